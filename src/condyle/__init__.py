@@ -1,0 +1,62 @@
+"""condyle: dynamics of redundantly actuated parallel mechanisms held at point contacts.
+
+    mechanism = condyle.load("masticatory")
+    model = condyle.derive(mechanism, formulation="momentum", route="core")
+    solution = model.solve(condyle.reference_motion(), condyle.reference_load())
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+# Heavy rooms open when they are entered: `import condyle` alone loads nothing.
+_HOMES = {
+    "CondyleError": "errors",
+    "InputError": "errors",
+    "MechanismError": "errors",
+    "SingularError": "errors",
+    "UnreachableError": "errors",
+    "UnsupportedError": "errors",
+    "Mechanism": "mechanism",
+    "bundled_mechanisms": "mechanism",
+    "dump": "mechanism",
+    "dumps": "mechanism",
+    "load": "mechanism",
+    "Model": "model",
+    "derive": "model",
+    "Load": "motion",
+    "Motion": "motion",
+    "reference_load": "motion",
+    "reference_motion": "motion",
+    "Solution": "solution",
+    "open_solution": "solution",
+}
+
+if TYPE_CHECKING:
+    from .errors import (
+        CondyleError,
+        InputError,
+        MechanismError,
+        SingularError,
+        UnreachableError,
+        UnsupportedError,
+    )
+    from .mechanism import Mechanism, bundled_mechanisms, dump, dumps, load
+    from .model import Model, derive
+    from .motion import Load, Motion, reference_load, reference_motion
+    from .solution import Solution, open_solution
+
+__all__ = [*_HOMES, "__version__"]  # noqa: PLE0604
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        return getattr(import_module(f".{_HOMES[name]}", __name__), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

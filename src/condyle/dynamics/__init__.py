@@ -1,0 +1,25 @@
+"""Sections 4 and 5: one formulation a file, and the two routes that use them."""
+
+from ..errors import InputError, did_you_mean
+from .formulation import Formulation
+from .lagrange import Lagrange
+from .momentum import Momentum
+from .virtual_power import VirtualPower
+
+FORMULATIONS: dict[str, Formulation] = {
+    f.name: f for f in (VirtualPower(), Momentum(), Lagrange())
+}
+ROUTES = ("core", "direct")
+
+
+def formulation(name: str) -> Formulation:
+    """The formulation of that name.
+
+    Raises: InputError: if there is none.
+    """
+    if name not in FORMULATIONS:
+        raise InputError(f'no formulation "{name}".{did_you_mean(name, FORMULATIONS)}')
+    return FORMULATIONS[name]
+
+
+__all__ = ["FORMULATIONS", "ROUTES", "Formulation", "formulation"]

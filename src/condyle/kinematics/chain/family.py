@@ -1,0 +1,212 @@
+"""What a chain family is: the one place where a new family plugs in.
+
+A chain meets the platform at one point M, so all that the rest of the system asks of it is a law
+of that point: from its position, velocity and acceleration to the joint coordinate, its rates,
+and the forces its bodies put on the platform. A family answers in two ways:
+
+- joint space (Section 3.2): joint coordinates q_r = (joint, beta, gamma) in closed form, the
+  loop's tip as an expression in q_r, and the moving links. The textbook formulations derive the
+  rest.
+- virtual power: the same forces written out by hand with the fewest operations.
+
+Numbers of a chain enter as named constants, so that one expression serves every chain.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import casadi as ca
+import numpy as np
+
+from ..rotation import rotation, rotation_y, rotation_z
+
+NEAR_X = np.cos(np.radians(5.0))  # a rod this near X_S takes Y_S for its frame
+
+
+class Constants:
+    """Named constants of a chain: scalars, 3-vectors and 3 x 3 matrices of one family."""
+
+    def __init__(self, values: dict[str, Any]) -> None:
+        self.__dict__.update(values)
+
+    def __getattr__(self, name: str) -> Any:  # for type checkers; never reached at run time
+        raise AttributeError(name)
+
+
+@dataclass(frozen=True)
+class Link:
+    """A moving body of a chain, by expressions in q_r.
+
+    centre: mass centre in {S}, (3,).   spin: W, (3, 3), with omega = W q_r'.
+    inertia: about the mass centre, in {S}, (3, 3).   mass: [kg].
+    """
+
+    name: str
+    mass: ca.SX
+    centre: ca.SX
+    spin: ca.SX
+    inertia: ca.SX
+
+
+@dataclass(frozen=True)
+class Loop:
+    """The closed loop at a position of M ([Cheng2023] eqs 12-14, 25-26).
+
+    q_r:      joint coordinates, (3,): (joint, beta, gamma).
+    reach:    dimensionless; the chain reaches M where it is not negative.
+    J:        row of the actuator Jacobian on M: joint' = J . M', (3,).
+    rod:      the vector e that closes the loop, (3,) [m].
+    J_A:      d L / d joint, and its scale: J_A / scale is the sine of the transmission angle.
+    cos_gamma: cosine of gamma_i; at 0 the two rod angles lose their meaning.
+    """
+
+    q_r: ca.SX
+    reach: ca.SX
+    J: ca.SX
+    rod: ca.SX
+    rod_length: ca.SX
+    J_A: ca.SX
+    J_A_scale: ca.SX
+    cos_gamma: ca.SX
+
+
+@dataclass(frozen=True)
+class Law:
+    """Forces of a chain's bodies on M, (3,) each, and the joint's motion.
+
+    forces: body name -> force dual to M' (inertia less gravity).
+    """
+
+    forces: dict[str, ca.SX]
+    J: ca.SX
+    reach: ca.SX
+    rate: ca.SX
+    acceleration: ca.SX
+
+
+class Family(ABC):
+    """One chain family. Instances hold no data; constants come in as arguments."""
+
+    kind: ClassVar[str]
+    bodies: ClassVar[tuple[str, ...]]  # moving links, base to platform, in the plural of reports
+    joint_unit: ClassVar[str]
+    effort_unit: ClassVar[str]
+    shapes: ClassVar[dict[str, int]]  # constant -> number of entries (1, 3 or 9)
+
+    @abstractmethod
+    def constants(self, chain: Any) -> dict[str, np.ndarray]:
+        """Numbers of one chain, by the names of `shapes`."""
+
+    @abstractmethod
+    def tip(self, c: Constants, q_r: ca.SX) -> ca.SX:
+        """M by way of the chain: the left side of [Cheng2023] eq. (15), (3,)."""
+
+    @abstractmethod
+    def links(self, c: Constants, q_r: ca.SX) -> list[Link]:
+        """The moving bodies, in the order of `bodies`."""
+
+    @abstractmethod
+    def loop(self, c: Constants, M: ca.SX) -> Loop:
+        """Inverse kinematics in closed form, on the branch of home."""
+
+    @abstractmethod
+    def law(self, c: Constants, M: ca.SX, V: ca.SX, A: ca.SX, g: ca.SX) -> Law:
+        """Virtual power: forces on M from its motion."""
+
+    @abstractmethod
+    def explain(self, chain: Any, pose: np.ndarray) -> str:
+        """Why the chain cannot reach its platform joint at a pose, in numbers."""
+
+    @classmethod
+    def size(cls) -> int:
+        return sum(cls.shapes.values())
+
+    @classmethod
+    def vector(cls, values: dict[str, np.ndarray]) -> np.ndarray:
+        """Constants in the order of `shapes`, (size,)."""
+        return np.concatenate([np.ravel(values[name]) for name in cls.shapes])
+
+    @classmethod
+    def named(cls, vector: Any) -> Constants:
+        """Constants by name from a symbolic or numeric vector, (size,)."""
+        values, start = {}, 0
+        for name, count in cls.shapes.items():
+            part = vector[start : start + count]
+            if count == 9:
+                part = ca.reshape(part, 3, 3).T
+            values[name] = part[0] if count == 1 else part
+            start += count
+        return Constants(values)
+
+
+def joint_position(chain: Any, pose: np.ndarray) -> np.ndarray:
+    """M in {S}, (3,), at a pose X_EE, (6,)."""
+    R = np.asarray(ca.DM(ca.evalf(rotation(ca.SX(ca.DM(pose[3:]))))))
+    return pose[:3] + R @ np.asarray(chain.platform)
+
+
+def rod_frame(direction: np.ndarray) -> np.ndarray:
+    """N_i0, (3, 3): X along the rod at home, Y = X x X_S (X x Y_S for a rod near X_S)."""
+    x = direction / np.linalg.norm(direction)
+    reference = np.array([0.0, 1.0, 0.0] if abs(x[0]) > NEAR_X else [1.0, 0.0, 0.0])
+    y = np.cross(x, reference)
+    y /= np.linalg.norm(y)
+    return np.column_stack([x, y, np.cross(x, y)])
+
+
+def rod_angles(N: ca.SX, rod: ca.SX, length: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """beta_i, gamma_i and cos(gamma_i) of a rod vector ([Cheng2023] eq. 14)."""
+    n = N.T @ rod / length
+    cos_gamma = ca.sqrt(n[0] ** 2 + n[2] ** 2)
+    return ca.atan2(-n[2], n[0]), ca.atan2(n[1], cos_gamma), cos_gamma
+
+
+def rod_direction(N: ca.SX, q_r: ca.SX) -> ca.SX:
+    """Unit vector along the rod, X of N_i0 Ry(beta_i) Rz(gamma_i) ([Cheng2023] eq. 12)."""
+    beta, gamma = q_r[1], q_r[2]
+    turn = rotation_y(ca.cos(beta), ca.sin(beta)) @ rotation_z(ca.cos(gamma), ca.sin(gamma))
+    return (N @ turn)[:, 0]
+
+
+def rod_spin(N: ca.SX, q_r: ca.SX) -> ca.SX:
+    """W of a rod, (3, 3): omega = W q_r' ([Cheng2023] eq. 19)."""
+    beta = q_r[1]
+    in_N = ca.vertcat(
+        ca.horzcat(0, 0, ca.sin(beta)), ca.horzcat(0, 1, 0), ca.horzcat(0, 0, ca.cos(beta))
+    )
+    return N @ in_N
+
+
+def rod_inertia(n: ca.SX, transverse: ca.SX, axial: ca.SX) -> ca.SX:
+    """Inertia of a rod along the unit vector n, in {S}, (3, 3)."""
+    return transverse * ca.SX.eye(3) + (axial - transverse) * (n @ n.T)
+
+
+def axial_force(
+    e: ca.SX, e_rate: ca.SX, e_acceleration: ca.SX, Y: ca.SX, inverse_length: ca.SX, axial: ca.SX
+) -> ca.SX:
+    """Force dual to e' that the axial inertia of a rod of constant length needs, (3,) [N].
+
+    The rod turns with N_i0 Ry(beta) Rz(gamma), so its axial rate is nu = beta' sin(gamma). With
+    p = |e|^2 - (Y.e)^2:
+
+        beta' = Y.(e x e') / p,   sin(gamma) = Y.e / |e|,
+        force = axial [ nu (e' x e) / |e|^3 + nu' (sin(gamma) / p) Y x e ].
+    """
+    y, y_rate = ca.dot(Y, e), ca.dot(Y, e_rate)
+    inverse_p = 1 / (ca.dot(e, e) - y * y)
+    turn = ca.cross(e, e_rate)
+    beta_rate = ca.dot(Y, turn) * inverse_p
+    # p' = -2 y y', since |e| is constant.
+    beta_acceleration = (
+        ca.dot(Y, ca.cross(e, e_acceleration)) + 2 * y * y_rate * beta_rate
+    ) * inverse_p
+    spin = y * beta_rate
+    spin_rate = y_rate * beta_rate + y * beta_acceleration
+    gain = axial * inverse_length**2
+    return gain * (
+        (y * inverse_p) * spin_rate * ca.cross(Y, e) - (inverse_length**2 * spin) * turn
+    )

@@ -1,0 +1,185 @@
+"""RSS: a crank turned by a base-mounted actuator, then a coupler with two ball joints.
+
+With d = M - G, crank length l, coupler length L and two perpendicular unit vectors of the crank
+plane, the loop |M - S| = L is one equation a cos + b sin = k in the crank angle, so that
+sines, cosines, rates and forces need no arc functions ([Cheng2023] Section 3.2 and eqs 33-40).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from ..rotation import rotation_z
+from .family import (
+    Constants,
+    Family,
+    Law,
+    Link,
+    Loop,
+    axial_force,
+    joint_position,
+    rod_angles,
+    rod_direction,
+    rod_frame,
+    rod_inertia,
+    rod_spin,
+)
+
+
+class RSSFamily(Family):
+    kind = "RSS"
+    bodies = ("cranks", "couplers")
+    joint_unit = "rad"
+    effort_unit = "N m"
+    # `level` and `steep` span the crank plane, level[2] = 0: one constant fewer in the hot path.
+    # C and N are C_i0 and N_i0; Y is the second axis of N.
+    shapes = {  # noqa: RUF012 - ClassVar stands in the base
+        "G": 3,
+        "level": 2,
+        "steep": 3,
+        "l": 1,
+        "L": 1,
+        "branch": 1,
+        "Y": 3,
+        "mass": 1,
+        "com": 1,
+        "transverse": 1,
+        "axial": 1,
+        "crank": 1,
+        "C": 9,
+        "N": 9,
+    }
+
+    def constants(self, chain: Any) -> dict[str, np.ndarray]:
+        crank = np.subtract(chain.crank_tip, chain.base)
+        coupler = np.subtract(chain.platform, chain.crank_tip)
+        x = crank / np.linalg.norm(crank)
+        z = np.asarray(chain.axis) - np.dot(chain.axis, x) * x
+        z /= np.linalg.norm(z)
+        y = np.cross(z, x)
+        level = np.array([-z[1], z[0]])
+        size = np.linalg.norm(level)
+        level = level / size if size > 1e-9 else np.array([1.0, 0.0])
+        if size <= 1e-9:
+            z = np.array([0.0, 0.0, np.sign(z[2])])  # the crank plane is level to rounding
+        N = rod_frame(coupler)
+        values = {
+            "G": chain.base,
+            "level": level,
+            "steep": np.cross(z, [*level, 0.0]),
+            "l": np.linalg.norm(crank),
+            "L": np.linalg.norm(coupler),
+            "branch": -np.sign(coupler @ y),
+            "Y": N[:, 1],
+            "mass": chain.coupler.mass,
+            "com": chain.coupler.com,
+            "transverse": chain.coupler.transverse,
+            "axial": chain.coupler.axial,
+            "crank": chain.crank.inertia,
+            "C": np.column_stack([x, y, z]),
+            "N": N,
+        }
+        return {name: np.asarray(value, dtype=float) for name, value in values.items()}
+
+    def tip(self, c: Constants, q_r: ca.SX) -> ca.SX:
+        return self._crank_tip(c, q_r) + c.L * rod_direction(c.N, q_r)
+
+    def links(self, c: Constants, q_r: ca.SX) -> list[Link]:
+        n = rod_direction(c.N, q_r)
+        Z_C = c.C[:, 2]
+        crank_spin = ca.horzcat(Z_C, ca.SX(3, 2))
+        return [
+            # The crank's mass centre is on its shaft, so its mass never matters (eq. 39).
+            Link("cranks", ca.SX(0), c.G, crank_spin, c.crank * (Z_C @ Z_C.T)),
+            Link(
+                "couplers",
+                c.mass,
+                self._crank_tip(c, q_r) + c.com * c.L * n,
+                rod_spin(c.N, q_r),
+                rod_inertia(n, c.transverse, c.axial),
+            ),
+        ]
+
+    def loop(self, c: Constants, M: ca.SX) -> Loop:
+        d = M - c.G
+        a, b = ca.dot(d, c.C[:, 0]), ca.dot(d, c.C[:, 1])
+        k = (ca.dot(d, d) + c.l**2 - c.L**2) / (2 * c.l)
+        h = a * a + b * b
+        root = h - k * k
+        s = c.branch * ca.sqrt(root)
+        cosine, sine = (a * k - b * s) / h, (b * k + a * s) / h
+        tangent = c.l * (c.C[:, 1] * cosine - c.C[:, 0] * sine)
+        e = d - c.l * (c.C[:, 0] * cosine + c.C[:, 1] * sine)
+        e_t = -c.l * s
+        beta, gamma, cos_gamma = rod_angles(c.N, e, c.L)
+        return Loop(
+            q_r=ca.vertcat(ca.atan2(b * k + a * s, a * k - b * s), beta, gamma),
+            reach=root / c.L**2,
+            J=e / ca.dot(e, tangent),
+            rod=e,
+            rod_length=c.L,
+            J_A=-2 * e_t,
+            J_A_scale=2 * c.l * c.L,
+            cos_gamma=cos_gamma,
+        )
+
+    def law(self, c: Constants, M: ca.SX, V: ca.SX, A: ca.SX, g: ca.SX) -> Law:
+        d = M - c.G
+        a = d[0] * c.level[0] + d[1] * c.level[1]
+        b = ca.dot(d, c.steep)
+        k = (ca.dot(d, d) + (c.l**2 - c.L**2)) * (0.5 / c.l)
+        h = a * a + b * b
+        root = h - k * k
+        s = c.branch * ca.sqrt(root)
+        scale = c.l / h
+        x, y = (a * k - b * s) * scale, (b * k + a * s) * scale  # l cos, l sin
+
+        r = ca.vertcat(x * c.level[0], x * c.level[1], 0) + y * c.steep
+        t = x * c.steep - ca.vertcat(y * c.level[0], y * c.level[1], 0)
+        e = d - r
+        J = e * (-1 / (c.l * s))  # e.t = -l s
+        rate = ca.dot(J, V)
+        e_rate = V - t * rate
+        rate2 = rate * rate
+        # e.(A - S'') + |e'|^2 = 0 with S'' = t theta'' - r theta'^2 and e.r = l (k - l)
+        acceleration = ca.dot(J, A) + (ca.dot(e_rate, e_rate) + c.l * (k - c.l) * rate2) * (
+            -1 / (c.l * s)
+        )
+        S_acceleration = t * acceleration - r * rate2
+
+        # The rod as three constants on its ends: kinetic energy
+        # (m_MM M'^2 + 2 m_SM S'.M' + m_SS S'^2) / 2 plus the axial part.
+        bend = c.transverse / c.L**2
+        m_MM = c.mass * c.com**2 + bend
+        m_SM = c.mass * c.com * (1 - c.com) - bend
+        m_SS = c.mass * (1 - c.com) ** 2 + bend
+        axial = axial_force(e, e_rate, A - S_acceleration, c.Y, 1 / c.L, c.axial)
+        crank_torque = (
+            m_SS * c.l**2 * acceleration
+            + m_SM * ca.dot(t, A)
+            - c.mass * (1 - c.com) * ca.dot(t, g)
+            - ca.dot(t, axial)
+        )
+        coupler = (
+            m_MM * A + m_SM * S_acceleration - c.mass * c.com * g + axial + J * crank_torque
+        )
+        crank = J * (c.crank * acceleration)
+        forces = {"cranks": crank, "couplers": coupler}
+        return Law(forces, J, root / c.L**2, rate, acceleration)
+
+    def explain(self, chain: Any, pose: np.ndarray) -> str:
+        c = self.constants(chain)
+        d = joint_position(chain, pose) - c["G"]
+        across, along = np.linalg.norm(c["C"][:, :2].T @ d), c["C"][:, 2] @ d
+        near, far = np.hypot(across - c["l"], along), np.hypot(across + c["l"], along)
+        return (
+            f'chain "{chain.name}" cannot reach M: its crank tip is {near * 1e3:.1f} to '
+            f"{far * 1e3:.1f} mm from M, the coupler is {float(c['L']) * 1e3:.1f} mm long"
+        )
+
+    @staticmethod
+    def _crank_tip(c: Constants, q_r: ca.SX) -> ca.SX:
+        return c.G + (c.C @ rotation_z(ca.cos(q_r[0]), ca.sin(q_r[0])))[:, 0] * c.l

@@ -1,0 +1,190 @@
+"""Poses from what is prescribed: independent coordinates, whole poses or a landmark's path.
+
+Six conditions fix a pose: the k contacts, phi = 0, and 6 - k prescribed functions g of the pose,
+g = s(t). Newton solves each sample from home, alone; rates come by the chain rule through the
+same Jacobian K of (phi, g):
+
+    K X' = (0, s'),     K X'' = (0, s'') - K' X'.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from ..errors import InputError
+from ..mechanism.home import condition_of, constraint_jacobian
+from ..mechanism.home import MAX_CONDITION, usable_sets
+from ..mechanism.mechanism import COORDINATES, Mechanism
+from .batch import evaluate
+from .contact import ContactSymbols, indices, residuals
+from .rotation import rotation
+
+CONTINUATION = (1, 4, 16, 64)  # pieces of the way from home, tried in turn
+ITERATIONS = 30
+ROUNDING = 1e-15
+
+
+@dataclass(frozen=True)
+class PlatformMotion:
+    """X_EE and its rates, (N, 6) each; `reached` tells where the conditions were met, (N,)."""
+
+    pose: np.ndarray
+    rate: np.ndarray
+    acceleration: np.ndarray
+    reached: np.ndarray
+
+
+def contact_symbols(mechanism: Mechanism) -> list[ContactSymbols]:
+    """The contacts with their numbers in place."""
+    return [
+        ContactSymbols(c.surface, ca.SX(ca.DM(c.point)), ca.SX(ca.DM(c.surface.constants())))
+        for c in mechanism.contacts
+    ]
+
+
+class Closure:
+    """Solves a mechanism's poses for one choice of prescribed functions."""
+
+    def __init__(self, mechanism: Mechanism, prescribed: ca.Function) -> None:
+        """Args: prescribed: g(X_EE), (6) -> (6 - k)."""
+        x, rate = ca.SX.sym("x", 6), ca.SX.sym("rate", 6)
+        conditions = ca.vertcat(residuals(contact_symbols(mechanism), x), prescribed(x))
+        K = ca.jacobian(conditions, x)
+        bias = ca.jtimes(K @ rate, x, rate)
+        self._k = len(mechanism.contacts)
+        self._conditions = ca.Function("conditions", [x], [conditions, K])
+        self._bias = ca.Function("bias", [x, rate], [bias])
+        home = np.asarray(self._conditions(np.zeros(6))[0]).ravel()
+        self._home = home[self._k :]
+        # On planes Newton is done when phi stalls at rounding; angles have scale 1.
+        self._scale = 1.0 + float(np.abs(home).max())
+
+    def solve(self, s: np.ndarray, s1: np.ndarray, s2: np.ndarray) -> PlatformMotion:
+        """Poses and rates where g = s, g' = s1, g'' = s2, (N, 6 - k) each."""
+        pose, reached = self._poses(s)
+        K = self._jacobian(pose)
+        rate = _solve(K, self._padded(s1))
+        bias = evaluate(self._bias, pose, rate)[0]
+        acceleration = _solve(K, self._padded(s2) - bias)
+        return PlatformMotion(pose, rate, acceleration, reached)
+
+    def _poses(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        pose = np.full((len(s), 6), np.nan)
+        reached = np.zeros(len(s), dtype=bool)
+        for pieces in CONTINUATION:
+            todo = np.flatnonzero(~reached & np.isfinite(s).all(axis=1))
+            if not todo.size:
+                break
+            x, ok = np.zeros((todo.size, 6)), np.ones(todo.size, dtype=bool)
+            for piece in range(1, pieces + 1):
+                target = self._home + (s[todo] - self._home) * (piece / pieces)
+                x[ok], ok[ok] = self._newton(x[ok], target[ok])
+            pose[todo[ok]], reached[todo[ok]] = x[ok], True
+        return pose, reached
+
+    def _newton(self, x: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Newton from x; a sample fails when its steps stop shrinking above rounding."""
+        x = x.copy()
+        last = np.full(len(x), np.inf)
+        active = np.arange(len(x))
+        converged = np.zeros(len(x), dtype=bool)
+        for _ in range(ITERATIONS):
+            if not active.size:
+                break
+            value, K = evaluate(self._conditions, x[active])
+            value[:, self._k :] -= target[active]
+            step = _solve(_square(K), value)
+            size = np.abs(step).max(axis=1)
+            finite = np.isfinite(size)
+            x[active[finite]] -= step[finite]
+            small = size <= ROUNDING * self._scale
+            # Newton's steps shrink until rounding; a stall near rounding is convergence.
+            stalled = size >= 0.5 * last[active]
+            converged[active] = small | (stalled & (size < 1e-13))
+            failed = ~finite | (stalled & (size >= 1e-13) & (last[active] < 1.0)) | (size > 10)
+            last[active] = size
+            active = active[~(converged[active] | failed)]
+        return x, converged
+
+    def _jacobian(self, pose: np.ndarray) -> np.ndarray:
+        return _square(evaluate(self._conditions, pose)[1])
+
+    def _padded(self, s: np.ndarray) -> np.ndarray:
+        return np.hstack([np.zeros((len(s), self._k)), s])
+
+
+def coordinate_closure(mechanism: Mechanism, names: Sequence[str]) -> Closure:
+    """Poses from 6 - k pose coordinates.
+
+    Raises: InputError: if the contacts do not determine the others at home.
+    """
+    dependent = [name for name in COORDINATES if name not in names]
+    k = len(mechanism.contacts)
+    usable = [tuple(n for n in COORDINATES if n not in d) for d in usable_sets(mechanism)]
+    if len(names) != 6 - k:
+        raise InputError(
+            f"got the {len(names)} coordinates {', '.join(names)}; the mechanism has {6 - k} "
+            f"degrees of freedom. Independent coordinates would be: {_sets(usable)}"
+        )
+    condition = condition_of(constraint_jacobian(mechanism), tuple(dependent)) if k else 1.0
+    if condition >= MAX_CONDITION:
+        raise InputError(
+            f"the coordinates {', '.join(names)} are not independent: the contacts do not "
+            f"determine {', '.join(dependent)} from them. Available: {_sets(usable)}"
+        )
+    x = ca.SX.sym("x", 6)
+    return Closure(mechanism, ca.Function("coordinates", [x], [x[indices(names)]]))
+
+
+def landmark_closure(mechanism: Mechanism, landmark: str) -> Closure:
+    """Poses from the displacement of a landmark from home, in {S}.
+
+    With two contacts the fourth condition is that the midpoint of the two contact points keeps
+    its home Y ([Cheng2023] leaves it open).
+    """
+    points = mechanism.platform.points
+    if landmark not in points:
+        from ..errors import did_you_mean
+
+        raise InputError(
+            f'the mechanism has no landmark "{landmark}".{did_you_mean(landmark, points)}'
+        )
+    if len(mechanism.contacts) != 2:
+        raise InputError(
+            f"a landmark's path determines a pose only with two contacts; this mechanism has "
+            f"{len(mechanism.contacts)}. Give {6 - len(mechanism.contacts)} pose coordinates "
+            "instead"
+        )
+    x = ca.SX.sym("x", 6)
+    R = rotation(x[3:])
+    m = ca.DM(points[landmark])
+    middle = (ca.DM(mechanism.contacts[0].point) + ca.DM(mechanism.contacts[1].point)) / 2
+    sideways = x[1] + (R @ middle)[1] - middle[1]
+    path = x[:3] + R @ m - m
+    return Closure(mechanism, ca.Function("landmark", [x], [ca.vertcat(path, sideways)]))
+
+
+def _sets(usable: list[tuple[str, ...]]) -> str:
+    shown = "; ".join(",".join(names) for names in usable[:4])
+    return shown + ("; ..." if len(usable) > 4 else "")
+
+
+def _square(K: np.ndarray) -> np.ndarray:
+    return K.reshape(len(K), 6, 6).transpose(0, 2, 1)
+
+
+def _solve(K: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """K^-1 b for each sample; NaN where K is singular or not finite."""
+    good = np.isfinite(K).all(axis=(1, 2)) & np.isfinite(b).all(axis=1)
+    x = np.full_like(b, np.nan)
+    try:
+        x[good] = np.linalg.solve(K[good], b[good][..., None])[..., 0]
+    except np.linalg.LinAlgError:
+        for i in np.flatnonzero(good):
+            if np.linalg.matrix_rank(K[i]) == len(K[i]):
+                x[i] = np.linalg.solve(K[i], b[i])
+    return x

@@ -1,0 +1,66 @@
+"""Bryant angles: the rotation of the platform and its rates ([Cheng2023] eqs 2, 8)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+
+def matrix(rows: list[list[Any]]) -> ca.SX:
+    return ca.vertcat(*(ca.horzcat(*row) for row in rows))
+
+
+def rotation_x(c: ca.SX, s: ca.SX) -> ca.SX:
+    return matrix([[1, 0, 0], [0, c, -s], [0, s, c]])
+
+
+def rotation_y(c: ca.SX, s: ca.SX) -> ca.SX:
+    return matrix([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+
+
+def rotation_z(c: ca.SX, s: ca.SX) -> ca.SX:
+    return matrix([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+
+
+@dataclass(frozen=True)
+class Bryant:
+    """Cosines and sines of (alpha, beta, gamma), (3,) each.
+
+    Where the contacts give an angle by its tangent, these come without arc functions.
+    """
+
+    cos: ca.SX
+    sin: ca.SX
+
+    @staticmethod
+    def of(angles: ca.SX) -> Bryant:
+        return Bryant(ca.cos(angles), ca.sin(angles))
+
+    def rotation(self) -> ca.SX:
+        """R = Rx(alpha) Ry(beta) Rz(gamma), (3, 3): components in {M} to components in {S}.
+
+        [Cheng2023] eq. (2); the paper's words say the inverse, its formulas this.
+        """
+        c, s = self.cos, self.sin
+        return rotation_x(c[0], s[0]) @ rotation_y(c[1], s[1]) @ rotation_z(c[2], s[2])
+
+    def angular_velocity(self) -> ca.SX:
+        """R_omega, (3, 3): omega = R_omega (alpha', beta', gamma') in {S}.
+
+        [Cheng2023] eq. (8), the sign of the last entry mended: the columns are the axes of
+        alpha', beta' and gamma'.
+        """
+        c, s = self.cos, self.sin
+        return matrix([[1, 0, s[1]], [0, c[0], -s[0] * c[1]], [0, s[0], c[0] * c[1]]])
+
+
+def rotation(angles: ca.SX) -> ca.SX:
+    """R of (alpha, beta, gamma) [rad], (3, 3)."""
+    return Bryant.of(angles).rotation()
+
+
+def angular_velocity_matrix(angles: ca.SX) -> ca.SX:
+    """R_omega of (alpha, beta, gamma) [rad], (3, 3)."""
+    return Bryant.of(angles).angular_velocity()

@@ -1,0 +1,97 @@
+"""The platform's motion, in the coordinates a formulation chooses.
+
+Three spaces carry the same motion:
+
+    independent   c = q_EE   forces dual to q_EE'      Model 1, route `direct`
+    pose          c = X_EE   forces dual to X_EE'      Model 2, route `core`
+    twist         c' = [V; omega]  forces dual to it   the operation-minimal formulation
+
+A state answers what every formulation asks of the platform: where one of its points is and how
+it moves, and what a force there is worth in the chosen coordinates.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from .rotation import angular_velocity_matrix, rotation
+
+
+@dataclass(frozen=True)
+class PointMotion:
+    """A platform point in {S}: position, velocity, acceleration, each (3,), and its lever r."""
+
+    position: ca.SX
+    velocity: ca.SX
+    acceleration: ca.SX
+    lever: ca.SX
+
+
+@dataclass(frozen=True)
+class State:
+    """The platform's motion.
+
+    rate, acceleration: c' and c'', (m,).
+    pose:    X_EE, (6,), an expression in c.
+    twist:   [V; omega], (6,); twist_rate its time derivative.
+    B:       twist Jacobian, (6, m): [V; omega] = B c'  ([Cheng2023] eqs 8, 11).
+    symbols: what a time derivative runs through: pairs (variable, its rate).
+    """
+
+    rate: ca.SX
+    acceleration: ca.SX
+    pose: ca.SX
+    R: ca.SX
+    twist: ca.SX
+    twist_rate: ca.SX
+    B: ca.SX
+    coordinates: ca.SX | None  # None in the twist space, which has no coordinates
+
+    def point(self, m: ca.SX) -> PointMotion:
+        """Motion of the platform point with components `m`, (3,) [m], in {M}."""
+        r = self.R @ m
+        omega, omega_rate = self.twist[3:], self.twist_rate[3:]
+        swing = ca.cross(omega, r)
+        return PointMotion(
+            position=self.pose[:3] + r,
+            velocity=self.twist[:3] + swing,
+            acceleration=self.twist_rate[:3] + ca.cross(omega_rate, r) + ca.cross(omega, swing),
+            lever=r,
+        )
+
+    def pull(self, force: ca.SX, lever: ca.SX) -> ca.SX:
+        """Generalized force, (m,), of a force (3,) acting at `lever` from O_M: M_2^T force."""
+        return self.B.T @ ca.vertcat(force, ca.cross(lever, force))
+
+    def time_derivative(self, expression: ca.SX) -> ca.SX:
+        """d/dt of an expression in c and c'."""
+        return ca.jtimes(expression, self.coordinates, self.rate) + ca.jtimes(
+            expression, self.rate, self.acceleration
+        )
+
+
+def pose_state(pose: ca.SX, rate: ca.SX, acceleration: ca.SX) -> State:
+    """State in the six coordinates X_EE (route `core`)."""
+    R, R_omega = rotation(pose[3:]), angular_velocity_matrix(pose[3:])
+    B = ca.diagcat(ca.SX.eye(3), R_omega)
+    twist = ca.vertcat(rate[:3], R_omega @ rate[3:])
+    R_omega_rate = ca.jtimes(R_omega @ rate[3:], pose, rate)
+    twist_rate = ca.vertcat(acceleration[:3], R_omega @ acceleration[3:] + R_omega_rate)
+    return State(rate, acceleration, pose, R, twist, twist_rate, B, pose)
+
+
+def independent_state(q: ca.SX, rate: ca.SX, acceleration: ca.SX, pose: ca.SX) -> State:
+    """State in the independent coordinates, from the closed form pose(q) (route `direct`)."""
+    M_J = ca.jacobian(pose, q)
+    R_omega = angular_velocity_matrix(pose[3:])
+    B = ca.diagcat(ca.SX.eye(3), R_omega) @ M_J
+    twist = B @ rate
+    twist_rate = B @ acceleration + ca.jtimes(twist, q, rate)
+    return State(rate, acceleration, pose, rotation(pose[3:]), twist, twist_rate, B, q)
+
+
+def twist_state(pose: ca.SX, R: ca.SX, twist: ca.SX, twist_rate: ca.SX) -> State:
+    """State whose forces are dual to the twist [V; omega]."""
+    return State(twist, twist_rate, pose, R, twist, twist_rate, ca.SX.eye(6), None)

@@ -1,0 +1,135 @@
+"""The chains that drive the platform: the data of each family, checked at home.
+
+A family's mathematics is in `condyle.kinematics.chain`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, ValidationInfo, field_validator
+
+from .quantities import (
+    Direction,
+    Fraction,
+    Length,
+    Name,
+    NonNegative,
+    Point,
+    Positive,
+    Table,
+)
+
+AXIS_TOLERANCE = math.radians(0.5)  # how far an axis may be off the perpendicular
+NO_BRANCH = 1e-9  # sine of the transmission angle below which home has no branch
+
+
+class Rod(Table):
+    """A rod with two ball ends, symmetric about its line."""
+
+    mass: NonNegative
+    com: Fraction = Field(description="mass centre: fraction of the way to the platform joint")
+    transverse: NonNegative = Field(description="central moment of inertia across the rod")
+    axial: NonNegative = Field(description="moment of inertia along the rod")
+
+    @field_validator("axial")
+    @classmethod
+    def _triangle(cls, axial: float, info: ValidationInfo) -> float:
+        return check_rod_inertia(axial, info.data.get("transverse"))
+
+
+def check_rod_inertia(axial: float, transverse: float | None) -> float:
+    """The triangle inequality on the principal moments (transverse, transverse, axial)."""
+    if transverse is not None and axial > 2 * transverse * (1 + 1e-12):
+        raise ValueError(
+            f"inertia breaks the triangle inequality: axial {axial:g} kg m^2 is more than "
+            f"twice transverse {transverse:g} kg m^2; no rigid body has such moments"
+        )
+    return axial
+
+
+class Crank(Table):
+    inertia: Positive = Field(description="about the shaft; its mass centre is on the shaft")
+
+
+class RotaryActuator(Table):
+    torque_limit: Positive | None = None
+    speed_limit: Positive | None = None
+
+
+class LinearActuator(Table):
+    force_limit: Positive | None = None
+    speed_limit: Positive | None = None
+
+
+class ChainTable(Table):
+    """What every family has: a name and a joint on the platform."""
+
+    name: Name
+
+    joint_unit: ClassVar[str]
+    effort_unit: ClassVar[str]
+
+
+class RSS(ChainTable):
+    """A crank on a base-mounted shaft, and a coupler with two ball joints ([Cheng2023] Fig. 1)."""
+
+    kind: Literal["RSS"]
+    base: Point = Field(description="crank pivot G, in {S}")
+    axis: Direction = Field(description="shaft direction Z_C, in {S}")
+    crank_tip: Point = Field(description="crank tip S at home, in {S}")
+    platform: Point = Field(description="platform joint M, in {M}")
+    crank: Crank
+    coupler: Rod
+    actuator: RotaryActuator = RotaryActuator()
+
+    joint_unit: ClassVar[str] = "rad"
+    effort_unit: ClassVar[str] = "N m"
+
+    @field_validator("crank_tip")
+    @classmethod
+    def _crank(cls, tip: Any, info: ValidationInfo) -> Any:
+        base, axis = info.data.get("base"), info.data.get("axis")
+        if base is None:
+            return tip
+        crank = np.subtract(tip, base)
+        if not (length := np.linalg.norm(crank)):
+            raise ValueError("the crank has zero length: base and crank_tip are the same point")
+        if axis is not None:
+            sine = abs(np.dot(axis, crank)) / (np.linalg.norm(axis) * length)
+            off = math.asin(min(sine, 1.0))
+            if off > AXIS_TOLERANCE:
+                raise ValueError(
+                    f"axis is {math.degrees(off):.2f} degrees off the perpendicular to the crank "
+                    "(base to crank_tip); at most 0.5 are projected away"
+                )
+        return tip
+
+    @field_validator("platform")
+    @classmethod
+    def _coupler(cls, joint: Any, info: ValidationInfo) -> Any:
+        data = info.data
+        tip, base, axis = data.get("crank_tip"), data.get("base"), data.get("axis")
+        if tip is None:
+            return joint
+        coupler = np.subtract(joint, tip)
+        check_rod_length(coupler, "coupler", "crank_tip")
+        if base is not None and axis is not None:
+            tangent = np.cross(axis, np.subtract(tip, base))
+            sine = abs(coupler @ tangent) / (np.linalg.norm(coupler) * np.linalg.norm(tangent))
+            if sine < NO_BRANCH:
+                raise ValueError(
+                    "crank and coupler are in line at home: there the crank has no branch, and "
+                    "its torque no hold on the platform; move crank_tip or platform"
+                )
+        return joint
+
+
+def check_rod_length(rod: np.ndarray, name: str, start: str) -> None:
+    if not np.linalg.norm(rod):
+        raise ValueError(f"the {name} has zero length: {start} and platform are the same point")
+
+
+Chain = Annotated[RSS, Field(discriminator="kind")]

@@ -1,0 +1,201 @@
+"""Mechanism files: TOML in, TOML out, the JSON schema, and the bundled mechanisms."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from ..errors import InputError, MechanismError, did_you_mean
+from .home import holding_problems, home_problem
+from .mechanism import Contact, Mechanism, structural_problems
+from .quantities import PER_METRE
+
+_BUNDLED = files(__package__) / "bundled"
+
+
+def bundled_mechanisms() -> tuple[str, ...]:
+    """Names of the mechanisms that come with the package."""
+    return tuple(sorted(f.name[:-5] for f in _BUNDLED.iterdir() if f.name.endswith(".toml")))
+
+
+def bundled_text(name: str) -> str:
+    """The file of a bundled mechanism, with its comments and provenance marks.
+
+    Raises: InputError: if no bundled mechanism has that name.
+    """
+    if name not in bundled_mechanisms():
+        raise InputError(
+            f'no bundled mechanism is called "{name}".{did_you_mean(name, bundled_mechanisms())}'
+        )
+    return (_BUNDLED / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def load(source: str | Path) -> Mechanism:
+    """Read a mechanism.
+
+    Args:   source: path of a TOML file, or the name of a bundled mechanism.
+    Raises: MechanismError: with every problem found in the file.
+            InputError:     if there is no such file or it is not TOML.
+    """
+    return parse(read_text(source), str(source))
+
+
+def read_text(source: str | Path) -> str:
+    """The text of a mechanism file or of a bundled mechanism."""
+    path = Path(source)
+    if str(source) in bundled_mechanisms() and not path.is_file():
+        return bundled_text(str(source))
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        near = {p.name for p in path.parent.glob("*.toml")} if path.parent.is_dir() else set()
+        raise InputError(
+            f"mechanism file {source} does not exist, and no bundled mechanism has that name."
+            + did_you_mean(str(source), {*bundled_mechanisms(), *near})
+        ) from None
+    except UnicodeDecodeError:
+        raise InputError(f"{source} is not a text file (UTF-8 expected)") from None
+    except OSError as error:
+        raise InputError(f"{source} cannot be read: {error.strerror}") from None
+
+
+def parse(text: str, source: str = "mechanism") -> Mechanism:
+    """A mechanism from the text of a file; `source` names it in messages."""
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{source} is not TOML: {error}") from None
+    return from_data(data, source)
+
+
+def from_data(data: Mapping[str, Any], source: str = "mechanism") -> Mechanism:
+    """A mechanism from the tables of a file, lengths in its `length_unit`."""
+    data = dict(data)
+    unit = data.pop("length_unit", "m")
+    problems = []
+    if unit not in PER_METRE:
+        problems.append(f'length_unit: expected "m" or "mm", got {unit!r}')
+    context = {"per_metre": PER_METRE.get(unit, 1.0) if isinstance(unit, str) else 1.0}
+    mechanism = None
+    try:
+        mechanism = Mechanism.model_validate(data, context=context)
+    except ValidationError as error:
+        structural = list(structural_problems(data))
+        problems += structural
+        problems += [p for p in describe(error, data) if not any(s in p for s in structural)]
+    if isinstance(unit, str):
+        problems += _contact_problems(data.get("contact"), context)
+    if mechanism is not None and not problems:
+        problems += holding_problems(mechanism)
+    if problems:
+        raise MechanismError(source, problems)
+    assert mechanism is not None
+    return mechanism
+
+
+def _contact_problems(tables: Any, context: Mapping[str, float]) -> Iterable[str]:
+    """Contacts off their surface at home, also where the rest of the file is not valid yet."""
+    for index, table in enumerate(tables if isinstance(tables, list) else ()):
+        try:
+            contact = TypeAdapter(Contact).validate_python(table, context=dict(context))
+        except ValidationError:
+            continue
+        if (problem := home_problem(contact)) is not None:
+            yield f"{_place(('contact', index), {'contact': tables})}: {problem}"
+
+
+def describe(error: ValidationError, data: Mapping[str, Any]) -> list[str]:
+    """One line a problem: where it is, by the names of the file, and what would be right."""
+    lines = []
+    for problem in error.errors(include_url=False):
+        place = _place(problem["loc"], data)
+        lines.append(f"{place}: {_message(problem)}" if place else _message(problem))
+    return lines
+
+
+def _place(location: Iterable[Any], data: Any) -> str:
+    """'chain "masseter_left".coupler.mass' for ("chain", 2, "RSS", "coupler", "mass")."""
+    text, here = "", data
+    for part in location:
+        if isinstance(part, int):
+            here = here[part] if isinstance(here, list | tuple) and part < len(here) else None
+            name = here.get("name") if isinstance(here, Mapping) else None
+            text += f' "{name}"' if isinstance(name, str) else f"[{part}]"
+        elif isinstance(here, Mapping) and part not in here and here.get("kind") == part:
+            continue  # pydantic names the family of a union too
+        else:
+            here = here.get(part) if isinstance(here, Mapping) else None
+            text += f".{part}" if text else str(part)
+    return text
+
+
+def _message(problem: Any) -> str:
+    kind, got, context = problem["type"], problem.get("input"), problem.get("ctx", {})
+    expected = {
+        "missing": "is missing",
+        "extra_forbidden": "is not a key of the file format; remove it or mend its spelling",
+        "float_type": f"expected a number, got {_shown(got)}",
+        "finite_number": f"expected a finite number, got {_shown(got)}",
+        "greater_than": f"expected a value above {context.get('gt')}, got {_shown(got)}",
+        "greater_than_equal": f"expected a value of at least {context.get('ge')}, "
+        f"got {_shown(got)}",
+        "less_than_equal": f"expected a value of at most {context.get('le')}, got {_shown(got)}",
+        "tuple_type": f"expected a list of numbers, got {_shown(got)}",
+        "string_type": f"expected text in quotes, got {_shown(got)}",
+        "value_error": str(context.get("error", "")),
+        "literal_error": f"expected {context.get('expected')}, got {_shown(got)}",
+        "union_tag_invalid": f"the kind {_shown(context.get('tag'))} is unknown; "
+        f"available: {context.get('expected_tags')}",
+        "union_tag_not_found": "the key `kind` is missing",
+    }.get(kind)
+    if expected is None:
+        expected = re.sub(r"^Value error, ", "", problem["msg"]) + f", got {_shown(got)}"
+    return expected
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def dumps(mechanism: Mechanism) -> str:
+    """The mechanism as a TOML file in SI; `parse(dumps(m)) == m` to the last bit."""
+    import tomli_w
+
+    data = mechanism.model_dump(by_alias=True, exclude_none=True, exclude_defaults=False)
+    return tomli_w.dumps(_without_empty({"length_unit": "m", **data}))
+
+
+def _without_empty(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        kept = {key: _without_empty(item) for key, item in value.items()}
+        return {key: item for key, item in kept.items() if item != {}}
+    if isinstance(value, list | tuple):
+        return [_without_empty(item) for item in value]
+    return value
+
+
+def dump(mechanism: Mechanism, path: str | Path) -> None:
+    """Write the mechanism as a TOML file in SI, whole or not at all."""
+    from ..atomic import write_text
+
+    write_text(path, dumps(mechanism))
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON schema of mechanism files, for editors."""
+    schema = Mechanism.model_json_schema(by_alias=True)
+    schema["title"] = "condyle mechanism"
+    unit = {
+        "enum": list(PER_METRE),
+        "default": "m",
+        "description": "unit of every length in the file; all else is SI",
+    }
+    schema["properties"] = {"length_unit": unit, **schema["properties"]}
+    return schema

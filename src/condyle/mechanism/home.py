@@ -1,0 +1,138 @@
+"""What the geometry at home decides: contact residuals, the dependent coordinates, and whether
+the contacts hold at all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+
+import casadi as ca
+import numpy as np
+
+from .mechanism import COORDINATES, Contact, Mechanism
+
+DEPENDENT_ORDER = ("Z", "gamma", "alpha", "beta", "Y", "X")
+MAX_CONDITION = 1e4
+HOME_ERROR = 1e-5  # metres off the surface at home: an error beyond this,
+HOME_WARNING = 1e-9  # a warning beyond that
+
+
+def characteristic_length(mechanism: Mechanism) -> float:
+    """Mean distance of the platform joints and contact points from O_M [m].
+
+    It multiplies angles wherever lengths and angles meet in one norm.
+    """
+    points = [chain.platform for chain in mechanism.chains]
+    points += [contact.point for contact in mechanism.contacts]
+    return float(np.mean(np.linalg.norm(points, axis=1))) or 1.0
+
+
+def contact_gradient(contact: Contact) -> tuple[float, np.ndarray]:
+    """phi [m] and its gradient, (3,) [1], of one contact at home."""
+    p = ca.SX.sym("p", 3)
+    phi = contact.surface.phi(p)
+    value, gradient = ca.Function("phi", [p], [phi, ca.gradient(phi, p)])(contact.point)
+    return float(value), np.asarray(gradient).ravel()
+
+
+def home_residuals(mechanism: Mechanism) -> np.ndarray:
+    """Distance of each contact point from its surface at home, (k,) [m]."""
+    return np.array([home_residual(contact) for contact in mechanism.contacts])
+
+
+def home_residual(contact: Contact) -> float:
+    value, gradient = contact_gradient(contact)
+    steepness = float(np.linalg.norm(gradient))
+    return value / steepness if steepness else value
+
+
+def constraint_jacobian(mechanism: Mechanism) -> np.ndarray:
+    """C = d phi / d X_EE at home, (k, 6), angles multiplied by the characteristic length."""
+    length = characteristic_length(mechanism)
+    rows = []
+    for contact in mechanism.contacts:
+        _, gradient = contact_gradient(contact)
+        # At home R_omega is the identity, so angles act as rotations about the axes of {S}.
+        rows.append(np.concatenate([gradient, np.cross(contact.point, gradient) / length]))
+    return np.array(rows).reshape(-1, 6)
+
+
+def condition_of(jacobian: np.ndarray, names: tuple[str, ...]) -> float:
+    """Condition number of the columns of C that belong to `names`; inf when they vanish."""
+    columns = jacobian[:, [COORDINATES.index(name) for name in names]]
+    singular = np.linalg.svd(columns, compute_uv=False)
+    scale = np.linalg.norm(jacobian, 2)
+    # Rounding must not turn a coordinate the contacts ignore into one they determine.
+    if singular[-1] < 1e-13 * scale or not np.isfinite(singular).all():
+        return float("inf")
+    return float(singular[0] / singular[-1])
+
+
+def usable_sets(mechanism: Mechanism) -> Iterator[tuple[str, ...]]:
+    """Sets of dependent coordinates that the contacts determine at home, best known first."""
+    jacobian = constraint_jacobian(mechanism)
+    for names in combinations(DEPENDENT_ORDER, len(mechanism.contacts)):
+        if condition_of(jacobian, names) < MAX_CONDITION:
+            yield names
+
+
+def dependent_coordinates(mechanism: Mechanism) -> tuple[str, ...]:
+    """The coordinates that the contacts determine: (Z, gamma) for the paper's mechanism.
+
+    Those of the file, else the first set in lexicographic order of Z, gamma, alpha, beta, Y, X
+    whose columns of C have a condition number below 1e4. For `check_home`ed mechanisms there is
+    one.
+    """
+    if not mechanism.contacts:
+        return ()
+    return mechanism.dependent or next(usable_sets(mechanism))
+
+
+def independent_coordinates(mechanism: Mechanism) -> tuple[str, ...]:
+    """The remaining coordinates, in the order of X_EE: q_EE of [Cheng2023] eq. (7)."""
+    dependent = dependent_coordinates(mechanism)
+    return tuple(name for name in COORDINATES if name not in dependent)
+
+
+def home_problem(contact: Contact) -> str | None:
+    """Why the contact cannot be at its point at home, or None."""
+    off = home_residual(contact)
+    if not np.isfinite(off):
+        return "the surface has no normal at the contact point at home"
+    if abs(off) > HOME_ERROR:
+        return (
+            f"the point is {off * 1e3:+.6g} mm off the surface at home; at most 0.01 mm is "
+            "accepted. Move the point or the surface"
+        )
+    return None
+
+
+def holding_problems(mechanism: Mechanism) -> Iterator[str]:
+    """Why the contacts do not determine the dependent coordinates, if they do not."""
+    if not mechanism.contacts:
+        return
+    usable = next(usable_sets(mechanism), None)
+    count = len(mechanism.contacts)
+    if usable is None:
+        yield (
+            f"contact: the {count} contacts cannot hold the platform at home: no {count} of its "
+            "coordinates are determined by them (condition number above 1e4 for every choice). "
+            "Two contacts may coincide or push along one line"
+        )
+    elif mechanism.dependent is not None:
+        condition = condition_of(constraint_jacobian(mechanism), mechanism.dependent)
+        if condition >= MAX_CONDITION:
+            yield (
+                f"dependent: the contacts do not determine {', '.join(mechanism.dependent)} at "
+                f"home (condition number {condition:.3g}, must be below 1e4); "
+                f"{', '.join(usable)} would do"
+            )
+
+
+def home_warnings(mechanism: Mechanism) -> list[str]:
+    """Residuals at home that are small enough to accept and large enough to mention."""
+    return [
+        f'contact "{name}": the point is {off * 1e3:+.3g} mm off its surface at home'
+        for name, off in zip(mechanism.contact_names, home_residuals(mechanism), strict=True)
+        if abs(off) > HOME_WARNING
+    ]

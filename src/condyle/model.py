@@ -1,0 +1,338 @@
+"""A model: one mechanism, one formulation, one route, ready to compute.
+
+    model = condyle.derive(mechanism, formulation="momentum", route="core")
+    solution = model.solve(motion, load)
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .dynamics import ROUTES, formulation as formulation_named
+from .dynamics.equations import part_names, posture_function, require_closed_form
+from .errors import InputError, MechanismError, SingularError, UnreachableError, did_you_mean
+from .kinematics.batch import evaluate
+from .kinematics.chain import FAMILIES
+from .kinematics.closure import Closure, coordinate_closure, landmark_closure
+from .kinematics.contact import indices
+from .kinematics.singularity import SINGULAR, Singularity, measure
+from .mechanism.home import (
+    characteristic_length,
+    dependent_coordinates,
+    holding_problems,
+    home_problem,
+    independent_coordinates,
+)
+from .mechanism.mechanism import COORDINATES, Mechanism
+
+if TYPE_CHECKING:
+    from .kernels.result import PoseRates, Torques
+    from .motion import Load, Motion
+    from .solution import Solution
+
+DEFAULT_LOAD_POINT = "right_molar"
+OK, UNREACHABLE, SINGULAR_STATUS = 0, 1, 2
+STATUS_NAMES = ("ok", "unreachable", "singular")
+
+
+@dataclass(frozen=True)
+class Posture:
+    """The mechanism's configuration at N poses.
+
+    joint, beta, gamma: (N, n) [rad or m, rad, rad], principal values.
+    reach:         (N, n), negative where a chain cannot reach its joint.
+    contact_point: (N, k, 3) [m], ball centres in {S}.
+    cos_gamma:     (N, n); near 0 beta_i and gamma_i lose their meaning.
+    """
+
+    joint: np.ndarray
+    beta: np.ndarray
+    gamma: np.ndarray
+    cos_gamma: np.ndarray
+    reach: np.ndarray
+    contact_point: np.ndarray
+    singularity: Singularity
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Everything about N samples, as plain arrays; failed samples are NaN."""
+
+    poses: PoseRates
+    torques: Torques
+    posture: Posture
+    status: np.ndarray
+
+
+class Model:
+    """Inverse dynamics of a mechanism by one formulation and route."""
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        formulation: str = "virtual_power",
+        route: str = "core",
+    ) -> None:
+        """Derive the equations of motion.
+
+        Raises: InputError:       for an unknown formulation or route.
+                UnsupportedError: where route `direct` has no closed form.
+                MechanismError:   if the contacts do not hold the platform at home.
+        """
+        from .kernels.interpreted import Interpreted
+
+        check_home(mechanism)
+        if route not in ROUTES:
+            raise InputError(f'no route "{route}".{did_you_mean(route, ROUTES)}')
+        if route == "direct":
+            require_closed_form(mechanism)
+        start = time.perf_counter()
+        self.mechanism = mechanism
+        self.formulation = formulation_named(formulation).name
+        self.route = route
+        self.kernel = Interpreted(mechanism, formulation_named(formulation), route)
+        self.derivation_seconds = time.perf_counter() - start
+
+    @property
+    def independent(self) -> tuple[str, ...]:
+        """Names of the independent coordinates q_EE, in order."""
+        return independent_coordinates(self.mechanism)
+
+    @property
+    def dependent(self) -> tuple[str, ...]:
+        """Names of the coordinates that the contacts determine."""
+        return dependent_coordinates(self.mechanism)
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Names of the parts that share the torques."""
+        return part_names(self.mechanism)
+
+    @cached_property
+    def characteristic_length(self) -> float:
+        return characteristic_length(self.mechanism)
+
+    @cached_property
+    def _posture_function(self):  # noqa: ANN202
+        return posture_function(self.mechanism)
+
+    def load_point(self, name: str | None) -> np.ndarray:
+        """Where a load acts, (3,) [m] in {M}: a named point, or right_molar if there is one.
+
+        Raises: InputError: if the mechanism has no such point.
+        """
+        points = self.mechanism.platform.points
+        if name is None and DEFAULT_LOAD_POINT not in points:
+            raise InputError(
+                f"the load needs a point: this mechanism has no {DEFAULT_LOAD_POINT}. "
+                f"Choose one with --load-point (load point).{did_you_mean('', points)}"
+            )
+        name = name or DEFAULT_LOAD_POINT
+        if name not in points:
+            raise InputError(
+                f'the platform has no point "{name}".{did_you_mean(name, points)}'
+            )
+        return np.array(points[name])
+
+    def evaluate(
+        self, q: np.ndarray, q1: np.ndarray, q2: np.ndarray, load: np.ndarray
+    ) -> Evaluation:
+        """Inverse dynamics at samples of the independent coordinates.
+
+        Args: q, q1, q2: (N, m) each, in the order of `independent` [m, rad; per s; per s^2].
+              load: (N, 9): force [N] and moment [N m] in {S}, and the point they act at, in {M}.
+        """
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            poses = self.kernel.poses(q, q1, q2)
+            torques = self.kernel.torques(q, q1, q2, load, poses)
+            posture = self.posture(poses.pose)
+            status = np.where(torques.reached, OK, UNREACHABLE)
+            regular = (posture.singularity.ratio >= SINGULAR) & np.isfinite(torques.torque).all(1)
+            status[torques.reached & ~regular] = SINGULAR_STATUS
+        return Evaluation(poses, torques, posture, status)
+
+    def posture(self, pose: np.ndarray) -> Posture:
+        """Joint coordinates, contact points and singularity measures at poses X_EE, (N, 6)."""
+        n, k = len(self.mechanism.chains), len(self.mechanism.contacts)
+        count, m = len(pose), 6 - k
+        outputs = evaluate(self._posture_function, pose)
+        q_r, cos_gamma, J_A, J_A_scale, J_W, rod_length, M_J, reach, points = outputs
+        J_W = J_W.reshape(count, 6, n).transpose(0, 2, 1)
+        M_J = M_J.reshape(count, m, 6).transpose(0, 2, 1)
+        joint, beta, gamma = q_r.reshape(count, 3, n).transpose(1, 0, 2)
+        angles = np.array([i >= 3 for i in indices(self.independent)])
+        singularity = measure(
+            J_A, J_A_scale, J_W @ M_J, rod_length, angles, self.characteristic_length
+        )
+        return Posture(
+            joint, beta, gamma, cos_gamma, reach, points.reshape(count, k, 3), singularity
+        )
+
+    def solve(
+        self,
+        motion: Motion,
+        load: Load | None = None,
+        load_point: str | None = None,
+        flag: bool = False,
+    ) -> Solution:
+        """Torques along a motion under a load.
+
+        Args:   motion: what the platform does; load: what acts on it (none by default).
+                load_point: platform point the load acts at; default: the load's own, else
+                right_molar.
+                flag: keep samples that cannot be computed, empty and with a status.
+        Raises: UnreachableError, SingularError: for such samples, unless `flag`.
+                InputError: if motion or load do not fit the mechanism.
+        """
+        from .motion import Load
+        from .solution import assemble
+
+        start = time.perf_counter()
+        load = load or Load.zero()
+        wrench = load.at(motion.t)
+        name = load_point or load.point
+        if np.any(wrench) or name is not None:
+            point = self.load_point(name)
+        else:
+            point = np.zeros(3)
+        q, q1, q2, residual = self.independent_motion(motion)
+        evaluation = self.evaluate(q, q1, q2, with_point(wrench, point))
+        if not flag:
+            self.require_ok(evaluation, motion.t)
+        seconds = time.perf_counter() - start
+        return assemble(self, motion, load, wrench, name, evaluation, residual, seconds)
+
+    def independent_motion(
+        self, motion: Motion
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float | None]:
+        """q_EE and its rates, (N, m) each, from a motion of any kind.
+
+        Also returns the largest distance of a given whole pose from the contacts [m], which the
+        projection removes; None for other kinds.
+        """
+        if motion.kind == "pose":
+            columns = indices(self.independent)
+            residual = self.contact_residual(motion.value)
+            values = (motion.value, motion.rate, motion.acceleration)
+            q, q1, q2 = (a[:, columns] for a in values)
+            return q, q1, q2, residual
+        q, q1, q2 = self.independent_states(
+            motion.names,
+            motion.value,
+            motion.rate,
+            motion.acceleration,
+            motion.t,
+            motion.landmark if motion.kind == "landmark" else None,
+        )
+        return q, q1, q2, None
+
+    def independent_states(
+        self,
+        names: Sequence[str],
+        value: np.ndarray,
+        rate: np.ndarray,
+        acceleration: np.ndarray,
+        t: np.ndarray | None = None,
+        landmark: str | None = None,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """q_EE and its rates from another set of coordinates or a landmark's displacement.
+
+        Samples that the contacts cannot meet come back as NaN.
+        """
+        if landmark is None and sorted(names) == sorted(self.independent):
+            order = [list(names).index(name) for name in self.independent]
+            return value[:, order], rate[:, order], acceleration[:, order]
+        if landmark is not None:
+            closure: Closure = landmark_closure(self.mechanism, landmark)
+            # The fourth condition prescribes zero: the midpoint of the contacts stays put.
+            value, rate, acceleration = (
+                np.column_stack([a, np.zeros(len(a))]) for a in (value, rate, acceleration)
+            )
+        else:
+            ordered = sorted(names, key=COORDINATES.index)
+            closure = coordinate_closure(self.mechanism, ordered)
+            order = [list(names).index(name) for name in ordered]
+            value, rate, acceleration = value[:, order], rate[:, order], acceleration[:, order]
+        found = closure.solve(value, rate, acceleration)
+        columns = indices(self.independent)
+        q, q1, q2 = (a[:, columns] for a in (found.pose, found.rate, found.acceleration))
+        return q, q1, q2
+
+    def contact_residual(self, pose: np.ndarray) -> float:
+        """Largest |phi| of the contacts over poses, (N, 6) [m]."""
+        import casadi as ca
+
+        from .kinematics.closure import contact_symbols
+        from .kinematics.contact import residuals
+
+        if not self.mechanism.contacts:
+            return 0.0
+        x = ca.SX.sym("x", 6)
+        phi = ca.Function("phi", [x], [residuals(contact_symbols(self.mechanism), x)])
+        return float(np.nanmax(np.abs(evaluate(phi, pose)[0])))
+
+    def require_ok(self, evaluation: Evaluation, t: np.ndarray | None = None) -> None:
+        """Raise for samples that could not be computed, naming the first and its cause."""
+        bad = np.flatnonzero(evaluation.status != OK)
+        if not bad.size:
+            return
+        first = int(bad[0])
+        where = f"sample {first}" if t is None else f"t = {t[first]:g} s (sample {first})"
+        more = f" {bad.size - 1} more samples fail too." if bad.size > 1 else ""
+        if evaluation.status[first] == SINGULAR_STATUS:
+            s = evaluation.posture.singularity
+            raise SingularError(
+                f"the mechanism is singular at {where}: dimensionless ratio {s.ratio[first]:.2g}, "
+                f"must be above {SINGULAR:g}. The torques are not determined there; avoid the "
+                f"pose, or keep such samples with --flag (flag=True).{more}",
+                bad.tolist(),
+            )
+        raise UnreachableError(
+            f"{self.unreachable_cause(evaluation, first)} at {where}. The motion goes too far for "
+            "this mechanism; scale it down, or keep such samples with --flag (flag=True)."
+            f"{more}",
+            bad.tolist(),
+        )
+
+    def unreachable_cause(self, evaluation: Evaluation, sample: int) -> str:
+        """Which chain or contact cannot be where the sample wants it."""
+        pose = evaluation.poses.pose[sample]
+        if not evaluation.poses.reached[sample] or not np.isfinite(pose).all():
+            names = ", ".join(f'"{name}"' for name in self.mechanism.contact_names)
+            return (
+                f"no {' and '.join(self.dependent)} puts the contacts {names} on their surfaces"
+            )
+        for i, chain in enumerate(self.mechanism.chains):
+            if not evaluation.posture.reach[sample, i] >= 0:
+                return FAMILIES[chain.kind].explain(chain, pose)
+        return "the pose cannot be reached"
+
+
+def derive(
+    mechanism: Mechanism, formulation: str = "virtual_power", route: str = "core"
+) -> Model:
+    """Derive the equations of motion of a mechanism; see `Model`."""
+    return Model(mechanism, formulation, route)
+
+
+def check_home(mechanism: Mechanism) -> None:
+    """Raises MechanismError where the contacts cannot hold the platform at home."""
+    problems = [
+        f'contact "{contact.name}": {problem}'
+        for contact in mechanism.contacts
+        if (problem := home_problem(contact)) is not None
+    ]
+    problems += [] if problems else list(holding_problems(mechanism))
+    if problems:
+        raise MechanismError(mechanism.name, problems)
+
+
+def with_point(wrench: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Wrenches (N, 6) and the point they act at, (3,), as loads (N, 9)."""
+    return np.hstack([wrench, np.broadcast_to(point, (len(wrench), 3))])

@@ -1,0 +1,36 @@
+"""Paths and loads: from files and arrays to clean samples, and tables back to files."""
+
+from condyle.motion.load import Load
+from condyle.motion.path import Motion
+from condyle.motion.reference import (
+    bundled_reference,
+    reference_load,
+    reference_motion,
+    write_reference,
+)
+from condyle.motion.smoothing import AUTO_CUTOFF, Smoothing
+from condyle.motion.table import Table, iter_table, read_table
+from condyle.motion.table_writer import TableWriter, write_table
+from condyle.motion.units import LANDMARK, POSE, Units, parse_units
+from condyle.motion.whole_file import whole_file
+
+__all__ = [
+    "AUTO_CUTOFF",
+    "LANDMARK",
+    "POSE",
+    "Load",
+    "Motion",
+    "Smoothing",
+    "Table",
+    "TableWriter",
+    "Units",
+    "bundled_reference",
+    "iter_table",
+    "parse_units",
+    "read_table",
+    "reference_load",
+    "reference_motion",
+    "whole_file",
+    "write_reference",
+    "write_table",
+]

@@ -1,0 +1,113 @@
+"""The load on the platform: a force and a moment over time, at a named point."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from condyle.errors import InputError
+from condyle.motion.arrays import as_samples, check_rising
+from condyle.motion.table import read_table
+
+FORCE = ("Fx", "Fy", "Fz")
+MOMENT = ("Mx", "My", "Mz")
+
+_SLACK = 1e-9  # [s], by which times may miss the load's ends through rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """Wrench on the platform, components in {S}, moment about the point it acts at.
+
+    Attributes: t: (N,) [s], rising; (0,) for a load that does not change.
+                wrench: Fx, Fy, Fz, Mx, My, Mz, (N, 6), [N, N m]; (1, 6) if it does not change.
+                point: name of the platform point; None leaves the choice to the mechanism.
+                source: where the load came from, for messages.
+    """
+
+    t: np.ndarray
+    wrench: np.ndarray
+    point: str | None = None
+    source: str = "load"
+
+    @classmethod
+    def from_csv(cls, path: str | os.PathLike[str], point: str | None = None) -> Load:
+        """Read `t,Fx,Fy,Fz`, optionally with `Mx,My,Mz`, in SI."""
+        table = read_table(path, known=("t", *FORCE, *MOMENT))
+        t = table.require(["t"])[:, 0]
+        force = table.require(FORCE)
+        moment = table.require(MOMENT) if set(MOMENT) & set(table.columns) else None
+        check_rising(t, table.where)
+        return cls.from_arrays(t, force, moment, point, table.source)
+
+    @classmethod
+    def from_arrays(
+        cls,
+        t: Any,
+        force: Any,
+        moment: Any = None,
+        point: str | None = None,
+        source: str = "load",
+    ) -> Load:
+        """Load through samples: t (N,) [s], force (N, 3) [N], moment (N, 3) [N m] or none."""
+        t = as_samples(t, "t", source)
+        if len(t) == 0:
+            raise InputError(f"{source}: no samples")
+        check_rising(t, f"{source}, sample {{}}".format)
+        wrench = np.zeros((len(t), 6))
+        wrench[:, :3] = _vectors(force, "force", source, len(t))
+        if moment is not None:
+            wrench[:, 3:] = _vectors(moment, "moment", source, len(t))
+        return cls(t, wrench, point, source)
+
+    @classmethod
+    def constant(cls, force: Any, moment: Any = (0, 0, 0), point: str | None = None) -> Load:
+        """The same force [N] and moment [N m], (3,) each, at all times."""
+        parts = [_vectors([v], n, "load", 1) for v, n in ((force, "force"), (moment, "moment"))]
+        return cls(np.empty(0), np.hstack(parts), point, "constant load")
+
+    @classmethod
+    def zero(cls) -> Load:
+        """No load."""
+        return cls(np.empty(0), np.zeros((1, 6)), None, "no load")
+
+    def at(self, times: Any) -> np.ndarray:
+        """Wrench at `times`, linear between the samples, (len(times), 6).
+
+        Raises: InputError: if the load does not cover the times, naming the gaps.
+        """
+        times = as_samples(times, "times", self.source)
+        if len(self.t) == 0:
+            return np.repeat(self.wrench, len(times), axis=0)
+        if len(times):
+            self._check_cover(times.min(), times.max())
+        return np.column_stack([np.interp(times, self.t, column) for column in self.wrench.T])
+
+    def _check_cover(self, start: float, end: float) -> None:
+        first, last = self.t[0], self.t[-1]
+        gaps = []
+        if start < first - _SLACK:
+            gaps.append(f"{start:.9g} to {min(first, end):.9g} s")
+        if end > last + _SLACK:
+            gaps.append(f"{max(last, start):.9g} to {end:.9g} s")
+        if gaps:
+            raise InputError(
+                f"{self.source}: runs from {first:.9g} to {last:.9g} s, but the motion from"
+                f" {start:.9g} to {end:.9g} s; no load at {' and '.join(gaps)}."
+                " Add rows there, of zeros if nothing acts."
+            )
+
+
+def _vectors(values: Any, name: str, source: str, rows: int) -> np.ndarray:
+    try:
+        array = np.array(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{source}: {name} is not made of numbers ({error})") from error
+    if array.shape != (rows, 3):
+        raise InputError(f"{source}: {name} has shape {array.shape}, expected ({rows}, 3)")
+    if not np.isfinite(array).all():
+        raise InputError(f"{source}: {name} has a number that is not finite")
+    return array

@@ -1,0 +1,114 @@
+"""Smoothing of measured motions: a low-pass filter in the form of a penalised spline."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from condyle.errors import InputError
+from condyle.motion.units import ANGLE_UNITS, POSE
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
+
+AUTO_CUTOFF = 10.0
+"""Cut-off of "auto" [Hz]. Chewing repeats one to two times a second, so at least five harmonics
+pass. Above them noise of markers and encoders prevails, and two derivatives raise it with the
+square of the frequency."""
+
+_DEGREE = 5
+_ORDER = 4  # of the penalised differences
+_KNOTS_PER_PERIOD = 8  # of the cut-off
+_MIN_PERIODS = 2  # of the cut-off, that a recording must last
+
+
+@dataclass(frozen=True, eq=False)
+class Smoothing:
+    """What was smoothed away, at the times of the input.
+
+    Attributes: cutoff: frequency at which the amplitude is 1/sqrt(2) [Hz].
+                automatic: whether the cut-off is the default one.
+                names: columns, (m,).
+                rms, peak: root of the mean square, and largest size, of the removed part, (m,),
+                    [m] or [rad].
+    """
+
+    cutoff: float
+    automatic: bool
+    names: tuple[str, ...]
+    rms: np.ndarray
+    peak: np.ndarray
+
+    def __str__(self) -> str:
+        parts = []
+        for name, rms, peak in zip(self.names, self.rms, self.peak, strict=True):
+            unit, size = ("deg", ANGLE_UNITS["deg"]) if name in POSE[3:] else ("mm", 1e-3)
+            parts.append(f"{name} {rms / size:.3g} {unit} rms ({peak / size:.3g} at most)")
+        return f"smoothing at {self.cutoff:g} Hz removed " + ", ".join(parts)
+
+
+def parse_cutoff(cutoff: float | str) -> float:
+    """Cut-off in Hz from a number or "auto"."""
+    try:
+        value = AUTO_CUTOFF if cutoff == "auto" else float(cutoff)
+    except (TypeError, ValueError):
+        value = math.nan
+    if not (math.isfinite(value) and value > 0):
+        raise InputError(f'cut-off: got {cutoff!r}, expected a frequency in Hz above 0, or "auto"')
+    return value
+
+
+def smoothing_spline(t: np.ndarray, values: np.ndarray, cutoff: float) -> BSpline:
+    """Quintic spline of what is slower than `cutoff` in the samples.
+
+        min over c:  sum_i |y_i - s(t_i)|^2 + mu sum_j |D^4 c_j|^2,   s = sum_j c_j B_j
+
+    with B_j on even knots, eight to a period of the cut-off. For even, dense samples its gain is
+
+        1 / (1 + mu' (2 sin(w h/2))^8 / sinc(w h/2)^12),
+
+    where h is the knot step: that of a Butterworth filter of order 4 run forward and backward, with
+    mu' such that it is 1/sqrt(2) at the cut-off. Unlike the filter it needs no made-up samples
+    beyond the ends (a cubic passes unchanged, up to the ends) and takes uneven samples as they are.
+
+    Args:    t: (N,) [s], rising from 0. values: (N, m). cutoff: [Hz].
+    Returns: s, of N' knots that do not depend on N.
+    Raises:  InputError: if the samples are too sparse or too few for the cut-off.
+    """
+    from scipy.interpolate import BSpline
+    from scipy.sparse import diags_array
+    from scipy.sparse.linalg import spsolve
+
+    _check_cutoff(t, cutoff)
+    intervals = math.ceil(_KNOTS_PER_PERIOD * cutoff * t[-1])
+    step = t[-1] / intervals
+    knots = step * np.arange(-_DEGREE, intervals + _DEGREE + 1)
+    B = BSpline.design_matrix(np.minimum(t, knots[-_DEGREE - 1]), knots, _DEGREE)
+    size = intervals + _DEGREE
+    binomials = [(-1.0) ** i * math.comb(_ORDER, i) for i in range(_ORDER + 1)]
+    D = diags_array(binomials, offsets=range(_ORDER + 1), shape=(size - _ORDER, size))
+
+    half_turn = math.pi * cutoff * step
+    samples_per_knot = (len(t) - 1) / intervals
+    spline_gain = np.sinc(half_turn / math.pi) ** (2 * (_DEGREE + 1))
+    mu = (math.sqrt(2) - 1) * spline_gain / (2 * math.sin(half_turn)) ** (2 * _ORDER)
+    A = B.T @ B + mu * samples_per_knot * (D.T @ D)
+    coefficients = spsolve(A.tocsc(), B.T @ values).reshape(size, -1)
+    return BSpline(knots, coefficients, _DEGREE)
+
+
+def _check_cutoff(t: np.ndarray, cutoff: float) -> None:
+    gap = np.diff(t).max()
+    if cutoff >= 0.5 / gap * (1 - 1e-9):
+        raise InputError(
+            f"cut-off {cutoff:g} Hz: must be below half the sampling rate, {0.5 / gap:.4g} Hz"
+            f" (the longest step is {gap:.4g} s)"
+        )
+    if t[-1] < _MIN_PERIODS / cutoff:
+        raise InputError(
+            f"cut-off {cutoff:g} Hz: needs a recording of at least {_MIN_PERIODS / cutoff:.3g} s"
+            f" ({_MIN_PERIODS} periods), got {t[-1]:.3g} s. Raise the cut-off, or do not smooth."
+        )
