@@ -1,8 +1,8 @@
 """condyle: dynamics of redundantly actuated parallel mechanisms held at point contacts.
 
-    mechanism = condyle.load("masticatory")
-    model = condyle.derive(mechanism, formulation="momentum", route="core")
-    solution = model.solve(condyle.reference_motion(), condyle.reference_load())
+mechanism = condyle.load("masticatory")
+model = condyle.derive(mechanism, formulation="momentum", route="core")
+solution = model.solve(condyle.reference_motion(), condyle.reference_load())
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from .motion import Load, Motion, reference_load, reference_motion
     from .solution import Solution, open_solution
 
-__all__ = [*_HOMES, "__version__"]  # noqa: PLE0604
+__all__ = [*_HOMES, "__version__"]
 
 
 def __getattr__(name: str) -> Any:

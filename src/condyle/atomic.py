@@ -1,46 +1,57 @@
-"""Files that are written whole or not at all."""
+"""Files that appear whole or not at all."""
 
 from __future__ import annotations
 
 import os
-import tempfile
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from .errors import InputError
+from condyle.errors import InputError
 
 
 @contextmanager
-def replacing(path: str | Path) -> Iterator[Path]:
-    """A temporary path beside `path` that takes its place when the block ends well.
+def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Lend a temporary path in the folder of `path`; rename it to `path` when the block succeeds.
 
-    Raises: InputError: if the folder cannot be written.
+    On any exception the temporary file is removed and what stood at `path` is untouched. A link
+    is followed; a device or pipe cannot be renamed to, so that one is lent itself.
+
+    Raises: InputError: if `path` cannot be written, a full disk inside the block included.
     """
-    path = Path(path)
-    if path.is_dir():
-        raise InputError(f"{path} is a folder; expected the name of a file to write")
+    target = _checked(path)
+    direct = target.exists() and not target.is_file()
+    name = f".{target.name[:100]}.{os.getpid()}-{secrets.token_hex(4)}.part"
+    temporary = target if direct else target.with_name(name)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
-        os.close(handle)
+        try:
+            yield temporary
+            if not direct:
+                os.replace(temporary, target)
+        finally:
+            if not direct:
+                temporary.unlink(missing_ok=True)
     except OSError as error:
-        raise InputError(f"{path} cannot be written: {error.strerror}") from None
-    temporary = Path(name)
-    try:
-        yield temporary
-        # mkstemp makes files private; a result has the permissions of any other new file.
-        mask = os.umask(0)
-        os.umask(mask)
-        temporary.chmod(0o666 & ~mask)
-        os.replace(temporary, path)
-    except OSError as error:
-        raise InputError(f"{path} cannot be written: {error.strerror or error}") from error
-    finally:
-        temporary.unlink(missing_ok=True)
+        if error.filename is not None and str(error.filename) != str(temporary):
+            raise  # another file's trouble
+        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
 
 
-def write_text(path: str | Path, text: str) -> None:
+def _checked(path: str | os.PathLike[str]) -> Path:
+    if "\0" in os.fspath(path):
+        raise InputError(f"{os.fspath(path)!r}: is not the name of a file")
+    if os.path.isdir(path):
+        raise InputError(f"{path}: is a folder; give the name of a file to write")
+    if os.path.exists(path) and not os.path.isfile(path):
+        return Path(path)
+    target = Path(os.path.realpath(path))
+    if not target.parent.is_dir():
+        raise InputError(f"{path}: the folder {target.parent} does not exist; create it first")
+    return target
+
+
+def write_text(path: str | os.PathLike[str], text: str) -> None:
     """Write a text file whole or not at all."""
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")

@@ -1,7 +1,7 @@
 """A model: one mechanism, one formulation, one route, ready to compute.
 
-    model = condyle.derive(mechanism, formulation="momentum", route="core")
-    solution = model.solve(motion, load)
+model = condyle.derive(mechanism, formulation="momentum", route="core")
+solution = model.solve(motion, load)
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .dynamics import ROUTES, formulation as formulation_named
+from .dynamics import ROUTES
+from .dynamics import formulation as formulation_named
 from .dynamics.equations import part_names, posture_function, require_closed_form
 from .errors import InputError, MechanismError, SingularError, UnreachableError, did_you_mean
 from .kinematics.batch import evaluate
@@ -119,7 +120,7 @@ class Model:
         return characteristic_length(self.mechanism)
 
     @cached_property
-    def _posture_function(self):  # noqa: ANN202
+    def _posture_function(self):
         return posture_function(self.mechanism)
 
     def load_point(self, name: str | None) -> np.ndarray:
@@ -135,9 +136,7 @@ class Model:
             )
         name = name or DEFAULT_LOAD_POINT
         if name not in points:
-            raise InputError(
-                f'the platform has no point "{name}".{did_you_mean(name, points)}'
-            )
+            raise InputError(f'the platform has no point "{name}".{did_you_mean(name, points)}')
         return np.array(points[name])
 
     def evaluate(
@@ -197,10 +196,8 @@ class Model:
         load = load or Load.zero()
         wrench = load.at(motion.t)
         name = load_point or load.point
-        if np.any(wrench) or name is not None:
-            point = self.load_point(name)
-        else:
-            point = np.zeros(3)
+        loaded = np.any(wrench) or name is not None
+        point = self.load_point(name) if loaded else np.zeros(3)
         q, q1, q2, residual = self.independent_motion(motion)
         evaluation = self.evaluate(q, q1, q2, with_point(wrench, point))
         if not flag:
@@ -277,13 +274,19 @@ class Model:
         phi = ca.Function("phi", [x], [residuals(contact_symbols(self.mechanism), x)])
         return float(np.nanmax(np.abs(evaluate(phi, pose)[0])))
 
-    def require_ok(self, evaluation: Evaluation, t: np.ndarray | None = None) -> None:
-        """Raise for samples that could not be computed, naming the first and its cause."""
+    def require_ok(
+        self, evaluation: Evaluation, t: np.ndarray | None = None, row_offset: int = 0
+    ) -> None:
+        """Raise for samples that could not be computed, naming the first and its cause.
+
+        Args: t: their times; without, they are rows of a file that start at `row_offset`.
+        """
         bad = np.flatnonzero(evaluation.status != OK)
         if not bad.size:
             return
         first = int(bad[0])
-        where = f"sample {first}" if t is None else f"t = {t[first]:g} s (sample {first})"
+        row = f"row {row_offset + first + 1}"
+        where = row if t is None else f"t = {t[first]:g} s (sample {first})"
         more = f" {bad.size - 1} more samples fail too." if bad.size > 1 else ""
         if evaluation.status[first] == SINGULAR_STATUS:
             s = evaluation.posture.singularity
@@ -305,18 +308,14 @@ class Model:
         pose = evaluation.poses.pose[sample]
         if not evaluation.poses.reached[sample] or not np.isfinite(pose).all():
             names = ", ".join(f'"{name}"' for name in self.mechanism.contact_names)
-            return (
-                f"no {' and '.join(self.dependent)} puts the contacts {names} on their surfaces"
-            )
+            return f"no {' and '.join(self.dependent)} puts the contacts {names} on their surfaces"
         for i, chain in enumerate(self.mechanism.chains):
             if not evaluation.posture.reach[sample, i] >= 0:
                 return FAMILIES[chain.kind].explain(chain, pose)
         return "the pose cannot be reached"
 
 
-def derive(
-    mechanism: Mechanism, formulation: str = "virtual_power", route: str = "core"
-) -> Model:
+def derive(mechanism: Mechanism, formulation: str = "virtual_power", route: str = "core") -> Model:
     """Derive the equations of motion of a mechanism; see `Model`."""
     return Model(mechanism, formulation, route)
 

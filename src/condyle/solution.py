@@ -235,9 +235,7 @@ def bound_margins(mechanism: Mechanism, points: np.ndarray) -> np.ndarray:
     return margins
 
 
-def run_warnings(
-    mechanism: Mechanism, solution: Solution, residual: float | None
-) -> list[str]:
+def run_warnings(mechanism: Mechanism, solution: Solution, residual: float | None) -> list[str]:
     """What the reader of the results should know."""
     warnings = [*home_warnings(mechanism), *bound_warnings(solution)]
     if residual is not None and residual > 1e-9:

@@ -6,9 +6,7 @@ from .lagrange import Lagrange
 from .momentum import Momentum
 from .virtual_power import VirtualPower
 
-FORMULATIONS: dict[str, Formulation] = {
-    f.name: f for f in (VirtualPower(), Momentum(), Lagrange())
-}
+FORMULATIONS: dict[str, Formulation] = {f.name: f for f in (VirtualPower(), Momentum(), Lagrange())}
 ROUTES = ("core", "direct")
 
 

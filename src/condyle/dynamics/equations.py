@@ -264,5 +264,3 @@ def closed_branch(mechanism: Mechanism) -> ca.SX:
 def _function(name: str, inputs: list[ca.SX], outputs: list[ca.SX]) -> ca.Function:
     outputs = ca.cse([ca.densify(o) for o in outputs])
     return ca.Function(name, inputs, outputs)
-
-

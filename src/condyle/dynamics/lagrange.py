@@ -52,7 +52,5 @@ def lagrange_force(
     M_rate_times_rate = ca.jtimes(momentum, c, rate)
     half_gradient = ca.gradient(ca.dot(rate, momentum), c) / 2
     return (
-        mass_matrix @ acceleration
-        + (M_rate_times_rate - half_gradient)
-        + ca.gradient(potential, c)
+        mass_matrix @ acceleration + (M_rate_times_rate - half_gradient) + ca.gradient(potential, c)
     )

@@ -16,8 +16,7 @@ import casadi as ca
 import numpy as np
 
 from ..errors import InputError
-from ..mechanism.home import condition_of, constraint_jacobian
-from ..mechanism.home import MAX_CONDITION, usable_sets
+from ..mechanism.home import MAX_CONDITION, condition_of, constraint_jacobian, usable_sets
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from .batch import evaluate
 from .contact import ContactSymbols, indices, residuals

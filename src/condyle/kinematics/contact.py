@@ -64,8 +64,7 @@ class ContactFrame:
     @property
     def N(self) -> ca.SX:
         columns = [
-            ca.vertcat(n, ca.cross(r, n))
-            for n, r in zip(self.gradients, self.levers, strict=True)
+            ca.vertcat(n, ca.cross(r, n)) for n, r in zip(self.gradients, self.levers, strict=True)
         ]
         return ca.horzcat(ca.SX(6, 0), *columns)
 
@@ -74,9 +73,7 @@ class ContactFrame:
         return ca.vertcat(ca.SX(0, 1), *(ca.norm_2(n) for n in self.gradients))
 
 
-def contact_frame(
-    contacts: Sequence[ContactSymbols], position: ca.SX, R: ca.SX
-) -> ContactFrame:
+def contact_frame(contacts: Sequence[ContactSymbols], position: ca.SX, R: ca.SX) -> ContactFrame:
     """Gradients and levers of the contacts at O_M = `position` and rotation R."""
     levers = [R @ c.point for c in contacts]
     gradients = [c.gradient(position + r) for c, r in zip(contacts, levers, strict=True)]
@@ -181,13 +178,13 @@ def closed_form(
         h = A * A + B * B
         root = h - k * k
         s = branch * ca.sqrt(root)
-        solution = ca.vertcat((A * k - B * s) / h, (B * k + A * s) / h)
+        solution: ca.SX = ca.vertcat((A * k - B * s) / h, (B * k + A * s) / h)
         reach = root / h
         cosines = ca.substitute(bryant.cos, unknown, solution)
         bryant = Bryant(cosines, ca.substitute(bryant.sin, unknown, solution))
         equations = [ca.substitute(e, unknown, solution) for e in equations]
     if positions:
-        S = ca.vertcat(*(ca.horzcat(*row) for row in slopes))
+        S: ca.SX = ca.vertcat(*(ca.horzcat(*row) for row in slopes))
         e = ca.vertcat(*equations)
         if len(positions) == 1:
             # With an angle also solved, both equations give the same value; weigh them alike.

@@ -37,7 +37,6 @@ class State:
     pose:    X_EE, (6,), an expression in c.
     twist:   [V; omega], (6,); twist_rate its time derivative.
     B:       twist Jacobian, (6, m): [V; omega] = B c'  ([Cheng2023] eqs 8, 11).
-    symbols: what a time derivative runs through: pairs (variable, its rate).
     """
 
     rate: ca.SX
@@ -47,7 +46,7 @@ class State:
     twist: ca.SX
     twist_rate: ca.SX
     B: ca.SX
-    coordinates: ca.SX | None  # None in the twist space, which has no coordinates
+    coordinates: ca.SX  # c, (m,); empty in the twist space, which has no coordinates
 
     def point(self, m: ca.SX) -> PointMotion:
         """Motion of the platform point with components `m`, (3,) [m], in {M}."""
@@ -94,4 +93,4 @@ def independent_state(q: ca.SX, rate: ca.SX, acceleration: ca.SX, pose: ca.SX) -
 
 def twist_state(pose: ca.SX, R: ca.SX, twist: ca.SX, twist_rate: ca.SX) -> State:
     """State whose forces are dual to the twist [V; omega]."""
-    return State(twist, twist_rate, pose, R, twist, twist_rate, ca.SX.eye(6), None)
+    return State(twist, twist_rate, pose, R, twist, twist_rate, ca.SX.eye(6), ca.SX(0, 1))

@@ -14,7 +14,6 @@ from pydantic import Field, ValidationInfo, field_validator
 from .quantities import (
     Direction,
     Fraction,
-    Length,
     Name,
     NonNegative,
     Point,

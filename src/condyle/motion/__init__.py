@@ -12,7 +12,6 @@ from condyle.motion.smoothing import AUTO_CUTOFF, Smoothing
 from condyle.motion.table import Table, iter_table, read_table
 from condyle.motion.table_writer import TableWriter, write_table
 from condyle.motion.units import LANDMARK, POSE, Units, parse_units
-from condyle.motion.whole_file import whole_file
 
 __all__ = [
     "AUTO_CUTOFF",
@@ -30,7 +29,6 @@ __all__ = [
     "read_table",
     "reference_load",
     "reference_motion",
-    "whole_file",
     "write_reference",
     "write_table",
 ]

@@ -24,6 +24,7 @@ Kind = Literal["coordinates", "pose", "landmark"]
 DEFAULT_LANDMARK = "incisor"
 MIN_ROWS = 6
 _MAX_SAMPLES = 10**8
+_SLACK = 1e-9  # [s], by which output times may miss the input's ends through rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +32,8 @@ class Motion:
     """Coordinates over time with their first and second derivatives, in SI.
 
     One quintic spline goes through the input samples, or near them if they are smoothed; value,
-    rate and acceleration are that spline and its exact derivatives. So they belong to the input alone: an
-    output grid of 1 kHz and one of 200 Hz give the same numbers where they meet.
+    rate and acceleration are that spline and its exact derivatives. So they belong to the input
+    alone: an output grid of 1 kHz and one of 200 Hz give the same numbers where they meet.
 
     Attributes:
         kind: "coordinates" (fewer than six of the pose), "pose" (all six), "landmark" (x, y, z).
@@ -142,7 +143,8 @@ class Motion:
 
 
 def _by_name(values: np.ndarray, names: Sequence[str] | None, source: str) -> dict[str, np.ndarray]:
-    if names is None or values.shape[1:] != (len(set(names)),):
+    distinct = names is not None and len(set(names)) == len(names)
+    if names is None or not distinct or values.shape[1:] != (len(names),):
         raise InputError(
             f"{source}: got values of shape {values.shape} for names {names},"
             " expected (samples, columns) and a different name for each column"
@@ -197,7 +199,7 @@ def _output_times(
     if times is not None:
         wanted = as_samples(times, "times", source)
         check_rising(wanted, "times, sample {}".format)
-        if len(wanted) == 0 or wanted[0] < t[0] or wanted[-1] > t[-1]:
+        if not len(wanted) or wanted[0] < t[0] - _SLACK or wanted[-1] > t[-1] + _SLACK:
             raise InputError(f"{source}: times must lie within {t[0]:g} to {t[-1]:g} s")
         return wanted
     if rate is None:

@@ -13,7 +13,7 @@ import math
 import os
 import re
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from io import TextIOWrapper
 from itertools import chain, islice
@@ -126,24 +126,24 @@ class _Parser:
         point = any("." in line for line in lines)
         sign = "," if comma else "." if point else self.decimal
         plain = not (comma and point) and self.decimal in ("", sign)
-        if plain and all(line.isascii() and "_" not in line for line in lines):
+        if plain and all(line.isascii() and not _ODD.search(line) for line in lines):
             text = (line.replace(",", ".") for line in lines) if comma else lines
-            try:
-                rows = list(_split(text, self.separator))
-                if len(rows) == len(lines) and all(len(row) == len(self.names) for row in rows):
+            rows = [line.split(self.separator) for line in text]
+            if all(len(row) == len(self.names) for row in rows):
+                with suppress(ValueError):  # the careful way says where
                     cells = chain.from_iterable(rows)
                     values = np.fromiter(map(float, cells), float, len(rows) * len(self.names))
                     if np.isfinite(values).all():
                         self.decimal = sign
                         return values.reshape(len(rows), len(self.names))
-            except (ValueError, csv.Error):
-                pass  # the careful way says where, or can read it
         return np.array([self._row(line, first_line + i) for i, line in enumerate(lines)])
 
     def _row(self, text: str, line: int) -> list[float]:
         where = f"{self.source}, line {line}"
         if not text.strip(self.blank):
             raise InputError(f"{where}: is empty, but rows follow. Remove the line.")
+        if text.count('"') % 2:
+            raise InputError(f"{where}: a quotation mark is not closed")
         try:
             cells = next(_split([text], self.separator))
         except csv.Error as error:
@@ -178,7 +178,8 @@ class _Parser:
             raise InputError(f"{where}: {_short(cell)} is too large for a number")
         if _NOT_FINITE.fullmatch(cell):
             raise InputError(
-                f'{where}: got "{cell}", expected a finite number. Fill the gap or leave the row out.'
+                f'{where}: got "{_short(cell)}", expected a finite number.'
+                " Fill the gap or leave the row out."
             )
         raise InputError(f'{where}: got "{_short(cell)}", expected a number')
 
@@ -187,6 +188,7 @@ def _split(lines: Iterable[str], separator: str) -> Iterator[list[str]]:
     return csv.reader(lines, delimiter=separator, skipinitialspace=True)
 
 
+_ODD = re.compile('[_"]')  # what float() would take and we would not, or has to be unpacked
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)|n/?a|#\S+", re.IGNORECASE)
 

@@ -11,7 +11,7 @@ from typing import Self, TextIO
 
 import numpy as np
 
-from condyle.motion.whole_file import whole_file
+from condyle.atomic import replacing
 
 Column = np.ndarray | Sequence[str] | Sequence[float]
 
@@ -37,7 +37,7 @@ class TableWriter:
 
     def __enter__(self) -> Self:
         with ExitStack() as stack:
-            temporary = stack.enter_context(whole_file(self.path))
+            temporary = stack.enter_context(replacing(self.path))
             self._file = stack.enter_context(open(temporary, "w", encoding="utf-8", newline=""))
             self._open = stack.pop_all()
         return self
@@ -78,7 +78,7 @@ def write_table(path: str | os.PathLike[str], columns: Mapping[str, Column]) -> 
 
 
 class _NothingWritten(Exception):
-    """Tells `whole_file` to drop a file that never got a header."""
+    """Tells `replacing` to drop a file that never got a header."""
 
 
 def _lines(values: Sequence[np.ndarray]) -> list[str]:

@@ -207,6 +207,4 @@ def axial_force(
     spin = y * beta_rate
     spin_rate = y_rate * beta_rate + y * beta_acceleration
     gain = axial * inverse_length**2
-    return gain * (
-        (y * inverse_p) * spin_rate * ca.cross(Y, e) - (inverse_length**2 * spin) * turn
-    )
+    return gain * ((y * inverse_p) * spin_rate * ca.cross(Y, e) - (inverse_length**2 * spin) * turn)

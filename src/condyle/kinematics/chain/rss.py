@@ -36,7 +36,7 @@ class RSSFamily(Family):
     effort_unit = "N m"
     # `level` and `steep` span the crank plane, level[2] = 0: one constant fewer in the hot path.
     # C and N are C_i0 and N_i0; Y is the second axis of N.
-    shapes = {  # noqa: RUF012 - ClassVar stands in the base
+    shapes = {
         "G": 3,
         "level": 2,
         "steep": 3,
@@ -163,9 +163,7 @@ class RSSFamily(Family):
             - c.mass * (1 - c.com) * ca.dot(t, g)
             - ca.dot(t, axial)
         )
-        coupler = (
-            m_MM * A + m_SM * S_acceleration - c.mass * c.com * g + axial + J * crank_torque
-        )
+        coupler = m_MM * A + m_SM * S_acceleration - c.mass * c.com * g + axial + J * crank_torque
         crank = J * (c.crank * acceleration)
         forces = {"cranks": crank, "couplers": coupler}
         return Law(forces, J, root / c.L**2, rate, acceleration)

@@ -1,0 +1,5 @@
+"""`python -m condyle`."""
+
+from .cli import main
+
+main()

@@ -1,0 +1,54 @@
+"""The command line: one thin file a command, errors on stderr with exit status 2."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+from .. import __version__
+from ..errors import CondyleError
+
+MAIN, LOOK, MAKE = "Compute", "Look", "Files and upkeep"
+
+app = typer.Typer(
+    name="condyle",
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+    help=(
+        "Dynamics of redundantly actuated parallel mechanisms whose platform the base also holds "
+        "at point contacts."
+    ),
+    epilog="Start with [bold]condyle run[/bold]: it solves the bundled chewing robot.",
+)
+
+
+def _version(value: bool) -> None:
+    if value:
+        typer.echo(f"condyle {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    pass
+
+
+def main() -> None:
+    """Entry point of the `condyle` command."""
+    from . import commands  # noqa: F401 - registers them
+
+    try:
+        app()
+    except CondyleError as error:
+        print(f"condyle: {error}", file=sys.stderr)
+        sys.exit(2)
+    except BrokenPipeError:
+        sys.stderr.close()
+        sys.exit(1)

@@ -1,0 +1,62 @@
+"""What several commands do first and last."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from ..errors import BoundsError, InputError
+
+if TYPE_CHECKING:
+    from ..motion import Load, Motion
+
+
+def motion_and_load(
+    motion: Path | None,
+    load: Path | None,
+    units: str = "m,rad",
+    landmark: str | None = None,
+    smooth: str | None = None,
+    rate: float | None = None,
+) -> tuple[Motion, Load]:
+    """The files named, or the reference case where none is."""
+    from ..motion import Load, Motion, bundled_reference
+
+    reference_path, reference_load = bundled_reference()
+    if motion is None and units != "m,rad":
+        raise InputError("--units is for a motion of your own; name it with --motion")
+    if load is not None:
+        acting = Load.from_csv(load)
+    else:
+        acting = Load.from_csv(reference_load) if motion is None else Load.zero()
+    path = Motion.from_csv(
+        motion or reference_path, units=units, landmark=landmark, cutoff=smooth, rate=rate
+    )
+    return path, acting
+
+
+def say(quiet: bool, text: str) -> None:
+    if not quiet:
+        typer.echo(text)
+
+
+def warn(warnings: list[str]) -> None:
+    """Warnings on stderr, so that they never mix with results."""
+    for warning in warnings:
+        print(f"condyle: warning: {warning}", file=sys.stderr)
+
+
+def say_json(data: Mapping[str, Any]) -> None:
+    typer.echo(json.dumps(data, indent=2, allow_nan=False))
+
+
+def require_inside(warnings: list[str]) -> None:
+    """Raises BoundsError if a contact left its bounds (`--strict`)."""
+    outside = [w for w in warnings if "leaves its bounds" in w]
+    if outside:
+        raise BoundsError("; ".join(outside) + ". Without --strict this is a warning", [])

@@ -1,0 +1,23 @@
+"""condyle reference: the bundled motion and load as files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .app import MAKE, app
+
+
+@app.command(rich_help_panel=MAKE)
+def reference(
+    out: Annotated[Path, typer.Option(help="Folder for the files.")] = Path(),
+) -> None:
+    """Write the reference chewing path and bite force. Both are synthetic, not measured."""
+    from ..motion import write_reference
+
+    out.mkdir(parents=True, exist_ok=True)
+    for path in write_reference(out):
+        typer.echo(f"Wrote {path}")
+    typer.echo("Next: condyle run --motion " + str(out / "chewing-incisor.csv"))

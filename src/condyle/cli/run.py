@@ -1,0 +1,63 @@
+"""condyle run: the main job."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from . import options
+from .app import MAIN, app
+from .inputs import motion_and_load, require_inside, say, say_json, warn
+
+
+@app.command(rich_help_panel=MAIN)
+def run(
+    mechanism: options.Mechanism = "masticatory",
+    motion: options.Motion = None,
+    load: options.Load = None,
+    load_point: options.LoadPoint = None,
+    formulation: options.Formulation = "virtual_power",
+    route: options.Route = "core",
+    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("results"),
+    units: options.Units = "m,rad",
+    landmark: options.Landmark = None,
+    smooth: options.Smooth = None,
+    rate: options.Rate = None,
+    figures: Annotated[bool, typer.Option("--figures", help="Draw figures too.")] = False,
+    strict: options.Strict = False,
+    flag: options.Flag = False,
+    quiet: options.Quiet = False,
+    as_json: options.Json = False,
+) -> None:
+    """Torques of a mechanism along a motion under a load.
+
+    Without arguments: the bundled chewing robot, a synthetic chewing path and bite force.
+    """
+    import condyle
+
+    from ..summary import summarize
+
+    machine = condyle.load(mechanism)
+    path, acting = motion_and_load(motion, load, units, landmark, smooth, rate)
+    model = condyle.derive(machine, formulation, route)
+    solution = model.solve(path, acting, load_point, flag)
+    if strict:
+        require_inside(solution.warnings)
+    out.mkdir(parents=True, exist_ok=True)
+    files = [out / f"{machine.name}.nc", out / f"{machine.name}.csv"]
+    for file in files:
+        solution.save(file)
+    if figures:
+        from ..report.figures import save_solution_figures
+
+        files += save_solution_figures(solution, out)
+    warn(solution.warnings)
+    summary = summarize(solution)
+    if as_json:
+        say_json(summary.data | {"files": [str(f) for f in files]})
+        return
+    say(quiet, str(summary))
+    say(quiet, "\nResults: " + ", ".join(str(f) for f in files))
+    say(quiet, "Next: condyle compare (all models side by side), condyle run --figures")

@@ -1,0 +1,96 @@
+"""What a mechanism is: freedoms, dependent coordinates, residuals, singularity at home."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..kinematics.chain import FAMILIES
+from ..kinematics.singularity import KINDS
+from ..mechanism.home import home_residuals
+from ..mechanism.mechanism import Mechanism
+from ..model import Model
+
+
+@dataclass(frozen=True)
+class Description:
+    """A mechanism at home; `data` for programs, `str` for people."""
+
+    data: dict[str, Any]
+
+    def __str__(self) -> str:
+        d, s = self.data, self.data["singularity"]
+        width = max(len(name) for name in [*d["chains"], *d["contacts"]])
+        lines = [
+            f"{d['name']}: {len(d['chains'])} chains, {len(d['contacts'])} contacts, "
+            f"{d['degrees_of_freedom']} degrees of freedom, "
+            f"actuation redundancy {d['redundancy']}",
+            f"independent coordinates: {', '.join(d['independent'])}",
+            f"dependent coordinates:   {', '.join(d['dependent']) or 'none'}",
+            f"characteristic length:   {d['characteristic_length'] * 1e3:.3f} mm "
+            "(mean distance of platform joints and contact points from O_M)",
+            "chains",
+        ]
+        for name, chain in d["chains"].items():
+            lines.append(
+                f"  {name:<{width}}  {chain['kind']}, joint [{chain['joint_unit']}], effort "
+                f"[{chain['effort_unit']}], transmission at home {chain['transmission']:+.4f}"
+            )
+        if d["contacts"]:
+            lines.append("contacts")
+        for name, contact in d["contacts"].items():
+            lines.append(
+                f"  {name:<{width}}  {contact['kind']}, {contact['residual'] * 1e3:+.2g} mm off "
+                "its surface at home"
+            )
+        sigma = ", ".join(f"{v:.4g}" for v in s["J_W_sigma"])
+        lines += [
+            "singularity at home (dimensionless)",
+            f"  J_W: rank {s['J_W_rank']} of {d['degrees_of_freedom']}, singular values {sigma}, "
+            f"condition {s['J_W_condition']:.4g}",
+            f"  J_A: smallest over largest {s['J_A_ratio']:.4g}",
+            f"  near: {s['near']}",
+        ]
+        return "\n".join(lines)
+
+
+def describe(mechanism: Mechanism) -> Description:
+    """Describe a mechanism at home."""
+    model = Model(mechanism)
+    posture = model.posture(np.zeros((1, 6)))
+    s = posture.singularity
+    m = mechanism.degrees_of_freedom
+    return Description(
+        {
+            "name": mechanism.name,
+            "degrees_of_freedom": m,
+            "redundancy": len(mechanism.chains) - m,
+            "independent": list(model.independent),
+            "dependent": list(model.dependent),
+            "characteristic_length": s.length,
+            "chains": {
+                chain.name: {
+                    "kind": chain.kind,
+                    "joint_unit": FAMILIES[chain.kind].joint_unit,
+                    "effort_unit": FAMILIES[chain.kind].effort_unit,
+                    "transmission": float(s.transmission[0, i]),
+                }
+                for i, chain in enumerate(mechanism.chains)
+            },
+            "contacts": {
+                contact.name: {"kind": contact.surface.kind, "residual": float(residual)}
+                for contact, residual in zip(
+                    mechanism.contacts, home_residuals(mechanism), strict=True
+                )
+            },
+            "singularity": {
+                "J_W_sigma": [float(v) for v in s.J_W_sigma[0]],
+                "J_W_rank": int(s.rank[0]),
+                "J_W_condition": float(min(s.condition[0], 1e300)),
+                "J_A_ratio": float(s.inverse_ratio[0]),
+                "near": KINDS[int(s.kind()[0])],
+            },
+        }
+    )

@@ -1,0 +1,106 @@
+"""Independent states, one a row: a file in, a file out, in flat memory."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from .errors import BoundsError, InputError
+from .mechanism.mechanism import COORDINATES
+from .model import STATUS_NAMES, Model, with_point
+from .motion import Table, TableWriter, iter_table
+from .solution import BOUND_TOLERANCE, WRENCH, bound_margins, named_columns
+
+CHUNK_ROWS = 65536
+
+
+def solve_file(
+    model: Model,
+    states: str | Path,
+    out: str | Path,
+    load_point: str | None = None,
+    flag: bool = False,
+    strict: bool = False,
+) -> tuple[int, list[str]]:
+    """Solve every row of a states file; the output appears whole or not at all.
+
+    Rows never influence each other.
+
+    Args:    states: CSV with 6 - k pose coordinates, their rates dX... and accelerations
+             ddX..., and optionally Fx, Fy, Fz, Mx, My, Mz.
+    Returns: number of rows, and warnings.
+    Raises:  InputError, UnreachableError, SingularError, BoundsError: nothing is written then.
+    """
+    known = [p + name for p in ("", "d", "dd") for name in COORDINATES] + list(WRENCH)
+    worst: dict[str, tuple[float, int, int]] = {}
+    rows = 0
+    with TableWriter(out) as writer:
+        for table in iter_table(states, CHUNK_ROWS, known=known):
+            columns, margins = solve_table(model, table, load_point, flag, rows)
+            for i, name in enumerate(model.mechanism.contact_names):
+                outside = np.flatnonzero(margins[:, i] < -BOUND_TOLERANCE)
+                if outside.size:
+                    row = int(outside[np.argmin(margins[outside, i])])
+                    depth, count, at = worst.get(name, (0.0, 0, 0))
+                    if -margins[row, i] > depth:
+                        depth, at = -margins[row, i], rows + row + 1
+                    worst[name] = (depth, count + outside.size, at)
+            writer.write(columns)
+            rows += table.rows
+        warnings = [
+            f'contact "{name}" is outside its bounds in {count} rows, by up to '
+            f"{depth * 1e3:.3g} mm in row {at}"
+            for name, (depth, count, at) in worst.items()
+        ]
+        if strict and warnings:
+            raise BoundsError("; ".join(warnings) + ". Without --strict this is a warning", [])
+    return rows, warnings
+
+
+def solve_table(
+    model: Model, table: Table, load_point: str | None, flag: bool, first_row: int
+) -> tuple[dict[str, np.ndarray | list[str]], np.ndarray]:
+    """Output columns for the rows of one table, and the contacts' bound margins, (N, k)."""
+    names = state_coordinates(model, table)
+    q, q1, q2 = (table.require([p + name for name in names]) for p in ("", "d", "dd"))
+    q, q1, q2 = model.independent_states(names, q, q1, q2)
+    wrench = np.zeros((table.rows, 6))
+    point = np.zeros(3)
+    for part, group in ((slice(0, 3), WRENCH[:3]), (slice(3, 6), WRENCH[3:])):
+        if any(name in table.columns for name in group):
+            wrench[:, part] = table.require(group)
+    if load_point is not None or "Fx" in table.columns:
+        point = model.load_point(load_point)
+    evaluation = model.evaluate(q, q1, q2, with_point(wrench, point))
+    ok = evaluation.status == 0
+    if not flag and not ok.all():
+        model.require_ok(evaluation, row_offset=first_row)
+    mechanism = model.mechanism
+    values = {
+        "tau_": (mechanism.chain_names, evaluation.torques.torque),
+        "contact_": (mechanism.contact_names, evaluation.torques.contact_force),
+        "": (COORDINATES, evaluation.poses.pose),
+        "joint_": (mechanism.chain_names, evaluation.posture.joint),
+    }
+    columns: dict[str, np.ndarray | list[str]] = {}
+    for prefix, (labels, array) in values.items():
+        assert array is not None
+        columns |= named_columns(prefix, labels, np.where(ok[:, None], array, np.nan))
+    if flag:
+        columns["status"] = [STATUS_NAMES[i] for i in evaluation.status]
+    margins = bound_margins(mechanism, evaluation.posture.contact_point)
+    return columns, np.where(ok[:, None], margins, np.inf)
+
+
+def state_coordinates(model: Model, table: Table) -> list[str]:
+    """The pose coordinates that a states file gives."""
+    names = [name for name in COORDINATES if name in table.columns]
+    m = model.mechanism.degrees_of_freedom
+    if len(names) != m:
+        raise InputError(
+            f"{table.source}: got the pose coordinates {', '.join(names) or 'none'}; a state of "
+            f"this mechanism has {m}, such as {', '.join(model.independent)}, with their rates "
+            "(dX ...) and accelerations (ddX ...)"
+        )
+    return names

@@ -1,0 +1,95 @@
+"""A solution in a few lines."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .solution import Solution
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a run found; `data` for programs, `str` for people."""
+
+    data: dict[str, Any]
+
+    def __str__(self) -> str:
+        d = self.data
+        width = max(map(len, [*d["peak_effort"], *d["peak_contact_force"]]))
+        lines = [
+            f"{d['mechanism']}: {d['samples']} samples, {d['time'][0]:g} to {d['time'][1]:g} s, "
+            f"{d['formulation']}/{d['route']}, {d['seconds']:.2f} s",
+            "peak effort",
+            *(f"  {name:<{width}}  {v:10.5g} {u}" for name, (v, u) in d["peak_effort"].items()),
+        ]
+        if d["peak_contact_force"]:
+            lines.append("peak contact force (negative: the surface pushes along -n)")
+            lines += [
+                f"  {name:<{width}}  {v[0]:10.5g} to {v[1]:.5g} N"
+                for name, v in d["peak_contact_force"].items()
+            ]
+        near = d["closest_to_singularity"]
+        if near is not None:
+            lines.append(
+                f"closest to a singularity: ratio {near['ratio']:.4g} at t = {near['time']:g} s; "
+                f"{d['samples_near_singularity']} samples below 1e-3"
+            )
+        for name, bound in d["closest_to_bounds"].items():
+            lines.append(
+                f"closest to the bounds: {name}, {bound['margin'] * 1e3:.4g} mm "
+                f"{'inside' if bound['margin'] >= 0 else 'OUTSIDE'} at t = {bound['time']:g} s"
+            )
+        if d["failed_samples"]:
+            lines.append(f"samples without a result: {d['failed_samples']}")
+        return "\n".join(lines)
+
+
+def summarize(solution: Solution) -> Summary:
+    """Samples, time, peaks, and the closest approach to singularities and bounds."""
+    time = solution["time"].values
+    torque, contact = solution["torque"].values, solution["contact_force"].values
+    ok = solution["status"].values == 0
+    units = solution["effort_unit"].values
+    margins, ratio = solution["bound_margin"].values, solution["singularity_ratio"].values
+    options = solution.options
+    some = bool(ok.any())
+    bounds = {}
+    for i, name in enumerate(solution["contact"].values):
+        if some and np.isfinite(margins[ok, i]).any():
+            k = int(np.nanargmin(margins[:, i]))
+            bounds[str(name)] = {"margin": float(margins[k, i]), "time": float(time[k])}
+    closest = int(np.nanargmin(ratio)) if some else None
+    return Summary(
+        {
+            "mechanism": solution.attrs["mechanism_name"],
+            "samples": len(time),
+            "failed_samples": int((~ok).sum()),
+            "time": [float(time[0]), float(time[-1])],
+            "formulation": options["formulation"],
+            "route": options["route"],
+            "seconds": options["solve_seconds"],
+            "peak_effort": {
+                str(name): [float(np.nanmax(np.abs(torque[:, i]))) if some else None, str(units[i])]
+                for i, name in enumerate(solution["chain"].values)
+            }
+            if some
+            else {},
+            "peak_contact_force": {
+                str(name): [float(np.nanmin(contact[:, i])), float(np.nanmax(contact[:, i]))]
+                for i, name in enumerate(solution["contact"].values)
+            }
+            if some
+            else {},
+            "closest_to_singularity": None
+            if closest is None
+            else {"ratio": float(ratio[closest]), "time": float(time[closest])},
+            "samples_near_singularity": int((solution["singularity"].values != 0).sum()),
+            "closest_to_bounds": bounds,
+            "warnings": json.loads(solution.attrs["warnings"]),
+        }
+    )

@@ -1,0 +1,73 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from condyle.errors import InputError
+from condyle.motion import Load
+
+
+def test_a_file_gives_force_and_moment_in_si(csv_file):
+    load = Load.from_csv(csv_file("Fz,t,Fx,Fy,Mz,Mx,My\n3,0,1,2,6,4,5\n0,1,0,0,0,0,0\n"), "molar")
+    np.testing.assert_array_equal(load.wrench[0], [1, 2, 3, 4, 5, 6])
+    np.testing.assert_allclose(load.at([0.25]), [[0.75, 1.5, 2.25, 3, 3.75, 4.5]])
+    assert load.point == "molar"
+
+
+def test_without_moments_they_are_zero(csv_file):
+    load = Load.from_csv(csv_file("t,Fx,Fy,Fz\n0,1,2,3\n1,1,2,3\n"))
+    np.testing.assert_array_equal(load.at([0, 1]), [[1, 2, 3, 0, 0, 0]] * 2)
+    assert load.point is None
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("t,Fx,Fy\n0,1,2\n", 'column "Fz" is missing'),
+        ("t,Fx,Fy,Fz,Mx\n0,1,2,3,4\n", 'columns "My", "Mz" are missing'),
+        ("Fx,Fy,Fz\n1,2,3\n", 'column "t" is missing'),
+        ("t,Fx,Fy,Fz,fz\n0,1,2,3,4\n", 'column "fz" is not known here'),
+        ("t,Fx,Fy,Fz\n0,1,2,3\n0,1,2,3\n", "line 3: t is 0.0 s after 0.0 s"),
+    ],
+)
+def test_what_is_no_load_is_refused(csv_file, content, message):
+    with pytest.raises(InputError, match=message):
+        Load.from_csv(csv_file(content))
+
+
+def test_times_that_the_load_does_not_cover_are_named():
+    load = Load.from_arrays([1, 2], np.ones((2, 3)), source="bite.csv")
+    with pytest.raises(InputError, match="no load at 0 to 1 s and 2 to 5 s") as caught:
+        load.at([0, 1.5, 5])
+    assert str(caught.value).startswith("bite.csv: runs from 1 to 2 s, but the motion from 0 to 5")
+    with pytest.raises(InputError, match="no load at 3 to 4 s"):
+        load.at([3, 4])
+    assert load.at([1 - 1e-12, 2 + 1e-12]).shape == (2, 6)  # rounding is forgiven
+    assert load.at([]).shape == (0, 6)
+
+
+def test_constant_and_zero_loads_hold_at_all_times():
+    load = Load.constant([1, 2, 3], [4, 5, 6], "molar")
+    np.testing.assert_array_equal(load.at([-1e9, 1e9]), [[1, 2, 3, 4, 5, 6]] * 2)
+    np.testing.assert_array_equal(Load.zero().at([0.0, 1.0]), np.zeros((2, 6)))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (([0, 1], np.ones((2, 2))), r"force has shape \(2, 2\), expected \(2, 3\)"),
+        (([0, 1], np.ones((2, 3)), np.ones(3)), "moment has shape"),
+        (([0, 1], np.full((2, 3), np.nan)), "not finite"),
+        (([0, 1], [["a", "b", "c"]] * 2), "not made of numbers"),
+        (([], np.ones((0, 3))), "no samples"),
+        (([1, 0], np.ones((2, 3))), "sample 1: t is 0.0 s after 1.0 s"),
+    ],
+)
+def test_arrays_that_are_no_load_are_refused(arguments, message):
+    with pytest.raises(InputError, match=message):
+        Load.from_arrays(*arguments)
+
+
+def test_a_constant_load_of_the_wrong_shape_is_refused():
+    with pytest.raises(InputError, match="force has shape"):
+        Load.constant([1, 2])

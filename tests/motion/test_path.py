@@ -1,0 +1,146 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from condyle.errors import InputError
+from condyle.motion import POSE, Motion, write_table
+
+T = np.linspace(0, 2, 201)
+
+
+def wobble(t, phase=0.0):
+    return 1e-2 * np.sin(7 * t + phase) * np.exp(-t)
+
+
+def test_columns_say_what_the_motion_is():
+    column = wobble(T)
+    path = Motion.from_arrays(T, dict.fromkeys("zyx", column))
+    assert (path.kind, path.names, path.landmark) == ("landmark", ("x", "y", "z"), "incisor")
+    pose = Motion.from_arrays(T, dict.fromkeys(reversed(POSE), column))
+    assert (pose.kind, pose.names, pose.landmark) == ("pose", POSE, None)
+    some = Motion.from_arrays(T, dict.fromkeys(["beta", "X"], column))
+    assert (some.kind, some.names, some.landmark) == ("coordinates", ("beta", "X"), None)
+    molar = Motion.from_arrays(T, np.column_stack([column] * 3), "xyz", landmark="left_molar")
+    assert molar.landmark == "left_molar" and molar.value.shape == (201, 3) and len(molar) == 201
+
+
+@pytest.mark.parametrize(
+    ("header", "message"),
+    [
+        ("t", "got only t; expected pose coordinates"),
+        ("X,Y", 'column "t" is missing'),
+        ("t,x,z", "a landmark's path also needs y"),
+        ("t,x,y,z,X", "not both"),
+        ("t,X,Y,alpa", 'column "alpa" is not known here. Did you mean "alpha"'),
+        ("t,X,dX", 'column "dX" is not known here'),
+    ],
+)
+def test_columns_that_are_no_motion_are_refused(csv_file, header, message):
+    rows = "".join(",".join([str(i)] * len(header.split(","))) + "\n" for i in range(9))
+    with pytest.raises(InputError, match=message):
+        Motion.from_csv(csv_file(f"{header}\n{rows}"))
+
+
+@pytest.mark.parametrize(
+    ("t", "message"),
+    [
+        ([0, 1, 2, 3, 4], "5 rows, expected at least 6"),
+        ([0, 1, 2, 2, 4, 5], "line 5: t is 2.0 s after 2.0 s; times must rise"),
+        ([0, 1, 2, 1, 4, 5], "line 5: t is 1.0 s after 2.0 s; times must rise"),
+    ],
+)
+def test_times_must_rise_and_be_six(csv_file, t, message):
+    with pytest.raises(InputError, match=message):
+        Motion.from_csv(csv_file("t,X\n" + "".join(f"{time},0\n" for time in t)))
+    with pytest.raises(InputError, match=message.replace("line 5", "motion, sample 3")):
+        Motion.from_arrays(t, {"X": np.zeros(len(t))})
+
+
+@pytest.mark.parametrize(
+    ("values", "options", "message"),
+    [
+        ({"X": T[:-1]}, {}, r'"X" has shape \(200,\), expected \(201,\)'),
+        ({"X": [*T[:7], np.nan, *T[8:]]}, {}, 'sample 7: "X" is nan'),
+        ({"X": ["a"] * 201}, {}, '"X" is not a series of numbers'),
+        (np.zeros((201, 2)), {"names": ["X"]}, "different name"),
+        (np.zeros((201, 2)), {"names": ["X", "X"]}, "different name"),
+        (np.zeros((201, 1)), {"names": ["X", "X"]}, "different name"),
+        (np.zeros(201), {}, "expected .samples, columns."),
+        ({"X": T}, {"landmark": "incisor"}, "a landmark's path has x, y, z"),
+        ({"X": T}, {"rate": 200, "times": T}, "expected one of them"),
+        ({"X": T}, {"rate": 0}, "rate: got 0"),
+        ({"X": T}, {"rate": 1e12}, "would give 2e"),
+        ({"X": T}, {"times": [0.5, 2.5]}, "must lie within 0 to 2 s"),
+        ({"X": T}, {"times": []}, "must lie within"),
+        ({"X": T}, {"times": [0.5, 0.5]}, "times must rise"),
+        ({"X": T}, {"units": "inch"}, "not a unit"),
+        ({"X": T * 1e305}, {}, "too extreme"),
+    ],
+)
+def test_arrays_and_options_that_cannot_be_used_are_refused(values, options, message):
+    with pytest.raises(InputError, match=message):
+        Motion.from_arrays(T, values, **options)
+
+
+def test_a_quintic_and_its_derivatives_are_exact_on_uneven_samples():
+    rng = np.random.default_rng(3)
+    t = np.sort(rng.uniform(-1, 1, 40))
+    p = np.polynomial.Polynomial(rng.standard_normal(6))
+    motion = Motion.from_arrays(t, {"X": p(t)}, rate=77)
+    np.testing.assert_allclose(motion.value[:, 0], p(motion.t), atol=1e-11)
+    np.testing.assert_allclose(motion.rate[:, 0], p.deriv(1)(motion.t), atol=1e-9)
+    np.testing.assert_allclose(motion.acceleration[:, 0], p.deriv(2)(motion.t), atol=1e-6)
+
+
+def test_the_spline_meets_its_samples_and_the_true_derivatives():
+    motion = Motion.from_arrays(T, {"X": wobble(T), "beta": wobble(T, 1.0)})
+    np.testing.assert_allclose(motion.value[:, 1], wobble(T, 1.0), atol=1e-17)
+    z = 7j - 1  # wobble is the imaginary part of exp(z t)
+    true = 1e-2 * np.imag(z**2 * np.exp(z * T))
+    np.testing.assert_allclose(motion.acceleration[:, 0], true, atol=2e-5 * np.abs(true).max())
+
+
+@pytest.mark.parametrize("cutoff", [None, 12.0])
+def test_rate_and_acceleration_are_the_derivatives_of_what_is_returned(cutoff):
+    h, middle = 1e-5, np.linspace(0.1, 1.9, 50)
+    noisy = wobble(T) + 1e-5 * np.random.default_rng(0).standard_normal(201)
+    below, at, above = (
+        Motion.from_arrays(T, {"X": noisy}, times=middle + d, cutoff=cutoff) for d in (-h, 0, h)
+    )
+    rate = (above.value - below.value) / (2 * h)
+    acceleration = (above.rate - below.rate) / (2 * h)
+    np.testing.assert_allclose(at.rate, rate, atol=1e-6 * np.abs(rate).max())
+    np.testing.assert_allclose(
+        at.acceleration, acceleration, atol=1e-5 * np.abs(acceleration).max()
+    )
+
+
+@pytest.mark.parametrize("start", [0.0, 0.3, 1.7e9])
+@pytest.mark.parametrize("cutoff", [None, "auto"])
+def test_output_grids_meet_in_the_same_numbers(start, cutoff):
+    noise = 1e-5 * np.random.default_rng(1).standard_normal(201)
+    columns = {"X": wobble(T) + noise, "alpha": wobble(T, 2.0)}
+    fine, coarse = (
+        Motion.from_arrays(start + T, columns, rate=rate, cutoff=cutoff) for rate in (1000, 200)
+    )
+    assert len(fine) == 2001 and len(coarse) == 401
+    np.testing.assert_array_equal(fine.t[::5], coarse.t)
+    for name in ("value", "rate", "acceleration"):
+        a, b = getattr(fine, name)[::5], getattr(coarse, name)
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-12 * np.abs(a).max())
+
+
+def test_a_grid_stays_within_the_input():
+    motion = Motion.from_arrays(T, {"X": T}, rate=30.3)
+    assert motion.t[-1] <= T[-1] and len(motion) == 61
+
+
+def test_units_of_a_file_become_si(csv_file):
+    t = np.arange(9) / 10
+    path = csv_file("")
+    write_table(path, {"t": t, "beta": 90 * t, "X": 50 * t})
+    motion = Motion.from_csv(path, units="mm,deg")
+    np.testing.assert_allclose(motion.value, np.column_stack([np.pi / 2 * t, 0.05 * t]))
+    np.testing.assert_allclose(motion.rate, [[np.pi / 2, 0.05]] * 9)
+    assert motion.source == str(path)

@@ -1,0 +1,77 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from condyle.errors import InputError
+from condyle.motion import AUTO_CUTOFF, Motion, reference_motion
+from condyle.motion.smoothing import smoothing_spline
+
+T = np.linspace(0, 4, 2001)
+
+
+@pytest.mark.parametrize("frequency", [1, 5, 8, 10, 12, 20, 60])
+def test_the_gain_is_that_of_a_fourth_order_filter_both_ways_and_nothing_shifts(frequency):
+    wave = np.cos(2 * np.pi * frequency * T)[:, None]
+    out = smoothing_spline(T, wave, 10.0)(T)[600:1400]
+    gain = np.linalg.lstsq(wave[600:1400], out, rcond=None)[0].item()
+    assert gain == pytest.approx(1 / (1 + (2**0.5 - 1) * (frequency / 10) ** 8), abs=0.012)
+    if frequency == 10:
+        assert gain == pytest.approx(0.5**0.5, abs=1e-4)
+    np.testing.assert_allclose(out, gain * wave[600:1400], atol=1e-3)
+
+
+def test_a_cubic_passes_unchanged_up_to_the_ends_and_on_uneven_times():
+    t = np.sort(np.random.default_rng(0).uniform(0, 5, 1000))
+    t -= t[0]
+    cubic = (t**3 - 2 * t)[:, None]
+    np.testing.assert_allclose(smoothing_spline(t, cubic, 8.0)(t), cubic, atol=1e-9)
+
+
+def test_noise_goes_and_the_motion_stays_to_its_acceleration():
+    clean = reference_motion()
+    noise = 5e-5 * np.random.default_rng(2).standard_normal(clean.value.shape)
+    options = {"names": clean.names, "cutoff": "auto"}
+    measured = Motion.from_arrays(clean.t, clean.value + noise, **options)
+    inner = slice(100, -100)
+    largest = np.abs(clean.acceleration).max()
+    error = np.abs(measured.acceleration - clean.acceleration)[inner].max()
+    raw = Motion.from_arrays(clean.t, clean.value + noise, names=clean.names)
+    assert error < 0.15 * largest
+    assert np.abs(raw.acceleration - clean.acceleration)[inner].max() > 100 * largest
+
+
+def test_the_removed_part_is_reported():
+    slow, fast = 1e-2 * np.sin(2 * np.pi * T), 1e-4 * np.sin(2 * np.pi * 60 * T)
+    motion = Motion.from_arrays(T, {"X": slow + fast, "alpha": slow}, cutoff="auto")
+    report = motion.smoothing
+    assert report is not None and report.cutoff == AUTO_CUTOFF and report.automatic
+    assert report.names == motion.names
+    assert report.rms[0] == pytest.approx(1e-4 / 2**0.5, rel=0.01)
+    assert report.peak[0] == pytest.approx(1e-4, rel=0.1)
+    assert report.rms[1] < 1e-7
+    assert str(report).startswith("smoothing at 10 Hz removed X 0.07")
+    assert not Motion.from_arrays(T, {"X": slow}, cutoff=8).smoothing.automatic
+    assert Motion.from_arrays(T, {"X": slow}).smoothing is None
+
+
+@pytest.mark.parametrize(
+    ("samples", "cutoff", "message"),
+    [
+        (2001, 250.0, "must be below half the sampling rate, 250 Hz"),
+        (50, 10.0, "needs a recording of at least 0.2 s"),
+        (2001, 0, "expected a frequency in Hz above 0"),
+        (2001, float("nan"), "expected a frequency"),
+        (2001, "often", "got 'often', expected a frequency in Hz above 0, or \"auto\""),
+    ],
+)
+def test_cut_offs_that_cannot_be_used_are_refused(samples, cutoff, message):
+    t = T[:samples]
+    with pytest.raises(InputError, match=message):
+        Motion.from_arrays(t, {"X": t}, cutoff=cutoff)
+
+
+def test_a_gap_in_the_recording_bounds_the_cut_off():
+    t = np.delete(T, range(1000, 1050))
+    with pytest.raises(InputError, match=r"longest step is 0\.102 s"):
+        Motion.from_arrays(t, {"X": t}, cutoff="auto")

@@ -1,0 +1,147 @@
+from __future__ import annotations
+
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from condyle.errors import InputError
+from condyle.motion.table import iter_table, read_table
+
+PLAIN = "t,x,y\n0,1.5,-2\n0.5,2.5e-3,+.25\n"
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        PLAIN,
+        PLAIN.rstrip("\n"),
+        PLAIN.replace("\n", "\r\n"),
+        PLAIN.replace("\n", "\r"),
+        "\ufeff" + PLAIN,
+        PLAIN.encode("utf-16"),
+        "\n\n" + PLAIN + "\n\n\n",
+        PLAIN + ",,\n , , \n",
+        PLAIN.replace(",", " , "),
+        PLAIN.replace(",", ";"),
+        PLAIN.replace(",", "\t"),
+        PLAIN.replace(",", ";").replace(".", ","),
+        PLAIN.replace(",", "\t").replace(".", ","),
+        "sep=;\r\n" + PLAIN.replace(",", ";").replace(".", ","),
+        't, "x" ,y\n"0","1.5","-2"\n0.5, "2.5e-3",.25\n',
+        't,x,y\n0,"1,5",-2\n"0,5","2,5e-3","0,25"\n',
+    ],
+    ids=str,
+)
+def test_the_ways_programs_and_spreadsheets_write_a_table(csv_file, content):
+    table = read_table(csv_file(content))
+    assert table.names == ("t", "x", "y") and table.rows == 2
+    np.testing.assert_array_equal(table.require("yxt"), [[-2, 1.5, 0], [0.25, 2.5e-3, 0.5]])
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("", "is empty"),
+        ("\n \n", "is empty"),
+        ("t,x\n", "no rows"),
+        ("t,x\n,\n\n", "no rows"),
+        ("0,1\n1,2\n", "line 1: got numbers, expected the names"),
+        ("t,x,\n0,1,2\n", "line 1: column 3 of 3 has no name"),
+        ("t,x,x\n0,1,2\n", 'line 1: column "x" is given more than once'),
+        ("t,x\n0,1\n1,abc\n", 'line 3, column "x": got "abc", expected a number'),
+        ("t,x\n0,1\n1,1_0\n", 'line 3, column "x": got "1_0", expected a number'),
+        ("t,x\n0,1\n1,\u0662\n", "expected a number"),
+        ("t,x\n0,1\n1,1 000\n", 'got "1 000", expected a number'),
+        ("t,x\n0,0x10\n", 'got "0x10", expected a number'),
+        ("t,x\n0,1\n1,nan\n", 'line 3, column "x": got "nan", expected a finite number'),
+        ("t,x\n0,-Inf\n", 'got "-Inf", expected a finite number'),
+        ("t,x\n0,#DIV/0!\n", "expected a finite number"),
+        ("t,x\n0,1e999\n", "1e999 is too large"),
+        ("t,x\n0,1\n1,\n", 'line 3, column "x": the cell is empty'),
+        ("t,x\n0,1\n\n2,1\n", "line 3: is empty, but rows follow"),
+        ("t,x\n0,1\n,\n2,1\n", "line 3: is empty, but rows follow"),
+        ("\nt,x\n0,1\n1\n", "line 4: 1 cells, expected 2"),
+        ("t,x\n0,1\n1,2,3\n4\n", "line 3: 3 cells, expected 2 (t, x). Decimal commas need semi"),
+        ('t,x\n0,"1\n1,2\n', "line 2: a quotation mark is not closed"),
+        ('t,x\n0,1\n1,"2', "line 3: a quotation mark is not closed"),
+        ("t;x\n0;1.5\n1;2,5\n", 'line 3, column "x": got "2,5" where the numbers before have "."'),
+        ("t;x\n0;1,5\n1;1.000,5\n", "expected a number"),
+        ("t,x\n0," + "9" * 200_000 + "\n", "line 2: cannot be read"),
+        (b"t,x\n0,\xff\n", "is not UTF-8 text"),
+        (b"t,x\n\0\0\0", "is not text"),
+        (b"PK\x03\x04 and so on", "spreadsheet or zip file"),
+    ],
+)
+def test_what_is_not_a_table_of_numbers_is_refused(csv_file, content, message):
+    with pytest.raises(InputError) as caught:
+        read_table(csv_file(content))
+    assert message in str(caught.value)
+    assert "data.csv" in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_sign_that_changes_between_chunks_is_found(csv_file):
+    path = csv_file("t;x\n0;1,5\n1;2.5\n")
+    with pytest.raises(InputError, match=r'line 3, column "x": got "2\.5" where'):
+        list(iter_table(path, chunk_rows=1))
+
+
+def test_a_missing_file_is_named_with_its_folder_and_its_neighbours(csv_file, tmp_path):
+    csv_file(PLAIN, "chewing.csv")
+    with pytest.raises(InputError) as caught:
+        read_table(tmp_path / "chewin.csv")
+    assert f"no such file in {tmp_path}. Did you mean chewing.csv?" in str(caught.value)
+    with pytest.raises(InputError, match=r"the folder .* does not exist"):
+        read_table(tmp_path / "nowhere" / "chewing.csv")
+    with pytest.raises(InputError, match="is a folder"):
+        read_table(tmp_path)
+    with pytest.raises(InputError, match="not the name of a file"):
+        read_table("a\0b")
+
+
+def test_columns_are_required_and_allowed_by_name(csv_file):
+    path = csv_file("t,alfa,x\n0,1,text\n")
+    with pytest.raises(InputError, match=r'column "alfa" is not known here\. Did you mean "alpha"'):
+        read_table(path, known=("t", "alpha", "x"))  # told before the text in x
+    table = read_table(csv_file("t,alpha\n0,1\n"))
+    with pytest.raises(
+        InputError, match=r'columns "beta", "gamma" are missing.*Available: alpha, t'
+    ):
+        table.require(["t", "beta", "gamma"])
+    with pytest.raises(InputError, match='"alpha" is not known here'):
+        table.allow(["t"])
+
+
+@pytest.mark.parametrize("chunk_rows", [1, 3, 7, 1000])
+def test_chunks_join_to_the_whole_and_know_their_lines(csv_file, chunk_rows):
+    rows = "".join(f"{i},{i / 7:.17g}\n" for i in range(20))
+    path = csv_file("\nt,x\n" + rows + "\n" * 9)
+    chunks = list(iter_table(path, chunk_rows))
+    x = np.concatenate([chunk.columns["x"] for chunk in chunks])
+    np.testing.assert_array_equal(x, np.arange(20) / 7)
+    assert [c.first_line for c in chunks] == list(range(3, 23, chunk_rows))
+    assert chunks[0].where(0) == f"{path}, line 3"
+
+
+def test_an_error_in_a_late_chunk_names_the_line_of_the_file(csv_file):
+    path = csv_file("t,x\n" + "0,1\n" * 10 + "0,one\n")
+    chunks = iter_table(path, 4)
+    assert [next(chunks).rows, next(chunks).rows] == [4, 4]
+    with pytest.raises(InputError, match="line 12"):
+        next(chunks)
+
+
+def test_reading_in_chunks_takes_flat_memory(csv_file):
+    path: Path = csv_file("t,x\n" + "0.125,-17.25\n" * 100_000)
+    tracemalloc.start()
+    rows = sum(chunk.rows for chunk in iter_table(path, 1000))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert rows == 100_000 and peak < 1.5e6
+
+
+@pytest.mark.parametrize("chunk_rows", [1, 2, 3])
+def test_an_empty_line_at_the_end_of_a_chunk_is_still_between_rows(csv_file, chunk_rows):
+    with pytest.raises(InputError, match="line 4: is empty, but rows follow"):
+        list(iter_table(csv_file("t,x\n0,1\n1,1\n\n\n2,1\n"), chunk_rows))
