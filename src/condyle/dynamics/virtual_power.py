@@ -37,4 +37,5 @@ class VirtualPower:
         return state.B.T @ ca.vertcat(force, moment)
 
     def chain(self, family: Family, c: Constants, M: PointMotion, g: ca.SX) -> Law:
-        return family.law(c, M.position, M.velocity, M.acceleration, g)
+        law = family.law(c, M.position, M.velocity, M.acceleration, g)
+        return law.with_end_masses(M.acceleration, g)

@@ -33,5 +33,4 @@ def _repeated(a: np.ndarray, count: int) -> np.ndarray:
 def _samples(output: ca.DM, count: int) -> np.ndarray:
     """(rows, columns * N) as CasADi maps it, to (N, rows * columns) column by column."""
     dense = np.asarray(ca.densify(output).full())
-    rows = dense.shape[0]
-    return dense.T.reshape(count, -1) if dense.size else np.zeros((count, rows))
+    return dense.T.reshape(count, -1) if dense.size else np.zeros((count, 0))

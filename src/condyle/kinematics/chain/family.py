@@ -15,7 +15,7 @@ Numbers of a chain enter as named constants, so that one expression serves every
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import casadi as ca
@@ -77,7 +77,9 @@ class Loop:
 class Law:
     """Forces of a chain's bodies on M, (3,) each, and the joint's motion.
 
-    forces: body name -> force dual to M' (inertia less gravity).
+    forces:     body name -> force dual to M' (inertia less gravity).
+    end_masses: body name -> constant mass at M whose force, end_mass (M'' - g), `forces` leaves
+                out: it can be folded into the platform's inertia once for all samples.
     """
 
     forces: dict[str, ca.SX]
@@ -85,6 +87,14 @@ class Law:
     reach: ca.SX
     rate: ca.SX
     acceleration: ca.SX
+    end_masses: dict[str, ca.SX] = field(default_factory=dict)
+
+    def with_end_masses(self, A: ca.SX, g: ca.SX) -> Law:
+        """The same law with the end masses among the forces."""
+        forces = dict(self.forces)
+        for name, mass in self.end_masses.items():
+            forces[name] += mass * (A - g)
+        return replace(self, forces=forces, end_masses={})
 
 
 class Family(ABC):

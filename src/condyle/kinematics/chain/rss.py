@@ -163,10 +163,10 @@ class RSSFamily(Family):
             - c.mass * (1 - c.com) * ca.dot(t, g)
             - ca.dot(t, axial)
         )
-        coupler = m_MM * A + m_SM * S_acceleration - c.mass * c.com * g + axial + J * crank_torque
+        coupler = m_SM * (S_acceleration - g) + axial + J * crank_torque
         crank = J * (c.crank * acceleration)
         forces = {"cranks": crank, "couplers": coupler}
-        return Law(forces, J, root / c.L**2, rate, acceleration)
+        return Law(forces, J, root / c.L**2, rate, acceleration, {"couplers": m_MM})
 
     def explain(self, chain: Any, pose: np.ndarray) -> str:
         c = self.constants(chain)
