@@ -6,7 +6,7 @@ Rules from formats.md. {S} is fixed, {M} at the platform's mass centre and equal
 from __future__ import annotations
 
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -52,8 +52,10 @@ class Chain:
     N0: Array  # (3, 3), columns are the axes of N_i0
     length: float  # of the rod; at home for SPS
     rods: tuple[Rod, ...]
-    G: Array | None = None  # crank pivot
-    axis: Array | None = None  # shaft (RSS, perpendicular to the crank) or rail (PSS), unit
+    G: Array = field(default_factory=lambda: np.zeros(3))  # crank pivot (RSS)
+    axis: Array = field(
+        default_factory=lambda: np.zeros(3)
+    )  # shaft (RSS, perpendicular to the crank) or rail (PSS), unit
     drive: float = 0.0  # crank inertia [kg m^2] or slider mass [kg]
 
 

@@ -111,7 +111,8 @@ class MujocoEngine:
         return J
 
     def coordinates(self, pose: Array) -> Array:
-        motion, parts = platform_motion(pose), [pose]
+        motion = platform_motion(pose)
+        parts: list[Array | list[float]] = [pose]
         for chain in self.d.chains:
             P = motion.point(chain.M)[0]
             travel, S = joint(chain, P)

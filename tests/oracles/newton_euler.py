@@ -9,6 +9,7 @@ Ry X. It comes from the base: a guide.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -133,13 +134,13 @@ def _rod_body(
 def _chain(chain: Chain, P: Path, gravity: Array) -> tuple[list[Body], list[Link], Array]:
     """Bodies, links and (joint coordinate, rate, acceleration) of a chain."""
     S, x = drive_motion(chain, P)
-    R, *spin, guide = rod_motion(chain, P - S)
+    R, omega, omega_rate, guide = rod_motion(chain, P - S)
     name, every, axis, still = chain.name, np.eye(3), R[:, 0], np.zeros(3)
     if chain.kind == "SPS":
         cylinder, piston = f"{name}.cylinder", f"{name}.piston"
         bodies = [
-            _rod_body(cylinder, chain.rods[0], S, R, *spin, gravity),
-            _rod_body(piston, chain.rods[1], P, R, *spin, gravity),
+            _rod_body(cylinder, chain.rods[0], S, R, omega, omega_rate, gravity),
+            _rod_body(piston, chain.rods[1], P, R, omega, omega_rate, gravity),
         ]
         links = [
             Link(f"{name}.S", cylinder, "base", S.x, force=every),
@@ -165,7 +166,7 @@ def _chain(chain: Chain, P: Path, gravity: Array) -> tuple[list[Body], list[Link
         Link(f"{name}.guide", rod, "base", S.x, moment=guide[:, None]),
         Link(f"{name}.M", "platform", rod, P.x, force=every),
     ]
-    return [body, _rod_body(rod, chain.rods[0], S, R, *spin, gravity)], links, x
+    return [body, _rod_body(rod, chain.rods[0], S, R, omega, omega_rate, gravity)], links, x
 
 
 def _columns(links: list[Link], bodies: list[Body], size: float) -> Array:
@@ -194,7 +195,7 @@ def inverse_dynamics(
     wrench: Array,
     load_point: str | Array | None = "right_molar",
     tau: Array | None = None,
-) -> dict[str, Array | dict[str, tuple[Array, Array]] | float]:
+) -> dict[str, Any]:
     """All forces of one sample, SI.
 
     Args:    wrench: force and moment on the platform at `load_point`, (6,) in {S};
@@ -210,7 +211,9 @@ def inverse_dynamics(
     """
     d = read(description)
     motion = platform_motion(*(np.asarray(x, float) for x in (pose, pose_rate, pose_acceleration)))
-    bodies, links, joints = [_platform(d, motion, wrench, load_point)], [], []
+    bodies = [_platform(d, motion, wrench, load_point)]
+    joints: list[Array] = []
+    links: list[Link] = []
     for chain in d.chains:
         more, joined, x = _chain(chain, Path(*motion.point(chain.M)), d.gravity)
         bodies, links, joints = bodies + more, links + joined, [*joints, x]
@@ -227,12 +230,11 @@ def inverse_dynamics(
     x = np.linalg.lstsq(A, b - A_tau @ tau, rcond=None)[0]
     gap = np.abs(A @ x + A_tau @ tau - b).max() / max(np.abs(b).max(), np.abs(x).max())
     forces = _named(reactions, x)
-    pushes = [forces[contact.name][0] for contact in d.contacts]
-    contact = [force @ n for force, n in zip(pushes, contact_normals(d, motion), strict=True)]
+    pushes = np.array([forces[c.name][0] for c in d.contacts]).reshape(-1, 3)
     position, rate, second = np.array(joints).T
     return {
         "tau": tau,
-        "contact": np.array(contact),
+        "contact": np.sum(pushes * contact_normals(d, motion), axis=1),
         "joint": position,
         "joint_rate": rate,
         "joint_acceleration": second,

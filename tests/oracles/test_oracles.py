@@ -201,6 +201,15 @@ def test_normals_point_up_or_outward() -> None:
     close(normal(read_surface({"surface": cylinder}, 1.0), above), across, 1e-15)
 
 
+def test_quadratic_in_millimetres() -> None:
+    table = {"kind": "quadratic", "offset": 2.0, "slope": [0.1, -0.2]}
+    table |= {"xx": 0.01, "xy": -0.02, "yy": 0.03}
+    x, y, z = 3.0, -4.0, 7.0
+    wanted = z - (2.0 + 0.1 * x - 0.2 * y + 0.01 * x * x - 0.02 * x * y + 0.03 * y * y)
+    got = read_surface({"surface": table}, 1e-3).value(1e-3 * np.array([x, y, z]))
+    assert got == pytest.approx(1e-3 * wanted, rel=1e-14)
+
+
 def test_surfaces_that_must_coincide() -> None:
     p = np.array([0.3, -0.2, 0.5])
 

@@ -16,6 +16,7 @@ from .quantities import (
     Fraction,
     Name,
     NonNegative,
+    NonNegativeLength,
     Point,
     Positive,
     Table,
@@ -51,6 +52,24 @@ def check_rod_inertia(axial: float, transverse: float | None) -> float:
 
 class Crank(Table):
     inertia: Positive = Field(description="about the shaft; its mass centre is on the shaft")
+
+
+class Slider(Table):
+    mass: NonNegative = Field(description="its mass centre is at its joint")
+
+
+class LegBody(Table):
+    """One of the two bodies of a telescopic leg, symmetric about the leg's line."""
+
+    mass: NonNegative
+    com: NonNegativeLength = Field(description="mass centre: distance from the body's own joint")
+    transverse: NonNegative = Field(description="central moment of inertia across the leg")
+    axial: NonNegative = Field(description="moment of inertia along the leg")
+
+    @field_validator("axial")
+    @classmethod
+    def _triangle(cls, axial: float, info: ValidationInfo) -> float:
+        return check_rod_inertia(axial, info.data.get("transverse"))
 
 
 class RotaryActuator(Table):
@@ -126,9 +145,62 @@ class RSS(ChainTable):
         return joint
 
 
+class PSS(ChainTable):
+    """A slider on a rail fixed in the base, and a rod with two ball joints; also called PUS."""
+
+    kind: Literal["PSS"]
+    base: Point = Field(description="the slider's joint S at home, in {S}")
+    axis: Direction = Field(description="rail direction, in {S}")
+    platform: Point = Field(description="platform joint M, in {M}")
+    slider: Slider
+    rod: Rod
+    actuator: LinearActuator = LinearActuator()
+
+    joint_unit: ClassVar[str] = "m"
+    effort_unit: ClassVar[str] = "N"
+
+    @field_validator("platform")
+    @classmethod
+    def _rod(cls, joint: Any, info: ValidationInfo) -> Any:
+        base, axis = info.data.get("base"), info.data.get("axis")
+        if base is None:
+            return joint
+        rod = np.subtract(joint, base)
+        check_rod_length(rod, "rod", "base")
+        if axis is not None:
+            sine = abs(np.dot(axis, rod)) / (np.linalg.norm(axis) * np.linalg.norm(rod))
+            if sine < NO_BRANCH:
+                raise ValueError(
+                    "the rod is perpendicular to the rail at home: there the slider has no "
+                    "branch, and its force no hold on the platform; move base or platform"
+                )
+        return joint
+
+
+class SPS(ChainTable):
+    """A telescopic leg, cylinder and piston, between two ball joints; also called UPS."""
+
+    kind: Literal["SPS"]
+    base: Point = Field(description="base joint B, in {S}")
+    platform: Point = Field(description="platform joint M, in {M}")
+    cylinder: LegBody = Field(description="the body at B")
+    piston: LegBody = Field(description="the body at M")
+    actuator: LinearActuator = LinearActuator()
+
+    joint_unit: ClassVar[str] = "m"
+    effort_unit: ClassVar[str] = "N"
+
+    @field_validator("platform")
+    @classmethod
+    def _leg(cls, joint: Any, info: ValidationInfo) -> Any:
+        if (base := info.data.get("base")) is not None:
+            check_rod_length(np.subtract(joint, base), "leg", "base")
+        return joint
+
+
 def check_rod_length(rod: np.ndarray, name: str, start: str) -> None:
     if not np.linalg.norm(rod):
         raise ValueError(f"the {name} has zero length: {start} and platform are the same point")
 
 
-Chain = Annotated[RSS, Field(discriminator="kind")]
+Chain = Annotated[RSS | PSS | SPS, Field(discriminator="kind")]

@@ -1,0 +1,1 @@
+"""What results mean side by side: indices, comparisons of models, the paper's numbers."""

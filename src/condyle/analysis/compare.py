@@ -1,0 +1,190 @@
+"""Every model on one motion: do they agree, and what does each cost?
+
+The formulations and routes come from `condyle.dynamics`. Beside the mechanism stands the same one
+without its contacts (the paper's 6RSS), whose platform makes the identical motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..dynamics import FORMULATIONS, ROUTES
+from ..dynamics import formulation as formulation_named
+from ..errors import UnsupportedError
+from ..mechanism.mechanism import Mechanism
+from ..model import Model, with_point
+from .indices import Indices, indices
+from .runs import Run, Samples, run_all
+
+if TYPE_CHECKING:
+    from ..motion import Load, Motion
+    from ..solution import Solution
+
+
+@dataclass(frozen=True)
+class Unavailable:
+    """A model that this mechanism cannot have, and why."""
+
+    label: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Largest difference of two runs, relative to the largest component along the motion."""
+
+    first: Run
+    second: Run
+    torque: float
+    contact_force: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All models of a mechanism on one motion.
+
+    solution:       by the first model; its motion is that of all.
+    runs:           with the contacts, in the order of the registries;  free_runs: without them.
+    unavailable:    the models that there are not.
+    free_condition: largest condition number of the dimensionless J_W without the contacts; nan
+                    where there are no free runs.
+    kernel:         name of what computed the numbers.
+    """
+
+    solution: Solution
+    runs: tuple[Run, ...]
+    free_runs: tuple[Run, ...]
+    unavailable: tuple[Unavailable, ...]
+    free_condition: float
+    kernel: str
+
+    @property
+    def mechanism(self) -> Mechanism:
+        return self.solution.mechanism
+
+    @property
+    def samples(self) -> int:
+        return self.solution.sizes["time"]
+
+    @property
+    def units(self) -> list[str]:
+        """Effort units of the chains, (n,)."""
+        return [str(unit) for unit in self.solution["effort_unit"].values]
+
+    def run(self, formulation: str, route: str, contacts: bool = True) -> Run | None:
+        """The run of that model, or None."""
+        for one in self.runs if contacts else self.free_runs:
+            if (one.formulation, one.route) == (formulation, route):
+                return one
+        return None
+
+    def differences(self, contacts: bool = True) -> list[Difference]:
+        """Every two runs against each other."""
+        return [
+            Difference(
+                a,
+                b,
+                relative_difference(a.torque, b.torque, self.units),
+                relative_difference(a.contact_force, b.contact_force),
+            )
+            for a, b in combinations(self.runs if contacts else self.free_runs, 2)
+        ]
+
+    def indices(self, contacts: bool = True) -> list[Indices]:
+        """The indices of eq. (67), from the first run; one entry for each effort unit."""
+        runs = self.runs if contacts else self.free_runs
+        parts = [str(part) for part in self.solution["part"].values]
+        return indices(runs[0].share, parts, self.units) if runs else []
+
+    def __str__(self) -> str:
+        from ..report.tables import comparison_text
+
+        return comparison_text(self)
+
+
+def compare(
+    mechanism: Mechanism,
+    motion: Motion,
+    load: Load | None = None,
+    load_point: str | None = None,
+    formulations: Sequence[str] | None = None,
+) -> Comparison:
+    """Compute one motion by every formulation and route, with and without the contacts.
+
+    Args:   motion, load, load_point: as in `Model.solve`.
+            formulations: names; all by default.
+    Raises: UnreachableError, SingularError: for samples that cannot be computed.
+            InputError: for an unknown formulation, or a motion or load that does not fit.
+    """
+    names = [formulation_named(name).name for name in formulations or FORMULATIONS]
+    # The first derivation also pays for imports, so it is not one of those that are timed.
+    model = Model(mechanism, names[0], "core")
+    solution = model.solve(motion, load, load_point)
+    samples = samples_of(model, solution)
+    models, unavailable = [], []
+    for name in names:
+        for route in ROUTES:
+            try:
+                models.append(Model(mechanism, name, route))
+            except UnsupportedError as error:
+                unavailable.append(Unavailable(f"{name} {route}", str(error)))
+
+    condition = float("nan")
+    if reason := why_not_free(mechanism):
+        unavailable.append(Unavailable("without contacts", reason))
+    else:
+        free = mechanism.replace(contacts=(), dependent=None)
+        models += [Model(free, name, "core") for name in names]
+        posture = models[-1].posture(samples.pose)
+        condition = float(posture.singularity.condition.max())
+    runs = run_all(models, samples)
+    held = bool(mechanism.contacts)
+    return Comparison(
+        solution,
+        tuple(one for one in runs if one.contacts == held),
+        tuple(one for one in runs if one.contacts != held),
+        tuple(unavailable),
+        condition,
+        model.kernel.name,
+    )
+
+
+def samples_of(model: Model, solution: Solution) -> Samples:
+    """The motion and load of a solution."""
+    wrench, name = solution["load"].values, solution.options["load_point"]
+    point = model.load_point(name) if name is not None or wrench.any() else np.zeros(3)
+    motion = (solution[v].values for v in ("pose", "pose_rate", "pose_acceleration"))
+    return Samples(*motion, with_point(wrench, point))
+
+
+def why_not_free(mechanism: Mechanism) -> str | None:
+    """Why there is nothing to compare with the contacts removed, or None."""
+    if not mechanism.contacts:
+        return "the mechanism has no contacts to remove"
+    if len(mechanism.chains) < 6:
+        return (
+            f"a platform without contacts has 6 degrees of freedom, and {len(mechanism.chains)} "
+            "chains cannot drive them"
+        )
+    return None
+
+
+def relative_difference(a: np.ndarray, b: np.ndarray, units: Sequence[str] | None = None) -> float:
+    """max |a - b| over the largest component of either, both (N, n); the worst of the units.
+
+    Samples that are not finite in both (at a singularity) are left out.
+    """
+    good = np.isfinite(a).all(axis=1) & np.isfinite(b).all(axis=1)
+    kinds = np.array(units if units is not None else [""] * a.shape[1])
+    worst = 0.0
+    for unit in set(kinds):
+        x, y = a[good][:, kinds == unit], b[good][:, kinds == unit]
+        size = max(np.abs(x).max(initial=0.0), np.abs(y).max(initial=0.0))
+        if size > 0:
+            worst = max(worst, float(np.abs(x - y).max() / size))
+    return worst

@@ -1,0 +1,37 @@
+/* The batch: blocks of W samples, read from columns of any stride, written to columns. */
+
+/* in:     INPUTS columns with a common element stride.
+ * out:    OUTPUTS columns of doubles, `columns` apart.
+ * status: 0 ok, 1 unreachable, 2 to be looked at again (near a singularity).  */
+void batch(const double *restrict table, const double *const *in, ptrdiff_t stride, size_t count,
+           double *restrict out, size_t columns, uint8_t *restrict status) {
+    double packed[INPUTS][W];
+    const double *here[INPUTS];
+    vec result[OUTPUTS];
+    for (size_t start = 0; start < count; start += W) {
+        size_t some = count - start < W ? count - start : W;
+        size_t at = start;
+        const double *const *from = in;
+        if (stride != 1 || some < W) {
+            for (int k = 0; k < INPUTS; k++) {
+                for (size_t i = 0; i < W; i++) {
+                    size_t sample = start + (i < some ? i : some - 1);
+                    packed[k][i] = in[k][(ptrdiff_t)sample * stride];
+                }
+                here[k] = packed[k];
+            }
+            from = here, at = 0;
+        }
+        step(table, from, at, result);
+        if (some == W) {
+            for (int k = 0; k < RESULTS; k++) store(out + (size_t)k * columns + start, result[SLOT(k)]);
+        } else {
+            for (int k = 0; k < RESULTS; k++)
+                for (size_t i = 0; i < some; i++) out[(size_t)k * columns + start + i] = result[SLOT(k)][i];
+        }
+        for (size_t i = 0; i < some; i++) {
+            double margin = result[MARGIN][i], quality = result[QUALITY][i];
+            status[start + i] = !(margin >= 0) ? 1 : margin < NEAR || !(quality >= NEAR) ? 2 : 0;
+        }
+    }
+}

@@ -1,0 +1,137 @@
+/* Vectors of doubles for the generated kernels: W lanes, by GCC's and Clang's vector types.
+ *
+ * W is 8 (AVX-512), 4 (AVX2) or 2 (SSE2, NEON); the same text compiles for all of them. */
+#include <math.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+#if defined(__x86_64__) || defined(__i386__)
+#include <immintrin.h>
+#endif
+
+#ifndef W
+#if defined(__AVX512F__)
+#define W 8
+#elif defined(__AVX2__)
+#define W 4
+#else
+#define W 2
+#endif
+#endif
+
+typedef double vec __attribute__((vector_size(8 * W)));
+typedef int64_t mask __attribute__((vector_size(8 * W)));
+typedef double unaligned __attribute__((vector_size(8 * W), aligned(8)));
+#define INLINE static inline __attribute__((always_inline))
+
+INLINE vec load(const double *p) { return *(const unaligned *)p; }
+INLINE void store(double *p, vec v) { *(unaligned *)p = v; }
+INLINE vec spread(double x) { return x - (vec){}; }
+INLINE vec choose(mask m, vec a, vec b) { return (vec)((m & (mask)a) | (~m & (mask)b)); }
+INLINE vec fabs_v(vec a) { return (vec)((mask)a & INT64_MAX); }
+INLINE double fabs_s(double a) { return fabs(a); }
+INLINE double fmin_s(double a, double b) { return a < b ? a : b; }
+INLINE double fmax_s(double a, double b) { return a > b ? a : b; }
+#if W == 8 && defined(__AVX512F__)
+INLINE vec fmin_v(vec a, vec b) { return (vec)_mm512_min_pd((__m512d)a, (__m512d)b); }
+INLINE vec fmax_v(vec a, vec b) { return (vec)_mm512_max_pd((__m512d)a, (__m512d)b); }
+#else
+INLINE vec fmin_v(vec a, vec b) { return choose(a < b, a, b); }
+INLINE vec fmax_v(vec a, vec b) { return choose(a > b, a, b); }
+#endif
+
+/* 1 / sqrt(a): an estimate of 14 bits and two steps of Newton where the processor has one. */
+#if W == 8 && defined(__AVX512F__)
+INLINE vec rsqrt_v(vec a) {
+    vec y = (vec)_mm512_rsqrt14_pd((__m512d)a);
+    vec h = 0.5 * a;
+    y = y * (1.5 - h * y * y);
+    vec e = 0.5 - h * y * y;
+    return y + y * e;
+}
+INLINE vec sqrt_v(vec a) { return (vec)_mm512_sqrt_pd((__m512d)a); }
+#elif W == 4 && defined(__AVX__)
+INLINE vec sqrt_v(vec a) { return (vec)_mm256_sqrt_pd((__m256d)a); }
+INLINE vec rsqrt_v(vec a) { return 1.0 / sqrt_v(a); }
+#else
+INLINE vec sqrt_v(vec a) {
+    for (int i = 0; i < W; i++) a[i] = __builtin_sqrt(a[i]);
+    return a;
+}
+INLINE vec rsqrt_v(vec a) { return 1.0 / sqrt_v(a); }
+#endif
+INLINE double sqrt_s(double a) { return __builtin_sqrt(a); }
+INLINE double rsqrt_s(double a) { return 1.0 / __builtin_sqrt(a); }
+
+/* Sum and minimum over the lanes. */
+#if W == 8 && defined(__AVX512F__)
+INLINE double lanes_sum(vec v) { return _mm512_reduce_add_pd((__m512d)v); }
+INLINE double lanes_least(vec v) { return _mm512_reduce_min_pd((__m512d)v); }
+#else
+INLINE double lanes_sum(vec v) {
+    double s = v[0];
+    for (int i = 1; i < W; i++) s += v[i];
+    return s;
+}
+INLINE double lanes_least(vec v) {
+    double s = v[0];
+    for (int i = 1; i < W; i++) s = fmin_s(s, v[i]);
+    return s;
+}
+#endif
+
+/* Sine and cosine: reduction by pi/2 in three parts, then minimax polynomials (Cephes). Full
+ * accuracy for |x| < 2^20; beyond that, and for what is not finite, the library's. */
+#define TURNS_LIMIT 1048576.0
+#define POLYNOMIALS                                                                              \
+    s = r + r * z * (-1.66666666666666307295e-1 + z * (8.33333333332211858878e-3 + z *           \
+        (-1.98412698295895385996e-4 + z * (2.75573136213857245213e-6 + z *                       \
+        (-2.50507477628578072866e-8 + z * 1.58962301576546568060e-10)))));                       \
+    c = 1.0 - 0.5 * z + z * z * (4.16666666666665929218e-2 + z * (-1.38888888888730564116e-3 +   \
+        z * (2.48015872888517045348e-5 + z * (-2.75573141792967388112e-7 + z *                   \
+        (2.08757008419747316778e-9 - z * 1.13585365213876817300e-11)))));
+
+INLINE void sincos_s(double x, double *sine, double *cosine) {
+    if (__builtin_expect(!(fabs(x) < TURNS_LIMIT), 0)) {
+        *sine = sin(x), *cosine = cos(x);
+        return;
+    }
+    double n = x * 6.36619772367581382433e-1 + 6755399441055744.0;
+    int64_t turns;
+    memcpy(&turns, &n, 8);
+    n -= 6755399441055744.0;
+    double r = ((x - n * 1.57079625129699707031) - n * 7.54978941586159635335e-8)
+               - n * 5.39030285815811905290e-15;
+    double z = r * r, s, c;
+    POLYNOMIALS
+    double a = turns & 1 ? c : s, b = turns & 1 ? s : c;
+    *sine = turns & 2 ? -a : a;
+    *cosine = (turns + 1) & 2 ? -b : b;
+}
+
+INLINE void sincos_v(vec x, vec *sine, vec *cosine) {
+    vec n = x * 6.36619772367581382433e-1 + 6755399441055744.0;
+    mask turns = (mask)n;
+    n -= 6755399441055744.0;
+    vec r = ((x - n * 1.57079625129699707031) - n * 7.54978941586159635335e-8)
+            - n * 5.39030285815811905290e-15;
+    vec z = r * r, s, c;
+    POLYNOMIALS
+    mask odd = -(turns & 1);
+    vec a = choose(odd, c, s), b = choose(odd, s, c);
+    vec sin_x = (vec)((mask)a ^ ((turns & 2) << 62));
+    vec cos_x = (vec)((mask)b ^ (((turns + 1) & 2) << 62));
+    mask far = ~(fabs_v(x) < TURNS_LIMIT);
+    int64_t any = 0;
+    for (int i = 0; i < W; i++) any |= far[i];
+    if (__builtin_expect(any != 0, 0))
+        for (int i = 0; i < W; i++)
+            if (far[i]) sin_x[i] = sin(x[i]), cos_x[i] = cos(x[i]);
+    *sine = sin_x, *cosine = cos_x;
+}
+
+INLINE double atan2_s(double y, double x) { return atan2(y, x); }
+INLINE vec atan2_v(vec y, vec x) {
+    for (int i = 0; i < W; i++) y[i] = atan2(y[i], x[i]);
+    return y;
+}

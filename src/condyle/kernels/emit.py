@@ -1,0 +1,435 @@
+"""A program as C: one evaluation with chains in the lanes, and a batch with samples in them.
+
+    prepare(numbers, table)          what does not change from sample to sample, once
+    one(table, in, out)              least latency: shared values scalar, lane values vectors
+    batch(table, in, strides, ...)   most throughput: all values vectors over W samples
+
+Both shapes are printed from the same graph. `Shape` says what a value looks like in each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from importlib.resources import files
+
+from .graph import REDUCTIONS, Graph, Value, reachable
+from .program import Program
+
+LONG = 700  # lane operations above which chains run in a loop instead of unrolled
+
+_INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
+
+
+@dataclass
+class Table:
+    """Values that `prepare` computes: shared ones, then those of each group's lanes."""
+
+    shared: dict[Value, int] = field(default_factory=dict)
+    lanes: list[dict[Value, int]] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Source:
+    """Generated C and what a caller must know of it.
+
+    outputs: names and sizes, in the order in which `one` and `batch` write them.
+    operations: vector operations of one batch step; a fused multiply-add counts one.
+    """
+
+    text: str
+    outputs: list[tuple[str, int]]
+    operations: int
+
+
+def emit(program: Program, width: int) -> Source:
+    """The kernel's C for `width` lanes."""
+    g = program.graph
+    roots = [v for output in program.outputs for v in output.nodes]
+    order = _fused_order(g, roots)
+    table = _table(program, order)
+    printer = _Printer(program, order, table, width)
+    header = (files(__package__) / "c" / "vector.h").read_text(encoding="utf-8")
+    driver = (files(__package__) / "c" / "driver.h").read_text(encoding="utf-8")
+    pieces = [
+        f"#define W {width}",
+        header,
+        printer.prepare(),
+        printer.one(),
+        printer.batch(),
+        driver,
+    ]
+    counts = [count for _, count in program.spec.chains]
+    outputs: dict[str, int] = {}
+    for o in program.outputs:
+        outputs[o.name] = outputs.get(o.name, 0) + (sum(counts) if o.lane else 1)
+    return Source("\n".join(pieces), list(outputs.items()), printer.operations())
+
+
+def _fused_order(g: Graph, roots: list[Value]) -> list[Value]:
+    return reachable(g, roots)
+
+
+def _table(program: Program, order: list[Value]) -> Table:
+    """Fixed values that varying ones (or outputs) use."""
+    g = program.graph
+    table = Table(lanes=[{} for _ in program.spec.chains])
+    used = {a for v in order if g.nodes[v].varies for a in g.nodes[v].args}
+    used |= {v for o in program.outputs for v in o.nodes}
+    for v in order:
+        node = g.nodes[v]
+        if node.varies or v not in used or node.op == "const":
+            continue
+        slots = table.shared if node.group is None else table.lanes[node.group]
+        slots[v] = len(slots)
+    return table
+
+
+class _Printer:
+    def __init__(self, program: Program, order: list[Value], table: Table, width: int) -> None:
+        self.program, self.g, self.order, self.table = program, program.graph, order, table
+        self.width = width
+        self.counts = [count for _, count in program.spec.chains]
+        self.padded = [-(-count // width) * width for count in self.counts]
+        self.varying = [v for v in order if self.g.nodes[v].varies]
+        self.fixed = [v for v in order if not self.g.nodes[v].varies]
+        self.starts = []
+        start = len(table.shared)
+        for lanes, padded in zip(table.lanes, self.padded, strict=True):
+            self.starts.append(start)
+            start += len(lanes) * padded
+        self.table_size = start
+        self.lane_operations = sum(1 for v in self.varying if self.g.nodes[v].group is not None)
+
+    def operations(self) -> int:
+        """Vector operations of a batch step, a multiply and the add that consumes it counting one."""
+        g, uses = self.g, self._uses()
+        total = 0
+        for v in self.varying:
+            node = g.nodes[v]
+            copies = 1 if node.group is None else self.counts[node.group]
+            if node.op in ("add", "sub"):
+                fused = any(
+                    g.nodes[a].op == "mul" and g.nodes[a].varies and uses[a] == 1
+                    for a in node.args
+                )
+                total += 0 if fused else copies
+            elif node.op == "mul":
+                total += copies
+            elif node.op in ("neg", "input"):
+                continue
+            elif node.op in REDUCTIONS:
+                for t in node.args:
+                    group = g.nodes[t].group
+                    terms = 1 if group is None else self.counts[group]
+                    fused = g.nodes[t].op == "mul" and uses[t] == 1
+                    total += 0 if fused else terms
+            elif node.op in ("sin", "cos"):
+                total += 12  # half of a sincos
+            else:
+                total += copies
+        return total
+
+    def _uses(self) -> dict[Value, int]:
+        uses: dict[Value, int] = dict.fromkeys(self.order, 0)
+        for v in self.order:
+            for a in self.g.nodes[v].args:
+                uses[a] += 1
+        return uses
+
+    # -- what is fixed ---------------------------------------------------------------------
+
+    def prepare(self) -> str:
+        """Fixed values, scalar: shared ones once, lane ones for each chain."""
+        lines = ["void prepare(const double *par, const double *const *lane, double *table) {"]
+        arrays = [v for v in self.fixed if self.g.nodes[v].group is not None]
+        for v in arrays:
+            lines.append(f"  double x{v}[{self.counts[self.g.nodes[v].group]}];")  # type: ignore[index]
+        for v in self.fixed:
+            node = self.g.nodes[v]
+            if node.group is None:
+                lines.append(f"  const double x{v} = {self._fixed(v, '')};")
+            else:
+                loop = f"  for (int i = 0; i < {self.counts[node.group]}; i++)"
+                lines.append(f"{loop} x{v}[i] = {self._fixed(v, '[i]')};")
+        for v, slot in self.table.shared.items():
+            lines.append(f"  table[{slot}] = x{v};")
+        for group, slots in enumerate(self.table.lanes):
+            count, padded = self.counts[group], self.padded[group]
+            for v, slot in slots.items():
+                at = self.starts[group] + slot * padded
+                # Lanes without a chain repeat the first, and are multiplied away by `active`.
+                pad = "0.0" if self._is_active(v) else f"x{v}[0]"
+                lines.append(
+                    f"  for (int i = 0; i < {padded}; i++) "
+                    f"table[{at} + i] = i < {count} ? x{v}[i] : {pad};"
+                )
+        return "\n".join([*lines, "}", ""])
+
+    def _is_active(self, v: Value) -> bool:
+        node = self.g.nodes[v]
+        return node.op == "lane" and node.data[1] == 0
+
+    def _fixed(self, v: Value, index: str) -> str:
+        node = self.g.nodes[v]
+        if node.op == "parameter":
+            return f"par[{node.data[0]}]"
+        if node.op == "lane":
+            group, k = node.data
+            return f"lane[{group}][{k} * {self.counts[group]} + i]"  # type: ignore[index]
+        if node.op in REDUCTIONS:
+            terms = []
+            for t in node.args:
+                group = self.g.nodes[t].group
+                if group is None:
+                    terms.append(f"{sum(self.counts)} * x{t}")
+                    continue
+                terms += [f"x{t}[{i}]" for i in range(self.counts[group])]
+            if node.op == "sum":
+                return " + ".join(terms)
+            text = terms[0]
+            for term in terms[1:]:
+                text = f"fmin_s({text}, {term})"
+            return text
+        return self._operation(v, lambda a: self._fixed_name(a, index), "_s")
+
+    def _fixed_name(self, v: Value, index: str) -> str:
+        node = self.g.nodes[v]
+        if node.op == "const":
+            return _number(node.data[0])
+        return f"x{v}{index if node.group is not None else ''}"
+
+    # -- what varies -----------------------------------------------------------------------
+
+    def one(self) -> str:
+        blocks = [padded // self.width for padded in self.padded]
+        shape = _Shape("double", "_s", blocks, lane_table="load({} + {})", stride=self.width)
+        head = "void one(const double *restrict table, const double *restrict in, "
+        head += "double *restrict out) {"
+        return self._body(shape, head)
+
+    def batch(self) -> str:
+        shape = _Shape("vec", "_v", self.counts, lane_table="table[{} + {}]", stride=1)
+        head = "INLINE void step(const double *restrict table, const double *const *in, "
+        head += "size_t at, vec *restrict out) {"
+        return self._body(shape, head)
+
+    def _body(self, shape: _Shape, head: str) -> str:
+        self.shape = shape
+        phases = range(max(self.g.nodes[v].phase for v in self.varying) + 1)
+        lines = [head]
+        looped = self.lane_operations > LONG and max(shape.copies) > 1
+        self.arrays = self._kept() if looped else set()
+        for v in sorted(self.arrays):
+            lines.append(f"  vec x{v}_[{shape.copies[self.g.nodes[v].group]}];")  # type: ignore[index]
+        for phase in phases:
+            shared = [v for v in self.varying if self._in(v, phase, None)]
+            lines += [f"  {s}" for s in self._statements(shared, 0)]
+            for group, copies in enumerate(shape.copies):
+                lanes = [v for v in self.varying if self._in(v, phase, group)]
+                lines += self._lanes(lanes, group, copies, phase, looped)
+        return "\n".join([*lines, *self._outputs(), "}", ""])
+
+    def _in(self, v: Value, phase: int, group: int | None) -> bool:
+        node = self.g.nodes[v]
+        return node.phase == phase and node.group == group
+
+    def _lanes(
+        self, lanes: list[Value], group: int, copies: int, phase: int, looped: bool
+    ) -> list[str]:
+        """Statements of a group's lanes: unrolled copy by copy, or in a loop."""
+        if not lanes:
+            return []
+        if not looped:
+            return [f"  {s}" for c in range(copies) for s in self._statements(lanes, c)]
+        sums = [
+            (v, t)
+            for v in self.varying
+            if self.g.nodes[v].op in REDUCTIONS and self.g.nodes[v].phase == phase + 1
+            for t in self.g.nodes[v].args
+            if self.g.nodes[t].group == group
+        ]
+        lines = [f"  vec r{v}_{group};" for v, _ in sums]
+        lines.append(f"  for (int c = 0; c < {copies}; c++) {{")
+        lines += [f"    {s}" for s in self._statements(lanes, -1)]
+        for v, t in sums:
+            r, x = f"r{v}_{group}", self._name(t, -1)
+            add = f"{r} + {x}" if self.g.nodes[v].op == "sum" else f"fmin_v({r}, {x})"
+            lines.append(f"    {r} = c ? {add} : {x};")
+        lines += [f"    x{v}_[c] = {self._name(v, -1)};" for v in lanes if v in self.arrays]
+        return [*lines, "  }"]
+
+    def _kept(self) -> set[Value]:
+        """Lane values that a later phase or an output needs."""
+        kept = {v for o in self.program.outputs if o.lane for v in o.nodes}
+        for v in self.varying:
+            node = self.g.nodes[v]
+            if node.op not in REDUCTIONS:
+                kept |= {a for a in node.args if self.g.nodes[a].phase < node.phase}
+        return {v for v in kept if self.g.nodes[v].group is not None and self.g.nodes[v].varies}
+
+    def _statements(self, values: list[Value], copy: int) -> Iterator[str]:
+        pairs: set[Value] = set()
+        for v in values:
+            node = self.g.nodes[v]
+            kind = "vec" if node.group is not None else self.shape.shared
+            suffix = "_v" if kind == "vec" else "_s"
+            if node.op in ("sin", "cos"):
+                if v in pairs:
+                    continue
+                partner = self._partner(v, values)
+                pairs.add(partner if partner is not None else v)
+                s, c = self._target(v, copy), f"unused{v}_{max(copy, 0)}"
+                if partner is not None:
+                    c = self._target(partner, copy)
+                if node.op == "cos":
+                    s, c = c, s
+                a = self._name(node.args[0], copy)
+                if kind == "vec" and self.g.nodes[node.args[0]].group is None:
+                    a = f"({a})"
+                yield f"{kind} {s}, {c}; sincos{suffix}({a}, &{s}, &{c});"
+            else:
+                yield f"const {kind} {self._target(v, copy)} = {self._expression(v, copy, suffix)};"
+
+    def _partner(self, v: Value, values: list[Value]) -> Value | None:
+        node = self.g.nodes[v]
+        other = "cos" if node.op == "sin" else "sin"
+        for w in values:
+            if self.g.nodes[w].op == other and self.g.nodes[w].args == node.args:
+                return w
+        return None
+
+    def _target(self, v: Value, copy: int) -> str:
+        return f"x{v}" if self.g.nodes[v].group is None or copy < 0 else f"x{v}_{copy}"
+
+    def _name(self, v: Value, copy: int) -> str:
+        node = self.g.nodes[v]
+        if node.op == "const":
+            return _number(node.data[0])
+        if not node.varies:
+            if node.group is None:
+                return f"table[{self.table.shared[v]}]"
+            at = self.starts[node.group] + self.table.lanes[node.group][v] * self.padded[node.group]
+            index = "c" if copy < 0 else str(copy)
+            if self.shape.stride > 1:
+                index = f"{index} * {self.shape.stride}"
+                return f"load(table + {at} + {index})"
+            return f"table[{at} + {index}]"
+        if v in self.arrays and copy < 0 and node.phase < self._phase:
+            return f"x{v}_[c]"
+        return self._target(v, copy)
+
+    def _expression(self, v: Value, copy: int, suffix: str) -> str:
+        node = self.g.nodes[v]
+        self._phase = node.phase
+        if node.op == "input":
+            i = node.data[0]
+            return f"in[{i}]" if self.shape.shared == "double" else f"load(in[{i}] + at)"
+        if node.op in REDUCTIONS:
+            return self._reduction(v)
+        return self._operation(v, lambda a: self._name(a, copy), suffix)
+
+    def _operation(self, v: Value, name, suffix: str) -> str:  # noqa: ANN001
+        node = self.g.nodes[v]
+        if node.op in _INFIX:
+            a, b = (name(x) for x in node.args)
+            if node.op == "div" and a == "1.0" and self._is_sqrt(node.args[1]):
+                root = self.g.nodes[node.args[1]]
+                return f"rsqrt{suffix}({name(root.args[0])})"
+            return f"{a} {_INFIX[node.op]} {b}"
+        if node.op == "neg":
+            return f"-{name(node.args[0])}"
+        if node.op == "const":
+            return _number(node.data[0])
+        args = [name(a) for a in node.args]
+        if suffix == "_v":
+            # Functions take vectors; a shared operand has to be spread.
+            args = [
+                f"spread({text})" if self._is_scalar(a) else text
+                for a, text in zip(node.args, args, strict=True)
+            ]
+        if node.op in ("sin", "cos"):
+            return f"{node.op}({args[0]})"
+        return f"{node.op}{suffix}({', '.join(args)})"
+
+    def _is_sqrt(self, v: Value) -> bool:
+        return self.g.nodes[v].op == "sqrt" and self.g.nodes[v].varies
+
+    def _is_scalar(self, v: Value) -> bool:
+        """Whether a value is a plain double where a vector is being computed."""
+        node = self.g.nodes[v]
+        if node.op == "const":
+            return True
+        if not node.varies:
+            return node.group is None or self.shape.stride == 1
+        return node.group is None and self.shape.shared == "double"
+
+    def _reduction(self, v: Value) -> str:
+        node = self.g.nodes[v]
+        terms = []
+        for t in node.args:
+            group = self.g.nodes[t].group
+            if group is None:
+                times = sum(self.shape.copies)
+                terms.append(f"({times} * {self._name(t, 0)})" if node.op == "sum" else
+                             self._name(t, 0))
+            elif self.arrays or (self.lane_operations > LONG and max(self.shape.copies) > 1):
+                terms.append(f"r{v}_{group}")
+            else:
+                terms += [self._name(t, c) for c in range(self.shape.copies[group])]
+        if node.op == "sum":
+            text = " + ".join(terms)
+            return f"lanes_sum({text})" if self.shape.shared == "double" else text
+        text = terms[0]
+        for term in terms[1:]:
+            text = f"fmin_v({text}, {term})"
+        return f"lanes_least({text})" if self.shape.shared == "double" else text
+
+    def _outputs(self) -> Iterator[str]:
+        slot = 0
+        looped = bool(self.arrays)
+        for o in self.program.outputs:
+            if not o.lane:
+                name = self._name(o.nodes[0], 0)
+                if self.shape.shared == "vec" and self._is_scalar(o.nodes[0]):
+                    name = f"spread({name})"
+                yield f"  out[{slot}] = {name};"
+                slot += 1
+                continue
+            for group, v in enumerate(o.nodes):
+                for c in range(self.shape.copies[group]):
+                    name = f"x{v}_[{c}]" if looped else self._name(v, c)
+                    if self.shape.shared == "vec":
+                        if self._is_scalar(v):
+                            name = f"spread({name})"
+                        yield f"  out[{slot + c}] = {name};"
+                        continue
+                    used = min(self.width, self.counts[group] - c * self.width)
+                    yield f"  {{ vec t = {name}; "
+                    if used == self.width:
+                        yield f"    store(out + {slot + c * self.width}, t); }}"
+                    else:
+                        at = slot + c * self.width
+                        copies = " ".join(f"out[{at + i}] = t[{i}];" for i in range(used))
+                        yield f"    {copies} }}"
+                slot += self.counts[group]
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """How a shape prints values.
+
+    shared: type of shared values.  copies: of each group's statements.  stride: lanes a copy.
+    """
+
+    shared: str
+    suffix: str
+    copies: list[int]
+    lane_table: str
+    stride: int
+
+
+def _number(value: object) -> str:
+    assert isinstance(value, float)
+    text = repr(value)
+    return f"({text})" if value < 0 else text

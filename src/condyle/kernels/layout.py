@@ -1,0 +1,109 @@
+"""Where a kernel finds its numbers: sample inputs, parameters of the mechanism, lanes of chains."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from ..dynamics.equations import closed_branch, has_closed_form
+from ..kinematics.chain import FAMILIES
+from ..kinematics.contact import ContactSymbols
+from ..mechanism.mechanism import Mechanism
+from ..mechanism.surface import Plane
+from .spec import KernelSpec
+
+Slot = tuple[int, int]  # start, count
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Names to positions.
+
+    inputs:     names of the sample inputs, in order.
+    parameters: shared numbers of the mechanism.
+    lanes:      numbers of a chain, by group.
+    """
+
+    inputs: list[str]
+    parameters: dict[str, Slot]
+    lanes: list[dict[str, Slot]]
+    spec: KernelSpec
+
+    @staticmethod
+    def of(spec: KernelSpec) -> Layout:
+        names = ["q", "q1", "q2"]
+        inputs = [f"{name}_{i}" for name in names for i in range(spec.m)]
+        inputs += [f"force_{i}" for i in range(3)]
+        inputs += [f"moment_{i}" for i in range(3)] if spec.moment else []
+        sizes = {"gravity": 3, "mass": 1, "first_moment": 3, "inertia": 6, "load_point": 3}
+        sizes["branch"] = 1
+        for i, (_, count) in enumerate(spec.contacts):
+            sizes |= {f"contact_point_{i}": 3, f"contact_surface_{i}": count}
+        lanes = [
+            _slots({"active": 1, "joint": 3, "constants": FAMILIES[kind].size()})
+            for kind, _ in spec.chains
+        ]
+        return Layout(inputs, _slots(sizes), lanes, spec)
+
+    def contact_symbols(self, parameters: Callable[[str], ca.SX]) -> list[ContactSymbols]:
+        return [
+            ContactSymbols(
+                SURFACES[kind],
+                parameters(f"contact_point_{i}"),
+                parameters(f"contact_surface_{i}"),
+            )
+            for i, (kind, _) in enumerate(self.spec.contacts)
+        ]
+
+    def parameter_values(self, mechanism: Mechanism, load_point: np.ndarray) -> np.ndarray:
+        """Shared numbers of a mechanism and the point its load acts at."""
+        inertia = mechanism.platform.inertia
+        values: dict[str, object] = {
+            "gravity": mechanism.gravity,
+            "mass": mechanism.platform.mass,
+            "first_moment": np.zeros(3),
+            "inertia": [getattr(inertia, name) for name in ("xx", "yy", "zz", "xy", "xz", "yz")],
+            "load_point": load_point,
+            "branch": float(closed_branch(mechanism)) if has_closed_form(mechanism) else 1.0,
+        }
+        for i, contact in enumerate(mechanism.contacts):
+            values[f"contact_point_{i}"] = contact.point
+            values[f"contact_surface_{i}"] = contact.surface.constants()
+        return np.concatenate([np.ravel(values[name]) for name in self.parameters]).astype(float)
+
+    def lane_values(self, mechanism: Mechanism) -> list[np.ndarray]:
+        """Numbers of the chains, (size, count) a group."""
+        groups = []
+        for kind, _ in self.spec.chains:
+            family = FAMILIES[kind]
+            chains = [c for c in mechanism.chains if c.kind == kind]
+            rows = [
+                np.concatenate([[1.0], c.platform, family.vector(family.constants(c))])
+                for c in chains
+            ]
+            groups.append(np.array(rows).T)
+        return groups
+
+    def chain_order(self, mechanism: Mechanism) -> list[int]:
+        """Where each lane, group by group, stands among the mechanism's chains."""
+        return [
+            i
+            for kind, _ in self.spec.chains
+            for i, chain in enumerate(mechanism.chains)
+            if chain.kind == kind
+        ]
+
+
+# Surfaces only lend their equation here: the numbers are the kernel's inputs.
+SURFACES = {"plane": Plane(slope=(0.0, 0.0), offset=0.0)}
+
+
+def _slots(sizes: dict[str, int]) -> dict[str, Slot]:
+    slots, start = {}, 0
+    for name, count in sizes.items():
+        slots[name] = (start, count)
+        start += count
+    return slots

@@ -1,0 +1,319 @@
+"""The whole computation of one kernel, from the independent coordinates to the torques.
+
+One expression serves every chain of a family, with the chain's numbers as inputs: a `lane` value
+differs from chain to chain, a shared one does not, and `total` sums lanes. What is printed from
+this runs lanes in a vector register (one evaluation) or samples (a batch).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import casadi as ca
+
+from ..dynamics import FORMULATIONS
+from ..dynamics.formulation import Body
+from ..kinematics.chain import FAMILIES, Constants, Law
+from ..kinematics.contact import Placement, closed_form, indices
+from ..kinematics.parasitic import WholeMotion, whole_motion
+from ..kinematics.state import PointMotion, State, independent_state, pose_state, twist_state
+from .graph import Graph, Value, read
+from .layout import Layout
+from .spec import KernelSpec
+
+Lanes = list[ca.SX]  # one expression a family group
+
+
+@dataclass(frozen=True)
+class Output:
+    """A result: `nodes` is one node for a shared value, one a group for a lane value."""
+
+    name: str
+    lane: bool
+    nodes: tuple[Value, ...]
+
+
+@dataclass
+class Program:
+    """Inputs, definitions and outputs of a kernel as one graph."""
+
+    spec: KernelSpec
+    layout: Layout
+    graph: Graph = field(default_factory=Graph)
+    outputs: list[Output] = field(default_factory=list)
+    _free: list[ca.SX] = field(default_factory=list)
+    _known: dict[str, Value] = field(default_factory=dict)
+
+    def inputs(self, name: str, count: int) -> ca.SX:
+        start = self.layout.inputs.index(f"{name}_0") if count else 0
+        return self._symbols(name, [self.graph.leaf("input", start + i) for i in range(count)])
+
+    def parameters(self, name: str) -> ca.SX:
+        start, count = self.layout.parameters[name]
+        return self._symbols(name, [self.graph.leaf("parameter", start + i) for i in range(count)])
+
+    def lane_constants(self, group: int, name: str) -> ca.SX:
+        start, count = self.layout.lanes[group][name]
+        leaves = [self.graph.leaf("lane", group, start + i, group=group) for i in range(count)]
+        return self._symbols(f"{name}_{group}", leaves)
+
+    def total(self, terms: Sequence[ca.SX]) -> ca.SX:
+        """Sum over all chains, entry by entry; one term a group."""
+        return self._reduced("sum", terms)
+
+    def least(self, terms: Sequence[ca.SX]) -> ca.SX:
+        """Minimum over all chains; one term a group."""
+        return self._reduced("least", terms)
+
+    def let(self, expression: ca.SX) -> ca.SX:
+        """Symbols that stand for an expression, to differentiate with respect to."""
+        nodes = read(self.graph, [expression], self._known, self._free)[0]
+        return self._symbols(f"let{len(self._free)}", nodes)
+
+    def output(self, name: str, expressions: ca.SX | Lanes) -> None:
+        """Results, entry by entry; a list of expressions, one a group, is a lane value."""
+        lane = isinstance(expressions, list)
+        parts = expressions if isinstance(expressions, list) else [expressions]
+        nodes = read(self.graph, parts, self._known, self._free)
+        for entry in zip(*nodes, strict=True):
+            self.outputs.append(Output(name, lane, tuple(entry)))
+
+    def _reduced(self, op: str, terms: Sequence[ca.SX]) -> ca.SX:
+        nodes = read(self.graph, list(terms), self._known, self._free)
+        reduced = [self.graph.reduce(op, entry) for entry in zip(*nodes, strict=True)]
+        return self._symbols(f"{op}{len(self._free)}", reduced)
+
+    def _symbols(self, name: str, nodes: Sequence[Value]) -> ca.SX:
+        symbols = [ca.SX.sym(f"{name}#{i}") for i in range(len(nodes))]
+        for symbol, node in zip(symbols, nodes, strict=True):
+            self._known[symbol.name()] = node
+            self._free.append(symbol)
+        return ca.vertcat(*symbols) if symbols else ca.SX(0, 1)
+
+
+@dataclass(frozen=True)
+class ChainTerms:
+    """What the chains of one group contribute, lane by lane, dual to the state's rates."""
+
+    law: Law
+    point: PointMotion
+    forces: dict[str, ca.SX]
+    row: ca.SX
+
+
+def build(spec: KernelSpec) -> Program:
+    """The program of a spec."""
+    p = Program(spec, Layout.of(spec))
+    m = spec.m
+    q, q1, q2 = (p.inputs(name, m) for name in ("q", "q1", "q2"))
+    force = p.inputs("force", 3)
+    moment = p.inputs("moment", 3) if spec.moment else ca.SX.zeros(3)
+    g = p.parameters("gravity")
+
+    contacts = p.layout.contact_symbols(p.parameters)
+    placement = closed_form(contacts, spec.dependent, q, p.parameters("branch"))
+    motion = whole_motion(contacts, spec.dependent, placement, q1, q2)
+    formulation = FORMULATIONS[spec.formulation]
+    twist = twist_state(ca.SX(0, 1), motion.R, motion.twist, motion.twist_rate)
+
+    # Dual to X_EE' both routes meet: C and M_J belong to those coordinates.
+    dep = indices(spec.dependent)
+    ind = [i for i in range(6) if i not in dep]
+    if spec.route == "direct":
+        state = independent_state(q, q1, q2, placement.pose())
+        to_independent: Callable[[ca.SX], ca.SX] = lambda f: f  # noqa: E731
+    else:
+        state = twist if formulation.uses_twist else _pose_state(p, placement, motion)
+        E = motion.E if formulation.uses_twist else ca.SX.eye(6)
+
+        def to_independent(f: ca.SX) -> ca.SX:
+            in_pose = E.T @ f
+            return in_pose[ind] + motion.M_J[dep, :].T @ in_pose[dep]
+
+    if formulation.uses_twist and spec.route == "core":
+        state = twist_state(placement.position, motion.R, motion.twist, motion.twist_rate)
+
+    fold = formulation.name == "virtual_power" and "share" not in spec.outputs
+    chains = [_chain_terms(p, group, spec.formulation, state, g, fold) for group in _groups(spec)]
+    body = _body(p, chains if fold else [])
+    r = state.R @ p.parameters("load_point")
+    bite = -(state.B.T @ ca.vertcat(force, ca.cross(r, force) + moment))
+    parts = {"platform": formulation.platform(state, body, g)}
+    parts |= _chain_parts(p, chains, "share" in spec.outputs)
+    parts["bite"] = bite
+
+    A = [to_independent(c.row) for c in chains]
+    if "share" in spec.outputs:
+        b = ca.horzcat(*(to_independent(part) for part in parts.values()))
+    else:
+        total = _sum(list(parts.values()))
+        b = to_independent(total)
+    shares, quality = least_norm(p, A, b, spec.n)
+    torque = [_sum(ca.horzsplit(s)) for s in shares]
+    p.output("torque", torque)
+    p.output("margin", _margin(p, placement, chains))
+    p.output("quality", quality)
+    if "contact" in spec.outputs and dep:
+        p.output("contact", _contact_forces(p, spec, motion, placement, force, moment, torque,
+                                            None if spec.route == "direct" else (parts, chains)))
+    if "share" in spec.outputs:
+        for k in range(b.shape[1]):
+            p.output("share", [s[:, k] for s in shares])
+    if "motion" in spec.outputs:
+        p.output("position", placement.position)
+        p.output("cosines", placement.bryant.cos)
+        p.output("sines", placement.bryant.sin)
+        p.output("rate", motion.rate)
+        p.output("acceleration", motion.acceleration)
+    if "joint" in spec.outputs:
+        p.output("joint_rate", [c.law.rate for c in chains])
+        p.output("joint_acceleration", [c.law.acceleration for c in chains])
+    return p
+
+
+def _groups(spec: KernelSpec) -> list[tuple[int, str]]:
+    return [(index, kind) for index, (kind, _) in enumerate(spec.chains)]
+
+
+def _pose_state(p: Program, placement: Placement, motion: WholeMotion) -> State:
+    """The state in X_EE, by symbols that a formulation can differentiate with respect to."""
+    pose, rate, acceleration = (
+        p.let(v) for v in (placement.pose(), motion.rate, motion.acceleration)
+    )
+    return pose_state(pose, rate, acceleration)
+
+
+def _chain_terms(
+    p: Program, group: tuple[int, str], formulation: str, state: State, g: ca.SX, fold: bool
+) -> ChainTerms:
+    index, kind = group
+    family = FAMILIES[kind]
+    constants: Constants = family.named(p.lane_constants(index, "constants"))
+    M = state.point(p.lane_constants(index, "joint"))
+    if fold:
+        law = family.law(constants, M.position, M.velocity, M.acceleration, g)
+    else:
+        law = FORMULATIONS[formulation].chain(family, constants, M, g)
+    # Lanes that stand for no chain are multiplied away; where there are none, so is `active`.
+    active = p.lane_constants(index, "active")
+    forces = {name: state.pull(active * f, M.lever) for name, f in law.forces.items()}
+    return ChainTerms(law, M, forces, state.pull(active * law.J, M.lever))
+
+
+def _body(p: Program, folded: Sequence[ChainTerms]) -> Body:
+    """The platform, with the end masses of the chains if they are folded into it."""
+    mass, first = p.parameters("mass"), p.parameters("first_moment")
+    i = p.parameters("inertia")
+    inertia = ca.vertcat(*(ca.horzcat(*(i[k] for k in row)) for row in _SYMMETRIC))
+    if any(c.law.end_masses for c in folded):
+        terms = []
+        for index, chain in enumerate(folded):
+            end = _sum(list(chain.law.end_masses.values())) if chain.law.end_masses else ca.SX(0)
+            end = end * p.lane_constants(index, "active")
+            joint = p.lane_constants(index, "joint")
+            tensor = end * (ca.dot(joint, joint) * ca.SX.eye(3) - joint @ joint.T)
+            unique = [tensor[k // 3, k % 3] for k in (0, 4, 8, 1, 2, 5)]
+            terms.append(ca.vertcat(end, end * joint, *unique))
+        added = p.total(terms)
+        mass, first = mass + added[0], first + added[1:4]
+        inertia = inertia + ca.vertcat(
+            *(ca.horzcat(*(added[4 + k] for k in row)) for row in _SYMMETRIC)
+        )
+    return Body(mass, first, inertia)
+
+
+_SYMMETRIC = ((0, 3, 4), (3, 1, 5), (4, 5, 2))  # entries xx, yy, zz, xy, xz, yz
+
+
+def _chain_parts(p: Program, chains: Sequence[ChainTerms], apart: bool) -> dict[str, ca.SX]:
+    """Forces of the chains' bodies, summed over the chains: by body, or all in one."""
+    size = chains[0].row.shape[0]
+    if not apart:
+        return {"chains": p.total([_sum(list(c.forces.values())) for c in chains])}
+    names: dict[str, None] = {}
+    for kind, _ in p.spec.chains:
+        names.update(dict.fromkeys(reversed(FAMILIES[kind].bodies)))
+    return {
+        name: p.total([c.forces.get(name, ca.SX.zeros(size)) for c in chains]) for name in names
+    }
+
+
+def least_norm(p: Program, A: Lanes, b: ca.SX, n: int) -> tuple[Lanes, ca.SX]:
+    """Least-norm solutions of A^T tau = b by modified Gram-Schmidt on the columns of A.
+
+    A = Q R with orthogonal, unnormalised columns, so that tau = Q (Q^T Q)^-1 R^-T b: no square
+    roots, and an error of rounding times the condition number, not its square.
+
+    Args:    A: (m,) a group, lane values; b: (m, r).
+    Returns: tau, (r,) a group as rows; the least |q_k|^2 / |a_k|^2, which is small where A is
+             ill conditioned.
+    """
+    m = b.shape[0]
+    columns = [[a[k] for a in A] for k in range(m)]
+    lengths = [p.total([x * x for x in column]) for column in columns]
+    z = [b[k, :] for k in range(m)]
+    result = [ca.SX(1, b.shape[1]) for _ in A]
+    quality = ca.SX(1.0)
+    for k in range(m):
+        q = columns[k]
+        # the first column is its own projection
+        d = lengths[0] if k == 0 else p.total([x * x for x in q])
+        quality = ca.fmin(quality, d / lengths[k]) if k else quality
+        inverse = 1 / d
+        for j in range(k + 1, m):
+            ratio = p.total([x * y for x, y in zip(q, columns[j], strict=True)]) * inverse
+            columns[j] = [y - ratio * x for x, y in zip(q, columns[j], strict=True)]
+            z[j] = z[j] - ratio * z[k]
+        weight = z[k] * inverse
+        result = [r + x * weight for r, x in zip(result, q, strict=True)]
+    return result, quality
+
+
+def _margin(p: Program, placement: Placement, chains: Sequence[ChainTerms]) -> ca.SX:
+    """Least of the dimensionless reaches: not negative where the pose can be reached."""
+    least = p.least([c.law.reach for c in chains])
+    return least if placement.reach is None else ca.fmin(least, placement.reach)
+
+
+def _contact_forces(
+    p: Program,
+    spec: KernelSpec,
+    motion: WholeMotion,
+    placement: Placement,
+    force: ca.SX,
+    moment: ca.SX,
+    torque: Lanes,
+    known: tuple[dict[str, ca.SX], Sequence[ChainTerms]] | None,
+) -> ca.SX:
+    """lambda along the unit normals, from the dependent rows of C^T mu = Q - J^T tau."""
+    dep = indices(spec.dependent)
+    E = motion.E
+    if known is None:
+        # Route `direct` has no equations across the contacts: take them from virtual power.
+        g = p.parameters("gravity")
+        state = twist_state(placement.position, motion.R, motion.twist, motion.twist_rate)
+        chains = [_chain_terms(p, gr, "virtual_power", state, g, True) for gr in _groups(spec)]
+        body = _body(p, chains)
+        r = state.R @ p.parameters("load_point")
+        Q = FORMULATIONS["virtual_power"].platform(state, body, g)
+        Q = Q - ca.vertcat(force, ca.cross(r, force) + moment)
+        Q = Q + _chain_parts(p, chains, False)["chains"]
+    else:
+        parts, chains = known
+        Q = _sum(list(parts.values()))
+        if not FORMULATIONS[spec.formulation].uses_twist:
+            E = ca.SX.eye(6)
+    pulled = p.total([(E.T @ c.row)[dep] * t for c, t in zip(chains, torque, strict=True)])
+    C = motion.frame.N.T @ motion.E
+    left = (E.T @ Q)[dep] - pulled
+    from ..kinematics.contact import solve_small
+
+    return solve_small(C[:, dep].T, left) * motion.frame.n_length
+
+
+def _sum(terms: Sequence[ca.SX]) -> ca.SX:
+    total = terms[0]
+    for term in terms[1:]:
+        total = total + term
+    return total

@@ -1,0 +1,42 @@
+"""Colours that colour-blind readers can tell apart, on light and on dark grounds.
+
+Each list was spread out in CIELAB as seen with full, protan, deutan and tritan vision; the tests
+measure it. A line's dash is the second sign, so nothing rests on colour alone.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+LIGHT = ("#105DCA", "#D97A03", "#07A973", "#693804", "#745F8A", "#1E1B19")
+DARK = ("#4491E5", "#D06A05", "#4CEE8D", "#F4EC46", "#A98AA0", "#DDF6FA")
+DASHES = ("solid", "dash", "dot", "dashdot")
+
+_SIDE = re.compile(r"^(left|right|l|r)[_\- ]|[_\- ](left|right|l|r)$", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Style:
+    """colour: index into `LIGHT` and `DARK`;  dash: one of `DASHES`."""
+
+    colour: int
+    dash: str
+
+
+def styles(names: Sequence[str]) -> list[Style]:
+    """A style for each name: a left and a right one share their colour and differ in dash."""
+    stems = [_SIDE.sub("", name) for name in names]
+    paired = any(stems.count(stem) == 2 for stem in stems)
+    groups = list(dict.fromkeys(stems)) if paired else list(names)
+    seen: dict[str, int] = {}
+    result = []
+    for name, stem in zip(names, stems, strict=True):
+        group = stem if paired else name
+        number, twin = groups.index(group), seen.get(group, 0)
+        seen[group] = twin + 1
+        lap = number // len(LIGHT)
+        step = twin + 2 * lap if paired else lap
+        result.append(Style(number % len(LIGHT), DASHES[step % len(DASHES)]))
+    return result

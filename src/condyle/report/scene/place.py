@@ -1,0 +1,55 @@
+"""A mechanism at poses: platform, chains, contacts and landmarks in {S}."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...mechanism import Mechanism
+from .chains import ChainDrawing, drawing_points
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Positions in {S} at N poses [m].
+
+    position: O_M, (N, 3).   rotation: R from {M} to {S}, (N, 3, 3).
+    chains, contacts, landmarks: by name; the latter two (N, 3) each.
+    """
+
+    position: np.ndarray
+    rotation: np.ndarray
+    chains: dict[str, ChainDrawing]
+    contacts: dict[str, np.ndarray]
+    landmarks: dict[str, np.ndarray]
+
+
+def rotations(angles: np.ndarray) -> np.ndarray:
+    """R = Rx(alpha) Ry(beta) Rz(gamma), (N, 3, 3), of angles (N, 3) [rad] ([Cheng2023] eq. 2)."""
+    (ca, cb, cg), (sa, sb, sg) = np.cos(angles).T, np.sin(angles).T
+    rows = [
+        [cb * cg, -cb * sg, sb],
+        [ca * sg + sa * sb * cg, ca * cg - sa * sb * sg, -sa * cb],
+        [sa * sg - ca * sb * cg, sa * cg + ca * sb * sg, ca * cb],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def place(mechanism: Mechanism, pose: np.ndarray, joint: np.ndarray) -> Scene:
+    """Place every point that a picture needs.
+
+    Args: pose: X_EE, (N, 6) [m, rad];  joint: joint coordinates, (N, n) [rad or m].
+    """
+    position, R = pose[:, :3], rotations(pose[:, 3:])
+
+    def on_platform(point: tuple[float, ...]) -> np.ndarray:
+        return position + R @ np.asarray(point)
+
+    chains = {
+        chain.name: drawing_points(chain, joint[:, i], on_platform(chain.platform))
+        for i, chain in enumerate(mechanism.chains)
+    }
+    contacts = {contact.name: on_platform(contact.point) for contact in mechanism.contacts}
+    landmarks = {name: on_platform(p) for name, p in mechanism.platform.points.items()}
+    return Scene(position, R, chains, contacts, landmarks)

@@ -1,0 +1,133 @@
+"""Contact surfaces as pictures: a patch with the bounds, its outline, and unit normals.
+
+A surface is an equation phi(p) = 0. Over a grid of two coordinates the third follows by Newton
+from the home point: over (x, y) where the surface can be seen from above, else over its tangent
+plane at home.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from ...kinematics.batch import evaluate
+from ...mechanism import Contact
+
+GRID = 17  # points along each side of a patch
+LEVEL = 0.3  # least |n_z| at home for which (x, y) are the grid
+ITERATIONS = 40
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A piece of surface.
+
+    vertices: (V, 3) [m];  faces: (F, 3);  outline: its border as segments, (E, 2, 3) [m].
+    bounded:  whether the outline is where the file says the surface ends.
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    outline: np.ndarray
+    bounded: bool
+
+
+def contact_normals(contact: Contact, points: np.ndarray) -> np.ndarray:
+    """Unit normals n of the surface at ball centres (N, 3): grad phi / |grad phi|."""
+    _, gradient = _phi(contact, points)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return gradient / np.linalg.norm(gradient, axis=1, keepdims=True)
+
+
+def contact_patch(contact: Contact, track: np.ndarray, size: float) -> Patch:
+    """The surface within its bounds; without them, round the track (N, 3) of the ball centre.
+
+    Args: size: a length of the mechanism [m], for the margin round a track.
+    """
+    frame = _frame(contact)
+    seen = track[np.isfinite(track).all(axis=1)]
+    along = (np.vstack([seen, contact.point]) - contact.point) @ frame[:2].T
+    low, high = along.min(axis=0) - 0.1 * size, along.max(axis=0) + 0.1 * size
+    bounds = contact.bounds
+    from_above = np.array_equal(frame, np.eye(3))
+    if from_above:
+        for axis, interval in enumerate((bounds.x, bounds.y)):
+            if interval is not None:
+                low[axis], high[axis] = np.subtract(interval, contact.point[axis])
+    u, v = np.meshgrid(*(np.linspace(low[i], high[i], GRID) for i in range(2)), indexing="ij")
+    vertices = _solve(contact, frame, np.column_stack([u.ravel(), v.ravel()]))
+    keep = np.isfinite(vertices).all(axis=1) & _inside(bounds, vertices, size)
+    faces = _triangles(GRID)
+    faces = faces[keep[faces].all(axis=1)]
+    bounded = any(getattr(bounds, axis) is not None for axis in "xyz")
+    return Patch(vertices, faces, vertices[_border(faces)], bounded)
+
+
+def contact_profile(contact: Contact, low: float, high: float, y: float) -> np.ndarray | None:
+    """The surface's line over x = low..high at `y`, (M, 3) [m]; None where it stands upright."""
+    frame = _frame(contact)
+    if not np.array_equal(frame, np.eye(3)):
+        return None
+    x = np.linspace(low, high, 61)
+    flat = np.column_stack([x, np.full_like(x, y)]) - np.asarray(contact.point)[:2]
+    return _solve(contact, frame, flat)
+
+
+def _phi(contact: Contact, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """phi, (N,) [m], and its gradient, (N, 3)."""
+    p = ca.SX.sym("p", 3)
+    phi = contact.surface.phi(p)
+    function = ca.Function("phi", [p], [phi, ca.gradient(phi, p)])
+    value, gradient = evaluate(function, points)
+    return value[:, 0], gradient
+
+
+def _frame(contact: Contact) -> np.ndarray:
+    """Rows u, v, w: the grid's directions and the one that Newton moves along."""
+    n = contact_normals(contact, np.array([contact.point]))[0]
+    if abs(n[2]) > LEVEL:
+        return np.eye(3)
+    u = np.cross([0.0, 0.0, 1.0], n)
+    u /= np.linalg.norm(u)
+    return np.array([u, np.cross(n, u), n])
+
+
+def _solve(contact: Contact, frame: np.ndarray, flat: np.ndarray) -> np.ndarray:
+    """Points of the surface over grid coordinates (N, 2) from the home point; NaN where none."""
+    start = np.asarray(contact.point) + flat @ frame[:2]
+    height = np.zeros(len(flat))
+    with np.errstate(all="ignore"):
+        for _ in range(ITERATIONS):
+            value, gradient = _phi(contact, start + height[:, None] * frame[2])
+            step = value / (gradient @ frame[2])
+            height = height - step
+        height[~(np.abs(step) < 1e-9)] = np.nan
+    return start + height[:, None] * frame[2]
+
+
+def _inside(bounds: object, points: np.ndarray, size: float) -> np.ndarray:
+    """Which points are within the bounds, to a rounding error."""
+    inside = np.ones(len(points), dtype=bool)
+    for axis, name in enumerate("xyz"):
+        if (interval := getattr(bounds, name)) is not None:
+            low, high = interval
+            slack = 1e-9 * size
+            inside &= (points[:, axis] >= low - slack) & (points[:, axis] <= high + slack)
+    return inside
+
+
+def _triangles(count: int) -> np.ndarray:
+    """Two triangles for each cell of a count x count grid, (F, 3)."""
+    corner = np.arange(count * count).reshape(count, count)
+    a, b, c, d = corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]
+    both = [np.stack(t, axis=-1).reshape(-1, 3) for t in ((a, b, c), (a, c, d))]
+    return np.concatenate(both)
+
+
+def _border(faces: np.ndarray) -> np.ndarray:
+    """Edges that belong to one triangle only, (E, 2)."""
+    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    unique, count = np.unique(edges, axis=0, return_counts=True)
+    return unique[count == 1]

@@ -1,0 +1,44 @@
+"""The differences between models and Tables 1 and 2 of the paper, as text, Markdown and CSV."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from ...analysis.compare import Comparison
+from ...atomic import write_text
+from .differences import differences
+from .indices import table_2
+from .seconds import table_1
+from .table import Table
+
+__all__ = [
+    "Table",
+    "comparison_text",
+    "differences",
+    "save_tables",
+    "table_1",
+    "table_2",
+    "tables",
+]
+
+
+def tables(comparison: Comparison) -> list[Table]:
+    """The differences, Table 1 and Table 2."""
+    return [differences(comparison), table_1(comparison), table_2(comparison)]
+
+
+def comparison_text(comparison: Comparison) -> str:
+    """All tables as plain text."""
+    return "\n".join(table.text() for table in tables(comparison))
+
+
+def save_tables(comparison: Comparison, folder: str | os.PathLike[str]) -> list[Path]:
+    """Write each table as Markdown and CSV; returns the paths."""
+    paths = []
+    for table in tables(comparison):
+        stem = Path(folder) / table.name
+        paths += [stem.with_suffix(".md"), stem.with_suffix(".csv")]
+        write_text(paths[-2], table.markdown())
+        table.write_csv(paths[-1])
+    return paths
