@@ -290,6 +290,12 @@ class Model:
         more = f" {bad.size - 1} more samples fail too." if bad.size > 1 else ""
         if evaluation.status[first] == SINGULAR_STATUS:
             s = evaluation.posture.singularity
+            if s.ratio[first] >= SINGULAR:
+                raise SingularError(
+                    f"the torques at {where} are not finite: its rates, accelerations or load are "
+                    f"too large for numbers.{more}",
+                    bad.tolist(),
+                )
             raise SingularError(
                 f"the mechanism is singular at {where}: dimensionless ratio {s.ratio[first]:.2g}, "
                 f"must be above {SINGULAR:g}. The torques are not determined there; avoid the "
@@ -311,7 +317,8 @@ class Model:
             return f"no {' and '.join(self.dependent)} puts the contacts {names} on their surfaces"
         for i, chain in enumerate(self.mechanism.chains):
             if not evaluation.posture.reach[sample, i] >= 0:
-                return FAMILIES[chain.kind].explain(chain, pose)
+                with np.errstate(all="ignore"):
+                    return FAMILIES[chain.kind].explain(chain, pose)
         return "the pose cannot be reached"
 
 

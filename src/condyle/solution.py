@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ from .errors import InputError
 from .kinematics.chain import FAMILIES
 from .kinematics.singularity import KINDS, NEAR
 from .mechanism import dumps, parse
+from .mechanism.files import written_in_python
 from .mechanism.home import home_warnings
 from .mechanism.mechanism import COORDINATES, Mechanism
 from .model import STATUS_NAMES
@@ -39,7 +41,15 @@ class Solution(xr.Dataset):
 
     @property
     def mechanism(self) -> Mechanism:
-        """The mechanism that was solved."""
+        """The mechanism that was solved.
+
+        Raises: InputError: if a surface of it was a Python expression, which cannot be kept.
+        """
+        if not self.attrs["mechanism"]:
+            raise InputError(
+                f"{self.attrs['mechanism_name']} has a surface written in Python, which a "
+                "solution cannot keep"
+            )
         return parse(self.attrs["mechanism"], self.attrs["mechanism_name"])
 
     @property
@@ -52,18 +62,22 @@ class Solution(xr.Dataset):
         """How the solution was made: formulation, route, sources, seconds."""
         return json.loads(self.attrs["options"])
 
-    def save(self, path: str | Path) -> None:
-        """Write as NetCDF (.nc) or CSV (.csv), whole or not at all."""
-        suffix = Path(path).suffix.lower()
-        if suffix == ".nc":
-            with replacing(path) as temporary:
-                self.to_netcdf(temporary, engine="h5netcdf")
-        elif suffix == ".csv":
-            from .motion import write_table
+    def save(self, *paths: str | Path) -> None:
+        """Write as NetCDF (.nc) or CSV (.csv): every file whole, or none of them."""
+        from .motion import write_table
 
-            write_table(path, self.columns())
-        else:
-            raise InputError(f'{path}: expected a name that ends in .nc or .csv, got "{suffix}"')
+        with ExitStack() as stack:
+            for path in paths:
+                suffix = Path(path).suffix.lower()
+                if suffix not in (".nc", ".csv"):
+                    raise InputError(
+                        f'{path}: expected a name that ends in .nc or .csv, got "{suffix}"'
+                    )
+                temporary = stack.enter_context(replacing(path))
+                if suffix == ".nc":
+                    self.to_netcdf(temporary, engine="h5netcdf")
+                else:
+                    write_table(temporary, self.columns())
 
     def columns(self) -> dict[str, np.ndarray | list[str]]:
         """Columns of the CSV: t, tau_<chain>, contact_<contact>, pose, joint_<chain>."""
@@ -138,6 +152,11 @@ def assemble(
             "N",
             "contact force on the platform along the unit normal of the surface",
         ),
+        "lift_off": (
+            ("time", "contact"),
+            lift_off(mechanism, t.contact_force) & ok[:, None],
+            {"long_name": "whether a one-sided contact would have to pull: the ball lifts off"},
+        ),
         "contact_point": variable(
             ("time", "contact", "axis"), p.contact_point, "m", "centre of the contact ball in {S}"
         ),
@@ -209,7 +228,7 @@ def assemble(
         "source": f"condyle {__version__}",
         "condyle_version": __version__,
         "mechanism_name": mechanism.name,
-        "mechanism": dumps(mechanism),
+        "mechanism": "" if written_in_python(mechanism) else dumps(mechanism),
         "options": json.dumps(options),
         "warnings": json.dumps(run_warnings(mechanism, solution, residual)),
     }
@@ -235,9 +254,16 @@ def bound_margins(mechanism: Mechanism, points: np.ndarray) -> np.ndarray:
     return margins
 
 
+def lift_off(mechanism: Mechanism, force: np.ndarray) -> np.ndarray:
+    """Whether one-sided contacts would have to pull at contact forces (N, k), (N, k)."""
+    push = np.array([c.push if c.one_sided else 0 for c in mechanism.contacts], dtype=float)
+    return push * force < -FORCE_TOLERANCE
+
+
 def run_warnings(mechanism: Mechanism, solution: Solution, residual: float | None) -> list[str]:
     """What the reader of the results should know."""
     warnings = [*home_warnings(mechanism), *bound_warnings(solution)]
+    warnings += lift_off_warnings(solution)
     if residual is not None and residual > 1e-9:
         warnings.append(
             f"the given poses are up to {residual * 1e3:.3g} mm off the contact surfaces; the "
@@ -276,6 +302,18 @@ def bound_warnings(solution: Solution) -> list[str]:
 
 
 BOUND_TOLERANCE = 1e-12  # metres: rounding at a bound is not outside
+FORCE_TOLERANCE = 1e-12  # newtons: rounding of no force is not a pull
+
+
+def lift_off_warnings(solution: Solution) -> list[str]:
+    """Which one-sided contact would have to pull, since when and how often."""
+    lifted, time = solution["lift_off"].values, solution["time"].values
+    return [
+        f'contact "{name}" lifts off at t = {time[np.argmax(lifted[:, i])]:g} s '
+        f"({lifted[:, i].sum()} samples): there its surface would have to pull the ball"
+        for i, name in enumerate(solution["contact"].values)
+        if lifted[:, i].any()
+    ]
 
 
 def limit_warnings(mechanism: Mechanism, solution: Solution) -> list[str]:

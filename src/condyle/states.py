@@ -10,7 +10,7 @@ from .errors import BoundsError, InputError
 from .mechanism.mechanism import COORDINATES
 from .model import STATUS_NAMES, Model, with_point
 from .motion import Table, TableWriter, iter_table
-from .solution import BOUND_TOLERANCE, WRENCH, bound_margins, named_columns
+from .solution import BOUND_TOLERANCE, WRENCH, bound_margins, lift_off, named_columns
 
 CHUNK_ROWS = 65536
 
@@ -34,10 +34,11 @@ def solve_file(
     """
     known = [p + name for p in ("", "d", "dd") for name in COORDINATES] + list(WRENCH)
     worst: dict[str, tuple[float, int, int]] = {}
+    lifts: dict[str, tuple[int, int]] = {}
     rows = 0
     with TableWriter(out) as writer:
         for table in iter_table(states, CHUNK_ROWS, known=known):
-            columns, margins = solve_table(model, table, load_point, flag, rows)
+            columns, margins, lifted = solve_table(model, table, load_point, flag, rows)
             for i, name in enumerate(model.mechanism.contact_names):
                 outside = np.flatnonzero(margins[:, i] < -BOUND_TOLERANCE)
                 if outside.size:
@@ -46,6 +47,9 @@ def solve_file(
                     if -margins[row, i] > depth:
                         depth, at = -margins[row, i], rows + row + 1
                     worst[name] = (depth, count + outside.size, at)
+                if (pulls := np.flatnonzero(lifted[:, i])).size:
+                    first, count = lifts.get(name, (rows + int(pulls[0]) + 1, 0))
+                    lifts[name] = (first, count + pulls.size)
             writer.write(columns)
             rows += table.rows
         warnings = [
@@ -55,13 +59,18 @@ def solve_file(
         ]
         if strict and warnings:
             raise BoundsError("; ".join(warnings) + ". Without --strict this is a warning", [])
+    warnings += [
+        f'contact "{name}" lifts off in {count} rows, first in row {first}: there its surface '
+        "would have to pull the ball"
+        for name, (first, count) in lifts.items()
+    ]
     return rows, warnings
 
 
 def solve_table(
     model: Model, table: Table, load_point: str | None, flag: bool, first_row: int
-) -> tuple[dict[str, np.ndarray | list[str]], np.ndarray]:
-    """Output columns for the rows of one table, and the contacts' bound margins, (N, k)."""
+) -> tuple[dict[str, np.ndarray | list[str]], np.ndarray, np.ndarray]:
+    """Output columns for the rows of one table, the contacts' bound margins and lift-off, (N, k)."""
     names = state_coordinates(model, table)
     q, q1, q2 = (table.require([p + name for name in names]) for p in ("", "d", "dd"))
     q, q1, q2 = model.independent_states(names, q, q1, q2)
@@ -90,7 +99,10 @@ def solve_table(
     if flag:
         columns["status"] = [STATUS_NAMES[i] for i in evaluation.status]
     margins = bound_margins(mechanism, evaluation.posture.contact_point)
-    return columns, np.where(ok[:, None], margins, np.inf)
+    force = evaluation.torques.contact_force
+    assert force is not None
+    lifted = lift_off(mechanism, force) & ok[:, None]
+    return columns, np.where(ok[:, None], margins, np.inf), lifted
 
 
 def state_coordinates(model: Model, table: Table) -> list[str]:

@@ -44,6 +44,10 @@ class Summary:
                 f"closest to the bounds: {name}, {bound['margin'] * 1e3:.4g} mm "
                 f"{'inside' if bound['margin'] >= 0 else 'OUTSIDE'} at t = {bound['time']:g} s"
             )
+        for name, lift in d["lift_off"].items():
+            lines.append(
+                f"lift-off: {name} in {lift['samples']} samples, first at t = {lift['time']:g} s"
+            )
         if d["failed_samples"]:
             lines.append(f"samples without a result: {d['failed_samples']}")
         return "\n".join(lines)
@@ -63,6 +67,7 @@ def summarize(solution: Solution) -> Summary:
         if some and np.isfinite(margins[ok, i]).any():
             k = int(np.nanargmin(margins[:, i]))
             bounds[str(name)] = {"margin": float(margins[k, i]), "time": float(time[k])}
+    lifted = solution["lift_off"].values
     closest = int(np.nanargmin(ratio)) if some else None
     return Summary(
         {
@@ -90,6 +95,14 @@ def summarize(solution: Solution) -> Summary:
             else {"ratio": float(ratio[closest]), "time": float(time[closest])},
             "samples_near_singularity": int((solution["singularity"].values != 0).sum()),
             "closest_to_bounds": bounds,
+            "lift_off": {
+                str(name): {
+                    "samples": int(lifted[:, i].sum()),
+                    "time": float(time[np.argmax(lifted[:, i])]),
+                }
+                for i, name in enumerate(solution["contact"].values)
+                if lifted[:, i].any()
+            },
             "warnings": json.loads(solution.attrs["warnings"]),
         }
     )

@@ -183,10 +183,18 @@ struct Chains {
   Vectors n, n_d, n_dd;        // coupler direction in N_i0 and its rates
   Lanes cos_gamma, inverse;    // of gamma_i; 1 / cos^2
   Lanes beta_d, beta_dd, gamma_d, gamma_dd;
+
+  double beta(int i) const { return std::atan2(-n.z[i], n.x[i]); }
+  double gamma(int i) const { return std::asin(n.y[i]); }
 };
 
+/// Components along the axes of N_i0, and back.
 inline Vectors in_frame(const Mechanism& m, const Vectors& a) {
   return {dot(m.N_x, a), dot(m.N_y, a), dot(m.N_z, a)};
+}
+
+inline Vectors from_frame(const Mechanism& m, const Vectors& a) {
+  return a.x * m.N_x + a.y * m.N_y + a.z * m.N_z;
 }
 
 inline Chains move(const Mechanism& m, const Platform& b) {
@@ -232,12 +240,59 @@ inline Chains move(const Mechanism& m, const Platform& b) {
   return c;
 }
 
+/// Couplers as free bodies, placed at their platform joints: {N_i} turned from N_i0, with its motion.
+struct FreeCouplers {
+  Lanes w, x, y, z;            // quaternion of Ry(beta_i) Rz(gamma_i)
+  Lanes cos_b, sin_b, cos_g, sin_g;
+  Vectors omega, alpha;        // in {N_i}
+
+  /// From {N_i} to N_i0, and back.
+  Vectors to_home(const Vectors& a) const {
+    const Lanes x = cos_g * a.x - sin_g * a.y, y = sin_g * a.x + cos_g * a.y;
+    return {cos_b * x + sin_b * a.z, y, cos_b * a.z - sin_b * x};
+  }
+  Vectors to_body(const Vectors& a) const {
+    const Lanes x = cos_b * a.x - sin_b * a.z;
+    return {cos_g * x + sin_g * a.y, cos_g * a.y - sin_g * x, sin_b * a.x + cos_b * a.z};
+  }
+};
+
+inline FreeCouplers release(const Chains& c) {
+  FreeCouplers f;
+  const Lanes inverse_cos = c.cos_gamma * c.inverse;
+  f.cos_b = c.n.x * inverse_cos;
+  f.sin_b = -c.n.z * inverse_cos;
+  f.cos_g = c.cos_gamma;
+  f.sin_g = c.n.y;
+  // Half angles without arc functions; a coupler never folds back on its home direction.
+  const Lanes cb = (0.5 + 0.5 * f.cos_b).sqrt(), sb = 0.5 * f.sin_b / cb;
+  const Lanes cg = (0.5 + 0.5 * f.cos_g).sqrt(), sg = 0.5 * f.sin_g / cg;
+  f.w = cb * cg;
+  f.x = sb * sg;
+  f.y = sb * cg;
+  f.z = cb * sg;
+  f.omega = {f.sin_g * c.beta_d, f.cos_g * c.beta_d, c.gamma_d};
+  f.alpha = {f.sin_g * c.beta_dd + f.omega.y * c.gamma_d,
+             f.cos_g * c.beta_dd - f.omega.x * c.gamma_d, c.gamma_dd};
+  return f;
+}
+
 /// Forces that an engine found on the cut tree.
 struct TreeForces {
   Vector3 force, moment;  // on the platform, about O_M, in {S}
   Vectors joint;          // on the couplers' ends at the platform joints, in {S}
   Lanes tau_beta, tau_gamma, tau_theta;
 };
+
+/// The products that need no engine: the platform's and the cranks' inertia forces.
+inline TreeForces without_couplers(const Mechanism& m, const Platform& b, const Chains& c) {
+  TreeForces out;
+  const Vector3 omega = b.R.transpose() * b.omega, alpha = b.R.transpose() * b.alpha;
+  out.force = m.mass * (b.a - m.gravity);
+  out.moment = b.R * (m.inertia * alpha + omega.cross(m.inertia * omega));
+  out.tau_theta = m.crank_inertia * c.theta_dd;
+  return out;
+}
 
 /// Solution of a symmetric positive definite system of four, by L D L^T in straight-line code.
 inline Eigen::Vector4d solve(Eigen::Matrix4d M, Eigen::Vector4d x) {

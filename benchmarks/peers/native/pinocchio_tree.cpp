@@ -76,8 +76,8 @@ class PinocchioTree {
       a_[kCranksV + i] = c.theta_dd[i];
       const int k = kCouplersQ + kCoupler * i, j = kCouplersV + kCoupler * i;
       q_.segment<3>(k) = c.P.of(i);
-      q_[k + 3] = std::atan2(-c.n.z[i], c.n.x[i]);
-      q_[k + 4] = std::atan2(c.n.y[i], c.cos_gamma[i]);
+      q_[k + 3] = c.beta(i);
+      q_[k + 4] = c.gamma(i);
       v_.segment<3>(j) = c.P_d.of(i);
       v_[j + 3] = c.beta_d[i];
       v_[j + 4] = c.gamma_d[i];

@@ -158,8 +158,12 @@ def samples_of(model: Model, solution: Solution) -> Samples:
     """The motion and load of a solution."""
     wrench, name = solution["load"].values, solution.options["load_point"]
     point = model.load_point(name) if name is not None or wrench.any() else np.zeros(3)
-    motion = (solution[v].values for v in ("pose", "pose_rate", "pose_acceleration"))
-    return Samples(*motion, with_point(wrench, point))
+    return Samples(
+        solution["pose"].values,
+        solution["pose_rate"].values,
+        solution["pose_acceleration"].values,
+        with_point(wrench, point),
+    )
 
 
 def why_not_free(mechanism: Mechanism) -> str | None:

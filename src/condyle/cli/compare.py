@@ -9,7 +9,7 @@ import typer
 
 from . import options
 from .app import MAIN, app
-from .inputs import motion_and_load, say
+from .inputs import motion_and_load, output_folder, say
 
 
 @app.command(rich_help_panel=MAIN)
@@ -35,7 +35,7 @@ def compare(
     machine = condyle.load(mechanism)
     path, acting = motion_and_load(motion, load, units, landmark, smooth, rate)
     comparison = compare_models(machine, path, acting, load_point)
-    out.mkdir(parents=True, exist_ok=True)
+    output_folder(out)
     files = save_tables(comparison, out)
     if figures:
         from ..report.figures import save_figures

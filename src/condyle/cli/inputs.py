@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -38,6 +39,25 @@ def motion_and_load(
         motion or reference_path, units=units, landmark=landmark, cutoff=smooth, rate=rate
     )
     return path, acting
+
+
+def output_folder(path: Path) -> Path:
+    """Make the folder for results.
+
+    Raises: InputError: if it cannot be one.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"--out {path}: cannot be made a folder for results ({error.strerror})"
+        ) from error
+    return path
+
+
+def file_stem(name: str) -> str:
+    """The name of a mechanism as the beginning of a file name: no way out of the folder."""
+    return re.sub(r"[^\w.+-]+", "_", name)
 
 
 def say(quiet: bool, text: str) -> None:

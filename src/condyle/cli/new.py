@@ -18,10 +18,19 @@ def new(
 ) -> None:
     """Write a commented starter file: a small mechanism that works, to change step by step."""
     from ..atomic import write_text
+    from ..mechanism import parse
     from ..mechanism.starter import starter_text
 
     path = Path(name if name.endswith(".toml") else f"{name}.toml")
     if path.exists() and not force:
         raise InputError(f"{path} exists already; choose another name or add --force")
-    write_text(path, starter_text(path.stem))
+    stem = path.name.removesuffix(".toml")
+    text = starter_text(stem)
+    try:
+        parse(text)
+    except InputError:
+        raise InputError(
+            f'"{stem}" cannot be the name of a mechanism; use letters, digits, - and _'
+        ) from None
+    write_text(path, text)
     typer.echo(f"Wrote {path}. Next: condyle check {path}")

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from .app import MAKE, app
+from .inputs import output_folder
 
 
 @app.command(rich_help_panel=MAKE)
@@ -17,7 +18,7 @@ def reference(
     """Write the reference chewing path and bite force. Both are synthetic, not measured."""
     from ..motion import write_reference
 
-    out.mkdir(parents=True, exist_ok=True)
+    output_folder(out)
     for path in write_reference(out):
         typer.echo(f"Wrote {path}")
     typer.echo("Next: condyle run --motion " + str(out / "chewing-incisor.csv"))

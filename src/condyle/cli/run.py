@@ -9,7 +9,15 @@ import typer
 
 from . import options
 from .app import MAIN, app
-from .inputs import motion_and_load, require_inside, say, say_json, warn
+from .inputs import (
+    file_stem,
+    motion_and_load,
+    output_folder,
+    require_inside,
+    say,
+    say_json,
+    warn,
+)
 
 
 @app.command(rich_help_panel=MAIN)
@@ -45,10 +53,9 @@ def run(
     solution = model.solve(path, acting, load_point, flag)
     if strict:
         require_inside(solution.warnings)
-    out.mkdir(parents=True, exist_ok=True)
-    files = [out / f"{machine.name}.nc", out / f"{machine.name}.csv"]
-    for file in files:
-        solution.save(file)
+    folder, stem = output_folder(out), file_stem(machine.name)
+    files = [folder / f"{stem}.nc", folder / f"{stem}.csv"]
+    solution.save(*files)
     if figures:
         from ..report.figures import save_solution_figures
 

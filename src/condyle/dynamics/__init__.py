@@ -2,11 +2,15 @@
 
 from ..errors import InputError, did_you_mean
 from .formulation import Formulation
+from .hessian import Hessian
 from .lagrange import Lagrange
 from .momentum import Momentum
+from .newton_euler import NewtonEuler
 from .virtual_power import VirtualPower
 
-FORMULATIONS: dict[str, Formulation] = {f.name: f for f in (VirtualPower(), Momentum(), Lagrange())}
+FORMULATIONS: dict[str, Formulation] = {
+    f.name: f for f in (VirtualPower(), Momentum(), Lagrange(), Hessian(), NewtonEuler())
+}
 ROUTES = ("core", "direct")
 
 

@@ -216,7 +216,8 @@ def law_function(
         vector = ca.vertcat(*(_flat(getattr(constants, name)) for name in family.shapes))
         values = function.call([vector, M.position, M.velocity, M.acceleration, gravity])
         forces = dict(zip(names, values, strict=False))
-        return Law(forces, *values[len(names) :])
+        J, reach, rate, acceleration = values[len(names) :]
+        return Law(forces, J, reach, rate, acceleration)
 
     return call
 

@@ -8,12 +8,12 @@ coordinates, M_3 = M_1^-1 M_2.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
 
-from ..kinematics.chain import Constants, Family, Law, Link
+from ..kinematics.chain import Constants, Family, Law, Link, Loop
 from ..kinematics.contact import solve_small
 from ..kinematics.state import PointMotion
 
@@ -26,43 +26,75 @@ class JointState:
     rate: ca.SX
     acceleration: ca.SX
 
+    @staticmethod
+    def symbols() -> JointState:
+        return JointState(*(ca.SX.sym(name, 3) for name in ("q_r", "q_r1", "q_r2")))
+
     def time_derivative(self, expression: ca.SX) -> ca.SX:
         return ca.jtimes(expression, self.q, self.rate) + ca.jtimes(
             expression, self.rate, self.acceleration
         )
 
 
+@dataclass(frozen=True)
+class JointMotion:
+    """q_r, q_r' and q_r'' that a motion of M implies, and M_1^-1."""
+
+    loop: Loop
+    rate: ca.SX
+    acceleration: ca.SX
+    inverse: ca.SX
+
+    def insert(self, s: JointState, expressions: Sequence[ca.SX]) -> list[ca.SX]:
+        """Expressions in the symbols `s`, at this motion."""
+        symbols = [s.q, s.rate, s.acceleration]
+        values = [self.loop.q_r, self.rate, self.acceleration]
+        return ca.substitute(list(expressions), symbols, values)
+
+    def law(self, forces: dict[str, ca.SX]) -> Law:
+        """The law of a chain whose links need `forces`, dual to q_r', (3,) each."""
+        on_M = {name: self.inverse.T @ force for name, force in forces.items()}
+        J = self.inverse[0, :].T
+        return Law(on_M, J, self.loop.reach, self.rate[0], self.acceleration[0])
+
+
 LinkForce = Callable[[Link, JointState, ca.SX], ca.SX]
+Bias = Callable[[ca.SX, JointState], ca.SX]
+
+
+def rate_bias(tip: ca.SX, s: JointState) -> ca.SX:
+    """M_1' q_r', (3,), by the derivative of M_1 along the motion."""
+    return ca.jtimes(ca.jacobian(tip, s.q) @ s.rate, s.q, s.rate)
+
+
+def joint_motion(
+    family: Family, c: Constants, M: PointMotion, bias: Bias = rate_bias
+) -> JointMotion:
+    """Joint motion of a chain. Args: bias: (tip, joint state) -> M_1' q_r', (3,)."""
+    s = JointState.symbols()
+    tip = family.tip(c, s.q)
+    loop = family.loop(c, M.position)
+    M_1, left = ca.substitute([ca.jacobian(tip, s.q), bias(tip, s)], [s.q], [loop.q_r])
+    inverse = solve_small(M_1, ca.SX.eye(3))
+    rate = inverse @ M.velocity
+    acceleration = inverse @ (M.acceleration - ca.substitute(left, s.rate, rate))
+    return JointMotion(loop, rate, acceleration, inverse)
 
 
 def joint_space_law(
-    family: Family, c: Constants, M: PointMotion, g: ca.SX, link_force: LinkForce
+    family: Family,
+    c: Constants,
+    M: PointMotion,
+    g: ca.SX,
+    link_force: LinkForce,
+    bias: Bias = rate_bias,
 ) -> Law:
     """The law of a chain whose links' forces are derived in joint space.
 
     Args: link_force: (link, joint state, gravity) -> force dual to q_r', (3,).
     """
-    s = JointState(*(ca.SX.sym(name, 3) for name in ("q_r", "q_r1", "q_r2")))
-    tip = family.tip(c, s.q)
-    M_1 = ca.jacobian(tip, s.q)
-    bias = ca.jtimes(M_1 @ s.rate, s.q, s.rate)
+    s = JointState.symbols()
     links = family.links(c, s.q)
-    forces = [link_force(link, s, g) for link in links]
-
-    loop = family.loop(c, M.position)
-    M_1, bias_of, *forces_of = _at(s, loop.q_r, [M_1, bias, *forces])
-    M_1_inverse = solve_small(M_1, ca.SX.eye(3))
-    rate = M_1_inverse @ M.velocity
-    bias_of = ca.substitute(bias_of, s.rate, rate)
-    acceleration = M_1_inverse @ (M.acceleration - bias_of)
-    symbols = ca.vertcat(s.rate, s.acceleration)
-    values = ca.vertcat(rate, acceleration)
-    on_M = {
-        link.name: M_1_inverse.T @ ca.substitute(force, symbols, values)
-        for link, force in zip(links, forces_of, strict=True)
-    }
-    return Law(on_M, M_1_inverse[0, :].T, loop.reach, rate[0], acceleration[0])
-
-
-def _at(s: JointState, q_r: ca.SX, expressions: list[ca.SX]) -> list[ca.SX]:
-    return ca.substitute(expressions, [s.q], [q_r])
+    motion = joint_motion(family, c, M, bias)
+    forces = motion.insert(s, [link_force(link, s, g) for link in links])
+    return motion.law({link.name: f for link, f in zip(links, forces, strict=True)})

@@ -18,6 +18,8 @@ from .program import Program
 
 LONG = 700  # lane operations above which chains run in a loop instead of unrolled
 
+NEAR = 1e-14  # margin or quality below which a sample is looked at again by the interpreter
+
 _INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
 
 
@@ -51,18 +53,27 @@ def emit(program: Program, width: int) -> Source:
     printer = _Printer(program, order, table, width)
     header = (files(__package__) / "c" / "vector.h").read_text(encoding="utf-8")
     driver = (files(__package__) / "c" / "driver.h").read_text(encoding="utf-8")
+    outputs: dict[str, int] = {}
+    for o in program.outputs:
+        outputs[o.name] = outputs.get(o.name, 0) + (program.spec.n if o.lane else 1)
+    names = [name for name, count in outputs.items() for _ in range(count)]
+    sizes = {
+        "W": width,
+        "INPUTS": len(program.layout.inputs),
+        "OUTPUTS": len(names),
+        "MARGIN": names.index("margin"),
+        "QUALITY": names.index("quality"),
+        "NEAR": NEAR,
+    }
     pieces = [
-        f"#define W {width}",
+        *(f"#define {name} {value}" for name, value in sizes.items()),
         header,
+        f"const int table_size = {printer.table_size};",
         printer.prepare(),
         printer.one(),
         printer.batch(),
         driver,
     ]
-    counts = [count for _, count in program.spec.chains]
-    outputs: dict[str, int] = {}
-    for o in program.outputs:
-        outputs[o.name] = outputs.get(o.name, 0) + (sum(counts) if o.lane else 1)
     return Source("\n".join(pieces), list(outputs.items()), printer.operations())
 
 

@@ -29,7 +29,7 @@ from .batch import evaluate
 from .contact import ContactSymbols, indices, residuals
 from .rotation import rotation
 
-CONTINUATION = (1, 4, 16, 64)  # pieces of the way from home, tried in turn
+SMALLEST_PIECE = 2.0**-10  # of the way from home
 ITERATIONS = 30
 ROUNDING = 1e-15
 
@@ -47,7 +47,7 @@ class PlatformMotion:
 def contact_symbols(mechanism: Mechanism) -> list[ContactSymbols]:
     """The contacts with their numbers in place."""
     return [
-        ContactSymbols(c.surface, ca.SX(ca.DM(c.point)), ca.SX(ca.DM(c.surface.constants())))
+        ContactSymbols(c.locus, ca.SX(ca.DM(c.point)), ca.SX(ca.DM(c.locus.constants())))
         for c in mechanism.contacts
     ]
 
@@ -66,7 +66,9 @@ class Closure:
         self._bias = ca.Function("bias", [x, rate], [bias])
         home = np.asarray(self._conditions(np.zeros(6))[0]).ravel()
         self._home = home[self._k :]
-        self._scale = 1.0 + characteristic_length(mechanism)  # lengths, and angles of scale 1
+        length = characteristic_length(mechanism)
+        self._unit = np.repeat([length, 1.0], 3)
+        self._scale = 1.0 + length  # lengths, and angles of scale 1
 
     def solve(self, s: np.ndarray, s1: np.ndarray, s2: np.ndarray) -> PlatformMotion:
         """Poses and rates where g = s, g' = s1, g'' = s2, (N, 6 - k) each."""
@@ -78,21 +80,26 @@ class Closure:
         return PlatformMotion(pose, rate, acceleration, reached)
 
     def _poses(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        pose = np.full((len(s), 6), np.nan)
-        reached = np.zeros(len(s), dtype=bool)
-        for pieces in CONTINUATION:
-            todo = np.flatnonzero(~reached & np.isfinite(s).all(axis=1))
-            if not todo.size:
-                break
-            x, ok = np.zeros((todo.size, 6)), np.ones(todo.size, dtype=bool)
-            for piece in range(1, pieces + 1):
-                target = self._home + (s[todo] - self._home) * (piece / pieces)
-                x[ok], ok[ok] = self._newton(x[ok], target[ok])
-            pose[todo[ok]], reached[todo[ok]] = x[ok], True
+        """Follow each sample from home, at once where Newton can, in pieces where it needs them."""
+        pose, done, piece = np.zeros((len(s), 6)), np.zeros(len(s)), np.ones(len(s))
+        active = np.flatnonzero(np.isfinite(s).all(axis=1))
+        while active.size:
+            goal = np.minimum(done[active] + piece[active], 1.0)
+            target = self._home + (s[active] - self._home) * goal[:, None]
+            x, ok = self._newton(pose[active], target)
+            pose[active[ok]], done[active[ok]] = x[ok], goal[ok]
+            piece[active] *= np.where(ok, 2.0, 0.5)
+            active = active[(done[active] < 1) & (piece[active] >= SMALLEST_PIECE)]
+        reached = done == 1
+        pose[~reached] = np.nan
         return pose, reached
 
     def _newton(self, x: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Newton from x; a sample fails when its steps stop shrinking above rounding."""
+        """Newton from x; a sample fails when its steps stop shrinking above rounding.
+
+        Steps that shrink to a quarter each time lead to the solution nearest to x, so that no
+        sample leaves the branch of home.
+        """
         x = x.copy()
         last = np.full(len(x), np.inf)
         active = np.arange(len(x))
@@ -103,16 +110,17 @@ class Closure:
             value, K = evaluate(self._conditions, x[active])
             value[:, self._k :] -= target[active]
             step = _solve(_square(K), value)
-            size = np.abs(step).max(axis=1)
+            size = np.abs(step / self._unit).max(axis=1)
             finite = np.isfinite(size)
             x[active[finite]] -= step[finite]
             small = size <= ROUNDING * self._scale
-            # Newton's steps shrink until rounding; a stall near rounding is convergence. Contacts
-            # that hold badly magnify rounding in the steps, never in the residual.
-            stalled = size >= 0.5 * last[active]
-            near = (size < 1e-13) | (np.abs(value).max(axis=1) <= ROUNDING * self._scale)
+            # A stall near rounding is convergence. Contacts that hold badly magnify rounding in
+            # the steps, never in the residual.
+            stalled = size > last[active] / 4
+            rounding = ROUNDING * (self._scale + np.abs(x[active]).max(axis=1))
+            near = (size < 1e-13) | (np.abs(value).max(axis=1) <= rounding)
             converged[active] = small | (stalled & near)
-            failed = ~finite | (stalled & ~near & (last[active] < 1.0)) | (size > 10)
+            failed = ~finite | (stalled & ~near) | (size > 1)
             last[active] = size
             active = active[~(converged[active] | failed)]
         return x, converged

@@ -23,7 +23,10 @@ POSITIONS = COORDINATES[:3]
 
 @dataclass(frozen=True)
 class ContactSymbols:
-    """A contact whose numbers are symbols: T in {M}, (3,), and the constants of its surface."""
+    """A contact whose numbers are symbols: T in {M}, (3,), and the constants of its locus.
+
+    surface: where the ball's centre stays, `Contact.locus` or another one of its form.
+    """
 
     surface: Any
     point: ca.SX
@@ -35,8 +38,11 @@ class ContactSymbols:
 
     def gradient(self, position: ca.SX) -> ca.SX:
         """d phi / d position, (3,): along the unit normal."""
-        p = ca.SX.sym("p", 3)
-        return ca.substitute(ca.gradient(self.phi(p), p), p, position)
+        return self.surface.gradient(position, self.constants)
+
+    def bending(self, position: ca.SX, velocity: ca.SX) -> ca.SX:
+        """v^T (d2 phi / d position2) v."""
+        return self.surface.bending(position, velocity, self.constants)
 
 
 def indices(names: Sequence[str]) -> list[int]:
@@ -92,9 +98,7 @@ def contact_bias(
     for contact, n, r in zip(contacts, frame.gradients, frame.levers, strict=True):
         swing = ca.cross(omega, r)
         v = twist[:3] + swing
-        p = ca.SX.sym("p", 3)
-        curving = ca.jtimes(ca.gradient(contact.phi(p), p), p, v)
-        curving = ca.dot(ca.substitute(curving, p, position + r), v)
+        curving = contact.bending(position + r, v)
         biases.append(curving + ca.dot(n, ca.cross(omega, swing)))
     return ca.vertcat(*biases)
 

@@ -6,7 +6,7 @@ A family's mathematics is in `condyle.kinematics.chain`.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
@@ -87,9 +87,6 @@ class ChainTable(Table):
 
     name: Name
 
-    joint_unit: ClassVar[str]
-    effort_unit: ClassVar[str]
-
 
 class RSS(ChainTable):
     """A crank on a base-mounted shaft, and a coupler with two ball joints ([Cheng2023] Fig. 1)."""
@@ -102,9 +99,6 @@ class RSS(ChainTable):
     crank: Crank
     coupler: Rod
     actuator: RotaryActuator = RotaryActuator()
-
-    joint_unit: ClassVar[str] = "rad"
-    effort_unit: ClassVar[str] = "N m"
 
     @field_validator("crank_tip")
     @classmethod
@@ -156,9 +150,6 @@ class PSS(ChainTable):
     rod: Rod
     actuator: LinearActuator = LinearActuator()
 
-    joint_unit: ClassVar[str] = "m"
-    effort_unit: ClassVar[str] = "N"
-
     @field_validator("platform")
     @classmethod
     def _rod(cls, joint: Any, info: ValidationInfo) -> Any:
@@ -186,9 +177,6 @@ class SPS(ChainTable):
     cylinder: LegBody = Field(description="the body at B")
     piston: LegBody = Field(description="the body at M")
     actuator: LinearActuator = LinearActuator()
-
-    joint_unit: ClassVar[str] = "m"
-    effort_unit: ClassVar[str] = "N"
 
     @field_validator("platform")
     @classmethod

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -12,9 +12,11 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from ..errors import InputError, MechanismError, did_you_mean
+from .chain import Chain
 from .home import holding_problems, home_problem
-from .mechanism import Contact, Mechanism, structural_problems
+from .mechanism import COORDINATES, Contact, Mechanism, structural_problems
 from .quantities import PER_METRE
+from .surface import Expression
 
 _BUNDLED = files(__package__) / "bundled"
 
@@ -57,7 +59,7 @@ def read_text(source: str | Path) -> str:
         near = {p.name for p in path.parent.glob("*.toml")} if path.parent.is_dir() else set()
         raise InputError(
             f"mechanism file {source} does not exist, and no bundled mechanism has that name."
-            + did_you_mean(str(source), {*bundled_mechanisms(), *near})
+            + did_you_mean(path.name, {*bundled_mechanisms(), *near})
         ) from None
     except UnicodeDecodeError:
         raise InputError(f"{source} is not a text file (UTF-8 expected)") from None
@@ -67,21 +69,36 @@ def read_text(source: str | Path) -> str:
 
 def parse(text: str, source: str = "mechanism") -> Mechanism:
     """A mechanism from the text of a file; `source` names it in messages."""
+    return from_data(read_tables(text, source), source)
+
+
+def read_tables(text: str, source: str) -> dict[str, Any]:
+    """The tables of a file as TOML gives them."""
     try:
-        data = tomllib.loads(text)
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{source} is not TOML: {error}") from None
-    return from_data(data, source)
 
 
-def from_data(data: Mapping[str, Any], source: str = "mechanism") -> Mechanism:
-    """A mechanism from the tables of a file, lengths in its `length_unit`."""
+def from_data(
+    data: Mapping[str, Any], source: str = "mechanism", at_home: bool = True
+) -> Mechanism:
+    """A mechanism from the tables of a file, lengths in its `length_unit`.
+
+    Args: at_home: whether the contacts must be on their surfaces and hold the platform.
+    """
     data = dict(data)
     unit = data.pop("length_unit", "m")
     problems = []
-    if unit not in PER_METRE:
-        problems.append(f'length_unit: expected "m" or "mm", got {unit!r}')
-    context = {"per_metre": PER_METRE.get(unit, 1.0) if isinstance(unit, str) else 1.0}
+    if not isinstance(unit, str) or unit not in PER_METRE:
+        problems.append(f'length_unit: expected "m" or "mm", got {_shown(unit)}')
+        unit = "m"
+    context = {"per_metre": PER_METRE[unit]}
+    # Names that Python has for a key of the file are no keys of the file.
+    aliased = {name for name, field in Mechanism.model_fields.items() if field.alias}
+    for key in aliased & data.keys():
+        problems.append(f"{key}: {_message({'type': 'extra_forbidden'})}")
+        del data[key]
     mechanism = None
     try:
         mechanism = Mechanism.model_validate(data, context=context)
@@ -89,25 +106,45 @@ def from_data(data: Mapping[str, Any], source: str = "mechanism") -> Mechanism:
         structural = list(structural_problems(data))
         problems += structural
         problems += [p for p in describe(error, data) if not any(s in p for s in structural)]
-    if isinstance(unit, str):
-        problems += _contact_problems(data.get("contact"), context)
-    if mechanism is not None and not problems:
-        problems += holding_problems(mechanism)
+    problems += _contact_problems(data, context) if at_home else ()
     if problems:
         raise MechanismError(source, problems)
     assert mechanism is not None
     return mechanism
 
 
-def _contact_problems(tables: Any, context: Mapping[str, float]) -> Iterable[str]:
-    """Contacts off their surface at home, also where the rest of the file is not valid yet."""
-    for index, table in enumerate(tables if isinstance(tables, list) else ()):
+def _contact_problems(data: Mapping[str, Any], context: Mapping[str, float]) -> Iterator[str]:
+    """Contacts that are off their surface at home or cannot hold the platform.
+
+    They are found also where other parts of the file are not valid yet.
+    """
+    contacts = _valid(Contact, data.get("contact"), context)
+    chains = [chain for chain in _valid(Chain, data.get("chain"), context) if chain is not None]
+    off = False
+    for index, contact in enumerate(contacts):
+        if contact is not None and (problem := home_problem(contact)) is not None:
+            off = True
+            yield f"{_place(('contact', index), data)}: {problem}"
+    if off or None in contacts or len(contacts) > 5 or not chains:
+        return
+    given = data.get("dependent")
+    names = tuple(map(str, given)) if isinstance(given, list) else ()
+    valid = {*names} <= {*COORDINATES} and len({*names}) == len(names) == len(contacts)
+    draft = Mechanism.model_construct(
+        contacts=tuple(contacts), chains=tuple(chains), dependent=names if valid else None
+    )
+    yield from holding_problems(draft)
+
+
+def _valid(kind: Any, tables: Any, context: Mapping[str, float]) -> list[Any]:
+    """Each table as a `kind`, None where it is none."""
+    adapter, found = TypeAdapter(kind), []
+    for table in tables if isinstance(tables, list) else ():
         try:
-            contact = TypeAdapter(Contact).validate_python(table, context=dict(context))
+            found.append(adapter.validate_python(table, context=dict(context)))
         except ValidationError:
-            continue
-        if (problem := home_problem(contact)) is not None:
-            yield f"{_place(('contact', index), {'contact': tables})}: {problem}"
+            found.append(None)
+    return found
 
 
 def describe(error: ValidationError, data: Mapping[str, Any]) -> list[str]:
@@ -147,6 +184,12 @@ def _message(problem: Any) -> str:
         f"got {_shown(got)}",
         "less_than_equal": f"expected a value of at most {context.get('le')}, got {_shown(got)}",
         "tuple_type": f"expected a list of numbers, got {_shown(got)}",
+        "too_long": f"expected at most {context.get('max_length')} entries, "
+        f"got {context.get('actual_length')}",
+        "too_short": f"expected at least {context.get('min_length')} entries, "
+        f"got {context.get('actual_length')}",
+        "model_type": f"expected a table, got {_shown(got)}",
+        "dict_type": f"expected a table, got {_shown(got)}",
         "string_type": f"expected text in quotes, got {_shown(got)}",
         "value_error": str(context.get("error", "")),
         "literal_error": f"expected {context.get('expected')}, got {_shown(got)}",
@@ -165,11 +208,25 @@ def _shown(value: Any) -> str:
 
 
 def dumps(mechanism: Mechanism) -> str:
-    """The mechanism as a TOML file in SI; `parse(dumps(m)) == m` to the last bit."""
+    """The mechanism as a TOML file in SI; `parse(dumps(m)) == m` to the last bit.
+
+    Raises: InputError: if a surface is a Python expression, which a file cannot hold.
+    """
     import tomli_w
+
+    if names := written_in_python(mechanism):
+        raise InputError(
+            f"{mechanism.name}: the surface of {', '.join(names)} is a Python expression; a "
+            "mechanism file holds kinds and numbers only. Use a kind of surface instead"
+        )
 
     data = mechanism.model_dump(by_alias=True, exclude_none=True, exclude_defaults=False)
     return tomli_w.dumps(_without_empty({"length_unit": "m", **data}))
+
+
+def written_in_python(mechanism: Mechanism) -> list[str]:
+    """Names of contacts whose surface is a Python expression."""
+    return [c.name for c in mechanism.contacts if isinstance(c.surface, Expression)]
 
 
 def _without_empty(value: Any) -> Any:

@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from .mechanism import COORDINATES, Contact, Mechanism
+from .surface import Parallel
 
 DEPENDENT_ORDER = ("Z", "gamma", "alpha", "beta", "Y", "X")
 MAX_CONDITION = 1e4
@@ -30,7 +31,7 @@ def characteristic_length(mechanism: Mechanism) -> float:
 def contact_gradient(contact: Contact) -> tuple[float, np.ndarray]:
     """phi [m] and its gradient, (3,) [1], of one contact at home."""
     p = ca.SX.sym("p", 3)
-    phi = contact.surface.phi(p)
+    phi = contact.locus.phi(p)
     value, gradient = ca.Function("phi", [p], [phi, ca.gradient(phi, p)])(contact.point)
     return float(value), np.asarray(gradient).ravel()
 
@@ -96,15 +97,25 @@ def independent_coordinates(mechanism: Mechanism) -> tuple[str, ...]:
 
 def home_problem(contact: Contact) -> str | None:
     """Why the contact cannot be at its point at home, or None."""
-    off = home_residual(contact)
+    off, locus = home_residual(contact), contact.locus
     if not np.isfinite(off):
+        if isinstance(locus, Parallel):
+            return f"{_ball(contact)} finds no point of the surface to touch"
         return "the surface has no normal at the contact point at home"
     if abs(off) > HOME_ERROR:
         return (
             f"the point is {off * 1e3:+.6g} mm off the surface at home; at most 0.01 mm is "
-            "accepted. Move the point or the surface"
+            "accepted. Move the point or the surface; `condyle check --project` shows the "
+            "nearest home"
         )
+    if isinstance(locus, Parallel) and not locus.grip() > 0:
+        return f"{_ball(contact)} cannot touch the surface there: it curves more tightly"
     return None
+
+
+def _ball(contact: Contact) -> str:
+    assert contact.ball_radius is not None
+    return f'a ball of radius {contact.ball_radius * 1e3:g} mm on the side "{contact.side}"'
 
 
 def holding_problems(mechanism: Mechanism) -> Iterator[str]:

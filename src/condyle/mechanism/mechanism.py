@@ -8,14 +8,26 @@ from functools import cached_property
 from typing import Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, StrictBool, ValidationError, field_validator, model_validator
 
+from ..errors import MechanismError
 from .chain import Chain
-from .quantities import Interval, Name, Number, Point, Positive, Table, Vector
-from .surface import Surface
+from .quantities import (
+    Interval,
+    Name,
+    Number,
+    Point,
+    Positive,
+    PositiveLength,
+    Table,
+    Vector,
+)
+from .surface import Surface, sides
 
 COORDINATES = ("X", "Y", "Z", "alpha", "beta", "gamma")
 Coordinate = Literal["X", "Y", "Z", "alpha", "beta", "gamma"]
+Side = Literal["below", "above", "inside", "outside"]
+SIDE_OPTIONS = ("side", "ball_radius", "one_sided")
 
 
 class Inertia(Table):
@@ -72,12 +84,64 @@ class Bounds(Table):
 
 
 class Contact(Table):
-    """A platform point (the centre of a condyle ball) that stays on a surface fixed in {S}."""
+    """A platform point (the centre of a condyle ball) that stays on a surface fixed in {S}.
+
+    With `ball_radius` the surface is the wall that the ball touches, and the centre keeps that
+    distance from it; with `one_sided` the ball can lift off.
+    """
 
     name: Name
     point: Point = Field(description="centre of the ball, in {M}")
     surface: Surface
+    side: Side | None = Field(default=None, description="where the ball is, seen from the surface")
+    ball_radius: PositiveLength | None = Field(
+        default=None, description="the surface is the wall, and the centre this far from it"
+    )
+    one_sided: StrictBool = Field(
+        default=False, description="the surface can push the ball and not pull it"
+    )
     bounds: Bounds = Bounds()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _options_of_the_surface(cls, data: Any) -> Any:
+        """`side` and its two options may stand in the table of the surface too."""
+        surface = data.get("surface") if isinstance(data, Mapping) else None
+        if not isinstance(surface, Mapping):
+            return data
+        moved = {key: surface[key] for key in SIDE_OPTIONS if key in surface}
+        if twice := sorted(moved.keys() & data.keys()):
+            raise ValueError(f"{', '.join(twice)} stands in the contact and in its surface")
+        kept = {key: value for key, value in surface.items() if key not in moved}
+        return {**data, **moved, "surface": kept}
+
+    @model_validator(mode="after")
+    def _sided(self) -> Self:
+        known = sides(self.surface.closed)
+        expected = f'expected "{known[0]}" or "{known[1]}" for a {self.surface.kind}'
+        if self.side is None and (self.ball_radius is not None or self.one_sided):
+            raise ValueError(f"side is missing, and ball_radius and one_sided need it: {expected}")
+        if self.side is not None and self.side not in known:
+            raise ValueError(f'side: {expected}, got "{self.side}"')
+        radius = getattr(self.surface, "radius", None)
+        if self.side == "inside" and radius is not None and (self.ball_radius or 0.0) >= radius:
+            raise ValueError(
+                f"ball_radius: a ball of radius {self.ball_radius * 1e3:g} mm has no room inside a "
+                f"{self.surface.kind} of radius {radius * 1e3:g} mm"
+            )
+        return self
+
+    @cached_property
+    def locus(self) -> Any:
+        """The surface on which the centre of the ball stays: parallel to the wall, if it is one."""
+        if self.ball_radius is None:
+            return self.surface
+        return self.surface.parallel(self.push * self.ball_radius, self.point)
+
+    @property
+    def push(self) -> int:
+        """Sign of a contact force lambda with which the surface pushes the ball; 0 if unknown."""
+        return {None: 0, "above": 1, "outside": 1, "below": -1, "inside": -1}[self.side]
 
 
 class Mechanism(Table):
@@ -96,9 +160,17 @@ class Mechanism(Table):
     chains: tuple[Chain, ...] = Field(alias="chain", min_length=1)
 
     def replace(self, **changes: Any) -> Mechanism:
-        """A copy with some fields changed, validated as a file would be."""
+        """A copy with some fields changed, validated as a file would be.
+
+        Raises: MechanismError: with every problem found.
+        """
+        from .files import describe
+
         fields = {name: getattr(self, name) for name in type(self).model_fields}
-        return Mechanism(**(fields | changes))
+        try:
+            return Mechanism(**(fields | changes))
+        except ValidationError as error:
+            raise MechanismError(self.name, describe(error, fields | changes)) from None
 
     @property
     def degrees_of_freedom(self) -> int:

@@ -41,9 +41,13 @@ class Description:
         if d["contacts"]:
             lines.append("contacts")
         for name, contact in d["contacts"].items():
+            ball = contact["ball_radius"]
+            options = [f", {contact['side']}"] if contact["side"] else []
+            options += [f", ball of radius {ball * 1e3:g} mm"] if ball is not None else []
+            options += [", one-sided"] if contact["one_sided"] else []
             lines.append(
-                f"  {name:<{width}}  {contact['kind']}, {contact['residual'] * 1e3:+.2g} mm off "
-                "its surface at home"
+                f"  {name:<{width}}  {contact['kind']}{''.join(options)}, "
+                f"{contact['residual'] * 1e3:+.2g} mm off its surface at home"
             )
         sigma = ", ".join(f"{v:.4g}" for v in s["J_W_sigma"])
         lines += [
@@ -80,7 +84,13 @@ def describe(mechanism: Mechanism) -> Description:
                 for i, chain in enumerate(mechanism.chains)
             },
             "contacts": {
-                contact.name: {"kind": contact.surface.kind, "residual": float(residual)}
+                contact.name: {
+                    "kind": contact.surface.kind,
+                    "side": contact.side,
+                    "ball_radius": contact.ball_radius,
+                    "one_sided": contact.one_sided,
+                    "residual": float(residual),
+                }
                 for contact, residual in zip(
                     mechanism.contacts, home_residuals(mechanism), strict=True
                 )

@@ -1,8 +1,12 @@
 """Chain families: one file each, found here by the `kind` of the mechanism file."""
 
-from .family import Constants, Family, Law, Link, Loop
+from .family import Constants, Family, Joint, Law, Link, Loop
+from .pss import PSSFamily
 from .rss import RSSFamily
+from .sps import SPSFamily
 
-FAMILIES: dict[str, Family] = {family.kind: family for family in (RSSFamily(),)}
+FAMILIES: dict[str, Family] = {
+    family.kind: family for family in (RSSFamily(), PSSFamily(), SPSFamily())
+}
 
-__all__ = ["FAMILIES", "Constants", "Family", "Law", "Link", "Loop"]
+__all__ = ["FAMILIES", "Constants", "Family", "Joint", "Law", "Link", "Loop"]

@@ -2,8 +2,8 @@
 
 from .chains import DRAWINGS, ChainDrawing, Rod, drawing_points
 from .colours import DARK, DASHES, LIGHT, Style, styles
+from .hull import platform_hull
 from .place import Scene, place, rotations
-from .platform import platform_hull
 from .surface import Patch, contact_normals, contact_patch, contact_profile
 
 __all__ = [

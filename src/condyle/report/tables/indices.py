@@ -16,6 +16,8 @@ def table_2(comparison: Comparison) -> Table:
     beside = paper.is_paper_class(comparison.mechanism)
     held, free = comparison.indices(True), comparison.indices(False)
     names = ("RAPM", "6RSS") if beside else ("with contacts", "without contacts")
+    if not comparison.mechanism.contacts:
+        names = ("no contacts", "")
     known = (paper.TABLE_2, paper.TABLE_2_FREE) if beside else ({}, {})
     parts = list(dict.fromkeys(part for one in held for part in one.values))
     records, rows = [], []

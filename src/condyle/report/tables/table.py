@@ -46,7 +46,7 @@ class Table:
 
     def write_csv(self, path: str | os.PathLike[str]) -> None:
         """One record a row; a number that there is not is an empty cell."""
-        columns = {}
+        columns: dict[str, list[Any]] = {}
         for name in self.records[0] if self.records else ():
             values = [record[name] for record in self.records]
             words = any(isinstance(value, str) for value in values)

@@ -1,0 +1,149 @@
+"""PSS: a slider pushed along a rail of the base, then a rod with two ball joints (also PUS).
+
+With d = M - S at home, rail direction a and rod length L, the loop |d - x a| = L is quadratic in
+the travel x; its root is the one of home. Forces and rates need one square root.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from .family import (
+    Constants,
+    Family,
+    Joint,
+    Law,
+    Link,
+    Loop,
+    axial_force,
+    joint_position,
+    rod_angles,
+    rod_direction,
+    rod_frame,
+    rod_guide,
+    rod_inertia,
+    rod_spin,
+)
+
+
+class PSSFamily(Family):
+    kind = "PSS"
+    bodies = ("sliders", "rods")
+    joint_unit = "m"
+    effort_unit = "N"
+    # S is the slider's joint at home; N is N_i0 and Y its second axis.
+    shapes = {
+        "S": 3,
+        "axis": 3,
+        "L": 1,
+        "branch": 1,
+        "Y": 3,
+        "mass": 1,
+        "com": 1,
+        "transverse": 1,
+        "axial": 1,
+        "slider": 1,
+        "N": 9,
+    }
+
+    def constants(self, chain: Any) -> dict[str, np.ndarray]:
+        rod = np.subtract(chain.platform, chain.base)
+        axis = np.asarray(chain.axis) / np.linalg.norm(chain.axis)
+        N = rod_frame(rod)
+        values = {
+            "S": chain.base,
+            "axis": axis,
+            "L": np.linalg.norm(rod),
+            "branch": np.sign(rod @ axis),
+            "Y": N[:, 1],
+            "mass": chain.rod.mass,
+            "com": chain.rod.com,
+            "transverse": chain.rod.transverse,
+            "axial": chain.rod.axial,
+            "slider": chain.slider.mass,
+            "N": N,
+        }
+        return {name: np.asarray(value, dtype=float) for name, value in values.items()}
+
+    def tip(self, c: Constants, q_r: ca.SX) -> ca.SX:
+        return c.S + q_r[0] * c.axis + c.L * rod_direction(c.N, q_r)
+
+    def links(self, c: Constants, q_r: ca.SX) -> list[Link]:
+        S, n = c.S + q_r[0] * c.axis, rod_direction(c.N, q_r)
+        return [
+            Link("sliders", c.slider, S, ca.SX(3, 3), ca.SX(3, 3)),
+            Link(
+                "rods",
+                c.mass,
+                S + c.com * c.L * n,
+                rod_spin(c.N, q_r),
+                rod_inertia(n, c.transverse, c.axial),
+            ),
+        ]
+
+    def joints(self, c: Constants, q_r: ca.SX) -> list[Joint]:
+        S = c.S + q_r[0] * c.axis
+        return [
+            Joint.slide("rail", "slider's joint S", S, c.axis),
+            Joint.ball("slider_joint", "slider's joint S", S, rod_guide(c.N, q_r)),
+        ]
+
+    def loop(self, c: Constants, M: ca.SX) -> Loop:
+        x, root, e, e_a = self._close(c, M)
+        beta, gamma, cos_gamma = rod_angles(c.N, e, c.L)
+        return Loop(
+            q_r=ca.vertcat(x, beta, gamma),
+            reach=root / c.L**2,
+            J=e / e_a,
+            rod=e,
+            rod_length=c.L,
+            J_A=-2 * e_a,
+            J_A_scale=2 * c.L,
+            cos_gamma=cos_gamma,
+        )
+
+    def law(self, c: Constants, M: ca.SX, V: ca.SX, A: ca.SX, g: ca.SX) -> Law:
+        _, root, e, _ = self._close(c, M)
+        inverse = c.branch / ca.sqrt(root)  # 1 / e.a
+        J = e * inverse
+        rate = ca.dot(J, V)
+        e_rate = V - c.axis * rate
+        # e.(A - a x'') + |e'|^2 = 0
+        acceleration = ca.dot(J, A) + ca.dot(e_rate, e_rate) * inverse
+        S_acceleration = c.axis * acceleration
+
+        # The rod as three constants on its ends, as in the RSS chain.
+        bend = c.transverse / c.L**2
+        m_MM = c.mass * c.com**2 + bend
+        m_SM = c.mass * c.com * (1 - c.com) - bend
+        m_SS = c.mass * (1 - c.com) ** 2 + bend
+        axial = axial_force(e, e_rate, A - S_acceleration, c.Y, c.L, c.axial)
+        weight = ca.dot(c.axis, g)
+        # m (1 - com) = m_SM + m_SS splits the weight that the slider carries.
+        along = m_SS * acceleration + ca.dot(c.axis, m_SM * (A - g) - axial) - m_SS * weight
+        rod = m_SM * (S_acceleration - g) + axial + J * along
+        slider = J * (c.slider * acceleration - c.slider * weight)
+        forces = {"sliders": slider, "rods": rod}
+        return Law(forces, J, root / c.L**2, rate, acceleration, {"rods": m_MM})
+
+    def explain(self, chain: Any, pose: np.ndarray) -> str:
+        c = self.constants(chain)
+        d = joint_position(chain, pose) - c["S"]
+        across = np.linalg.norm(d - (d @ c["axis"]) * c["axis"])
+        return (
+            f'chain "{chain.name}" cannot reach M: its rail passes M at {across * 1e3:.1f} mm, '
+            f"the rod is {float(c['L']) * 1e3:.1f} mm long"
+        )
+
+    @staticmethod
+    def _close(c: Constants, M: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+        """Travel x, (e.a)^2, rod vector e and e.a."""
+        d = M - c.S
+        along = ca.dot(d, c.axis)
+        root = along * along - ca.dot(d, d) + c.L**2
+        e_a = c.branch * ca.sqrt(root)
+        x = along - e_a
+        return x, root, d - x * c.axis, e_a

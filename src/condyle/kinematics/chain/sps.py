@@ -1,0 +1,154 @@
+"""SPS: a telescopic leg, cylinder and piston, between two ball joints (also UPS).
+
+The leg's length r = |M - B| is the joint coordinate, up to that of home, so there is no loop to
+solve: e = M - B, and with u = e / r the actuator's row is u itself. Cylinder and piston share the
+leg's direction and turn with N_i0 Ry(beta_i) Rz(gamma_i).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from .family import (
+    Constants,
+    Family,
+    Joint,
+    Law,
+    Link,
+    Loop,
+    rod_angles,
+    rod_direction,
+    rod_frame,
+    rod_guide,
+    rod_inertia,
+    rod_spin,
+)
+
+BODY = ("mass", "com", "transverse", "axial")
+
+
+class SPSFamily(Family):
+    kind = "SPS"
+    bodies = ("cylinders", "pistons")
+    joint_unit = "m"
+    effort_unit = "N"
+    # cylinder_com is the distance from B, piston_com the distance from M, both along the leg.
+    shapes = {
+        "B": 3,
+        "home": 1,
+        "Y": 3,
+        **{f"{body}_{name}": 1 for body in ("cylinder", "piston") for name in BODY},
+        "N": 9,
+    }
+
+    def constants(self, chain: Any) -> dict[str, np.ndarray]:
+        leg = np.subtract(chain.platform, chain.base)
+        N = rod_frame(leg)
+        bodies = {
+            f"{body}_{name}": getattr(getattr(chain, body), name)
+            for body in ("cylinder", "piston")
+            for name in BODY
+        }
+        values = {"B": chain.base, "home": np.linalg.norm(leg), "Y": N[:, 1], **bodies, "N": N}
+        return {name: np.asarray(value, dtype=float) for name, value in values.items()}
+
+    def tip(self, c: Constants, q_r: ca.SX) -> ca.SX:
+        return c.B + (c.home + q_r[0]) * rod_direction(c.N, q_r)
+
+    def links(self, c: Constants, q_r: ca.SX) -> list[Link]:
+        n, spin = rod_direction(c.N, q_r), rod_spin(c.N, q_r)
+        cylinder, piston = (
+            rod_inertia(n, c.cylinder_transverse, c.cylinder_axial),
+            rod_inertia(n, c.piston_transverse, c.piston_axial),
+        )
+        return [
+            Link("cylinders", c.cylinder_mass, c.B + c.cylinder_com * n, spin, cylinder),
+            Link("pistons", c.piston_mass, self.tip(c, q_r) - c.piston_com * n, spin, piston),
+        ]
+
+    def joints(self, c: Constants, q_r: ca.SX) -> list[Joint]:
+        return [
+            Joint.ball("base_joint", "base joint B", c.B, rod_guide(c.N, q_r)),
+            Joint.slide("sleeve", "platform joint M", self.tip(c, q_r), rod_direction(c.N, q_r)),
+        ]
+
+    def loop(self, c: Constants, M: ca.SX) -> Loop:
+        e = M - c.B
+        r = ca.norm_2(e)
+        beta, gamma, cos_gamma = rod_angles(c.N, e, r)
+        return Loop(
+            q_r=ca.vertcat(r - c.home, beta, gamma),
+            reach=ca.SX(1.0),
+            J=e / r,
+            rod=e,
+            rod_length=r,
+            J_A=-2 * r,
+            J_A_scale=2 * r,
+            cos_gamma=cos_gamma,
+        )
+
+    def law(self, c: Constants, M: ca.SX, V: ca.SX, A: ca.SX, g: ca.SX) -> Law:
+        """With w = r u'' across the leg, W = |V|^2 - r'^2 = r^2 |u'|^2 and z = com_piston / r:
+
+        cylinder: (m com^2 + I) w / r^2 - (m com / r) (g across u),
+        piston:   m [(1 - z) (A - g - z w) + z (u.(A - g) + W / r) u] + I w / r^2,
+        both:     axial [(s^2 beta')' / p  Y x e - s beta'^2 ds/de],
+
+        s = sin(gamma) = Y.e / r, p = r^2 - (Y.e)^2, beta' = (Y x e).V / p, ds/de = (Y - s u) / r.
+        """
+        e = M - c.B
+        r2 = ca.dot(e, e)
+        inverse = ca.sqrt(r2) / r2  # 1 / r; CasADi would turn x * (1 / r) into a division
+        u = e * inverse
+        rate = ca.dot(u, V)
+        u_A, u_g = ca.dot(u, A), ca.dot(u, g)
+        swing = (ca.dot(V, V) - rate * rate) * inverse
+        acceleration = u_A + swing
+        slip = 2 * rate * inverse
+        w = A - slip * V - (u_A - slip * rate) * u
+
+        spin = self._spin_force(c, e, u, V, A, r2, inverse, rate)
+        inverse2 = inverse * inverse
+        about_B = c.cylinder_mass * c.cylinder_com**2 + c.cylinder_transverse
+        arm = c.cylinder_mass * c.cylinder_com * inverse
+        cylinder = (about_B * inverse2) * w + arm * (u_g * u - g) + c.cylinder_axial * spin
+        z = c.piston_com * inverse
+        near = c.piston_mass * (1 - z)
+        piston = (
+            near * (A - g)
+            + (c.piston_mass * z * (u_A - u_g + swing)) * u
+            + (c.piston_transverse * inverse2 - near * z) * w
+            + c.piston_axial * spin
+        )
+        return Law({"cylinders": cylinder, "pistons": piston}, u, ca.SX(1.0), rate, acceleration)
+
+    def explain(self, chain: Any, pose: np.ndarray) -> str:
+        return f'chain "{chain.name}" has no direction: M is at its base joint'
+
+    @staticmethod
+    def _spin_force(
+        c: Constants,
+        e: ca.SX,
+        u: ca.SX,
+        V: ca.SX,
+        A: ca.SX,
+        r2: ca.SX,
+        inverse: ca.SX,
+        rate: ca.SX,
+    ) -> ca.SX:
+        """Force on M of a unit axial inertia, (3,): `axial_force` for a leg that changes length."""
+        y, y_rate = ca.dot(c.Y, e), ca.dot(c.Y, V)
+        turn = ca.cross(c.Y, e)
+        s = y * inverse
+        s_rate = (y_rate - s * rate) * inverse
+        inverse_p = -1 / (y * y - r2)
+        beta_rate = ca.dot(turn, V) * inverse_p
+        # p' = 2 (e.V - y y')
+        p_rate = 2 * (ca.dot(e, V) - y * y_rate)
+        beta_acceleration = (ca.dot(turn, A) - beta_rate * p_rate) * inverse_p
+        about_Y = (2 * s * s_rate * beta_rate + s * s * beta_acceleration) * inverse_p
+        tilt = s * beta_rate * beta_rate * inverse
+        return about_Y * turn + (tilt * s) * u - tilt * c.Y

@@ -1,0 +1,61 @@
+"""Contact surfaces: the data of each kind and its equation phi(p) = 0 in {S}, one file a kind."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import casadi as ca
+from pydantic import Field, ValidatorFunctionWrapHandler, WrapValidator
+
+from .base import SurfaceTable, sides
+from .cylinder import Cylinder
+from .ellipsoid import Ellipsoid
+from .expression import Expression
+from .parallel import Parallel
+from .plane import Plane
+from .profile import Profile
+from .quadratic import Quadratic
+from .sphere import Sphere
+
+
+def _written_in_python(value: Any, from_file: ValidatorFunctionWrapHandler) -> Any:
+    return value if isinstance(value, Expression) else from_file(value)
+
+
+Surface = Annotated[
+    Annotated[
+        Plane | Quadratic | Sphere | Cylinder | Ellipsoid | Profile, Field(discriminator="kind")
+    ],
+    WrapValidator(_written_in_python),
+]
+
+_KINDS = (Plane, Quadratic, Sphere, Cylinder, Ellipsoid, Profile)
+
+
+def of_form(form: str) -> Any:
+    """A surface that lends its phi(point, constants) to all surfaces of a form; it has no numbers.
+
+    A form is a kind, "parallel ..." for the place of a ball's centre, or "expression ...".
+    """
+    first, _, rest = form.partition(" ")
+    if first == "parallel":
+        return Parallel(of_form(rest), 0.0)
+    if first == "expression":
+        return Expression(ca.Function.deserialize(rest))
+    return {kind.model_fields["kind"].default: kind for kind in _KINDS}[first].model_construct()
+
+
+__all__ = [
+    "Cylinder",
+    "Ellipsoid",
+    "Expression",
+    "Parallel",
+    "Plane",
+    "Profile",
+    "Quadratic",
+    "Sphere",
+    "Surface",
+    "SurfaceTable",
+    "of_form",
+    "sides",
+]

@@ -1,0 +1,182 @@
+"""The surface at a distance from a wall: where the centre of a ball is that touches the wall.
+
+The foot w of a point p, where the ball would touch, solves with the wall's equation g
+
+    p = w + mu grad g(w),   g(w) = 0.
+
+Newton goes there from the foot at home, along the straight line from the home centre to p: so
+the foot is that of home's branch, also for a ball that nearly fills its socket. The number of
+steps is fixed, which makes the foot an expression. With n = grad g / |grad g| at w,
+
+    phi(p) = n . (p - w) + g(w) / |grad g(w)| - distance,   grad phi = n.
+
+phi is stationary in w at the foot: an error of w enters phi squared, its first and second
+derivatives at first order; the last steps start from a converged foot and remove it from all
+three, so that automatic derivatives are exact too. Where Newton has not converged phi is
+infinite, never wrong.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from .smooth import Smooth
+
+ON_THE_WAY = (1 / 3, 2 / 3)  # parts of the way from home at which Newton makes one step,
+STEPS = 6  # and how many it makes at the point itself
+CONVERGED = 1e-10  # metres off the foot's conditions
+DIRECTIONS = 400  # in which the foot of home is looked for
+_FUNCTIONS: dict[tuple[str, int], tuple[ca.Function, ca.Function]] = {}
+
+
+@dataclass(frozen=True)
+class Parallel(Smooth):
+    """Points at a signed distance [m] from a wall, positive along its normal.
+
+    centre, foot, multiplier: a point near the surface, its foot and mu there: where Newton begins.
+    """
+
+    wall: Any
+    distance: float
+    centre: tuple[float, ...] = (0.0, 0.0, 0.0)
+    foot: tuple[float, ...] = (0.0, 0.0, 0.0)
+    multiplier: float = 0.0
+
+    @staticmethod
+    def near(wall: Any, distance: float, point: tuple[float, ...]) -> Parallel:
+        """The parallel surface as seen from `point`, (3,) [m]."""
+        equation = _functions(wall, len(wall.constants()))[0]
+        foot, multiplier = _home_foot(equation, wall.constants(), distance, np.array(point))
+        return Parallel(wall, distance, tuple(point), tuple(map(float, foot)), float(multiplier))
+
+    @property
+    def kind(self) -> str:
+        return self.wall.kind
+
+    @property
+    def closed(self) -> bool:
+        return self.wall.closed
+
+    @property
+    def form(self) -> str:
+        return f"parallel {self.wall.form}"
+
+    def constants(self) -> tuple[float, ...]:
+        """distance, centre, foot, multiplier, then the wall's."""
+        start = (*self.centre, *self.foot, self.multiplier)
+        return (self.distance, *start, *self.wall.constants())
+
+    def phi(self, point: Any, constants: Any = None) -> Any:
+        return self._at(point, constants)[0]
+
+    def gradient(self, point: ca.SX, constants: Any = None) -> ca.SX:
+        """n at the foot, (3,)."""
+        return self._at(point, constants)[1]
+
+    def bending(self, point: ca.SX, velocity: ca.SX, constants: Any = None) -> ca.SX:
+        """v . dn/dt, from the velocity of the foot."""
+        _, n, size, H, inverse, along = self._at(point, constants)
+        still = inverse @ velocity
+        foot_velocity = still - along * (ca.dot(n, still) / ca.dot(n, along))
+        turn = (H @ foot_velocity) / size
+        return ca.dot(velocity, turn) - ca.dot(velocity, n) * ca.dot(n, turn)
+
+    def grip(self) -> float:
+        """Smallest eigenvalue of 1 + distance * curvature at the foot of `centre`.
+
+        It is 1 on a flat wall and 0 for a ball of the wall's radius of curvature; where it is not
+        positive, the ball does not fit.
+        """
+        c = ca.DM(self.constants())
+        value, n, size, H, *_ = (np.asarray(v) for v in self._at(ca.DM(self.centre), c))
+        if not np.isfinite(value).all():
+            return float("nan")
+        across = np.eye(3) - n @ n.T
+        return float(np.linalg.eigvalsh(np.eye(3) + self.distance * across @ H @ across / size)[0])
+
+    def _at(self, point: Any, constants: Any) -> Any:
+        c = self.constants() if constants is None else constants
+        c = c if hasattr(c, "numel") else ca.DM(c)
+        touching = _functions(self.wall, c.numel() - 8)[1]
+        return touching(ca.vertcat(point[0], point[1], point[2]), c)
+
+
+def _functions(wall: Any, count: int) -> tuple[ca.Function, ca.Function]:
+    """The wall's equation with its derivatives, and the ball that touches it."""
+    key = (wall.form, count)
+    if key not in _FUNCTIONS:
+        equation = _equation(wall, count)
+        _FUNCTIONS[key] = equation, _touching(equation, count)
+    return _FUNCTIONS[key]
+
+
+def _equation(wall: Any, count: int) -> ca.Function:
+    """(w, constants) -> g, grad g, second derivative of the wall's equation."""
+    w, c = ca.SX.sym("w", 3), ca.SX.sym("c", count)
+    g = wall.phi(w, c)
+    H, gradient = ca.hessian(g, w)
+    return ca.Function("wall", [w, c], [g, ca.densify(gradient), ca.densify(H)])
+
+
+def _touching(equation: ca.Function, count: int) -> ca.Function:
+    """(p, constants) -> phi, n, |grad g|, H, (1 + mu H)^-1, (1 + mu H)^-1 n."""
+    p, c = ca.SX.sym("p", 3), ca.SX.sym("c", count + 8)
+    home, w, mu, wall = c[1:4], c[4:7], c[7], c[8:]
+    for part in (*ON_THE_WAY, *[1.0] * STEPS):
+        w, mu = newton_step(equation, home + part * (p - home) if part < 1 else p, w, mu, wall)
+    g, a, H = equation(w, wall)
+    size = ca.norm_2(a)
+    n = a / size
+    off = p - w - mu * a
+    converged = ca.dot(off, off) + g * g <= CONVERGED**2
+    phi = ((ca.dot(n, p - w) + g / size) - c[0]) / converged
+    inverse = ca.inv_minor(ca.SX.eye(3) + mu * H)
+    return ca.Function("touching", [p, c], [phi, n, size, H, inverse, inverse @ n])
+
+
+def newton_step(equation: ca.Function, p: Any, w: Any, mu: Any, constants: Any) -> tuple[Any, Any]:
+    """One step of w and mu towards the foot of p.
+
+    (1 + mu H) dw + a dmu = p - w - mu a,   a . dw = -g,   a = grad g.
+    """
+    g, a, H = equation(w, constants)
+    inverse = ca.inv_minor(ca.DM.eye(3) + mu * H)
+    rest, along = inverse @ (p - w - mu * a), inverse @ a
+    step = (ca.dot(a, rest) + g) / ca.dot(a, along)
+    return w + rest - step * along, mu + step
+
+
+def _home_foot(
+    equation: ca.Function, constants: tuple[float, ...], distance: float, p: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Foot and mu of a point at about `distance` from the wall.
+
+    The ball's own surface passes through the foot: of points all over it, the one that is nearest
+    the wall and whose radius is nearest the normal starts Newton.
+    """
+    u = spread_directions(DIRECTIONS)
+    points = p - distance * u
+    columns = np.repeat(np.array(constants, float)[:, None], len(u), axis=1)
+    g, a, _ = (np.asarray(v) for v in equation(points.T, columns))
+    a = a.reshape(3, -1).T
+    with np.errstate(all="ignore"):
+        size = np.linalg.norm(a, axis=1)
+        miss = np.abs(g.ravel()) / size
+        miss += abs(distance) * np.linalg.norm(a / size[:, None] - u, axis=1)
+    best = int(np.argmin(np.where(np.isfinite(miss), miss, np.inf)))
+    w, mu = ca.DM(points[best]), ca.DM(distance / size[best])
+    for _ in range(50):
+        w, mu = newton_step(equation, ca.DM(p), w, mu, ca.DM(constants))
+    return np.asarray(w).ravel(), float(mu)
+
+
+def spread_directions(count: int) -> np.ndarray:
+    """Unit vectors spread evenly over the sphere (a golden spiral), (count, 3)."""
+    k = np.arange(count) + 0.5
+    z, turn = 1 - 2 * k / count, np.pi * (1 + 5**0.5) * k
+    across = np.sqrt(1 - z * z)
+    return np.column_stack([across * np.cos(turn), across * np.sin(turn), z])

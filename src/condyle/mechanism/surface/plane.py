@@ -1,0 +1,28 @@
+"""A plane, the paper's contact surface."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+from ..quantities import Length, Number
+from .base import Coordinates, Scalar, SurfaceTable
+
+
+class Plane(SurfaceTable):
+    """z = slope[0] x + slope[1] y + offset, [Cheng2023] eq. (1)."""
+
+    kind: Literal["plane"] = "plane"
+    slope: tuple[Number, Number]
+    offset: Length
+
+    def phi(self, point: Coordinates, constants: Coordinates | None = None) -> Scalar:
+        c = self.constants() if constants is None else constants
+        return point[2] - c[0] * point[0] - c[1] * point[1] - c[2]
+
+    def constants(self) -> tuple[float, ...]:
+        return (*self.slope, self.offset)
+
+    def parallel(self, distance: float, point: Coordinates) -> Plane:
+        steepness = math.hypot(1.0, *self.slope)
+        return self.model_copy(update={"offset": self.offset + distance * steepness})

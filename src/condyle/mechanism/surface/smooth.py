@@ -1,0 +1,25 @@
+"""Exact derivatives of a surface's equation, by CasADi."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+
+
+class Smooth:
+    """What has an equation phi(point, constants), twice differentiable."""
+
+    def phi(self, point: Any, constants: Any = None) -> Any:
+        raise NotImplementedError
+
+    def gradient(self, point: ca.SX, constants: Any = None) -> ca.SX:
+        """d phi / d point, (3,): along the unit normal."""
+        p = ca.SX.sym("p", 3)
+        return ca.substitute(ca.gradient(self.phi(p, constants), p), p, point)
+
+    def bending(self, point: ca.SX, velocity: ca.SX, constants: Any = None) -> ca.SX:
+        """v^T (d2 phi / d point2) v: what phi'' owes to a velocity, (3,), alone."""
+        p = ca.SX.sym("p", 3)
+        change = ca.jtimes(ca.gradient(self.phi(p, constants), p), p, velocity)
+        return ca.dot(ca.substitute(change, p, point), velocity)

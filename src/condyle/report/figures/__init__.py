@@ -1,0 +1,63 @@
+"""Figures of a solution, in one house style; among them Figures 5 to 9 of the paper.
+
+from condyle.report.figures import PLOTS
+PLOTS["torque"](solution).savefig("torque.png")
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .accessor import SolutionPlots
+from .files import save, save_each
+from .load import load as figure_7
+from .motion import figure_5
+from .registry import PLOTS
+from .share import figure_9
+from .singularity import jacobian as figure_6
+from .torque import figure_8
+
+if TYPE_CHECKING:
+    from ...analysis.compare import Comparison
+    from ...solution import Solution
+
+__all__ = [
+    "PLOTS",
+    "SolutionPlots",
+    "figure_5",
+    "figure_6",
+    "figure_7",
+    "figure_8",
+    "figure_9",
+    "save",
+    "save_figures",
+    "save_solution_figures",
+]
+
+
+def save_figures(
+    solution: Solution, comparison: Comparison, folder: str | os.PathLike[str]
+) -> list[Path]:
+    """Write Figures 5 to 9 of the paper as PNG and SVG into a folder that exists.
+
+    Returns: the paths: figure-5-motion.png, figure-5-motion.svg, ...
+    """
+    return [
+        *save(figure_5(solution), folder, "figure-5-motion"),
+        *save(figure_6(solution), folder, "figure-6-jacobian"),
+        *save(figure_7(solution), folder, "figure-7-load"),
+        *save(figure_8(comparison), folder, "figure-8-torque"),
+        *save(figure_9(solution), folder, "figure-9-share"),
+    ]
+
+
+def save_solution_figures(solution: Solution, folder: str | os.PathLike[str]) -> list[Path]:
+    """Write the plots of `PLOTS` as PNG and SVG into a folder that exists; returns the paths.
+
+    Without contacts there are no plots of them.
+    """
+    held = solution.sizes["contact"] > 0
+    plots = {name: draw for name, draw in PLOTS.items() if held or not name.startswith("contact")}
+    return save_each(plots, solution, folder)

@@ -1,0 +1,64 @@
+"""Which chains share a panel, a colour, a unit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+from .style import PALETTE, look
+
+_SIDE = re.compile(r"(?<![a-zA-Z])(left|right|l|r)(?![a-zA-Z])", re.IGNORECASE)
+
+
+def stem(name: str) -> str:
+    """The name without its side: the same for masseter_left and masseter_right."""
+    return _SIDE.sub("", name)
+
+
+def groups(names: Sequence[str], units: Sequence[str]) -> list[list[int]]:
+    """Indices of the chains that share a panel: left and right of a pair, the others two by two.
+
+    Chains of different units never share one.
+    """
+    keys = [(stem(name), unit) for name, unit in zip(names, units, strict=True)]
+    found: list[list[int]] = []
+    lone: list[list[int]] = []
+    for key in dict.fromkeys(keys):
+        members = [i for i, k in enumerate(keys) if k == key]
+        (found if len(members) > 1 else lone).append(members)
+    for members in by_unit([units[i] for (i,) in lone]).values():
+        alone = [lone[j][0] for j in members]
+        found += [alone[j : j + 2] for j in range(0, len(alone), 2)]
+    return sorted(found)
+
+
+def by_unit(units: Sequence[str]) -> dict[str, list[int]]:
+    """Unit -> indices of its chains."""
+    return {unit: [i for i, u in enumerate(units) if u == unit] for unit in dict.fromkeys(units)}
+
+
+def styles(names: Sequence[str]) -> list[dict[str, Any]]:
+    """A line style for each name: a pair has one colour, solid and dashed."""
+    stems = list(dict.fromkeys(map(stem, names)))
+    used = dict.fromkeys(stems, 0)
+    found = []
+    for name in names:
+        colour = stems.index(stem(name))
+        turn = used[stem(name)] + colour // len(PALETTE)
+        used[stem(name)] += 1
+        found.append(look(colour, turn))
+    return found
+
+
+def readable(name: str) -> str:
+    """A name from a file as words."""
+    return str(name).replace("_", " ")
+
+
+def heading(names: Sequence[str]) -> str:
+    """What the chains of one panel have in common, or all their names."""
+    stems = {stem(name) for name in names}
+    if len(names) > 1 and len(stems) == 1:
+        return readable(stems.pop()).strip() or ", ".join(map(readable, names))
+    return ", ".join(map(readable, names))

@@ -1,0 +1,40 @@
+"""Figures to PNG and SVG files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+from ...atomic import replacing
+from .style import STYLE
+
+if TYPE_CHECKING:
+    from ...solution import Solution
+
+FORMATS = ("png", "svg")
+
+
+def save(figure: Figure, folder: str | os.PathLike[str], name: str) -> list[Path]:
+    """Write one figure as PNG and SVG, each whole or not at all; returns the paths."""
+    paths = [Path(folder) / f"{name}.{kind}" for kind in FORMATS]
+    with mpl.rc_context(STYLE):
+        for path, kind in zip(paths, FORMATS, strict=True):
+            # Without a date the same figure gives the same file.
+            metadata = {"Date": None} if kind == "svg" else None
+            with replacing(path) as temporary:
+                figure.savefig(temporary, format=kind, metadata=metadata)
+    return paths
+
+
+def save_each(
+    plots: Mapping[str, Callable[[Solution], Figure]],
+    solution: Solution,
+    folder: str | os.PathLike[str],
+) -> list[Path]:
+    """Draw and write figures by name."""
+    return [path for name, draw in plots.items() for path in save(draw(solution), folder, name)]

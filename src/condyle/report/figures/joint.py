@@ -1,0 +1,54 @@
+"""Joint coordinates of the chains."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from matplotlib.figure import Figure
+
+from .chains import by_unit, readable, styles
+from .labels import caption, shown
+from .panels import finish, limits, lines
+from .style import house, new_figure
+
+if TYPE_CHECKING:
+    from ...solution import Solution
+
+ROWS = (("joint", "coordinate"), ("joint_rate", "rate"), ("joint_acceleration", "acceleration"))
+
+
+@house
+def joint(solution: Solution) -> Figure:
+    """Joint coordinates from home, their rates with the limits, and accelerations."""
+    names = [str(name) for name in solution["chain"].values]
+    columns = by_unit([str(unit) for unit in solution["joint_unit"].values])
+    figure = new_figure("Joint coordinates", caption(solution), 2.5 + 5.5 * len(columns), 6.8)
+    grid = figure.subplots(3, len(columns), sharex=True, squeeze=False)
+    looks, bounds = styles(names), speed_limits(solution)
+    labels = []
+    for order, (row, (variable, kind)) in enumerate(zip(grid, ROWS, strict=True)):
+        row_labels = []
+        for axes, (si_unit, members) in zip(row, columns.items(), strict=True):
+            unit, factor = shown(si_unit, order)
+            values = solution[variable].values[:, members] * factor
+            own = [names[i] for i in members]
+            lines(axes, solution, values, list(map(readable, own)), [looks[i] for i in members])
+            if order == 1:
+                for limit in {bounds[name] for name in own if name in bounds}:
+                    limits(axes, values, limit * factor, unit)
+            row_labels.append(f"{kind} [{unit}]")
+        labels.append(row_labels)
+    finish(grid, labels)
+    handles, texts = [], []
+    for axes in grid[0]:
+        more = axes.get_legend_handles_labels()
+        handles += more[0]
+        texts += more[1]
+    figure.legend(handles, texts, loc="outside right upper")
+    return figure
+
+
+def speed_limits(solution: Solution) -> dict[str, float]:
+    """Chain -> its actuator's largest speed, where it has one."""
+    limits = {chain.name: chain.actuator.speed_limit for chain in solution.mechanism.chains}
+    return {name: limit for name, limit in limits.items() if limit is not None}

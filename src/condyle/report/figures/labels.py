@@ -1,0 +1,36 @@
+"""How quantities are written on axes, and where the data came from."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import TYPE_CHECKING
+
+from ...analysis.paper import is_stand_in, is_synthetic
+
+if TYPE_CHECKING:
+    from ...solution import Solution
+
+TIME = "time [s]"
+COORDINATE = {"alpha": "α", "beta": "β", "gamma": "γ"}
+
+# SI unit -> the unit on the axis, and what to multiply by.
+_SHOWN = {"m": ("mm", 1e3), "rad": ("°", 180 / pi)}
+_PER_SECOND = ("", "/s", "/s²")
+
+
+def shown(unit: str, derivative: int = 0) -> tuple[str, float]:
+    """Unit on the axis for a length or an angle or its derivatives, and the factor to it."""
+    name, factor = _SHOWN.get(unit, (unit, 1.0))
+    return name + _PER_SECOND[derivative], factor
+
+
+def caption(solution: Solution) -> str:
+    """Where the data come from, and what they must not be taken for."""
+    options, name = solution.options, solution.attrs["mechanism_name"]
+    stand_in = is_stand_in(solution.mechanism)
+    invented = [what for what in ("motion", "load") if is_synthetic(options[what])]
+    parts = [f"Mechanism {name}" + (": stand-in, not the authors' robot" if stand_in else "")]
+    if invented:
+        parts.append(f"synthetic {' and '.join(invented)}, not the paper's")
+    parts += [f"{what}: {options[what]}" for what in ("motion", "load") if what not in invented]
+    return "; ".join(parts) + "."

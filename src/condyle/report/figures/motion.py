@@ -1,0 +1,117 @@
+"""Motion of the platform: its path in space, and its coordinates over time (the paper's Fig. 5)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure, FigureBase
+
+from ...mechanism.mechanism import COORDINATES
+from .labels import COORDINATE, caption, shown
+from .panels import finish, legend, lines
+from .style import PALETTE, house, look, new_figure
+
+if TYPE_CHECKING:
+    from ...solution import Solution
+
+VIEWS = (("sagittal", "X", "Z"), ("frontal", "Y", "Z"), ("horizontal", "X", "Y"))
+# The third dashed and black: alpha and gamma nearly coincide, as in the paper.
+LOOKS = (look(0, 0), look(1, 0), look(-1, 1))
+VARIABLES = ("pose", "pose_rate", "pose_acceleration")
+KINDS = (
+    ("position", "angle"),
+    ("velocity", "angular rate"),
+    ("acceleration", "angular acceleration"),
+)
+DEFAULT_LANDMARK = "incisor"
+
+
+@house
+def motion(solution: Solution) -> Figure:
+    """Pose coordinates, their rates and accelerations over time."""
+    figure = new_figure("Motion of the platform", caption(solution), 8, 6.2)
+    draw_coordinates(figure, solution)
+    return figure
+
+
+@house
+def path(solution: Solution) -> Figure:
+    """Path of a platform point from the side, the front, above and in space."""
+    figure = new_figure(f"Path of {landmark(solution)[0]}", caption(solution), 10, 2.9)
+    draw_path(figure, solution)
+    return figure
+
+
+@house
+def figure_5(solution: Solution) -> Figure:
+    """The paper's Fig. 5: path and coordinates."""
+    title = f"Motion of the platform: path of {landmark(solution)[0]}, and coordinates"
+    figure = new_figure(title, caption(solution), 10, 9)
+    [above], [below] = figure.subfigures(2, 1, squeeze=False, height_ratios=(1, 2.4))
+    draw_path(above, solution)
+    draw_coordinates(below, solution)
+    return figure
+
+
+def draw_coordinates(figure: FigureBase, solution: Solution) -> None:
+    grid = figure.subplots(3, 2, sharex=True)
+    labels = []
+    for order, (row, variable) in enumerate(zip(grid, VARIABLES, strict=True)):
+        row_labels = []
+        for axes, names, unit, kind in zip(
+            row, (COORDINATES[:3], COORDINATES[3:]), ("m", "rad"), KINDS[order], strict=True
+        ):
+            unit, factor = shown(unit, order)
+            values = solution[variable].sel(coordinate=list(names)).values * factor
+            written = [COORDINATE.get(name, name) + "′" * order for name in names]
+            lines(axes, solution, values, written, LOOKS)
+            legend(axes, 3)
+            row_labels.append(f"{kind} [{unit}]")
+        labels.append(row_labels)
+    finish(grid, labels)
+
+
+def draw_path(figure: FigureBase, solution: Solution) -> None:
+    point = landmark(solution)[1]
+    place = track(solution, point) * 1e3
+    [[flat, space]] = figure.subfigures(1, 2, squeeze=False, width_ratios=(3, 1.2))
+    row = flat.subplots(1, 3)
+    home = point * 1e3
+    for axes, (view, across, up) in zip(row, VIEWS, strict=True):
+        i, j = "XYZ".index(across), "XYZ".index(up)
+        axes.plot(place[:, i], place[:, j], color=PALETTE[0], lw=0.9)
+        axes.plot(home[i], home[j], "o", color=PALETTE[1], ms=4, label="home")
+        axes.set(title=view, xlabel=f"{across} [mm]", ylabel=f"{up} [mm]")
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.margins(0.1)
+    row[-1].legend(loc="upper right", bbox_to_anchor=(1.0, 1.12), handlelength=0.8)
+    axes = space.add_subplot(projection="3d")
+    axes.plot(*place.T, color=PALETTE[0], lw=0.9)
+    axes.plot(*home[:, None], "o", color=PALETTE[1], ms=4)
+    axes.set_title("in space")
+    axes.set(xlabel="X [mm]", ylabel="Y [mm]")
+    axes.set_zlabel("Z [mm]")
+    axes.tick_params(labelsize=7, pad=0)
+    axes.locator_params(nbins=4)
+    axes.set_box_aspect(None, zoom=0.78)  # leaves room for the labels
+
+
+def landmark(solution: Solution) -> tuple[str, np.ndarray]:
+    """The point whose path is drawn: that of the motion, the incisor, or O_M; its place in {M}."""
+    points = solution.mechanism.platform.points
+    name = solution.options["landmark"] or DEFAULT_LANDMARK
+    if name in points:
+        return name, np.array(points[name])
+    return "the mass centre", np.zeros(3)
+
+
+def track(solution: Solution, point: np.ndarray) -> np.ndarray:
+    """Places of a platform point in {S}, (N, 3) [m]; R = Rx(alpha) Ry(beta) Rz(gamma)."""
+    pose = solution["pose"].values
+    (ca, cb, cg), (sa, sb, sg) = np.cos(pose[:, 3:].T), np.sin(pose[:, 3:].T)
+    x, y, z = point
+    x, y = cg * x - sg * y, sg * x + cg * y
+    x, z = cb * x + sb * z, cb * z - sb * x
+    y, z = ca * y - sa * z, sa * y + ca * z
+    return pose[:, :3] + np.column_stack([x, y, z])

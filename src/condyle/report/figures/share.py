@@ -1,0 +1,56 @@
+"""What each part of the mechanism needs of the efforts (the paper's Fig. 9)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from matplotlib.figure import Figure
+
+from ...analysis.indices import LOAD_PART
+from .chains import groups, readable
+from .labels import caption
+from .panels import finish, legend_beside, lines
+from .style import house, new_figure
+from .torque import chains_of, effort_label, scale_by_unit
+
+if TYPE_CHECKING:
+    from ...solution import Solution
+
+PAPER_ORDER = ("platform", "cranks", "couplers")
+
+
+@house
+def share(solution: Solution, parts: Sequence[str] | None = None) -> Figure:
+    """Efforts by part: a column a part, a row a pair of chains.
+
+    Args: parts: names; all by default.
+    """
+    parts = [str(part) for part in (parts or solution["part"].values)]
+    names, units = chains_of(solution)
+    panels = groups(names, units)
+    figure = new_figure(
+        "Efforts by the part of the mechanism that needs them",
+        caption(solution),
+        max(6.0, 1.8 + 2.7 * len(parts)),
+        1.1 + 1.7 * len(panels),
+    )
+    grid = figure.subplots(len(panels), len(parts), sharex=True, squeeze=False)
+    for row, members in zip(grid, panels, strict=True):
+        own = [readable(names[i]) for i in members]
+        for axes, part in zip(row, parts, strict=True):
+            values = solution["share"].sel(part=part).values[:, members]
+            lines(axes, solution, values, own)
+        legend_beside(row[-1])
+    for axes, part in zip(grid[0], parts, strict=True):
+        axes.set_title(readable(part), pad=20)
+    scale_by_unit(grid, panels, units)
+    finish(grid, [[effort_label(units[m[0]])] + [""] * (len(parts) - 1) for m in panels])
+    return figure
+
+
+def figure_9(solution: Solution) -> Figure:
+    """The paper's Fig. 9: end effector, cranks and couplers, without the bite force."""
+    there = [str(part) for part in solution["part"].values if part != LOAD_PART]
+    first = [part for part in PAPER_ORDER if part in there]
+    return share(solution, first + [part for part in there if part not in first])

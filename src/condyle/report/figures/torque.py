@@ -1,0 +1,111 @@
+"""Efforts of the actuators (the paper's Fig. 8)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from .chains import by_unit, groups, heading, readable
+from .labels import caption
+from .panels import finish, legend, legend_beside, limits, lines, same_scale
+from .style import house, new_figure
+
+if TYPE_CHECKING:
+    from ...analysis.compare import Comparison
+    from ...analysis.runs import Run
+    from ...solution import Solution
+
+
+@house
+def torque(solution: Solution) -> Figure:
+    """Effort of each chain over time, with its actuator's limit."""
+    names, units = chains_of(solution)
+    panels = groups(names, units)
+    figure = new_figure("Efforts of the actuators", caption(solution), 7.5, 0.9 + 1.7 * len(panels))
+    grid = figure.subplots(len(panels), 1, sharex=True, squeeze=False)
+    bounds = effort_limits(solution)
+    values = solution["torque"].values
+    for axes, members in zip(grid[:, 0], panels, strict=True):
+        own = [names[i] for i in members]
+        lines(axes, solution, values[:, members], list(map(readable, own)))
+        legend(axes, 2)
+        axes.set_title(heading(own))
+        unit = units[members[0]]
+        for limit in {bounds[name] for name in own if name in bounds}:
+            limits(axes, values[:, by_unit(units)[unit]], limit, unit)
+    scale_by_unit(grid, panels, units)
+    finish(grid, [[effort_label(units[members[0]])] for members in panels])
+    return figure
+
+
+@house
+def figure_8(comparison: Comparison) -> Figure:
+    """The paper's Fig. 8: torques of Model 1, and how far other models are from them."""
+    solution = comparison.solution
+    names, units = chains_of(solution)
+    panels = groups(names, units)
+    first, others = first_and_others(comparison)
+    columns = [(first.label, first.torque)]
+    columns += [(f"{first.label} − {other.label}", first.torque - other.torque) for other in others]
+    figure = new_figure(
+        f"Efforts by {first.label}, and differences to other models",
+        caption(solution),
+        1.2 + 3.4 * len(columns),
+        1.1 + 1.7 * len(panels),
+    )
+    grid = figure.subplots(len(panels), len(columns), sharex=True, squeeze=False)
+    for row, members in zip(grid, panels, strict=True):
+        own = [readable(names[i]) for i in members]
+        for axes, (_, values) in zip(row, columns, strict=True):
+            lines(axes, solution, values[:, members], own)
+        legend_beside(row[-1])
+    for axes, (title, _) in zip(grid[0], columns, strict=True):
+        axes.set_title(title, pad=20)
+    scale_by_unit(grid, panels, units)
+    finish(grid, [[effort_label(units[m[0]])] + [""] * len(others) for m in panels])
+    return figure
+
+
+def first_and_others(comparison: Comparison) -> tuple[Run, list[Run]]:
+    """Model 1 (momentum, direct) and the two the paper sets against it, as far as there are."""
+    wanted = [
+        ("momentum", "direct"),
+        ("momentum", "core"),
+        ("lagrange", "direct"),
+        ("lagrange", "core"),
+    ]
+    found = [run for key in wanted if (run := comparison.run(*key)) is not None]
+    found += [run for run in comparison.runs if run not in found]
+    return found[0], found[1:3]
+
+
+def chains_of(solution: Solution) -> tuple[list[str], list[str]]:
+    """Names of the chains and units of their efforts."""
+    names = [str(name) for name in solution["chain"].values]
+    return names, [str(unit) for unit in solution["effort_unit"].values]
+
+
+def effort_label(unit: str) -> str:
+    """The label of an axis of efforts."""
+    return f"{'force' if unit == 'N' else 'torque'} [{unit}]"
+
+
+def effort_limits(solution: Solution) -> dict[str, float]:
+    """Chain -> its actuator's largest effort, where it has one."""
+    found = {}
+    for chain in solution.mechanism.chains:
+        actuator = chain.actuator.model_dump()
+        limit = actuator.get("torque_limit") or actuator.get("force_limit")
+        if limit is not None:
+            found[chain.name] = limit
+    return found
+
+
+def scale_by_unit(grid: np.ndarray, panels: list[list[int]], units: list[str]) -> None:
+    """One vertical scale in a column for the panels of one unit."""
+    for unit in set(units):
+        rows = [k for k, members in enumerate(panels) if units[members[0]] == unit]
+        for column in grid.T:
+            same_scale([column[k] for k in rows])

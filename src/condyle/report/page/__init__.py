@@ -1,0 +1,9 @@
+"""The report that people send: one HTML file, with no need of a network.
+
+    condyle.report.page.write_report(solution, "report.html")
+"""
+
+from .facts import PageTable
+from .write import report_html, write_report
+
+__all__ = ["PageTable", "report_html", "write_report"]

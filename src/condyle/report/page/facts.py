@@ -1,0 +1,217 @@
+"""What the page says in words and tables; it reads without any script."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...errors import InputError
+from ...summary import summarize
+from .html import Markup, table, tag
+from .panels import effort_limits, reaction_magnitudes, reaction_variables, speed_limits
+
+if TYPE_CHECKING:
+    from ...solution import Solution
+
+
+@dataclass(frozen=True)
+class PageTable:
+    """A table to print on the page, such as Tables 1 and 2 of the paper."""
+
+    title: str
+    header: Sequence[str]
+    rows: Sequence[Sequence[Any]]
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Fact:
+    """A number worth knowing at once: what, how much, and where."""
+
+    what: str
+    value: str
+    where: str = ""
+    alarm: bool = field(default=False)
+
+
+def warnings_box(warnings: Sequence[str]) -> Markup:
+    """Every warning of the run."""
+    if not warnings:
+        return tag("p", "✓ The run gave no warnings.", class_="calm", id="warnings")
+    count = "1 warning" if len(warnings) == 1 else f"{len(warnings)} warnings"
+    return tag(
+        "section",
+        tag("h2", f"⚠ {count}"),
+        tag("ul", *(tag("li", warning) for warning in warnings)),
+        class_="warnings",
+        id="warnings",
+        role="status",
+    )
+
+
+def fact_cards(solution: Solution) -> Markup:
+    cards = [
+        tag(
+            "div",
+            tag("dt", fact.what),
+            tag("dd", fact.value, tag("small", fact.where)),
+            class_="fact alarm" if fact.alarm else "fact",
+        )
+        for fact in _facts(solution)
+    ]
+    return tag("dl", *cards, class_="facts")
+
+
+def _facts(solution: Solution) -> Iterator[Fact]:
+    data = summarize(solution).data
+    start, end = data["time"]
+    time = solution["time"].values
+    failed = data["failed_samples"]
+    yield Fact(
+        "Samples",
+        f"{data['samples']:,}".replace(",", "\u202f"),
+        f"{failed} without a result" if failed else f"{start:g} to {end:g} s",
+        alarm=bool(failed),
+    )
+    units = [str(unit) for unit in solution["effort_unit"].values]
+    for unit in dict.fromkeys(units):
+        mine = [i for i, u in enumerate(units) if u == unit]
+        peak = _peak(solution["torque"].values[:, mine])
+        if peak is not None:
+            sample, i, value = peak
+            name = solution["chain"].values[mine[i]]
+            word = "Largest torque" if unit == "N m" else "Largest force"
+            yield Fact(word, f"{value:.4g} {unit}", f"{name}, t = {time[sample]:g} s")
+    peak = _peak(solution["contact_force"].values)
+    if peak is not None:
+        sample, i, value = peak
+        where = f"{solution['contact'].values[i]}, t = {time[sample]:g} s"
+        yield Fact("Largest contact force", f"{value:.4g} N", where)
+    bounds = data["closest_to_bounds"]
+    if bounds:
+        name = min(bounds, key=lambda n: bounds[n]["margin"])
+        margin = bounds[name]["margin"]
+        yield Fact(
+            "Closest to the bounds" if margin >= 0 else "Outside the bounds",
+            f"{margin * 1e3:.4g} mm",
+            f"{name}, t = {bounds[name]['time']:g} s",
+            alarm=margin < 0,
+        )
+    near = data["closest_to_singularity"]
+    if near is not None:
+        yield Fact(
+            "Closest to a singularity",
+            f"{near['ratio']:.4g}",
+            f"ratio, t = {near['time']:g} s",
+            alarm=bool(data["samples_near_singularity"]),
+        )
+
+
+def _peak(values: np.ndarray) -> tuple[int, int, float] | None:
+    """(sample, column, signed value) of the largest magnitude of (N, m) values."""
+    if not np.isfinite(values).any():
+        return None
+    sample, column = np.unravel_index(np.nanargmax(np.abs(values)), values.shape)
+    return int(sample), int(column), float(values[sample, column])
+
+
+def chain_table(solution: Solution) -> Markup:
+    """Peak effort and speed of each chain beside its limits."""
+    rows = []
+    efforts, speeds = effort_limits(solution), speed_limits(solution)
+    for i, chain in enumerate(solution.mechanism.chains):
+        effort_unit = str(solution["effort_unit"].values[i])
+        speed_unit = f"{solution['joint_unit'].values[i]}/s"
+        rows.append(
+            [
+                chain.name,
+                chain.kind,
+                *_peak_cells(solution, "torque", i, effort_unit, efforts[i]),
+                *_peak_cells(solution, "joint_rate", i, speed_unit, speeds[i]),
+            ]
+        )
+    header = ["Chain", "Kind", "Peak effort", "at", "of limit", "Peak speed", "at", "of limit"]
+    return table(header, rows, "Peaks of each chain")
+
+
+def _peak_cells(
+    solution: Solution, variable: str, chain: int, unit: str, limit: float | None
+) -> list[str]:
+    peak = _peak(solution[variable].values[:, [chain]])
+    if peak is None:
+        return ["-", "-", "-"]
+    sample, _, value = peak
+    use = "no limit" if limit is None else f"{abs(value) / limit:.0%} of {limit:g} {unit}"
+    return [f"{value:.4g} {unit}", f"{solution['time'].values[sample]:g} s", use]
+
+
+def reaction_table(solution: Solution) -> Markup:
+    """Largest magnitude of every reaction."""
+    rows = []
+    time = solution["time"].values
+    for name in reaction_variables(solution):
+        unit = solution[name].attrs.get("units", "")
+        title = str(solution[name].attrs.get("long_name", name))
+        for group, lines in reaction_magnitudes(solution, name).items():
+            for label, values in lines.items():
+                if np.isfinite(values).any():
+                    k = int(np.nanargmax(values))
+                    what = f"{group} {label}".strip()
+                    rows.append([what, title, f"{values[k]:.4g} {unit}", f"{time[k]:g} s"])
+    if not rows:
+        return Markup("")
+    return table(["Where", "Reaction", "Largest", "at"], rows, "Largest reactions")
+
+
+def given_tables(tables: Sequence[Any]) -> Markup:
+    """Tables with title, header, rows and, if they have one, a note."""
+    parts = [table(t.header, t.rows, t.title, getattr(t, "note", "")) for t in tables]
+    return tag("section", tag("h2", "Tables"), *parts, id="tables") if parts else Markup("")
+
+
+def provenance(solution: Solution, files: Sequence[Path]) -> Markup:
+    """What was run: options, files and their hashes, version, and the mechanism itself."""
+    text = solution.attrs["mechanism"]
+    listed = [
+        ["mechanism as solved (below)", len(text.encode()), _sha256(text.encode())],
+        *(_file_row(Path(file)) for file in files),
+    ]
+    options = [[_words(key), _said(value)] for key, value in solution.options.items()]
+    return tag(
+        "section",
+        tag("h2", "What was run"),
+        tag("p", f"{solution.attrs.get('title', '')}, by {solution.attrs.get('source', '')}."),
+        table(["Option", "Value"], options, "Options"),
+        table(["File", "Bytes", "SHA-256"], listed, "Files"),
+        tag("details", tag("summary", "The mechanism, in SI (TOML)"), tag("pre", text)),
+        id="run",
+    )
+
+
+def _file_row(path: Path) -> list[Any]:
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
+    return [str(path), len(content), _sha256(content)]
+
+
+def _sha256(content: bytes) -> Markup:
+    return tag("code", hashlib.sha256(content).hexdigest())
+
+
+def _words(key: str) -> str:
+    return key.replace("_", " ").replace(" seconds", " time [s]")
+
+
+def _said(value: Any) -> str:
+    if isinstance(value, list):
+        return ", ".join(map(str, value)) or "none"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return "none" if value is None else str(value)

@@ -1,0 +1,156 @@
+"""The mechanism for the page's 3D view: what is fixed, what rides on the platform, what moves.
+
+A point is one of {"fixed": [x, y, z]} in {S}, {"platform": [x, y, z]} in {M}, or
+{"columns": [i, j, k]}: numbers of the columns with its coordinates in {S}. Metres throughout.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...mechanism.home import characteristic_length
+from ..scene import Scene, contact_normals, contact_patch, place, platform_hull, styles
+from ..scene.chains import PLATFORM_JOINT
+from .columns import Columns
+
+if TYPE_CHECKING:
+    from ...mechanism import Mechanism
+    from ...solution import Solution
+
+ARROW = 0.9  # longest arrow over the characteristic length
+
+
+def machine(solution: Solution, columns: Columns) -> dict[str, Any]:
+    """Everything the 3D view draws."""
+    mechanism = solution.mechanism
+    scene = place(mechanism, solution["pose"].values, solution["joint"].values)
+    size = characteristic_length(mechanism)
+    vertices, faces = platform_hull(mechanism)
+    rods, joints = _chains(mechanism, scene, columns)
+    return {
+        "size": size,
+        "pose": [
+            columns.add(f"pose.{name}", solution["pose"].values[:, i])
+            for i, name in enumerate(solution["coordinate"].values)
+        ],
+        "hull": {"vertices": vertices.tolist(), "faces": faces.tolist()},
+        "rods": rods,
+        "joints": joints,
+        "balls": [
+            {"name": c.name, "at": {"platform": list(c.point)}, "radius": ball_radius(c, size)}
+            for c in mechanism.contacts
+        ],
+        "landmarks": [
+            {"name": name, "at": {"platform": list(point)}}
+            for name, point in mechanism.platform.points.items()
+        ],
+        "surfaces": list(_surfaces(mechanism, scene, size)),
+        "arrows": [*_contact_arrows(solution, columns, size), *_load_arrow(solution, columns)],
+        "arrowLength": ARROW * size,
+        "traces": list(_traces(solution)),
+        "range": _range(scene, vertices, size),
+    }
+
+
+def ball_radius(contact: Any, size: float) -> float:
+    """Radius of a contact's ball as drawn [m]: its own, where the file gives one."""
+    return getattr(contact, "ball_radius", None) or 0.08 * size
+
+
+def _chains(
+    mechanism: Mechanism, scene: Scene, columns: Columns
+) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    rods, joints = [], []
+    looks = styles(mechanism.chain_names)
+    for chain, look in zip(mechanism.chains, looks, strict=True):
+        drawing = scene.chains[chain.name]
+        at: dict[str, dict[str, Any]] = {}
+        for name, point in drawing.points.items():
+            if name == PLATFORM_JOINT:
+                at[name] = {"platform": list(chain.platform)}
+            elif point.ndim == 1:
+                at[name] = {"fixed": point.tolist()}
+            else:
+                at[name] = {"columns": columns.add_vector(f"point.{chain.name}.{name}", point)}
+        rods += [
+            {
+                "chain": chain.name,
+                "body": rod.body,
+                "from": at[rod.start],
+                "to": at[rod.end],
+                "thickness": rod.thickness,
+                "colour": look.colour if rod.moving else None,
+            }
+            for rod in drawing.rods
+        ]
+        joints += [at[name] for name in drawing.balls]
+    return rods, joints
+
+
+def _surfaces(mechanism: Mechanism, scene: Scene, size: float) -> Iterator[dict[str, Any]]:
+    for contact in mechanism.contacts:
+        patch = contact_patch(contact, scene.contacts[contact.name], size)
+        finite = np.where(np.isfinite(patch.vertices), patch.vertices, 0.0)
+        yield {
+            "name": contact.name,
+            "vertices": finite.tolist(),
+            "faces": patch.faces.tolist(),
+            "outline": patch.outline.tolist(),
+            "bounded": patch.bounded,
+        }
+
+
+def _contact_arrows(
+    solution: Solution, columns: Columns, size: float
+) -> Iterator[dict[str, Any]]:
+    points, forces = solution["contact_point"].values, solution["contact_force"].values
+    for i, contact in enumerate(solution.mechanism.contacts):
+        vector = forces[:, i, None] * contact_normals(contact, points[:, i])
+        yield {
+            "name": f"contact force, {contact.name}",
+            "kind": "contact",
+            "from": ball_radius(contact, size),
+            "at": {"platform": list(contact.point)},
+            "columns": columns.add_vector(f"contact_vector.{contact.name}", vector),
+        }
+
+
+def _load_arrow(solution: Solution, columns: Columns) -> Iterator[dict[str, Any]]:
+    force = solution["load"].values[:, :3]
+    if not np.nan_to_num(force).any():
+        return
+    points = solution.mechanism.platform.points
+    yield {
+        "name": "load",
+        "kind": "load",
+        "from": 0.0,
+        "at": {"platform": list(points.get(solution.options.get("load_point"), (0.0, 0.0, 0.0)))},
+        "columns": [
+            columns.add(f"load.{name}", force[:, i])
+            for i, name in enumerate(solution["component"].values[:3])
+        ],
+    }
+
+
+def _traces(solution: Solution) -> Iterator[dict[str, Any]]:
+    """Paths to draw: the guided landmark (else the incisor, else the first) and the balls."""
+    mechanism = solution.mechanism
+    points = mechanism.platform.points
+    wanted = [solution.options.get("landmark"), "incisor", *points]
+    guide = next((name for name in wanted if name in points), None)
+    yield {"name": guide or "platform centre", "at": list(points.get(guide, (0.0, 0.0, 0.0)))}
+    for contact in mechanism.contacts:
+        yield {"name": contact.name, "at": list(contact.point)}
+
+
+def _range(scene: Scene, hull: np.ndarray, size: float) -> list[list[float]]:
+    """Box round everything that is ever shown, [[x0, x1], [y0, y1], [z0, z1]] [m]."""
+    clouds = [p.reshape(-1, 3) for d in scene.chains.values() for p in d.points.values()]
+    step = max(len(scene.position) // 200, 1)
+    corners = scene.position[::step, None] + np.einsum("nij,vj->nvi", scene.rotation[::step], hull)
+    cloud = np.vstack([*clouds, corners.reshape(-1, 3), *scene.contacts.values(), hull])
+    low, high = np.nanmin(cloud, axis=0), np.nanmax(cloud, axis=0)
+    return [[a - 0.15 * size, b + 0.15 * size] for a, b in zip(low, high, strict=True)]

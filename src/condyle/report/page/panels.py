@@ -1,0 +1,338 @@
+"""Which plots stand on the page, and what each draws."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..scene import Style, styles
+from .columns import Columns
+from .units import Shown, shown
+
+if TYPE_CHECKING:
+    from ...solution import Solution
+
+LIMITS_IN_VIEW = 0.25  # of a limit: peaks above this bring the limit into view
+MAX_BOUND = 1e9  # metres; a margin without a bound is infinite
+
+Panel = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Line:
+    """One curve of a panel: a label, its samples (N,) in SI, and how it is drawn."""
+
+    label: str
+    column: str
+    values: np.ndarray
+    style: Style
+
+
+def time_panels(solution: Solution, columns: Columns) -> list[Panel]:
+    """Every plot over time, in the order of the page."""
+    return [
+        *_motion(solution, columns),
+        *_chains(solution, columns),
+        *_shares(solution, columns),
+        *_contacts(solution, columns),
+        *_singularity(solution, columns),
+        *_reactions(solution, columns),
+    ]
+
+
+def panel(
+    columns: Columns,
+    section: str,
+    name: str,
+    title: str,
+    unit: Shown,
+    sets: dict[str, list[Line]],
+    note: str = "",
+    limits: Sequence[tuple[float, str]] = (),
+) -> Panel:
+    """A plot over time; several `sets` of lines become a choice.
+
+    Args: limits: (value in SI, label); drawn at plus and minus the value.
+    """
+    values = np.concatenate([line.values for lines in sets.values() for line in lines])
+    finite = np.abs(values[np.isfinite(values)])
+    peak = float(finite.max(initial=0.0))
+    nearest = min((value for value, _ in limits), default=np.inf)
+    return {
+        "id": name,
+        "section": section,
+        "title": title,
+        "unit": unit.unit,
+        "decimals": unit.decimals(values),
+        "note": note,
+        "limits": [{"value": v * unit.scale, "label": label} for v, label in limits],
+        "limitsInView": peak >= LIMITS_IN_VIEW * nearest,
+        "sets": [
+            {
+                "label": label,
+                "lines": [
+                    {
+                        "label": line.label,
+                        "column": columns.add(line.column, line.values),
+                        "scale": unit.scale,
+                        "colour": line.style.colour,
+                        "dash": line.style.dash,
+                    }
+                    for line in lines
+                ],
+            }
+            for label, lines in sets.items()
+        ],
+    }
+
+
+def variable_lines(solution: Solution, variable: str, dimension: str) -> list[Line]:
+    """A line for each entry of `dimension` of a variable (time, dimension)."""
+    names = [str(name) for name in solution[dimension].values]
+    values = solution[variable].values
+    return [
+        Line(name, f"{variable}.{name}", values[:, i], style)
+        for i, (name, style) in enumerate(zip(names, styles(names), strict=True))
+    ]
+
+
+def _motion(solution: Solution, columns: Columns) -> Iterator[Panel]:
+    for variable, word, suffix in (("pose", "", ""), ("pose_rate", " rate", "/s")):
+        lines = variable_lines(solution, variable, "coordinate")
+        lines = [
+            Line(line.label + "′" * bool(suffix), line.column, line.values, style)
+            for line, style in zip(lines, styles(list("abc")) * 2, strict=True)
+        ]
+        for part, what, unit in ((lines[:3], "position", "m"), (lines[3:], "angles", "rad")):
+            people = shown(unit)
+            yield panel(
+                columns,
+                "motion",
+                f"{variable}-{what}",
+                f"Platform {what}{word}",
+                Shown(people.unit + suffix, people.scale),
+                {"": part},
+            )
+
+
+def _chains(solution: Solution, columns: Columns) -> Iterator[Panel]:
+    titles = {
+        "joint": ("Joint angle", "Joint travel", ""),
+        "joint_rate": ("Joint speed", "Joint speed", "/s"),
+        "torque": ("Actuator torque", "Actuator force", ""),
+    }
+    for variable, (rotary, sliding, suffix) in titles.items():
+        kinds = solution["effort_unit" if variable == "torque" else "joint_unit"].values
+        lines = variable_lines(solution, variable, "chain")
+        limits = effort_limits(solution) if variable == "torque" else speed_limits(solution)
+        for unit in dict.fromkeys(str(kind) for kind in kinds):
+            chosen = [i for i, kind in enumerate(kinds) if kind == unit]
+            people = shown(unit) if variable == "joint" else Shown(unit + suffix)
+            bounds = [] if variable == "joint" else [limits[i] for i in chosen]
+            yield panel(
+                columns,
+                "chains",
+                f"{variable}-{unit}".replace(" ", ""),
+                rotary if unit in ("rad", "N m") else sliding,
+                people,
+                {"": [lines[i] for i in chosen]},
+                limits=_distinct(bounds, [lines[i].label for i in chosen], people),
+            )
+
+
+def effort_limits(solution: Solution) -> list[float | None]:
+    """Torque or force limit of each chain [N m or N]."""
+    actuators = [chain.actuator for chain in solution.mechanism.chains]
+    names = ("torque_limit", "force_limit")
+    return [next((v for n in names if (v := getattr(a, n, None))), None) for a in actuators]
+
+
+def speed_limits(solution: Solution) -> list[float | None]:
+    """Speed limit of each chain [rad/s or m/s]."""
+    return [getattr(chain.actuator, "speed_limit", None) for chain in solution.mechanism.chains]
+
+
+def _distinct(
+    limits: Sequence[float | None], names: Sequence[str], unit: Shown
+) -> list[tuple[float, str]]:
+    """Each limit once, with the chains it is for unless it is for all."""
+    found = []
+    for value in dict.fromkeys(v for v in limits if v is not None):
+        whose = [name for name, v in zip(names, limits, strict=True) if v == value]
+        who = "" if len(whose) == len(names) else f" ({', '.join(whose)})"
+        found.append((value, f"limit ±{value * unit.scale:g} {unit.unit}{who}"))
+    return found
+
+
+def _shares(solution: Solution, columns: Columns) -> Iterator[Panel]:
+    """What platform, couplers, cranks and load need of each effort."""
+    parts = [str(part) for part in solution["part"].values]
+    chains = [str(chain) for chain in solution["chain"].values]
+    units = [str(unit) for unit in solution["effort_unit"].values]
+    share = solution["share"].values
+    look = styles(parts)
+    for unit in dict.fromkeys(units):
+        mine = [i for i, u in enumerate(units) if u == unit]
+        norm = np.linalg.norm(share[:, :, mine], axis=2)
+        sets = {
+            "all chains (2-norm)": [
+                Line(part, f"share.{unit}.{part}", norm[p], look[p]) for p, part in enumerate(parts)
+            ]
+        }
+        for i in mine:
+            sets[chains[i]] = [
+                Line(part, f"share.{chains[i]}.{part}", share[p, :, i], look[p])
+                for p, part in enumerate(parts)
+            ]
+        yield panel(
+            columns,
+            "shares",
+            f"share-{unit}".replace(" ", ""),
+            "Share of each part in the effort",
+            Shown(unit),
+            sets,
+            note="The parts of one chain add up to its effort; norms over chains do not add up.",
+        )
+
+
+def _contacts(solution: Solution, columns: Columns) -> Iterator[Panel]:
+    load = variable_lines(solution, "load", "component")
+    force = [
+        Line(line.label, line.column, line.values, style)
+        for line, style in zip(load[:3], styles(list("abc")), strict=True)
+    ]
+    if solution.sizes["contact"]:
+        yield panel(
+            columns,
+            "contacts",
+            "contact-force",
+            "Contact force along the normal",
+            Shown("N"),
+            {"": variable_lines(solution, "contact_force", "contact")},
+            note="Negative: the surface pushes the ball along -n.",
+        )
+        margins = [
+            line
+            for line in variable_lines(solution, "bound_margin", "contact")
+            if not np.isposinf(line.values).any()
+        ]
+        if margins:
+            yield panel(
+                columns,
+                "contacts",
+                "bound-margin",
+                "Distance to the nearest bound",
+                shown("m"),
+                {"": margins},
+                note="Negative: outside the bounds.",
+            )
+    if any(np.any(line.values) for line in force):
+        point = solution.options.get("load_point")
+        at = f" at {point}" if point else ""
+        yield panel(columns, "contacts", "load", f"Load{at}", Shown("N"), {"": force})
+
+
+def _singularity(solution: Solution, columns: Columns) -> Iterator[Panel]:
+    one = Shown("")
+    yield panel(
+        columns,
+        "singularity",
+        "transmission",
+        "Transmission (J_A, dimensionless)",
+        one,
+        {"": variable_lines(solution, "transmission", "chain")},
+        note="1 is best; 0 is an inverse singularity of that chain.",
+    )
+    sigma = solution["J_W_sigma"].values
+    names = [f"σ{i + 1}" for i in range(sigma.shape[1])]
+    yield panel(
+        columns,
+        "singularity",
+        "sigma",
+        "Singular values of J_W (dimensionless)",
+        one,
+        {
+            "": [
+                Line(name, f"J_W_sigma.{i}", sigma[:, i], style)
+                for i, (name, style) in enumerate(zip(names, styles(names), strict=True))
+            ]
+        },
+        note="The smallest at 0 is a direct singularity.",
+    )
+    look = styles(["ratio", "condition"])
+    yield panel(
+        columns,
+        "singularity",
+        "ratio",
+        "Distance from a singularity",
+        one,
+        {"": [Line("ratio", "singularity_ratio", solution["singularity_ratio"].values, look[0])]},
+        note="Smallest over largest singular value of J_A or J_W; 0 is singular.",
+    )
+    condition = solution["condition"].values
+    condition = np.where(np.isfinite(condition), condition, np.nan)
+    yield panel(
+        columns,
+        "singularity",
+        "condition",
+        "Condition number of J_W",
+        one,
+        {"": [Line("condition", "condition", condition, look[1])]},
+    )
+
+
+def reaction_variables(solution: Solution) -> list[str]:
+    """Names of the variables that hold joint reactions."""
+    return [
+        str(name)
+        for name, variable in solution.data_vars.items()
+        if str(name).startswith("reaction") and variable.dims[:1] == ("time",)
+    ]
+
+
+def reaction_magnitudes(solution: Solution, name: str) -> dict[str, dict[str, np.ndarray]]:
+    """Magnitudes (N,) of a reaction: group -> label -> values.
+
+    The dimensions between time and the axes label them; of several, the first makes the groups.
+    """
+    variable = solution[name]
+    values, dimensions = variable.values, list(variable.dims[1:])
+    if dimensions and dimensions[-1] == "axis":
+        values = np.linalg.norm(values, axis=-1)
+        dimensions.pop()
+    labels = [[str(v) for v in solution[d].values] for d in dimensions]
+    if not labels:
+        return {"": {name: values}}
+    groups = labels[0] if len(labels) > 1 else [""]
+    values = values.reshape(len(values), len(groups), -1)
+    inner = [""]
+    for names in labels[1:] or labels:
+        inner = [f"{before} {name}".strip() for before in inner for name in names]
+    return {
+        group: {label: values[:, g, i] for i, label in enumerate(inner)}
+        for g, group in enumerate(groups)
+    }
+
+
+def _reactions(solution: Solution, columns: Columns) -> Iterator[Panel]:
+    for name in reaction_variables(solution):
+        sets = {}
+        for group, lines in reaction_magnitudes(solution, name).items():
+            looks = styles(list(lines))
+            sets[group] = [
+                Line(label, f"{name}.{group}.{label}", values, look)
+                for (label, values), look in zip(lines.items(), looks, strict=True)
+            ]
+        attributes = solution[name].attrs
+        yield panel(
+            columns,
+            "reactions",
+            name,
+            str(attributes.get("long_name", name.replace("_", " "))).capitalize(),
+            Shown(str(attributes.get("units", ""))),
+            sets,
+            note="Magnitudes.",
+        )

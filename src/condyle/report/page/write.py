@@ -1,0 +1,144 @@
+"""One self-contained HTML file from a solution."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import os
+from collections.abc import Sequence
+from importlib.resources import files as package_files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ...atomic import write_text
+from ..scene import DARK, LIGHT
+from .columns import Columns
+from .facts import (
+    chain_table,
+    fact_cards,
+    given_tables,
+    provenance,
+    reaction_table,
+    warnings_box,
+)
+from .html import Markup, fill, json_for_script, tag, text
+from .machine import machine
+from .panels import time_panels
+from .tracks import track_panels
+
+if TYPE_CHECKING:
+    from ...solution import Solution
+
+_ASSETS = package_files(__package__) / "assets"
+# One file an idea, in the order they run.
+_SCRIPTS = (
+    "data",
+    "theme",
+    "clock",
+    "geometry",
+    "stage",
+    "panels",
+    "tracks",
+    "readout",
+    "controls",
+    "print",
+    "main",
+)
+
+
+def write_report(
+    solution: Solution,
+    path: str | os.PathLike[str],
+    *,
+    tables: Sequence[Any] | None = None,
+    files: Sequence[str | os.PathLike[str]] | None = None,
+) -> Path:
+    """Write the report, whole or not at all.
+
+    Args:   solution: what to show; more samples than a page can carry are thinned, extremes kept.
+            path: the HTML file.
+            tables: to print on it: objects with title, header, rows and note, as `PageTable`.
+            files: inputs of the run, to be named with their hashes.
+    Returns: the path.
+    Raises: InputError: if a file cannot be read or the report cannot be written.
+    """
+    write_text(path, report_html(solution, tables=tables, files=files))
+    return Path(path)
+
+
+def report_html(
+    solution: Solution,
+    *,
+    tables: Sequence[Any] | None = None,
+    files: Sequence[str | os.PathLike[str]] | None = None,
+) -> str:
+    """The report as text; see `write_report`."""
+    from plotly.offline import get_plotlyjs
+
+    scripts = [_lines(get_plotlyjs()), _script()]
+    name, options = solution.attrs["mechanism_name"], solution.options
+    parts = {
+        "policy": text(_policy(scripts)),
+        "style": Markup(_asset("page.css")),
+        "title": text(f"{name} - condyle report"),
+        "name": text(name),
+        "subtitle": text(
+            f"Inverse dynamics by {options['formulation']}, route {options['route']}; motion: "
+            f"{options['motion']}; load: {options['load']}"
+        ),
+        "version": text(solution.attrs.get("source", "condyle")),
+        "warnings": warnings_box(solution.warnings),
+        "facts": fact_cards(solution),
+        "chains": chain_table(solution),
+        "reactions": reaction_table(solution),
+        "tables": given_tables(tables or ()),
+        "run": provenance(solution, [Path(file) for file in files or ()]),
+        "payload": json_for_script(_payload(solution)),
+        "plotly": tag("script", Markup(scripts[0])),
+        "script": tag("script", Markup(scripts[1])),
+    }
+    return fill(_asset("page.html"), parts)
+
+
+def _payload(solution: Solution) -> dict[str, Any]:
+    """What the page's script draws from."""
+    columns = Columns(solution["time"].values)
+    drawn = machine(solution, columns)
+    panels = time_panels(solution, columns)
+    tracks = track_panels(solution, columns)
+    status = columns.add("status", solution["status"].values)
+    return {
+        "machine": drawn,
+        "panels": panels,
+        "tracks": tracks,
+        "statusColumn": status,
+        "statusNames": solution["status"].attrs["flag_meanings"].split(),
+        "palette": {"light": LIGHT, "dark": DARK},
+        "columns": columns.packed(),  # last, when all columns are in
+    }
+
+
+def _policy(scripts: Sequence[str]) -> str:
+    """A content policy that allows these scripts and no network at all."""
+    hashes = " ".join(
+        f"'sha256-{base64.b64encode(hashlib.sha256(s.encode()).digest()).decode()}'"
+        for s in scripts
+    )
+    return (
+        f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; "
+        "img-src data: blob:; connect-src 'none'; base-uri 'none'; form-action 'none'"
+    )
+
+
+def _script() -> str:
+    body = "\n".join(_asset(f"{name}.js") for name in _SCRIPTS)
+    return f'"use strict";\n(() => {{\n{body}\n}})();\n'
+
+
+def _asset(name: str) -> str:
+    return _lines((_ASSETS / name).read_text(encoding="utf-8"))
+
+
+def _lines(content: str) -> str:
+    """Line ends as HTML keeps them, so that hashes stay true."""
+    return content.replace("\r\n", "\n").replace("\r", "\n")

@@ -1,0 +1,61 @@
+"""Shared by all tests: the oracles on the import path, mechanisms, and a runner of the command."""
+
+from __future__ import annotations
+
+import sys
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import condyle
+from condyle.mechanism import bundled_text
+
+sys.path.insert(0, str(Path(__file__).parent))  # `from oracles import ...` from any folder
+
+
+@pytest.fixture(scope="session")
+def reference() -> condyle.Mechanism:
+    """The bundled mechanism of the paper."""
+    return condyle.load("masticatory")
+
+
+@pytest.fixture
+def raw() -> dict[str, Any]:
+    """The tables of the bundled file, to be spoiled; lengths in mm."""
+    return tomllib.loads(bundled_text("masticatory"))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a run of the command left behind."""
+
+    status: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def condyle_command(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> Callable[..., Outcome]:
+    """Runs `condyle ...` in this process, in an empty folder."""
+    from condyle.cli import main
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("TERM", "dumb")
+
+    def run(*arguments: object) -> Outcome:
+        monkeypatch.setattr(sys, "argv", ["condyle", *map(str, arguments)])
+        status = 0
+        try:
+            main()
+        except SystemExit as stop:
+            status = int(stop.code or 0)
+        text = capsys.readouterr()
+        return Outcome(status, text.out, text.err)
+
+    return run

@@ -1,0 +1,1 @@
+"""Chain families: against outside engines, against each other, and in their files."""

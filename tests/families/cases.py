@@ -1,0 +1,83 @@
+"""Random mechanisms of every family, and states to try them at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from condyle.mechanism import Mechanism, parse
+from condyle.model import Evaluation, Model
+from oracles.description import Raw
+from oracles.random_mechanism import random_mechanism, random_state, toml_text
+
+MIXED = ("RSS", "PSS", "SPS")
+MECHANISMS: dict[str, dict[str, Any]] = {
+    "rss": {},
+    "rss_k0": {"contacts": 0},
+    "rss_k3_n7": {"contacts": 3, "chains": 7},
+    "pss": {"families": ("PSS",), "tilted_gravity": True},
+    "pss_k0": {"families": ("PSS",), "contacts": 0},
+    "pss_k1": {"families": ("PSS",), "contacts": 1},
+    "pss_k3_n8": {"families": ("PSS",), "contacts": 3, "chains": 8},
+    "pss_along_x": {"families": ("PSS",), "rod_along_x": True},
+    "sps_k0": {"families": ("SPS",), "contacts": 0, "tilted_gravity": True},
+    "sps_k1": {"families": ("SPS",), "contacts": 1},
+    "sps_k2_n7": {"families": ("SPS",), "chains": 7},
+    "sps_k3": {"families": ("SPS",), "contacts": 3},
+    "sps_along_x": {"families": ("SPS",), "rod_along_x": True},
+    "mixed": {"families": MIXED},
+    "mixed_k0_n8": {"families": MIXED, "chains": 8, "contacts": 0},
+    "mixed_k1_n7": {"families": MIXED, "chains": 7, "contacts": 1, "tilted_gravity": True},
+    "mixed_k3": {"families": MIXED, "contacts": 3},
+}
+SCALES = (0.0, 0.05, 1.0, 1.0)  # home, near it, and far
+
+
+@dataclass(frozen=True)
+class Case:
+    """A mechanism and N states of it; load is (N, 9) as `Model.evaluate` takes it."""
+
+    raw: Raw
+    mechanism: Mechanism
+    states: dict[str, Any]
+    load: np.ndarray
+
+    def evaluate(self, formulation: str = "virtual_power", route: str = "core") -> Evaluation:
+        model = Model(self.mechanism, formulation, route)
+        assert model.independent == tuple(self.states["names"])
+        return model.evaluate(*(self.states[key] for key in ("q", "qd", "qdd")), self.load)
+
+    def sample(self, i: int) -> tuple[Any, ...]:
+        """Pose, its rate and acceleration, wrench and load point, as the oracles take them."""
+        keys = ("pose", "pose_rate", "pose_acceleration", "wrench")
+        return (*(self.states[key][i] for key in keys), self.states["load_point"])
+
+
+@cache
+def case(name: str) -> Case:
+    """One of `MECHANISMS`, at home, near it and away from it."""
+    raw = random_mechanism(np.random.default_rng(sum(map(ord, name))), **MECHANISMS[name])
+    return of_raw(raw)
+
+
+def of_raw(raw: Raw) -> Case:
+    rng = np.random.default_rng(11)
+    found = [random_state(rng, raw, 1, scale) for scale in SCALES]
+    states = {
+        key: np.concatenate([s[key] for s in found]) if isinstance(value, np.ndarray) else value
+        for key, value in found[0].items()
+    }
+    mechanism = parse(toml_text(raw))
+    name = states["load_point"]
+    point = mechanism.platform.points[name] if name else np.zeros(3)
+    wrench = states["wrench"]
+    return Case(raw, mechanism, states, np.hstack([wrench, np.tile(point, (len(wrench), 1))]))
+
+
+def close(got: Any, wanted: Any, tolerance: float, floor: float = 0.0) -> None:
+    """Equal relative to the largest component (or `floor`)."""
+    scale = max(np.abs(wanted).max(initial=0), floor)
+    np.testing.assert_allclose(got, wanted, rtol=0, atol=tolerance * scale)

@@ -1,0 +1,52 @@
+"""Five formulations, derived in five ways, give the same numbers on every family."""
+
+from __future__ import annotations
+
+import pytest
+
+from condyle.dynamics import FORMULATIONS
+from condyle.dynamics.equations import has_closed_form
+from condyle.mechanism import load
+from condyle.model import Evaluation
+from families.cases import MECHANISMS, Case, case, close, of_raw
+from oracles import description
+
+OTHERS = [name for name in FORMULATIONS if name != "virtual_power"]
+BUNDLED = description.Path(description.__file__).parents[2] / "src/condyle/mechanism/bundled"
+
+
+def same(ours: Evaluation, wanted: Evaluation, tolerance: float) -> None:
+    a, b = ours.torques, wanted.torques
+    close(a.torque, b.torque, tolerance)
+    close(a.contact_force, b.contact_force, 10 * tolerance)
+    # Shares cancel in the torque; parts are compared with the largest of them.
+    close(a.share, b.share, tolerance)
+    close(a.rate, b.rate, tolerance)
+    close(a.acceleration, b.acceleration, tolerance)
+
+
+@pytest.mark.parametrize("formulation", OTHERS)
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_formulations_agree(name: str, formulation: str) -> None:
+    c = case(name)
+    same(c.evaluate(formulation), c.evaluate(), 1e-10)
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("name", ["rss", "pss", "sps_k1", "mixed_k0_n8"])
+def test_routes_agree(name: str, formulation: str) -> None:
+    c = case(name)
+    assert has_closed_form(c.mechanism)
+    same(c.evaluate(formulation, "direct"), c.evaluate(), 1e-10)
+
+
+def bundled(name: str) -> Case:
+    return of_raw(description.load(BUNDLED / f"{name}.toml"))
+
+
+@pytest.mark.parametrize("formulation", OTHERS)
+@pytest.mark.parametrize("name", ["gough-stewart", "hexaglide"])
+def test_bundled_mechanisms(name: str, formulation: str) -> None:
+    c = bundled(name)
+    assert c.mechanism == load(name)
+    same(c.evaluate(formulation), c.evaluate(), 1e-10)

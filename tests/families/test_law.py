@@ -1,0 +1,116 @@
+"""The laws of a family: what its closed forms must satisfy, whatever the chain."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from condyle.kinematics.chain import FAMILIES, Family
+from families.cases import case, close
+
+ARCS = (ca.OP_ATAN, ca.OP_ATAN2, ca.OP_ACOS, ca.OP_ASIN)
+# Operations a chain costs a sample in `law`, numbers of the chain not counted.
+OPERATIONS = {"RSS": 210, "PSS": 165, "SPS": 195}
+DIVISIONS = {"RSS": 6, "PSS": 5, "SPS": 3}
+
+
+class Chain:
+    """A family with the numbers of a random chain, and platform joints near its home."""
+
+    def __init__(self, kind: str, joints: int = 5) -> None:
+        mechanism = case({"RSS": "rss", "PSS": "pss", "SPS": "sps_k0"}[kind]).mechanism
+        self.family: Family = FAMILIES[kind]
+        self.table = mechanism.chains[1]
+        self.c = self.family.named(self.family.vector(self.family.constants(self.table)))
+        rng = np.random.default_rng(5)
+        self.joints = np.asarray(self.table.platform) + rng.normal(0, 2e-3, (joints, 3))
+        self.rates, self.accelerations = rng.normal(size=(2, joints, 3))
+
+    def law(self, *symbols: ca.SX) -> Any:
+        return self.family.law(self.c, *symbols, ca.SX([0.3, -0.2, -9.81]))
+
+
+@pytest.fixture(params=FAMILIES)
+def chain(request: pytest.FixtureRequest) -> Chain:
+    return Chain(request.param)
+
+
+def test_the_loop_closes_on_the_branch_of_home(chain: Chain) -> None:
+    M = ca.SX.sym("M", 3)
+    loop = chain.family.loop(chain.c, M)
+    closes = ca.Function("closes", [M], [chain.family.tip(chain.c, loop.q_r) - M, loop.q_r])
+    for joint in chain.joints:
+        gap, _ = closes(joint)
+        close(gap, np.zeros((3, 1)), 1e-15, floor=1)
+    _, home = closes(chain.table.platform)
+    close(home, np.zeros((3, 1)), 1e-14, floor=1)
+
+
+def test_row_rate_and_acceleration_are_derivatives_of_the_joint(chain: Chain) -> None:
+    M, V, A = (ca.SX.sym(name, 3) for name in "MVA")
+    joint = chain.family.loop(chain.c, M).q_r[0]
+    J = ca.jacobian(joint, M)
+    rate = J @ V
+    acceleration = ca.jtimes(rate, M, V) + J @ A
+    law = chain.law(M, V, A)
+    function = ca.Function(
+        "both",
+        [M, V, A],
+        [J.T, law.J, rate, law.rate, acceleration, law.acceleration, law.reach],
+    )
+    for state in zip(chain.joints, chain.rates, chain.accelerations, strict=True):
+        wanted_J, got_J, wanted_rate, got_rate, wanted, got, reach = function(*state)
+        close(got_J, wanted_J, 1e-12)
+        close(got_rate, wanted_rate, 1e-12)
+        close(got, wanted, 1e-12)
+        assert float(reach) > 0
+
+
+def test_inertia_is_symmetric_and_positive(chain: Chain) -> None:
+    M, V, A = (ca.SX.sym(name, 3) for name in "MVA")
+    law = chain.law(M, V, A).with_end_masses(A, ca.SX([0.3, -0.2, -9.81]))
+    total = sum(law.forces.values(), ca.SX(3, 1))
+    inertia = ca.Function("inertia", [M], [ca.jacobian(total, A)])
+    for joint in chain.joints:
+        I = np.asarray(inertia(joint))
+        close(I, I.T, 1e-13)
+        assert np.linalg.eigvalsh(I).min() > -1e-13 * np.abs(I).max()
+
+
+def test_dimensionless_transmission(chain: Chain) -> None:
+    """|J_A| / scale is a sine, and J_A / |rod| the inverse of the row's length along the rod."""
+    M = ca.SX.sym("M", 3)
+    loop = chain.family.loop(chain.c, M)
+    outputs = [loop.J_A, loop.J_A_scale, loop.J, loop.rod, loop.rod_length]
+    function = ca.Function("posture", [M], outputs)
+    for joint in chain.joints:
+        J_A, scale, J, rod, length = (np.asarray(o).ravel() for o in function(joint))
+        assert np.abs(J_A) <= scale * (1 + 1e-12)
+        close(np.linalg.norm(rod), length, 1e-13)
+        close(J, -2 * rod / J_A, 1e-12)  # J_A joint' + 2 rod . M' = 0
+
+
+def test_laws_stay_cheap(chain: Chain) -> None:
+    c, g = ca.SX.sym("c", chain.family.size()), ca.SX.sym("g", 3)
+    M, V, A = (ca.SX.sym(name, 3) for name in "MVA")
+    law = chain.family.law(chain.family.named(c), M, V, A, g).with_end_masses(A, g)
+    outputs = [sum(law.forces.values(), ca.SX(3, 1)), law.J]
+    f = ca.Function("law", [c, g, M, V, A], ca.cse(outputs))
+    varies: dict[int, bool] = {}
+    operations = []
+    for k in range(f.n_instructions()):
+        op, inputs, results = f.instruction_id(k), f.instruction_input(k), f.instruction_output(k)
+        if op == ca.OP_INPUT:
+            varies[results[0]] = inputs[0] > 1
+        elif op == ca.OP_CONST:
+            varies[results[0]] = False
+        elif op != ca.OP_OUTPUT:
+            varies[results[0]] = any(varies[i] for i in inputs)
+            operations += [op] if varies[results[0]] else []
+    slow = [op for op in operations if op in (ca.OP_DIV, ca.OP_INV, ca.OP_SQRT)]
+    assert not set(operations) & set(ARCS)
+    assert len(operations) <= OPERATIONS[chain.family.kind]
+    assert len(slow) <= DIVISIONS[chain.family.kind]

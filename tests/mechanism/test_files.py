@@ -1,0 +1,160 @@
+"""Files in and out: units, round trips, the bundled file and its starter."""
+
+from __future__ import annotations
+
+import tomllib
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from oracles.random_mechanism import random_mechanism, toml_text
+
+import condyle
+from condyle import InputError, MechanismError
+from condyle.kinematics.chain import FAMILIES
+from condyle.mechanism import Mechanism, bundled_text, dump, dumps, load, parse
+from condyle.mechanism.files import from_data
+from condyle.mechanism.home import home_warnings
+from condyle.mechanism.starter import starter_text
+
+ORACLES = Path(__file__).parents[1] / "oracles"
+LENGTHS = {"base", "crank_tip", "platform", "point", "offset", "x", "y", "z"}
+
+
+def in_metres(node: Any, length: bool = False) -> Any:
+    """The tables of a file in mm, in m, each number rounded once."""
+    if isinstance(node, dict):
+        points = "incisor" in node
+        return {key: in_metres(v, points or key in LENGTHS) for key, v in node.items()}
+    if isinstance(node, list):
+        return [in_metres(v, length) for v in node]
+    if isinstance(node, Decimal | int):
+        return float(Decimal(node) / 1000 if length else Decimal(node))
+    return node
+
+
+def leaves(node: Any) -> list[Any]:
+    if isinstance(node, dict | list | tuple):
+        inner = node.values() if isinstance(node, dict) else node
+        return [leaf for child in inner for leaf in leaves(child)]
+    return [node]
+
+
+def test_millimetres_and_metres_are_the_same() -> None:
+    text = bundled_text("masticatory")
+    metres = in_metres(tomllib.loads(text, parse_float=Decimal))
+    del metres["length_unit"]  # metres are the default
+    assert from_data(metres) == from_data(metres | {"length_unit": "m"})
+    pairs = zip(
+        leaves(from_data(metres).model_dump()), leaves(parse(text).model_dump()), strict=True
+    )
+    for got, wanted in pairs:
+        assert got == (pytest.approx(wanted, rel=3e-16) if isinstance(wanted, float) else wanted)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_written_mechanism_is_read_back_bit_for_bit(seed: int, tmp_path: Path) -> None:
+    raw = random_mechanism(np.random.default_rng(seed), contacts=seed, tilted_gravity=True)
+    mechanism = parse(toml_text(raw)) if seed else load("masticatory")
+    again = parse(dumps(mechanism))
+    assert again == mechanism
+    assert dumps(again) == dumps(mechanism)
+    dump(mechanism, tmp_path / "jaw.toml")
+    assert load(tmp_path / "jaw.toml") == mechanism
+    assert load(str(tmp_path / "jaw.toml")) == mechanism
+
+
+def test_the_bundled_file_keeps_its_comments_and_marks() -> None:
+    assert bundled_text("masticatory") == (ORACLES / "masticatory.toml").read_text()
+    for mark in ("[P]", "[H]", "[D]", "[A]", "[C]"):
+        assert mark in bundled_text("masticatory")
+    assert "masticatory" in condyle.bundled_mechanisms()
+
+
+def test_changes_in_python(reference: Mechanism) -> None:
+    platform = reference.platform.model_copy(update={"mass": 0.3})
+    heavy = reference.replace(platform=platform)
+    assert heavy.platform.mass == 0.3 and heavy.chains == reference.chains
+    assert parse(dumps(heavy)) == heavy != reference
+    assert reference.platform.mass == 0.2
+    with pytest.raises(ValueError, match="frozen"):
+        reference.gravity = (0.0, 0.0, 0.0)  # type: ignore[misc]
+    with pytest.raises(MechanismError, match="chain: 3 actuators cannot drive 4"):
+        reference.replace(chains=reference.chains[:3])
+    with pytest.raises(MechanismError, match="gravity"):
+        reference.replace(gravity=(0.0, 0.0, float("nan")))
+
+
+def test_a_tilted_axis_is_projected(raw: dict[str, Any]) -> None:
+    chain = raw["chain"][0]
+    crank = np.subtract(chain["crank_tip"], chain["base"])
+    exact = np.array(chain["axis"]) - crank * (np.dot(chain["axis"], crank) / (crank @ crank))
+    chain["axis"] = list(exact + 0.4 * np.pi / 180 * crank / np.linalg.norm(crank))
+    shaft = FAMILIES["RSS"].constants(from_data(raw).chains[0])["C"][:, 2]
+    assert abs(shaft @ crank) < 1e-14 * np.linalg.norm(crank)
+    np.testing.assert_allclose(shaft, exact / np.linalg.norm(exact), atol=1e-15)
+
+
+@pytest.mark.parametrize("millimetres, warned", [(1e-7, False), (1e-3, True)])
+def test_a_contact_a_little_off_its_surface_is_mentioned(
+    raw: dict[str, Any], millimetres: float, warned: bool
+) -> None:
+    raw["contact"][1]["surface"]["offset"] += millimetres
+    warnings = home_warnings(from_data(raw))
+    assert [("right_condyle" in w) for w in warnings] == [True] * warned
+
+
+def test_the_starter_is_a_mechanism() -> None:
+    text = starter_text("my-robot")
+    mechanism = parse(text)
+    assert mechanism.name == "my-robot" and not home_warnings(mechanism)
+    assert text.count("#") > 15
+    state = np.zeros((1, mechanism.degrees_of_freedom))
+    evaluation = condyle.derive(mechanism).evaluate(state, state, state, np.zeros((1, 9)))
+    assert evaluation.status[0] == 0 and np.isfinite(evaluation.torques.torque).all()
+
+
+def spoil(path: Path, kind: str) -> Path:
+    """A file, or not, that is no mechanism."""
+    contents = {
+        "empty": b"",
+        "prose": b"mass is 3 kg\n",
+        "twice": b'name = "a"\nname = "b"\n',
+        "binary": bytes(range(256)),
+        "utf-16": 'name = "a"'.encode("utf-16"),
+    }
+    if kind == "folder":
+        path.mkdir()
+    elif kind in contents:
+        path.write_bytes(contents[kind])
+    return path
+
+
+@pytest.mark.parametrize(
+    "kind, message",
+    [
+        ("empty", "name: is missing"),
+        ("prose", "is not TOML: .*line 1"),
+        ("twice", "is not TOML: .*line 2"),
+        ("binary", "is not a text file"),
+        ("utf-16", "is not a text file"),
+        ("folder", "cannot be read: Is a directory"),
+        ("missing", 'does not exist.*Did you mean "jaws.toml"'),
+    ],
+)
+def test_what_is_no_mechanism_file(tmp_path: Path, kind: str, message: str) -> None:
+    (tmp_path / "jaws.toml").write_text(bundled_text("masticatory"))
+    with pytest.raises(InputError, match=f"(?s)jaw.toml.*{message}"):
+        load(spoil(tmp_path / "jaw.toml", kind))
+
+
+def test_a_bundled_name_is_guessed() -> None:
+    with pytest.raises(InputError, match='Did you mean "masticatory"'):
+        load("mastikatory")
+
+
+def test_a_byte_order_mark_does_no_harm(tmp_path: Path, reference: Mechanism) -> None:
+    (tmp_path / "jaw.toml").write_text("\ufeff" + bundled_text("masticatory"), encoding="utf-8")
+    assert load(tmp_path / "jaw.toml") == reference
