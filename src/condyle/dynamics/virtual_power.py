@@ -32,10 +32,10 @@ class VirtualPower:
         omega_M, omega_rate_M = state.R.T @ omega, state.R.T @ omega_rate
         spin_M = body.inertia @ omega_M
         moment_M = body.inertia @ omega_rate_M + ca.cross(omega_M, spin_M)
-        force = body.mass * lift + ca.cross(omega_rate, S) + ca.cross(omega, ca.cross(omega, S))
+        force = body.mass * lift + state.lever_acceleration @ S
         moment = ca.cross(S, lift) + state.R @ moment_M
         return state.B.T @ ca.vertcat(force, moment)
 
     def chain(self, family: Family, c: Constants, M: PointMotion, g: ca.SX) -> Law:
         law = family.law(c, M.position, M.velocity, M.acceleration, g)
-        return law.with_end_masses(M.acceleration, g)
+        return law.complete(M.acceleration, g)

@@ -13,6 +13,7 @@ it moves, and what a force there is worth in the chosen coordinates.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 
@@ -51,14 +52,18 @@ class State:
     def point(self, m: ca.SX) -> PointMotion:
         """Motion of the platform point with components `m`, (3,) [m], in {M}."""
         r = self.R @ m
-        omega, omega_rate = self.twist[3:], self.twist_rate[3:]
-        swing = ca.cross(omega, r)
         return PointMotion(
             position=self.pose[:3] + r,
-            velocity=self.twist[:3] + swing,
-            acceleration=self.twist_rate[:3] + ca.cross(omega_rate, r) + ca.cross(omega, swing),
+            velocity=self.twist[:3] + ca.cross(self.twist[3:], r),
+            acceleration=self.twist_rate[:3] + self.lever_acceleration @ r,
             lever=r,
         )
+
+    @cached_property
+    def lever_acceleration(self) -> ca.SX:
+        """[omega'] + [omega]^2, (3, 3): times a lever, its acceleration about O_M."""
+        spin = ca.skew(self.twist[3:])
+        return ca.skew(self.twist_rate[3:]) + spin @ spin
 
     def pull(self, force: ca.SX, lever: ca.SX) -> ca.SX:
         """Generalized force, (m,), of a force (3,) acting at `lever` from O_M: M_2^T force."""

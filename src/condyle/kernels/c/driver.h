@@ -24,10 +24,10 @@ void batch(const double *restrict table, const double *const *in, ptrdiff_t stri
         }
         step(table, from, at, result);
         if (some == W) {
-            for (int k = 0; k < RESULTS; k++) store(out + (size_t)k * columns + start, result[SLOT(k)]);
+            for (int k = 0; k < OUTPUTS; k++) store(out + (size_t)k * columns + start, result[k]);
         } else {
-            for (int k = 0; k < RESULTS; k++)
-                for (size_t i = 0; i < some; i++) out[(size_t)k * columns + start + i] = result[SLOT(k)][i];
+            for (int k = 0; k < OUTPUTS; k++)
+                for (size_t i = 0; i < some; i++) out[(size_t)k * columns + start + i] = result[k][i];
         }
         for (size_t i = 0; i < some; i++) {
             double margin = result[MARGIN][i], quality = result[QUALITY][i];

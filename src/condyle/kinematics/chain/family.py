@@ -5,8 +5,8 @@ of that point: from its position, velocity and acceleration to the joint coordin
 and the forces its bodies put on the platform. A family answers in two ways:
 
 - joint space (Section 3.2): joint coordinates q_r = (joint, beta, gamma) in closed form, the
-  loop's tip as an expression in q_r, and the moving links. The textbook formulations derive the
-  rest.
+  loop's tip as an expression in q_r, the moving links and the joints between them. The textbook
+  formulations and the reactions derive the rest.
 - virtual power: the same forces written out by hand with the fewest operations.
 
 Numbers of a chain enter as named constants, so that one expression serves every chain.
@@ -52,6 +52,41 @@ class Link:
 
 
 @dataclass(frozen=True)
+class Joint:
+    """Where a link meets the link before it, and the first link the base; expressions in q_r.
+
+    name, place: what reports call it and its point.
+    point:  in {S}, (3,).
+    turns:  axes about which it lets the link turn, (3, a).
+    slides: directions along which it lets the link slide, (3, b).
+    driven: whether the actuator works along its one freedom.
+    guide:  axis of a moment that the base puts on the link besides, (3,), or None.
+    """
+
+    name: str
+    place: str
+    point: ca.SX
+    turns: ca.SX
+    slides: ca.SX
+    driven: bool = False
+    guide: ca.SX | None = None
+
+    @staticmethod
+    def ball(name: str, place: str, point: ca.SX, guide: ca.SX | None = None) -> Joint:
+        return Joint(name, place, point, ca.SX.eye(3), ca.SX(3, 0), guide=guide)
+
+    @staticmethod
+    def shaft(name: str, place: str, point: ca.SX, axis: ca.SX) -> Joint:
+        """Turned by the actuator."""
+        return Joint(name, place, point, axis, ca.SX(3, 0), driven=True)
+
+    @staticmethod
+    def slide(name: str, place: str, point: ca.SX, direction: ca.SX) -> Joint:
+        """Pushed by the actuator."""
+        return Joint(name, place, point, ca.SX(3, 0), direction, driven=True)
+
+
+@dataclass(frozen=True)
 class Loop:
     """The closed loop at a position of M ([Cheng2023] eqs 12-14, 25-26).
 
@@ -78,6 +113,7 @@ class Law:
     """Forces of a chain's bodies on M, (3,) each, and the joint's motion.
 
     forces:     body name -> force dual to M' (inertia less gravity).
+    efforts:    body name -> effort at the joint, worth J effort on M, that `forces` leaves out.
     end_masses: body name -> constant mass at M whose force, end_mass (M'' - g), `forces` leaves
                 out: it can be folded into the platform's inertia once for all samples.
     """
@@ -87,14 +123,17 @@ class Law:
     reach: ca.SX
     rate: ca.SX
     acceleration: ca.SX
+    efforts: dict[str, ca.SX] = field(default_factory=dict)
     end_masses: dict[str, ca.SX] = field(default_factory=dict)
 
-    def with_end_masses(self, A: ca.SX, g: ca.SX) -> Law:
-        """The same law with the end masses among the forces."""
+    def complete(self, A: ca.SX, g: ca.SX) -> Law:
+        """The same law with everything among the forces."""
         forces = dict(self.forces)
+        for name, effort in self.efforts.items():
+            forces[name] = forces.get(name, ca.SX.zeros(3)) + self.J * effort
         for name, mass in self.end_masses.items():
-            forces[name] += mass * (A - g)
-        return replace(self, forces=forces, end_masses={})
+            forces[name] = forces.get(name, ca.SX.zeros(3)) + mass * (A - g)
+        return replace(self, forces=forces, efforts={}, end_masses={})
 
 
 class Family(ABC):
@@ -105,6 +144,7 @@ class Family(ABC):
     joint_unit: ClassVar[str]
     effort_unit: ClassVar[str]
     shapes: ClassVar[dict[str, int]]  # constant -> number of entries (1, 3 or 9)
+    idle: ClassVar[tuple[str, ...]]  # constants that are 0 in a lane without a chain: no J, no force
 
     @abstractmethod
     def constants(self, chain: Any) -> dict[str, np.ndarray]:
@@ -117,6 +157,10 @@ class Family(ABC):
     @abstractmethod
     def links(self, c: Constants, q_r: ca.SX) -> list[Link]:
         """The moving bodies, in the order of `bodies`."""
+
+    @abstractmethod
+    def joints(self, c: Constants, q_r: ca.SX) -> list[Joint]:
+        """One joint a link, in the order of `bodies`; M, the last one's end, is understood."""
 
     @abstractmethod
     def loop(self, c: Constants, M: ca.SX) -> Loop:
@@ -190,31 +234,42 @@ def rod_spin(N: ca.SX, q_r: ca.SX) -> ca.SX:
     return N @ in_N
 
 
+def rod_guide(N: ca.SX, q_r: ca.SX) -> ca.SX:
+    """Axis of the moment that keeps a rod turning with N_i0 Ry(beta_i) Rz(gamma_i), (3,).
+
+    Two ball joints leave a rod free to spin about itself. That it does not is a constraint, and
+    its moment does no work on beta_i' and gamma_i': it acts along X of N_i0 Ry(beta_i), across
+    both of their axes. The angles are relative to the base, so the base must provide it.
+    """
+    beta = q_r[1]
+    return N @ ca.vertcat(ca.cos(beta), 0, -ca.sin(beta))
+
+
 def rod_inertia(n: ca.SX, transverse: ca.SX, axial: ca.SX) -> ca.SX:
     """Inertia of a rod along the unit vector n, in {S}, (3, 3)."""
     return transverse * ca.SX.eye(3) + (axial - transverse) * (n @ n.T)
 
 
 def axial_force(
-    e: ca.SX, e_rate: ca.SX, e_acceleration: ca.SX, Y: ca.SX, inverse_length: ca.SX, axial: ca.SX
+    e: ca.SX, e_rate: ca.SX, e_acceleration: ca.SX, Y: ca.SX, length: ca.SX, axial: ca.SX
 ) -> ca.SX:
     """Force dual to e' that the axial inertia of a rod of constant length needs, (3,) [N].
 
     The rod turns with N_i0 Ry(beta) Rz(gamma), so its axial rate is nu = beta' sin(gamma). With
-    p = |e|^2 - (Y.e)^2:
+    y = Y.e, u = Y x e and p = |e|^2 - y^2 (so that sin(gamma) = y / |e|):
 
-        beta' = Y.(e x e') / p,   sin(gamma) = Y.e / |e|,
-        force = axial [ nu (e' x e) / |e|^3 + nu' (sin(gamma) / p) Y x e ].
+        beta'  = u.e' / p,    beta'' = (u.e'' + 2 y y' beta') / p,
+        force  = axial / |e|^2 [ (|e|^2 beta'' - u.e'') / p u - y beta'^2 Y ],
+
+    up to a multiple of e, which does no work.
     """
     y, y_rate = ca.dot(Y, e), ca.dot(Y, e_rate)
-    inverse_p = 1 / (ca.dot(e, e) - y * y)
-    turn = ca.cross(e, e_rate)
-    beta_rate = ca.dot(Y, turn) * inverse_p
-    # p' = -2 y y', since |e| is constant.
-    beta_acceleration = (
-        ca.dot(Y, ca.cross(e, e_acceleration)) + 2 * y * y_rate * beta_rate
-    ) * inverse_p
-    spin = y * beta_rate
-    spin_rate = y_rate * beta_rate + y * beta_acceleration
-    gain = axial * inverse_length**2
-    return gain * ((y * inverse_p) * spin_rate * ca.cross(Y, e) - (inverse_length**2 * spin) * turn)
+    u = ca.cross(Y, e)
+    square = length * length
+    inverse_p = 1 / (square - y * y)
+    beta_rate = ca.dot(u, e_rate) * inverse_p
+    bending = ca.dot(u, e_acceleration)
+    beta_acceleration = (bending + 2 * y * y_rate * beta_rate) * inverse_p
+    gain = axial / square
+    along_u = gain * inverse_p * (square * beta_acceleration - bending)
+    return along_u * u - (gain * y * beta_rate * beta_rate) * Y

@@ -16,6 +16,7 @@ from ..rotation import rotation_z
 from .family import (
     Constants,
     Family,
+    Joint,
     Law,
     Link,
     Loop,
@@ -24,6 +25,7 @@ from .family import (
     rod_angles,
     rod_direction,
     rod_frame,
+    rod_guide,
     rod_inertia,
     rod_spin,
 )
@@ -36,6 +38,7 @@ class RSSFamily(Family):
     effort_unit = "N m"
     # `level` and `steep` span the crank plane, level[2] = 0: one constant fewer in the hot path.
     # C and N are C_i0 and N_i0; Y is the second axis of N.
+    idle = ("branch", "mass", "transverse", "axial", "crank")
     shapes = {
         "G": 3,
         "level": 2,
@@ -103,6 +106,12 @@ class RSSFamily(Family):
             ),
         ]
 
+    def joints(self, c: Constants, q_r: ca.SX) -> list[Joint]:
+        return [
+            Joint.shaft("shaft", "crank pivot G", c.G, c.C[:, 2]),
+            Joint.ball("crank_tip", "crank tip S", self._crank_tip(c, q_r), rod_guide(c.N, q_r)),
+        ]
+
     def loop(self, c: Constants, M: ca.SX) -> Loop:
         d = M - c.G
         a, b = ca.dot(d, c.C[:, 0]), ca.dot(d, c.C[:, 1])
@@ -130,24 +139,26 @@ class RSSFamily(Family):
         d = M - c.G
         a = d[0] * c.level[0] + d[1] * c.level[1]
         b = ca.dot(d, c.steep)
-        k = (ca.dot(d, d) + (c.l**2 - c.L**2)) * (0.5 / c.l)
+        k = ca.dot(d, d) * (0.5 / c.l) + (c.l**2 - c.L**2) * (0.5 / c.l)
         h = a * a + b * b
         root = h - k * k
-        s = c.branch * ca.sqrt(root)
+        inverse_s = 1 / ca.sqrt(root)
+        s = c.branch * (root * inverse_s)
         scale = c.l / h
         x, y = (a * k - b * s) * scale, (b * k + a * s) * scale  # l cos, l sin
 
-        r = ca.vertcat(x * c.level[0], x * c.level[1], 0) + y * c.steep
-        t = x * c.steep - ca.vertcat(y * c.level[0], y * c.level[1], 0)
-        e = d - r
-        J = e * (-1 / (c.l * s))  # e.t = -l s
+        level = ca.vertcat(c.level[0], c.level[1], 0)
+        e = d - x * level - y * c.steep
+        r = d - e
+        t = x * c.steep - y * level
+        inverse_e_t = (-c.branch / c.l) * inverse_s  # e.t = -l s
+        J = e * inverse_e_t
         rate = ca.dot(J, V)
         e_rate = V - t * rate
         rate2 = rate * rate
         # e.(A - S'') + |e'|^2 = 0 with S'' = t theta'' - r theta'^2 and e.r = l (k - l)
-        acceleration = ca.dot(J, A) + (ca.dot(e_rate, e_rate) + c.l * (k - c.l) * rate2) * (
-            -1 / (c.l * s)
-        )
+        square = ca.dot(e_rate, e_rate) + (c.l * k - c.l**2) * rate2
+        acceleration = ca.dot(J, A) + square * inverse_e_t
         S_acceleration = t * acceleration - r * rate2
 
         # The rod as three constants on its ends: kinetic energy
@@ -156,17 +167,22 @@ class RSSFamily(Family):
         m_MM = c.mass * c.com**2 + bend
         m_SM = c.mass * c.com * (1 - c.com) - bend
         m_SS = c.mass * (1 - c.com) ** 2 + bend
-        axial = axial_force(e, e_rate, A - S_acceleration, c.Y, 1 / c.L, c.axial)
+        axial = axial_force(e, e_rate, A - S_acceleration, c.Y, c.L, c.axial)
+        # m (1 - com) = m_SM + m_SS splits the weight that the crank carries.
         crank_torque = (
-            m_SS * c.l**2 * acceleration
-            + m_SM * ca.dot(t, A)
-            - c.mass * (1 - c.com) * ca.dot(t, g)
-            - ca.dot(t, axial)
+            (m_SS * c.l**2) * acceleration
+            + ca.dot(t, m_SM * (A - g) - axial)
+            - m_SS * ca.dot(t, g)
         )
-        coupler = m_SM * (S_acceleration - g) + axial + J * crank_torque
-        crank = J * (c.crank * acceleration)
-        forces = {"cranks": crank, "couplers": coupler}
-        return Law(forces, J, root / c.L**2, rate, acceleration, {"couplers": m_MM})
+        return Law(
+            forces={"couplers": m_SM * (S_acceleration - g) + axial},
+            J=J,
+            reach=root / c.L**2,
+            rate=rate,
+            acceleration=acceleration,
+            efforts={"cranks": c.crank * acceleration, "couplers": crank_torque},
+            end_masses={"couplers": m_MM},
+        )
 
     def explain(self, chain: Any, pose: np.ndarray) -> str:
         c = self.constants(chain)
