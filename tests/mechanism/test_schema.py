@@ -31,7 +31,7 @@ class Validator:
         self.root = root
 
     def fits(self, value: Any, schema: Schema) -> bool:
-        words = schema.keys() - NOTES
+        words = sorted(schema.keys() - NOTES, key=lambda word: word != "type")  # type first
         return all(getattr(self, word.strip("$"))(value, schema[word], schema) for word in words)
 
     def ref(self, value: Any, rule: str, _: Schema) -> bool:

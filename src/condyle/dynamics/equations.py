@@ -20,7 +20,7 @@ from ..errors import UnsupportedError
 from ..kinematics.chain import FAMILIES, Constants, Family, Law
 from ..kinematics.closure import contact_symbols
 from ..kinematics.contact import (
-    Placement,
+    angle_equation,
     closed_form,
     closed_form_available,
     contact_frame,
@@ -28,7 +28,6 @@ from ..kinematics.contact import (
     parasitic_jacobian,
 )
 from ..kinematics.parasitic import whole_motion
-from ..kinematics.rotation import Bryant
 from ..kinematics.state import (
     PointMotion,
     State,
@@ -146,7 +145,7 @@ def direct_function(mechanism: Mechanism, formulation: Formulation) -> ca.Functi
     m = 6 - len(dependent)
     q, q1, q2 = (ca.SX.sym(name, m) for name in ("q", "q1", "q2"))
     load = ca.SX.sym("load", 9)
-    placement = closed_form(contact_symbols(mechanism), dependent, q, closed_branch(mechanism))
+    placement = closed_form(contact_symbols(mechanism), dependent, q, ca.SX(closed_branch(mechanism)))
     state = independent_state(q, q1, q2, placement.pose())
     outputs = dynamics_outputs(mechanism, formulation, state, ca.SX.eye(m), load)
     return _function("direct", [q, q1, q2, load], list(vars(outputs).values()))
@@ -158,7 +157,7 @@ def closure_function(mechanism: Mechanism) -> ca.Function:
     m = 6 - len(dependent)
     q, q1, q2 = (ca.SX.sym(name, m) for name in ("q", "q1", "q2"))
     contacts = contact_symbols(mechanism)
-    placement = closed_form(contacts, dependent, q, closed_branch(mechanism))
+    placement = closed_form(contacts, dependent, q, ca.SX(closed_branch(mechanism)))
     motion = whole_motion(contacts, dependent, placement, q1, q2)
     pose = placement.pose()
     # The given angles as they are: arc functions would take them to their principal values.
@@ -245,21 +244,11 @@ def has_closed_form(mechanism: Mechanism) -> bool:
     return closed_form_available(kinds, dependent_coordinates(mechanism))
 
 
-def closed_branch(mechanism: Mechanism) -> ca.SX:
-    """-sign(B) at home, which keeps the dependent angle on the branch of home."""
+def closed_branch(mechanism: Mechanism) -> float:
+    """-sign(B) of the angle equation at home, which keeps the dependent angle on its branch."""
     dependent = dependent_coordinates(mechanism)
-    contacts = contact_symbols(mechanism)
-    angle = [i for i in indices(dependent) if i >= 3]
-    if not angle:
-        return ca.SX(1.0)
-    position = [i for i in indices(dependent) if i < 3]
-    # d phi / d angle at home, with the dependent position eliminated as `closed_form` does.
-    placement = Placement(ca.SX.zeros(3), Bryant(ca.SX.ones(3), ca.SX.zeros(3)), None)
-    frame = contact_frame(contacts, placement.position, placement.bryant.rotation())
-    slopes = np.array([[float(n[i]) for i in position] for n in frame.gradients])
-    turns = [float(frame.N[angle[0], k]) for k in range(len(contacts))]
-    B = turns[0] if not position else slopes[1, 0] * turns[0] - slopes[0, 0] * turns[1]
-    return ca.SX(-float(np.sign(B)))
+    equation = angle_equation(contact_symbols(mechanism), dependent, ca.SX.zeros(6))
+    return -float(np.sign(float(ca.evalf(equation.B))))
 
 
 def _function(name: str, inputs: list[ca.SX], outputs: list[ca.SX]) -> ca.Function:

@@ -13,9 +13,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from importlib.resources import files
 
+from .fuse import fuse
 from .graph import REDUCTIONS, Graph, Value, reachable
-from .program import Program
+from .program import Output, Program
+from .schedule import scheduled
 
+CHAIN = 5
+INTERLEAVED = 2  # chains whose statements alternate, to keep both arithmetic ports busy
 LONG = 700  # lane operations above which chains run in a loop instead of unrolled
 
 NEAR = 1e-14  # margin or quality below which a sample is looked at again by the interpreter
@@ -46,11 +50,7 @@ class Source:
 
 def emit(program: Program, width: int) -> Source:
     """The kernel's C for `width` lanes."""
-    g = program.graph
-    roots = [v for output in program.outputs for v in output.nodes]
-    order = _fused_order(g, roots)
-    table = _table(program, order)
-    printer = _Printer(program, order, table, width)
+    printer = _Printer(fused(program), width)
     header = (files(__package__) / "c" / "vector.h").read_text(encoding="utf-8")
     driver = (files(__package__) / "c" / "driver.h").read_text(encoding="utf-8")
     outputs: dict[str, int] = {}
@@ -77,8 +77,15 @@ def emit(program: Program, width: int) -> Source:
     return Source("\n".join(pieces), list(outputs.items()), printer.operations())
 
 
-def _fused_order(g: Graph, roots: list[Value]) -> list[Value]:
-    return reachable(g, roots)
+def fused(program: Program) -> Program:
+    """The program with its sums as fused multiply-adds."""
+    roots = [v for output in program.outputs for v in output.nodes]
+    graph, moved = fuse(program.graph, roots, CHAIN)
+    renamed = dict(zip(roots, moved, strict=True))
+    outputs = [
+        Output(o.name, o.lane, tuple(renamed[v] for v in o.nodes)) for o in program.outputs
+    ]
+    return Program(program.spec, program.layout, graph, outputs)
 
 
 def _table(program: Program, order: list[Value]) -> Table:
@@ -97,7 +104,10 @@ def _table(program: Program, order: list[Value]) -> Table:
 
 
 class _Printer:
-    def __init__(self, program: Program, order: list[Value], table: Table, width: int) -> None:
+    def __init__(self, program: Program, width: int) -> None:
+        roots = [v for output in program.outputs for v in output.nodes]
+        order = reachable(program.graph, roots)
+        table = _table(program, order)
         self.program, self.g, self.order, self.table = program, program.graph, order, table
         self.width = width
         self.counts = [count for _, count in program.spec.chains]
@@ -119,15 +129,7 @@ class _Printer:
         for v in self.varying:
             node = g.nodes[v]
             copies = 1 if node.group is None else self.counts[node.group]
-            if node.op in ("add", "sub"):
-                fused = any(
-                    g.nodes[a].op == "mul" and g.nodes[a].varies and uses[a] == 1
-                    for a in node.args
-                )
-                total += 0 if fused else copies
-            elif node.op == "mul":
-                total += copies
-            elif node.op in ("neg", "input"):
+            if node.op in ("neg", "input"):
                 continue
             elif node.op in REDUCTIONS:
                 for t in node.args:
@@ -155,31 +157,22 @@ class _Printer:
         lines = ["void prepare(const double *par, const double *const *lane, double *table) {"]
         arrays = [v for v in self.fixed if self.g.nodes[v].group is not None]
         for v in arrays:
-            lines.append(f"  double x{v}[{self.counts[self.g.nodes[v].group]}];")  # type: ignore[index]
+            lines.append(f"  double x{v}[{self.padded[self.g.nodes[v].group]}];")  # type: ignore[index]
         for v in self.fixed:
             node = self.g.nodes[v]
             if node.group is None:
                 lines.append(f"  const double x{v} = {self._fixed(v, '')};")
             else:
-                loop = f"  for (int i = 0; i < {self.counts[node.group]}; i++)"
+                loop = f"  for (int i = 0; i < {self.padded[node.group]}; i++)"
                 lines.append(f"{loop} x{v}[i] = {self._fixed(v, '[i]')};")
         for v, slot in self.table.shared.items():
             lines.append(f"  table[{slot}] = x{v};")
         for group, slots in enumerate(self.table.lanes):
-            count, padded = self.counts[group], self.padded[group]
+            padded = self.padded[group]
             for v, slot in slots.items():
                 at = self.starts[group] + slot * padded
-                # Lanes without a chain repeat the first, and are multiplied away by `active`.
-                pad = "0.0" if self._is_active(v) else f"x{v}[0]"
-                lines.append(
-                    f"  for (int i = 0; i < {padded}; i++) "
-                    f"table[{at} + i] = i < {count} ? x{v}[i] : {pad};"
-                )
+                lines.append(f"  for (int i = 0; i < {padded}; i++) table[{at} + i] = x{v}[i];")
         return "\n".join([*lines, "}", ""])
-
-    def _is_active(self, v: Value) -> bool:
-        node = self.g.nodes[v]
-        return node.op == "lane" and node.data[1] == 0
 
     def _fixed(self, v: Value, index: str) -> str:
         node = self.g.nodes[v]
@@ -187,7 +180,7 @@ class _Printer:
             return f"par[{node.data[0]}]"
         if node.op == "lane":
             group, k = node.data
-            return f"lane[{group}][{k} * {self.counts[group]} + i]"  # type: ignore[index]
+            return f"lane[{group}][{k} * {self.padded[group]} + i]"  # type: ignore[index]
         if node.op in REDUCTIONS:
             terms = []
             for t in node.args:
@@ -233,6 +226,9 @@ class _Printer:
         self.arrays = self._kept() if looped else set()
         for v in sorted(self.arrays):
             lines.append(f"  vec x{v}_[{shape.copies[self.g.nodes[v].group]}];")  # type: ignore[index]
+        if shape.shared == "double" and not looped:
+            order = scheduled(self.g, self.varying)
+            return "\n".join([*lines, *self._straight(order), *self._outputs(), "}", ""])
         for phase in phases:
             shared = [v for v in self.varying if self._in(v, phase, None)]
             lines += [f"  {s}" for s in self._statements(shared, 0)]
@@ -240,6 +236,23 @@ class _Printer:
                 lanes = [v for v in self.varying if self._in(v, phase, group)]
                 lines += self._lanes(lanes, group, copies, phase, looped)
         return "\n".join([*lines, *self._outputs(), "}", ""])
+
+    def _straight(self, order: list[Value]) -> list[str]:
+        """Statements in the given order, the copies of a lane value together."""
+        lines, printed = [], set[Value]()
+        for v in order:
+            node = self.g.nodes[v]
+            copies = 1 if node.group is None else self.shape.copies[node.group]
+            if v in printed:
+                continue
+            pair = [v]
+            if node.op in ("sin", "cos"):
+                partner = self._partner(v, order)
+                pair += [] if partner is None else [partner]
+            printed.update(pair)
+            for c in range(copies):
+                lines += [f"  {s}" for s in self._statements(pair, c)]
+        return lines
 
     def _in(self, v: Value, phase: int, group: int | None) -> bool:
         node = self.g.nodes[v]
@@ -252,7 +265,12 @@ class _Printer:
         if not lanes:
             return []
         if not looped:
-            return [f"  {s}" for c in range(copies) for s in self._statements(lanes, c)]
+            lines = []
+            for first in range(0, copies, INTERLEAVED):
+                some = range(first, min(first + INTERLEAVED, copies))
+                lists = [list(self._statements(lanes, c)) for c in some]
+                lines += [f"  {s}" for row in zip(*lists, strict=True) for s in row]
+            return lines
         sums = [
             (v, t)
             for v in self.varying
@@ -348,6 +366,9 @@ class _Printer:
                 root = self.g.nodes[node.args[1]]
                 return f"rsqrt{suffix}({name(root.args[0])})"
             return f"{a} {_INFIX[node.op]} {b}"
+        if node.op in ("fma", "fnma"):
+            a, b, c = (name(x) for x in node.args)
+            return f"{c} {'+' if node.op == 'fma' else '-'} {a} * {b}"
         if node.op == "neg":
             return f"-{name(node.args[0])}"
         if node.op == "const":

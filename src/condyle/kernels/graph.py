@@ -89,6 +89,10 @@ class Graph:
             max(n.phase for n in nodes),
         )
 
+    def copy(self, node: Node, args: tuple[Value, ...]) -> Value:
+        """The same operation on other arguments."""
+        return self._node(node.op, args, node.data, node.group, node.varies, node.phase)
+
     def _node(
         self,
         op: str,
@@ -142,14 +146,24 @@ class Graph:
                 return self.apply("add", a, B.args[0])
             if A.op == "neg":
                 return self.apply("neg", self.apply("add", A.args[0], b))
-        if op in ("mul", "div"):
+        if op == "div":
+            if a == b:
+                return self.const(1.0)
+            if number.get(a) != 1.0:
+                # One reciprocal serves every division by b.
+                return self.apply("mul", a, self.apply("div", self.const(1.0), b))
+            if B.op == "div" and B.args[0] == a:
+                return B.args[1]
+            if B.op == "neg":
+                return self.apply("neg", self.apply("div", a, B.args[0]))
+        if op == "mul":
             if number.get(b) == 1.0:
                 return a
             if number.get(b) == -1.0:
                 return self.apply("neg", a)
-            if op == "mul" and number.get(a) in (1.0, -1.0):
+            if number.get(a) in (1.0, -1.0):
                 return b if number[a] == 1.0 else self.apply("neg", b)
-            if op == "mul" and 0.0 in (number.get(a), number.get(b)):
+            if 0.0 in (number.get(a), number.get(b)):
                 return self.const(0.0)
             if A.op == "neg" and B.op == "neg":
                 return self.apply(op, A.args[0], B.args[0])

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
 
-from ..dynamics.equations import closed_branch, has_closed_form
+from ..dynamics.equations import has_closed_form
 from ..kinematics.chain import FAMILIES
-from ..kinematics.contact import ContactSymbols
+from ..kinematics.contact import ContactSymbols, angle_equation, mean_and_difference
 from ..mechanism.mechanism import Mechanism
-from ..mechanism.surface import Plane
+from ..mechanism.surface import of_form
 from .spec import KernelSpec
 
 Slot = tuple[int, int]  # start, count
@@ -40,8 +40,11 @@ class Layout:
         inputs += [f"moment_{i}" for i in range(3)] if spec.moment else []
         sizes = {"gravity": 3, "mass": 1, "first_moment": 3, "inertia": 6, "load_point": 3}
         sizes["branch"] = 1
-        for i, (_, count) in enumerate(spec.contacts):
-            sizes |= {f"contact_point_{i}": 3, f"contact_surface_{i}": count}
+        if spec.parallel:
+            sizes |= {"slope": 2, "mean": 3, "mean_offset": 1, "difference": 3, "gap": 1}
+        else:
+            for i, (_, count) in enumerate(spec.contacts):
+                sizes |= {f"contact_point_{i}": 3, f"contact_surface_{i}": count}
         lanes = [
             _slots({"active": 1, "joint": 3, "constants": FAMILIES[kind].size()})
             for kind, _ in spec.chains
@@ -49,17 +52,19 @@ class Layout:
         return Layout(inputs, _slots(sizes), lanes, spec)
 
     def contact_symbols(self, parameters: Callable[[str], ca.SX]) -> list[ContactSymbols]:
+        """The contacts, their numbers by name."""
+        if self.spec.parallel:
+            names = ("slope", "mean", "mean_offset", "difference", "gap")
+            return mean_and_difference(of_form("plane"), *(parameters(name) for name in names))
         return [
             ContactSymbols(
-                SURFACES[kind],
-                parameters(f"contact_point_{i}"),
-                parameters(f"contact_surface_{i}"),
+                of_form(form), parameters(f"contact_point_{i}"), parameters(f"contact_surface_{i}")
             )
-            for i, (kind, _) in enumerate(self.spec.contacts)
+            for i, (form, _) in enumerate(self.spec.contacts)
         ]
 
     def parameter_values(self, mechanism: Mechanism, load_point: np.ndarray) -> np.ndarray:
-        """Shared numbers of a mechanism and the point its load acts at."""
+        """Shared numbers of a mechanism and the point its load acts at, (size,)."""
         inertia = mechanism.platform.inertia
         values: dict[str, object] = {
             "gravity": mechanism.gravity,
@@ -67,24 +72,37 @@ class Layout:
             "first_moment": np.zeros(3),
             "inertia": [getattr(inertia, name) for name in ("xx", "yy", "zz", "xy", "xz", "yz")],
             "load_point": load_point,
-            "branch": float(closed_branch(mechanism)) if has_closed_form(mechanism) else 1.0,
+            "branch": 1.0,
         }
         for i, contact in enumerate(mechanism.contacts):
             values[f"contact_point_{i}"] = contact.point
-            values[f"contact_surface_{i}"] = contact.surface.constants()
+            values[f"contact_surface_{i}"] = contact.locus.constants()
+        if self.spec.parallel:
+            first, second = (np.array(c.point) for c in mechanism.contacts)
+            a, b = (c.locus.constants() for c in mechanism.contacts)
+            values |= {"slope": a[:2], "mean": (first + second) / 2, "difference": first - second}
+            values |= {"mean_offset": (a[2] + b[2]) / 2, "gap": a[2] - b[2]}
+        if has_closed_form(mechanism):
+            contacts = self.contact_symbols(lambda name: ca.SX(ca.DM(np.ravel(values[name]))))
+            equation = angle_equation(contacts, self.spec.dependent, ca.SX.zeros(6))
+            values["branch"] = -float(np.sign(float(ca.evalf(equation.B))))
         return np.concatenate([np.ravel(values[name]) for name in self.parameters]).astype(float)
 
-    def lane_values(self, mechanism: Mechanism) -> list[np.ndarray]:
-        """Numbers of the chains, (size, count) a group."""
+    def lane_values(self, mechanism: Mechanism, width: int = 1) -> list[np.ndarray]:
+        """Numbers of the chains, (size, count) a group.
+
+        Args: width: lanes a vector; groups are filled up to it with chains that do nothing.
+        """
         groups = []
         for kind, _ in self.spec.chains:
             family = FAMILIES[kind]
             chains = [c for c in mechanism.chains if c.kind == kind]
-            rows = [
-                np.concatenate([[1.0], c.platform, family.vector(family.constants(c))])
-                for c in chains
-            ]
-            groups.append(np.array(rows).T)
+            rows = [[1.0, *c.platform, *family.vector(family.constants(c))] for c in chains]
+            idle = family.constants(chains[0])
+            if self.spec.formulation == "virtual_power":
+                idle |= {name: np.zeros_like(idle[name]) for name in family.idle}
+            rows += [[0.0, *chains[0].platform, *family.vector(idle)]] * (-len(chains) % width)
+            groups.append(np.array(rows).T.copy())
         return groups
 
     def chain_order(self, mechanism: Mechanism) -> list[int]:
@@ -97,8 +115,12 @@ class Layout:
         ]
 
 
-# Surfaces only lend their equation here: the numbers are the kernel's inputs.
-SURFACES = {"plane": Plane(slope=(0.0, 0.0), offset=0.0)}
+def specialise(spec: KernelSpec, parameters: np.ndarray, lanes: list[np.ndarray]) -> KernelSpec:
+    """The spec that leaves out what is zero in this mechanism."""
+    zeros = [(-1, int(i)) for i in np.flatnonzero(parameters == 0)]
+    for group, values in enumerate(lanes):
+        zeros += [(group, int(i)) for i in np.flatnonzero((values == 0).all(axis=1))]
+    return replace(spec, zeros=tuple(zeros))
 
 
 def _slots(sizes: dict[str, int]) -> dict[str, Slot]:

@@ -8,7 +8,7 @@ this runs lanes in a vector register (one evaluation) or samples (a batch).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import casadi as ca
 
@@ -51,12 +51,19 @@ class Program:
 
     def parameters(self, name: str) -> ca.SX:
         start, count = self.layout.parameters[name]
-        return self._symbols(name, [self.graph.leaf("parameter", start + i) for i in range(count)])
+        return self._symbols(name, [self._number(-1, start + i) for i in range(count)])
 
     def lane_constants(self, group: int, name: str) -> ca.SX:
         start, count = self.layout.lanes[group][name]
-        leaves = [self.graph.leaf("lane", group, start + i, group=group) for i in range(count)]
+        leaves = [self._number(group, start + i) for i in range(count)]
         return self._symbols(f"{name}_{group}", leaves)
+
+    def _number(self, group: int, i: int) -> Value:
+        if (group, i) in self.spec.zeros:
+            return self.graph.const(0.0)
+        if group < 0:
+            return self.graph.leaf("parameter", i)
+        return self.graph.leaf("lane", group, i, group=group)
 
     def total(self, terms: Sequence[ca.SX]) -> ca.SX:
         """Sum over all chains, entry by entry; one term a group."""
@@ -97,13 +104,15 @@ class ChainTerms:
     """What the chains of one group contribute, lane by lane, dual to the state's rates."""
 
     law: Law
-    point: PointMotion
     forces: dict[str, ca.SX]
     row: ca.SX
 
 
-def build(spec: KernelSpec) -> Program:
-    """The program of a spec."""
+def build(spec: KernelSpec, careful: bool = False) -> Program:
+    """The program of a spec.
+
+    Args: careful: solve for the torques by `gram_schmidt` where `normal_equations` are quicker.
+    """
     p = Program(spec, Layout.of(spec))
     m = spec.m
     q, q1, q2 = (p.inputs(name, m) for name in ("q", "q1", "q2"))
@@ -149,7 +158,8 @@ def build(spec: KernelSpec) -> Program:
     else:
         total = _sum(list(parts.values()))
         b = to_independent(total)
-    shares, quality = least_norm(p, A, b, spec.n)
+    solve = gram_schmidt if careful or spec.n == m else normal_equations
+    shares, quality = solve(p, A, b)
     torque = [_sum(ca.horzsplit(s)) for s in shares]
     p.output("torque", torque)
     p.output("margin", _margin(p, placement, chains))
@@ -195,10 +205,16 @@ def _chain_terms(
         law = family.law(constants, M.position, M.velocity, M.acceleration, g)
     else:
         law = FORMULATIONS[formulation].chain(family, constants, M, g)
-    # Lanes that stand for no chain are multiplied away; where there are none, so is `active`.
-    active = p.lane_constants(index, "active")
-    forces = {name: state.pull(active * f, M.lever) for name, f in law.forces.items()}
-    return ChainTerms(law, M, forces, state.pull(active * law.J, M.lever))
+    if formulation != "virtual_power":
+        # A lane without a chain has neither J nor force. (Virtual power: by its idle constants.)
+        active = p.lane_constants(index, "active")
+        forces = {name: active * f for name, f in law.forces.items()}
+        law = replace(law, forces=forces, J=active * law.J)
+    row = state.pull(law.J, M.lever)
+    if fold:
+        force = _sum([*law.forces.values(), law.J * _sum([*law.efforts.values(), ca.SX(0)])])
+        return ChainTerms(law, {"chains": state.pull(force, M.lever)}, row)
+    return ChainTerms(law, {k: state.pull(f, M.lever) for k, f in law.forces.items()}, row)
 
 
 def _body(p: Program, folded: Sequence[ChainTerms]) -> Body:
@@ -210,7 +226,6 @@ def _body(p: Program, folded: Sequence[ChainTerms]) -> Body:
         terms = []
         for index, chain in enumerate(folded):
             end = _sum(list(chain.law.end_masses.values())) if chain.law.end_masses else ca.SX(0)
-            end = end * p.lane_constants(index, "active")
             joint = p.lane_constants(index, "joint")
             tensor = end * (ca.dot(joint, joint) * ca.SX.eye(3) - joint @ joint.T)
             unique = [tensor[k // 3, k % 3] for k in (0, 4, 8, 1, 2, 5)]
@@ -239,7 +254,43 @@ def _chain_parts(p: Program, chains: Sequence[ChainTerms], apart: bool) -> dict[
     }
 
 
-def least_norm(p: Program, A: Lanes, b: ca.SX, n: int) -> tuple[Lanes, ca.SX]:
+def normal_equations(p: Program, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
+    """Least-norm solutions tau = A (A^T A)^-1 b, by L D L^T.
+
+    Quick, since all its sums run at once, and good to rounding times the square of the condition
+    number; where the quality it returns is small, `gram_schmidt` has to do the work.
+
+    Args:    A: (m,) a group, lane values; b: (m, r).
+    Returns: tau, (r,) a group as rows; the least pivot over its column's square.
+    """
+    m = b.shape[0]
+    G = [
+        [p.total([a[j] * a[k] for a in A]) if j <= k else ca.SX(0) for k in range(m)]
+        for j in range(m)
+    ]
+    pivots, z, quality = [], [b[k, :] for k in range(m)], ca.SX(1.0)
+    L = [[ca.SX(0)] * m for _ in range(m)]
+    rows = [[G[j][k] for k in range(m)] for j in range(m)]
+    for k in range(m):
+        d = rows[k][k]
+        inverse = 1 / d
+        pivots.append(inverse)
+        if k:
+            quality = ca.fmin(quality, d / G[k][k])
+        for j in range(k + 1, m):
+            L[j][k] = rows[k][j] * inverse
+        for j in range(k + 1, m):
+            for i in range(j, m):
+                rows[j][i] = rows[j][i] - L[j][k] * rows[k][i]
+            z[j] = z[j] - L[j][k] * z[k]
+    y = [z[k] * pivots[k] for k in range(m)]
+    for k in reversed(range(m)):
+        for j in range(k + 1, m):
+            y[k] = y[k] - L[j][k] * y[j]
+    return [_sum([a[k] * y[k] for k in range(m)]) for a in A], quality
+
+
+def gram_schmidt(p: Program, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
     """Least-norm solutions of A^T tau = b by modified Gram-Schmidt on the columns of A.
 
     A = Q R with orthogonal, unnormalised columns, so that tau = Q (Q^T Q)^-1 R^-T b: no square
@@ -309,7 +360,12 @@ def _contact_forces(
     left = (E.T @ Q)[dep] - pulled
     from ..kinematics.contact import solve_small
 
-    return solve_small(C[:, dep].T, left) * motion.frame.n_length
+    mu = solve_small(C[:, dep].T, left)
+    if spec.parallel:
+        # mu_mean grad (phi_1 + phi_2) / 2 + mu_difference grad (phi_1 - phi_2)
+        mu = ca.vertcat(mu[0] / 2 + mu[1], mu[0] / 2 - mu[1])
+        return mu * motion.frame.n_length[0]
+    return mu * motion.frame.n_length
 
 
 def _sum(terms: Sequence[ca.SX]) -> ca.SX:

@@ -25,12 +25,16 @@ POSITIONS = COORDINATES[:3]
 class ContactSymbols:
     """A contact whose numbers are symbols: T in {M}, (3,), and the constants of its locus.
 
+    Two contacts on parallel planes can also be written as their mean and their difference; the
+    latter does not depend on O_M: it is not `anchored`.
+
     surface: where the ball's centre stays, `Contact.locus` or another one of its form.
     """
 
     surface: Any
     point: ca.SX
     constants: ca.SX
+    anchored: bool = True
 
     def phi(self, position: ca.SX) -> ca.SX:
         """How far a ball centre at `position`, (3,) in {S}, is off the surface [m]."""
@@ -45,6 +49,12 @@ class ContactSymbols:
         return self.surface.bending(position, velocity, self.constants)
 
 
+    def at(self, position: ca.SX, R: ca.SX) -> ca.SX:
+        """Where the ball centre is when O_M is at `position`, (3,)."""
+        lever = R @ self.point
+        return position + lever if self.anchored else lever
+
+
 def indices(names: Sequence[str]) -> list[int]:
     """Positions of pose coordinates in X_EE."""
     return [COORDINATES.index(name) for name in names]
@@ -53,7 +63,7 @@ def indices(names: Sequence[str]) -> list[int]:
 def residuals(contacts: Sequence[ContactSymbols], pose: ca.SX) -> ca.SX:
     """phi(X_EE), (k,) [m]: how far each ball centre is off its surface."""
     R = rotation(pose[3:])
-    return ca.vertcat(ca.SX(0, 1), *(c.phi(pose[:3] + R @ c.point) for c in contacts))
+    return ca.vertcat(ca.SX(0, 1), *(c.phi(c.at(pose[:3], R)) for c in contacts))
 
 
 @dataclass(frozen=True)
@@ -66,11 +76,13 @@ class ContactFrame:
 
     gradients: list[ca.SX]
     levers: list[ca.SX]
+    anchored: list[bool]
 
     @property
     def N(self) -> ca.SX:
         columns = [
-            ca.vertcat(n, ca.cross(r, n)) for n, r in zip(self.gradients, self.levers, strict=True)
+            ca.vertcat(n if anchored else ca.SX.zeros(3), ca.cross(r, n))
+            for n, r, anchored in zip(self.gradients, self.levers, self.anchored, strict=True)
         ]
         return ca.horzcat(ca.SX(6, 0), *columns)
 
@@ -82,8 +94,8 @@ class ContactFrame:
 def contact_frame(contacts: Sequence[ContactSymbols], position: ca.SX, R: ca.SX) -> ContactFrame:
     """Gradients and levers of the contacts at O_M = `position` and rotation R."""
     levers = [R @ c.point for c in contacts]
-    gradients = [c.gradient(position + r) for c, r in zip(contacts, levers, strict=True)]
-    return ContactFrame(gradients, levers)
+    gradients = [c.gradient(c.at(position, R)) for c in contacts]
+    return ContactFrame(gradients, levers, [c.anchored for c in contacts])
 
 
 def contact_bias(
@@ -97,17 +109,35 @@ def contact_bias(
     omega = twist[3:]
     for contact, n, r in zip(contacts, frame.gradients, frame.levers, strict=True):
         swing = ca.cross(omega, r)
-        v = twist[:3] + swing
-        curving = contact.bending(position + r, v)
+        v, at = (twist[:3] + swing, position + r) if contact.anchored else (swing, r)
+        curving = contact.bending(at, v)
         biases.append(curving + ca.dot(n, ca.cross(omega, swing)))
     return ca.vertcat(*biases)
 
 
 def solve_small(A: ca.SX, b: ca.SX) -> ca.SX:
-    """A^-1 b for a square A of a few rows, by minors: no pivots, no branches."""
-    if A.shape[0] == 0:
+    """A^-1 b for a square A of a few rows, without pivots that depend on numbers.
+
+    An entry that is 1 by structure, such as d phi / dZ on z = f(x, y), is eliminated first; the
+    rest is solved by minors.
+    """
+    size = A.shape[0]
+    if size == 0:
         return ca.SX(b.shape[0], b.shape[1])
-    return ca.inv_minor(A) @ b if A.shape[0] > 1 else b / A
+    if size == 1:
+        return b * (1 / A)
+    for i, j in ((i, j) for j in range(size) for i in range(size)):
+        if A[i, j].is_one():
+            rows = [r for r in range(size) if r != i]
+            columns = [c for c in range(size) if c != j]
+            rest = solve_small(
+                A[rows, columns] - A[rows, j] @ A[i, columns], b[rows, :] - A[rows, j] @ b[i, :]
+            )
+            x = ca.SX(size, b.shape[1])
+            x[columns, :] = rest
+            x[j, :] = b[i, :] - A[i, columns] @ rest
+            return x
+    return ca.inv_minor(A) @ b
 
 
 def parasitic_jacobian(C: ca.SX, dependent: Sequence[str]) -> ca.SX:
@@ -145,21 +175,37 @@ class Placement:
         return ca.vertcat(self.position, *angles)
 
 
-def closed_form(
-    contacts: Sequence[ContactSymbols], dependent: Sequence[str], q: ca.SX, branch: ca.SX
-) -> Placement:
-    """Dependent coordinates on planes, [Cheng2023] eq. (6) for any two planes.
+@dataclass(frozen=True)
+class AngleEquation:
+    """A cos + B sin = k for the one dependent angle, and what is left for the positions.
 
-    phi is linear in the position and in the cosine and sine of each single angle. Eliminating
-    the dependent position coordinate leaves A cos + B sin = k in the dependent angle.
+    base:      O_M with zeros for the dependent positions.
+    equations: phi of the contacts there, in the unknown cosine and sine, `unknown` (2,).
+    slopes:    d phi / d (dependent positions), one row a contact.
+    """
 
-    Args: q: independent coordinates in the order of X_EE; branch: -sign(B) at home.
+    A: ca.SX
+    B: ca.SX
+    k: ca.SX
+    unknown: ca.SX
+    base: ca.SX
+    bryant: Bryant
+    equations: list[ca.SX]
+    slopes: list[list[ca.SX]]
+
+
+def angle_equation(
+    contacts: Sequence[ContactSymbols], dependent: Sequence[str], q: ca.SX
+) -> AngleEquation:
+    """The contacts on planes as equations in the dependent coordinates.
+
+    phi is linear in the position and in the cosine and sine of each single angle; the dependent
+    position, if there is one, is eliminated between the two contacts.
     """
     dep = indices(dependent)
-    unknown = ca.SX.sym("unknown", 2)  # cosine and sine of the dependent angle
+    unknown = ca.SX.sym("unknown", 2)
     values: list[Any] = [None] * 6
-    independent = [i for i in range(6) if i not in dep]
-    for k, i in enumerate(independent):
+    for k, i in enumerate(i for i in range(6) if i not in dep):
         values[i] = q[k]
     positions = [i for i in dep if i < 3]
     angles = [i for i in dep if i >= 3]
@@ -167,28 +213,46 @@ def closed_form(
     sin = [unknown[1] if i in angles else ca.sin(values[i]) for i in (3, 4, 5)]
     bryant = Bryant(ca.vertcat(*cos), ca.vertcat(*sin))
     R = bryant.rotation()
-    # Planes have a constant gradient, so the coefficient of a position is its entry.
     base = ca.vertcat(*(0 if i in positions else values[i] for i in range(3)))
-    equations = [c.phi(base + R @ c.point) for c in contacts]
-    slopes = [[c.gradient(ca.SX.zeros(3))[i] for i in positions] for c in contacts]
+    equations = [c.phi(c.at(base, R)) for c in contacts]
+    # Planes have a constant gradient, so the coefficient of a position is its entry.
+    slopes = [
+        [c.gradient(ca.SX.zeros(3))[i] if c.anchored else ca.SX(0) for i in positions]
+        for c in contacts
+    ]
+    rest = equations[-1] if equations else ca.SX(0)
+    if angles and positions and contacts[-1].anchored:
+        rest = slopes[1][0] * equations[0] - slopes[0][0] * equations[1]
+    A, B = ca.jacobian(rest, unknown[0]), ca.jacobian(rest, unknown[1])
+    k = -ca.substitute(rest, unknown, ca.SX.zeros(2))
+    return AngleEquation(A, B, k, unknown, base, bryant, equations, slopes)
 
-    reach = None
-    if angles:
-        rest = equations[0]
-        if positions:
-            rest = slopes[1][0] * equations[0] - slopes[0][0] * equations[1]
-        A, B = ca.jacobian(rest, unknown[0]), ca.jacobian(rest, unknown[1])
-        k = -ca.substitute(rest, unknown, ca.SX.zeros(2))
+
+def closed_form(
+    contacts: Sequence[ContactSymbols], dependent: Sequence[str], q: ca.SX, branch: ca.SX
+) -> Placement:
+    """Dependent coordinates on planes, [Cheng2023] eq. (6) for any two planes.
+
+    Args: q: independent coordinates in the order of X_EE; branch: -sign(B) at home.
+    """
+    dep = indices(dependent)
+    positions = [i for i in dep if i < 3]
+    s = angle_equation(contacts, dependent, q)
+    base, bryant, equations, reach = s.base, s.bryant, s.equations, None
+    if len(positions) < len(dep):
+        A, B, k = s.A, s.B, s.k
         h = A * A + B * B
         root = h - k * k
-        s = branch * ca.sqrt(root)
-        solution: ca.SX = ca.vertcat((A * k - B * s) / h, (B * k + A * s) / h)
-        reach = root / h
-        cosines = ca.substitute(bryant.cos, unknown, solution)
-        bryant = Bryant(cosines, ca.substitute(bryant.sin, unknown, solution))
-        equations = [ca.substitute(e, unknown, solution) for e in equations]
+        side = branch * ca.sqrt(root)
+        inverse_h = 1 / h
+        solution = ca.vertcat((A * k - B * side) * inverse_h, (B * k + A * side) * inverse_h)
+        reach = root * inverse_h
+        bryant, equations = (
+            Bryant(*(ca.substitute(v, s.unknown, solution) for v in (bryant.cos, bryant.sin))),
+            [ca.substitute(e, s.unknown, solution) for e in equations],
+        )
     if positions:
-        S: ca.SX = ca.vertcat(*(ca.horzcat(*row) for row in slopes))
+        S = ca.vertcat(*(ca.horzcat(*row) for row in s.slopes))
         e = ca.vertcat(*equations)
         if len(positions) == 1:
             # With an angle also solved, both equations give the same value; weigh them alike.
@@ -199,3 +263,16 @@ def closed_form(
         for i, value in zip(positions, found, strict=True):
             base[i] = value
     return Placement(base, bryant, reach)
+
+
+def mean_and_difference(
+    surface: Any, slope: ca.SX, point: ca.SX, offset: ca.SX, difference: ca.SX, gap: ca.SX
+) -> list[ContactSymbols]:
+    """Two contacts on parallel planes, (phi_1 + phi_2) / 2 and phi_1 - phi_2.
+
+    Args: point, offset: means of the two; difference, gap: first less second.
+    """
+    return [
+        ContactSymbols(surface, point, ca.vertcat(slope, offset)),
+        ContactSymbols(surface, difference, ca.vertcat(slope, gap), anchored=False),
+    ]

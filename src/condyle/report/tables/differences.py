@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from ...analysis.compare import Comparison, Difference
 from ...analysis.runs import Run
@@ -30,7 +30,7 @@ def differences(comparison: Comparison) -> Table:
     notes = [
         "Each model against all others on the same motion: the largest difference of any torque "
         "and contact force, divided by the largest component along the motion.",
-        *(f"Not available: {one.label}: {one.reason}." for one in comparison.unavailable),
+        *_not_available(comparison),
     ]
     title = f"Differences between models: {_what(comparison)}"
     return Table("differences", title, ("Model", "Torque", "Contact force"), rows, records, notes)
@@ -50,3 +50,12 @@ def _what(comparison: Comparison) -> str:
     options = comparison.solution.options
     name = comparison.solution.attrs["mechanism_name"]
     return f"{name}, {options['motion']}, {comparison.samples} samples"
+
+
+def _not_available(comparison: Comparison) -> Iterator[str]:
+    """Each reason once, with the models that it keeps away."""
+    reasons: dict[str, list[str]] = {}
+    for one in comparison.unavailable:
+        reasons.setdefault(one.reason, []).append(one.label)
+    for reason, labels in reasons.items():
+        yield f"Not available: {', '.join(labels)}. Reason: {reason}."

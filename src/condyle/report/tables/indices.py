@@ -19,6 +19,7 @@ def table_2(comparison: Comparison) -> Table:
     if not comparison.mechanism.contacts:
         names = ("no contacts", "")
     known = (paper.TABLE_2, paper.TABLE_2_FREE) if beside else ({}, {})
+    form = "{:.4f}" if beside else "{:.4g}"
     parts = list(dict.fromkeys(part for one in held for part in one.values))
     records, rows = [], []
     for k, one in enumerate(held):
@@ -26,7 +27,7 @@ def table_2(comparison: Comparison) -> Table:
         for name, published, found in zip(names, known, both, strict=False):
             entries = _entries(name, published, found)
             records += entries
-            rows.append(_row(f"{name} [{one.unit}]", entries, parts, "{:.4f}"))
+            rows.append(_row(f"{name} [{one.unit}]", entries, parts, form))
         if free:
             entries = _savings(known, one, free[k])
             records += entries
@@ -99,6 +100,10 @@ def _notes_2(comparison: Comparison, beside: bool) -> Iterator[str]:
             "Saved by contacts: (without - with) / without, the platform moving identically."
             + (" The paper's text gives these for three parts as an increase." if beside else "")
         )
+        if beside:
+            yield (
+                "The paper's four decimals leave its 9.09% for the cranks anywhere from 0 to 17%."
+            )
         yield _condition_note(comparison, beside)
     if paper.is_stand_in(comparison.mechanism):
         yield (

@@ -1,0 +1,119 @@
+"""Sums of products as chains of fused multiply-adds.
+
+A tree of additions whose inner values nobody else wants is one sum of terms; a term that is a
+product nobody else wants joins it by a fused multiply-add, the one operation that does two. Terms
+join in the order in which they are ready.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from .graph import Graph, Value, reachable
+
+LATENCY = {"div": 14, "sqrt": 18, "sin": 40, "cos": 40, "sum": 22, "least": 22, "atan2": 80}
+
+
+@dataclass(frozen=True)
+class Term:
+    sign: int
+    factors: tuple[Value, ...]  # of the new graph: one value, or two to multiply
+    ready: int
+
+
+def fuse(graph: Graph, roots: Sequence[Value], chain: int) -> tuple[Graph, list[Value]]:
+    """The same values with products joined to sums.
+
+    Args: chain: terms above which a sum becomes two that run side by side.
+    """
+    order = reachable(graph, roots)
+    uses: dict[Value, int] = dict.fromkeys(order, 0)
+    for v in order:
+        for a in graph.nodes[v].args:
+            uses[a] += 1
+    for v in roots:
+        uses[v] += 1
+    inside = _inside(graph, order, uses)
+    new, moved = Graph(), dict[Value, Value]()
+    ready = dict[Value, int]()
+
+    def note(value: Value) -> Value:
+        if value not in ready:
+            node = new.nodes[value]
+            start = max((ready[a] for a in node.args), default=0)
+            ready[value] = start + (LATENCY.get(node.op, 4) if node.args else 0)
+        return value
+
+    def terms(v: Value, sign: int) -> list[Term]:
+        node = graph.nodes[v]
+        if node.op in ("add", "sub", "neg") and (v in inside or v == top):
+            signs = {"add": (1, 1), "sub": (1, -1), "neg": (-1,)}[node.op]
+            return [
+                t for a, s in zip(node.args, signs, strict=True) for t in terms(a, s * sign)
+            ]
+        if node.op == "mul" and v in inside:
+            a, b = (moved[x] for x in node.args)
+            return [Term(sign, (a, b), max(ready[a], ready[b]))]
+        return [Term(sign, (moved[v],), ready[moved[v]])]
+
+    for v in order:
+        node = graph.nodes[v]
+        if v in inside:
+            continue
+        if node.op in ("add", "sub"):
+            top = v
+            found = sorted(terms(v, 1), key=lambda t: (len(t.factors) > 1, t.ready))
+            moved[v] = _sum(new, found, chain, note)
+        else:
+            args = tuple(moved[a] for a in node.args)
+            moved[v] = note(new.copy(node, args))
+    return new, [moved[v] for v in roots]
+
+
+def _inside(graph: Graph, order: Sequence[Value], uses: dict[Value, int]) -> set[Value]:
+    """Values that only a sum around them wants, so that they vanish in it."""
+    inside = set()
+    for v in order:
+        node = graph.nodes[v]
+        if node.op not in ("add", "sub") and not (node.op == "neg" and v in inside):
+            continue
+        for a in node.args:
+            inner = graph.nodes[a]
+            same = (inner.group, inner.varies, inner.phase) == (
+                node.group,
+                node.varies,
+                node.phase,
+            )
+            if uses[a] == 1 and same and inner.op in ("add", "sub", "mul"):
+                inside.add(a)
+    return inside
+
+
+def _sum(new: Graph, terms: list[Term], chain: int, note) -> Value:  # noqa: ANN001
+    if len(terms) > chain:
+        products = [t for t in terms if len(t.factors) > 1]
+        plain = [t for t in terms if len(t.factors) == 1]
+        left, right = plain[::2] + products[::2], plain[1::2] + products[1::2]
+        if left and right:
+            a, b = _sum(new, left, chain, note), _sum(new, right, chain, note)
+            return note(new.apply("add", a, b))
+    total: Value | None = None
+    # A positive plain term first, so that no sign has to be changed.
+    terms = sorted(terms, key=lambda t: t.sign < 0 and len(t.factors) == 1)
+    start = next((i for i, t in enumerate(terms) if t.sign > 0), 0)
+    terms = [terms[start], *terms[:start], *terms[start + 1 :]]
+    for t in terms:
+        if len(t.factors) == 1:
+            if total is None:
+                total = t.factors[0] if t.sign > 0 else note(new.apply("neg", t.factors[0]))
+            else:
+                total = note(new.apply("add" if t.sign > 0 else "sub", total, t.factors[0]))
+        elif total is None:
+            total = note(new.apply("mul", *t.factors))
+            if t.sign < 0:
+                total = note(new.apply("neg", total))
+        else:
+            total = note(new.apply("fma" if t.sign > 0 else "fnma", *t.factors, total))
+    assert total is not None
+    return total

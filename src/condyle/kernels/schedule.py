@@ -1,0 +1,57 @@
+"""List scheduling: the order in which one evaluation's statements keep the processor busy.
+
+Statements are issued two a cycle, of those whose arguments are ready the one with the longest way
+still to go first. Compilers keep that order on the whole. (A batch gains nothing: there the
+neighbouring chain fills the gaps, and long lives of values cost memory traffic.)
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Sequence
+
+from .fuse import LATENCY
+from .graph import Graph, Value
+
+ISSUE = 2  # arithmetic statements a cycle
+
+
+def scheduled(graph: Graph, values: Sequence[Value]) -> list[Value]:
+    """The values in an order that shortens one evaluation; arguments stay first."""
+    position = {v: i for i, v in enumerate(values)}
+    users: dict[Value, list[Value]] = {v: [] for v in values}
+    waiting: dict[Value, int] = {}
+    for v in values:
+        inside = {a for a in graph.nodes[v].args if a in position}
+        waiting[v] = len(inside)
+        for a in inside:
+            users[a].append(v)
+    way: dict[Value, int] = {}
+    for v in reversed(values):
+        latency = LATENCY.get(graph.nodes[v].op, 4 if graph.nodes[v].args else 0)
+        way[v] = latency + max((way[u] for u in users[v]), default=0)
+
+    order: list[Value] = []
+    future: list[tuple[int, int, Value]] = []  # ready at a later cycle
+    ready: list[tuple[int, int, Value]] = []  # (-way, position, value)
+    done: dict[Value, int] = {}
+    for v in values:
+        if not waiting[v]:
+            heapq.heappush(ready, (-way[v], position[v], v))
+    cycle = 0
+    while ready or future:
+        while future and future[0][0] <= cycle:
+            _, _, v = heapq.heappop(future)
+            heapq.heappush(ready, (-way[v], position[v], v))
+        for _ in range(min(ISSUE, len(ready))):
+            _, _, v = heapq.heappop(ready)
+            order.append(v)
+            node = graph.nodes[v]
+            done[v] = cycle + LATENCY.get(node.op, 4 if node.args else 0)
+            for u in users[v]:
+                waiting[u] -= 1
+                if not waiting[u]:
+                    at = max(done[a] for a in graph.nodes[u].args if a in done)
+                    heapq.heappush(future, (at, position[u], u))
+        cycle += 1
+    return order

@@ -1,0 +1,126 @@
+"""All models side by side."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.analysis.compare import Comparison, compare, relative_difference
+from condyle.dynamics import FORMULATIONS, ROUTES
+from condyle.mechanism import Mechanism
+from condyle.mechanism.mechanism import Contact
+from condyle.motion import Motion
+
+
+def small_motion(mechanism: Mechanism) -> Motion:
+    """A little of every independent coordinate."""
+    t = np.linspace(0, 1, 30)
+    size = {name: 1e-3 if name in "XYZ" else 0.02 for name in condyle.derive(mechanism).independent}
+    return Motion.from_arrays(t, {name: a * np.sin(6 * t) for name, a in size.items()})
+
+
+def test_every_model_is_there(comparison: Comparison) -> None:
+    models = [(run.formulation, run.route) for run in comparison.runs]
+    assert models == [(name, route) for name in FORMULATIONS for route in ROUTES]
+    assert [run.formulation for run in comparison.free_runs] == list(FORMULATIONS)
+    assert not comparison.unavailable
+    assert comparison.samples == 251
+
+
+@pytest.mark.parametrize("contacts", [True, False])
+def test_models_agree(comparison: Comparison, contacts: bool) -> None:
+    found = comparison.differences(contacts)
+    count = len(comparison.runs if contacts else comparison.free_runs)
+    assert len(found) == count * (count - 1) // 2
+    assert max(pair.torque for pair in found) < 1e-10
+    assert max(pair.contact_force for pair in found) < 1e-10
+
+
+def test_runs_are_what_solve_gives(comparison: Comparison) -> None:
+    solution = comparison.solution
+    for run in comparison.runs:
+        np.testing.assert_allclose(run.torque, solution["torque"].values, atol=1e-12)
+        np.testing.assert_allclose(run.contact_force, solution["contact_force"].values, atol=1e-9)
+        np.testing.assert_allclose(run.share.sum(axis=0), run.torque, atol=1e-12)
+
+
+def test_free_platform_needs_all_six_torques(comparison: Comparison) -> None:
+    """Without contacts the platform moves identically, and nothing carries what they carried."""
+    held, free = comparison.runs[0], comparison.free_runs[0]
+    assert free.contact_force.shape == (251, 0)
+    assert free.torque.shape == held.torque.shape
+    # The contacts' forces do no work, so both efforts give the same power along the motion.
+    rate = comparison.solution["joint_rate"].values
+    power = (held.torque * rate).sum(axis=1), (free.torque * rate).sum(axis=1)
+    np.testing.assert_allclose(*power, atol=1e-10)
+    # With the contacts it is the least of all efforts of that power.
+    assert (np.linalg.norm(held.torque, axis=1) < np.linalg.norm(free.torque, axis=1) + 1e-12).all()
+
+
+def test_seconds_are_measured(comparison: Comparison) -> None:
+    for run in (*comparison.runs, *comparison.free_runs):
+        assert run.seconds.symbolic > 0 and run.seconds.numeric > 0
+        assert run.seconds.total == run.seconds.symbolic + run.seconds.numeric
+
+
+def test_one_formulation_and_the_run_of_a_name(reference: Comparison) -> None:
+    assert [run.label for run in reference.runs] == ["momentum core", "momentum direct"]
+    assert reference.run("momentum", "direct") is reference.runs[1]
+    assert reference.run("momentum", "core", contacts=False) is reference.free_runs[0]
+    assert reference.run("lagrange", "core") is None
+    assert 10 < reference.free_condition < 20
+
+
+def test_unknown_formulation() -> None:
+    mechanism = condyle.load("masticatory")
+    with pytest.raises(condyle.InputError, match="Did you mean"):
+        compare(mechanism, condyle.reference_motion(), formulations=["momentums"])
+
+
+def test_models_that_there_are_not() -> None:
+    """Three contacts: no closed form, so no route `direct`; the message says which to take."""
+    mechanism = condyle.load("masticatory")
+    chin = Contact(
+        name="chin",
+        point=(0.05, 0, 0),
+        surface={"kind": "plane", "slope": (0.1, 0), "offset": -0.005},
+    )
+    three = mechanism.replace(contacts=(*mechanism.contacts, chin), dependent=None)
+    found = compare(three, small_motion(three), formulations=["lagrange"])
+    assert [run.label for run in found.runs] == ["lagrange core"]
+    assert [one.label for one in found.unavailable] == ["lagrange direct"]
+    assert "route core" in found.unavailable[0].reason
+    assert len(found.free_runs) == 1
+
+
+def test_nothing_to_free() -> None:
+    mechanism = condyle.load("masticatory")
+    four = mechanism.replace(chains=mechanism.chains[:4])
+    none = mechanism.replace(contacts=(), dependent=None)
+    for machine, reason in ((four, "4 chains cannot drive"), (none, "no contacts to remove")):
+        found = compare(machine, small_motion(machine), formulations=["momentum"])
+        assert len(found.runs) == 2
+        assert not found.free_runs and np.isnan(found.free_condition)
+        assert reason in found.unavailable[-1].reason
+        assert found.indices(contacts=False) == []
+
+
+def test_samples_that_cannot_be_computed() -> None:
+    mechanism = condyle.load("masticatory")
+    t = np.linspace(0, 1, 10)
+    far = Motion.from_arrays(t, np.outer(t, [0.2, 0, 0, 0]), ["X", "Y", "alpha", "beta"])
+    with pytest.raises(condyle.UnreachableError):
+        compare(mechanism, far, formulations=["momentum"])
+
+
+def test_relative_difference() -> None:
+    a = np.array([[1.0, 100.0], [2.0, 50.0]])
+    b = np.array([[1.0, 101.0], [2.5, 50.0]])
+    assert relative_difference(a, b) == pytest.approx(1 / 101)
+    assert relative_difference(a, b, ["N m", "N"]) == pytest.approx(0.5 / 2.5)
+    assert relative_difference(a, a) == 0.0
+    hole = np.array([[np.nan, np.nan], [2.0, 50.0]])
+    assert relative_difference(a, hole) == 0.0
+    assert relative_difference(np.zeros((2, 0)), np.zeros((2, 0))) == 0.0
+    assert relative_difference(np.zeros((2, 2)), np.zeros((2, 2))) == 0.0

@@ -1,0 +1,57 @@
+"""The paper's Table 2 on the reference case, and its own numbers as printed."""
+
+from __future__ import annotations
+
+import pytest
+
+import condyle
+from condyle.analysis import paper
+from condyle.analysis.compare import Comparison
+from condyle.analysis.indices import solution_indices
+
+
+@pytest.mark.parametrize("contacts", [True, False], ids=["RAPM", "6RSS"])
+@pytest.mark.parametrize("part", paper.TABLE_2)
+def test_table_2_within_a_fifth(reference: Comparison, contacts: bool, part: str) -> None:
+    published = paper.TABLE_2 if contacts else paper.TABLE_2_FREE
+    (found,) = reference.indices(contacts)
+    assert found.unit == "N m"
+    assert found.samples == 5001
+    assert found.values[part] == pytest.approx(published[part], rel=0.2)
+
+
+def test_table_2_does_not_depend_on_the_model(comparison: Comparison) -> None:
+    (first,) = comparison.indices()
+    (again,) = solution_indices(comparison.solution)
+    assert first.values == pytest.approx(again.values, rel=1e-12)
+    assert first.values["all"] == pytest.approx(0.0209, abs=1e-4)
+
+
+def test_totals_as_printed() -> None:
+    printed = {"momentum direct": 35.861, "lagrange direct": 61.265, "momentum core": 8.582}
+    printed["lagrange core"] = 10.041
+    totals = {" ".join(key): seconds.total for key, seconds in paper.TABLE_1.items()}
+    assert totals == pytest.approx(printed)
+    free = {name: seconds.total for name, seconds in paper.TABLE_1_FREE.items()}
+    assert free == pytest.approx({"momentum": 7.258, "lagrange": 10.018})
+
+
+def test_percentages_as_printed() -> None:
+    saved = {p: 1 - v / paper.TABLE_2_FREE[p] for p, v in paper.TABLE_2.items() if p != "all"}
+    printed = {"platform": 0.7232, "couplers": 0.5294, "cranks": 0.0909}
+    assert saved == pytest.approx(printed, abs=5e-5)
+
+
+def test_what_may_stand_beside_the_paper() -> None:
+    mechanism = condyle.load("masticatory")
+    assert paper.is_paper_class(mechanism) and paper.is_stand_in(mechanism)
+    other = mechanism.replace(gravity=(0, 0, -1.62))
+    assert paper.is_paper_class(other) and not paper.is_stand_in(other)
+    assert not paper.is_paper_class(mechanism.replace(contacts=mechanism.contacts[:1], dependent=None))
+    assert not paper.is_paper_class(mechanism.replace(contacts=(), dependent=None))
+
+
+def test_what_is_synthetic() -> None:
+    assert paper.is_synthetic(condyle.reference_motion().source)
+    assert paper.is_synthetic("/anywhere/condyle/motion/data/bite-force.csv")
+    assert not paper.is_synthetic("recordings/bite-force.csv")
