@@ -6,8 +6,9 @@ solution = model.solve(motion, load)
 
 from __future__ import annotations
 
+import os
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -33,11 +34,14 @@ from .mechanism.home import (
 from .mechanism.mechanism import COORDINATES, Mechanism
 
 if TYPE_CHECKING:
+    from .kernels.compiled import Compiled
+    from .kernels.interpreted import Interpreted
     from .kernels.result import PoseRates, Torques
     from .motion import Load, Motion
     from .solution import Solution
 
 DEFAULT_LOAD_POINT = "right_molar"
+BACKENDS = ("auto", "compiled", "interpreted")
 OK, UNREACHABLE, SINGULAR_STATUS = 0, 1, 2
 STATUS_NAMES = ("ok", "unreachable", "singular")
 
@@ -79,15 +83,15 @@ class Model:
         mechanism: Mechanism,
         formulation: str = "virtual_power",
         route: str = "core",
+        backend: str = "auto",
     ) -> None:
         """Derive the equations of motion.
 
+        Args:   backend: compiled, interpreted, or auto (compiled where there is a C compiler).
         Raises: InputError:       for an unknown formulation or route.
                 UnsupportedError: where route `direct` has no closed form.
                 MechanismError:   if the contacts do not hold the platform at home.
         """
-        from .kernels.interpreted import Interpreted
-
         check_home(mechanism)
         if route not in ROUTES:
             raise InputError(f'no route "{route}".{did_you_mean(route, ROUTES)}')
@@ -97,7 +101,7 @@ class Model:
         self.mechanism = mechanism
         self.formulation = formulation_named(formulation).name
         self.route = route
-        self.kernel = Interpreted(mechanism, formulation_named(formulation), route)
+        self.kernel = choose_kernel(mechanism, self.formulation, route, backend)
         self.derivation_seconds = time.perf_counter() - start
 
     @property
@@ -139,17 +143,50 @@ class Model:
             raise InputError(f'the platform has no point "{name}".{did_you_mean(name, points)}')
         return np.array(points[name])
 
+    def torques(
+        self,
+        q: np.ndarray,
+        q1: np.ndarray,
+        q2: np.ndarray,
+        load: np.ndarray,
+        outputs: Collection[str] = (),
+        threads: int | None = None,
+    ) -> tuple[Torques, np.ndarray]:
+        """Efforts alone, as fast as the machine.
+
+        Args:    as for `evaluate`; outputs: what is wanted besides, of contact, share, motion
+                 and joint: ask for less, pay for less; threads: at most so many.
+        Returns: the efforts, and the status of the samples (N,), an index into `STATUS_NAMES`.
+        """
+        result = self.kernel.solve(q, q1, q2, load, outputs, threads)
+        status = np.where(result.reached, OK, UNREACHABLE)
+        doubtful = np.flatnonzero(result.uncertain & result.reached)
+        if doubtful.size:
+            poses = result.poses.pose[doubtful] if result.poses is not None else None
+            if poses is None:
+                inputs = (a[doubtful] for a in (q, q1, q2, load))
+                again = self.kernel.solve(*inputs, ("motion",)).poses
+                assert again is not None
+                poses = again.pose
+            with np.errstate(invalid="ignore", divide="ignore"):
+                ratio = self.posture(poses).singularity.ratio
+                regular = (ratio >= SINGULAR) & np.isfinite(result.torque[doubtful]).all(axis=1)
+            status[doubtful[~regular]] = SINGULAR_STATUS
+        result.torque[status != OK] = np.nan
+        return result, status
+
     def evaluate(
         self, q: np.ndarray, q1: np.ndarray, q2: np.ndarray, load: np.ndarray
     ) -> Evaluation:
-        """Inverse dynamics at samples of the independent coordinates.
+        """Inverse dynamics at samples of the independent coordinates, with all that follows.
 
         Args: q, q1, q2: (N, m) each, in the order of `independent` [m, rad; per s; per s^2].
               load: (N, 9): force [N] and moment [N m] in {S}, and the point they act at, in {M}.
         """
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            poses = self.kernel.poses(q, q1, q2)
-            torques = self.kernel.torques(q, q1, q2, load, poses)
+            torques = self.kernel.solve(q, q1, q2, load)
+            poses = torques.poses
+            assert poses is not None
             posture = self.posture(poses.pose)
             status = np.where(torques.reached, OK, UNREACHABLE)
             regular = (posture.singularity.ratio >= SINGULAR) & np.isfinite(torques.torque).all(1)
@@ -322,9 +359,36 @@ class Model:
         return "the pose cannot be reached"
 
 
-def derive(mechanism: Mechanism, formulation: str = "virtual_power", route: str = "core") -> Model:
+def derive(
+    mechanism: Mechanism,
+    formulation: str = "virtual_power",
+    route: str = "core",
+    backend: str = "auto",
+) -> Model:
     """Derive the equations of motion of a mechanism; see `Model`."""
-    return Model(mechanism, formulation, route)
+    return Model(mechanism, formulation, route, backend)
+
+
+def choose_kernel(
+    mechanism: Mechanism, formulation: str, route: str, backend: str
+) -> Interpreted | Compiled:
+    """The kernel of a backend; `CONDYLE_BACKEND` decides what auto means, if it is set."""
+    from .kernels.compiled import Compiled
+    from .kernels.compiler import CompilerError
+    from .kernels.interpreted import Interpreted
+    from .kernels.notice import notice
+
+    chosen = os.environ.get("CONDYLE_BACKEND", "auto") if backend == "auto" else backend
+    if chosen not in BACKENDS:
+        raise InputError(f'no backend "{chosen}".{did_you_mean(chosen, BACKENDS)}')
+    if chosen != "interpreted":
+        try:
+            return Compiled(mechanism, formulation, route)
+        except CompilerError as error:
+            if chosen == "compiled":
+                raise
+            notice(f"{error}; the interpreter gives the same numbers, slower")
+    return Interpreted(mechanism, formulation_named(formulation), route)
 
 
 def check_home(mechanism: Mechanism) -> None:

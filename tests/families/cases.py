@@ -79,5 +79,6 @@ def of_raw(raw: Raw) -> Case:
 
 def close(got: Any, wanted: Any, tolerance: float, floor: float = 0.0) -> None:
     """Equal relative to the largest component (or `floor`)."""
+    got, wanted = np.asarray(got), np.asarray(wanted)
     scale = max(np.abs(wanted).max(initial=0), floor)
     np.testing.assert_allclose(got, wanted, rtol=0, atol=tolerance * scale)

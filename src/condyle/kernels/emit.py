@@ -2,7 +2,7 @@
 
     prepare(numbers, table)          what does not change from sample to sample, once
     one(table, in, out)              least latency: shared values scalar, lane values vectors
-    batch(table, in, strides, ...)   most throughput: all values vectors over W samples
+    batch(table, in, stride, ...)    most throughput: all values vectors over W samples
 
 Both shapes are printed from the same graph. `Shape` says what a value looks like in each.
 """
@@ -15,13 +15,17 @@ from importlib.resources import files
 
 from .fuse import fuse
 from .graph import REDUCTIONS, Graph, Value, reachable
-from .program import Output, Program
+from .program import Output, Program, build
 from .schedule import scheduled
+from .spec import KernelSpec
 
 CHAIN = 5
 INTERLEAVED = 2  # chains whose statements alternate, to keep both arithmetic ports busy
 LONG = 700  # lane operations above which chains run in a loop instead of unrolled
 
+# |q_k|^2 / |a_k|^2 below which the normal equations lose too many digits: they square the
+# condition number, and their error stays under about rounding / CONDITIONED.
+CONDITIONED = 1e-3
 NEAR = 1e-14  # margin or quality below which a sample is looked at again by the interpreter
 
 _INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
@@ -39,24 +43,26 @@ class Table:
 class Source:
     """Generated C and what a caller must know of it.
 
-    outputs: names and sizes, in the order in which `one` and `batch` write them.
+    outputs:    names and sizes, in the order in which `one` and `batch` write them.
+    table_size: numbers that `prepare` computes.
     operations: vector operations of one batch step; a fused multiply-add counts one.
     """
 
     text: str
     outputs: list[tuple[str, int]]
+    table_size: int
     operations: int
 
 
-def emit(program: Program, width: int) -> Source:
+def emit(spec: KernelSpec, width: int) -> Source:
     """The kernel's C for `width` lanes."""
-    printer = _Printer(fused(program), width)
-    header = (files(__package__) / "c" / "vector.h").read_text(encoding="utf-8")
-    driver = (files(__package__) / "c" / "driver.h").read_text(encoding="utf-8")
+    program = fused(build(spec))
+    printer = _Printer(program, width)
     outputs: dict[str, int] = {}
     for o in program.outputs:
-        outputs[o.name] = outputs.get(o.name, 0) + (program.spec.n if o.lane else 1)
+        outputs[o.name] = outputs.get(o.name, 0) + (spec.n if o.lane else 1)
     names = [name for name, count in outputs.items() for _ in range(count)]
+    careful = [] if spec.n == spec.m else _careful(spec, width)
     sizes = {
         "W": width,
         "INPUTS": len(program.layout.inputs),
@@ -64,17 +70,32 @@ def emit(program: Program, width: int) -> Source:
         "MARGIN": names.index("margin"),
         "QUALITY": names.index("quality"),
         "NEAR": NEAR,
+        "CONDITIONED": CONDITIONED if careful else NEAR,
     }
     pieces = [
         *(f"#define {name} {value}" for name, value in sizes.items()),
-        header,
-        f"const int table_size = {printer.table_size};",
-        printer.prepare(),
-        printer.one(),
+        _text("vector.h"),
+        printer.prepare("prepare_quick"),
+        printer.one("quick"),
         printer.batch(),
-        driver,
+        *careful,
+        f"#define QUICK_TABLE {printer.table_size}",
+        _text("driver.h"),
     ]
-    return Source("\n".join(pieces), list(outputs.items()), printer.operations())
+    size = printer.table_size
+    if careful:
+        size += _Printer(fused(build(spec, careful=True)), width).table_size
+    return Source("\n".join(pieces), list(outputs.items()), size, printer.operations())
+
+
+def _careful(spec: KernelSpec, width: int) -> list[str]:
+    """One evaluation that keeps its accuracy where the quick one's torques lose it."""
+    printer = _Printer(fused(build(spec, careful=True)), width)
+    return ["#define CAREFUL", printer.prepare("prepare_careful"), printer.one("careful")]
+
+
+def _text(name: str) -> str:
+    return (files(__package__) / "c" / name).read_text(encoding="utf-8")
 
 
 def fused(program: Program) -> Program:
@@ -152,9 +173,10 @@ class _Printer:
 
     # -- what is fixed ---------------------------------------------------------------------
 
-    def prepare(self) -> str:
+    def prepare(self, name: str) -> str:
         """Fixed values, scalar: shared ones once, lane ones for each chain."""
-        lines = ["void prepare(const double *par, const double *const *lane, double *table) {"]
+        head = f"static void {name}(const double *par, const double *const *lane, double *table) {{"
+        lines = [head]
         arrays = [v for v in self.fixed if self.g.nodes[v].group is not None]
         for v in arrays:
             lines.append(f"  double x{v}[{self.padded[self.g.nodes[v].group]}];")  # type: ignore[index]
@@ -205,10 +227,10 @@ class _Printer:
 
     # -- what varies -----------------------------------------------------------------------
 
-    def one(self) -> str:
+    def one(self, name: str) -> str:
         blocks = [padded // self.width for padded in self.padded]
         shape = _Shape("double", "_s", blocks, lane_table="load({} + {})", stride=self.width)
-        head = "void one(const double *restrict table, const double *restrict in, "
+        head = f"static void {name}(const double *restrict table, const double *restrict in, "
         head += "double *restrict out) {"
         return self._body(shape, head)
 

@@ -5,6 +5,8 @@ Needs no compiler. Its numbers are the reference for the compiled kernels.
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from ..dynamics.distribution import minimum_norm
@@ -22,6 +24,7 @@ from ..kinematics.contact import indices
 from ..mechanism.home import characteristic_length, independent_coordinates
 from ..mechanism.mechanism import Mechanism
 from .result import PoseRates, Torques
+from .spec import OUTPUTS
 
 
 class Interpreted:
@@ -42,6 +45,24 @@ class Interpreted:
         self._core = None if direct else self._core_of()
         angles = np.array([i >= 3 for i in indices(independent)])
         self._scale = np.where(angles, characteristic_length(mechanism), 1.0)
+
+    def solve(
+        self,
+        q: np.ndarray,
+        q1: np.ndarray,
+        q2: np.ndarray,
+        load: np.ndarray,
+        outputs: Collection[str] = OUTPUTS,
+        threads: int | None = None,
+    ) -> Torques:
+        """Efforts at N samples of the independent coordinates, (N, m) each, under loads (N, 9).
+
+        Args: outputs: what is wanted besides the efforts, of `OUTPUTS`; here only the contact
+              forces cost extra.
+        """
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            poses = self.poses(q, q1, q2)
+            return self.torques(q, q1, q2, load, poses, "contact" in outputs)
 
     def poses(self, q: np.ndarray, q1: np.ndarray, q2: np.ndarray) -> PoseRates:
         """Close the contacts at N samples of the independent coordinates, (N, m) each."""
@@ -84,7 +105,8 @@ class Interpreted:
             rate=rate,
             acceleration=acceleration,
             reached=poses.reached & (reach >= 0).all(axis=1),
-            sigma=distribution.sigma,
+            poses=poses,
+            uncertain=np.ones(len(q), dtype=bool),
         )
 
     def _contact_forces(

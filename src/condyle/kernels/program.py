@@ -15,7 +15,14 @@ import casadi as ca
 from ..dynamics import FORMULATIONS
 from ..dynamics.formulation import Body
 from ..kinematics.chain import FAMILIES, Constants, Law
-from ..kinematics.contact import Placement, closed_form, indices
+from ..kinematics.contact import (
+    Placement,
+    closed_form,
+    closed_form_available,
+    indices,
+    solve_small,
+)
+from ..kinematics.iteration import newton
 from ..kinematics.parasitic import WholeMotion, whole_motion
 from ..kinematics.state import PointMotion, State, independent_state, pose_state, twist_state
 from .graph import Graph, Value, read
@@ -121,7 +128,10 @@ def build(spec: KernelSpec, careful: bool = False) -> Program:
     g = p.parameters("gravity")
 
     contacts = p.layout.contact_symbols(p.parameters)
-    placement = closed_form(contacts, spec.dependent, q, p.parameters("branch"))
+    if closed_form_available([form for form, _ in spec.contacts], spec.dependent):
+        placement = closed_form(contacts, spec.dependent, q, p.parameters("branch"))
+    else:
+        placement = newton(contacts, spec.dependent, q)
     motion = whole_motion(contacts, spec.dependent, placement, q1, q2)
     formulation = FORMULATIONS[spec.formulation]
     twist = twist_state(ca.SX(0, 1), motion.R, motion.twist, motion.twist_rate)
@@ -205,8 +215,8 @@ def _chain_terms(
         law = family.law(constants, M.position, M.velocity, M.acceleration, g)
     else:
         law = FORMULATIONS[formulation].chain(family, constants, M, g)
-    if formulation != "virtual_power":
-        # A lane without a chain has neither J nor force. (Virtual power: by its idle constants.)
+    if formulation != "virtual_power" or not family.idle:
+        # A lane without a chain has neither J nor force; elsewhere idle constants see to that.
         active = p.lane_constants(index, "active")
         forces = {name: active * f for name, f in law.forces.items()}
         law = replace(law, forces=forces, J=active * law.J)
@@ -358,8 +368,6 @@ def _contact_forces(
     pulled = p.total([(E.T @ c.row)[dep] * t for c, t in zip(chains, torque, strict=True)])
     C = motion.frame.N.T @ motion.E
     left = (E.T @ Q)[dep] - pulled
-    from ..kinematics.contact import solve_small
-
     mu = solve_small(C[:, dep].T, left)
     if spec.parallel:
         # mu_mean grad (phi_1 + phi_2) / 2 + mu_difference grad (phi_1 - phi_2)

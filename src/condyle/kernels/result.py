@@ -26,7 +26,8 @@ class Torques:
     contact_force: (N, k) [N], along the unit normals, on the platform.
     rate, acceleration: of the joints, (N, n).
     reached:       (N,), where every chain and contact can be.
-    sigma:         singular values of the dimensionless actuator Jacobian, (N, m).
+    poses:         of the same samples.
+    uncertain:     (N,), samples so near a singularity that `Posture` has to judge them.
     """
 
     torque: np.ndarray
@@ -35,4 +36,5 @@ class Torques:
     rate: np.ndarray | None
     acceleration: np.ndarray | None
     reached: np.ndarray
-    sigma: np.ndarray | None
+    poses: PoseRates | None
+    uncertain: np.ndarray

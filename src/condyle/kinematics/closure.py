@@ -64,8 +64,9 @@ class Closure:
         self._k = len(mechanism.contacts)
         self._conditions = ca.Function("conditions", [x], [conditions, K])
         self._bias = ca.Function("bias", [x, rate], [bias])
-        home = np.asarray(self._conditions(np.zeros(6))[0]).ravel()
-        self._home = home[self._k :]
+        home, K = evaluate(self._conditions, np.zeros((1, 6)))
+        self._home = home[0, self._k :]
+        self._branch = np.linalg.slogdet(_square(K)).sign[0]
         length = characteristic_length(mechanism)
         self._unit = np.repeat([length, 1.0], 3)
         self._scale = 1.0 + length  # lengths, and angles of scale 1
@@ -91,15 +92,23 @@ class Closure:
             piece[active] *= np.where(ok, 2.0, 0.5)
             active = active[(done[active] < 1) & (piece[active] >= SMALLEST_PIECE)]
         reached = done == 1
+        # The straight way may leave the surfaces where another would not: then one bold leap.
+        missed = np.flatnonzero(~reached & np.isfinite(s).all(axis=1))
+        pose[missed], reached[missed] = self._newton(pose[missed] * 0, s[missed], bold=True)
+        # Branches meet where K is singular, so the sign of its determinant tells them apart.
+        reached &= np.linalg.slogdet(self._jacobian(pose)).sign == self._branch
         pose[~reached] = np.nan
         return pose, reached
 
-    def _newton(self, x: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Newton from x; a sample fails when its steps stop shrinking above rounding.
+    def _newton(
+        self, x: np.ndarray, target: np.ndarray, bold: bool = False
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Newton from x, down to rounding.
 
         Steps that shrink to a quarter each time lead to the solution nearest to x, so that no
-        sample leaves the branch of home.
+        sample leaves the branch of home; unless `bold`, a sample with other steps fails.
         """
+        longest, shrink = (10.0, np.inf) if bold else (1.0, 0.25)
         x = x.copy()
         last = np.full(len(x), np.inf)
         active = np.arange(len(x))
@@ -116,11 +125,11 @@ class Closure:
             small = size <= ROUNDING * self._scale
             # A stall near rounding is convergence. Contacts that hold badly magnify rounding in
             # the steps, never in the residual.
-            stalled = size > last[active] / 4
+            stalled = size > shrink * last[active]
             rounding = ROUNDING * (self._scale + np.abs(x[active]).max(axis=1))
             near = (size < 1e-13) | (np.abs(value).max(axis=1) <= rounding)
-            converged[active] = small | (stalled & near)
-            failed = ~finite | (stalled & ~near) | (size > 1)
+            converged[active] = small | (near & (stalled | bold))
+            failed = ~finite | (stalled & ~near) | (size > longest)
             last[active] = size
             active = active[~(converged[active] | failed)]
         return x, converged

@@ -48,7 +48,6 @@ class ContactSymbols:
         """v^T (d2 phi / d position2) v."""
         return self.surface.bending(position, velocity, self.constants)
 
-
     def at(self, position: ca.SX, R: ca.SX) -> ca.SX:
         """Where the ball centre is when O_M is at `position`, (3,)."""
         lever = R @ self.point

@@ -191,6 +191,7 @@ def _message(problem: Any) -> str:
         "model_type": f"expected a table, got {_shown(got)}",
         "dict_type": f"expected a table, got {_shown(got)}",
         "string_type": f"expected text in quotes, got {_shown(got)}",
+        "bool_type": f"expected true or false, got {_shown(got)}",
         "value_error": str(context.get("error", "")),
         "literal_error": f"expected {context.get('expected')}, got {_shown(got)}",
         "union_tag_invalid": f"the kind {_shown(context.get('tag'))} is unknown; "

@@ -1,8 +1,25 @@
-/* The batch: blocks of W samples, read from columns of any stride, written to columns. */
+/* What a kernel exports. The quick torques come from normal equations; a sample for which those
+ * lose digits is done again, carefully. */
 
-/* in:     INPUTS columns with a common element stride.
+void prepare(const double *par, const double *const *lane, double *table) {
+    prepare_quick(par, lane, table);
+#ifdef CAREFUL
+    prepare_careful(par, lane, table + QUICK_TABLE);
+#endif
+}
+
+void one(const double *restrict table, const double *restrict in, double *restrict out) {
+    quick(table, in, out);
+#ifdef CAREFUL
+    if (__builtin_expect(!(out[QUALITY] >= CONDITIONED), 0)) careful(table + QUICK_TABLE, in, out);
+#endif
+}
+
+/* Blocks of W samples, read from columns of any stride, written to columns.
+ *
+ * in:     INPUTS columns with a common stride between samples.
  * out:    OUTPUTS columns of doubles, `columns` apart.
- * status: 0 ok, 1 unreachable, 2 to be looked at again (near a singularity).  */
+ * status: 0 ok, 1 unreachable, 2 to be looked at again (near a singularity). */
 void batch(const double *restrict table, const double *const *in, ptrdiff_t stride, size_t count,
            double *restrict out, size_t columns, uint8_t *restrict status) {
     double packed[INPUTS][W];
@@ -23,15 +40,30 @@ void batch(const double *restrict table, const double *const *in, ptrdiff_t stri
             from = here, at = 0;
         }
         step(table, from, at, result);
+#ifdef CAREFUL
+        mask poor = ~(result[QUALITY] >= CONDITIONED);
+        int64_t any = 0;
+        for (int i = 0; i < W; i++) any |= poor[i];
+        if (__builtin_expect(any != 0, 0))
+            for (size_t i = 0; i < some; i++) {
+                double sample[INPUTS], again[OUTPUTS];
+                if (!poor[i]) continue;
+                for (int k = 0; k < INPUTS; k++) sample[k] = from[k][at + i];
+                careful(table + QUICK_TABLE, sample, again);
+                for (int k = 0; k < OUTPUTS; k++) result[k][i] = again[k];
+            }
+#endif
         if (some == W) {
-            for (int k = 0; k < OUTPUTS; k++) store(out + (size_t)k * columns + start, result[k]);
+            for (int k = 0; k < OUTPUTS; k++)
+                store(out + (size_t)k * columns + start, result[k]);
         } else {
             for (int k = 0; k < OUTPUTS; k++)
-                for (size_t i = 0; i < some; i++) out[(size_t)k * columns + start + i] = result[k][i];
+                for (size_t i = 0; i < some; i++)
+                    out[(size_t)k * columns + start + i] = result[k][i];
         }
         for (size_t i = 0; i < some; i++) {
             double margin = result[MARGIN][i], quality = result[QUALITY][i];
-            status[start + i] = !(margin >= 0) ? 1 : margin < NEAR || !(quality >= NEAR) ? 2 : 0;
+            status[start + i] = margin < 0 ? 1 : margin >= NEAR && quality >= NEAR ? 0 : 2;
         }
     }
 }

@@ -144,7 +144,9 @@ class Family(ABC):
     joint_unit: ClassVar[str]
     effort_unit: ClassVar[str]
     shapes: ClassVar[dict[str, int]]  # constant -> number of entries (1, 3 or 9)
-    idle: ClassVar[tuple[str, ...]]  # constants that are 0 in a lane without a chain: no J, no force
+    # Constants that, at 0, leave `law` without J and forces: for lanes that stand for no chain.
+    # A family that has none pays for such lanes with a few multiplications.
+    idle: ClassVar[tuple[str, ...]] = ()
 
     @abstractmethod
     def constants(self, chain: Any) -> dict[str, np.ndarray]:

@@ -35,6 +35,8 @@ class PSSFamily(Family):
     joint_unit = "m"
     effort_unit = "N"
     # S is the slider's joint at home; N is N_i0 and Y its second axis.
+    idle = ("branch", "mass", "transverse", "axial", "slider")
+    idle = ("branch", "mass", "transverse", "axial", "slider")
     shapes = {
         "S": 3,
         "axis": 3,
@@ -107,7 +109,7 @@ class PSSFamily(Family):
 
     def law(self, c: Constants, M: ca.SX, V: ca.SX, A: ca.SX, g: ca.SX) -> Law:
         _, root, e, _ = self._close(c, M)
-        inverse = c.branch / ca.sqrt(root)  # 1 / e.a
+        inverse = c.branch * (1 / ca.sqrt(root))  # 1 / e.a
         J = e * inverse
         rate = ca.dot(J, V)
         e_rate = V - c.axis * rate
@@ -121,13 +123,19 @@ class PSSFamily(Family):
         m_SM = c.mass * c.com * (1 - c.com) - bend
         m_SS = c.mass * (1 - c.com) ** 2 + bend
         axial = axial_force(e, e_rate, A - S_acceleration, c.Y, c.L, c.axial)
-        weight = ca.dot(c.axis, g)
         # m (1 - com) = m_SM + m_SS splits the weight that the slider carries.
-        along = m_SS * acceleration + ca.dot(c.axis, m_SM * (A - g) - axial) - m_SS * weight
-        rod = m_SM * (S_acceleration - g) + axial + J * along
-        slider = J * (c.slider * acceleration - c.slider * weight)
-        forces = {"sliders": slider, "rods": rod}
-        return Law(forces, J, root / c.L**2, rate, acceleration, {"rods": m_MM})
+        weight = ca.dot(c.axis, g)
+        rod_effort = ca.dot(c.axis, m_SM * (A - g) - axial) + m_SS * acceleration - m_SS * weight
+        slider_effort = c.slider * acceleration - c.slider * weight
+        return Law(
+            forces={"rods": m_SM * (S_acceleration - g) + axial},
+            J=J,
+            reach=root / c.L**2,
+            rate=rate,
+            acceleration=acceleration,
+            efforts={"sliders": slider_effort, "rods": rod_effort},
+            end_masses={"rods": m_MM},
+        )
 
     def explain(self, chain: Any, pose: np.ndarray) -> str:
         c = self.constants(chain)
@@ -144,6 +152,6 @@ class PSSFamily(Family):
         d = M - c.S
         along = ca.dot(d, c.axis)
         root = along * along - ca.dot(d, d) + c.L**2
-        e_a = c.branch * ca.sqrt(root)
+        e_a = c.branch * (root * (1 / ca.sqrt(root)))  # shares the law's inverse root
         x = along - e_a
         return x, root, d - x * c.axis, e_a

@@ -36,9 +36,12 @@ class SPSFamily(Family):
     joint_unit = "m"
     effort_unit = "N"
     # cylinder_com is the distance from B, piston_com the distance from M, both along the leg.
+    # `present` is 1; at 0 the leg has no row.
+    idle = ("present", "piston_mass")
     shapes = {
         "B": 3,
         "home": 1,
+        "present": 1,
         "Y": 3,
         **{f"{body}_{name}": 1 for body in ("cylinder", "piston") for name in BODY},
         "N": 9,
@@ -52,7 +55,8 @@ class SPSFamily(Family):
             for body in ("cylinder", "piston")
             for name in BODY
         }
-        values = {"B": chain.base, "home": np.linalg.norm(leg), "Y": N[:, 1], **bodies, "N": N}
+        home = {"B": chain.base, "home": np.linalg.norm(leg), "present": 1.0}
+        values = {**home, "Y": N[:, 1], **bodies, "N": N}
         return {name: np.asarray(value, dtype=float) for name, value in values.items()}
 
     def tip(self, c: Constants, q_r: ca.SX) -> ca.SX:
@@ -98,57 +102,51 @@ class SPSFamily(Family):
         both:     axial [(s^2 beta')' / p  Y x e - s beta'^2 ds/de],
 
         s = sin(gamma) = Y.e / r, p = r^2 - (Y.e)^2, beta' = (Y x e).V / p, ds/de = (Y - s u) / r.
+        J = u, so that what acts along u is an effort.
         """
         e = M - c.B
         r2 = ca.dot(e, e)
-        inverse = ca.sqrt(r2) / r2  # 1 / r; CasADi would turn x * (1 / r) into a division
+        inverse = c.present * (1 / ca.sqrt(r2))
+        inverse2 = inverse * inverse
         u = e * inverse
         rate = ca.dot(u, V)
         u_A, u_g = ca.dot(u, A), ca.dot(u, g)
         swing = (ca.dot(V, V) - rate * rate) * inverse
-        acceleration = u_A + swing
         slip = 2 * rate * inverse
-        w = A - slip * V - (u_A - slip * rate) * u
+        w, w_u = A - slip * V, slip * rate - u_A  # w + w_u u is across the leg
 
-        spin = self._spin_force(c, e, u, V, A, r2, inverse, rate)
-        inverse2 = inverse * inverse
-        about_B = c.cylinder_mass * c.cylinder_com**2 + c.cylinder_transverse
-        arm = c.cylinder_mass * c.cylinder_com * inverse
-        cylinder = (about_B * inverse2) * w + arm * (u_g * u - g) + c.cylinder_axial * spin
-        z = c.piston_com * inverse
-        near = c.piston_mass * (1 - z)
-        piston = (
-            near * (A - g)
-            + (c.piston_mass * z * (u_A - u_g + swing)) * u
-            + (c.piston_transverse * inverse2 - near * z) * w
-            + c.piston_axial * spin
-        )
-        return Law({"cylinders": cylinder, "pistons": piston}, u, ca.SX(1.0), rate, acceleration)
-
-    def explain(self, chain: Any, pose: np.ndarray) -> str:
-        return f'chain "{chain.name}" has no direction: M is at its base joint'
-
-    @staticmethod
-    def _spin_force(
-        c: Constants,
-        e: ca.SX,
-        u: ca.SX,
-        V: ca.SX,
-        A: ca.SX,
-        r2: ca.SX,
-        inverse: ca.SX,
-        rate: ca.SX,
-    ) -> ca.SX:
-        """Force on M of a unit axial inertia, (3,): `axial_force` for a leg that changes length."""
         y, y_rate = ca.dot(c.Y, e), ca.dot(c.Y, V)
         turn = ca.cross(c.Y, e)
         s = y * inverse
-        s_rate = (y_rate - s * rate) * inverse
-        inverse_p = -1 / (y * y - r2)
+        inverse_p = 1 / (r2 - y * y)
         beta_rate = ca.dot(turn, V) * inverse_p
-        # p' = 2 (e.V - y y')
-        p_rate = 2 * (ca.dot(e, V) - y * y_rate)
-        beta_acceleration = (ca.dot(turn, A) - beta_rate * p_rate) * inverse_p
+        half_p_rate = rate * (r2 * inverse) - y * y_rate
+        beta_acceleration = (ca.dot(turn, A) - 2 * half_p_rate * beta_rate) * inverse_p
+        s_rate = (y_rate - s * rate) * inverse
         about_Y = (2 * s * s_rate * beta_rate + s * s * beta_acceleration) * inverse_p
         tilt = s * beta_rate * beta_rate * inverse
-        return about_Y * turn + (tilt * s) * u - tilt * c.Y
+        spin, spin_u = about_Y * turn - tilt * c.Y, tilt * s
+
+        about_B = (c.cylinder_mass * c.cylinder_com**2 + c.cylinder_transverse) * inverse2
+        arm = c.cylinder_mass * c.cylinder_com * inverse
+        z = c.piston_com * inverse
+        lag = c.piston_mass * z
+        about_M = c.piston_transverse * inverse2 - (c.piston_mass - lag) * z
+        return Law(
+            forces={
+                "cylinders": about_B * w - arm * g + c.cylinder_axial * spin,
+                "pistons": about_M * w - lag * (A - g) + c.piston_axial * spin,
+            },
+            J=u,
+            reach=ca.SX(1.0),
+            rate=rate,
+            acceleration=u_A + swing,
+            efforts={
+                "cylinders": about_B * w_u + arm * u_g + c.cylinder_axial * spin_u,
+                "pistons": about_M * w_u + lag * (u_A - u_g + swing) + c.piston_axial * spin_u,
+            },
+            end_masses={"pistons": c.piston_mass},
+        )
+
+    def explain(self, chain: Any, pose: np.ndarray) -> str:
+        return f'chain "{chain.name}" has no direction: M is at its base joint'

@@ -158,19 +158,17 @@ def _home_foot(
     The ball's own surface passes through the foot: of points all over it, the one that is nearest
     the wall and whose radius is nearest the normal starts Newton.
     """
+    numbers = ca.DM(constants)
     u = spread_directions(DIRECTIONS)
     points = p - distance * u
-    columns = np.repeat(np.array(constants, float)[:, None], len(u), axis=1)
-    g, a, _ = (np.asarray(v) for v in equation(points.T, columns))
-    a = a.reshape(3, -1).T
+    g, a, _ = (np.asarray(v) for v in equation(points.T, ca.repmat(numbers, 1, len(u))))
     with np.errstate(all="ignore"):
-        size = np.linalg.norm(a, axis=1)
-        miss = np.abs(g.ravel()) / size
-        miss += abs(distance) * np.linalg.norm(a / size[:, None] - u, axis=1)
+        size = np.linalg.norm(a, axis=0)
+        miss = np.abs(g[0]) / size + abs(distance) * np.linalg.norm(a / size - u.T, axis=0)
     best = int(np.argmin(np.where(np.isfinite(miss), miss, np.inf)))
     w, mu = ca.DM(points[best]), ca.DM(distance / size[best])
     for _ in range(50):
-        w, mu = newton_step(equation, ca.DM(p), w, mu, ca.DM(constants))
+        w, mu = newton_step(equation, ca.DM(p), w, mu, numbers)
     return np.asarray(w).ravel(), float(mu)
 
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from .chains import readable
 from .labels import caption
 from .panels import finish, legend, lines
-from .style import house, new_figure
+from .style import XYZ, house, new_figure
 
 if TYPE_CHECKING:
     from ...solution import Solution
@@ -29,7 +29,7 @@ def load(solution: Solution) -> Figure:
     grid = figure.subplots(len(kinds), 1, sharex=True, squeeze=False)
     for axes, (_, _, names) in zip(grid[:, 0], kinds, strict=True):
         values = np.asarray(wrench.sel(component=names).values)
-        lines(axes, solution, values, names)
+        lines(axes, solution, values, names, XYZ)
         legend(axes, 3)
     finish(grid, [[f"{kind} [{unit}]"] for kind, unit, _ in kinds])
     return figure

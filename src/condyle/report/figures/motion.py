@@ -10,14 +10,12 @@ from matplotlib.figure import Figure, FigureBase
 from ...mechanism.mechanism import COORDINATES
 from .labels import COORDINATE, caption, shown
 from .panels import finish, legend, lines
-from .style import PALETTE, house, look, new_figure
+from .style import PALETTE, XYZ, house, new_figure
 
 if TYPE_CHECKING:
     from ...solution import Solution
 
 VIEWS = (("sagittal", "X", "Z"), ("frontal", "Y", "Z"), ("horizontal", "X", "Y"))
-# The third dashed and black: alpha and gamma nearly coincide, as in the paper.
-LOOKS = (look(0, 0), look(1, 0), look(-1, 1))
 VARIABLES = ("pose", "pose_rate", "pose_acceleration")
 KINDS = (
     ("position", "angle"),
@@ -65,7 +63,7 @@ def draw_coordinates(figure: FigureBase, solution: Solution) -> None:
             unit, factor = shown(unit, order)
             values = solution[variable].sel(coordinate=list(names)).values * factor
             written = [COORDINATE.get(name, name) + "′" * order for name in names]
-            lines(axes, solution, values, written, LOOKS)
+            lines(axes, solution, values, written, XYZ)
             legend(axes, 3)
             row_labels.append(f"{kind} [{unit}]")
         labels.append(row_labels)

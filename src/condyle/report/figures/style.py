@@ -59,6 +59,10 @@ def look(i: int, turn: int | None = None) -> dict[str, Any]:
     return {"color": PALETTE[i % len(PALETTE)], "linestyle": DASHES[dashes % len(DASHES)]}
 
 
+# For three components; the third dashed, since alpha and gamma nearly coincide in chewing.
+XYZ = (look(0, 0), look(1, 0), look(-1, 1))
+
+
 def house(draw: Callable[P, Figure]) -> Callable[P, Figure]:
     """Draw in the house style, whatever the caller's settings are."""
 

@@ -3,7 +3,6 @@
     condyle.report.page.write_report(solution, "report.html")
 """
 
-from .facts import PageTable
 from .write import report_html, write_report
 
-__all__ = ["PageTable", "report_html", "write_report"]
+__all__ = ["report_html", "write_report"]

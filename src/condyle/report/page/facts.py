@@ -17,16 +17,7 @@ from .panels import effort_limits, reaction_magnitudes, reaction_variables, spee
 
 if TYPE_CHECKING:
     from ...solution import Solution
-
-
-@dataclass(frozen=True)
-class PageTable:
-    """A table to print on the page, such as Tables 1 and 2 of the paper."""
-
-    title: str
-    header: Sequence[str]
-    rows: Sequence[Sequence[Any]]
-    note: str = ""
+    from ..tables import Table
 
 
 @dataclass(frozen=True)
@@ -168,9 +159,9 @@ def reaction_table(solution: Solution) -> Markup:
     return table(["Where", "Reaction", "Largest", "at"], rows, "Largest reactions")
 
 
-def given_tables(tables: Sequence[Any]) -> Markup:
-    """Tables with title, header, rows and, if they have one, a note."""
-    parts = [table(t.header, t.rows, t.title, getattr(t, "note", "")) for t in tables]
+def given_tables(tables: Sequence[Table]) -> Markup:
+    """Tables of `condyle.report.tables`, such as Tables 1 and 2 of the paper."""
+    parts = [table(t.columns, t.rows, t.title, t.notes) for t in tables]
     return tag("section", tag("h2", "Tables"), *parts, id="tables") if parts else Markup("")
 
 

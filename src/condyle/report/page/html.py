@@ -31,13 +31,16 @@ def tag(name: str, *children: Any, **attributes: Any) -> Markup:
 
 
 def table(
-    header: Sequence[Any], rows: Sequence[Sequence[Any]], caption: Any = None, note: Any = None
+    header: Sequence[Any],
+    rows: Sequence[Sequence[Any]],
+    caption: str | None = None,
+    notes: Sequence[str] = (),
 ) -> Markup:
     """A table that scrolls sideways by itself; numbers are set right."""
     head = tag("thead", tag("tr", *(tag("th", cell, scope="col") for cell in header)))
     body = tag("tbody", *(tag("tr", *_cells(row)) for row in rows))
     parts = [tag("caption", caption)] if caption else []
-    note_below = [tag("p", note, class_="note")] if note else []
+    below = [tag("p", note, class_="note") for note in notes]
     # Focusable, so that the keyboard can scroll it.
     wide = tag(
         "div",
@@ -47,7 +50,7 @@ def table(
         role="region",
         aria_label=caption or "table",
     )
-    return tag("div", wide, *note_below, class_="table")
+    return tag("div", wide, *below, class_="table")
 
 
 def _cells(row: Sequence[Any]) -> list[Markup]:

@@ -7,11 +7,11 @@ A point is one of {"fixed": [x, y, z]} in {S}, {"platform": [x, y, z]} in {M}, o
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...mechanism.home import characteristic_length
 from ..scene import Scene, contact_normals, contact_patch, place, platform_hull, styles
 from ..scene.chains import PLATFORM_JOINT
 from .columns import Columns
@@ -20,16 +20,22 @@ if TYPE_CHECKING:
     from ...mechanism import Mechanism
     from ...solution import Solution
 
-ARROW = 0.9  # longest arrow over the characteristic length
+SIZE = 0.26  # the size that radii and arrows are stated in, over the diagonal of everything
+ARROW = 0.9  # longest arrow
 
 
 def machine(solution: Solution, columns: Columns) -> dict[str, Any]:
     """Everything the 3D view draws."""
     mechanism = solution.mechanism
     scene = place(mechanism, solution["pose"].values, solution["joint"].values)
-    size = characteristic_length(mechanism)
     vertices, faces = platform_hull(mechanism)
+    cloud = _cloud(scene, vertices)
+    size = SIZE * float(np.linalg.norm(np.nanmax(cloud, axis=0) - np.nanmin(cloud, axis=0)))
     rods, joints = _chains(mechanism, scene, columns)
+    arrows = [*_contact_arrows(solution, scene, columns, size), *_load_arrow(solution, columns)]
+    largest = max((arrow.largest for arrow in arrows), default=0.0)
+    scale = ARROW * size / largest if largest else 0.0
+    tips = [scene.on_platform(arrow.at) + scale * arrow.force for arrow in arrows]
     return {
         "size": size,
         "pose": [
@@ -48,16 +54,17 @@ def machine(solution: Solution, columns: Columns) -> dict[str, Any]:
             for name, point in mechanism.platform.points.items()
         ],
         "surfaces": list(_surfaces(mechanism, scene, size)),
-        "arrows": [*_contact_arrows(solution, columns, size), *_load_arrow(solution, columns)],
-        "arrowLength": ARROW * size,
+        "arrows": [arrow.description for arrow in arrows],
+        "metresPerNewton": scale,
+        "largestForce": largest,
         "traces": list(_traces(solution)),
-        "range": _range(scene, vertices, size),
+        "range": _range(np.vstack([cloud, *tips]), size),
     }
 
 
 def ball_radius(contact: Any, size: float) -> float:
     """Radius of a contact's ball as drawn [m]: its own, where the file gives one."""
-    return getattr(contact, "ball_radius", None) or 0.08 * size
+    return contact.ball_radius or 0.08 * size
 
 
 def _chains(
@@ -103,36 +110,47 @@ def _surfaces(mechanism: Mechanism, scene: Scene, size: float) -> Iterator[dict[
         }
 
 
+@dataclass(frozen=True)
+class Arrow:
+    """A force, (N, 3) [N] in {S}, at a point of the platform; `start`: how far off it begins."""
+
+    kind: str
+    at: tuple[float, ...]
+    force: np.ndarray
+    start: float
+    columns: list[int]
+
+    @property
+    def largest(self) -> float:
+        size = np.linalg.norm(self.force, axis=1)
+        return float(size[np.isfinite(size)].max(initial=0.0))
+
+    @property
+    def description(self) -> dict[str, Any]:
+        at = {"platform": list(self.at)}
+        return {"kind": self.kind, "at": at, "from": self.start, "columns": self.columns}
+
+
 def _contact_arrows(
-    solution: Solution, columns: Columns, size: float
-) -> Iterator[dict[str, Any]]:
-    points, forces = solution["contact_point"].values, solution["contact_force"].values
+    solution: Solution, scene: Scene, columns: Columns, size: float
+) -> Iterator[Arrow]:
+    forces = solution["contact_force"].values
     for i, contact in enumerate(solution.mechanism.contacts):
-        vector = forces[:, i, None] * contact_normals(contact, points[:, i])
-        yield {
-            "name": f"contact force, {contact.name}",
-            "kind": "contact",
-            "from": ball_radius(contact, size),
-            "at": {"platform": list(contact.point)},
-            "columns": columns.add_vector(f"contact_vector.{contact.name}", vector),
-        }
+        vector = forces[:, i, None] * contact_normals(contact, scene.contacts[contact.name])
+        numbers = columns.add_vector(f"contact_vector.{contact.name}", vector)
+        # From the ball's skin, or a small force would hide in it.
+        yield Arrow("contact", contact.point, vector, ball_radius(contact, size), numbers)
 
 
-def _load_arrow(solution: Solution, columns: Columns) -> Iterator[dict[str, Any]]:
+def _load_arrow(solution: Solution, columns: Columns) -> Iterator[Arrow]:
     force = solution["load"].values[:, :3]
     if not np.nan_to_num(force).any():
         return
     points = solution.mechanism.platform.points
-    yield {
-        "name": "load",
-        "kind": "load",
-        "from": 0.0,
-        "at": {"platform": list(points.get(solution.options.get("load_point"), (0.0, 0.0, 0.0)))},
-        "columns": [
-            columns.add(f"load.{name}", force[:, i])
-            for i, name in enumerate(solution["component"].values[:3])
-        ],
-    }
+    at = points.get(solution.options.get("load_point"), (0.0, 0.0, 0.0))
+    names = solution["component"].values[:3]
+    numbers = [columns.add(f"load.{name}", force[:, i]) for i, name in enumerate(names)]
+    yield Arrow("load", at, force, 0.0, numbers)
 
 
 def _traces(solution: Solution) -> Iterator[dict[str, Any]]:
@@ -146,11 +164,15 @@ def _traces(solution: Solution) -> Iterator[dict[str, Any]]:
         yield {"name": contact.name, "at": list(contact.point)}
 
 
-def _range(scene: Scene, hull: np.ndarray, size: float) -> list[list[float]]:
-    """Box round everything that is ever shown, [[x0, x1], [y0, y1], [z0, z1]] [m]."""
+def _cloud(scene: Scene, hull: np.ndarray) -> np.ndarray:
+    """Every place that a point of the mechanism is ever at, (P, 3) [m]."""
     clouds = [p.reshape(-1, 3) for d in scene.chains.values() for p in d.points.values()]
     step = max(len(scene.position) // 200, 1)
     corners = scene.position[::step, None] + np.einsum("nij,vj->nvi", scene.rotation[::step], hull)
-    cloud = np.vstack([*clouds, corners.reshape(-1, 3), *scene.contacts.values(), hull])
+    return np.vstack([*clouds, corners.reshape(-1, 3), *scene.contacts.values(), hull])
+
+
+def _range(cloud: np.ndarray, size: float) -> list[list[float]]:
+    """Box round everything that is ever shown, [[x0, x1], [y0, y1], [z0, z1]] [m]."""
     low, high = np.nanmin(cloud, axis=0), np.nanmax(cloud, axis=0)
     return [[a - 0.15 * size, b + 0.15 * size] for a, b in zip(low, high, strict=True)]

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...atomic import write_text
 from ..scene import DARK, LIGHT
+from .alerts import alerts
 from .columns import Columns
 from .facts import (
     chain_table,
@@ -28,6 +29,7 @@ from .tracks import track_panels
 
 if TYPE_CHECKING:
     from ...solution import Solution
+    from ..tables import Table
 
 _ASSETS = package_files(__package__) / "assets"
 # One file an idea, in the order they run.
@@ -50,14 +52,14 @@ def write_report(
     solution: Solution,
     path: str | os.PathLike[str],
     *,
-    tables: Sequence[Any] | None = None,
+    tables: Sequence[Table] | None = None,
     files: Sequence[str | os.PathLike[str]] | None = None,
 ) -> Path:
     """Write the report, whole or not at all.
 
     Args:   solution: what to show; more samples than a page can carry are thinned, extremes kept.
             path: the HTML file.
-            tables: to print on it: objects with title, header, rows and note, as `PageTable`.
+            tables: of `condyle.report.tables`, to print on it.
             files: inputs of the run, to be named with their hashes.
     Returns: the path.
     Raises: InputError: if a file cannot be read or the report cannot be written.
@@ -69,7 +71,7 @@ def write_report(
 def report_html(
     solution: Solution,
     *,
-    tables: Sequence[Any] | None = None,
+    tables: Sequence[Table] | None = None,
     files: Sequence[str | os.PathLike[str]] | None = None,
 ) -> str:
     """The report as text; see `write_report`."""
@@ -106,13 +108,12 @@ def _payload(solution: Solution) -> dict[str, Any]:
     drawn = machine(solution, columns)
     panels = time_panels(solution, columns)
     tracks = track_panels(solution, columns)
-    status = columns.add("status", solution["status"].values)
+    told = alerts(solution, columns)
     return {
         "machine": drawn,
         "panels": panels,
         "tracks": tracks,
-        "statusColumn": status,
-        "statusNames": solution["status"].attrs["flag_meanings"].split(),
+        "alerts": told,
         "palette": {"light": LIGHT, "dark": DARK},
         "columns": columns.packed(),  # last, when all columns are in
     }

@@ -24,6 +24,10 @@ class Scene:
     contacts: dict[str, np.ndarray]
     landmarks: dict[str, np.ndarray]
 
+    def on_platform(self, point: tuple[float, ...]) -> np.ndarray:
+        """A point of the platform, (3,) in {M}, in {S}, (N, 3)."""
+        return on_platform(self.position, self.rotation, point)
+
 
 def rotations(angles: np.ndarray) -> np.ndarray:
     """R = Rx(alpha) Ry(beta) Rz(gamma), (N, 3, 3), of angles (N, 3) [rad] ([Cheng2023] eq. 2)."""
@@ -36,6 +40,11 @@ def rotations(angles: np.ndarray) -> np.ndarray:
     return np.moveaxis(np.array(rows), 2, 0)
 
 
+def on_platform(position: np.ndarray, R: np.ndarray, point: tuple[float, ...]) -> np.ndarray:
+    """O_M + R m for one point m of the platform, (N, 3)."""
+    return position + R @ np.asarray(point)
+
+
 def place(mechanism: Mechanism, pose: np.ndarray, joint: np.ndarray) -> Scene:
     """Place every point that a picture needs.
 
@@ -43,13 +52,10 @@ def place(mechanism: Mechanism, pose: np.ndarray, joint: np.ndarray) -> Scene:
     """
     position, R = pose[:, :3], rotations(pose[:, 3:])
 
-    def on_platform(point: tuple[float, ...]) -> np.ndarray:
-        return position + R @ np.asarray(point)
-
     chains = {
-        chain.name: drawing_points(chain, joint[:, i], on_platform(chain.platform))
+        chain.name: drawing_points(chain, joint[:, i], on_platform(position, R, chain.platform))
         for i, chain in enumerate(mechanism.chains)
     }
-    contacts = {contact.name: on_platform(contact.point) for contact in mechanism.contacts}
-    landmarks = {name: on_platform(p) for name, p in mechanism.platform.points.items()}
+    contacts = {c.name: on_platform(position, R, c.point) for c in mechanism.contacts}
+    landmarks = {n: on_platform(position, R, p) for n, p in mechanism.platform.points.items()}
     return Scene(position, R, chains, contacts, landmarks)

@@ -1,6 +1,7 @@
 """Contact surfaces as pictures: a patch with the bounds, its outline, and unit normals.
 
-A surface is an equation phi(p) = 0. Over a grid of two coordinates the third follows by Newton
+A surface is an equation phi(p) = 0: the wall that a ball touches, or the locus of its centre, which
+are the same without a radius. Over a grid of two coordinates the third follows by Newton
 from the home point: over (x, y) where the surface can be seen from above, else over its tangent
 plane at home.
 """
@@ -8,6 +9,7 @@ plane at home.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -35,14 +37,14 @@ class Patch:
 
 
 def contact_normals(contact: Contact, points: np.ndarray) -> np.ndarray:
-    """Unit normals n of the surface at ball centres (N, 3): grad phi / |grad phi|."""
-    _, gradient = _phi(contact, points)
+    """Unit normals n of the contact at ball centres (N, 3): grad phi / |grad phi|."""
+    _, gradient = _phi(contact.locus, points)
     with np.errstate(invalid="ignore", divide="ignore"):
         return gradient / np.linalg.norm(gradient, axis=1, keepdims=True)
 
 
 def contact_patch(contact: Contact, track: np.ndarray, size: float) -> Patch:
-    """The surface within its bounds; without them, round the track (N, 3) of the ball centre.
+    """The wall within the bounds; without them, round the track (N, 3) of the ball centre.
 
     Args: size: a length of the mechanism [m], for the margin round a track.
     """
@@ -57,7 +59,7 @@ def contact_patch(contact: Contact, track: np.ndarray, size: float) -> Patch:
             if interval is not None:
                 low[axis], high[axis] = np.subtract(interval, contact.point[axis])
     u, v = np.meshgrid(*(np.linspace(low[i], high[i], GRID) for i in range(2)), indexing="ij")
-    vertices = _solve(contact, frame, np.column_stack([u.ravel(), v.ravel()]))
+    vertices = _solve(contact.surface, contact.point, frame, np.column_stack([u.ravel(), v.ravel()]))
     keep = np.isfinite(vertices).all(axis=1) & _inside(bounds, vertices, size)
     faces = _triangles(GRID)
     faces = faces[keep[faces].all(axis=1)]
@@ -66,20 +68,20 @@ def contact_patch(contact: Contact, track: np.ndarray, size: float) -> Patch:
 
 
 def contact_profile(contact: Contact, low: float, high: float, y: float) -> np.ndarray | None:
-    """The surface's line over x = low..high at `y`, (M, 3) [m]; None where it stands upright."""
+    """The locus of the centre over x = low..high at `y`, (M, 3) [m]; None where it is upright."""
     frame = _frame(contact)
     if not np.array_equal(frame, np.eye(3)):
         return None
     x = np.linspace(low, high, 61)
     flat = np.column_stack([x, np.full_like(x, y)]) - np.asarray(contact.point)[:2]
-    return _solve(contact, frame, flat)
+    return _solve(contact.locus, contact.point, frame, flat)
 
 
-def _phi(contact: Contact, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _phi(surface: Any, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """phi, (N,) [m], and its gradient, (N, 3)."""
     p = ca.SX.sym("p", 3)
-    phi = contact.surface.phi(p)
-    function = ca.Function("phi", [p], [phi, ca.gradient(phi, p)])
+    phi = surface.phi(p)
+    function = ca.Function("phi", [p], [phi, surface.gradient(p)])
     value, gradient = evaluate(function, points)
     return value[:, 0], gradient
 
@@ -94,13 +96,15 @@ def _frame(contact: Contact) -> np.ndarray:
     return np.array([u, np.cross(n, u), n])
 
 
-def _solve(contact: Contact, frame: np.ndarray, flat: np.ndarray) -> np.ndarray:
+def _solve(
+    surface: Any, home: tuple[float, ...], frame: np.ndarray, flat: np.ndarray
+) -> np.ndarray:
     """Points of the surface over grid coordinates (N, 2) from the home point; NaN where none."""
-    start = np.asarray(contact.point) + flat @ frame[:2]
+    start = np.asarray(home) + flat @ frame[:2]
     height = np.zeros(len(flat))
     with np.errstate(all="ignore"):
         for _ in range(ITERATIONS):
-            value, gradient = _phi(contact, start + height[:, None] * frame[2])
+            value, gradient = _phi(surface, start + height[:, None] * frame[2])
             step = value / (gradient @ frame[2])
             height = height - step
         height[~(np.abs(step) < 1e-9)] = np.nan

@@ -9,23 +9,24 @@ const CAMERAS = {
   Top: { eye: { x: 0, y: 0, z: 2.1 }, up: { x: 1, y: 0, z: 0 }, away: "z" },
   Oblique: { eye: { x: 1.15, y: -1.15, z: 0.6 }, up: { x: 0, y: 0, z: 1 }, away: null },
 };
+// Boxes far from a cube need a wider view.
+const distance = (() => {
+  const sides = drawn.range.map(([low, high]) => high - low);
+  return Math.hypot(...sides) / Math.cbrt(sides[0] * sides[1] * sides[2]) / 1.83;
+})();
+const eyeOf = (name) => Object.fromEntries(Object.entries(CAMERAS[name].eye).map(([axis, v]) => [axis, v * distance]));
+
 let view = "Oblique";
-const layersShown = { platform: true, chains: true, surfaces: true, forces: true, traces: true, labels: true };
+const layersShown = Object.fromEntries(
+  ["platform", "chains", "surfaces", "forces", "traces", "labels"]
+    .filter((layer) => (layer !== "surfaces" || drawn.surfaces.length) && (layer !== "forces" || drawn.arrows.length))
+    .map((layer) => [layer, true]));
 const NEUTRAL = { light: "#7d8894", dark: "#8d98a5" };
 const PLATFORM = { light: "#c9d3de", dark: "#5b6877" };
 const SURFACE = { light: "#e5b567", dark: "#b98a3c" };
 const FORCE = { contact: 4, load: 5 };  // colours of the palette that chains seldom reach
 
 const rodRadius = 0.022 * drawn.size;
-let largestForce = 0;
-for (const arrow of drawn.arrows) {
-  const [x, y, z] = arrow.columns.map(column);
-  for (let i = 0; i < samples; i++) {
-    const size = Math.hypot(x[i], y[i], z[i]);
-    if (size > largestForce) largestForce = size;
-  }
-}
-const forceScale = largestForce ? drawn.arrowLength / largestForce : 0;
 const lastGood = { index: 0 };
 
 function bodies(index) {
@@ -39,7 +40,7 @@ function bodies(index) {
   for (const joint of drawn.joints) joints.sphere(position(joint, index), 1.9 * rodRadius, NEUTRAL[theme], 12);
   for (const ball of drawn.balls) balls.sphere(position(ball.at, index), ball.radius, css("--cursor"), 18);
   for (const arrow of drawn.arrows) {
-    const vector = arrow.columns.map((c) => column(c)[index] * forceScale);
+    const vector = arrow.columns.map((c) => column(c)[index] * drawn.metresPerNewton);
     // From the ball's skin, or a small force would hide in it.
     const from = plus(position(arrow.at, index), unit(vector), arrow.from);
     forces.arrow(from, vector, 0.026 * drawn.size, colour(FORCE[arrow.kind]));
@@ -135,7 +136,7 @@ function stageTraces(index) {
   setPose(index);
   layerOf = traces.map((t) => t.layer);
   for (const trace of traces) {
-    trace.visible = layersShown[trace.layer];
+    trace.visible = layersShown[trace.layer] ?? false;
     delete trace.layer;
   }
   return traces;
@@ -147,8 +148,7 @@ async function drawStage() {
   stageBusy = true;
   setPose(lastGood.index);
   const layout = stageLayout();
-  const { eye, up } = CAMERAS.Oblique;
-  layout.scene.camera = stageNode.layout?.scene?.camera ?? { eye, up };
+  layout.scene.camera = stageNode.layout?.scene?.camera ?? { eye: eyeOf("Oblique"), up: CAMERAS.Oblique.up };
   await Plotly.react(stageNode, stageTraces(lastGood.index), layout, { displayModeBar: false, responsive: false });
   if (!stageReady) stageNode.on("plotly_relayout", turnedByHand);
   stageReady = true;
@@ -161,7 +161,7 @@ const MOVING = 6;  // platform, chains, joints, balls, forces, labels
 
 // At most one update is under way; the newest time wins.
 async function moveStage(index) {
-  showStatus(index);
+  showAlerts(index);
   if (!stageReady || stageBusy || lastGood.index === stageShows) return;
   stageBusy = true;
   while (stageShows !== lastGood.index && stageReady) {
@@ -176,23 +176,22 @@ async function moveStage(index) {
   stageBusy = false;
 }
 
-// Samples without a result keep the last picture and say so.
-function showStatus(index) {
-  const status = column(payload.statusColumn)[index];
+// What is wrong at this sample. One without a result keeps the last picture.
+function showAlerts(index) {
+  const told = payload.alerts.filter((alert) => column(alert.column)[index] === 1);
   const message = document.getElementById("stage-message");
-  const good = !(status > 0) && drawn.pose.every((c) => Number.isFinite(column(c)[index]));
-  message.hidden = good;
-  if (good) lastGood.index = index;
-  else message.textContent = `No result at t = ${time[index].toFixed(timeDecimals)} s: ${payload.statusNames[status] ?? "empty"}`;
+  message.hidden = !told.length;
+  if (told.length) message.textContent = `t = ${time[index].toFixed(timeDecimals)} s: ${told.map((a) => a.text).join("; ")}`;
+  if (!told.some((alert) => alert.failed)) lastGood.index = index;
 }
 
 function setCamera(name) {
   view = name;
-  const { eye, up, away } = CAMERAS[name];
+  const { up, away } = CAMERAS[name];
   for (const button of document.querySelectorAll("#cameras button")) {
     button.setAttribute("aria-pressed", String(button.textContent === name));
   }
-  const change = { "scene.camera.eye": eye, "scene.camera.up": up, "scene.camera.center": { x: 0, y: 0, z: 0 } };
+  const change = { "scene.camera.eye": eyeOf(name), "scene.camera.up": up, "scene.camera.center": { x: 0, y: 0, z: 0 } };
   for (const axis of ["x", "y", "z"]) change[`scene.${axis}axis.visible`] = axis !== away;
   Plotly.relayout(stageNode, change);
 }
@@ -212,7 +211,7 @@ function setLayer(layer, on) {
 }
 
 function stageNote() {
-  if (!largestForce) return "";
-  const tenth = forceScale ? 0.01 / forceScale : 0;
-  return `Arrows: 10 mm stands for ${tenth.toPrecision(2)} N; the longest is ${largestForce.toPrecision(4)} N.`;
+  if (!drawn.largestForce) return "";
+  const perCentimetre = 0.01 / drawn.metresPerNewton;
+  return `Arrows: 10 mm stands for ${perCentimetre.toPrecision(2)} N; the longest is ${drawn.largestForce.toPrecision(4)} N.`;
 }

@@ -1,0 +1,123 @@
+"""The C compiler of this machine: which one, what it says of itself, and how it is called."""
+
+from __future__ import annotations
+
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.util import find_spec
+from pathlib import Path
+
+from ..errors import CondyleError
+
+# Never -ffast-math: it undoes fused forms and breaks argument reduction in sine and cosine.
+FLAGS = (
+    "-O2",
+    "-ffp-contract=fast",
+    "-fno-math-errno",
+    "-fno-trapping-math",
+    "-fno-signed-zeros",
+    "-fPIC",
+    "-shared",
+)
+NATIVE = ("-march=native", "-mcpu=native", "")  # the first that the compiler takes
+SECONDS = 300  # a build that takes longer has gone wrong
+
+
+class CompilerError(CondyleError):
+    """No compiler, or one that could not build a kernel."""
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """A working compiler.
+
+    command:  how it is called.
+    flags:    what it is given.
+    identity: its version and the processor features it compiles for.
+    lanes:    doubles in a vector register of that processor.
+    """
+
+    command: tuple[str, ...]
+    flags: tuple[str, ...]
+    identity: str
+    lanes: int
+
+    def build(self, source: Path, library: Path) -> None:
+        """Compile C into a shared library.
+
+        Raises: CompilerError: with the first lines of what the compiler said.
+        """
+        call = [*self.command, *self.flags, str(source), "-o", str(library), "-lm"]
+        try:
+            done = subprocess.run(
+                call, capture_output=True, text=True, timeout=SECONDS, stdin=subprocess.DEVNULL
+            )
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise CompilerError(f"{self.command[0]} could not be run: {error}") from None
+        if done.returncode:
+            said = "\n".join((done.stderr or done.stdout).splitlines()[:5])
+            raise CompilerError(f"{shlex.join(self.command)} failed: {said}")
+
+
+def find_compiler() -> Compiler:
+    """The compiler of `CC`, else cc, gcc, clang, or the one of the `ziglang` package.
+
+    Raises: CompilerError: if there is none that works.
+    """
+    return _find(os.environ.get("CC", ""), os.environ.get("PATH", ""))
+
+
+@lru_cache(maxsize=8)
+def _find(cc: str, path: str) -> Compiler:
+    tried = []
+    for command in _candidates(cc):
+        if shutil.which(command[0], path=path or None) is None:
+            tried.append(f"{command[0]} (not found)")
+            continue
+        for native in NATIVE:
+            macros = _macros(command, native)
+            if macros is not None:
+                flags = (*FLAGS, native) if native else FLAGS
+                return Compiler(command, flags, macros, _lanes(macros))
+        tried.append(f"{shlex.join(command)} (does not work)")
+    raise CompilerError(f"no C compiler: tried {', '.join(tried) or 'nothing'}")
+
+
+def _candidates(cc: str) -> list[tuple[str, ...]]:
+    if cc:
+        return [tuple(shlex.split(cc))]
+    found: list[tuple[str, ...]] = [("cc",), ("gcc",), ("clang",)]
+    if find_spec("ziglang") is not None:
+        found.append((sys.executable, "-m", "ziglang", "cc"))
+    return found
+
+
+def _macros(command: tuple[str, ...], native: str) -> str | None:
+    """Everything the compiler defines for this processor: its version and instruction sets."""
+    call = [*command, *([native] if native else []), "-dM", "-E", "-x", "c", "-"]
+    try:
+        done = subprocess.run(
+            call, capture_output=True, text=True, timeout=SECONDS, stdin=subprocess.DEVNULL
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    if done.returncode or "__VERSION__" not in done.stdout:
+        return None
+    where = shutil.which(command[0]) or command[0]
+    return f"{where}\n{platform.machine()}\n{done.stdout}"
+
+
+def _lanes(macros: str) -> int:
+    if chosen := os.environ.get("CONDYLE_LANES"):
+        if chosen not in ("2", "4", "8"):
+            raise CompilerError(f"CONDYLE_LANES is {chosen!r}; expected 2, 4 or 8")
+        return int(chosen)
+    if "__AVX512F__" in macros:
+        return 8
+    return 4 if "__AVX2__" in macros else 2

@@ -1,0 +1,53 @@
+"""What the page says of single samples: no result, lift-off, out of bounds, above a limit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...solution import BOUND_TOLERANCE
+from .columns import Columns
+from .panels import effort_limits, speed_limits
+
+if TYPE_CHECKING:
+    from ...solution import Solution
+
+NEAR_SINGULAR = "near a singularity"
+
+
+def alerts(solution: Solution, columns: Columns) -> list[dict[str, Any]]:
+    """Texts, each with the number of a column that is 1 where the text holds.
+
+    `failed`: there is nothing to draw at such samples.
+    """
+    status = solution["status"]
+    words = status.attrs["flag_meanings"].split()
+    found = [
+        (f"no result: {word}", status.values == code, True)
+        for code, word in enumerate(words)
+        if code
+    ]
+    found += [(text, where, False) for text, where in _warnings(solution)]
+    return [
+        {"text": text, "column": columns.add(f"alert.{text}", where), "failed": failed}
+        for text, where, failed in found
+        if where.any()
+    ]
+
+
+def _warnings(solution: Solution) -> Iterator[tuple[str, np.ndarray]]:
+    with np.errstate(invalid="ignore"):
+        for i, name in enumerate(solution["contact"].values):
+            margin = solution["bound_margin"].values[:, i]
+            yield f"{name} is outside its bounds", margin < -BOUND_TOLERANCE
+            yield f"{name} lifts off", solution["lift_off"].values[:, i]
+        limits = {"torque": effort_limits(solution), "joint_rate": speed_limits(solution)}
+        for variable, word in (("torque", "effort"), ("joint_rate", "speed")):
+            values = np.abs(solution[variable].values)
+            for i, name in enumerate(solution["chain"].values):
+                limit = limits[variable][i]
+                if limit is not None:
+                    yield f"{name} is above its {word} limit", values[:, i] > limit
+    yield NEAR_SINGULAR, solution["singularity"].values != 0

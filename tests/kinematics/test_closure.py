@@ -1,0 +1,196 @@
+"""Poses on the contacts for any number of them: residuals, branches, rates and accelerations."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from oracles.closure import complete_state, contact_rows
+from oracles.description import read
+from oracles.random_mechanism import random_mechanism, random_state, toml_text
+from oracles.rotations import platform_motion
+
+from condyle import InputError
+from condyle.kinematics.closure import (
+    _solve,
+    contact_symbols,
+    coordinate_closure,
+    landmark_closure,
+)
+from condyle.kinematics.contact import contact_frame, parasitic_jacobian, residuals
+from condyle.kinematics.rotation import angular_velocity_matrix, rotation
+from condyle.mechanism import Mechanism, parse
+from condyle.mechanism.home import (
+    condition_of,
+    constraint_jacobian,
+    dependent_coordinates,
+    independent_coordinates,
+    usable_sets,
+)
+
+
+@cache
+def drawn(contacts: int) -> tuple[dict[str, Any], Mechanism]:
+    raw = random_mechanism(np.random.default_rng(20 + contacts), contacts=contacts)
+    return raw, parse(toml_text(raw))
+
+
+def off(mechanism: Mechanism, pose: np.ndarray) -> float:
+    """Largest distance of a contact point from its plane [m]."""
+    x = ca.SX.sym("x", 6)
+    phi = ca.Function("phi", [x], [residuals(contact_symbols(mechanism), x)])
+    return float(np.abs(phi(pose.T).full()).max())
+
+
+@pytest.mark.parametrize("contacts", range(1, 6))
+def test_poses_lie_on_the_contacts_and_agree_with_the_oracle(contacts: int) -> None:
+    raw, mechanism = drawn(contacts)
+    states = random_state(np.random.default_rng(contacts), raw, 5)
+    for dependent in list(usable_sets(mechanism))[:6]:
+        names = [n for n in ("X", "Y", "Z", "alpha", "beta", "gamma") if n not in dependent]
+        columns = [("X", "Y", "Z", "alpha", "beta", "gamma").index(n) for n in names]
+        given = ("pose", "pose_rate", "pose_acceleration")
+        found = coordinate_closure(mechanism, names).solve(*(states[k][:, columns] for k in given))
+        assert found.reached.all()
+        assert off(mechanism, found.pose) < 1e-12
+        condition = condition_of(constraint_jacobian(mechanism), dependent)
+        for key, got in zip(given, (found.pose, found.rate, found.acceleration), strict=True):
+            scale = np.abs(states[key]).max()
+            np.testing.assert_allclose(got, states[key], atol=1e-13 * condition * scale)
+
+
+@pytest.mark.parametrize("contacts", range(1, 6))
+def test_rates_and_accelerations_are_derivatives(contacts: int) -> None:
+    """Along q(t) = q + q' t + q'' t^2 / 2, against central differences of the pose."""
+    raw, mechanism = drawn(contacts)
+    states = random_state(np.random.default_rng(7), raw, 4, scale=0.5)
+    q, q1, q2 = (states[key] for key in ("q", "qd", "qdd"))
+    closure = coordinate_closure(mechanism, independent_coordinates(mechanism))
+    h = 2e-4
+    left2, left, middle, right, right2 = (
+        closure.solve(q + q1 * t + q2 * t * t / 2, q1, q2).pose for t in h * np.arange(-2, 3)
+    )
+    found = closure.solve(q, q1, q2)
+    first = (8 * (right - left) - (right2 - left2)) / (12 * h)
+    second = (16 * (right + left) - (right2 + left2) - 30 * middle) / (12 * h * h)
+    np.testing.assert_allclose(found.rate, first, atol=1e-8 * np.abs(first).max())
+    np.testing.assert_allclose(found.acceleration, second, atol=1e-6 * np.abs(second).max())
+
+
+@pytest.mark.parametrize("contacts", range(6))
+def test_parasitic_jacobian(contacts: int) -> None:
+    """M_J: identity rows, C M_J = 0, and it turns q' into X_EE'."""
+    raw, mechanism = drawn(contacts)
+    d, dependent = read(raw), dependent_coordinates(mechanism)
+    x = ca.SX.sym("x", 6)
+    frame = contact_frame(contact_symbols(mechanism), x[:3], rotation(x[3:]))
+    C = frame.N.T @ ca.diagcat(ca.SX.eye(3), angular_velocity_matrix(x[3:]))
+    M_J_of = ca.Function("M_J", [x], [ca.densify(parasitic_jacobian(C, dependent))])
+    states = random_state(np.random.default_rng(2), raw, 4)
+    for pose, rate, q1 in zip(states["pose"], states["pose_rate"], states["qd"], strict=True):
+        M_J = M_J_of(pose).full()
+        np.testing.assert_allclose(M_J @ q1, rate, atol=1e-13 * np.abs(rate).max())
+        rows = contact_rows(d, platform_motion(pose))
+        np.testing.assert_allclose(rows @ M_J, 0, atol=1e-13 * np.abs(rows).max(initial=1))
+        free = [
+            i for i, n in enumerate(("X", "Y", "Z", "alpha", "beta", "gamma")) if n not in dependent
+        ]
+        np.testing.assert_array_equal(M_J[free], np.eye(6 - contacts))
+
+
+def test_far_from_home_the_branch_is_that_of_home() -> None:
+    """A pose found at once is the one found by following 400 small steps."""
+    raw, mechanism = drawn(3)
+    names = independent_coordinates(mechanism)
+    far = np.array([0.01 if name in "XYZ" else 0.6 for name in names])
+    signs = np.array(np.meshgrid(*[[-1, 0.5, 1]] * len(names))).reshape(len(names), -1).T
+    q = far * signs
+    found = coordinate_closure(mechanism, names).solve(q, q, q)
+    followed = 0
+    for sample, pose, reached in zip(q, found.pose, found.reached, strict=True):
+        try:
+            wanted = complete_state(raw, names, sample, 0 * sample, 0 * sample, steps=400)[0]
+        except (ValueError, np.linalg.LinAlgError):
+            continue
+        if np.abs(wanted).max() < 1.5 and reached:
+            np.testing.assert_allclose(pose, wanted, atol=1e-11)
+            followed += 1
+    assert followed > 15 and np.ptp(found.pose[found.reached, 3:]) > 1
+
+
+def test_contacts_that_hold_badly_still_hold() -> None:
+    """Two balls 2 mm apart on nearly the same plane: steps stall far above rounding."""
+    raw = random_mechanism(np.random.default_rng(3), contacts=3)
+    near, other = raw["contact"][0], raw["contact"][2]
+    other["point"] = [p + step for p, step in zip(near["point"], (0.3, 0.2, 0.1), strict=True)]
+    slope = [s + step for s, step in zip(near["surface"]["slope"], (0.001, -0.002), strict=True)]
+    offset = other["point"][2] - np.dot(slope, other["point"][:2])
+    other["surface"] = {"kind": "plane", "slope": slope, "offset": float(offset)}
+    mechanism = parse(toml_text(raw))
+    condition = condition_of(constraint_jacobian(mechanism), dependent_coordinates(mechanism))
+    assert 2e3 < condition < 1e4
+    names = independent_coordinates(mechanism)
+    q = np.random.default_rng(0).uniform(-1, 1, (100, 3)) * [
+        0.0005 if name in "XYZ" else 0.01 for name in names
+    ]
+    found = coordinate_closure(mechanism, names).solve(q, q, q)
+    assert found.reached.all() and off(mechanism, found.pose) < 1e-15
+
+
+def test_a_pose_out_of_reach_is_not_a_number_and_alone() -> None:
+    _, mechanism = drawn(2)
+    names = [n for n in ("X", "Y", "Z", "alpha", "beta", "gamma") if n not in ("gamma", "X")]
+    closure = coordinate_closure(mechanism, names)
+    good = np.array([[0.001, 0.002, 0.01, -0.02]])
+    with_bad = np.vstack([good, [[0.0, 5.0, 0.0, 0.0]], good])
+    alone, together = closure.solve(good, good, good), closure.solve(with_bad, with_bad, with_bad)
+    assert together.reached.tolist() == [True, False, True]
+    for name in ("pose", "rate", "acceleration"):
+        assert np.isnan(getattr(together, name)[1]).all()
+        np.testing.assert_array_equal(getattr(together, name)[[0, 2]], getattr(alone, name)[[0, 0]])
+
+
+def test_a_singular_matrix_does_not_touch_its_neighbours() -> None:
+    nearly = np.diag([1.0, 1, 1, 1, 1, 1e-17]) + 1e-3
+    b = np.arange(12.0).reshape(2, 6)
+    together = _solve(np.stack([nearly, np.zeros((6, 6))]), b)
+    np.testing.assert_array_equal(together[0], _solve(nearly[None], b[:1])[0])
+    assert np.isfinite(together[0]).all() and np.isnan(together[1]).all()
+
+
+def test_a_landmark_is_led_and_the_midpoint_keeps_its_y(reference: Mechanism) -> None:
+    rng = np.random.default_rng(5)
+    s = rng.uniform(-1, 1, (40, 4)) * [0.002, 0.002, 0.01, 0]
+    found = landmark_closure(reference, "incisor").solve(s, s, s)
+    middle = np.mean([c.point for c in reference.contacts], axis=0)
+    incisor = np.array(reference.platform.points["incisor"])
+    assert found.reached.all() and off(reference, found.pose) < 1e-12
+    for sample, pose, rate in zip(s, found.pose, found.rate, strict=True):
+        motion = platform_motion(pose, rate)
+        np.testing.assert_allclose(motion.point(incisor)[0] - incisor, sample[:3], atol=1e-15)
+        np.testing.assert_allclose(motion.point(incisor)[1], sample[:3], atol=1e-15)
+        assert abs(motion.point(middle)[0][1] - middle[1]) < 1e-15
+
+
+@pytest.mark.parametrize(
+    "names, message",
+    [
+        (["X", "Y", "alpha"], "got the 3 coordinates.*4 degrees of freedom.*X,Y,alpha,beta"),
+        (["X", "Z", "alpha", "beta"], "not independent.*do not determine Y, gamma"),
+    ],
+)
+def test_sets_that_do_not_determine_the_pose(
+    reference: Mechanism, names: list[str], message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        coordinate_closure(reference, names)
+
+
+def test_a_landmark_needs_two_contacts(reference: Mechanism) -> None:
+    with pytest.raises(InputError, match='no landmark "incisors".*Did you mean "incisor"'):
+        landmark_closure(reference, "incisors")
+    with pytest.raises(InputError, match=r"two contacts; this mechanism has 0"):
+        landmark_closure(reference.replace(contacts=()), "incisor")

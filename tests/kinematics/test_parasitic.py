@@ -1,0 +1,102 @@
+"""Closed-form parasitic motion: the paper's eq. (6), and any two planes against Newton."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from oracles.random_mechanism import random_mechanism, toml_text
+
+import condyle
+from condyle.dynamics.equations import closure_function, require_closed_form
+from condyle.kinematics.batch import evaluate
+from condyle.kinematics.closure import coordinate_closure
+from condyle.mechanism import Mechanism, parse
+from condyle.mechanism.home import (
+    condition_of,
+    constraint_jacobian,
+    independent_coordinates,
+    usable_sets,
+)
+
+ANGLES = {"alpha", "beta", "gamma"}
+
+
+def samples(rng: np.random.Generator, mechanism: Mechanism, size: float) -> tuple[np.ndarray, ...]:
+    """q, q', q'' within size * (40 mm, 0.7 rad), (20, m) each."""
+    names = independent_coordinates(mechanism)
+    unit = np.array([0.7 if name in ANGLES else 0.04 for name in names])
+    q = rng.uniform(-size, size, (20, len(names))) * unit
+    return q, *(rng.normal(0, 3, (2, 20, len(names))) * unit)
+
+
+def test_equation_6_of_the_paper(reference: Mechanism) -> None:
+    """gamma = -atan(s(alpha) / (p1 c(beta) + c(alpha) s(beta))), and Z from either contact."""
+    rng = np.random.default_rng(0)
+    q = rng.uniform(-1, 1, (50, 4)) * [0.01, 0.01, 0.4, 0.4]
+    pose, _, _, reach = evaluate(closure_function(reference), q, q, q)
+    X, Y, alpha, beta = q.T
+    p1, p2 = -1.1, 0.013215
+    gamma = -np.arctan(np.sin(alpha) / (p1 * np.cos(beta) + np.cos(alpha) * np.sin(beta)))
+    assert (reach > 0).all()
+    np.testing.assert_allclose(pose[:, 5], gamma, atol=1e-14)
+    np.testing.assert_array_equal(pose[:, [0, 1, 3, 4]], q)
+    x, y, z = reference.contacts[0].point
+    sb, cb, sa, ca = np.sin(beta), np.cos(beta), np.sin(alpha), np.cos(alpha)
+    sg, cg = np.sin(gamma), np.cos(gamma)
+    ball_x = X + cb * cg * x - cb * sg * y + sb * z
+    lift = (ca * -sb * cg + sa * sg) * x + (ca * sb * sg + sa * cg) * y + ca * cb * z
+    np.testing.assert_allclose(pose[:, 2], p1 * ball_x + p2 - lift, atol=1e-15)
+    assert np.ptp(pose[:, 5]) > 0.2
+
+
+@settings(max_examples=15, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 10**6), contacts=st.sampled_from([1, 2]))
+def test_any_planes_and_any_set_agree_with_newton(seed: int, contacts: int) -> None:
+    """Two independent ways to the same pose, rate and acceleration, also far from home."""
+    rng = np.random.default_rng(seed)
+    drawn = parse(toml_text(random_mechanism(rng, contacts=contacts, spread=2.0)))
+    compared = 0
+    for dependent in usable_sets(drawn):
+        condition = condition_of(constraint_jacobian(drawn), dependent)
+        if len(ANGLES & set(dependent)) > 1 or condition > 30:
+            continue
+        mechanism = drawn.replace(dependent=dependent)
+        require_closed_form(mechanism)
+        q, q1, q2 = samples(rng, mechanism, 0.3 / condition**0.5)
+        *closed, reach = evaluate(closure_function(mechanism), q, q1, q2)
+        newton = coordinate_closure(mechanism, independent_coordinates(mechanism)).solve(q, q1, q2)
+        both = (reach[:, 0] > 0) & newton.reached
+        # Newton reaches what the closed form does, but where the way from home leaves the planes.
+        assert not (newton.reached & ~both).any()
+        compared += both.sum()
+        for got, wanted in zip(
+            closed, (newton.pose, newton.rate, newton.acceleration), strict=True
+        ):
+            scale = np.abs(wanted[both]).max(axis=1, initial=1.0, keepdims=True)
+            # Near the end of the reach everything is steep; its square root is the distance.
+            steep = 1 / np.minimum(reach[both], 1.0) ** 2
+            assert (np.abs(got[both] - wanted[both]) < 1e-12 * condition * steep * scale).all()
+    assert compared > 100
+
+
+def test_without_contacts_the_pose_is_given(reference: Mechanism) -> None:
+    free = reference.replace(contacts=())
+    q, q1, q2 = np.random.default_rng(3).normal(0, 1, (3, 7, 6))
+    pose, rate, acceleration, _ = evaluate(closure_function(free), q, q1, q2)
+    for got, given_value in ((pose, q), (rate, q1), (acceleration, q2)):
+        np.testing.assert_array_equal(got, given_value)
+
+
+@pytest.mark.parametrize("contacts, dependent", [(3, None), (2, ("alpha", "gamma"))])
+def test_route_direct_names_core_where_there_is_no_closed_form(
+    contacts: int, dependent: tuple[str, ...] | None
+) -> None:
+    raw = random_mechanism(np.random.default_rng(1), contacts=contacts)
+    mechanism = parse(toml_text(raw)).replace(dependent=dependent)
+    with pytest.raises(
+        condyle.UnsupportedError, match=f"This mechanism has {contacts}.*Use route core"
+    ):
+        condyle.derive(mechanism, route="direct")
+    condyle.derive(mechanism, route="core")

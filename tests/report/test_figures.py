@@ -1,0 +1,236 @@
+"""The figures: the numbers drawn, labels with units, limits, and files."""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+from xml.etree import ElementTree
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib._pylab_helpers import Gcf
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+import condyle
+from condyle.analysis.compare import Comparison
+from condyle.kinematics.rotation import rotation
+from condyle.report import figures
+from condyle.report.figures import PLOTS, SolutionPlots, figure_5, figure_8, figure_9
+from condyle.report.figures.chains import groups, heading, styles
+from condyle.report.figures.motion import track
+from condyle.solution import Solution
+
+
+def curves(axes: Axes) -> dict[str, np.ndarray]:
+    """Label -> values of the labelled curves."""
+    found = {str(line.get_label()): np.asarray(line.get_ydata()) for line in axes.get_lines()}
+    return {label: values for label, values in found.items() if not label.startswith("_")}
+
+
+def words(figure: Figure) -> str:
+    """All text of a figure."""
+    return " | ".join(text.get_text() for text in figure.findobj(mpl.text.Text))
+
+
+@pytest.mark.parametrize("name", PLOTS)
+def test_every_plot_has_title_labels_units_and_provenance(name: str, solution: Solution) -> None:
+    figure = PLOTS[name](solution)
+    assert isinstance(figure, Figure)
+    assert figure.get_suptitle()
+    assert "stand-in" in words(figure) and "synthetic motion and load" in words(figure)
+    for axes in figure.axes:
+        assert axes.get_ylabel().endswith("]") or not axes.get_subplotspec().is_first_col()
+        assert axes.get_xlabel().endswith("]") or not axes.get_subplotspec().is_last_row()
+    assert PLOTS[name].__doc__
+
+
+@pytest.mark.parametrize("name", PLOTS)
+def test_any_number_of_contacts(name: str, fewer_contacts: dict[int, Solution]) -> None:
+    for k, solution in fewer_contacts.items():
+        figure = PLOTS[name](solution)
+        nothing = "no contacts" in words(figure)
+        assert nothing == (k == 0 and name.startswith("contact"))
+
+
+@pytest.mark.parametrize("name", PLOTS)
+def test_mixed_units_never_share_axes(name: str, mixed: Solution) -> None:
+    figure = PLOTS[name](mixed)
+    for axes in figure.axes:
+        kinds = {label.split()[0] for label in curves(axes) if label[:4] in ("cran", "rail")}
+        assert len(kinds) <= 1 or name == "singularity"  # which is dimensionless
+    figure.draw_without_rendering()
+
+
+def test_torque_shows_the_torques_and_their_limits(solution: Solution) -> None:
+    figure = PLOTS["torque"](solution)
+    drawn = {k: v for axes in figure.axes for k, v in curves(axes).items()}
+    for i, name in enumerate(solution["chain"].values):
+        np.testing.assert_array_equal(
+            drawn[name.replace("_", " ")], solution["torque"].values[:, i]
+        )
+    assert [axes.get_ylabel() for axes in figure.axes] == ["torque [N m]"] * 3
+    assert all("limit ±3 N m is outside the view" in a.get_title("left") for a in figure.axes)
+    assert len({axes.get_ylim() for axes in figure.axes}) == 1
+
+
+def test_limit_near_the_data_is_a_line(solution: Solution) -> None:
+    figure = PLOTS["joint"](solution)
+    rate = figure.axes[1]
+    assert rate.get_ylabel() == "rate [°/s]"
+    levels = [float(np.ravel(line.get_ydata())[0]) for line in rate.get_lines()[-2:]]
+    assert levels == pytest.approx([np.degrees(6.0), -np.degrees(6.0)])
+    assert rate.get_ylim()[1] > levels[0]
+    assert "limit ±343.8 °/s" in words(figure)
+
+
+def test_units_on_the_axes(solution: Solution, mixed: Solution) -> None:
+    motion = PLOTS["motion"](solution).axes
+    assert motion[0].get_ylabel() == "position [mm]"
+    np.testing.assert_allclose(curves(motion[0])["Z"], solution["pose"].values[:, 2] * 1e3)
+    assert motion[5].get_ylabel() == "angular acceleration [°/s²]"
+    beta = np.degrees(solution["pose_acceleration"].values[:, 4])
+    np.testing.assert_allclose(curves(motion[5])["β′′"], beta)
+
+    crank, rail, _ = PLOTS["jacobian"](mixed).axes
+    assert crank.get_ylabel() == "$J_A$ [mm²/rad]"
+    np.testing.assert_allclose(curves(crank)["crank left"], solution["J_A"].values[:, 0] * 1e6)
+    assert rail.get_ylabel() == "$J_A$ [mm]"
+    np.testing.assert_allclose(curves(rail)["rail 1"], solution["J_A"].values[:, 2] * 1e3)
+
+    labels = [axes.get_ylabel() for axes in PLOTS["torque"](mixed).axes]
+    assert labels == ["torque [N m]", "force [N]", "force [N]"]
+
+
+def test_path_of_the_landmark(solution: Solution) -> None:
+    point = np.array([0.05, 0.01, -0.02])
+    anywhere = solution.copy(deep=True)
+    anywhere["pose"].values[:] = np.random.default_rng(5).uniform(-1, 1, anywhere["pose"].shape)
+    for pose, place in zip(anywhere["pose"].values, track(anywhere, point), strict=True):
+        expected = pose[:3] + np.asarray(rotation(pose[3:])) @ point
+        np.testing.assert_allclose(place, expected, atol=1e-15)
+    figure = PLOTS["path"](solution)
+    assert "Path of incisor" in words(figure)
+    sagittal = figure.axes[0].get_lines()[0]
+    assert sagittal.get_xdata()[0] == pytest.approx(52.75)
+
+
+def test_failed_samples_are_shaded(solution: Solution, mixed: Solution) -> None:
+    def shades(one: Solution) -> list[Rectangle]:
+        return PLOTS["torque"](one).axes[0].findobj(Rectangle)
+
+    assert len(shades(mixed)) == len(shades(solution)) + 1
+
+
+def test_contact_track_against_bounds(solution: Solution) -> None:
+    figure = PLOTS["contact_track"](solution)
+    above = figure.axes[0]
+    assert above.get_title("left") == "left condyle, from above"
+    bounds = next(p for p in above.patches if isinstance(p, Rectangle))
+    assert bounds.get_bbox().extents == pytest.approx([-27.65, 69, -14.65, 75])
+    x = above.get_lines()[0].get_xdata()
+    np.testing.assert_allclose(x, solution["contact_point"].values[:, 0, 0] * 1e3)
+    assert "out of bounds" not in words(figure)
+    outside = solution.copy(deep=True)
+    outside["bound_margin"].values[50:, 0] = -1e-3
+    assert "out of bounds" in words(PLOTS["contact_track"](outside))
+
+
+def test_figure_8_shows_the_differences(comparison: Comparison) -> None:
+    figure = figure_8(comparison)
+    titles = [axes.get_title("left") for axes in figure.axes[:3]]
+    assert titles == [
+        "momentum direct",
+        "momentum direct − momentum core",
+        "momentum direct − lagrange direct",
+    ]
+    one, two = (comparison.run("momentum", route) for route in ("direct", "core"))
+    assert one is not None and two is not None
+    drawn = curves(figure.axes[1])["temporalis left"]
+    np.testing.assert_array_equal(drawn, one.torque[:, 0] - two.torque[:, 0])
+
+
+def test_figure_9_leaves_the_bite_out(solution: Solution) -> None:
+    figure = figure_9(solution)
+    titles = [axes.get_title("left") for axes in figure.axes[:3]]
+    assert titles == ["platform", "cranks", "couplers"]
+    cranks = solution["share"].sel(part="cranks").values[:, 1]
+    np.testing.assert_array_equal(curves(figure.axes[1])["temporalis right"], cranks)
+
+
+def test_pairs_share_a_panel_and_a_colour() -> None:
+    names = ["jaw_left", "jaw_right", "a", "b", "leftover"]
+    assert groups(names, ["N m"] * 5) == [[0, 1], [2, 3], [4]]
+    assert groups(["jaw_left", "jaw_right"], ["N m", "N"]) == [[0], [1]]
+    assert groups([f"leg_{i}" for i in range(5)], ["N"] * 5) == [[0, 1], [2, 3], [4]]
+    looks = styles(names)
+    assert looks[0]["color"] == looks[1]["color"] != looks[2]["color"]
+    assert looks[0]["linestyle"] != looks[1]["linestyle"]
+    assert heading(names[:2]) == "jaw" and heading(names[2:4]) == "a, b"
+    many = styles([f"leg {i}" for i in range(20)])
+    assert len({str(look) for look in many}) == 20
+
+
+def test_accessor_has_every_plot_and_xarrays_own(solution: Solution) -> None:
+    plots = SolutionPlots(solution)
+    for name, draw in PLOTS.items():
+        assert inspect.getdoc(getattr(plots, name)) == inspect.getdoc(draw)
+    figure = plots.share(parts=["bite"])
+    assert figure.axes[0].get_title("left") == "bite"
+    assert callable(plots.scatter)
+
+
+def test_callers_settings_are_left_alone(solution: Solution) -> None:
+    before = dict(mpl.rcParams)
+    with mpl.rc_context({"font.size": 30}):
+        figure = PLOTS["load"](solution)
+        assert figure.axes[0].xaxis.label.get_size() == 9
+    assert dict(mpl.rcParams) == before
+    assert not Gcf.figs  # what pyplot would keep
+
+
+def test_papers_figures_as_files(comparison: Comparison, tmp_path: Path) -> None:
+    paths = figures.save_figures(comparison.solution, comparison, tmp_path)
+    names = ["5-motion", "6-jacobian", "7-load", "8-torque", "9-share"]
+    assert [p.name for p in paths] == [
+        f"figure-{name}.{kind}" for name in names for kind in ("png", "svg")
+    ]
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(p.name for p in paths)
+    for path in paths[::2]:
+        assert path.read_bytes().startswith(b"\x89PNG")
+    for path in paths[1::2]:
+        assert ElementTree.parse(path).getroot().tag.endswith("svg")
+
+
+def test_same_figure_same_file(solution: Solution, tmp_path: Path) -> None:
+    first = figures.save(PLOTS["load"](solution), tmp_path, "first")
+    second = figures.save(PLOTS["load"](solution), tmp_path, "second")
+    for one, two in zip(first, second, strict=True):
+        assert one.read_bytes() == two.read_bytes()
+
+
+def test_whole_or_not_at_all(solution: Solution, tmp_path: Path) -> None:
+    with pytest.raises(condyle.InputError, match="does not exist"):
+        figures.save(PLOTS["load"](solution), tmp_path / "nowhere", "load")
+    broken = PLOTS["load"](solution)
+    broken.axes[0].set_title("$\\nosuch$")  # fails while it is being written
+    with pytest.raises(ValueError):
+        figures.save(broken, tmp_path, "load")
+    assert not list(tmp_path.iterdir())
+
+
+def test_figures_of_a_solution(
+    fewer_contacts: dict[int, Solution], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    few = {name: PLOTS[name] for name in ("load", "contact_force")}
+    monkeypatch.setattr(figures, "PLOTS", few)
+    paths = figures.save_solution_figures(fewer_contacts[0], tmp_path)
+    assert [p.name for p in paths] == ["load.png", "load.svg"]
+
+
+def test_figure_5_holds_path_and_coordinates(solution: Solution) -> None:
+    figure = figure_5(solution)
+    assert len(figure.axes) == 4 + 6
+    assert [axes.name for axes in figure.axes].count("3d") == 1

@@ -1,0 +1,285 @@
+"""The report's file, without a browser: it is whole, closed to the network, and says the truth."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import itertools
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.errors import InputError
+from condyle.motion import Motion, bundled_reference
+from condyle.report.page import report_html, write_report
+from condyle.report.page.columns import BUDGET, Columns
+from condyle.report.page.html import fill, json_for_script, tag
+from condyle.report.page.panels import reaction_magnitudes
+from condyle.report.scene import DARK, LIGHT, styles
+from condyle.report.tables import Table
+from condyle.solution import Solution
+
+ATTACK = "</script><img src=x onerror=alert(1)>{{style}}"
+
+
+@pytest.fixture(scope="module")
+def solution(reference: condyle.Mechanism) -> Solution:
+    """The reference case at 50 Hz."""
+    motion = Motion.from_csv(bundled_reference()[0], rate=50)
+    return condyle.derive(reference).solve(motion, condyle.reference_load())
+
+
+@pytest.fixture(scope="module")
+def page(solution: Solution) -> str:
+    return report_html(solution)
+
+
+class Elements(HTMLParser):
+    """Every element with its attributes, and the text of scripts and of the rest."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.found: list[tuple[str, dict[str, str | None]]] = []
+        self.scripts: list[str] = []
+        self.text = ""
+        self._open: list[str] = []
+        self.feed(page)
+
+    def handle_starttag(self, name: str, attributes: list[tuple[str, str | None]]) -> None:
+        self.found.append((name, dict(attributes)))
+        self._open.append(name)
+        if name == "script":
+            self.scripts.append("")
+
+    def handle_endtag(self, name: str) -> None:
+        while self._open and self._open.pop() != name:
+            pass
+
+    def handle_data(self, data: str) -> None:
+        if self._open and self._open[-1] == "script":
+            self.scripts[-1] += data
+        elif "style" not in self._open:
+            self.text += data
+
+
+def payload(page: str) -> dict[str, Any]:
+    return json.loads(Elements(page).scripts[0])
+
+
+def column(data: dict[str, Any], number: int) -> np.ndarray:
+    values = np.frombuffer(base64.b64decode(data["columns"]["values"]), dtype="<f4")
+    return values.reshape(-1, data["columns"]["samples"])[number]
+
+
+def test_page_of_5001_samples_is_one_file_below_10_megabytes(
+    reference: condyle.Mechanism, tmp_path: Path
+) -> None:
+    whole = condyle.derive(reference).solve(condyle.reference_motion(), condyle.reference_load())
+    path = write_report(whole, tmp_path / "report.html")
+    assert path.stat().st_size < 10e6
+    data = payload(path.read_text(encoding="utf-8"))
+    assert data["columns"]["samples"] == data["columns"]["total"] == 5001
+    assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
+
+
+def test_nothing_on_the_page_points_elsewhere(page: str) -> None:
+    for name, attributes in Elements(page).found:
+        for key in ("src", "href", "action", "srcset", "data"):
+            assert (attributes.get(key) or "#").startswith("#"), (name, attributes)
+        assert not any(key.startswith("on") for key in attributes), "scripts only in scripts"
+
+
+def test_policy_allows_just_the_scripts_of_the_page(page: str) -> None:
+    elements = Elements(page)
+    policy = next(a["content"] for n, a in elements.found if a.get("http-equiv")) or ""
+    assert "default-src 'none'" in policy and "connect-src 'none'" in policy
+    assert "http" not in policy and "unsafe-eval" not in policy
+    _, *code = elements.scripts
+    allowed = set(re.findall(r"sha256-([^']+)", policy))
+    assert allowed == {
+        base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in code
+    }
+
+
+def test_values_of_the_page_equal_the_solution(page: str, solution: Solution) -> None:
+    data = payload(page)
+    names = data["columns"]["names"]
+    time = np.frombuffer(base64.b64decode(data["columns"]["time"]), dtype="<f8")
+    assert np.array_equal(time, solution["time"].values)
+    for variable in ("torque", "joint", "joint_rate", "transmission"):
+        for i, chain in enumerate(solution["chain"].values):
+            shown = column(data, names.index(f"{variable}.{chain}"))
+            assert np.array_equal(shown, solution[variable].values[:, i].astype("f4"))
+
+
+def test_every_kind_of_plot_is_there(page: str) -> None:
+    data = payload(page)
+    found = {panel["id"] for panel in data["panels"]}
+    expected = {"pose-position", "pose-angles", "joint-rad", "joint_rate-rad", "torque-Nm"}
+    expected |= {"share-Nm", "contact-force", "bound-margin", "load", "transmission", "sigma"}
+    assert expected | {"ratio", "condition"} <= found
+    torque = next(panel for panel in data["panels"] if panel["id"] == "torque-Nm")
+    assert [limit["value"] for limit in torque["limits"]] == [3.0]
+    assert [t["view"] for t in data["tracks"]] == ["above", "side"] * 2
+    assert data["tracks"][0]["bounds"] == [pytest.approx([-27.65, -14.65]), pytest.approx([69, 75])]
+
+
+def test_names_are_text_and_never_markup(reference: condyle.Mechanism, solution: Solution) -> None:
+    chains = tuple(
+        c.model_copy(update={"name": ATTACK.replace(",", "")}) if i == 0 else c
+        for i, c in enumerate(reference.chains)
+    )
+    mechanism = reference.replace(name=ATTACK, chains=chains)
+    motion = Motion.from_csv(bundled_reference()[0], rate=20)
+    attacked = condyle.derive(mechanism).solve(motion)
+    page = report_html(attacked)
+    elements = Elements(page)
+    assert "img" not in {name for name, _ in elements.found}
+    assert len(elements.scripts) == 3, "the data, plotly and the page's own script"
+    assert ATTACK in elements.text
+    assert ATTACK in payload(page)["panels"][4]["sets"][0]["lines"][0]["label"]
+
+
+def test_warnings_stand_at_the_top(reference: condyle.Mechanism) -> None:
+    t = np.linspace(0, 1, 21)
+    motion = Motion.from_arrays(t, {n: -0.003 * t * (n == "X") for n in ("X", "Y", "alpha", "beta")})
+    outside = condyle.derive(reference).solve(motion, flag=True)
+    page = report_html(outside)
+    assert outside.warnings
+    text = Elements(page).text
+    for warning in outside.warnings:
+        assert text.index(warning) < text.index("Mechanism")
+    told = {alert["text"] for alert in payload(page)["alerts"]}
+    assert "left_condyle is outside its bounds" in told
+
+
+def test_samples_without_a_result_are_holes_and_said_so(reference: condyle.Mechanism) -> None:
+    t = np.linspace(0, 1, 21)
+    motion = Motion.from_arrays(t, {n: 0.2 * t * (n == "X") for n in ("X", "Y", "alpha", "beta")})
+    torn = condyle.derive(reference).solve(motion, flag=True)
+    data = payload(report_html(torn))
+    failed = next(alert for alert in data["alerts"] if alert["failed"])
+    assert failed["text"] == "no result: unreachable"
+    assert np.array_equal(column(data, failed["column"]), torn["status"].values == 1)
+    shown = column(data, data["columns"]["names"].index("torque.masseter_left"))
+    assert np.array_equal(np.isnan(shown), torn["status"].values != 0)
+
+
+def test_what_was_run_is_named_with_hashes(solution: Solution, tmp_path: Path) -> None:
+    motion = tmp_path / "chewing <1>.csv"
+    motion.write_text("t,X\n")
+    text = Elements(report_html(solution, files=[motion])).text
+    assert str(motion) in text and hashlib.sha256(b"t,X\n").hexdigest() in text
+    assert hashlib.sha256(solution.attrs["mechanism"].encode()).hexdigest() in text
+    assert f"condyle {condyle.__version__}" in text and solution.options["motion"] in text
+    assert solution.attrs["mechanism"] in text
+
+
+def test_a_missing_file_leaves_no_page(solution: Solution, tmp_path: Path) -> None:
+    out = tmp_path / "report.html"
+    out.write_text("before")
+    with pytest.raises(InputError, match="gone.csv"):
+        write_report(solution, out, files=[tmp_path / "gone.csv"])
+    assert out.read_text() == "before"
+
+
+def test_tables_and_reactions_stand_on_the_page(solution: Solution) -> None:
+    table = Table("table-1", "Table 1. Seconds", ("Model", "s"), [["GM1 <a>", "1.5"]], [], ["n=5"])
+    force = np.ones((solution.sizes["time"], 6, 3)) * [2.0, 3.0, 6.0]
+    attributes = {"units": "N", "long_name": "force at the ball joints"}
+    added = Solution(
+        {**solution.data_vars, "reaction_ball": (("time", "chain", "axis"), force, attributes)},
+        solution.coords,
+        solution.attrs,
+    )
+    page = report_html(added, tables=[table])
+    text = Elements(page).text
+    assert "Table 1. Seconds" in text and "GM1 <a>" in text and "n=5" in text
+    assert "Largest reactions" in text and "7 N" in text
+    panel = next(p for p in payload(page)["panels"] if p["id"] == "reaction_ball")
+    assert len(panel["sets"][0]["lines"]) == 6
+    magnitudes = reaction_magnitudes(added, "reaction_ball")[""]
+    assert np.allclose(magnitudes["masseter_left"], 7.0)
+
+
+@pytest.mark.parametrize("name", ["gough-stewart", "hexaglide"])
+def test_other_families_have_a_page(name: str) -> None:
+    mechanism = condyle.load(name)
+    model = condyle.derive(mechanism)
+    t = np.linspace(0, 1, 21)
+    motion = Motion.from_arrays(t, {n: 0.01 * np.sin(t) for n in model.independent})
+    data = payload(report_html(model.solve(motion)))
+    assert {rod["chain"] for rod in data["machine"]["rods"]} == set(mechanism.chain_names)
+    assert len(data["machine"]["surfaces"]) == len(mechanism.contacts)
+
+
+def test_long_runs_are_thinned_and_keep_their_extremes() -> None:
+    count = 400_000
+    columns = Columns(np.arange(count) / 1000)
+    values = np.zeros(count)
+    values[123_457], values[321_001] = 5.0, -7.0
+    columns.add("spike", values)
+    for i in range(50):
+        columns.add(str(i), np.zeros(count))
+    packed = columns.packed()
+    assert packed["total"] == count and packed["samples"] * 4 * 51 <= BUDGET
+    kept = columns.kept()
+    assert {0, 123_457, 321_001, count - 1} <= set(kept)
+
+
+def test_json_cannot_leave_its_script_and_filling_is_one_pass() -> None:
+    assert "<" not in json_for_script({"a": "</script><!--\u2028"})
+    assert json.loads(json_for_script({"a": "</script>\u2028"})) == {"a": "</script>\u2028"}
+    assert fill("{{a}} {{b}}", {"a": tag("i", "{{b}}"), "b": tag("b", "x")}) == (
+        "<i>{{b}}</i> <b>x</b>"
+    )
+    assert tag("p", "<&", title='"') == '<p title="&quot;">&lt;&amp;</p>'
+
+
+# Machado, Oliveira & Fernandes 2009, severity 1, on linear RGB.
+VISION = {
+    "full": np.eye(3),
+    "protan": [[0.1523, 1.0526, -0.2049], [0.1145, 0.7863, 0.0992], [-0.0039, -0.0481, 1.0520]],
+    "deutan": [[0.3673, 0.8606, -0.2280], [0.2801, 0.6725, 0.0474], [-0.0118, 0.0429, 0.9689]],
+    "tritan": [[1.2555, -0.0767, -0.1788], [-0.0784, 0.9308, 0.1476], [0.0047, 0.6914, 0.3039]],
+}
+
+
+def linear(colour: str) -> np.ndarray:
+    c = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
+    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+
+
+def lab(rgb: np.ndarray) -> np.ndarray:
+    to_xyz = [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
+    x = to_xyz @ np.clip(rgb, 0, 1) / [0.9505, 1.0, 1.089]
+    f = np.where(x > 0.008856, np.cbrt(x), 7.787 * x + 16 / 116)
+    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
+
+
+def contrast(a: str, b: str) -> float:
+    bright = sorted(float(linear(c) @ [0.2126, 0.7152, 0.0722]) + 0.05 for c in (a, b))
+    return bright[1] / bright[0]
+
+
+@pytest.mark.parametrize(("palette", "ground"), [(LIGHT, "#ffffff"), (DARK, "#171c22")])
+@pytest.mark.parametrize("vision", VISION)
+def test_colours_can_be_told_apart(palette: tuple[str, ...], ground: str, vision: str) -> None:
+    seen = [lab(np.array(VISION[vision]) @ linear(colour)) for colour in palette]
+    nearest = min(float(np.linalg.norm(a - b)) for a, b in itertools.combinations(seen, 2))
+    assert nearest > 20  # CIELAB distance; 2.3 is just noticeable
+    assert min(contrast(colour, ground) for colour in palette) > 3
+
+
+def test_styles_pair_left_and_right_and_never_repeat() -> None:
+    pairs = styles(["jaw_left", "jaw_right", "lid_left", "lid_right"])
+    assert [s.colour for s in pairs] == [0, 0, 1, 1]
+    assert pairs[0].dash == pairs[2].dash != pairs[1].dash
+    many = styles([f"leg_{i}" for i in range(20)])
+    assert len({(s.colour, s.dash) for s in many}) == 20

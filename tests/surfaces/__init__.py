@@ -1,0 +1,1 @@
+"""Contact surfaces: equations, balls on walls, files, and the dynamics on them."""

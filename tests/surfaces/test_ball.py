@@ -1,0 +1,135 @@
+"""A ball on a wall: the surface on which its centre stays."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from condyle.mechanism import Contact
+from condyle.mechanism.home import home_problem, home_residual
+from condyle.mechanism.surface import (
+    Cylinder,
+    Ellipsoid,
+    Expression,
+    Parallel,
+    Plane,
+    Quadratic,
+    Sphere,
+)
+
+from .cases import close, jet
+
+POINT = (0.003, -0.002, 0.005)
+
+
+def ball(surface, point, radius: float = 0.004, side: str = "below", **more) -> Contact:
+    return Contact(
+        name="b", point=tuple(point), surface=surface, ball_radius=radius, side=side, **more
+    )
+
+
+def test_plane_moves_along_its_normal() -> None:
+    plane = Plane(slope=(-1.1, 0.2), offset=0.01)
+    below, above = (ball(plane, POINT, side=side).locus for side in ("below", "above"))
+    steepness = np.sqrt(1 + 1.1**2 + 0.2**2)
+    assert below.kind == "plane" and below.slope == plane.slope
+    assert below.offset == pytest.approx(0.01 - 0.004 * steepness, abs=1e-18)
+    assert above.offset == pytest.approx(0.01 + 0.004 * steepness, abs=1e-18)
+
+
+@pytest.mark.parametrize(("side", "radius"), [("inside", 0.026), ("outside", 0.034)])
+def test_sphere_and_cylinder_change_their_radius(side: str, radius: float) -> None:
+    sphere = Sphere(centre=(0.01, 0.0, 0.02), radius=0.03)
+    cylinder = Cylinder(point=(0.0, 0.01, 0.0), axis=(0.0, 3.0, 4.0), radius=0.03)
+    for surface in (sphere, cylinder):
+        locus = ball(surface, POINT, side=side).locus
+        assert type(locus) is type(surface)
+        assert locus.radius == pytest.approx(radius, abs=1e-18)
+
+
+@pytest.mark.parametrize("side", ["inside", "outside"])
+def test_round_ellipsoid_is_a_sphere(side: str) -> None:
+    """The general way, foot by Newton, against the exact one."""
+    centre = np.array([0.01, 0.0, 0.02])
+    sphere = Sphere(centre=tuple(centre), radius=0.006)
+    ellipsoid = Ellipsoid(centre=tuple(centre), semi_axes=(0.006,) * 3, rotation=(0.1, 0.2, 0.3))
+    u = np.array([2.0, -1.0, 2.0]) / 3
+    point = centre + u * (0.001 if side == "inside" else 0.011)  # a socket that fits closely
+    exact, general = (ball(s, point, 0.005, side).locus for s in (sphere, ellipsoid))
+    assert isinstance(general, Parallel) and not isinstance(exact, Parallel)
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        v = u + rng.normal(0, 0.3, 3)
+        on = centre + v / np.linalg.norm(v) * exact.radius
+        a, b = jet(exact, on), jet(general, on)
+        assert abs(b.value) < 1e-16
+        close(b.gradient, a.gradient, 1e-12)
+        n = a.gradient
+        across = np.eye(3) - np.outer(n, n)
+        close(across @ b.second @ across, across @ a.second @ across, 1e-11)
+
+
+@pytest.mark.parametrize("side", ["below", "above"])
+@pytest.mark.parametrize("kind", ["quadratic", "expression"])
+def test_flat_walls_are_planes(kind: str, side: str) -> None:
+    plane = Plane(slope=(-1.1, 0.2), offset=0.01)
+    flat = {
+        "quadratic": Quadratic(slope=(-1.1, 0.2), offset=0.01),
+        "expression": Expression(lambda p: p[2] + 1.1 * p[0] - 0.2 * p[1] - 0.01),
+    }[kind]
+    exact, general = (ball(s, POINT, side=side).locus for s in (plane, flat))
+    steepness = np.linalg.norm([1.1, -0.2, 1])
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        p = np.array(POINT) + rng.normal(0, 0.005, 3)
+        assert float(general.phi(p)) == pytest.approx(exact.phi(p) / steepness, abs=1e-17)
+
+
+def trough(curvature: float) -> Quadratic:
+    """z = curvature x^2 / 2: a gutter with its bottom on the Y axis."""
+    return Quadratic(offset=0.0, slope=(0.0, 0.0), xx=curvature / 2)
+
+
+def test_a_ball_that_fits_closely_goes_along() -> None:
+    """Nearly as tight as the wall at the bottom, and the same branch all the way up the flank."""
+    curvature, radius = 150.0, 0.006  # radius of curvature at the bottom 6.67 mm
+    contact = ball(trough(curvature), (0.0, 0.0, radius), radius, "above")
+    assert home_problem(contact) is None
+    assert contact.locus.grip() == pytest.approx(1 - radius * curvature, abs=1e-12)
+    for x in np.linspace(-0.01, 0.01, 21):
+        foot, slope = np.array([x, 0.0, curvature * x * x / 2]), curvature * x
+        n = np.array([-slope, 0.0, 1.0]) / np.hypot(slope, 1.0)
+        got = jet(contact.locus, foot + radius * n)
+        assert abs(got.value) < 1e-15
+        close(got.gradient, n, 1e-12)
+        bend = -curvature / np.hypot(slope, 1.0) ** 3  # signed curvature of the wall
+        t = np.array([n[2], 0.0, -n[0]])
+        close(got.second, bend / (1 + radius * bend) * np.outer(t, t), 1e-10)
+
+
+@pytest.mark.parametrize("radius", [0.0072, 0.008, 0.01, 0.02])
+def test_a_ball_that_is_too_big(radius: float) -> None:
+    contact = ball(trough(150.0), (0.0, 0.0, radius), radius, "above")
+    assert home_residual(contact) == pytest.approx(0, abs=1e-15)  # at the bottom, and stuck
+    problem = home_problem(contact)
+    assert problem is not None and f"radius {radius * 1e3:g} mm on the side" in problem
+    assert "cannot touch" in problem
+    assert home_problem(ball(trough(150.0), (0.0, 0.0, -radius), radius, "below")) is None
+
+
+def test_off_the_surface_is_said_in_distance() -> None:
+    contact = ball(trough(20.0), (0.0, 0.0, 0.0042), 0.004, "above")
+    assert home_residual(contact) == pytest.approx(0.0002, abs=1e-12)
+    problem = home_problem(contact)
+    assert problem is not None and "+0.2 mm off" in problem
+
+
+def test_no_foot_gives_no_number() -> None:
+    """Where Newton has not converged phi is not finite: never a wrong distance."""
+    contact = ball(trough(150.0), (0.0, 0.0, 0.006), 0.006, "above")
+    far = [float(contact.locus.phi((0.3 * k, 0.0, 0.001))) for k in range(-5, 6)]
+    surely = [
+        v for k, v in zip(range(-5, 6), far, strict=True) if np.isfinite(v) and k != 0 and v > 0.3
+    ]
+    # A finite value is the distance to a real foot: no further than the point's height above it.
+    assert all(v < 1.6 for v in surely)
