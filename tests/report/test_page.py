@@ -148,7 +148,9 @@ def test_names_are_text_and_never_markup(reference: condyle.Mechanism, solution:
 
 def test_warnings_stand_at_the_top(reference: condyle.Mechanism) -> None:
     t = np.linspace(0, 1, 21)
-    motion = Motion.from_arrays(t, {n: -0.003 * t * (n == "X") for n in ("X", "Y", "alpha", "beta")})
+    motion = Motion.from_arrays(
+        t, {n: -0.003 * t * (n == "X") for n in ("X", "Y", "alpha", "beta")}
+    )
     outside = condyle.derive(reference).solve(motion, flag=True)
     page = report_html(outside)
     assert outside.warnings
@@ -184,7 +186,7 @@ def test_what_was_run_is_named_with_hashes(solution: Solution, tmp_path: Path) -
 def test_a_missing_file_leaves_no_page(solution: Solution, tmp_path: Path) -> None:
     out = tmp_path / "report.html"
     out.write_text("before")
-    with pytest.raises(InputError, match="gone.csv"):
+    with pytest.raises(InputError, match=r"gone\.csv"):
         write_report(solution, out, files=[tmp_path / "gone.csv"])
     assert out.read_text() == "before"
 

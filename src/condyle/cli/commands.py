@@ -1,3 +1,3 @@
 """Every command, in the order of the help page."""
 
-from . import run, solve, compare, check, schema, new, reference  # noqa: F401, I001
+from . import run, solve, compare, check, schema, new, reference, cache  # noqa: F401, I001

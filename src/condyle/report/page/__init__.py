@@ -1,6 +1,6 @@
 """The report that people send: one HTML file, with no need of a network.
 
-    condyle.report.page.write_report(solution, "report.html")
+condyle.report.page.write_report(solution, "report.html")
 """
 
 from .write import report_html, write_report

@@ -147,7 +147,7 @@ def _load_arrow(solution: Solution, columns: Columns) -> Iterator[Arrow]:
     if not np.nan_to_num(force).any():
         return
     points = solution.mechanism.platform.points
-    at = points.get(solution.options.get("load_point"), (0.0, 0.0, 0.0))
+    at = points.get(solution.options["load_point"] or "", (0.0, 0.0, 0.0))
     names = solution["component"].values[:3]
     numbers = [columns.add(f"load.{name}", force[:, i]) for i, name in enumerate(names)]
     yield Arrow("load", at, force, 0.0, numbers)
@@ -157,8 +157,8 @@ def _traces(solution: Solution) -> Iterator[dict[str, Any]]:
     """Paths to draw: the guided landmark (else the incisor, else the first) and the balls."""
     mechanism = solution.mechanism
     points = mechanism.platform.points
-    wanted = [solution.options.get("landmark"), "incisor", *points]
-    guide = next((name for name in wanted if name in points), None)
+    wanted = [solution.options["landmark"], "incisor", *points]
+    guide = next((name for name in wanted if name in points), "")
     yield {"name": guide or "platform centre", "at": list(points.get(guide, (0.0, 0.0, 0.0)))}
     for contact in mechanism.contacts:
         yield {"name": contact.name, "at": list(contact.point)}

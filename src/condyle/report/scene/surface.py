@@ -59,7 +59,9 @@ def contact_patch(contact: Contact, track: np.ndarray, size: float) -> Patch:
             if interval is not None:
                 low[axis], high[axis] = np.subtract(interval, contact.point[axis])
     u, v = np.meshgrid(*(np.linspace(low[i], high[i], GRID) for i in range(2)), indexing="ij")
-    vertices = _solve(contact.surface, contact.point, frame, np.column_stack([u.ravel(), v.ravel()]))
+    vertices = _solve(
+        contact.surface, contact.point, frame, np.column_stack([u.ravel(), v.ravel()])
+    )
     keep = np.isfinite(vertices).all(axis=1) & _inside(bounds, vertices, size)
     faces = _triangles(GRID)
     faces = faces[keep[faces].all(axis=1)]
