@@ -1,4 +1,4 @@
-"""Peers of the benchmark: other engines on the same problem, each in code its own users would write.
+"""Peers of the benchmark: other engines on the same problem, in code their own users would write.
 
 The problem: for the reference mechanism, from independent coordinates, rates, accelerations and
 bite force to the six minimum-norm torques, closure included. No peer imports condyle; each reads

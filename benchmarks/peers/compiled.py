@@ -1,4 +1,4 @@
-"""A peer as a shared library: built from one source file, called and timed through C entry points."""
+"""A peer as a shared library: built from one source file, called through C entry points."""
 
 from __future__ import annotations
 
@@ -69,7 +69,8 @@ class CompiledPeer(Peer):
 
         def run(count: int) -> float:
             rows = _pointer(samples)
-            return self._library.peer_time(self._engine, rows, len(samples), count, dependent)
+            library = self._library
+            return float(library.peer_time(self._engine, rows, len(samples), count, dependent))
 
         return repeats(run, seconds)
 

@@ -89,4 +89,4 @@ def _processor() -> str:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:
         return platform.processor() or platform.machine()
-    return "\n".join(next((x for x in lines if x.startswith(k)), "") for k in ("model name", "flags"))
+    return "\n".join(x for x in lines if x.startswith(("model name", "flags")))

@@ -93,9 +93,9 @@ def read(data: dict[str, Any], load_point: str = "right_molar") -> Mechanism:
     scale = UNIT[data.get("length_unit", "m")]
     chains, contacts = data.get("chain", []), data.get("contact", [])
     if len(chains) != CHAINS or any(c["kind"] != "RSS" for c in chains):
-        raise ValueError(f"the peers are written for {CHAINS} RSS chains, got {len(chains)} chains")
+        raise ValueError(f"the peers are written for {CHAINS} RSS chains, got {len(chains)}")
     if len(contacts) != CONTACTS or any(c["surface"]["kind"] != "plane" for c in contacts):
-        raise ValueError(f"the peers are written for {CONTACTS} planes, got {len(contacts)} contacts")
+        raise ValueError(f"the peers are written for {CONTACTS} planes, got {len(contacts)}")
     platform = data["platform"]
     entry = {"xy": 0.0, "xz": 0.0, "yz": 0.0} | platform["inertia"]
     inertia = np.array([[entry["".join(sorted(i + j))] for j in "xyz"] for i in "xyz"])

@@ -21,7 +21,8 @@ class _MujocoC(CompiledPeer):
         wheel = Path(spec.submodule_search_locations[0])
         library = max(wheel.glob("libmujoco.so*"))
         eigen = distribution("cmeel-eigen").locate_file("cmeel.prefix/include/eigen3")
-        return [f"-isystem{wheel / 'include'}", f"-isystem{eigen}", str(library), f"-Wl,-rpath,{wheel}"]
+        include = [f"-isystem{path}" for path in (wheel / "include", eigen)]
+        return [*include, str(library), f"-Wl,-rpath,{wheel}"]
 
     def _model(self, mechanism: Mechanism) -> str:
         return mjcf(mechanism, self.couplers)

@@ -9,6 +9,7 @@ import condyle
 from condyle.analysis.compare import Comparison, compare, relative_difference
 from condyle.dynamics import FORMULATIONS, ROUTES
 from condyle.mechanism import Mechanism
+from condyle.mechanism.home import independent_coordinates
 from condyle.mechanism.mechanism import Contact
 from condyle.motion import Motion
 
@@ -16,7 +17,8 @@ from condyle.motion import Motion
 def small_motion(mechanism: Mechanism) -> Motion:
     """A little of every independent coordinate."""
     t = np.linspace(0, 1, 30)
-    size = {name: 1e-3 if name in "XYZ" else 0.02 for name in condyle.derive(mechanism).independent}
+    names = independent_coordinates(mechanism)
+    size = {name: 1e-3 if name in "XYZ" else 0.02 for name in names}
     return Motion.from_arrays(t, {name: a * np.sin(6 * t) for name, a in size.items()})
 
 

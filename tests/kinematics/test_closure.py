@@ -20,9 +20,9 @@ from condyle.kinematics.closure import (
     coordinate_closure,
     landmark_closure,
 )
-from condyle.kinematics.contact import contact_frame, parasitic_jacobian, residuals
+from condyle.kinematics.contact import contact_frame, indices, parasitic_jacobian, residuals
 from condyle.kinematics.rotation import angular_velocity_matrix, rotation
-from condyle.mechanism import Mechanism, parse
+from condyle.mechanism import COORDINATES, Mechanism, parse
 from condyle.mechanism.home import (
     condition_of,
     constraint_jacobian,
@@ -49,17 +49,21 @@ def off(mechanism: Mechanism, pose: np.ndarray) -> float:
 def test_poses_lie_on_the_contacts_and_agree_with_the_oracle(contacts: int) -> None:
     raw, mechanism = drawn(contacts)
     states = random_state(np.random.default_rng(contacts), raw, 5)
-    for dependent in list(usable_sets(mechanism))[:6]:
-        names = [n for n in ("X", "Y", "Z", "alpha", "beta", "gamma") if n not in dependent]
-        columns = [("X", "Y", "Z", "alpha", "beta", "gamma").index(n) for n in names]
-        given = ("pose", "pose_rate", "pose_acceleration")
+    given, compared = ("pose", "pose_rate", "pose_acceleration"), 0
+    for dependent in usable_sets(mechanism):
+        condition = condition_of(constraint_jacobian(mechanism), dependent)
+        if condition > 40:  # there the set ceases to determine the pose near home
+            continue
+        names = [name for name in COORDINATES if name not in dependent]
+        columns = indices(names)
         found = coordinate_closure(mechanism, names).solve(*(states[k][:, columns] for k in given))
         assert found.reached.all()
         assert off(mechanism, found.pose) < 1e-12
-        condition = condition_of(constraint_jacobian(mechanism), dependent)
         for key, got in zip(given, (found.pose, found.rate, found.acceleration), strict=True):
             scale = np.abs(states[key]).max()
             np.testing.assert_allclose(got, states[key], atol=1e-13 * condition * scale)
+            compared += 1
+    assert compared >= 6
 
 
 @pytest.mark.parametrize("contacts", range(1, 6))
@@ -95,30 +99,28 @@ def test_parasitic_jacobian(contacts: int) -> None:
         np.testing.assert_allclose(M_J @ q1, rate, atol=1e-13 * np.abs(rate).max())
         rows = contact_rows(d, platform_motion(pose))
         np.testing.assert_allclose(rows @ M_J, 0, atol=1e-13 * np.abs(rows).max(initial=1))
-        free = [
-            i for i, n in enumerate(("X", "Y", "Z", "alpha", "beta", "gamma")) if n not in dependent
-        ]
+        free = indices([name for name in COORDINATES if name not in dependent])
         np.testing.assert_array_equal(M_J[free], np.eye(6 - contacts))
 
 
 def test_far_from_home_the_branch_is_that_of_home() -> None:
-    """A pose found at once is the one found by following 400 small steps."""
+    """A pose found at once is the one found by following small steps."""
     raw, mechanism = drawn(3)
     names = independent_coordinates(mechanism)
-    far = np.array([0.01 if name in "XYZ" else 0.6 for name in names])
-    signs = np.array(np.meshgrid(*[[-1, 0.5, 1]] * len(names))).reshape(len(names), -1).T
-    q = far * signs
+    far = np.array([0.01 if name in "XYZ" else 0.7 for name in names])
+    q = far * np.array(np.meshgrid(*[[-1, 1]] * len(names))).reshape(len(names), -1).T
     found = coordinate_closure(mechanism, names).solve(q, q, q)
     followed = 0
     for sample, pose, reached in zip(q, found.pose, found.reached, strict=True):
         try:
-            wanted = complete_state(raw, names, sample, 0 * sample, 0 * sample, steps=400)[0]
+            wanted = complete_state(raw, names, sample, 0 * sample, 0 * sample, steps=25)[0]
         except (ValueError, np.linalg.LinAlgError):
             continue
-        if np.abs(wanted).max() < 1.5 and reached:
-            np.testing.assert_allclose(pose, wanted, atol=1e-11)
+        if np.abs(wanted).max() < 1.5:
+            assert reached
+            np.testing.assert_allclose(pose, wanted, atol=1e-12)
             followed += 1
-    assert followed > 15 and np.ptp(found.pose[found.reached, 3:]) > 1
+    assert followed > 3 and np.ptp(found.pose[found.reached, 3:]) > 1
 
 
 def test_contacts_that_hold_badly_still_hold() -> None:
@@ -142,8 +144,7 @@ def test_contacts_that_hold_badly_still_hold() -> None:
 
 def test_a_pose_out_of_reach_is_not_a_number_and_alone() -> None:
     _, mechanism = drawn(2)
-    names = [n for n in ("X", "Y", "Z", "alpha", "beta", "gamma") if n not in ("gamma", "X")]
-    closure = coordinate_closure(mechanism, names)
+    closure = coordinate_closure(mechanism, ["Y", "Z", "alpha", "beta"])
     good = np.array([[0.001, 0.002, 0.01, -0.02]])
     with_bad = np.vstack([good, [[0.0, 5.0, 0.0, 0.0]], good])
     alone, together = closure.solve(good, good, good), closure.solve(with_bad, with_bad, with_bad)
@@ -190,7 +191,7 @@ def test_sets_that_do_not_determine_the_pose(
 
 
 def test_a_landmark_needs_two_contacts(reference: Mechanism) -> None:
-    with pytest.raises(InputError, match='no landmark "incisors".*Did you mean "incisor"'):
+    with pytest.raises(InputError, match=r'no landmark "incisors".*Did you mean "incisor"'):
         landmark_closure(reference, "incisors")
     with pytest.raises(InputError, match=r"two contacts; this mechanism has 0"):
         landmark_closure(reference.replace(contacts=()), "incisor")

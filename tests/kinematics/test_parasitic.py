@@ -36,7 +36,7 @@ def test_equation_6_of_the_paper(reference: Mechanism) -> None:
     rng = np.random.default_rng(0)
     q = rng.uniform(-1, 1, (50, 4)) * [0.01, 0.01, 0.4, 0.4]
     pose, _, _, reach = evaluate(closure_function(reference), q, q, q)
-    X, Y, alpha, beta = q.T
+    X, _, alpha, beta = q.T
     p1, p2 = -1.1, 0.013215
     gamma = -np.arctan(np.sin(alpha) / (p1 * np.cos(beta) + np.cos(alpha) * np.sin(beta)))
     assert (reach > 0).all()

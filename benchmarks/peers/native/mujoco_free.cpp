@@ -2,6 +2,8 @@
 // platform and the cranks are products of a line; attitudes come without arc functions.
 #include <mujoco/mujoco.h>
 
+#include <stdexcept>
+
 #include "entry.hpp"
 
 namespace peer {
@@ -11,6 +13,7 @@ class MujocoFree {
   MujocoFree(const double* constants, const char* model_path) : m_(constants) {
     char error[1000];
     model_ = mj_loadXML(model_path, nullptr, error, sizeof error);
+    if (!model_) throw std::runtime_error(error);
     data_ = mj_makeData(model_);
     for (int lane = 0; lane < kLanes; ++lane) {
       Matrix3 N;
@@ -27,8 +30,6 @@ class MujocoFree {
     mj_deleteData(data_);
     mj_deleteModel(model_);
   }
-
-  EIGEN_MAKE_ALIGNED_OPERATOR_NEW
 
   void torques(const Sample& s, double* tau) {
     const Platform b = place(m_, s);

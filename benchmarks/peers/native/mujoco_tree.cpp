@@ -3,6 +3,8 @@
 // Of mj_inverse only the four steps that the tree needs are called.
 #include <mujoco/mujoco.h>
 
+#include <stdexcept>
+
 #include "entry.hpp"
 
 namespace peer {
@@ -12,14 +14,13 @@ class MujocoTree {
   MujocoTree(const double* constants, const char* model_path) : m_(constants) {
     char error[1000];
     model_ = mj_loadXML(model_path, nullptr, error, sizeof error);
+    if (!model_) throw std::runtime_error(error);
     data_ = mj_makeData(model_);
   }
   ~MujocoTree() {
     mj_deleteData(data_);
     mj_deleteModel(model_);
   }
-
-  EIGEN_MAKE_ALIGNED_OPERATOR_NEW
 
   void torques(const Sample& s, double* tau) {
     const Platform b = place(m_, s);

@@ -11,8 +11,6 @@ class PinocchioFree {
  public:
   PinocchioFree(const double* constants, const char*) : m_(constants), data_(build(m_)) {}
 
-  EIGEN_MAKE_ALIGNED_OPERATOR_NEW
-
   void torques(const Sample& s, double* tau) {
     const Platform b = place(m_, s);
     const Chains c = move(m_, b);

@@ -19,7 +19,7 @@ from ..errors import UnsupportedError
 from ..mechanism.mechanism import Mechanism
 from ..model import Model, with_point
 from .indices import Indices, indices
-from .runs import Run, Samples, run_all
+from .runs import InterpretedModel, Run, Samples, run
 
 if TYPE_CHECKING:
     from ..motion import Load, Motion
@@ -53,7 +53,6 @@ class Comparison:
     unavailable:    the models that there are not.
     free_condition: largest condition number of the dimensionless J_W without the contacts; nan
                     where there are no free runs.
-    kernel:         name of what computed the numbers.
     """
 
     solution: Solution
@@ -61,7 +60,6 @@ class Comparison:
     free_runs: tuple[Run, ...]
     unavailable: tuple[Unavailable, ...]
     free_condition: float
-    kernel: str
 
     @property
     def mechanism(self) -> Mechanism:
@@ -123,14 +121,14 @@ def compare(
     """
     names = [formulation_named(name).name for name in formulations or FORMULATIONS]
     # The first derivation also pays for imports, so it is not one of those that are timed.
-    model = Model(mechanism, names[0], "core")
+    model = InterpretedModel(mechanism, names[0], "core")
     solution = model.solve(motion, load, load_point)
     samples = samples_of(model, solution)
     models, unavailable = [], []
     for name in names:
         for route in ROUTES:
             try:
-                models.append(Model(mechanism, name, route))
+                models.append(InterpretedModel(mechanism, name, route))
             except UnsupportedError as error:
                 unavailable.append(Unavailable(f"{name} {route}", str(error)))
 
@@ -139,10 +137,10 @@ def compare(
         unavailable.append(Unavailable("without contacts", reason))
     else:
         free = mechanism.replace(contacts=(), dependent=None)
-        models += [Model(free, name, "core") for name in names]
+        models += [InterpretedModel(free, name, "core") for name in names]
         posture = models[-1].posture(samples.pose)
         condition = float(posture.singularity.condition.max())
-    runs = run_all(models, samples)
+    runs = [run(one, samples) for one in models]
     held = bool(mechanism.contacts)
     return Comparison(
         solution,
@@ -150,7 +148,6 @@ def compare(
         tuple(one for one in runs if one.contacts != held),
         tuple(unavailable),
         condition,
-        model.kernel.name,
     )
 
 

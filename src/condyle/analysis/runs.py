@@ -3,16 +3,36 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..mechanism.mechanism import COORDINATES
+from ..kernels.interpreted import Interpreted
+from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..model import Model
 from .paper import Seconds
 
-ROUNDS = 2  # the fastest counts: whatever else the machine does only adds
+
+class InterpretedModel(Model):
+    """A model run by the interpreter, so that its derivation and its numbers are timed apart.
+
+    A compiled kernel would mix in the compiler's seconds, or none where the kernel is cached; the
+    benchmark is the place for those.
+
+    Attributes: symbolic: seconds of the derivation.
+    """
+
+    kernel: Interpreted
+
+    def __init__(self, mechanism: Mechanism, formulation: str, route: str) -> None:
+        start = clock()
+        super().__init__(mechanism, formulation, route, backend="interpreted")
+        self.symbolic = clock() - start
+
+
+def clock() -> float:
+    """Seconds of processor time: what else a machine does does not count."""
+    return time.process_time()
 
 
 @dataclass(frozen=True)
@@ -51,55 +71,38 @@ class Run:
         return f"{self.formulation} {self.route}" + ("" if self.contacts else ", no contacts")
 
 
-def run_all(models: Sequence[Model], samples: Samples) -> list[Run]:
-    """Compute the samples by each model, and time their torques.
+def run(model: InterpretedModel, samples: Samples) -> Run:
+    """Compute the samples by a model, and time its torques."""
+    columns = [COORDINATES.index(name) for name in model.independent]
+    q, q1, q2 = (a[:, columns] for a in (samples.pose, samples.rate, samples.acceleration))
+    numeric = numeric_seconds(model, q, q1, q2, samples.load)
+    found = model.kernel.solve(q, q1, q2, samples.load)
+    assert found.share is not None and found.contact_force is not None
+    return Run(
+        model.formulation,
+        model.route,
+        bool(model.mechanism.contacts),
+        Seconds(model.symbolic, numeric),
+        found.torque,
+        found.share,
+        found.contact_force,
+    )
 
-    The models take turns, so that a busy moment of the machine does not fall on one of them.
-    """
-    rounds = [[numeric_seconds(model, samples) for model in models] for _ in range(ROUNDS)]
-    fastest = [min(seconds) for seconds in zip(*rounds, strict=True)]
-    return [run(model, samples, s) for model, s in zip(models, fastest, strict=True)]
 
-
-def numeric_seconds(model: Model, samples: Samples) -> float:
+def numeric_seconds(
+    model: InterpretedModel, q: np.ndarray, q1: np.ndarray, q2: np.ndarray, load: np.ndarray
+) -> float:
     """Seconds of torques alone.
 
     Route `core` closes the contacts in a step of its own, which counts; without contacts the pose
     is given. Contact forces, postures and checks are not counted.
     """
-    states = independent_states(model, samples)
+    kernel = model.kernel
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        start = time.perf_counter()
-        poses = model.kernel.poses(*states)
-        closed = time.perf_counter()
-        model.kernel.torques(*states, samples.load, poses, contact_forces=False)
-        end = time.perf_counter()
+        start = clock()
+        poses = kernel.poses(q, q1, q2)
+        closed = clock()
+        kernel.torques(q, q1, q2, load, poses, contact_forces=False)
+        end = clock()
     own_step = model.route == "core" and model.mechanism.contacts
     return end - (start if own_step else closed)
-
-
-def run(model: Model, samples: Samples, numeric: float) -> Run:
-    """The numbers of a model."""
-    states = independent_states(model, samples)
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        torques = model.kernel.torques(*states, samples.load, model.kernel.poses(*states))
-    assert torques.share is not None and torques.contact_force is not None
-    return Run(
-        model.formulation,
-        model.route,
-        bool(model.mechanism.contacts),
-        Seconds(model.derivation_seconds, numeric),
-        torques.torque,
-        torques.share,
-        torques.contact_force,
-    )
-
-
-def independent_states(model: Model, samples: Samples) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """q_EE and its rates, (N, m) each, as the model wants them."""
-    columns = [COORDINATES.index(name) for name in model.independent]
-    return (
-        samples.pose[:, columns],
-        samples.rate[:, columns],
-        samples.acceleration[:, columns],
-    )

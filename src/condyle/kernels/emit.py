@@ -23,9 +23,6 @@ CHAIN = 5
 INTERLEAVED = 2  # chains whose statements alternate, to keep both arithmetic ports busy
 LONG = 700  # lane operations above which chains run in a loop instead of unrolled
 
-# |q_k|^2 / |a_k|^2 below which the normal equations lose too many digits: they square the
-# condition number, and their error stays under about rounding / CONDITIONED.
-CONDITIONED = 1e-3
 NEAR = 1e-14  # margin or quality below which a sample is looked at again by the interpreter
 
 _INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
@@ -70,7 +67,6 @@ def emit(spec: KernelSpec, width: int) -> Source:
         "MARGIN": names.index("margin"),
         "QUALITY": names.index("quality"),
         "NEAR": NEAR,
-        "CONDITIONED": CONDITIONED if careful else NEAR,
     }
     pieces = [
         *(f"#define {name} {value}" for name, value in sizes.items()),
@@ -90,7 +86,8 @@ def emit(spec: KernelSpec, width: int) -> Source:
 
 def _careful(spec: KernelSpec, width: int) -> list[str]:
     """One evaluation that keeps its accuracy where the quick one's torques lose it."""
-    printer = _Printer(fused(build(spec, careful=True)), width)
+    program = fused(build(spec, careful=True))
+    printer = _Printer(program, width)
     return ["#define CAREFUL", printer.prepare("prepare_careful"), printer.one("careful")]
 
 
@@ -142,6 +139,15 @@ class _Printer:
             start += len(lanes) * padded
         self.table_size = start
         self.lane_operations = sum(1 for v in self.varying if self.g.nodes[v].group is not None)
+
+    @property
+    def blocks(self) -> list[int]:
+        """Vectors that hold a group's lanes."""
+        return [padded // self.width for padded in self.padded]
+
+    def looped(self, copies: list[int]) -> bool:
+        """Whether the copies of lane statements run in a loop: unrolled they would be too long."""
+        return self.lane_operations > LONG and max(copies) > 1
 
     def operations(self) -> int:
         """Vector operations of a batch step, a multiply and the add that consumes it counting one."""
@@ -228,8 +234,7 @@ class _Printer:
     # -- what varies -----------------------------------------------------------------------
 
     def one(self, name: str) -> str:
-        blocks = [padded // self.width for padded in self.padded]
-        shape = _Shape("double", "_s", blocks, lane_table="load({} + {})", stride=self.width)
+        shape = _Shape("double", "_s", self.blocks, lane_table="load({} + {})", stride=self.width)
         head = f"static void {name}(const double *restrict table, const double *restrict in, "
         head += "double *restrict out) {"
         return self._body(shape, head)
@@ -244,7 +249,7 @@ class _Printer:
         self.shape = shape
         phases = range(max(self.g.nodes[v].phase for v in self.varying) + 1)
         lines = [head]
-        looped = self.lane_operations > LONG and max(shape.copies) > 1
+        looped = self.looped(shape.copies)
         self.arrays = self._kept() if looped else set()
         for v in sorted(self.arrays):
             lines.append(f"  vec x{v}_[{shape.copies[self.g.nodes[v].group]}];")  # type: ignore[index]
@@ -427,7 +432,7 @@ class _Printer:
                 times = sum(self.shape.copies)
                 terms.append(f"({times} * {self._name(t, 0)})" if node.op == "sum" else
                              self._name(t, 0))
-            elif self.arrays or (self.lane_operations > LONG and max(self.shape.copies) > 1):
+            elif self.looped(self.shape.copies):
                 terms.append(f"r{v}_{group}")
             else:
                 terms += [self._name(t, c) for c in range(self.shape.copies[group])]

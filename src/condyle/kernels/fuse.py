@@ -41,7 +41,7 @@ def fuse(graph: Graph, roots: Sequence[Value], chain: int) -> tuple[Graph, list[
     def note(value: Value) -> Value:
         if value not in ready:
             node = new.nodes[value]
-            start = max((ready[a] for a in node.args), default=0)
+            start = max((ready[note(a)] for a in node.args), default=0)
             ready[value] = start + (LATENCY.get(node.op, 4) if node.args else 0)
         return value
 
@@ -53,15 +53,25 @@ def fuse(graph: Graph, roots: Sequence[Value], chain: int) -> tuple[Graph, list[
                 t for a, s in zip(node.args, signs, strict=True) for t in terms(a, s * sign)
             ]
         if node.op == "mul" and v in inside:
-            a, b = (moved[x] for x in node.args)
-            return [Term(sign, (a, b), max(ready[a], ready[b]))]
+            *early, late = sorted(factors(v), key=lambda x: ready[x])
+            pair = (_product(new, early, ready, note), late)
+            return [Term(sign, pair, max(ready[x] for x in pair))]
         return [Term(sign, (moved[v],), ready[moved[v]])]
+
+    def factors(v: Value) -> list[Value]:
+        node = graph.nodes[v]
+        found = []
+        for a in node.args:
+            found += factors(a) if graph.nodes[a].op == "mul" and a in inside else [moved[a]]
+        return found
 
     for v in order:
         node = graph.nodes[v]
         if v in inside:
             continue
-        if node.op in ("add", "sub"):
+        if node.op == "mul":
+            moved[v] = _product(new, factors(v), ready, note)
+        elif node.op in ("add", "sub"):
             top = v
             found = sorted(terms(v, 1), key=lambda t: (len(t.factors) > 1, t.ready))
             moved[v] = _sum(new, found, chain, note)
@@ -76,8 +86,9 @@ def _inside(graph: Graph, order: Sequence[Value], uses: dict[Value, int]) -> set
     inside = set()
     for v in order:
         node = graph.nodes[v]
-        if node.op not in ("add", "sub") and not (node.op == "neg" and v in inside):
+        if node.op not in ("add", "sub", "mul"):
             continue
+        wanted = ("mul",) if node.op == "mul" else ("add", "sub", "mul")
         for a in node.args:
             inner = graph.nodes[a]
             same = (inner.group, inner.varies, inner.phase) == (
@@ -85,9 +96,18 @@ def _inside(graph: Graph, order: Sequence[Value], uses: dict[Value, int]) -> set
                 node.varies,
                 node.phase,
             )
-            if uses[a] == 1 and same and inner.op in ("add", "sub", "mul"):
+            if uses[a] == 1 and same and inner.op in wanted:
                 inside.add(a)
     return inside
+
+
+def _product(new: Graph, factors: list[Value], ready: dict[Value, int], note) -> Value:  # noqa: ANN001
+    """Factors that are ready first are multiplied first."""
+    rest = sorted(factors, key=lambda x: ready[x])
+    while len(rest) > 1:
+        product = note(new.apply("mul", rest[0], rest[1]))
+        rest = sorted([product, *rest[2:]], key=lambda x: ready[x])
+    return rest[0]
 
 
 def _sum(new: Graph, terms: list[Term], chain: int, note) -> Value:  # noqa: ANN001

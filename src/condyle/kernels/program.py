@@ -29,6 +29,10 @@ from .graph import Graph, Value, read
 from .layout import Layout
 from .spec import KernelSpec
 
+# |q_k|^2 / |a_k|^2 below which the normal equations lose too many digits: they square the
+# condition number, and their error stays under about rounding / CONDITIONED.
+CONDITIONED = 1e-3
+
 Lanes = list[ca.SX]  # one expression a family group
 
 
@@ -271,7 +275,8 @@ def normal_equations(p: Program, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
     number; where the quality it returns is small, `gram_schmidt` has to do the work.
 
     Args:    A: (m,) a group, lane values; b: (m, r).
-    Returns: tau, (r,) a group as rows; the least pivot over its column's square.
+    Returns: tau, (r,) a group as rows; the least pivot less `CONDITIONED` times its column's
+             square, negative where the columns of A are too nearly dependent.
     """
     m = b.shape[0]
     G = [
@@ -286,7 +291,7 @@ def normal_equations(p: Program, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
         inverse = 1 / d
         pivots.append(inverse)
         if k:
-            quality = ca.fmin(quality, d / G[k][k])
+            quality = ca.fmin(quality, d - CONDITIONED * G[k][k])
         for j in range(k + 1, m):
             L[j][k] = rows[k][j] * inverse
         for j in range(k + 1, m):

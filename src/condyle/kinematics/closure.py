@@ -64,9 +64,9 @@ class Closure:
         self._k = len(mechanism.contacts)
         self._conditions = ca.Function("conditions", [x], [conditions, K])
         self._bias = ca.Function("bias", [x, rate], [bias])
-        home, K = evaluate(self._conditions, np.zeros((1, 6)))
+        home, K_home = evaluate(self._conditions, np.zeros((1, 6)))
         self._home = home[0, self._k :]
-        self._branch = np.linalg.slogdet(_square(K)).sign[0]
+        self._branch = np.linalg.slogdet(_square(K_home)).sign[0]
         length = characteristic_length(mechanism)
         self._unit = np.repeat([length, 1.0], 3)
         self._scale = 1.0 + length  # lengths, and angles of scale 1

@@ -242,9 +242,9 @@ def closed_form(
         A, B, k = s.A, s.B, s.k
         h = A * A + B * B
         root = h - k * k
-        side = branch * ca.sqrt(root)
         inverse_h = 1 / h
-        solution = ca.vertcat((A * k - B * side) * inverse_h, (B * k + A * side) * inverse_h)
+        k_h, s_h = k * inverse_h, branch * inverse_h * ca.sqrt(root)
+        solution = ca.vertcat(A * k_h - B * s_h, B * k_h + A * s_h)
         reach = root * inverse_h
         bryant, equations = (
             Bryant(*(ca.substitute(v, s.unknown, solution) for v in (bryant.cos, bryant.sin))),

@@ -1,13 +1,17 @@
 """Dependent coordinates where they have no closed form: Newton's method as one expression.
 
-A fixed number of steps from home's tangent, for kernels that cannot loop until it is enough. The
-residual that is left says whether it was; where not, the sample needs `Closure`, which follows it
-from home.
+A fixed number of steps, for kernels that cannot loop until it is enough. The residual that is
+left says whether it was; where not, the sample needs `Closure`, which follows it from home.
+
+Most mechanisms on curved surfaces z = f(x, y) depend in Z and one angle. Their difference of phi
+is one equation in that angle, solved from its second-order Taylor expansion at home; the angle's
+cosine and sine are turned along, without trigonometry.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import casadi as ca
 
@@ -24,28 +28,157 @@ from .rotation import Bryant
 
 STEPS = 5
 RESIDUAL = 1e-13  # metres off a surface that count as on it
+SHORT = 5e-3  # radians that Taylor's expansion at home may be off
 
 
-def newton(
-    contacts: Sequence[ContactSymbols], dependent: Sequence[str], q: ca.SX, steps: int = STEPS
-) -> Placement:
+def newton(contacts: Sequence[ContactSymbols], dependent: Sequence[str], q: ca.SX) -> Placement:
     """A pose with phi = 0, from q in the order of X_EE.
 
     Its `reach` is near 1 where the steps sufficed, and 0 where they did not.
     """
     dep = indices(dependent)
+    if all(_is_graph(c) for c in contacts) and 2 in dep:
+        if len(dep) == 1:
+            return _height(contacts[0], q)
+        if len(dep) == 2 and max(dep) >= 3:
+            return _one_angle(contacts, max(dep), q)
+    return _all_at_once(contacts, dependent, q)
+
+
+def _is_graph(contact: ContactSymbols) -> bool:
+    """Whether phi = z - f(x, y), so that Z is found by adding."""
+    p = ca.SX.sym("p", 3)
+    return contact.anchored and ca.jacobian(contact.phi(p), p[2]).is_one()
+
+
+def _height(contact: ContactSymbols, q: ca.SX) -> Placement:
+    """One contact: Z follows from the other five coordinates directly."""
+    bryant = Bryant.of(q[2:])
+    below = ca.vertcat(q[:2], 0)
+    Z = -contact.phi(contact.at(below, bryant.rotation()))
+    return Placement(ca.vertcat(q[:2], Z), bryant, None)
+
+
+@dataclass(frozen=True)
+class _Circle:
+    """Ball centre as an angle turns: cos a + sin b + k, (3,) each, with Z left out."""
+
+    a: ca.SX
+    b: ca.SX
+    k: ca.SX
+
+    def at(self, turn: ca.SX) -> ca.SX:
+        return turn[0] * self.a + turn[1] * self.b + self.k
+
+    def slope(self, turn: ca.SX) -> ca.SX:
+        return turn[0] * self.b - turn[1] * self.a
+
+
+def _one_angle(contacts: Sequence[ContactSymbols], angle: int, q: ca.SX) -> Placement:
+    """Z and one angle: Newton on phi_1 - phi_2 = 0, which is free of Z."""
+    first, second = contacts
+    circles, bryant, unknown = _circles(contacts, angle, q)
+    turn = _far(_taylor(contacts, angle, q))
+    inverse_slope, steps = ca.SX(0), []
+    for last in (False, False, True):
+        p, r = (c.at(turn) for c in circles)
+        off = first.phi(p) - second.phi(r)
+        if not last:  # the last step is so short that the slope before it does
+            slopes = (
+                ca.dot(contact.gradient(point), circle.slope(turn))
+                for contact, circle, point in zip(contacts, circles, (p, r), strict=True)
+            )
+            inverse_slope = 1 / (next(slopes) - next(slopes))
+        steps.append(-off * inverse_slope)
+        turn = _near(turn, steps[-1])
+    p, r = (c.at(turn) for c in circles)
+    heights = first.phi(p), second.phi(r)
+    bryant = Bryant(*(ca.substitute(v, unknown, turn) for v in (bryant.cos, bryant.sin)))
+    Z = -(heights[0] + heights[1]) / 2
+    short = ca.fmax(1 - ca.fabs(steps[0]) / SHORT, 0)
+    reach = ca.fmin(short, _converged(heights[0] - heights[1]))
+    return Placement(ca.vertcat(q[:2], Z), bryant, reach)
+
+
+def _circles(
+    contacts: Sequence[ContactSymbols], angle: int, q: ca.SX
+) -> tuple[list[_Circle], Bryant, ca.SX]:
+    unknown = ca.SX.sym("turn", 2)
+    given = iter(ca.vertsplit(q[2:]))
+    cos, sin = [], []
+    for i in (3, 4, 5):
+        value = None if i == angle else next(given)
+        cos.append(unknown[0] if value is None else ca.cos(value))
+        sin.append(unknown[1] if value is None else ca.sin(value))
+    bryant = Bryant(ca.vertcat(*cos), ca.vertcat(*sin))
+    R, base = bryant.rotation(), ca.vertcat(q[:2], 0)
+    circles = []
+    for contact in contacts:
+        p = contact.at(base, R)
+        a, b = ca.jacobian(p, unknown[0]), ca.jacobian(p, unknown[1])
+        circles.append(_Circle(a, b, ca.substitute(p, unknown, ca.SX.zeros(2))))
+    return circles, bryant, unknown
+
+
+def _far(angle: ca.SX) -> ca.SX:
+    """Cosine and sine of 2 atan(angle / 2): near those of the angle, and of exactly unit length."""
+    t = angle / 2
+    scale = 1 / (1 + t * t)
+    return ca.vertcat((1 - t * t) * scale, 2 * t * scale)
+
+
+def _near(turn: ca.SX, angle: ca.SX) -> ca.SX:
+    """Cosine and sine turned by an angle below `SHORT`, whose sixth power is below rounding."""
+    square = angle * angle
+    c = 1 - square * (0.5 - square * (1 / 24))
+    s = angle * (1 - square * (1 / 6 - square * (1 / 120)))
+    return ca.vertcat(turn[0] * c - turn[1] * s, turn[1] * c + turn[0] * s)
+
+
+def _taylor(contacts: Sequence[ContactSymbols], angle: int, q: ca.SX) -> ca.SX:
+    """The dependent angle to second order in q, about home.
+
+    From E(angle, q) = 0: E_a g = -E_q, E_a H = -(E_qq + E_qa g^T + g E_qa^T + E_aa g g^T).
+    """
+    m = q.shape[0]
+    v = ca.SX.sym("v", m + 1)  # q, then the angle
+    circles, _, _ = _circles(contacts, angle, v[:m])
+    turn = ca.vertcat(ca.cos(v[m]), ca.sin(v[m]))
+    E = contacts[0].phi(circles[0].at(turn)) - contacts[1].phi(circles[1].at(turn))
+    H, gradient = ca.hessian(E, v)
+    H, gradient = ca.substitute([H, gradient], [v], [ca.SX.zeros(m + 1)])
+    inverse = 1 / gradient[m]
+    g = -gradient[:m] * inverse
+    E_qa = H[:m, m]
+    bend = -(H[:m, :m] + E_qa @ g.T + g @ E_qa.T + H[m, m] * (g @ g.T)) * inverse
+    value = ca.dot(g, q)
+    for i in range(m):
+        for j in range(i, m):
+            value += (bend[i, j] * (0.5 if i == j else 1.0)) * (q[i] * q[j])
+    return value
+
+
+def _all_at_once(
+    contacts: Sequence[ContactSymbols], dependent: Sequence[str], q: ca.SX
+) -> Placement:
+    """Newton on all dependent coordinates, from home's tangent."""
+    dep = indices(dependent)
     ind = [i for i in range(6) if i not in dep]
     home = contact_frame(contacts, ca.SX.zeros(3), ca.SX.eye(3))
-    # At home R_omega is the identity.
-    start = parasitic_jacobian(home.N.T, dependent)[dep, :] @ q
     pose = ca.SX.zeros(6)
-    pose[ind], pose[dep] = q, start
-    for _ in range(steps):
+    # At home R_omega is the identity.
+    pose[ind], pose[dep] = q, parasitic_jacobian(home.N.T, dependent)[dep, :] @ q
+    for _ in range(STEPS):
         pose[dep] = pose[dep] - solve_small(*_linear(contacts, dep, pose))
     off = ca.SX(0.0)
     for phi in ca.vertsplit(residuals(contacts, pose)):
         off = ca.fmax(off, ca.fabs(phi))
-    return Placement(pose[:3], Bryant.of(pose[3:]), ca.fmax(1 - off / RESIDUAL, 0))
+    return Placement(pose[:3], Bryant.of(pose[3:]), _converged(off))
+
+
+def _converged(off: ca.SX) -> ca.SX:
+    """Near 1 where a residual [m] is at rounding, 0 beyond `RESIDUAL`."""
+    return ca.fmax(1 - ca.fabs(off) / RESIDUAL, 0)
 
 
 def _linear(

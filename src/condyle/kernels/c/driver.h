@@ -11,7 +11,7 @@ void prepare(const double *par, const double *const *lane, double *table) {
 void one(const double *restrict table, const double *restrict in, double *restrict out) {
     quick(table, in, out);
 #ifdef CAREFUL
-    if (__builtin_expect(!(out[QUALITY] >= CONDITIONED), 0)) careful(table + QUICK_TABLE, in, out);
+    if (__builtin_expect(!(out[QUALITY] >= 0), 0)) careful(table + QUICK_TABLE, in, out);
 #endif
 }
 
@@ -41,7 +41,7 @@ void batch(const double *restrict table, const double *const *in, ptrdiff_t stri
         }
         step(table, from, at, result);
 #ifdef CAREFUL
-        mask poor = ~(result[QUALITY] >= CONDITIONED);
+        mask poor = ~(result[QUALITY] >= 0);
         int64_t any = 0;
         for (int i = 0; i < W; i++) any |= poor[i];
         if (__builtin_expect(any != 0, 0))

@@ -143,9 +143,9 @@ class RSSFamily(Family):
         h = a * a + b * b
         root = h - k * k
         inverse_s = 1 / ca.sqrt(root)
-        s = c.branch * (root * inverse_s)
-        scale = c.l / h
-        x, y = (a * k - b * s) * scale, (b * k + a * s) * scale  # l cos, l sin
+        scale = c.l * (1 / h)
+        k_h, s_h = k * scale, c.branch * root * scale * inverse_s
+        x, y = a * k_h - b * s_h, b * k_h + a * s_h  # l cos, l sin
 
         level = ca.vertcat(c.level[0], c.level[1], 0)
         e = d - x * level - y * c.steep

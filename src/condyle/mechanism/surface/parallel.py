@@ -29,7 +29,8 @@ from .smooth import Smooth
 ON_THE_WAY = (1 / 3, 2 / 3)  # parts of the way from home at which Newton makes one step,
 STEPS = 6  # and how many it makes at the point itself
 CONVERGED = 1e-10  # metres off the foot's conditions
-DIRECTIONS = 400  # in which the foot of home is looked for
+STILL = 1e-15  # metres of a step that is rounding
+DIRECTIONS, STARTS, HOME_STEPS = 1000, 20, 50  # with which the foot of home is looked for
 _FUNCTIONS: dict[tuple[str, int], tuple[ca.Function, ca.Function]] = {}
 
 
@@ -155,21 +156,29 @@ def _home_foot(
 ) -> tuple[np.ndarray, float]:
     """Foot and mu of a point at about `distance` from the wall.
 
-    The ball's own surface passes through the foot: of points all over it, the one that is nearest
-    the wall and whose radius is nearest the normal starts Newton.
+    The ball's own surface passes through the foot: points all over it that are nearest the wall,
+    with radii nearest the normal, start Newton; the foot whose distance is nearest `distance` is
+    the one.
     """
     numbers = ca.DM(constants)
     u = spread_directions(DIRECTIONS)
-    points = p - distance * u
-    g, a, _ = (np.asarray(v) for v in equation(points.T, ca.repmat(numbers, 1, len(u))))
+    starts = p - distance * u
+    g, a, _ = (np.asarray(v) for v in equation(starts.T, ca.repmat(numbers, 1, len(u))))
     with np.errstate(all="ignore"):
         size = np.linalg.norm(a, axis=0)
         miss = np.abs(g[0]) / size + abs(distance) * np.linalg.norm(a / size - u.T, axis=0)
-    best = int(np.argmin(np.where(np.isfinite(miss), miss, np.inf)))
-    w, mu = ca.DM(points[best]), ca.DM(distance / size[best])
-    for _ in range(50):
-        w, mu = newton_step(equation, ca.DM(p), w, mu, numbers)
-    return np.asarray(w).ravel(), float(mu)
+    feet = []
+    for k in np.argsort(np.where(np.isfinite(miss), miss, np.inf))[:STARTS]:
+        w, mu = ca.DM(starts[k]), ca.DM(distance / size[k])
+        for _ in range(HOME_STEPS):
+            last, (w, mu) = w, newton_step(equation, ca.DM(p), w, mu, numbers)
+            if not float(ca.norm_2(w - last)) > STILL:
+                break
+        off = abs(float(mu * ca.norm_2(equation(w, numbers)[1])) - distance)
+        feet.append((off if np.isfinite(off) else np.inf, np.asarray(w).ravel(), float(mu)))
+        if off < CONVERGED:
+            break
+    return min(feet, key=lambda foot: foot[0])[1:]
 
 
 def spread_directions(count: int) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import pi
+from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 from ...analysis.paper import is_stand_in, is_synthetic
@@ -32,5 +33,9 @@ def caption(solution: Solution) -> str:
     parts = [f"Mechanism {name}" + (": stand-in, not the authors' robot" if stand_in else "")]
     if invented:
         parts.append(f"synthetic {' and '.join(invented)}, not the paper's")
-    parts += [f"{what}: {options[what]}" for what in ("motion", "load") if what not in invented]
+    parts += [
+        f"{what}: {PurePath(options[what]).name}"
+        for what in ("motion", "load")
+        if what not in invented
+    ]
     return "; ".join(parts) + "."

@@ -15,7 +15,11 @@ from .style import PALETTE, XYZ, house, new_figure
 if TYPE_CHECKING:
     from ...solution import Solution
 
-VIEWS = (("sagittal", "X", "Z"), ("frontal", "Y", "Z"), ("horizontal", "X", "Y"))
+VIEWS = (
+    ("side (sagittal)", "X", "Z"),
+    ("front (frontal)", "Y", "Z"),
+    ("above (horizontal)", "X", "Y"),
+)
 VARIABLES = ("pose", "pose_rate", "pose_acceleration")
 KINDS = (
     ("position", "angle"),
@@ -79,11 +83,11 @@ def draw_path(figure: FigureBase, solution: Solution) -> None:
     for axes, (view, across, up) in zip(row, VIEWS, strict=True):
         i, j = "XYZ".index(across), "XYZ".index(up)
         axes.plot(place[:, i], place[:, j], color=PALETTE[0], lw=0.9)
-        axes.plot(home[i], home[j], "o", color=PALETTE[1], ms=4, label="home")
+        axes.plot(home[i], home[j], "o", color=PALETTE[1], ms=4)
         axes.set(title=view, xlabel=f"{across} [mm]", ylabel=f"{up} [mm]")
         axes.set_aspect("equal", adjustable="datalim")
         axes.margins(0.1)
-    row[-1].legend(loc="upper right", bbox_to_anchor=(1.0, 1.12), handlelength=0.8)
+    row[0].annotate("home", home[[0, 2]], (6, -3), textcoords="offset points", fontsize=8)
     axes = space.add_subplot(projection="3d")
     axes.plot(*place.T, color=PALETTE[0], lw=0.9)
     axes.plot(*home[:, None], "o", color=PALETTE[1], ms=4)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from pathlib import PurePath
 
 from ...analysis.compare import Comparison, Difference
 from ...analysis.runs import Run
@@ -49,7 +50,8 @@ def _has_forces(run: Run) -> bool:
 def _what(comparison: Comparison) -> str:
     options = comparison.solution.options
     name = comparison.solution.attrs["mechanism_name"]
-    return f"{name}, {options['motion']}, {comparison.samples} samples"
+    motion = PurePath(options["motion"]).name
+    return f"{name}, {motion}, {comparison.samples} samples"
 
 
 def _not_available(comparison: Comparison) -> Iterator[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from pathlib import PurePath
 from typing import Any
 
 from ...analysis import paper
@@ -19,7 +20,7 @@ def table_2(comparison: Comparison) -> Table:
     if not comparison.mechanism.contacts:
         names = ("no contacts", "")
     known = (paper.TABLE_2, paper.TABLE_2_FREE) if beside else ({}, {})
-    form = "{:.4f}" if beside else "{:.4g}"
+    form = "{:.4f}" if beside else "{:.5g}"
     parts = list(dict.fromkeys(part for one in held for part in one.values))
     records, rows = [], []
     for k, one in enumerate(held):
@@ -33,7 +34,7 @@ def table_2(comparison: Comparison) -> Table:
             records += entries
             rows.append(_row("saved by contacts", entries, parts, "{:.2%}"))
     heads = [paper.INDEX_NAMES.get(part, f"F_{part}") for part in parts]
-    title = "Table 2. Mean norm of the torques, all without the bite force, and by part" + (
+    title = "Table 2. Mean norm of the efforts, all without the bite force, and by part" + (
         ": here (paper, ratio)" if beside else ""
     )
     notes = list(_notes_2(comparison, beside))
@@ -114,7 +115,7 @@ def _notes_2(comparison: Comparison, beside: bool) -> Iterator[str]:
     if paper.is_synthetic(options["motion"]):
         yield "The motion is synthetic, not the paper's recording, which was never published."
     elif beside:
-        yield f"The motion is {options['motion']}, not the paper's recording."
+        yield f"The motion is {PurePath(options['motion']).name}, not the paper's recording."
 
 
 def _condition_note(comparison: Comparison, beside: bool) -> str:

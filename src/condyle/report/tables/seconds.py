@@ -18,7 +18,8 @@ def table_1(comparison: Comparison) -> Table:
     beside = paper.is_paper_class(comparison.mechanism)
     first = comparison.run("momentum", "direct")
     records = []
-    for run in in_paper_order(comparison):
+    runs = in_paper_order(comparison) if beside else [*comparison.runs, *comparison.free_runs]
+    for run in runs:
         name, published = _published(run) if beside else (None, None)
         record: dict[str, Any] = {
             "model": run.label,
@@ -82,8 +83,9 @@ def _published(run: Run) -> tuple[str | None, paper.Seconds | None]:
 def _notes_1(comparison: Comparison, beside: bool) -> Iterator[str]:
     yield (
         f"Symbolic: deriving the model; numeric: torques of all {comparison.samples} samples, "
-        f"without contact forces, by the kernel {comparison.kernel!r} on {processor()}, Python "
-        f"{platform.python_version()}. Seconds vary from run to run."
+        f"without contact forces, by CasADi's interpreter on {processor()}, Python "
+        f"{platform.python_version()}. Seconds are of processor time and vary from run to run; "
+        "compiled kernels are faster by far."
     )
     yield (
         "Route core closes the contacts in its numeric part; route direct has that in its "

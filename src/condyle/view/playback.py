@@ -1,0 +1,117 @@
+"""A solution to play back: which sample it is, and the snapshot there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..kinematics.singularity import KINDS
+from ..model import STATUS_NAMES
+from ..report.scene import place
+from ..solution import Solution
+from .session import force_vectors, state_messages
+from .snapshot import Level, Snapshot
+
+
+class Playback:
+    """A solution with a clock.
+
+    Attributes: index: the sample shown;  playing;  speed: times real time.
+    """
+
+    def __init__(self, solution: Solution) -> None:
+        self.solution = solution
+        self.mechanism = solution.mechanism
+        self.time = solution["time"].values
+        self.index = 0
+        self.playing = False
+        self.speed = 1.0
+        self._clock = 0.0
+        good = np.flatnonzero(solution["status"].values == 0)
+        self._last_good = int(good[0]) if good.size else None
+        names = ("pose", "joint", "joint_rate", "torque", "contact_force", "bound_margin", "load")
+        self._values = {name: solution[name].values for name in names}
+
+    @property
+    def now(self) -> float:
+        """Time of the sample shown [s]."""
+        return float(self.time[self.index])
+
+    def seek(self, time: float) -> None:
+        """Show the sample nearest to `time` [s]."""
+        after = int(np.searchsorted(self.time, time))
+        near = [i for i in (after - 1, after) if 0 <= i < len(self.time)]
+        self.index = min(near, key=lambda i: abs(self.time[i] - time))
+        self._clock = self.now
+
+    def play(self) -> None:
+        """Go on from here, from the start at the end."""
+        if self.index == len(self.time) - 1:
+            self.index = 0
+        self._clock = self.now
+        self.playing = True
+
+    def pause(self) -> None:
+        self.playing = False
+
+    def advance(self, seconds: float) -> bool:
+        """Let `seconds` of real time pass; returns whether another sample is shown."""
+        if not self.playing:
+            return False
+        before = self.index
+        clock = self._clock + seconds * self.speed
+        self.seek(clock)
+        self._clock = clock  # the sample's own time would lose what is between samples
+        if clock >= self.time[-1]:
+            self.index, self.playing = len(self.time) - 1, False
+        return self.index != before
+
+    def path(self, point: tuple[float, ...]) -> np.ndarray:
+        """Where a point of the platform, (3,) in {M}, goes: (N, 3) [m], good samples only."""
+        pose = self._values["pose"]
+        good = np.isfinite(pose).all(axis=1)
+        return place(self.mechanism, pose[good], self._values["joint"][good]).on_platform(point)
+
+    def snapshot(self) -> Snapshot:
+        """The mechanism at the sample shown; without a result there, the last good picture."""
+        i, s = self.index, self.solution
+        status = int(s["status"].values[i])
+        if status == 0:
+            self._last_good = i
+        drawn = i if status == 0 or self._last_good is None else self._last_good
+        here = {name: values[i] for name, values in self._values.items()}
+        pose, joint = self._values["pose"][drawn], self._values["joint"][drawn]
+        pose = np.nan_to_num(pose)  # home, where there is not one good sample
+        scene = place(self.mechanism, pose[None], np.nan_to_num(joint)[None])
+        points = self.mechanism.platform.points
+        at = points.get(s.options["load_point"] or "", (0.0, 0.0, 0.0))
+        force = here["contact_force"]
+        level, messages = self._messages(status, here)
+        return Snapshot(
+            mechanism=self.mechanism,
+            pose=pose,
+            wanted=None,
+            scene=scene,
+            broken=(),
+            joint=here["joint"],
+            rate=here["joint_rate"],
+            torque=here["torque"],
+            reach=None,
+            contact_force=force,
+            force_vector=force_vectors(self.mechanism, scene.contacts, force),
+            margin=here["bound_margin"],
+            load=here["load"][:3],
+            load_at=np.array(at),
+            ratio=float(s["singularity_ratio"].values[i]),
+            condition=float(s["condition"].values[i]),
+            near=KINDS[int(s["singularity"].values[i])],
+            level=level,
+            messages=messages,
+            time=self.now,
+        )
+
+    def _messages(self, status: int, here: dict[str, np.ndarray]) -> tuple[Level, tuple[str, ...]]:
+        if status != 0:
+            return "unreachable", (f"No result at this time: {STATUS_NAMES[status]}",)
+        margin, force = here["bound_margin"], here["contact_force"]
+        messages = state_messages(self.mechanism, margin, force, here["torque"], here["joint_rate"])
+        return ("warning" if messages else "calm"), tuple(messages)

@@ -1,0 +1,111 @@
+"""A snapshot as the words and tables of the page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+import numpy as np
+
+from ..kinematics.chain import FAMILIES
+from .session import effort_limit
+from .snapshot import Snapshot
+
+COLOURS = {"calm": "#2b8a3e", "warning": "#b35c00", "unreachable": "#c92a2a"}
+SIGNS = {"calm": "✓", "warning": "⚠", "unreachable": "✕"}
+_CELL = "padding:1px 6px;text-align:right;font-variant-numeric:tabular-nums"
+_HEAD = "opacity:.65;font-weight:400"
+_NAME = "padding:1px 6px 1px 0;text-align:left;font-weight:500;white-space:nowrap"
+
+
+def status_html(snapshot: Snapshot) -> str:
+    """Whether the pose can be, and what is wrong with it."""
+    when = "" if snapshot.time is None else f"t = {snapshot.time:.3f} s. "
+    lines = snapshot.messages or ("Within reach and bounds.",)
+    items = "<br>".join(map(escape, lines))
+    colour, sign = COLOURS[snapshot.level], SIGNS[snapshot.level]
+    return (
+        f'<div role="status" data-level="{snapshot.level}" style="border-left:4px solid {colour};'
+        f'margin:4px 10px;padding:4px 8px;font-size:13px;line-height:1.4">'
+        f'<b style="color:{colour}">{sign} {when}</b>{items}</div>'
+    )
+
+
+def tables_html(snapshot: Snapshot) -> str:
+    """Pose, chains, contacts and singularity in numbers."""
+    parts = [_pose(snapshot), _chains(snapshot)]
+    if len(snapshot.contact_force):
+        parts.append(_contacts(snapshot))
+    parts.append(_singularity(snapshot))
+    body = "".join(parts)
+    return f'<div style="margin:4px 10px;font-size:12px;overflow-x:auto">{body}</div>'
+
+
+def _pose(s: Snapshot) -> str:
+    values = [*s.pose[:3] * 1e3, *np.degrees(s.pose[3:])]
+    heads = ["X mm", "Y mm", "Z mm", "alpha °", "beta °", "gamma °"]
+    return _table(["Pose", *heads], [["", *(number(v, 2) for v in values)]], "pose")
+
+
+def _chains(s: Snapshot) -> str:
+    rows = []
+    for i, chain in enumerate(s.mechanism.chains):
+        family = FAMILIES[chain.kind]
+        angle = family.joint_unit == "rad"
+        unit, scale = ("°", 180 / np.pi) if angle else ("mm", 1e3)
+        limit = effort_limit(chain)
+        row = [
+            chain.name,
+            number(s.joint[i] * scale, 2, unit),
+            number(s.torque[i], 4, family.effort_unit),
+            "" if limit is None else number(100 * abs(s.torque[i]) / limit, 0, "%"),
+        ]
+        if s.rate is not None:
+            row.append(number(s.rate[i], 3, f"{family.joint_unit}/s"))
+        if s.reach is not None:
+            row.append(number(s.reach[i], 3))
+        rows.append(row)
+    last = "speed" if s.reach is None else "reach"
+    return _table(["Chain", "joint", "effort", "of limit", last], rows, "chains")
+
+
+def _contacts(s: Snapshot) -> str:
+    rows = []
+    for name, force, margin in zip(
+        s.mechanism.contact_names, s.contact_force, s.margin, strict=True
+    ):
+        room = "no bounds" if np.isposinf(margin) else number(margin * 1e3, 3, "mm")
+        rows.append([name, number(force, 3, "N"), room])
+    return _table(["Contact", "force along n", "to the bounds"], rows, "contacts")
+
+
+def _singularity(s: Snapshot) -> str:
+    row = ["", number(s.ratio, 4), number(s.condition, 2), s.near]
+    return _table(["Singularity", "ratio", "condition", "near"], [row], "singularity")
+
+
+def number(value: float, decimals: int, unit: str = "") -> str:
+    """A number with its unit, or a dash where there is none."""
+    if not np.isfinite(value):
+        return "–"
+    text = f"{value:.{decimals}f}"
+    return f"{text if float(text) else text.replace('-', '')} {unit}".rstrip()
+
+
+def _table(header: Sequence[str], rows: Sequence[Sequence[str]], name: str) -> str:
+    head = "".join(
+        f'<th scope="col" style="{_CELL if i else _NAME};{_HEAD}">{escape(h)}</th>'
+        for i, h in enumerate(header)
+    )
+    body = "".join(
+        "<tr>"
+        + "".join(
+            f'<td style="{_CELL if i else _NAME}">{escape(cell)}</td>' for i, cell in enumerate(row)
+        )
+        + "</tr>"
+        for row in rows
+    )
+    return (
+        f'<table data-table="{name}" style="border-collapse:collapse;width:100%;margin-bottom:6px">'
+        f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+    )

@@ -1,0 +1,207 @@
+"""The live page: viser's server, its sliders, and the one thread that moves the mechanism.
+
+Callbacks only note what is wanted; one worker computes the latest wish and draws it. So a fast
+hand never makes a queue, and no pose can stop the page.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import threading
+import time
+from pathlib import Path
+
+import viser
+
+from ..mechanism import Mechanism, load
+from ..solution import Solution, open_solution
+from .panel import Panel
+from .playback import Playback
+from .session import Session
+from .snapshot import Snapshot
+from .stage import Stage
+
+DEFAULT = "masticatory"
+BRAND = (16, 93, 202)
+FRAME = 1 / 30  # seconds between pictures of a solution that plays
+
+
+class View:
+    """A running page. `url` is where it is; `close` ends it.
+
+    Attributes: session: the pose and the load that people move;  playback: a solution, or None;
+                snapshot: what is shown now.
+    """
+
+    session: Session
+    stage: Stage
+    panel: Panel
+    snapshot: Snapshot
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        solution: Solution | None = None,
+        host: str = "127.0.0.1",
+        port: int = 8080,
+    ) -> None:
+        """Start serving. Raises: MechanismError: if the contacts do not hold the platform."""
+        session = Session(mechanism)
+        with contextlib.redirect_stdout(io.StringIO()):  # viser greets in its own name
+            self._server = viser.ViserServer(host=host, port=port, label="condyle", verbose=False)
+        self.set_dark(False)
+        # Pictures of rooms would come from the network.
+        self._server.scene.configure_environment_map(None)
+        self.host = host
+        self._lock = threading.RLock()
+        self._wake = threading.Event()
+        self._closed = False
+        self.dragging = False
+        self.playback: Playback | None = None
+        self._enter(session)
+        if solution is not None:
+            self.play_solution(solution)
+        self._worker = threading.Thread(target=self._work, name="condyle-view", daemon=True)
+        self._worker.start()
+        self.refresh()
+
+    @property
+    def url(self) -> str:
+        return f"http://{self.host}:{self._server.get_port()}"
+
+    @property
+    def lock(self) -> threading.RLock:
+        """Held while the session or the playback changes."""
+        return self._lock
+
+    def refresh(self) -> None:
+        """Compute and draw soon, whatever is wanted by then."""
+        self._wake.set()
+
+    def open_mechanism(self, mechanism: Mechanism) -> None:
+        """Show another mechanism, at home. Raises: CondyleError: if it cannot be."""
+        session = Session(mechanism)  # before anything is cleared
+        with self._lock:
+            self.playback = None
+            self._enter(session)
+        self.refresh()
+
+    def play_solution(self, solution: Solution) -> None:
+        """Show a solution and its mechanism, at its first sample."""
+        playback = Playback(solution)
+        with self._lock:
+            if playback.mechanism != self.session.mechanism:
+                self._enter(Session(playback.mechanism))
+            self.playback = playback
+            points = self.session.mechanism.platform.points
+            guides = list(points.values())[:1] or [(0.0, 0.0, 0.0)]
+            guides += [contact.point for contact in self.session.mechanism.contacts]
+            self.stage.show_paths([playback.path(point) for point in guides])
+            self.panel.show_playback(playback)
+        self.refresh()
+
+    def set_dark(self, dark: bool) -> None:
+        """Draw the page dark or light."""
+        self.dark = dark
+        self._server.gui.configure_theme(
+            control_layout="collapsible",
+            control_width="large",
+            dark_mode=dark,
+            show_logo=False,
+            show_share_button=False,  # it would go through a server elsewhere
+            brand_color=BRAND,
+        )
+
+    def look_from(self, name: str) -> None:
+        """Turn the cameras of everyone who looks to a view of `stage.VIEWS`."""
+        for client in self._server.get_clients().values():
+            self.stage.look_from(client.camera, name)
+
+    def close(self) -> None:
+        """Stop serving."""
+        self._closed = True
+        self._wake.set()
+        self._worker.join(timeout=5)
+        self._server.stop()
+
+    def _enter(self, session: Session) -> None:
+        """Build scene and panel for a session's mechanism."""
+        if hasattr(self, "stage"):
+            self.stage.remove()
+            self._server.gui.reset()
+        self.session = session
+        self.stage = Stage(self._server, session.mechanism)
+        self.stage.look_from(self._server.initial_camera, "Oblique")
+        for client in self._server.get_clients().values():
+            self.stage.look_from(client.camera, "Oblique")
+        self.panel = Panel(self._server, self)
+        self.snapshot = session.snapshot()
+
+    def _work(self) -> None:
+        before = time.monotonic()
+        while not self._closed:
+            playing = self.playback is not None and self.playback.playing
+            self._wake.wait(FRAME if playing else None)
+            asked = self._wake.is_set()
+            self._wake.clear()
+            now = time.monotonic()
+            with self._lock:
+                moved = self.playback is not None and self.playback.advance(now - before)
+                before = now
+                if self._closed or not (asked or moved):
+                    continue
+                self._draw()
+
+    def _draw(self) -> None:
+        try:
+            source = self.playback or self.session
+            self.snapshot = source.snapshot()
+            with self._server.atomic():
+                self.stage.show(self.snapshot, self.dragging)
+                self.panel.show(self.snapshot)
+        except Exception as error:  # the page must say it and go on
+            self.panel.say_error(f"{type(error).__name__}: {error}")
+
+
+def open_view(
+    mechanism: Mechanism | str | Path | None = None,
+    solution: Solution | str | Path | None = None,
+    host: str = "127.0.0.1",
+    port: int = 8080,
+) -> View:
+    """Start the page and return at once; see `serve`."""
+    if isinstance(solution, str | Path):
+        solution = open_solution(solution)
+    if not isinstance(mechanism, Mechanism):
+        solved = solution.mechanism if solution is not None else None
+        mechanism = load(mechanism) if mechanism is not None else solved or load(DEFAULT)
+    return View(mechanism, solution, host, port)
+
+
+def serve(
+    mechanism: Mechanism | str | Path | None = None,
+    solution: Solution | str | Path | None = None,
+    host: str = "127.0.0.1",
+    port: int = 8080,
+    open_browser: bool = False,
+) -> None:
+    """Serve the live page until interrupted.
+
+    Args:   mechanism: one, the path of its file, or the name of a bundled one; without, that of
+                the solution, or the chewing robot.
+            solution: to play back, or the path of its NetCDF file; its own mechanism is shown.
+            host, port: where to listen; the next free port is taken if `port` is not.
+            open_browser: show the page at once.
+    Raises: CondyleError: if mechanism or solution cannot be used.
+    """
+    view = open_view(mechanism, solution, host, port)
+    print(f"condyle view: {view.url} (stop with Ctrl-C)", flush=True)
+    if open_browser:
+        import webbrowser
+
+        webbrowser.open(view.url)
+    with contextlib.suppress(KeyboardInterrupt):
+        while True:
+            time.sleep(3600)
+    view.close()

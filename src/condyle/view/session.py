@@ -1,0 +1,272 @@
+"""The live view without its page: a pose and a load in, a snapshot out. It never raises for a pose.
+
+The platform stands still, so efforts are those that hold it against gravity and the load.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError, did_you_mean
+from ..kinematics.contact import indices
+from ..kinematics.singularity import KINDS, NEAR
+from ..mechanism import COORDINATES, Mechanism
+from ..model import DEFAULT_LOAD_POINT, OK, UNREACHABLE, Evaluation, Model
+from ..report.scene import contact_normals, place
+from ..solution import BOUND_TOLERANCE, bound_margins, lift_off
+from .snapshot import Level, Snapshot
+
+CENTRE = "mass centre"  # where the load acts besides the platform's points
+SPAN_ANGLE = np.radians(60)  # how far from home the reach is looked for
+SCAN = 121
+BEYOND = 1.25  # sliders go this much further than the reach, to show where it ends
+STEPS = 6  # of Gauss-Newton towards a dragged pose
+NUDGE = 1e-6  # [m, rad], for differences
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """An independent coordinate that a slider moves: its range in SI, and how it is shown."""
+
+    name: str
+    low: float
+    high: float
+    unit: str
+    scale: float
+
+
+class Session:
+    """A mechanism at one pose under one load, both free to change.
+
+    Attributes: q: independent coordinates, (m,) [m, rad];  load: force in {S}, (3,) [N];
+                load_point: a platform point, or `CENTRE`.
+    """
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        """Raises: MechanismError: if the contacts do not hold the platform at home."""
+        self.mechanism = mechanism
+        # One pose at a time: a compiled kernel would take longer to build than it saves.
+        self.model = Model(mechanism, backend="interpreted")
+        self.q = np.zeros(len(self.model.independent))
+        self.load = np.zeros(3)
+        points = mechanism.platform.points
+        self.load_point = DEFAULT_LOAD_POINT if DEFAULT_LOAD_POINT in points else CENTRE
+        self._pose = np.zeros(6)
+        self._joint = np.zeros(len(mechanism.chains))
+
+    @property
+    def load_points(self) -> tuple[str, ...]:
+        """Where the load can act."""
+        return (CENTRE, *self.mechanism.platform.points)
+
+    def coordinates(self) -> list[Coordinate]:
+        """The independent coordinates, with ranges a little wider than their reach from home."""
+        found = []
+        for i, name in enumerate(self.model.independent):
+            angle = name not in COORDINATES[:3]
+            span = SPAN_ANGLE if angle else self.model.characteristic_length
+            value = np.linspace(-span, span, SCAN)
+            q = np.zeros((SCAN, len(self.q)))
+            q[:, i] = value
+            reached = self._evaluate(q).status == OK
+            low, high = _around_home(value, reached)
+            unit, scale = ("°", 180 / np.pi) if angle else ("mm", 1e3)
+            found.append(Coordinate(name, BEYOND * low, BEYOND * high, unit, scale))
+        return found
+
+    def set_coordinate(self, name: str, value: float) -> None:
+        """Move one independent coordinate [m or rad]."""
+        if name not in self.model.independent:
+            known = did_you_mean(name, self.model.independent)
+            raise InputError(f'"{name}" is not an independent coordinate.{known}')
+        self.q[self.model.independent.index(name)] = value
+
+    def set_load(self, force: np.ndarray, point: str | None = None) -> None:
+        """Put a force (3,) [N] on the platform, at a point of it."""
+        self.load = np.asarray(force, dtype=float)
+        if point is not None and point not in self.load_points:
+            raise InputError(f'no load point "{point}".{did_you_mean(point, self.load_points)}')
+        self.load_point = point or self.load_point
+
+    def take_pose(self, pose: np.ndarray) -> None:
+        """Go on from X_EE, (6,) [m, rad], which the contacts meet."""
+        self.q = np.array(pose)[indices(self.model.independent)]
+
+    def go_home(self) -> None:
+        self.q = np.zeros(len(self.q))
+
+    def drag_to(self, wanted: np.ndarray) -> None:
+        """Go to the pose on the contacts that is nearest to `wanted`, X_EE (6,) [m, rad].
+
+        Where that search leaves the reach, the independent coordinates of `wanted` are taken as
+        they are, so that the page can say what is wrong with them.
+        """
+        columns = indices(self.model.independent)
+        scale = np.where(np.arange(6) < 3, 1.0, self.model.characteristic_length)
+        q = self.q.copy()
+        for _ in range(STEPS):
+            around = np.vstack([q, q + NUDGE * np.eye(len(q))])
+            pose = self._evaluate(around).poses.pose
+            J = scale[:, None] * (pose[1:] - pose[0]).T / NUDGE
+            away = scale * (wanted - pose[0])
+            if not np.isfinite(J).all():
+                self.q = np.asarray(wanted, dtype=float)[columns]
+                return
+            step = np.linalg.lstsq(J, away, rcond=None)[0]
+            q = q + step
+            if np.abs(step).max() < 1e-9:
+                break
+        self.q = q
+
+    def snapshot(self) -> Snapshot:
+        """The mechanism at `q` under `load`."""
+        found = self._evaluate(self.q[None])
+        status = int(found.status[0])
+        pose = found.poses.pose[0]
+        met = bool(np.isfinite(pose).all())
+        wanted = None if met else self._wanted()
+        if met:
+            self._pose = pose
+        joint, reach = found.posture.joint[0], found.posture.reach[0]
+        in_reach = reach >= 0
+        broken = [
+            n for n, fine in zip(self.mechanism.chain_names, in_reach, strict=True) if not fine
+        ]
+        if met:
+            self._joint = np.where(in_reach, joint, self._joint)
+        scene = place(self.mechanism, self._pose[None], self._joint[None])
+        force = _or_nan(found.torques.contact_force, len(self.mechanism.contacts), status == OK)
+        measures = found.posture.singularity
+        ratio = float(measures.ratio[0])
+        near = KINDS[int(measures.kind()[0])] if np.isfinite(ratio) else KINDS[0]
+        margin = bound_margins(self.mechanism, found.posture.contact_point)[0]
+        level, messages = self._messages(found, met, broken, margin, force, near)
+        return Snapshot(
+            mechanism=self.mechanism,
+            pose=self._pose,
+            wanted=wanted,
+            scene=scene,
+            broken=tuple(broken) if met else (),
+            joint=np.where(in_reach, joint, np.nan),
+            rate=None,
+            torque=_or_nan(found.torques.torque, len(in_reach), status == OK),
+            reach=reach,
+            contact_force=force,
+            force_vector=force_vectors(self.mechanism, scene.contacts, force),
+            margin=margin,
+            load=self.load,
+            load_at=self._load_at(),
+            ratio=ratio,
+            condition=float(measures.condition[0]),
+            near=near,
+            level=level,
+            messages=messages,
+        )
+
+    def _evaluate(self, q: np.ndarray) -> Evaluation:
+        load = np.concatenate([self.load, np.zeros(3), self._load_at()])
+        rest = np.zeros_like(q)
+        return self.model.evaluate(q, rest, rest, np.repeat(load[None], len(q), axis=0))
+
+    def _load_at(self) -> np.ndarray:
+        return np.array(self.mechanism.platform.points.get(self.load_point, (0.0, 0.0, 0.0)))
+
+    def _wanted(self) -> np.ndarray:
+        """What was asked for, completed by the dependent coordinates of the last good pose."""
+        wanted = self._pose.copy()
+        wanted[indices(self.model.independent)] = self.q
+        return wanted
+
+    def _messages(
+        self,
+        found: Evaluation,
+        met: bool,
+        broken: list[str],
+        margin: np.ndarray,
+        force: np.ndarray,
+        near: str,
+    ) -> tuple[Level, tuple[str, ...]]:
+        status = int(found.status[0])
+        if status == UNREACHABLE:
+            cause = self.model.unreachable_cause(found, 0)
+            messages = [f"Out of reach: {cause}"]
+            others = [name for name in broken if f'"{name}"' not in cause]
+            if met and others:
+                messages.append(f"Also out of reach: {', '.join(others)}")
+            return "unreachable", (*messages, *bound_messages(self.mechanism, margin))
+        messages = []
+        if status != OK:
+            messages.append("Singular: the efforts are not determined here")
+        messages += state_messages(self.mechanism, margin, force, found.torques.torque[0], None)
+        if near != KINDS[0] and status == OK:
+            messages.append(f"Near a singularity of the kind {near} (ratio below {NEAR:g})")
+        return ("warning" if messages else "calm"), tuple(messages)
+
+
+def state_messages(
+    mechanism: Mechanism,
+    margin: np.ndarray,
+    force: np.ndarray,
+    torque: np.ndarray,
+    rate: np.ndarray | None,
+) -> list[str]:
+    """Contacts out of bounds or lifting off, and actuators above a limit."""
+    messages = bound_messages(mechanism, margin)
+    lifted = lift_off(mechanism, force[None])[0] if len(force) else []
+    messages += [
+        f"{name} lifts off: its surface would have to pull"
+        for name, up in zip(mechanism.contact_names, lifted, strict=True)
+        if up
+    ]
+    for i, chain in enumerate(mechanism.chains):
+        effort = effort_limit(chain)
+        speed = chain.actuator.speed_limit
+        if effort is not None and abs(torque[i]) > effort:
+            messages.append(f"{chain.name} is above its effort limit of {effort:g}")
+        if rate is not None and speed is not None and abs(rate[i]) > speed:
+            messages.append(f"{chain.name} is above its speed limit of {speed:g}")
+    return messages
+
+
+def bound_messages(mechanism: Mechanism, margin: np.ndarray) -> list[str]:
+    """Contacts outside their bounds by margins (k,) [m], NaN where a pose has none."""
+    return [
+        f"{name} is {-m * 1e3:.3g} mm outside its bounds"
+        for name, m in zip(mechanism.contact_names, margin, strict=True)
+        if m < -BOUND_TOLERANCE
+    ]
+
+
+def effort_limit(chain: object) -> float | None:
+    """Torque or force limit of a chain [N m or N]."""
+    actuator = chain.actuator  # type: ignore[attr-defined]
+    return getattr(actuator, "torque_limit", None) or getattr(actuator, "force_limit", None)
+
+
+def force_vectors(
+    mechanism: Mechanism, points: dict[str, np.ndarray], force: np.ndarray
+) -> np.ndarray:
+    """Contact forces (k,) along the normals at ball centres (1, 3) each, as vectors (k, 3) [N]."""
+    vectors = [
+        value * contact_normals(contact, points[contact.name])[0]
+        for contact, value in zip(mechanism.contacts, force, strict=True)
+    ]
+    return np.array(vectors).reshape(-1, 3)
+
+
+def _around_home(value: np.ndarray, reached: np.ndarray) -> tuple[float, float]:
+    """Ends of the unbroken run of reached values round the middle one."""
+    middle = len(value) // 2
+    low = high = middle
+    while low > 0 and reached[low - 1]:
+        low -= 1
+    while high < len(value) - 1 and reached[high + 1]:
+        high += 1
+    step = value[1] - value[0]
+    return min(value[low], -step), max(value[high], step)
+
+
+def _or_nan(values: np.ndarray | None, count: int, good: bool) -> np.ndarray:
+    return values[0] if good and values is not None else np.full(count, np.nan)

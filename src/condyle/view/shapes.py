@@ -1,0 +1,79 @@
+"""Unit shapes for the page, and the turns that lay them where they belong."""
+
+from __future__ import annotations
+
+import numpy as np
+
+Mesh = tuple[np.ndarray, np.ndarray]
+
+
+def unit_rod(sides: int = 16) -> Mesh:
+    """A closed cylinder of radius 1 along Z from 0 to 1: vertices (V, 3), faces (F, 3)."""
+    angle = 2 * np.pi * np.arange(sides) / sides
+    ring = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(sides)])
+    vertices = np.vstack([ring, np.add(ring, [0, 0, 1]), [[0, 0, 0], [0, 0, 1]]])
+    i, j = np.arange(sides), np.roll(np.arange(sides), -1)
+    low, high = np.full(sides, 2 * sides), np.full(sides, 2 * sides + 1)
+    faces = [
+        (i, j, j + sides),
+        (i, j + sides, i + sides),
+        (low, j, i),
+        (high, i + sides, j + sides),
+    ]
+    return vertices, np.concatenate([np.column_stack(f) for f in faces])
+
+
+def turn_onto(direction: np.ndarray) -> np.ndarray:
+    """Quaternion (w, x, y, z) that turns Z onto a unit vector."""
+    x, y, z = direction
+    if z < -1 + 1e-12:
+        return np.array([0.0, 1.0, 0.0, 0.0])
+    q = np.array([1 + z, -y, x, 0.0])
+    return q / np.linalg.norm(q)
+
+
+def quaternion(R: np.ndarray) -> np.ndarray:
+    """(w, x, y, z) of a rotation matrix (3, 3)."""
+    # The largest of the four squares keeps its accuracy.
+    squares = np.array(
+        [
+            1 + R[0, 0] + R[1, 1] + R[2, 2],
+            1 + R[0, 0] - R[1, 1] - R[2, 2],
+            1 - R[0, 0] + R[1, 1] - R[2, 2],
+            1 - R[0, 0] - R[1, 1] + R[2, 2],
+        ]
+    )
+    k = int(np.argmax(squares))
+    a, b, c = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
+    d, e, f = R[0, 1] + R[1, 0], R[0, 2] + R[2, 0], R[1, 2] + R[2, 1]
+    rows = [
+        (squares[0], a, b, c),
+        (a, squares[1], d, e),
+        (b, d, squares[2], f),
+        (c, e, f, squares[3]),
+    ]
+    q = np.array(rows[k])
+    return q / np.linalg.norm(q)
+
+
+def matrix(q: np.ndarray) -> np.ndarray:
+    """Rotation matrix (3, 3) of a unit quaternion (w, x, y, z)."""
+    w, x, y, z = q
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def bryant_angles(R: np.ndarray) -> np.ndarray:
+    """(alpha, beta, gamma) [rad] of R = Rx Ry Rz, with beta within 90 degrees."""
+    return np.array(
+        [
+            np.arctan2(-R[1, 2], R[2, 2]),
+            np.arcsin(np.clip(R[0, 2], -1, 1)),
+            np.arctan2(-R[0, 1], R[0, 0]),
+        ]
+    )

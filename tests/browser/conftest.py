@@ -1,0 +1,115 @@
+"""A system Chromium without a window, through Playwright. Skips say why; CI lets none skip."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.report.page import write_report
+from condyle.solution import Solution
+
+CHROMIUM = ("/usr/bin/chromium", "chromium", "chromium-browser", "google-chrome")
+OPTIONS = (
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+)
+PATIENCE = 60_000  # milliseconds; software rendering on a busy machine is slow
+
+
+def _missing(what: str) -> None:
+    if os.environ.get("CONDYLE_BROWSER") == "required":
+        pytest.fail(f"CONDYLE_BROWSER=required, but {what}")
+    pytest.skip(f"browser tests need Playwright and Chromium: {what}")
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    try:
+        from playwright.sync_api import Error, sync_playwright
+    except ImportError:
+        _missing("Playwright is not installed (pip install playwright)")
+    path = next((found for name in CHROMIUM if (found := shutil.which(name))), None)
+    if path is None:
+        _missing("there is no Chromium (apt-get install chromium)")
+    with sync_playwright() as playwright:
+        try:
+            running = playwright.chromium.launch(executable_path=path, args=list(OPTIONS))
+        except Error as error:
+            _missing(f"{path} does not start: {error}")
+        yield running
+        running.close()
+
+
+class Tab:
+    """A page with what it complained of and what it asked the network for."""
+
+    def __init__(self, page: Any) -> None:
+        self.page = page
+        self.errors: list[str] = []
+        self.requests: list[str] = []
+        page.set_default_timeout(PATIENCE)
+        page.on("pageerror", lambda error: self.errors.append(str(error)))
+        page.on("console", self._heard)
+        page.on("request", lambda request: self.requests.append(request.url))
+
+    def _heard(self, message: Any) -> None:
+        if message.type == "error":
+            self.errors.append(message.text)
+
+    def picture(self, selector: str) -> np.ndarray:
+        """Pixels of an element, (height, width, 3)."""
+        from PIL import Image
+
+        shot = self.page.locator(selector).first.screenshot()
+        return np.asarray(Image.open(BytesIO(shot)).convert("RGB")).astype(int)
+
+    def wait(self, script: str, argument: Any = None) -> None:
+        """Until a JavaScript function of `argument` returns true."""
+        self.page.wait_for_function(script, arg=argument)
+
+
+@pytest.fixture
+def open_tab(browser: Any) -> Iterator[Callable[..., Tab]]:
+    """Opens a page in a window of a size; afterwards it must have had no complaint."""
+    tabs: list[Tab] = []
+
+    def open_one(url: str, width: int = 1440, height: int = 900, **options: Any) -> Tab:
+        page = browser.new_page(viewport={"width": width, "height": height}, **options)
+        tab = Tab(page)
+        tabs.append(tab)
+        page.goto(url)
+        return tab
+
+    yield open_one
+    for tab in tabs:
+        tab.page.close()
+        assert tab.errors == []
+
+
+@pytest.fixture(scope="session")
+def solution(reference: condyle.Mechanism) -> Solution:
+    """All 5001 samples of the reference case."""
+    model = condyle.derive(reference, backend="interpreted")
+    return model.solve(condyle.reference_motion(), condyle.reference_load())
+
+
+@pytest.fixture(scope="session")
+def report(solution: Solution, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_report(solution, tmp_path_factory.mktemp("report") / "report.html")

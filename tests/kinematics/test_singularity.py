@@ -1,0 +1,153 @@
+"""The three kinds of singularity of Section 3.3, at poses built to have them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from oracles.closure import complete_state
+from oracles.pinocchio_engine import PinocchioEngine
+from oracles.random_mechanism import random_mechanism, random_state, toml_text
+
+import condyle
+from condyle import SingularError
+from condyle.kinematics.singularity import KINDS, measure
+from condyle.mechanism import Mechanism, parse
+from condyle.mechanism.files import from_data
+from condyle.model import STATUS_NAMES, Evaluation
+
+HOME = np.zeros((1, 6))
+
+
+def unit(v: np.ndarray) -> np.ndarray:
+    return v / np.linalg.norm(v)
+
+
+def spatial(kinks: tuple[float, ...] = (0.3,) * 6, meeting: bool = False) -> dict[str, Any]:
+    """Six chains around the Z axis; each crank is its kink, in rad, off the line of its rod.
+
+    meeting: whether the lines of all rods meet the Z axis.
+    """
+    chains = []
+    for i, kink in enumerate(kinks):
+        third, side = 2 * np.pi * (i // 2) / 3 + 0.5 * (i > 5), 0.35 * (-1) ** i
+        out = np.array([np.cos(third + side), np.sin(third + side), 0])
+        joint = np.array([50 * np.cos(third), 50 * np.sin(third), 10.0 + side])
+        tip = 90 * out + [0, 0, 60]
+        if meeting:
+            tip = joint + 1.5 * (joint - [0, 0, -40.0 + 7 * i])
+        axis = unit(np.cross(out, [0, 0, 1]) + 0.2 * out)
+        across = unit(np.cross(axis, tip - joint))
+        crank = 25 * (np.cross(across, axis) * np.cos(kink) + across * np.sin(kink))
+        places = {"base": tip + crank, "axis": axis, "crank_tip": tip, "platform": joint}
+        chains.append(
+            {"name": f"c{i}", "kind": "RSS", "crank": {"inertia": 1e-5}}
+            | {name: list(place) for name, place in places.items()}
+            | {"coupler": {"mass": 0.01, "com": 0.5, "transverse": 1e-6, "axial": 1e-8}}
+        )
+    platform = {"mass": 0.3, "inertia": {"xx": 1e-4, "yy": 1e-4, "zz": 1e-4}}
+    return {"name": "spatial", "length_unit": "mm", "platform": platform, "chain": chains}
+
+
+def at_home(raw: dict[str, Any]) -> Evaluation:
+    mechanism = from_data(raw)
+    zero = np.zeros((1, mechanism.degrees_of_freedom))
+    return condyle.derive(mechanism).evaluate(zero, zero, zero, np.zeros((1, 9)))
+
+
+def test_a_regular_home() -> None:
+    evaluation = at_home(spatial())
+    s = evaluation.posture.singularity
+    assert KINDS[s.kind()[0]] == "none" and s.rank[0] == 6 and evaluation.status[0] == 0
+    assert s.condition[0] == pytest.approx(1 / s.direct_ratio[0]) and 1 < s.condition[0] < 100
+
+
+def test_inverse_singularity_of_a_stretched_crank() -> None:
+    """J_A tells how far a crank is from in line, as a sine; here 1e-4 against 0.3."""
+    kinks = (0.3, 0.3, 1e-4, 0.3, 0.3, 0.3)
+    s = at_home(spatial(kinks)).posture.singularity
+    assert KINDS[s.kind()[0]] == "inverse"
+    crank = np.argsort(np.abs(s.transmission[0]))[0]
+    assert crank == 2 and s.rank[0] == 6
+    assert s.inverse_ratio[0] == s.ratio[0] < 1e-3 < s.direct_ratio[0]
+
+
+def test_direct_singularity_of_rods_that_meet_an_axis() -> None:
+    """No force along such rods turns the platform about it."""
+    evaluation = at_home(spatial(meeting=True))
+    s = evaluation.posture.singularity
+    assert s.rank[0] == 5 and s.direct_ratio[0] < 1e-12
+    assert KINDS[s.kind()[0]] == "direct" and STATUS_NAMES[evaluation.status[0]] == "singular"
+    both = at_home(spatial((1e-4, 0.3, 0.3, 0.3, 0.3, 0.3), meeting=True)).posture.singularity
+    assert KINDS[both.kind()[0]] == "combined"
+
+
+def test_a_singular_pose_is_an_error_that_names_it() -> None:
+    model = condyle.derive(from_data(spatial(meeting=True)))
+    q = np.random.default_rng(0).normal(0, 1e-4, (3, 6)) * [[1], [0], [1]]
+    evaluation = model.evaluate(q, 0 * q, 0 * q, np.zeros((3, 9)))
+    assert evaluation.status.tolist() == [0, 2, 0]
+    with pytest.raises(SingularError, match=r"singular at row 12: dimensionless ratio") as caught:
+        model.require_ok(evaluation, row_offset=10)
+    assert caught.value.samples == [1]
+
+
+@pytest.mark.parametrize("contacts", range(6))
+def test_measures_are_those_of_the_actuator_jacobian(contacts: int) -> None:
+    """J_A theta' + J_W q' = 0 with the joints' Jacobian of Pinocchio, by numpy's own SVD."""
+    raw = random_mechanism(np.random.default_rng(contacts), contacts=contacts)
+    mechanism = parse(toml_text(raw))
+    model, engine = condyle.derive(mechanism), PinocchioEngine(raw)
+    states = random_state(np.random.default_rng(1), raw, 3)
+    s = model.posture(states["pose"]).singularity
+    length = model.characteristic_length
+    for i, pose in enumerate(states["pose"]):
+        zero = np.zeros(6)
+        J_theta = engine.inverse_dynamics(pose, zero, zero, zero, None)["J_theta"]
+        J_A = s.J_A[i]
+        M_J = np.array(
+            [
+                complete_state(raw, states["names"], states["q"][i], unit, 0 * unit)[1]
+                for unit in np.eye(6 - contacts)
+            ]
+        ).T
+        scale = np.array([1 if name in "XYZ" else length for name in states["names"]])
+        rods = [2 * np.linalg.norm(np.subtract(c.platform, c.crank_tip)) for c in mechanism.chains]
+        J_W = J_A[:, None] * (J_theta @ M_J) / scale / np.array(rods)[:, None]
+        sigma = np.linalg.svd(J_W, compute_uv=False)
+        np.testing.assert_allclose(s.J_W_sigma[i], sigma, rtol=1e-10)
+        assert s.condition[i] == pytest.approx(sigma[0] / sigma[-1], rel=1e-10)
+        for k, chain in enumerate(mechanism.chains):
+            crank = np.linalg.norm(np.subtract(chain.crank_tip, chain.base))
+            assert s.transmission[i, k] == pytest.approx(J_A[k] / (rods[k] * crank), rel=1e-12)
+    assert (np.abs(s.transmission) <= 1).all() and (s.rank == 6 - contacts).all()
+
+
+def test_the_measures_do_not_depend_on_the_unit_of_length(raw: dict[str, Any]) -> None:
+    """A robot ten times as large has the same singular values."""
+    large = from_data(raw | {"length_unit": "mm"})
+    raw["length_unit"] = "m"
+    huge = from_data(raw)
+    pose = np.array([[0.002, 0.001, 0, 0.05, -0.1, 0.02]])
+    scaled = pose * np.repeat([1000.0, 1.0], 3)
+    a = condyle.derive(large).posture(pose).singularity
+    b = condyle.derive(huge).posture(scaled).singularity
+    np.testing.assert_allclose(a.J_W_sigma, b.J_W_sigma, rtol=1e-12)
+    np.testing.assert_allclose(a.transmission, b.transmission, rtol=1e-12)
+    assert b.length == pytest.approx(1000 * a.length)
+
+
+def test_kinds_by_their_thresholds() -> None:
+    ones = np.ones((4, 2))
+    J_A = np.array([[1, 1], [1, 1e-4], [1, 1], [1, -1e-4]])
+    J_W = np.array([np.eye(2), np.eye(2), np.diag([1, 1e-4]), np.diag([1, 1e-13])])
+    s = measure(J_A, ones, J_W, ones / 2, np.array([False, False]), 1.0)
+    assert [KINDS[k] for k in s.kind()] == ["none", "inverse", "direct", "combined"]
+    assert s.rank.tolist() == [2, 2, 2, 1]
+    assert (s.kind(threshold=1e-5) == [0, 0, 0, 2]).all()
+
+
+def test_home_of_the_reference_is_regular(reference: Mechanism) -> None:
+    s = condyle.derive(reference).posture(HOME).singularity
+    assert s.rank[0] == 4 and s.kind()[0] == 0 and s.ratio[0] > 0.05
