@@ -30,6 +30,11 @@ def cross(a: Triple, b: Triple) -> Triple:
     )
 
 
+def turn(rows: list[Triple], v: Triple) -> Triple:
+    """Product of a matrix's rows and a vector, plain numbers."""
+    return dot(rows[0], v), dot(rows[1], v), dot(rows[2], v)
+
+
 def skew(v: Triple) -> Array:
     """Matrix of v x, (3, 3)."""
     x, y, z = v
@@ -124,7 +129,7 @@ class Closure:
         cg, sg = (A * C + B * k) / h, (B * C - A * k) / h
         rows = [(cg * x[i] + sg * y[i], cg * y[i] - sg * x[i], z[i]) for i in range(3)]
 
-        r0, r1 = [tuple(dot(row, t) for row in rows) for t in (t0, t1)]
+        r0, r1 = turn(rows, t0), turn(rows, t1)
         m0, m1 = cross(r0, n0), cross(r1, n1)
         dm = (m0[0] - m1[0], m0[1] - m1[1], m0[2] - m1[2])
         # Gradients of gamma and Z by (X, Y, alpha, beta); alpha turns about X_S, beta about y.
@@ -135,9 +140,13 @@ class Closure:
         Za, Zb = -m0[0] - m_z * ga, -dot(m0, y) - m_z * gb
 
         gamma_d = gX * X_d + gY * Y_d + ga * alpha_d + gb * beta_d
-        turn = (alpha_d, beta_d * ca, beta_d * sa)
-        omega = tuple(w + gamma_d * e for w, e in zip(turn, z, strict=True))
-        about_z, ab = cross(turn, z), alpha_d * beta_d
+        omega_xy = (alpha_d, beta_d * ca, beta_d * sa)
+        omega = (
+            omega_xy[0] + gamma_d * z[0],
+            omega_xy[1] + gamma_d * z[1],
+            omega_xy[2] + gamma_d * z[2],
+        )
+        about_z, ab = cross(omega_xy, z), alpha_d * beta_d
         bias = (
             gamma_d * about_z[0],
             gamma_d * about_z[1] - ab * sa,

@@ -46,7 +46,8 @@ class CompiledPeer(Peer):
     def _prepare(self, mechanism: dict[str, Any], workdir: Path) -> None:
         numbers = read(mechanism)
         source = NATIVE / self.source
-        library, flags = compilers.build(self.family, source, self._options(), workdir)
+        versions = str(self.facts["versions"])
+        library, flags = compilers.build(self.family, source, self._options(), versions, workdir)
         self.facts |= {"compiler": compilers.version(self.family), "flags": " ".join(flags)}
         model = self._model(numbers)
         path = workdir / f"{source.stem}.xml"

@@ -54,8 +54,12 @@ def command(family: str) -> list[str] | None:
     return [sys.executable, "-m", "ziglang", "c++"] if importlib.util.find_spec("ziglang") else None
 
 
-def build(family: str, source: Path, options: list[str], workdir: Path) -> tuple[Path, list[str]]:
+def build(
+    family: str, source: Path, options: list[str], versions: str, workdir: Path
+) -> tuple[Path, list[str]]:
     """Shared library made from one source file, or found made from the same; and its flags.
+
+    Args: versions: of the libraries whose headers it includes.
 
     Raises: PeerError: with the end of what the compiler said.
     """
@@ -64,7 +68,7 @@ def build(family: str, source: Path, options: list[str], workdir: Path) -> tuple
         raise PeerError(HINT[family])
     flags = [*COMMON, *TUNED[family]]
     texts = [p.read_text() for p in (source, *sorted(source.parent.glob("*.hpp")))]
-    identity = [version(family), _processor(), *flags, *SHARED, *options, *texts]
+    identity = [version(family), _processor(), *flags, *SHARED, *options, versions, *texts]
     key = hashlib.sha256("\0".join(identity).encode()).hexdigest()[:16]
     library = workdir / f"{source.stem}-{family}-{key}.so"
     if not library.exists():

@@ -45,8 +45,13 @@ class Case:
     states: dict[str, Any]
     load: np.ndarray
 
-    def evaluate(self, formulation: str = "virtual_power", route: str = "core") -> Evaluation:
-        model = Model(self.mechanism, formulation, route)
+    def evaluate(
+        self,
+        formulation: str = "virtual_power",
+        route: str = "core",
+        backend: str = "interpreted",
+    ) -> Evaluation:
+        model = Model(self.mechanism, formulation, route, backend)
         assert model.independent == tuple(self.states["names"])
         return model.evaluate(*(self.states[key] for key in ("q", "qd", "qdd")), self.load)
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+import condyle
 from condyle.dynamics import FORMULATIONS
 from condyle.dynamics.equations import has_closed_form
 from condyle.mechanism import load
@@ -12,7 +15,7 @@ from families.cases import MECHANISMS, Case, case, close, of_raw
 from oracles import description
 
 OTHERS = [name for name in FORMULATIONS if name != "virtual_power"]
-BUNDLED = description.Path(description.__file__).parents[2] / "src/condyle/mechanism/bundled"
+BUNDLED = Path(condyle.__file__).parent / "mechanism" / "bundled"
 
 
 def same(ours: Evaluation, wanted: Evaluation, tolerance: float) -> None:
@@ -30,6 +33,18 @@ def same(ours: Evaluation, wanted: Evaluation, tolerance: float) -> None:
 def test_formulations_agree(name: str, formulation: str) -> None:
     c = case(name)
     same(c.evaluate(formulation), c.evaluate(), 1e-10)
+
+
+@pytest.mark.parametrize("name", ["pss", "sps_k1", "mixed"])
+def test_compiled_kernels_agree(name: str) -> None:
+    c = case(name)
+    same(c.evaluate(backend="compiled"), c.evaluate(), 1e-11)
+
+
+@pytest.mark.parametrize("formulation", ["hessian", "newton_euler"])
+def test_compiled_formulations_agree(formulation: str) -> None:
+    c = case("mixed_k1_n7")
+    same(c.evaluate(formulation, backend="compiled"), c.evaluate(), 1e-10)
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)

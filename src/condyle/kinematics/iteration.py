@@ -28,7 +28,7 @@ from .rotation import Bryant
 
 STEPS = 5
 RESIDUAL = 1e-13  # metres off a surface that count as on it
-SHORT = 5e-3  # radians that Taylor's expansion at home may be off
+SHORT = 2e-4  # radians of the second step at the most; the first is exact whatever its length
 
 
 def newton(contacts: Sequence[ContactSymbols], dependent: Sequence[str], q: ca.SX) -> Placement:
@@ -90,12 +90,12 @@ def _one_angle(contacts: Sequence[ContactSymbols], angle: int, q: ca.SX) -> Plac
             )
             inverse_slope = 1 / (next(slopes) - next(slopes))
         steps.append(-off * inverse_slope)
-        turn = _near(turn, steps[-1])
+        turn = _turned(turn, _near(steps[-1]) if len(steps) > 1 else _far(steps[-1]))
     p, r = (c.at(turn) for c in circles)
     heights = first.phi(p), second.phi(r)
     bryant = Bryant(*(ca.substitute(v, unknown, turn) for v in (bryant.cos, bryant.sin)))
     Z = -(heights[0] + heights[1]) / 2
-    short = ca.fmax(1 - ca.fabs(steps[0]) / SHORT, 0)
+    short = ca.fmax(1 - ca.fabs(steps[1]) / SHORT, 0)
     reach = ca.fmin(short, _converged(heights[0] - heights[1]))
     return Placement(ca.vertcat(q[:2], Z), bryant, reach)
 
@@ -127,12 +127,14 @@ def _far(angle: ca.SX) -> ca.SX:
     return ca.vertcat((1 - t * t) * scale, 2 * t * scale)
 
 
-def _near(turn: ca.SX, angle: ca.SX) -> ca.SX:
-    """Cosine and sine turned by an angle below `SHORT`, whose sixth power is below rounding."""
+def _near(angle: ca.SX) -> ca.SX:
+    """Cosine and sine of an angle below `SHORT`, whose fourth power is below rounding."""
     square = angle * angle
-    c = 1 - square * (0.5 - square * (1 / 24))
-    s = angle * (1 - square * (1 / 6 - square * (1 / 120)))
-    return ca.vertcat(turn[0] * c - turn[1] * s, turn[1] * c + turn[0] * s)
+    return ca.vertcat(1 - square * 0.5, angle * (1 - square * (1 / 6)))
+
+
+def _turned(turn: ca.SX, by: ca.SX) -> ca.SX:
+    return ca.vertcat(turn[0] * by[0] - turn[1] * by[1], turn[1] * by[0] + turn[0] * by[1])
 
 
 def _taylor(contacts: Sequence[ContactSymbols], angle: int, q: ca.SX) -> ca.SX:

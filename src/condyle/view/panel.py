@@ -81,8 +81,9 @@ class Panel:
             points = self._view.session.load_points
             here = self._view.session.load_point
             self._load_point = self._gui.add_dropdown("at", points, initial_value=here)
-        for handle in (*self._load, self._load_point):
-            handle.on_update(self._loaded)
+        for slider in self._load:
+            slider.on_update(self._loaded)
+        self._load_point.on_update(self._loaded)
 
     def _add_player(self) -> None:
         self._player_note = self._gui.add_markdown("No solution is open. Open one (.nc) here:")

@@ -192,8 +192,8 @@ class Stage:
         load = snapshot.load[None]
         forces = {"load": (load, self.scale * snapshot.scene.on_platform(tuple(snapshot.load_at)))}
         if "contact" in self._arrows:
-            at = [snapshot.scene.contacts[c.name][0] for c in self.mechanism.contacts]
-            forces["contact"] = snapshot.force_vector, self.scale * np.array(at)
+            balls = [snapshot.scene.contacts[c.name][0] for c in self.mechanism.contacts]
+            forces["contact"] = snapshot.force_vector, self.scale * np.array(balls)
         sizes = [np.linalg.norm(force, axis=1) for force, _ in forces.values()]
         here = float(np.nan_to_num(np.concatenate(sizes)).max(initial=0.0))
         per_newton = ARROW / max(here, self.largest_force)

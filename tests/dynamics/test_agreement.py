@@ -1,0 +1,128 @@
+"""Every formulation by every route gives the same torques, shares and contact forces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from oracles.random_mechanism import random_mechanism, random_state, toml_text
+
+import condyle
+from condyle import InputError, UnsupportedError
+from condyle.dynamics import FORMULATIONS, ROUTES
+from condyle.mechanism import Mechanism, parse
+from condyle.model import Evaluation, Model, with_point
+
+
+def models(mechanism: Mechanism) -> Iterator[Model]:
+    """Every combination that the mechanism allows, the paper's `momentum` by `core` first."""
+    for formulation in sorted(FORMULATIONS, key=lambda name: name != "momentum"):
+        for route in ROUTES:
+            try:
+                yield condyle.derive(mechanism, formulation, route, backend="interpreted")
+            except UnsupportedError:
+                assert route == "direct" and len(mechanism.contacts) > 2
+
+
+def difference(got: Evaluation, wanted: Evaluation) -> float:
+    """Largest difference of anything, over the largest component of its kind in its sample."""
+    assert (got.status == 0).all() and (wanted.status == 0).all()
+    worst = 0.0
+    for name in ("torque", "contact_force", "rate", "acceleration", "share"):
+        a, b = getattr(got.torques, name), getattr(wanted.torques, name)
+        axes = tuple(i for i in range(b.ndim) if i != b.ndim - 2)
+        size = np.abs(b).max(axis=axes, initial=0)
+        size = size if name != "contact_force" else np.maximum(size, 0.1)
+        worst = max(worst, (np.abs(a - b).max(axis=axes, initial=0) / size).max())
+    return worst
+
+
+def compare_all(mechanism: Mechanism, *samples: np.ndarray) -> int:
+    first, *others = (model.evaluate(*samples) for model in models(mechanism))
+    for other in others:
+        assert difference(other, first) < 1e-10
+    return len(others)
+
+
+@settings(max_examples=8, deadline=None, derandomize=True)
+@given(
+    seed=st.integers(0, 10**6),
+    chains=st.sampled_from([6, 8]),
+    contacts=st.integers(0, 3),
+    metres=st.booleans(),
+)
+def test_random_mechanisms(seed: int, chains: int, contacts: int, metres: bool) -> None:
+    """In millimetres, and the same numbers in metres: a robot as tall as a tower."""
+    rng = np.random.default_rng(seed)
+    raw = random_mechanism(rng, chains=chains, contacts=contacts, tilted_gravity=True)
+    raw["length_unit"] = "m" if metres else "mm"
+    mechanism = parse(toml_text(raw))
+    states = random_state(rng, raw, 4)
+    load = with_point(states["wrench"], np.array(mechanism.platform.points["right_molar"]))
+    compared = compare_all(mechanism, *(states[key] for key in ("q", "qd", "qdd")), load)
+    assert compared == len(FORMULATIONS) * (2 if contacts < 3 else 1) - 1
+
+
+def test_the_reference_motion(reference: Mechanism) -> None:
+    motion = condyle.reference_motion()
+    wrench = condyle.reference_load().at(motion.t)[::25]
+    model = condyle.derive(reference)
+    q, q1, q2, _ = model.independent_motion(motion)
+    load = with_point(wrench, model.load_point("right_molar"))
+    assert compare_all(reference, q[::25], q1[::25], q2[::25], load) == len(FORMULATIONS) * 2 - 1
+
+
+@pytest.mark.parametrize("dependent", [("Z", "alpha"), ("gamma", "X"), ("alpha", "gamma")])
+def test_the_choice_of_dependent_coordinates_is_free(
+    reference: Mechanism, dependent: tuple[str, ...]
+) -> None:
+    """Another choice of q_EE describes the same motion, so the torques are the same."""
+    model = condyle.derive(reference, backend="interpreted")
+    rng = np.random.default_rng(0)
+    q, q1, q2 = rng.normal(0, 1, (3, 5, 4)) * [[[0.001, 0.001, 0.05, 0.05]], [[1]], [[10]]]
+    load = with_point(rng.normal(0, 5, (5, 6)), model.load_point(None))
+    wanted = model.evaluate(q, q1, q2, load)
+    other = condyle.derive(reference.replace(dependent=dependent), backend="interpreted")
+    columns = [("X", "Y", "Z", "alpha", "beta", "gamma").index(n) for n in other.independent]
+    poses = wanted.poses
+    whole = (poses.pose, poses.rate, poses.acceleration)
+    got = other.evaluate(*(a[:, columns] for a in whole), load)
+    assert difference(got, wanted) < 1e-10
+
+
+@pytest.mark.parametrize("backend", ["interpreted", "auto"])
+def test_near_crank_singularities(reference: Mechanism, backend: str) -> None:
+    """Towards a stretched crank the loss is rounding over the transmission's sine, no more.
+
+    Of root = h - k^2 about eps is lost, so that its square root s, and all that is divided by it,
+    loses eps / s^2.
+    """
+    wanted_by = condyle.derive(reference, "momentum", "core", backend="interpreted")
+    low, high = 0.0, 0.05
+    for _ in range(60):  # to the end of the reach along X
+        middle = (low + high) / 2
+        pose = np.array([[middle, 0, 0, 0]])
+        reached = wanted_by.evaluate(pose, 0 * pose, 0 * pose, np.zeros((1, 9))).torques.reached[0]
+        low, high = (middle, high) if reached else (low, middle)
+    q = np.zeros((9, 4))
+    q[:, 0] = low * (1 - 10.0 ** -np.arange(1, 10))
+    q1, q2 = q * [1, 0, 0, 0] + 0.01, q + 0.1
+    load = with_point(np.full((9, 6), 0.3), wanted_by.load_point(None))
+    wanted = wanted_by.evaluate(q, q1, q2, load)
+    sine = np.abs(wanted.posture.singularity.transmission).min(axis=1)
+    assert sine[0] > 0.1 and sine[-1] < 1e-4
+    for formulation in FORMULATIONS:
+        got = condyle.derive(reference, formulation, backend=backend).evaluate(q, q1, q2, load)
+        error = np.abs(got.torques.torque - wanted.torques.torque).max(axis=1)
+        error /= np.abs(wanted.torques.torque).max(axis=1)
+        assert (error < 1e-13 / sine**2).all()
+
+
+def test_names_that_do_not_exist(reference: Mechanism) -> None:
+    with pytest.raises(InputError, match='no formulation "momentun".*Did you mean "momentum"'):
+        condyle.derive(reference, formulation="momentun")
+    with pytest.raises(InputError, match='no route "care".*Did you mean "core"'):
+        condyle.derive(reference, route="care")
