@@ -23,6 +23,7 @@ from .model import STATUS_NAMES
 
 if TYPE_CHECKING:
     from .model import Evaluation, Model
+    from .report.figures import SolutionPlots
     from .motion import Load, Motion
 
 AXES = ("x", "y", "z")
@@ -61,6 +62,13 @@ class Solution(xr.Dataset):
     def options(self) -> dict[str, Any]:
         """How the solution was made: formulation, route, sources, seconds."""
         return json.loads(self.attrs["options"])
+
+    @property
+    def plot(self) -> SolutionPlots:
+        """Figures: `solution.plot.torque()` and friends; xarray's own are there too."""
+        from .report.figures import SolutionPlots
+
+        return SolutionPlots(self)
 
     def save(self, *paths: str | Path) -> None:
         """Write as NetCDF (.nc) or CSV (.csv): every file whole, or none of them."""

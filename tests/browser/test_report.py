@@ -142,7 +142,9 @@ def test_values_shown_equal_the_data(tab: Tab, solution: Solution) -> None:
         shown = legend(tab, panel)
         assert list(shown) == list(solution["chain"].values)
         largest = float(np.abs(solution[variable].values).max()) * scale
-        assert list(shown.values()) == pytest.approx(at[variable].values * scale, abs=6e-4 * largest)
+        assert list(shown.values()) == pytest.approx(
+            at[variable].values * scale, abs=6e-4 * largest
+        )
     for i, contact in enumerate(solution["contact"].values):
         force, margin = readout(tab, str(contact))
         assert force == pytest.approx(float(at["contact_force"].values[i]), abs=0.0051)
@@ -159,8 +161,11 @@ def test_drawn_mechanism_is_where_the_data_say(tab: Tab, solution: Solution) -> 
     sample = 2040
     scrub(tab, sample)
     labels = tab.page.evaluate(
-        "() => { const t = document.getElementById('stage').data.find((d) => d.name === 'landmarks');"
-        " return t.text.map((name, i) => [name, t.x[i], t.y[i], t.z[i]]); }"
+        """() => {
+            const all = document.getElementById('stage').data;
+            const t = all.find((d) => d.name === 'landmarks');
+            return t.text.map((name, i) => [name, t.x[i], t.y[i], t.z[i]]);
+        }"""
     )
     drawn = {name: position for name, *position in labels}
     for i, contact in enumerate(solution["contact"].values):
@@ -271,7 +276,7 @@ def test_samples_without_a_result_say_so(
     motion = Motion.from_arrays(t, {n: 0.2 * t * (n == "X") for n in names})
     torn = condyle.derive(reference, backend="interpreted").solve(motion, flag=True)
     tab = ready(open_tab(write_report(torn, tmp_path / "torn.html").as_uri()))
-    assert tab.page.locator("#stage-message").is_hidden()
+    assert "speed limit" in tab.page.inner_text("#stage-message")
     tab.page.keyboard.press("End")
     assert "unreachable" in tab.page.inner_text("#stage-message")
     assert tab.page.locator("#panel-torque-Nm .value").first.inner_text() == "–"
@@ -279,9 +284,7 @@ def test_samples_without_a_result_say_so(
 
 
 @pytest.mark.parametrize("name", ["gough-stewart", "hexaglide"])
-def test_other_families_are_drawn(
-    open_tab: Callable[..., Tab], name: str, tmp_path: Path
-) -> None:
+def test_other_families_are_drawn(open_tab: Callable[..., Tab], name: str, tmp_path: Path) -> None:
     model = condyle.derive(condyle.load(name), backend="interpreted")
     t = np.linspace(0, 1, 41)
     motion = Motion.from_arrays(t, {n: 0.02 * np.sin(6 * t) for n in model.independent})

@@ -21,8 +21,10 @@ CASES = {f"k{k}": {"contacts": k} for k in range(4)} | {"n8": {"chains": 8}}
 
 @cache
 def drawn(case: str) -> tuple[dict[str, Any], Model]:
-    rng = np.random.default_rng(sum(map(ord, case)))
+    rng = np.random.default_rng(sum(map(ord, case)) + 1)
     raw = random_mechanism(rng, tilted_gravity=True, **CASES[case])
+    if case == "k3":  # three contacts nearly fix the roll by Y: turn that round
+        raw["dependent"] = ["Z", "gamma", "Y"]
     return raw, condyle.derive(parse(toml_text(raw)), backend="interpreted")
 
 
@@ -32,8 +34,7 @@ def rod_energy(d: Description, chain: Any, P: np.ndarray, V: np.ndarray) -> tupl
     e, t = P - S, np.cross(chain.axis, S - chain.G)
     rate = e @ V / (e @ t)  # the rod keeps its length
     S_rate = t * rate
-    beta, gamma = rod_angles(chain, e)
-    axes = np.column_stack(swing_axes(chain, beta))
+    axes = np.column_stack(swing_axes(chain, rod_angles(chain, e)[0]))
     angles = np.linalg.lstsq(np.cross(axes.T, e).T, V - S_rate, rcond=None)[0]
     omega, n, rod = axes @ angles, e / chain.length, chain.rods[0]
     part = rod.com / chain.length
@@ -58,12 +59,12 @@ def test_power_balance_along_a_trajectory(case: str) -> None:
     """Power of torques and bite = rate of the energy; contacts do no work."""
     raw, model = drawn(case)
     d, rng, m = read(raw), np.random.default_rng(2), model.mechanism.degrees_of_freedom
-    unit = np.array([1e-3 if name in "XYZ" else 0.04 for name in model.independent])
+    unit = np.array([3e-4 if name in "XYZ" else 0.01 for name in model.independent])
     phase = rng.uniform(0, 6, m)
-    t = np.linspace(0, 1, 9)[:, None]
+    t = np.linspace(0, 0.1, 9)[:, None]
 
     def q(t: np.ndarray, order: int) -> np.ndarray:
-        return unit * 7.0**order * np.sin(7 * t + phase + order * np.pi / 2)
+        return unit * 60.0**order * np.sin(60 * t + phase + order * np.pi / 2)
 
     def energies(t: np.ndarray) -> np.ndarray:
         poses = model.evaluate(q(t, 0), q(t, 1), q(t, 2), np.zeros((len(t), 9))).poses
@@ -74,7 +75,7 @@ def test_power_balance_along_a_trajectory(case: str) -> None:
     point = d.points["right_molar"]
     result = model.evaluate(q(t, 0), q(t, 1), q(t, 2), with_point(wrench, point))
     assert (result.status == 0).all()
-    h = 1e-3
+    h = 2e-4
     slope = 8 * (energies(t + h) - energies(t - h)) - (energies(t + 2 * h) - energies(t - 2 * h))
     slope /= 12 * h
     power = result.torques.torque * result.torques.rate

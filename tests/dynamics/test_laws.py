@@ -51,13 +51,13 @@ def test_mirrored_motion_gives_mirrored_torques(contacts: int, chains: int) -> N
     np.testing.assert_allclose(
         other.contact_force[:, ::-1], one.contact_force, atol=1e-11 * np.abs(states["wrench"]).max()
     )
-    assert np.abs(one.torque - other.torque).max() > 0.1 * np.abs(one.torque).max()
+    assert np.abs(one.torque - other.torque).max() > 0.05 * np.abs(one.torque).max()
 
 
 def test_the_reference_is_its_own_mirror_image(reference: Mechanism) -> None:
     model = condyle.derive(reference)
     rng = np.random.default_rng(1)
-    q, q1, q2 = rng.normal(0, 1, (3, 5, 4)) * [[[0.001, 0.001, 0.05, 0.05]], [[0.5]], [[5]]]
+    q, q1, q2 = rng.normal(0, 1, (3, 5, 4)) * [0.001, 0.001, 0.05, 0.05]
     sign = [1, -1, -1, 1]
     wrench = rng.normal(0, 10, (5, 6))
     one = model.evaluate(q, q1, q2, with_point(wrench, model.load_point("right_molar"))).torques

@@ -1,3 +1,6 @@
 """Every command, in the order of the help page."""
 
-from . import run, solve, compare, check, schema, new, reference, cache  # noqa: F401, I001
+# isort: off
+from . import run, solve, compare, pose  # noqa: F401
+from . import check, plot, report, view  # noqa: F401
+from . import new, schema, reference, cache  # noqa: F401

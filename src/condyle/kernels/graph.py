@@ -26,6 +26,8 @@ _BINARY = {
     ca.OP_ATAN2: "atan2",
     ca.OP_FMIN: "fmin",
     ca.OP_FMAX: "fmax",
+    ca.OP_LE: "le",  # 1 or 0
+    ca.OP_LT: "lt",
 }
 _UNARY = {
     ca.OP_NEG: "neg",

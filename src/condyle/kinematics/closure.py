@@ -75,9 +75,9 @@ class Closure:
         """Poses and rates where g = s, g' = s1, g'' = s2, (N, 6 - k) each."""
         pose, reached = self._poses(s)
         K = self._jacobian(pose)
-        rate = _solve(K, self._padded(s1))
+        rate = solve_samples(K, self._padded(s1))
         bias = evaluate(self._bias, pose, rate)[0]
-        acceleration = _solve(K, self._padded(s2) - bias)
+        acceleration = solve_samples(K, self._padded(s2) - bias)
         return PlatformMotion(pose, rate, acceleration, reached)
 
     def _poses(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -118,7 +118,7 @@ class Closure:
                 break
             value, K = evaluate(self._conditions, x[active])
             value[:, self._k :] -= target[active]
-            step = _solve(_square(K), value)
+            step = solve_samples(_square(K), value)
             size = np.abs(step / self._unit).max(axis=1)
             finite = np.isfinite(size)
             x[active[finite]] -= step[finite]
@@ -201,7 +201,7 @@ def _square(K: np.ndarray) -> np.ndarray:
     return K.reshape(len(K), 6, 6).transpose(0, 2, 1)
 
 
-def _solve(K: np.ndarray, b: np.ndarray) -> np.ndarray:
+def solve_samples(K: np.ndarray, b: np.ndarray) -> np.ndarray:
     """K^-1 b for each sample; NaN where K is singular or not finite."""
     good = np.isfinite(K).all(axis=(1, 2)) & np.isfinite(b).all(axis=1)
     x = np.full_like(b, np.nan)

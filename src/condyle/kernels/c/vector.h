@@ -28,6 +28,10 @@ INLINE vec load(const double *p) { return *(const unaligned *)p; }
 INLINE void store(double *p, vec v) { *(unaligned *)p = v; }
 INLINE vec spread(double x) { return x - (vec){}; }
 INLINE vec choose(mask m, vec a, vec b) { return (vec)((m & (mask)a) | (~m & (mask)b)); }
+INLINE vec le_v(vec a, vec b) { return choose(a <= b, spread(1.0), spread(0.0)); }
+INLINE vec lt_v(vec a, vec b) { return choose(a < b, spread(1.0), spread(0.0)); }
+INLINE double le_s(double a, double b) { return a <= b; }
+INLINE double lt_s(double a, double b) { return a < b; }
 INLINE vec fabs_v(vec a) { return (vec)((mask)a & INT64_MAX); }
 INLINE double fabs_s(double a) { return fabs(a); }
 INLINE double fmin_s(double a, double b) { return a < b ? a : b; }

@@ -85,7 +85,7 @@ class SPSFamily(Family):
         beta, gamma, cos_gamma = rod_angles(c.N, e, r)
         return Loop(
             q_r=ca.vertcat(r - c.home, beta, gamma),
-            reach=ca.SX(1.0),
+            reach=ca.dot(e, e) / c.home**2,  # a leg reaches everywhere
             J=e / r,
             rod=e,
             rod_length=r,
@@ -138,7 +138,7 @@ class SPSFamily(Family):
                 "pistons": about_M * w - lag * (A - g) + c.piston_axial * spin,
             },
             J=u,
-            reach=ca.SX(1.0),
+            reach=r2 * (1 / c.home**2),
             rate=rate,
             acceleration=u_A + swing,
             efforts={

@@ -1,0 +1,283 @@
+"""The live view without its page: poses, loads and solutions in, snapshots out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.errors import InputError
+from condyle.motion import Load, Motion
+from condyle.report.scene import contact_patch, place, platform_hull, rotations
+from condyle.solution import Solution
+from condyle.view.playback import Playback
+from condyle.view.readout import number, status_html, tables_html
+from condyle.view.session import Session
+from condyle.view.shapes import bryant_angles, matrix, quaternion, turn_onto, unit_rod
+
+MECHANISMS = ["masticatory", "gough-stewart", "hexaglide"]
+
+
+@pytest.fixture
+def session(reference: condyle.Mechanism) -> Session:
+    return Session(reference)
+
+
+def test_home_holds_the_platform_against_gravity(session: Session) -> None:
+    home = session.snapshot()
+    assert home.level == "calm" and home.messages == ()
+    assert np.allclose(home.pose, 0, atol=1e-12) and np.allclose(home.joint, 0, atol=1e-9)
+    motion = Motion.from_arrays(
+        np.linspace(0, 1, 6),
+        {n: np.zeros(6) for n in ("X", "Y")} | {"alpha": np.zeros(6), "beta": np.zeros(6)},
+    )
+    still = condyle.derive(session.mechanism, backend="interpreted").solve(motion)
+    assert np.allclose(home.torque, still["torque"].values[0], rtol=1e-9)
+    assert np.allclose(home.contact_force, still["contact_force"].values[0], rtol=1e-9)
+
+
+def test_a_coordinate_moves_the_chains_and_the_numbers(session: Session) -> None:
+    before = session.snapshot()
+    session.set_coordinate("beta", np.radians(8))
+    after = session.snapshot()
+    assert after.pose[4] == pytest.approx(np.radians(8))
+    assert np.all(np.abs(after.joint - before.joint) > 0.1)
+    assert not np.allclose(after.torque, before.torque)
+    tip = after.scene.chains["masseter_left"].points
+    assert np.linalg.norm(tip["S"] - tip["M"]) == pytest.approx(0.06, abs=2e-4)
+
+
+def test_load_changes_efforts_and_contact_forces(session: Session) -> None:
+    before = session.snapshot()
+    session.set_load(np.array([0.0, 0.0, -60.0]), "right_molar")
+    after = session.snapshot()
+    assert after.torque[5] > before.torque[5] + 0.1
+    assert after.contact_force[1] < before.contact_force[1] - 1
+    assert np.array_equal(after.load_at, session.mechanism.platform.points["right_molar"])
+    with pytest.raises(InputError, match="left_molar"):
+        session.set_load(np.zeros(3), "molar")
+
+
+def test_out_of_bounds_is_a_warning(session: Session) -> None:
+    session.set_coordinate("X", -0.003)
+    found = session.snapshot()
+    assert found.level == "warning"
+    assert "left_condyle is 2 mm outside its bounds" in found.messages
+    assert np.isfinite(found.torque).all()
+
+
+def test_a_chain_out_of_reach_is_named_and_stays_drawn(session: Session) -> None:
+    session.set_coordinate("X", 0.016)
+    found = session.snapshot()
+    assert found.level == "unreachable"
+    assert 'chain "temporalis_left" cannot reach M' in found.messages[0]
+    assert "temporalis_right" in found.messages[1]
+    assert found.broken == ("temporalis_left", "temporalis_right")
+    assert np.isnan(found.torque).all() and found.pose[0] == 0.016
+    drawn = [p for d in found.scene.chains.values() for p in d.points.values()]
+    assert all(np.isfinite(p).all() for p in drawn)
+    session.go_home()
+    assert session.snapshot().level == "calm"
+
+
+def test_contacts_that_cannot_be_met_leave_the_last_pose_and_a_ghost(raw: dict) -> None:
+    raw["contact"][0]["surface"] = SURFACES["sphere"]
+    session = Session(condyle.mechanism.files.from_data(raw))
+    session.set_coordinate("beta", 0.05)
+    good = session.snapshot().pose
+    session.set_coordinate("Y", 0.1)  # the ball's socket is 20 mm wide
+    found = session.snapshot()
+    assert found.level == "unreachable" and "left_condyle" in found.messages[0]
+    assert np.array_equal(found.pose, good) and found.broken == ()
+    assert found.wanted is not None and found.wanted[1] == 0.1 and found.wanted[4] == 0.05
+
+
+def test_wild_poses_never_raise(session: Session) -> None:
+    rng = np.random.default_rng(5)
+    levels = set()
+    for _ in range(200):
+        session.q = rng.normal(size=4) * rng.choice([0.01, 0.1, 1.0, 1e3], 4)
+        levels.add(session.snapshot().level)
+    for q in ([np.nan] * 4, [np.inf, 0, 0, 0]):
+        session.q = np.array(q)
+        assert session.snapshot().level == "unreachable"
+    assert "unreachable" in levels
+    session.go_home()
+    assert session.snapshot().level == "calm"
+
+
+def test_dragging_goes_to_the_nearest_pose_on_the_contacts(session: Session) -> None:
+    session.set_coordinate("beta", 0.06)
+    session.set_coordinate("X", -0.001)
+    target = session.snapshot().pose
+    session.go_home()
+    session.snapshot()
+    session.drag_to(target)
+    assert np.allclose(session.snapshot().pose, target, atol=1e-6)
+    # Pulled straight down the platform opens, though Z is no independent coordinate.
+    session.go_home()
+    session.drag_to(np.array([0, 0, -0.004, 0, 0, 0]))
+    assert session.snapshot().pose[2] < -0.002
+    session.drag_to(np.array([0.5, 0, 0, 0, 0, 0]))
+    assert session.snapshot().level == "unreachable"
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_sliders_reach_from_home_and_a_little_beyond(name: str) -> None:
+    session = Session(condyle.load(name))
+    found = session.coordinates()
+    assert [c.name for c in found] == list(session.model.independent)
+    for c in found:
+        assert c.low < 0 < c.high
+        session.go_home()
+        session.set_coordinate(c.name, 0.1 * c.high)
+        assert session.snapshot().level != "unreachable"
+
+
+def test_unknown_coordinate_is_refused(session: Session) -> None:
+    with pytest.raises(InputError, match="alpha"):
+        session.set_coordinate("alhpa", 0.0)
+
+
+@pytest.fixture(scope="module")
+def chewing(reference: condyle.Mechanism) -> Solution:
+    motion = Motion.from_csv(condyle.motion.bundled_reference()[0], rate=100)
+    model = condyle.derive(reference, backend="interpreted")
+    return model.solve(motion, condyle.reference_load())
+
+
+def test_playback_shows_the_solutions_numbers(chewing: Solution) -> None:
+    playback = Playback(chewing)
+    playback.seek(1.634)
+    assert playback.now == pytest.approx(1.63)
+    found, at = playback.snapshot(), chewing.isel(time=163)
+    assert np.array_equal(found.torque, at["torque"].values)
+    assert np.array_equal(found.contact_force, at["contact_force"].values)
+    assert np.array_equal(found.pose, at["pose"].values)
+    assert found.time == playback.now and found.reach is None
+    assert np.array_equal(found.rate, at["joint_rate"].values)
+    balls = np.array([p[0] for p in found.scene.contacts.values()])
+    assert np.allclose(balls, at["contact_point"].values, atol=1e-12)
+
+
+def test_playback_runs_with_the_clock_and_stops_at_the_end(chewing: Solution) -> None:
+    playback = Playback(chewing)
+    assert not playback.advance(1.0), "it is not playing"
+    playback.play()
+    for _ in range(1000):
+        playback.advance(0.001)  # ten steps a sample
+    assert playback.now == pytest.approx(1.0, abs=0.011)
+    playback.speed = 2.0
+    assert playback.advance(0.5)
+    assert playback.now == pytest.approx(2.0, abs=0.011)
+    assert playback.advance(100.0) and not playback.playing
+    assert playback.now == chewing["time"].values[-1]
+    playback.play()
+    assert playback.index == 0, "from the end, play starts over"
+
+
+def test_playback_of_failed_samples_keeps_the_picture(reference: condyle.Mechanism) -> None:
+    t = np.linspace(0, 1, 21)
+    names = ("X", "Y", "alpha", "beta")
+    motion = Motion.from_arrays(t, {n: 0.2 * t * (n == "X") for n in names})
+    torn = condyle.derive(reference, backend="interpreted").solve(motion, flag=True)
+    playback = Playback(torn)
+    good = playback.snapshot()
+    assert good.level != "unreachable"
+    playback.seek(1.0)
+    found = playback.snapshot()
+    assert found.level == "unreachable" and "unreachable" in found.messages[0]
+    assert np.isnan(found.torque).all() and np.isfinite(found.pose).all()
+
+
+def test_readout_escapes_names_and_writes_the_numbers(reference: condyle.Mechanism) -> None:
+    chains = [
+        c.model_copy(update={"name": "<b>jaw</b>"}) if i == 0 else c
+        for i, c in enumerate(reference.chains)
+    ]
+    session = Session(reference.replace(chains=tuple(chains)))
+    session.set_coordinate("X", 0.016)
+    found = session.snapshot()
+    for text in (status_html(found), tables_html(found)):
+        assert "<b>jaw" not in text and "&lt;b&gt;jaw" in text
+    assert number(-0.0001, 2) == "0.00" and number(np.nan, 2, "N") == "–"
+    assert number(-1.5, 1, "N m") == "-1.5 N m"
+
+
+def test_turns_agree_with_each_other() -> None:
+    rng = np.random.default_rng(3)
+    angles = rng.uniform(-1.4, 1.4, (50, 3))
+    for R, expected in zip(rotations(angles), angles, strict=True):
+        assert np.allclose(R @ R.T, np.eye(3)) and np.linalg.det(R) == pytest.approx(1)
+        assert np.allclose(bryant_angles(R), expected)
+        assert np.allclose(matrix(quaternion(R)), R)
+    for direction in (*rng.normal(size=(20, 3)), [0, 0, 1], [0, 0, -1]):
+        unit = np.asarray(direction) / np.linalg.norm(direction)
+        assert np.allclose(matrix(turn_onto(unit)) @ [0, 0, 1], unit)
+
+
+def volume(vertices: np.ndarray, faces: np.ndarray) -> float:
+    """Signed: positive for a closed surface whose faces look outwards."""
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    return float((a * np.cross(b, c)).sum() / 6)
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_bodies_are_closed_and_look_outwards(name: str) -> None:
+    mechanism = condyle.load(name)
+    vertices, faces = platform_hull(mechanism)
+    assert volume(vertices, faces) > 0
+    points = [np.asarray(c.platform) for c in mechanism.chains]
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    normal = np.cross(b - a, c - a)
+    for point in points:
+        assert ((point - a) * normal).sum(axis=1).max() < 1e-9, "no joint is outside"
+    assert volume(*unit_rod(64)) == pytest.approx(np.pi, rel=2e-3)
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_drawn_rods_join_the_platform_and_keep_their_length(name: str) -> None:
+    mechanism = condyle.load(name)
+    model = condyle.derive(mechanism, backend="interpreted")
+    t = np.linspace(0, 1, 31)
+    motion = Motion.from_arrays(t, {n: 0.004 * np.sin(5 * t) for n in model.independent})
+    found = model.solve(motion, Load.zero())
+    scene = place(mechanism, found["pose"].values, found["joint"].values)
+    for i, contact in enumerate(mechanism.contacts):
+        assert np.allclose(scene.contacts[contact.name], found["contact_point"].values[:, i])
+    for i, chain in enumerate(mechanism.chains):
+        drawing = scene.chains[chain.name]
+        last = drawing.rods[-1]
+        assert last.end == "M"
+        length = np.linalg.norm(drawing.points[last.end] - drawing.points[last.start], axis=1)
+        if chain.kind != "SPS":
+            assert np.ptp(length) < 1e-12
+        else:
+            leg = np.linalg.norm(drawing.points["M"] - drawing.points["B"], axis=1)
+            home = np.linalg.norm(np.subtract(chain.platform, chain.base))
+            assert np.allclose(leg, home + found["joint"].values[:, i])
+
+
+SURFACES = {
+    "sphere": {"kind": "sphere", "centre": [-26.65, 72, 62.53], "radius": 20},
+    "cylinder": {"kind": "cylinder", "point": [0, 72, 62.53], "axis": [1, 0, 0], "radius": 20},
+    "wall": {"kind": "sphere", "centre": [-26.65, 92, 42.53], "radius": 20},
+}
+
+
+@pytest.mark.parametrize("kind", SURFACES)
+def test_patches_lie_on_their_surface_within_the_bounds(raw: dict, kind: str) -> None:
+    raw["contact"][0]["surface"] = SURFACES[kind]
+    if kind == "wall":
+        del raw["contact"][0]["bounds"]
+    contact = condyle.mechanism.files.from_data(raw).contacts[0]
+    patch = contact_patch(contact, np.array([contact.point]), 0.06)
+    assert len(patch.faces) > 100
+    shown = patch.vertices[np.unique(patch.faces)]
+    phi = [float(contact.surface.phi(p)) for p in shown]
+    assert np.abs(phi).max() < 1e-9
+    assert patch.bounded == (kind != "wall")
+    if patch.bounded:
+        assert shown[:, 0].min() == pytest.approx(-0.02765)
+        assert shown[:, 1].max() == pytest.approx(0.075)
+    assert patch.outline.shape[1:] == (2, 3)

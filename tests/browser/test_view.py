@@ -1,0 +1,169 @@
+"""The live page in a browser: hands on the sliders move the mechanism and the numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.solution import Solution
+from condyle.view import View, open_view
+
+from .conftest import PATIENCE, Tab
+
+
+@pytest.fixture
+def view(browser: object) -> Iterator[View]:
+    running = open_view("masticatory", port=0)
+    yield running
+    running.close()
+
+
+@pytest.fixture
+def tab(open_tab: Callable[..., Tab], view: View) -> Tab:
+    return ready(open_tab(view.url))
+
+
+def ready(tab: Tab) -> Tab:
+    tab.page.wait_for_selector("[data-level]")
+    tab.page.wait_for_timeout(1500)  # the scene's meshes arrive after the panel
+    return tab
+
+
+def fill(tab: Tab, label: str, value: float) -> None:
+    """Type into the number of a slider."""
+    field = tab.page.locator(
+        f'xpath=//label[text()="{label}"]'
+        '/ancestor::div[.//input[@inputmode="decimal"]][1]//input[@inputmode="decimal"]'
+    )
+    field.fill(str(value))
+    field.press("Enter")
+
+
+def row(tab: Tab, table: str, name: str) -> list[str]:
+    cells = tab.page.locator(f'[data-table="{table}"] tr').filter(has_text=name).locator("td")
+    return cells.all_inner_texts()
+
+
+def wait_for_level(tab: Tab, level: str) -> str:
+    status = tab.page.locator(f'[data-level="{level}"]')
+    status.wait_for(timeout=PATIENCE)
+    return status.inner_text()
+
+
+@pytest.mark.parametrize(("width", "height"), [(1440, 900), (420, 844)])
+def test_page_opens_without_a_network(
+    open_tab: Callable[..., Tab], view: View, width: int, height: int
+) -> None:
+    tab = ready(open_tab(view.url, width, height))
+    local = ("http://127.0.0.1", "ws://127.0.0.1", "data:", "blob:")
+    assert [url for url in tab.requests if not url.startswith(local)] == []
+    assert tab.page.locator('[data-level="calm"]').is_visible()
+    pixels = tab.picture("canvas").reshape(-1, 3)
+    assert pixels.std(axis=0).max() > 8, "the canvas is not blank"
+
+
+def test_a_slider_moves_the_mechanism_and_the_numbers(tab: Tab, view: View) -> None:
+    before, picture = row(tab, "chains", "masseter_left"), tab.picture("canvas")
+    fill(tab, "beta [°]", 8)
+    tab.page.locator('[data-table="pose"]').filter(has_text="8.00").wait_for()
+    after = row(tab, "chains", "masseter_left")
+    assert after[1] != before[1] and after[2] != before[2]
+    at = view.snapshot
+    assert at.pose[4] == pytest.approx(np.radians(8))
+    assert after[1] == f"{np.degrees(at.joint[2]):.2f} °"
+    assert after[2] == f"{at.torque[2]:.4f} N m"
+    tab.page.wait_for_timeout(1000)
+    assert np.abs(tab.picture("canvas") - picture).max() > 50, "the mechanism moved"
+
+
+def test_a_load_changes_efforts_and_contact_forces(tab: Tab, view: View) -> None:
+    fill(tab, "Fz [N]", -60)
+    tab.page.locator('[data-table="contacts"]').filter(has_not_text="0.370").wait_for()
+    assert view.snapshot.load[2] == -60
+    force = row(tab, "contacts", "right_condyle")[1]
+    assert force == f"{view.snapshot.contact_force[1]:.3f} N"
+    assert view.snapshot.contact_force[1] < -1
+
+
+def test_poses_out_of_bounds_and_out_of_reach_say_so_and_the_page_lives(
+    tab: Tab, view: View
+) -> None:
+    fill(tab, "X [mm]", -3)
+    assert "left_condyle is 2 mm outside its bounds" in wait_for_level(tab, "warning")
+    fill(tab, "X [mm]", 16)
+    told = wait_for_level(tab, "unreachable")
+    assert 'chain "temporalis_left" cannot reach M' in told
+    assert row(tab, "chains", "temporalis_left")[2] == "–"
+    tab.page.wait_for_timeout(1000)
+    pixels = tab.picture("canvas")
+    red = (pixels[..., 0] > 150) & (pixels[..., 1] < 110) & (pixels[..., 2] < 110)
+    assert red.sum() > 2000, "the platform is drawn in red"
+    tab.page.get_by_role("button", name="Go home").click()
+    wait_for_level(tab, "calm")
+    assert row(tab, "chains", "temporalis_left")[2] == "0.0145 N m"
+
+
+def test_a_solution_is_played_and_scrubbed(
+    tab: Tab, view: View, solution: Solution, tmp_path: Path
+) -> None:
+    path = tmp_path / "chewing.nc"
+    solution.save(path)
+    tab.page.get_by_role("tab", name="Play").click()
+    tab.page.set_input_files("input[type=file]", str(path))
+    tab.page.get_by_text("5001 samples").wait_for()
+    fill(tab, "t [s]", 1.626)
+    tab.page.locator("[data-level]").filter(has_text="t = 1.626 s").wait_for()
+    at = solution.sel(time=1.626, method="nearest")
+    for i, chain in enumerate(solution["chain"].values):
+        assert row(tab, "chains", str(chain))[2] == f"{float(at['torque'].values[i]):.4f} N m"
+    tab.page.get_by_role("button", name="Play", exact=True).click()
+    tab.page.get_by_role("button", name="Pause", exact=True).wait_for()
+    tab.page.wait_for_timeout(1500)
+    assert view.playback is not None and view.playback.now > 1.7
+    tab.page.get_by_role("tab", name="Move").click()
+    fill(tab, "beta [°]", 3)
+    tab.page.locator('[data-table="pose"]').filter(has_text="3.00").wait_for()
+    assert view.playback is None, "a hand on the mechanism ends the playing"
+
+
+def test_files_open_and_bad_ones_are_refused(tab: Tab, view: View, tmp_path: Path) -> None:
+    bad = tmp_path / "bad.toml"
+    bad.write_text('name = "<b>bad</b>"\nunknown = 1\n')
+    tab.page.get_by_role("tab", name="Open").click()
+    tab.page.set_input_files("input[type=file]", str(bad))
+    told = tab.page.get_by_role("alert").filter(has_text="unknown")
+    told.wait_for()
+    assert view.session.mechanism.name == "masticatory"
+    good = tmp_path / "good.toml"
+    condyle.dump(condyle.load("hexaglide"), good)
+    tab.page.set_input_files("input[type=file]", str(good))
+    tab.page.get_by_text("condyle - hexaglide").wait_for()
+    wait_for_level(tab, "calm")
+    assert view.session.mechanism.name == "hexaglide"
+    assert len(row(tab, "chains", "left_front")) == 5
+
+
+def test_dragging_the_platform_moves_it(tab: Tab, view: View) -> None:
+    """The gizmo's drag as viser reports it, start to end."""
+    control = view.stage.control
+    control.position = view.stage.scale * np.array([0.0, 0.0, -0.004])
+
+    class Event:
+        phase = "update"
+
+    view.panel._dragged(Event())
+    assert view.dragging
+    Event.phase = "end"
+    view.panel._dragged(Event())
+    tab.page.locator('[data-table="pose"]').filter(has_not_text="-0.00").wait_for()
+    assert not view.dragging and view.snapshot.pose[2] < -0.002
+
+
+def test_the_page_is_for_this_machine_only(view: View) -> None:
+    assert view.url.startswith("http://127.0.0.1:")
+    listening = view._server.get_host()
+    assert listening == "127.0.0.1"

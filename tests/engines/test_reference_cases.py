@@ -1,0 +1,73 @@
+"""The cases of an independent engine on the reference mechanism, by every model and `solve`."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.dynamics import FORMULATIONS, ROUTES
+from condyle.model import with_point
+
+REFERENCE = json.loads((Path(__file__).parents[1] / "oracles" / "reference_cases.json").read_text())
+CASES = {key: np.array([case[key] for case in REFERENCE["cases"]]) for key in REFERENCE["cases"][0]}
+NAMES = REFERENCE["coordinates"]
+
+
+def close(got: np.ndarray, key: str) -> None:
+    """To 1e-9 of the largest component of each case."""
+    size = np.abs(CASES[key]).max(axis=1, keepdims=True)
+    assert (np.abs(got - CASES[key]) < 1e-9 * size).all(), key
+
+
+@pytest.mark.parametrize("route", ROUTES)
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_every_model_meets_the_cases(
+    reference: condyle.Mechanism, formulation: str, route: str
+) -> None:
+    backend = "auto" if (formulation, route) == ("virtual_power", "core") else "interpreted"
+    model = condyle.derive(reference, formulation, route, backend=backend)
+    assert list(model.independent) == NAMES
+    force = np.hstack([CASES["F"], np.zeros_like(CASES["F"])])
+    load = with_point(force, model.load_point(REFERENCE["load_point"]))
+    found = model.evaluate(CASES["q"], CASES["qd"], CASES["qdd"], load)
+    close(found.torques.torque, "tau")
+    close(found.torques.contact_force, "contact")
+    close(found.poses.pose, "pose")
+    close(found.poses.rate, "pose_d")
+    close(found.poses.acceleration, "pose_dd")
+    close(found.posture.joint, "theta")
+    close(found.torques.rate, "theta_d")
+    close(found.torques.acceleration, "theta_dd")
+    close(found.posture.beta, "beta_i")
+    close(found.posture.gamma, "gamma_i")
+
+
+@pytest.mark.parametrize("options", [(), ("--formulation", "lagrange", "--route", "direct")])
+def test_the_command_meets_the_cases(
+    condyle_command: Callable[..., Any], tmp_path: Path, options: tuple[str, ...]
+) -> None:
+    header = [p + name for p in ("", "d", "dd") for name in NAMES] + ["Fx", "Fy", "Fz"]
+    rows = np.hstack([CASES[key] for key in ("q", "qd", "qdd", "F")])
+    with open(tmp_path / "states.csv", "w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(header)
+        writer.writerows(rows.tolist())
+    arguments = ("--states", "states.csv", "--out", "out.csv", "--load-point", "right_molar")
+    outcome = condyle_command("solve", "masticatory", *arguments, *options)
+    assert outcome.status == 0, outcome.err
+    with open(tmp_path / "out.csv", newline="") as file:
+        columns, *found = list(csv.reader(file))
+    table = np.array(found, dtype=float)
+    assert table.shape == (len(rows), 20)
+    close(table[:, :6], "tau")
+    close(table[:, 6:8], "contact")
+    close(table[:, 8:14], "pose")
+    close(table[:, 14:], "theta")
+    assert columns[0] == "tau_temporalis_left" and columns[19] == "joint_pterygoid_right"

@@ -1,0 +1,1 @@
+"""Reactions: what joints, guides and contacts carry."""
