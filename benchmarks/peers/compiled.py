@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import tempfile
 from abc import abstractmethod
 from pathlib import Path
 from typing import Any
@@ -39,9 +40,9 @@ class CompiledPeer(Peer):
     def _options(self) -> list[str]:
         """Include directories and libraries of the engine."""
 
-    def _model(self, mechanism: Mechanism) -> str | None:
-        """The model as a file for the engine, if it reads one."""
-        return None
+    def _model(self, mechanism: Mechanism) -> str:
+        """Text of the model file, for an engine that reads one."""
+        return ""
 
     def _prepare(self, mechanism: dict[str, Any], workdir: Path) -> None:
         numbers = read(mechanism)
@@ -49,14 +50,14 @@ class CompiledPeer(Peer):
         versions = str(self.facts["versions"])
         library, flags = compilers.build(self.family, source, self._options(), versions, workdir)
         self.facts |= {"compiler": compilers.version(self.family), "flags": " ".join(flags)}
-        model = self._model(numbers)
-        path = workdir / f"{source.stem}.xml"
-        if model is not None:
-            path.write_text(model)
         self._library = _load(library)
-        self._engine = self._library.peer_new(_pointer(numbers.packed()), str(path).encode())
+        with tempfile.TemporaryDirectory() as folder:
+            model = Path(folder) / "model.xml"
+            model.write_text(self._model(numbers))
+            constants = _pointer(numbers.packed())
+            self._engine = self._library.peer_new(constants, str(model).encode())
         if not self._engine:
-            raise PeerError(f"{self.name}: the engine refused the model {path}")
+            raise PeerError(f"{self.name}: the engine refuses its model of this mechanism")
 
     def solve(self, q: Array, qd: Array, qdd: Array, F: Array) -> Array:
         samples, tau = _rows(q, qd, qdd, F), np.empty((len(q), CHAINS))

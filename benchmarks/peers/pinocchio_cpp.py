@@ -8,10 +8,11 @@ from .compiled import CompiledPeer
 
 
 class _PinocchioCpp(CompiledPeer):
-    packages = ("pin", "libpinocchio", "cmeel-boost", "cmeel-eigen")
+    packages = ("pin", "cmeel-eigen")
 
     def _options(self) -> list[str]:
-        include = distribution("libpinocchio").locate_file("cmeel.prefix/include")
+        # The wheels around `pin` share one prefix: Pinocchio, Boost and Eigen.
+        include = distribution("cmeel-eigen").locate_file("cmeel.prefix/include")
         return [
             f"-isystem{include}",
             f"-isystem{include}/eigen3",

@@ -23,8 +23,8 @@ from .model import STATUS_NAMES
 
 if TYPE_CHECKING:
     from .model import Evaluation, Model
-    from .report.figures import SolutionPlots
     from .motion import Load, Motion
+    from .report.figures import SolutionPlots
 
 AXES = ("x", "y", "z")
 WRENCH = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")

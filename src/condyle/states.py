@@ -70,7 +70,7 @@ def solve_file(
 def solve_table(
     model: Model, table: Table, load_point: str | None, flag: bool, first_row: int
 ) -> tuple[dict[str, np.ndarray | list[str]], np.ndarray, np.ndarray]:
-    """Output columns for the rows of one table, the contacts' bound margins and lift-off, (N, k)."""
+    """Output columns for the rows of one table; bound margins and lift-off, (N, k)."""
     names = state_coordinates(model, table)
     q, q1, q2 = (table.require([p + name for name in names]) for p in ("", "d", "dd"))
     q, q1, q2 = model.independent_states(names, q, q1, q2)

@@ -49,10 +49,18 @@ def test_every_model_meets_the_cases(
     close(found.posture.gamma, "gamma_i")
 
 
-@pytest.mark.parametrize("options", [(), ("--formulation", "lagrange", "--route", "direct")])
+@pytest.mark.parametrize(
+    "backend, options",
+    [("auto", ()), ("interpreted", ("--formulation", "lagrange", "--route", "direct"))],
+)
 def test_the_command_meets_the_cases(
-    condyle_command: Callable[..., Any], tmp_path: Path, options: tuple[str, ...]
+    condyle_command: Callable[..., Any],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    backend: str,
+    options: tuple[str, ...],
 ) -> None:
+    monkeypatch.setenv("CONDYLE_BACKEND", backend)
     header = [p + name for p in ("", "d", "dd") for name in NAMES] + ["Fx", "Fy", "Fz"]
     rows = np.hstack([CASES[key] for key in ("q", "qd", "qdd", "F")])
     with open(tmp_path / "states.csv", "w", newline="") as file:

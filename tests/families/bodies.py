@@ -135,9 +135,10 @@ def drive(chain: dict[str, Any], M: Jet, unit: float) -> tuple[Rod, list[Body]]:
         x = x + gap * power((e @ tangent) * 2.0, -1)
     S, _ = place(x)
     r = rod(S, M, M_0 - S_0)
-    data = chain["coupler" if crank else "rod"]
+    kind = "coupler" if crank else "rod"
+    data = chain[kind]
     centre = S + data["com"] * size * r.along
-    second = Body(f"{chain['name']}.{'coupler' if crank else 'rod'}", data["mass"], centre, r.R, table(data))
+    second = Body(f"{chain['name']}.{kind}", data["mass"], centre, r.R, table(data))
     if crank:
         turn = jet(np.eye(3)) + sin(x) * cross_matrix(axis)
         turn = turn + (jet(1.0) - cos(x)) * (cross_matrix(axis) @ cross_matrix(axis))

@@ -7,11 +7,11 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from oracles.description import Raw
+from oracles.random_mechanism import random_mechanism, random_state, toml_text
 
 from condyle.mechanism import Mechanism, parse
 from condyle.model import Evaluation, Model
-from oracles.description import Raw
-from oracles.random_mechanism import random_mechanism, random_state, toml_text
 
 MIXED = ("RSS", "PSS", "SPS")
 MECHANISMS: dict[str, dict[str, Any]] = {

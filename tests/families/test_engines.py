@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-from families.cases import MECHANISMS, case, close
 from oracles import newton_euler
 from oracles.mujoco_engine import MujocoEngine
 from oracles.pinocchio_engine import PinocchioEngine
+
+from families.cases import MECHANISMS, case, close
 
 TOLERANCE = 1e-9
 

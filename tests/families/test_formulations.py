@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from oracles import description
 
 import condyle
 from condyle.dynamics import FORMULATIONS
@@ -12,7 +13,6 @@ from condyle.dynamics.equations import has_closed_form
 from condyle.mechanism import load
 from condyle.model import Evaluation
 from families.cases import MECHANISMS, Case, case, close, of_raw
-from oracles import description
 
 OTHERS = [name for name in FORMULATIONS if name != "virtual_power"]
 BUNDLED = Path(condyle.__file__).parent / "mechanism" / "bundled"
@@ -41,7 +41,9 @@ def test_compiled_kernels_agree(name: str) -> None:
     same(c.evaluate(backend="compiled"), c.evaluate(), 1e-11)
 
 
-@pytest.mark.parametrize(("name", "formulation"), [("pss_k1", "hessian"), ("sps_k1", "newton_euler")])
+@pytest.mark.parametrize(
+    ("name", "formulation"), [("pss_k1", "hessian"), ("sps_k1", "newton_euler")]
+)
 def test_compiled_formulations_agree(name: str, formulation: str) -> None:
     c = case(name)
     same(c.evaluate(formulation, backend="compiled"), c.evaluate(), 1e-10)

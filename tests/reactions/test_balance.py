@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from condyle.dynamics.reactions import Reaction, reactions
-from condyle.model import Model
-from families.bodies import bodies
+from families.bodies import Body, bodies
 from families.cases import MECHANISMS, Case, case, of_raw
 from families.jets import Jet
 from oracles.random_mechanism import random_mechanism
+
+from condyle.dynamics.reactions import Reaction, reactions
+from condyle.model import Model
 
 SURFACES = {
     "curved_k3": {"surface": "mixed", "contacts": 3, "families": ("RSS", "PSS", "SPS")},
     "ellipsoids": {"surface": "ellipsoid"},
 }
+
+
+LENGTH = 0.05  # metres: a lever of these mechanisms
 
 
 def build(name: str) -> Case:
@@ -30,6 +33,27 @@ def found_reactions(c: Case, formulation: str = "virtual_power") -> dict[str, Re
     return reactions(model, model.evaluate(q, q1, q2, c.load))
 
 
+class Ledger:
+    """What is left of each body's balance: force, and moment about its mass centre."""
+
+    def __init__(self, free: dict[str, Body], gravity: np.ndarray) -> None:
+        self.free = free
+        needs = {key: body.needs(gravity) for key, body in free.items()}
+        self.force = {key: -need[0] for key, need in needs.items()}
+        self.moment = {key: -need[1] for key, need in needs.items()}
+        self.largest = dict.fromkeys(free, 0.0)
+
+    def act(self, key: str, force: np.ndarray, moment: np.ndarray, point: np.ndarray) -> None:
+        if key not in self.free:
+            assert key in ("base", "surface")
+            return
+        self.force[key] = self.force[key] + force
+        arm = point - self.free[key].centre.x
+        self.moment[key] = self.moment[key] + moment + np.cross(arm, force)
+        size = max(np.abs(force).max(), np.abs(moment).max() / LENGTH)
+        self.largest[key] = max(self.largest[key], size)
+
+
 def body_of(reaction: Reaction, name: str) -> str:
     """The free body that a reaction calls `name`."""
     return name if name in ("platform", "base", "surface") else f"{reaction.owner}.{name}"
@@ -39,34 +63,21 @@ def body_of(reaction: Reaction, name: str) -> str:
 def test_every_body_balances(name: str) -> None:
     c = build(name)
     found = found_reactions(c)
-    gravity = np.array(c.mechanism.gravity)
     for i in range(len(c.load)):
         motion = Jet(*(c.states[key][i] for key in ("pose", "pose_rate", "pose_acceleration")))
         free = bodies(c.raw, motion)
-        needs = {key: body.needs(gravity) for key, body in free.items()}
-        force = {key: -need[0] for key, need in needs.items()}
-        moment = {key: -need[1] for key, need in needs.items()}
-        largest = dict.fromkeys(free, 0.0)
-
-        def act(key: str, push: np.ndarray, couple: np.ndarray, point: np.ndarray) -> None:
-            if key not in free:
-                assert key in ("base", "surface")
-                return
-            force[key] = force[key] + push
-            moment[key] = moment[key] + couple + np.cross(point - free[key].centre.x, push)
-            largest[key] = max(largest[key], np.abs(push).max(), np.abs(couple).max() / 0.05)
-
+        ledger = Ledger(free, np.array(c.mechanism.gravity))
         for r in found.values():
             vector, zero = r.array[i], np.zeros(3)
-            push, couple = (vector, zero) if r.unit == "N" else (zero, vector)
-            act(body_of(r, r.body), push, couple, r.point[i])
-            act(body_of(r, r.by), -push, -couple, r.point[i])
-        arm = free["platform"].R.x @ c.load[i, 6:]
-        where = free["platform"].centre.x + arm
-        act("platform", c.load[i, :3], c.load[i, 3:6], where)
-        for key in free:
-            assert np.abs(force[key]).max() < 1e-9 * largest[key], key
-            assert np.abs(moment[key]).max() < 1e-9 * 0.05 * largest[key], key
+            force, moment = (vector, zero) if r.unit == "N" else (zero, vector)
+            ledger.act(body_of(r, r.body), force, moment, r.point[i])
+            ledger.act(body_of(r, r.by), -force, -moment, r.point[i])
+        top = free["platform"]
+        where = top.centre.x + top.R.x @ c.load[i, 6:]
+        ledger.act("platform", c.load[i, :3], c.load[i, 3:6], where)
+        for key, largest in ledger.largest.items():
+            assert np.abs(ledger.force[key]).max() < 1e-9 * largest, key
+            assert np.abs(ledger.moment[key]).max() < 1e-9 * LENGTH * largest, key
 
 
 @pytest.mark.parametrize("formulation", ["momentum", "newton_euler"])

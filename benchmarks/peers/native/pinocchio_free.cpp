@@ -1,7 +1,6 @@
 // Pinocchio's RNEA where it pays most: on six free couplers, one joint each. The platform and the
 // cranks are products of a line; the couplers' attitude comes as quaternions without arc functions.
 #include <pinocchio/algorithm/rnea.hpp>
-#include <pinocchio/multibody.hpp>
 
 #include "entry.hpp"
 

@@ -2,7 +2,6 @@
 // (to the platform joint, where it is cut) and a Universal joint, whose angles turn about the base
 // frame N_i0 as the paper's beta_i and gamma_i do.
 #include <pinocchio/algorithm/rnea.hpp>
-#include <pinocchio/multibody.hpp>
 
 #include "entry.hpp"
 

@@ -13,7 +13,9 @@ from .app import LOOK, app
 @app.command(rich_help_panel=LOOK)
 def report(
     solution: Annotated[Path, typer.Argument(help="Solution (.nc) of a run.")],
-    out: Annotated[Path | None, typer.Option(help="HTML file. Default: beside the solution.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="HTML file. Default: beside the solution.")
+    ] = None,
     file: Annotated[
         list[Path] | None,
         typer.Option(help="Input of the run to name with its hash; repeat for more."),

@@ -145,7 +145,9 @@ def direct_function(mechanism: Mechanism, formulation: Formulation) -> ca.Functi
     m = 6 - len(dependent)
     q, q1, q2 = (ca.SX.sym(name, m) for name in ("q", "q1", "q2"))
     load = ca.SX.sym("load", 9)
-    placement = closed_form(contact_symbols(mechanism), dependent, q, ca.SX(closed_branch(mechanism)))
+    placement = closed_form(
+        contact_symbols(mechanism), dependent, q, ca.SX(closed_branch(mechanism))
+    )
     state = independent_state(q, q1, q2, placement.pose())
     outputs = dynamics_outputs(mechanism, formulation, state, ca.SX.eye(m), load)
     return _function("direct", [q, q1, q2, load], list(vars(outputs).values()))

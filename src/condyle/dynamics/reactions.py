@@ -83,10 +83,10 @@ def reactions(
     mechanism, poses, torques = model.mechanism, evaluation.poses, evaluation.torques
     effort = torques.torque if effort is None else effort
     assert torques.contact_force is not None
-    contact = np.where(evaluation.status[:, None] == 0, torques.contact_force, np.nan)
-    inputs = (poses.pose, poses.rate, poses.acceleration, effort, contact)
+    inputs = (poses.pose, poses.rate, poses.acceleration, effort, torques.contact_force)
     with np.errstate(invalid="ignore"):
         values, points = evaluate(reaction_function(mechanism), *inputs)
+    values[evaluation.status != 0] = np.nan
     shape = (len(effort), -1, 3)
     return {
         place.name: Reaction(**vars(place), array=array, point=point)

@@ -8,21 +8,35 @@ what its manifest says is never loaded.
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import json
 import os
+import re
 import shutil
 import stat
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import platformdirs
 
+from ..errors import CondyleError
+
 STALE_SECONDS = 3600  # a folder of a killed build is cleared after this
+BUILD = "condyle-build-"  # what such a folder's name begins with
+ENTRY = re.compile(r"[0-9a-f]{40}(\.json|-[0-9a-f]{16}\.so)")  # files that are ours to remove
+
+Facts = dict[str, Any]
+Make = Callable[[Path], tuple[Path, Facts]]
+_apart: dict[str, Entry] = {}  # kernels of this process alone
+
+
+class CacheError(CondyleError):
+    """A cache that cannot be cleared."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +44,7 @@ class Entry:
     """A library that is safe to load, and what is known of it."""
 
     library: Path
-    facts: dict[str, Any]
+    facts: Facts
     cached: bool
 
 
@@ -46,7 +60,7 @@ class Contents:
 def cache_folder() -> Path:
     """Where kernels are kept: `CONDYLE_CACHE`, else the user's cache folder."""
     if chosen := os.environ.get("CONDYLE_CACHE"):
-        return Path(chosen)
+        return Path(chosen).absolute()
     return Path(platformdirs.user_cache_dir("condyle")) / "kernels"
 
 
@@ -62,73 +76,106 @@ def digest(*parts: str | bytes) -> str:
 
 def find(recipe: str) -> Entry | None:
     """The kernel of a recipe, if it is there and whole."""
+    if recipe in _apart:
+        return _apart[recipe]
     folder = cache_folder()
     if not _trusted(folder):
         return None
     try:
-        facts = json.loads((folder / f"{recipe}.json").read_text(encoding="utf-8"))
+        manifest = json.loads((folder / f"{recipe}.json").read_text(encoding="utf-8"))
+        facts = manifest["facts"]
         library = folder / facts["library"]
-        if library.parent != folder or _hash(library) != facts["sha256"]:
+        if manifest["seal"] != _seal(recipe, facts) or _hash(library) != facts["sha256"]:
             return None
         return Entry(library, facts, True)
     except (OSError, ValueError, KeyError, TypeError):
         return None
 
 
-def build(
-    recipe: str, make: Callable[[Path], tuple[Path, dict[str, Any]]], say: Callable[[str], None]
-) -> Entry:
-    """Build a kernel and keep it; where nothing can be kept, build it in a temporary folder.
+def build(recipe: str, make: Make, say: Callable[[str, str], None]) -> Entry:
+    """Build a kernel and keep it; where nothing can be kept, build it for this process alone.
 
     Args:   make: builds in an empty folder and returns the library and facts about it.
-            say:  told when the cache cannot be used.
+            say:  told when the cache cannot be used: what, and what that is about.
     Raises: OSError: if there is no place to build at all; what `make` raises.
     """
     folder = cache_folder()
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         if not _trusted(folder):
-            raise PermissionError(f"{folder} belongs to or can be written by others")
+            raise PermissionError(0, "it belongs to or can be written by others")
         _sweep(folder)
-        with tempfile.TemporaryDirectory(prefix="build-", dir=folder) as name:
+        with tempfile.TemporaryDirectory(
+            prefix=BUILD, dir=folder, ignore_cleanup_errors=True
+        ) as name:
             library, facts = make(Path(name))
             facts["sha256"] = _hash(library)
             facts["library"] = f"{recipe}-{facts['sha256'][:16]}.so"
             manifest = Path(name) / "manifest.json"
-            manifest.write_text(json.dumps(facts), encoding="utf-8")
+            sealed = {"seal": _seal(recipe, facts), "facts": facts}
+            manifest.write_text(json.dumps(sealed), encoding="utf-8")
             os.replace(library, folder / facts["library"])
             os.replace(manifest, folder / f"{recipe}.json")
         return Entry(folder / facts["library"], facts, False)
-    except OSError as error:
-        say(f"the kernel cache cannot be used ({error}); building for this process alone")
+    except (OSError, CondyleError) as error:
+        # A full disk may fail the compiler: elsewhere it may do.
+        entry = build_apart(recipe, make)
+        why = getattr(error, "strerror", None) or error
+        say(
+            f"the kernel cache {folder} cannot be used ({why}); kernels are built for this "
+            "process alone",
+            "cache",
+        )
+        return entry
+
+
+def build_apart(recipe: str, make: Make) -> Entry:
+    """Build a kernel for this process alone, in a temporary folder that goes when it ends."""
     place = Path(tempfile.mkdtemp(prefix="condyle-"))
+    atexit.register(shutil.rmtree, place, ignore_errors=True)
     try:
         library, facts = make(place)
     except BaseException:
         shutil.rmtree(place, ignore_errors=True)
         raise
-    return Entry(library, facts, False)
+    _apart[recipe] = Entry(library, facts, False)
+    return _apart[recipe]
 
 
 def contents() -> Contents:
     """How many kernels there are and what they take [bytes]."""
-    folder = cache_folder()
-    files = [f for f in folder.glob("*") if f.is_file()] if folder.is_dir() else []
-    return Contents(
-        folder, sum(f.suffix == ".json" for f in files), sum(f.stat().st_size for f in files)
-    )
+    folder, kernels, size = cache_folder(), 0, 0
+    for path in _entries(folder):
+        try:
+            size += path.stat().st_size
+        except FileNotFoundError:  # cleared meanwhile
+            continue
+        kernels += path.suffix == ".json"
+    return Contents(folder, kernels, size)
 
 
 def clear() -> Contents:
-    """Remove every kernel; returns what there was."""
+    """Remove every kernel and nothing else; returns what there was.
+
+    Raises: CacheError: if the folder cannot be written.
+    """
     had = contents()
-    if had.folder.is_dir():
-        for path in had.folder.iterdir():
-            if path.is_dir() and path.name.startswith("build-"):
-                shutil.rmtree(path, ignore_errors=True)
-            elif path.suffix in (".so", ".json"):
-                path.unlink(missing_ok=True)
+    try:
+        for path in _entries(had.folder):
+            path.unlink(missing_ok=True)
+        for path in had.folder.glob(f"{BUILD}*"):
+            shutil.rmtree(path, ignore_errors=True)
+    except OSError as error:
+        raise CacheError(f"{had.folder} cannot be cleared: {error.strerror}") from None
     return had
+
+
+def _entries(folder: Path) -> Iterator[Path]:
+    return (path for path in folder.glob("*") if ENTRY.fullmatch(path.name))
+
+
+def _seal(recipe: str, facts: Facts) -> str:
+    return digest(recipe, json.dumps(facts, sort_keys=True))
 
 
 def _hash(path: Path) -> str:
@@ -149,7 +196,7 @@ def _trusted(folder: Path) -> bool:
 
 def _sweep(folder: Path) -> None:
     """Remove what killed builds left behind."""
-    for path in folder.glob("build-*"):
+    for path in folder.glob(f"{BUILD}*"):
         try:
             if time.time() - path.stat().st_mtime > STALE_SECONDS:
                 shutil.rmtree(path, ignore_errors=True)

@@ -23,7 +23,7 @@ from ..kinematics.contact import indices
 from ..mechanism.home import independent_coordinates
 from ..mechanism.mechanism import Mechanism
 from . import cache
-from .compiler import Compiler, find_compiler
+from .compiler import Compiler, CompilerError, find_compiler
 from .layout import Layout, specialise
 from .notice import notice
 from .result import PoseRates, Torques
@@ -61,9 +61,8 @@ class Kernel:
         parameters = layout.parameter_values(mechanism, load_point)
         lanes = layout.lane_values(mechanism, compiler.lanes)
         self.spec = specialise(spec, parameters, lanes)
-        entry = _entry(self.spec, compiler)
+        entry, self._library = _loaded(self.spec, compiler)
         self.facts, self.cached = entry.facts, entry.cached
-        self._library = _load(str(entry.library))
         self._table = _aligned(self.facts["table_size"])
         blocks = [np.ascontiguousarray(block) for block in lanes]
         pointers = (_doubles * len(blocks))(*(_pointer(block) for block in blocks))
@@ -149,8 +148,32 @@ class Kernel:
         return one, batch, self._table.ctypes.data
 
 
-def _entry(spec: KernelSpec, compiler: Compiler) -> cache.Entry:
-    recipe = cache.digest(
+def _loaded(spec: KernelSpec, compiler: Compiler) -> tuple[cache.Entry, ctypes.CDLL]:
+    """The kernel of a spec, built if need be.
+
+    Raises: CompilerError: where it cannot be built, or loaded once it is.
+    """
+    recipe = _recipe(spec, compiler)
+
+    def make(folder: Path) -> tuple[Path, dict[str, Any]]:
+        return _make(folder, spec, compiler)
+
+    try:
+        entry = cache.find(recipe) or cache.build(recipe, make, notice)
+        try:
+            return entry, _load(str(entry.library))
+        except OSError as error:  # a disk that may not hold programs, or was cleared just now
+            entry = cache.build_apart(recipe, make)
+            library = _load(str(entry.library))
+            notice(f"a cached kernel cannot be loaded ({error}); it was built again", "cache")
+            return entry, library
+    except (OSError, AttributeError, NotImplementedError) as error:
+        raise CompilerError(f"no kernel could be built and loaded: {error}") from error
+
+
+def _recipe(spec: KernelSpec, compiler: Compiler) -> str:
+    """Name of everything that shapes a kernel."""
+    return cache.digest(
         generator_digest(),
         version("casadi"),
         spec.text(),
@@ -158,8 +181,6 @@ def _entry(spec: KernelSpec, compiler: Compiler) -> cache.Entry:
         str(compiler.lanes),
         compiler.identity,
     )
-    found = cache.find(recipe)
-    return found or cache.build(recipe, lambda folder: _make(folder, spec, compiler), notice)
 
 
 def _make(folder: Path, spec: KernelSpec, compiler: Compiler) -> tuple[Path, dict[str, Any]]:
@@ -233,16 +254,22 @@ class Compiled:
     """Inverse dynamics of one mechanism by compiled kernels; same numbers as `Interpreted`.
 
     Kernels are built when first needed, one for each set of outputs. The few samples that a
-    kernel cannot judge, next to a singularity, go to the interpreter.
+    kernel cannot judge, next to a singularity, go to the interpreter; all of them do where the
+    compiler fails, unless kernels are `required`.
     """
 
-    name = "compiled"
-
-    def __init__(self, mechanism: Mechanism, formulation: str, route: str) -> None:
+    def __init__(
+        self, mechanism: Mechanism, formulation: str, route: str, required: bool = False
+    ) -> None:
         """Raises CompilerError where there is no compiler."""
         find_compiler()
         self._mechanism, self._formulation, self._route = mechanism, formulation, route
+        self._required, self._failed = required, False
         self._kernels: dict[tuple[bytes, tuple[str, ...], bool], Kernel] = {}
+
+    @property
+    def name(self) -> str:
+        return "interpreted" if self._failed else "compiled"
 
     @cached_property
     def interpreted(self) -> Interpreted:
@@ -271,12 +298,22 @@ class Compiled:
         outputs: Collection[str] = OUTPUTS,
         threads: int | None = None,
     ) -> Torques:
-        """Efforts at N samples; see `Interpreted.solve`. One load point for all samples."""
-        if len(load) and (load[:, 6:] != load[0, 6:]).any():
+        """Efforts at N samples; see `Interpreted.solve`. One load point for all samples.
+
+        Raises: CompilerError: if a kernel cannot be built and is required.
+        """
+        if self._failed or (len(load) and (load[:, 6:] != load[0, 6:]).any()):
             return self.interpreted.solve(q, q1, q2, load, outputs)
         moment = bool(load[:, 3:6].any())
         point = load[0, 6:] if len(load) else np.zeros(3)
-        kernel = self.kernel(point, outputs, moment)
+        try:
+            kernel = self.kernel(point, outputs, moment)
+        except CompilerError as error:
+            if self._required:
+                raise
+            self._failed = True
+            notice(f"{error}; the interpreter gives the same numbers, slower", "compiler")
+            return self.interpreted.solve(q, q1, q2, load, outputs)
         columns = [q, q1, q2, load[:, : 6 if moment else 3]]
         inputs = np.empty((len(q), kernel.inputs), order="F")
         np.concatenate(columns, axis=1, out=inputs)
@@ -305,7 +342,9 @@ class Compiled:
             pose = np.hstack([found["position"], angles])
             # The given coordinates as they are: arc functions return principal values.
             pose[:, indices(independent_coordinates(self._mechanism))] = q
-            poses = PoseRates(pose, found["rate"], found["acceleration"], status != 1)
+            # The contacts can be met in a pose that a chain cannot reach.
+            met = np.isfinite(pose).all(axis=1)
+            poses = PoseRates(pose, found["rate"], found["acceleration"], met)
         return Torques(
             torque=kernel.in_order(found["torque"]),
             share=share,

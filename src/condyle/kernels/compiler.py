@@ -70,11 +70,12 @@ def find_compiler() -> Compiler:
 
     Raises: CompilerError: if there is none that works.
     """
-    return _find(os.environ.get("CC", ""), os.environ.get("PATH", ""))
+    names = ("CC", "PATH", "CONDYLE_LANES")
+    return _find(*(os.environ.get(name, "").strip() for name in names))
 
 
 @lru_cache(maxsize=8)
-def _find(cc: str, path: str) -> Compiler:
+def _find(cc: str, path: str, lanes: str) -> Compiler:
     tried = []
     for command in _candidates(cc):
         if shutil.which(command[0], path=path or None) is None:
@@ -84,14 +85,17 @@ def _find(cc: str, path: str) -> Compiler:
             macros = _macros(command, native)
             if macros is not None:
                 flags = (*FLAGS, native) if native else FLAGS
-                return Compiler(command, flags, macros, _lanes(macros))
+                return Compiler(command, flags, macros, _lanes(lanes, macros))
         tried.append(f"{shlex.join(command)} (does not work)")
     raise CompilerError(f"no C compiler: tried {', '.join(tried) or 'nothing'}")
 
 
 def _candidates(cc: str) -> list[tuple[str, ...]]:
     if cc:
-        return [tuple(shlex.split(cc))]
+        try:
+            return [tuple(shlex.split(cc))]
+        except ValueError as error:
+            raise CompilerError(f"CC is {cc!r}: {error}") from None
     found: list[tuple[str, ...]] = [("cc",), ("gcc",), ("clang",)]
     if find_spec("ziglang") is not None:
         found.append((sys.executable, "-m", "ziglang", "cc"))
@@ -113,8 +117,8 @@ def _macros(command: tuple[str, ...], native: str) -> str | None:
     return f"{where}\n{platform.machine()}\n{done.stdout}"
 
 
-def _lanes(macros: str) -> int:
-    if chosen := os.environ.get("CONDYLE_LANES"):
+def _lanes(chosen: str, macros: str) -> int:
+    if chosen:
         if chosen not in ("2", "4", "8"):
             raise CompilerError(f"CONDYLE_LANES is {chosen!r}; expected 2, 4 or 8")
         return int(chosen)

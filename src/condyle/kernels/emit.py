@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from importlib.resources import files
 
 from .fuse import fuse
-from .graph import REDUCTIONS, Graph, Value, reachable
+from .graph import REDUCTIONS, Value, reachable
 from .program import Output, Program, build
 from .schedule import scheduled
 from .spec import KernelSpec
@@ -23,6 +23,7 @@ CHAIN = 5
 INTERLEAVED = 2  # chains whose statements alternate, to keep both arithmetic ports busy
 LONG = 700  # lane operations above which chains run in a loop instead of unrolled
 
+TRIGONOMETRY = 12  # operations of half a sine and cosine
 NEAR = 1e-14  # margin or quality below which a sample is looked at again by the interpreter
 
 _INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
@@ -59,7 +60,7 @@ def emit(spec: KernelSpec, width: int) -> Source:
     for o in program.outputs:
         outputs[o.name] = outputs.get(o.name, 0) + (spec.n if o.lane else 1)
     names = [name for name, count in outputs.items() for _ in range(count)]
-    careful = [] if spec.n == spec.m else _careful(spec, width)
+    careful = None if spec.n == spec.m else _Printer(fused(build(spec, careful=True)), width)
     sizes = {
         "W": width,
         "INPUTS": len(program.layout.inputs),
@@ -74,20 +75,16 @@ def emit(spec: KernelSpec, width: int) -> Source:
         printer.prepare("prepare_quick"),
         printer.one("quick"),
         printer.batch(),
-        *careful,
+        *(_careful(careful) if careful else ()),
         f"#define QUICK_TABLE {printer.table_size}",
         _text("driver.h"),
     ]
-    size = printer.table_size
-    if careful:
-        size += _Printer(fused(build(spec, careful=True)), width).table_size
+    size = printer.table_size + (careful.table_size if careful else 0)
     return Source("\n".join(pieces), list(outputs.items()), size, printer.operations())
 
 
-def _careful(spec: KernelSpec, width: int) -> list[str]:
+def _careful(printer: _Printer) -> list[str]:
     """One evaluation that keeps its accuracy where the quick one's torques lose it."""
-    program = fused(build(spec, careful=True))
-    printer = _Printer(program, width)
     return ["#define CAREFUL", printer.prepare("prepare_careful"), printer.one("careful")]
 
 
@@ -100,9 +97,7 @@ def fused(program: Program) -> Program:
     roots = [v for output in program.outputs for v in output.nodes]
     graph, moved = fuse(program.graph, roots, CHAIN)
     renamed = dict(zip(roots, moved, strict=True))
-    outputs = [
-        Output(o.name, o.lane, tuple(renamed[v] for v in o.nodes)) for o in program.outputs
-    ]
+    outputs = [Output(o.name, o.lane, tuple(renamed[v] for v in o.nodes)) for o in program.outputs]
     return Program(program.spec, program.layout, graph, outputs)
 
 
@@ -150,32 +145,29 @@ class _Printer:
         return self.lane_operations > LONG and max(copies) > 1
 
     def operations(self) -> int:
-        """Vector operations of a batch step, a multiply and the add that consumes it counting one."""
-        g, uses = self.g, self._uses()
+        """Vector operations of a batch step; a fused multiply-add counts one."""
         total = 0
         for v in self.varying:
-            node = g.nodes[v]
+            node = self.g.nodes[v]
             copies = 1 if node.group is None else self.counts[node.group]
-            if node.op in ("neg", "input"):
-                continue
-            elif node.op in REDUCTIONS:
-                for t in node.args:
-                    group = g.nodes[t].group
-                    terms = 1 if group is None else self.counts[group]
-                    fused = g.nodes[t].op == "mul" and uses[t] == 1
-                    total += 0 if fused else terms
+            if node.op in REDUCTIONS:
+                # A product nobody else wants joins the sum by a fused multiply-add.
+                groups = [self.g.nodes[t].group for t in node.args]
+                total += sum(1 if g is None else self.counts[g] for g in groups)
             elif node.op in ("sin", "cos"):
-                total += 12  # half of a sincos
-            else:
+                total += TRIGONOMETRY
+            elif node.op not in ("neg", "input"):
                 total += copies
-        return total
+        return total - sum(self._joined(v) for v in self.varying)
 
-    def _uses(self) -> dict[Value, int]:
-        uses: dict[Value, int] = dict.fromkeys(self.order, 0)
-        for v in self.order:
-            for a in self.g.nodes[v].args:
-                uses[a] += 1
-        return uses
+    def _joined(self, v: Value) -> int:
+        """Products that vanish in the sum over chains that alone wants them."""
+        node = self.g.nodes[v]
+        if node.op != "mul" or node.group is None:
+            return 0
+        users = [u for u in self.varying if v in self.g.nodes[u].args]
+        alone = len(users) == 1 and self.g.nodes[users[0]].op == "sum"
+        return self.counts[node.group] if alone else 0
 
     # -- what is fixed ---------------------------------------------------------------------
 
@@ -385,7 +377,7 @@ class _Printer:
             return self._reduction(v)
         return self._operation(v, lambda a: self._name(a, copy), suffix)
 
-    def _operation(self, v: Value, name, suffix: str) -> str:  # noqa: ANN001
+    def _operation(self, v: Value, name, suffix: str) -> str:
         node = self.g.nodes[v]
         if node.op in _INFIX:
             a, b = (name(x) for x in node.args)
@@ -430,8 +422,9 @@ class _Printer:
             group = self.g.nodes[t].group
             if group is None:
                 times = sum(self.shape.copies)
-                terms.append(f"({times} * {self._name(t, 0)})" if node.op == "sum" else
-                             self._name(t, 0))
+                terms.append(
+                    f"({times} * {self._name(t, 0)})" if node.op == "sum" else self._name(t, 0)
+                )
             elif self.looped(self.shape.copies):
                 terms.append(f"r{v}_{group}")
             else:

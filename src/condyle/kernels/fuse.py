@@ -49,9 +49,7 @@ def fuse(graph: Graph, roots: Sequence[Value], chain: int) -> tuple[Graph, list[
         node = graph.nodes[v]
         if node.op in ("add", "sub", "neg") and (v in inside or v == top):
             signs = {"add": (1, 1), "sub": (1, -1), "neg": (-1,)}[node.op]
-            return [
-                t for a, s in zip(node.args, signs, strict=True) for t in terms(a, s * sign)
-            ]
+            return [t for a, s in zip(node.args, signs, strict=True) for t in terms(a, s * sign)]
         if node.op == "mul" and v in inside:
             *early, late = sorted(factors(v), key=lambda x: ready[x])
             pair = (_product(new, early, ready, note), late)
@@ -101,7 +99,7 @@ def _inside(graph: Graph, order: Sequence[Value], uses: dict[Value, int]) -> set
     return inside
 
 
-def _product(new: Graph, factors: list[Value], ready: dict[Value, int], note) -> Value:  # noqa: ANN001
+def _product(new: Graph, factors: list[Value], ready: dict[Value, int], note) -> Value:
     """Factors that are ready first are multiplied first."""
     rest = sorted(factors, key=lambda x: ready[x])
     while len(rest) > 1:
@@ -110,7 +108,7 @@ def _product(new: Graph, factors: list[Value], ready: dict[Value, int], note) ->
     return rest[0]
 
 
-def _sum(new: Graph, terms: list[Term], chain: int, note) -> Value:  # noqa: ANN001
+def _sum(new: Graph, terms: list[Term], chain: int, note) -> Value:
     if len(terms) > chain:
         products = [t for t in terms if len(t.factors) > 1]
         plain = [t for t in terms if len(t.factors) == 1]

@@ -7,8 +7,11 @@ import sys
 _said: set[str] = set()
 
 
-def notice(text: str) -> None:
-    """Say something on stderr, the first time only."""
-    if text not in _said:
-        _said.add(text)
+def notice(text: str, about: str | None = None) -> None:
+    """Say something on stderr, the first time only.
+
+    Args: about: what it is about, where the same matter may come in different words.
+    """
+    if (about or text) not in _said:
+        _said.add(about or text)
         print(f"condyle: {text}", file=sys.stderr)

@@ -7,7 +7,7 @@ this runs lanes in a vector register (one evaluation) or samples (a batch).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import casadi as ca
@@ -24,7 +24,7 @@ from ..kinematics.contact import (
 )
 from ..kinematics.iteration import newton
 from ..kinematics.parasitic import WholeMotion, whole_motion
-from ..kinematics.state import PointMotion, State, independent_state, pose_state, twist_state
+from ..kinematics.state import State, independent_state, pose_state, twist_state
 from .graph import Graph, Value, read
 from .layout import Layout
 from .spec import KernelSpec
@@ -89,13 +89,16 @@ class Program:
         nodes = read(self.graph, [expression], self._known, self._free)[0]
         return self._symbols(f"let{len(self._free)}", nodes)
 
-    def output(self, name: str, expressions: ca.SX | Lanes) -> None:
+    def finish(self, results: Mapping[str, ca.SX | Lanes]) -> None:
         """Results, entry by entry; a list of expressions, one a group, is a lane value."""
-        lane = isinstance(expressions, list)
-        parts = expressions if isinstance(expressions, list) else [expressions]
-        nodes = read(self.graph, parts, self._known, self._free)
-        for entry in zip(*nodes, strict=True):
-            self.outputs.append(Output(name, lane, tuple(entry)))
+        parts = {name: e if isinstance(e, list) else [e] for name, e in results.items()}
+        every = [e for expressions in parts.values() for e in expressions]
+        # All in one reading, since each goes through everything its expressions share.
+        nodes = iter(read(self.graph, every, self._known, self._free))
+        for name, expressions in parts.items():
+            found = [next(nodes) for _ in expressions]
+            for entry in zip(*found, strict=True):
+                self.outputs.append(Output(name, isinstance(results[name], list), tuple(entry)))
 
     def _reduced(self, op: str, terms: Sequence[ca.SX]) -> ca.SX:
         nodes = read(self.graph, list(terms), self._known, self._free)
@@ -175,24 +178,30 @@ def build(spec: KernelSpec, careful: bool = False) -> Program:
     solve = gram_schmidt if careful or spec.n == m else normal_equations
     shares, quality = solve(p, A, b)
     torque = [_sum(ca.horzsplit(s)) for s in shares]
-    p.output("torque", torque)
-    p.output("margin", _margin(p, placement, chains))
-    p.output("quality", quality)
+    results: dict[str, ca.SX | Lanes] = {
+        "torque": torque,
+        "margin": _margin(p, placement, chains),
+        "quality": quality,
+    }
     if "contact" in spec.outputs and dep:
-        p.output("contact", _contact_forces(p, spec, motion, placement, force, moment, torque,
-                                            None if spec.route == "direct" else (parts, chains)))
+        known = None if spec.route == "direct" else (parts, chains)
+        results["contact"] = _contact_forces(
+            p, spec, motion, placement, force, moment, torque, known
+        )
     if "share" in spec.outputs:
-        for k in range(b.shape[1]):
-            p.output("share", [s[:, k] for s in shares])
+        results["share"] = [s.T for s in shares]
     if "motion" in spec.outputs:
-        p.output("position", placement.position)
-        p.output("cosines", placement.bryant.cos)
-        p.output("sines", placement.bryant.sin)
-        p.output("rate", motion.rate)
-        p.output("acceleration", motion.acceleration)
+        results |= {
+            "position": placement.position,
+            "cosines": placement.bryant.cos,
+            "sines": placement.bryant.sin,
+            "rate": motion.rate,
+            "acceleration": motion.acceleration,
+        }
     if "joint" in spec.outputs:
-        p.output("joint_rate", [c.law.rate for c in chains])
-        p.output("joint_acceleration", [c.law.acceleration for c in chains])
+        results["joint_rate"] = [c.law.rate for c in chains]
+        results["joint_acceleration"] = [c.law.acceleration for c in chains]
+    p.finish(results)
     return p
 
 
@@ -279,10 +288,11 @@ def normal_equations(p: Program, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
              square, negative where the columns of A are too nearly dependent.
     """
     m = b.shape[0]
-    G = [
-        [p.total([a[j] * a[k] for a in A]) if j <= k else ca.SX(0) for k in range(m)]
-        for j in range(m)
-    ]
+    pairs = [(j, k) for j in range(m) for k in range(j, m)]
+    products = p.total([ca.vertcat(*(a[j] * a[k] for j, k in pairs)) for a in A])
+    G = [[ca.SX(0)] * m for _ in range(m)]
+    for (j, k), product in zip(pairs, ca.vertsplit(products), strict=True):
+        G[j][k] = product
     pivots, z, quality = [], [b[k, :] for k in range(m)], ca.SX(1.0)
     L = [[ca.SX(0)] * m for _ in range(m)]
     rows = [[G[j][k] for k in range(m)] for j in range(m)]
@@ -317,18 +327,19 @@ def gram_schmidt(p: Program, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
     """
     m = b.shape[0]
     columns = [[a[k] for a in A] for k in range(m)]
-    lengths = [p.total([x * x for x in column]) for column in columns]
+    lengths = p.total([a * a for a in A])
     z = [b[k, :] for k in range(m)]
     result = [ca.SX(1, b.shape[1]) for _ in A]
     quality = ca.SX(1.0)
     for k in range(m):
         q = columns[k]
-        # the first column is its own projection
-        d = lengths[0] if k == 0 else p.total([x * x for x in q])
-        quality = ca.fmin(quality, d / lengths[k]) if k else quality
-        inverse = 1 / d
+        products = p.total(
+            [ca.vertcat(*(x * columns[j][g] for j in range(k, m))) for g, x in enumerate(q)]
+        )
+        quality = ca.fmin(quality, products[0] / lengths[k])
+        inverse = 1 / products[0]
         for j in range(k + 1, m):
-            ratio = p.total([x * y for x, y in zip(q, columns[j], strict=True)]) * inverse
+            ratio = products[j - k] * inverse
             columns[j] = [y - ratio * x for x, y in zip(q, columns[j], strict=True)]
             z[j] = z[j] - ratio * z[k]
         weight = z[k] * inverse

@@ -106,9 +106,7 @@ class ForwardKinematics:
                 break
         return x, done
 
-    def _step(
-        self, x: np.ndarray, joints: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _step(self, x: np.ndarray, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """A Gauss-Newton step (N, 6), its size (N,) and the error before it (N,)."""
         residual, A, M_J, J, fall, phi = self._residual(x, joints)
         A = A * self._unit

@@ -183,9 +183,7 @@ def _converged(off: ca.SX) -> ca.SX:
     return ca.fmax(1 - ca.fabs(off) / RESIDUAL, 0)
 
 
-def _linear(
-    contacts: Sequence[ContactSymbols], dep: list[int], pose: ca.SX
-) -> tuple[ca.SX, ca.SX]:
+def _linear(contacts: Sequence[ContactSymbols], dep: list[int], pose: ca.SX) -> tuple[ca.SX, ca.SX]:
     """C_dep, (k, k), and phi, (k,), at a pose."""
     bryant = Bryant.of(pose[3:])
     R = bryant.rotation()

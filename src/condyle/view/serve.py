@@ -104,8 +104,8 @@ class View:
     def set_dark(self, dark: bool) -> None:
         """Draw the page dark or light."""
         self.dark = dark
+        self._server.gui.main_panel.dock_right()
         self._server.gui.configure_theme(
-            control_layout="collapsible",
             control_width="large",
             dark_mode=dark,
             show_logo=False,

@@ -24,7 +24,7 @@ SURFACE: RGB = (229, 181, 103)
 BALL: RGB = (194, 24, 91)
 ALARM: RGB = (201, 42, 42)
 WARNING: RGB = (224, 160, 74)
-LOAD: RGB = (30, 30, 30)
+LOAD: RGB = (70, 80, 92)
 PUSH: RGB = (116, 95, 138)
 BODY = {"calm": PLATFORM, "warning": WARNING, "unreachable": ALARM}
 VIEWS = {
@@ -101,7 +101,7 @@ class Stage:
                 self._scene.add_line_segments(
                     f"/bounds/{i}",
                     self.scale * patch.outline,
-                    colors=(40, 40, 40),
+                    colors=(90, 90, 90),
                     thickness=2.0,
                     thickness_units="screen",
                 )

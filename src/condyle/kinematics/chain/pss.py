@@ -36,7 +36,6 @@ class PSSFamily(Family):
     effort_unit = "N"
     # S is the slider's joint at home; N is N_i0 and Y its second axis.
     idle = ("branch", "mass", "transverse", "axial", "slider")
-    idle = ("branch", "mass", "transverse", "axial", "slider")
     shapes = {
         "S": 3,
         "axis": 3,

@@ -170,9 +170,7 @@ class RSSFamily(Family):
         axial = axial_force(e, e_rate, A - S_acceleration, c.Y, c.L, c.axial)
         # m (1 - com) = m_SM + m_SS splits the weight that the crank carries.
         crank_torque = (
-            (m_SS * c.l**2) * acceleration
-            + ca.dot(t, m_SM * (A - g) - axial)
-            - m_SS * ca.dot(t, g)
+            (m_SS * c.l**2) * acceleration + ca.dot(t, m_SM * (A - g) - axial) - m_SS * ca.dot(t, g)
         )
         return Law(
             forces={"couplers": m_SM * (S_acceleration - g) + axial},

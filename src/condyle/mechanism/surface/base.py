@@ -23,7 +23,7 @@ CLOSED_SIDES = ("inside", "outside")
 
 
 class SurfaceTable(Smooth, Table):
-    """A surface of a mechanism file. Its `kind` names it, `closed` says whether it has an inside."""
+    """A surface of a mechanism file: its `kind`, and whether it is `closed` around an inside."""
 
     kind: str
     closed: ClassVar[bool] = False

@@ -285,11 +285,13 @@ def _singularity(solution: Solution, columns: Columns) -> Iterator[Panel]:
 
 
 def reaction_variables(solution: Solution) -> list[str]:
-    """Names of the variables that hold joint reactions."""
+    """Names of the variables that hold reactions of joints, and contact forces as vectors."""
+    names = [str(name) for name in solution.data_vars]
     return [
-        str(name)
-        for name, variable in solution.data_vars.items()
-        if str(name).startswith("reaction") and variable.dims[:1] == ("time",)
+        name
+        for name in names
+        if (name.startswith("reaction_") or name == "contact_force_vector")
+        and solution[name].dims[:1] == ("time",)
     ]
 
 

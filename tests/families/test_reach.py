@@ -1,0 +1,88 @@
+"""Where a chain cannot go, which way it goes on, and the units it is told in."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.errors import UnreachableError
+from condyle.mechanism import Mechanism
+from condyle.model import UNREACHABLE, Model
+from families.cases import case
+
+
+def hexaglide() -> Mechanism:
+    return condyle.load("hexaglide")
+
+
+def test_a_rail_too_far_from_its_joint() -> None:
+    model = Model(hexaglide(), backend="interpreted")
+    q = np.zeros((2, 5))
+    q[1, 1] = 0.3  # sideways, by more than the rods reach
+    evaluation = model.evaluate(q, 0 * q, 0 * q, np.zeros((2, 9)))
+    assert evaluation.status.tolist() == [0, UNREACHABLE]
+    with pytest.raises(UnreachableError) as caught:
+        model.require_ok(evaluation)
+    # The right-hand rail is 280 + 300 mm away sideways and 230 mm up; M is 20 mm off the middle.
+    distance = np.hypot(580 - 20, 230 + 60)
+    assert 'chain "right_front" cannot reach M: its rail passes M at' in str(caught.value)
+    assert f"{distance:.0f}"[:1] in str(caught.value)
+
+
+def test_travel_follows_the_platform_along_the_rails() -> None:
+    """Moving along parallel rails moves every slider as far, and its force does the work."""
+    mechanism = hexaglide().replace(contacts=())
+    model = Model(mechanism, backend="interpreted")
+    q = np.zeros((3, 6))
+    q[:, 0] = [-0.03, 0.0, 0.04]
+    evaluation = model.evaluate(q, 0 * q, 0 * q, np.zeros((3, 9)))
+    np.testing.assert_allclose(evaluation.posture.joint, q[:, :1].repeat(6, axis=1), atol=1e-15)
+    # At rest the forces along the rails cancel: gravity has no part along them.
+    total = evaluation.torques.torque.sum(axis=1)
+    assert np.abs(total).max() < 1e-12 * np.abs(evaluation.torques.torque).max()
+
+
+def test_the_slider_keeps_the_branch_of_home() -> None:
+    c = case("pss_k0")
+    evaluation = c.evaluate()
+    for i, chain in enumerate(c.mechanism.chains):
+        axis = np.array(chain.axis) / np.linalg.norm(chain.axis)
+        home = np.subtract(chain.platform, chain.base) @ axis
+        sines = evaluation.posture.singularity.transmission[:, i]
+        assert (np.sign(-sines) == np.sign(home)).all()
+
+
+def test_leg_coordinate_is_the_change_of_length() -> None:
+    c = case("sps_k0")
+    model = Model(c.mechanism, backend="interpreted")
+    q = np.zeros((2, 6))
+    q[1, :3] = [0.004, -0.003, 0.006]
+    joint = model.evaluate(q, 0 * q, 0 * q, np.zeros((2, 9))).posture.joint
+    for i, chain in enumerate(c.mechanism.chains):
+        leg = np.subtract(chain.platform, chain.base)
+        change = np.linalg.norm(leg + q[1, :3]) - np.linalg.norm(leg)
+        assert joint[1, i] == pytest.approx(change, abs=1e-15)
+    assert np.abs(joint[0]).max() < 1e-15
+
+
+def test_extension_pushes() -> None:
+    """A load that presses a Gough-Stewart platform down needs positive, pushing efforts."""
+    mechanism = condyle.load("gough-stewart")
+    model = Model(mechanism, backend="interpreted")
+    zero = np.zeros((1, 6))
+    load = np.zeros((1, 9))
+    load[0, 2] = -1e4
+    torque = model.evaluate(zero, zero, zero, load).torques.torque
+    assert (torque > 1e4 / 6).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "joint", "effort"),
+    [("gough-stewart", "m", "N"), ("hexaglide", "m", "N"), ("masticatory", "rad", "N m")],
+)
+def test_units_in_the_check(name: str, joint: str, effort: str) -> None:
+    from condyle.report.check import describe
+
+    text = str(describe(condyle.load(name)))
+    assert f"joint [{joint}], effort [{effort}]" in text
