@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import tomllib
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -51,10 +52,12 @@ def condyle_command(
     def run(*arguments: object) -> Outcome:
         monkeypatch.setattr(sys, "argv", ["condyle", *map(str, arguments)])
         status = 0
-        try:
-            main()
-        except SystemExit as stop:
-            status = int(stop.code or 0)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", RuntimeWarning)  # numpy's would end up on stderr
+            try:
+                main()
+            except SystemExit as stop:
+                status = int(stop.code or 0)
         text = capsys.readouterr()
         return Outcome(status, text.out, text.err)
 

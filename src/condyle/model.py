@@ -164,8 +164,8 @@ class Model:
         if doubtful.size:
             poses = result.poses.pose[doubtful] if result.poses is not None else None
             if poses is None:
-                inputs = (a[doubtful] for a in (q, q1, q2, load))
-                again = self.kernel.solve(*inputs, ("motion",)).poses
+                few = [a[doubtful] for a in (q, q1, q2, load)]
+                again = self.kernel.solve(few[0], few[1], few[2], few[3], ("motion",)).poses
                 assert again is not None
                 poses = again.pose
             with np.errstate(invalid="ignore", divide="ignore"):
@@ -235,6 +235,7 @@ class Model:
         name = load_point or load.point
         loaded = np.any(wrench) or name is not None
         point = self.load_point(name) if loaded else np.zeros(3)
+        name = (name or DEFAULT_LOAD_POINT) if loaded else None
         q, q1, q2, residual = self.independent_motion(motion)
         evaluation = self.evaluate(q, q1, q2, with_point(wrench, point))
         if not flag:
@@ -351,7 +352,7 @@ class Model:
         pose = evaluation.poses.pose[sample]
         if not evaluation.poses.reached[sample] or not np.isfinite(pose).all():
             names = ", ".join(f'"{name}"' for name in self.mechanism.contact_names)
-            return f"no {' and '.join(self.dependent)} puts the contacts {names} on their surfaces"
+            return f"no pose with the given coordinates has the contacts {names} on their surfaces"
         for i, chain in enumerate(self.mechanism.chains):
             if not evaluation.posture.reach[sample, i] >= 0:
                 with np.errstate(all="ignore"):

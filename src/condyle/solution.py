@@ -64,7 +64,7 @@ class Solution(xr.Dataset):
         return json.loads(self.attrs["options"])
 
     @property
-    def plot(self) -> SolutionPlots:
+    def plot(self) -> SolutionPlots:  # type: ignore[override]
         """Figures: `solution.plot.torque()` and friends; xarray's own are there too."""
         from .report.figures import SolutionPlots
 
@@ -163,7 +163,10 @@ def assemble(
         "lift_off": (
             ("time", "contact"),
             lift_off(mechanism, t.contact_force) & ok[:, None],
-            {"long_name": "whether a one-sided contact would have to pull: the ball lifts off"},
+            {
+                "units": "1",
+                "long_name": "whether a one-sided contact would have to pull: the ball lifts off",
+            },
         ),
         "contact_point": variable(
             ("time", "contact", "axis"), p.contact_point, "m", "centre of the contact ball in {S}"
@@ -194,12 +197,16 @@ def assemble(
         "singularity": (
             ("time",),
             np.where(ok, s.kind(), 0).astype(np.int8),
-            {"long_name": "kind of singularity that is near", "flag_meanings": " ".join(KINDS)},
+            {
+                "units": "1",
+                "long_name": "kind of singularity that is near",
+                "flag_meanings": " ".join(KINDS),
+            },
         ),
         "status": (
             ("time",),
             evaluation.status.astype(np.int8),
-            {"long_name": "status", "flag_meanings": " ".join(STATUS_NAMES)},
+            {"units": "1", "long_name": "status", "flag_meanings": " ".join(STATUS_NAMES)},
         ),
     }
     coordinates = {

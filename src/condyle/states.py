@@ -115,4 +115,10 @@ def state_coordinates(model: Model, table: Table) -> list[str]:
             f"this mechanism has {m}, such as {', '.join(model.independent)}, with their rates "
             "(dX ...) and accelerations (ddX ...)"
         )
+    used = {prefix + name for prefix in ("", "d", "dd") for name in names} | {*WRENCH}
+    if idle := [name for name in table.columns if name not in used]:
+        raise InputError(
+            f"{table.source}: {', '.join(idle)} would not be used: the state is given by "
+            f"{', '.join(names)}, their rates and accelerations. Remove what is not of these"
+        )
     return names

@@ -24,10 +24,12 @@ def test_a_rail_too_far_from_its_joint() -> None:
     assert evaluation.status.tolist() == [0, UNREACHABLE]
     with pytest.raises(UnreachableError) as caught:
         model.require_ok(evaluation)
-    # The right-hand rail is 280 + 300 mm away sideways and 230 mm up; M is 20 mm off the middle.
-    distance = np.hypot(580 - 20, 230 + 60)
-    assert 'chain "right_front" cannot reach M: its rail passes M at' in str(caught.value)
-    assert f"{distance:.0f}"[:1] in str(caught.value)
+    # Up the slope of 0.1 as well: M is then at y = 355, z = 90, its rail at y = 0, z = 230 mm.
+    distance, rod = np.hypot(355, 140), np.linalg.norm([310, 55, 170])
+    assert (
+        f'chain "middle_front" cannot reach M: its rail passes M at {distance:.1f} mm, '
+        f"the rod is {rod:.1f} mm long at row 2"
+    ) in str(caught.value)
 
 
 def test_travel_follows_the_platform_along_the_rails() -> None:

@@ -15,10 +15,10 @@ from oracles.rotations import platform_motion
 
 from condyle import InputError
 from condyle.kinematics.closure import (
-    _solve,
     contact_symbols,
     coordinate_closure,
     landmark_closure,
+    solve_samples,
 )
 from condyle.kinematics.contact import contact_frame, indices, parasitic_jacobian, residuals
 from condyle.kinematics.rotation import angular_velocity_matrix, rotation
@@ -157,8 +157,8 @@ def test_a_pose_out_of_reach_is_not_a_number_and_alone() -> None:
 def test_a_singular_matrix_does_not_touch_its_neighbours() -> None:
     nearly = np.diag([1.0, 1, 1, 1, 1, 1e-17]) + 1e-3
     b = np.arange(12.0).reshape(2, 6)
-    together = _solve(np.stack([nearly, np.zeros((6, 6))]), b)
-    np.testing.assert_array_equal(together[0], _solve(nearly[None], b[:1])[0])
+    together = solve_samples(np.stack([nearly, np.zeros((6, 6))]), b)
+    np.testing.assert_array_equal(together[0], solve_samples(nearly[None], b[:1])[0])
     assert np.isfinite(together[0]).all() and np.isnan(together[1]).all()
 
 

@@ -34,6 +34,11 @@ MECHANISMS: dict[str, dict[str, Any]] = {
 }
 
 
+def interpreted(mechanism: Mechanism, *choices: str) -> Model:
+    """A model by the interpreter: what is tested here is the mathematics, not its compilation."""
+    return Model(mechanism, *choices, backend="interpreted")
+
+
 def evaluate(model: Model, states: dict[str, Any]) -> Evaluation:
     """At the oracles' states, given in any coordinates."""
     motion = (states[key] for key in ("q", "qd", "qdd"))
@@ -50,7 +55,7 @@ def test_oracle_and_formulations(name: str) -> None:
     states = random_state(rng, raw, COUNT)
     mechanism = from_data(raw)
     for formulation in FORMULATIONS:
-        got = evaluate(Model(mechanism, formulation), states)
+        got = evaluate(interpreted(mechanism, formulation), states)
         assert (got.status == 0).all()
         close(got.poses.pose, states["pose"], 1e-12)
         close(got.poses.acceleration, states["pose_acceleration"], 1e-11)
@@ -96,7 +101,7 @@ def same(got: Evaluation, wanted: Evaluation, tolerance: float) -> None:
 def test_surfaces_that_are_the_plane(reference: Mechanism) -> None:
     """Quadratic without second order, straight profile, expression: equal to rounding."""
     states = masticatory_states()
-    wanted = evaluate(Model(reference), states)
+    wanted = evaluate(interpreted(reference), states)
     s = (-0.04, -0.02, 0.0)
     points = tuple((x, 0.013215 - 1.1 * x) for x in s)
     for surface in (
@@ -105,13 +110,13 @@ def test_surfaces_that_are_the_plane(reference: Mechanism) -> None:
         Expression(lambda p: p[2] + 1.1 * p[0] - 0.013215),
         Expression(lambda p: 2 * (p[2] + 1.1 * p[0]) - 0.02643),  # phi has no fixed scale
     ):
-        got = evaluate(Model(with_surfaces(reference, surface, surface)), states)
+        got = evaluate(interpreted(with_surfaces(reference, surface, surface)), states)
         same(got, wanted, 1e-12)
 
 
 def test_ball_on_a_wall_is_its_centre_on_a_shifted_one(reference: Mechanism) -> None:
     states = masticatory_states()
-    wanted = evaluate(Model(reference), states)
+    wanted = evaluate(interpreted(reference), states)
     radius = 0.004
     lift = 0.013215 + radius * np.hypot(1.0, 1.1)  # the skull is above the ball
     for wall in (
@@ -120,24 +125,24 @@ def test_ball_on_a_wall_is_its_centre_on_a_shifted_one(reference: Mechanism) -> 
         Expression(lambda p: p[2] + 1.1 * p[0] - lift),
     ):
         machine = with_surfaces(reference, wall, wall, side="below", ball_radius=radius)
-        same(evaluate(Model(machine), states), wanted, 1e-12)
+        same(evaluate(interpreted(machine), states), wanted, 1e-12)
 
 
 def test_a_large_sphere_tends_to_its_tangent_plane(reference: Mechanism) -> None:
     """As 1 / r: ten times the radius, a tenth of the difference."""
     states = masticatory_states()
-    wanted = evaluate(Model(reference), states).torques.torque
+    wanted = evaluate(interpreted(reference), states).torques.torque
     n = np.array([1.1, 0.0, 1.0]) / np.hypot(1.1, 1.0)
     differences = []
-    for radius in (1.0, 10.0, 100.0, 1000.0):
+    for radius in (1.0, 10.0, 100.0, 1e3, 1e4):
         spheres = [
             Sphere(centre=tuple(np.array(c.point) - radius * n), radius=radius)
             for c in reference.contacts
         ]
-        got = evaluate(Model(with_surfaces(reference, *spheres)), states).torques.torque
+        got = evaluate(interpreted(with_surfaces(reference, *spheres)), states).torques.torque
         differences.append(np.abs(got - wanted).max() / np.abs(wanted).max())
     ratios = np.array(differences[:-1]) / differences[1:]
-    np.testing.assert_allclose(ratios, 10, rtol=[0.2, 0.02, 0.002])
+    assert (np.abs(ratios / 10 - 1) < [0.01, 1e-3, 1e-4, 1e-4]).all()
     assert differences[0] < 0.1
 
 
@@ -150,7 +155,7 @@ def test_a_profile_through_a_quadratic(reference: Mechanism) -> None:
 
     slope = -1.1 + 36 * 0.02665
     curved = Quadratic(offset=float(height(np.zeros(1))[0]), slope=(slope, 0.0), xx=18.0)
-    wanted = evaluate(Model(with_surfaces(reference, curved, curved)), states)
+    wanted = evaluate(interpreted(with_surfaces(reference, curved, curved)), states)
     errors = []
     for count in (15, 61):
         s = np.linspace(-0.09, 0.05, count)
@@ -158,7 +163,7 @@ def test_a_profile_through_a_quadratic(reference: Mechanism) -> None:
         line = Profile(direction=(1.0, 0.0), points=points)
         offset = line.phi(reference.contacts[0].point)  # home is on the spline, not between
         line = line.model_copy(update={"points": tuple((a, b + offset) for a, b in points)})
-        got = evaluate(Model(with_surfaces(reference, line, line)), states)
+        got = evaluate(interpreted(with_surfaces(reference, line, line)), states)
         errors.append(np.abs(got.torques.torque - wanted.torques.torque).max())
     scale = np.abs(wanted.torques.torque).max()
     assert errors[0] < 0.05 * scale and errors[1] < 1e-7 * scale
@@ -175,8 +180,8 @@ def test_direct_route_names_the_core(reference: Mechanism) -> None:
         ball_radius=0.006785 / np.hypot(1.1, 1.0),
     )
     states = masticatory_states()
-    direct = evaluate(Model(walls, "momentum", "direct"), states)
-    same(direct, evaluate(Model(reference, "momentum", "direct"), states), 1e-12)
+    direct = evaluate(interpreted(walls, "momentum", "direct"), states)
+    same(direct, evaluate(interpreted(reference, "momentum", "direct"), states), 1e-12)
 
 
 def test_expression_sees_the_point_only() -> None:

@@ -93,7 +93,7 @@ struct Mechanism {
   }
 };
 
-/// One sample's input: independent coordinates (X, Y, alpha, beta), rates, accelerations, bite force.
+/// One sample's input: (X, Y, alpha, beta), rates, accelerations, bite force.
 struct Sample {
   double q[4], qd[4], qdd[4], F[3];
 };
@@ -240,7 +240,7 @@ inline Chains move(const Mechanism& m, const Platform& b) {
   return c;
 }
 
-/// Couplers as free bodies, placed at their platform joints: {N_i} turned from N_i0, with its motion.
+/// Couplers as free bodies at their platform joints: {N_i} turned from N_i0, with its motion.
 struct FreeCouplers {
   Lanes w, x, y, z;            // quaternion of Ry(beta_i) Rz(gamma_i)
   Lanes cos_b, sin_b, cos_g, sin_g;
@@ -332,8 +332,8 @@ inline void project(const Mechanism& m, const Platform& b, const Chains& c, cons
   const Vector3 moment = tree.moment - (b.R * m.load_point).cross(bite) +
                          Vector3(M_P.x.sum(), M_P.y.sum(), M_P.z.sum());
   const double on_gamma = moment.dot(b.axis[2]);
-  const Eigen::Vector4d Q = Eigen::Vector4d(force.x(), force.y(), moment.x(), moment.dot(b.axis[1])) +
-                            force.z() * b.Z_q + on_gamma * b.gamma_q;
+  Eigen::Vector4d Q(force.x(), force.y(), moment.x(), moment.dot(b.axis[1]));
+  Q += force.z() * b.Z_q + on_gamma * b.gamma_q;
 
   // A: crank rates per independent rate, one column an array.
   const Vectors J = m.weight * c.J, rJ = cross(c.r, J);

@@ -1,6 +1,6 @@
-// Pinocchio's RNEA on the cut tree: a free-flyer platform, six cranks, and per coupler a Translation
-// (to the platform joint, where it is cut) and a Universal joint, whose angles turn about the base
-// frame N_i0 as the paper's beta_i and gamma_i do.
+// Pinocchio's RNEA on the cut tree: a free-flyer platform, six cranks, and per coupler a
+// Translation (to the platform joint, where it is cut) and a Universal joint, whose angles turn
+// about the base frame N_i0 as the paper's beta_i and gamma_i do.
 #include <pinocchio/algorithm/rnea.hpp>
 
 #include "entry.hpp"
@@ -30,7 +30,8 @@ class PinocchioTree {
     using pinocchio::Inertia;
     using pinocchio::SE3;
     model_.gravity.linear() = m.gravity;
-    const auto platform = model_.addJoint(0, pinocchio::JointModelFreeFlyer(), SE3::Identity(), "m");
+    const auto platform =
+        model_.addJoint(0, pinocchio::JointModelFreeFlyer(), SE3::Identity(), "platform");
     model_.appendBodyToJoint(platform, Inertia(m.mass, Vector3::Zero(), m.inertia));
     for (int i = 0; i < kChains; ++i) {
       SE3 shaft = SE3::Identity();

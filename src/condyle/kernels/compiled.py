@@ -353,7 +353,7 @@ class Compiled:
             acceleration=acceleration,
             reached=status != 1,
             poses=poses,
-            uncertain=status == LOOK_AGAIN,
+            uncertain=(status == LOOK_AGAIN) | ~np.isfinite(found["torque"].sum(axis=1)),
         )
 
 

@@ -200,7 +200,8 @@ class _Printer:
             return f"par[{node.data[0]}]"
         if node.op == "lane":
             group, k = node.data
-            return f"lane[{group}][{k} * {self.padded[group]} + i]"  # type: ignore[index]
+            assert isinstance(group, int)
+            return f"lane[{group}][{k} * {self.padded[group]} + i]"
         if node.op in REDUCTIONS:
             terms = []
             for t in node.args:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -66,7 +67,7 @@ class Layout:
     def parameter_values(self, mechanism: Mechanism, load_point: np.ndarray) -> np.ndarray:
         """Shared numbers of a mechanism and the point its load acts at, (size,)."""
         inertia = mechanism.platform.inertia
-        values: dict[str, object] = {
+        values: dict[str, Any] = {
             "gravity": mechanism.gravity,
             "mass": mechanism.platform.mass,
             "first_moment": np.zeros(3),

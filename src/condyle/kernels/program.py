@@ -377,7 +377,7 @@ def _contact_forces(
         Q = Q - ca.vertcat(force, ca.cross(r, force) + moment)
         Q = Q + _chain_parts(p, chains, False)["chains"]
     else:
-        parts, chains = known
+        parts, chains = known[0], list(known[1])
         Q = _sum(list(parts.values()))
         if not FORMULATIONS[spec.formulation].uses_twist:
             E = ca.SX.eye(6)

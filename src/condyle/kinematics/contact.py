@@ -219,12 +219,12 @@ def angle_equation(
         [c.gradient(ca.SX.zeros(3))[i] if c.anchored else ca.SX(0) for i in positions]
         for c in contacts
     ]
-    rest = equations[-1] if equations else ca.SX(0)
+    rest: ca.SX = equations[-1] if equations else ca.SX(0)
     if angles and positions and contacts[-1].anchored:
         rest = slopes[1][0] * equations[0] - slopes[0][0] * equations[1]
     A, B = ca.jacobian(rest, unknown[0]), ca.jacobian(rest, unknown[1])
-    k = -ca.substitute(rest, unknown, ca.SX.zeros(2))
-    return AngleEquation(A, B, k, unknown, base, bryant, equations, slopes)
+    right = -ca.substitute(rest, unknown, ca.SX.zeros(2))
+    return AngleEquation(A, B, right, unknown, base, bryant, equations, slopes)
 
 
 def closed_form(

@@ -131,7 +131,7 @@ class Contact(Table):
             )
         return self
 
-    @cached_property
+    @property
     def locus(self) -> Any:
         """The surface on which the centre of the ball stays: parallel to the wall, if it is one."""
         if self.ball_radius is None:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from typing import ClassVar, Literal
 
+import numpy as np
 from pydantic import Field
 
 from ..quantities import Direction, Point, PositiveLength
 from .base import Coordinates, Scalar, SurfaceTable
+from .quadric import about_itself, value
 
 
 class Cylinder(SurfaceTable):
-    """|axis x (p - point)| = radius with a unit axis, written as `Sphere` is."""
+    """|p - axis| = radius, as phi = (|p - axis|^2 - radius^2) / (2 radius)."""
 
     kind: Literal["cylinder"] = "cylinder"
     point: Point = Field(description="a point of the axis, in {S}")
@@ -22,15 +23,13 @@ class Cylinder(SurfaceTable):
     closed: ClassVar[bool] = True
 
     def phi(self, point: Coordinates, constants: Coordinates | None = None) -> Scalar:
-        c = self.constants() if constants is None else constants
-        x, y, z = point[0] - c[0], point[1] - c[1], point[2] - c[2]
-        u, v, w = c[3], c[4], c[5]
-        i, j, k = v * z - w * y, w * x - u * z, u * y - v * x
-        return ((i * i + j * j + k * k) / c[6] - c[6]) / 2
+        return value(point, self.constants() if constants is None else constants)
 
     def constants(self) -> tuple[float, ...]:
-        length = math.hypot(*self.axis)
-        return (*self.point, *(a / length for a in self.axis), self.radius)
+        """As `quadric.about_itself` gives them, the centre being the axis' point nearest O_M."""
+        axis = np.array(self.axis) / np.linalg.norm(self.axis)
+        across = np.eye(3) - np.outer(axis, axis)
+        return about_itself(across / (2 * self.radius), across @ self.point, self.radius / 2)
 
     def parallel(self, distance: float, point: Coordinates) -> Cylinder:
         return self.model_copy(update={"radius": self.radius + distance})

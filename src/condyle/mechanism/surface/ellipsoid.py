@@ -10,12 +10,13 @@ from pydantic import Field
 
 from ..quantities import Number, Point, PositiveLength, Vector
 from .base import Coordinates, Scalar, SurfaceTable
+from .quadric import about_itself, value
 
 
 class Ellipsoid(SurfaceTable):
-    """(p - centre)^T A (p - centre) = s, as phi = (left - s) / 2.
+    """(p - centre)^T A (p - centre) = s / 2, as phi = left - right.
 
-    A = s R diag(1 / semi_axes^2) R^T, with R = Rx Ry Rz of `rotation` and s the geometric mean of
+    A = R diag(s / (2 semi_axes^2)) R^T, with R = Rx Ry Rz of `rotation` and s the geometric mean of
     the semi-axes, which makes phi a distance to first order on a sphere.
     """
 
@@ -30,20 +31,14 @@ class Ellipsoid(SurfaceTable):
     closed: ClassVar[bool] = True
 
     def phi(self, point: Coordinates, constants: Coordinates | None = None) -> Scalar:
-        c = self.constants() if constants is None else constants
-        x, y, z = point[0] - c[0], point[1] - c[1], point[2] - c[2]
-        i = c[3] * x + c[6] * y + c[7] * z
-        j = c[6] * x + c[4] * y + c[8] * z
-        k = c[7] * x + c[8] * y + c[5] * z
-        return (x * i + y * j + z * k - c[9]) / 2
+        return value(point, self.constants() if constants is None else constants)
 
     def constants(self) -> tuple[float, ...]:
-        """centre, entries xx, yy, zz, xy, xz, yz of A, and s."""
+        """As `quadric.about_itself` gives them."""
         s = math.prod(self.semi_axes) ** (1 / 3)
         R = bryant_matrix(self.rotation)
-        A = (R * (s / np.square(self.semi_axes))) @ R.T
-        entries = (A[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
-        return (*self.centre, *map(float, entries), s)
+        A = (R * (s / (2 * np.square(self.semi_axes)))) @ R.T
+        return about_itself(A, np.array(self.centre), s / 2)
 
 
 def bryant_matrix(angles: tuple[Number, Number, Number]) -> np.ndarray:

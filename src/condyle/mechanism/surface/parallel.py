@@ -19,6 +19,7 @@ infinite, never wrong.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import casadi as ca
@@ -48,6 +49,7 @@ class Parallel(Smooth):
     multiplier: float = 0.0
 
     @staticmethod
+    @lru_cache(maxsize=256)
     def near(wall: Any, distance: float, point: tuple[float, ...]) -> Parallel:
         """The parallel surface as seen from `point`, (3,) [m]."""
         equation = _functions(wall, len(wall.constants()))[0]

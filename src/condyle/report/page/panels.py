@@ -329,11 +329,12 @@ def _reactions(solution: Solution, columns: Columns) -> Iterator[Panel]:
                 for (label, values), look in zip(lines.items(), looks, strict=True)
             ]
         attributes = solution[name].attrs
+        title = str(attributes.get("long_name", name.replace("_", " ")))
         yield panel(
             columns,
             "reactions",
             name,
-            str(attributes.get("long_name", name.replace("_", " "))).capitalize(),
+            title[:1].upper() + title[1:],
             Shown(str(attributes.get("units", ""))),
             sets,
             note="Magnitudes.",

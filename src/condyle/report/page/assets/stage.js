@@ -211,7 +211,12 @@ function setLayer(layer, on) {
 }
 
 function stageNote() {
-  if (!drawn.largestForce) return "";
-  const perCentimetre = 0.01 / drawn.metresPerNewton;
-  return `Arrows: 10 mm stands for ${perCentimetre.toPrecision(2)} N; the longest is ${drawn.largestForce.toPrecision(4)} N.`;
+  const notes = [];
+  const { samples: kept, total } = payload.columns;
+  if (kept < total) notes.push(`The page shows ${kept} of ${total} samples, the largest and smallest values among them.`);
+  if (drawn.largestForce) {
+    const perCentimetre = 0.01 / drawn.metresPerNewton;
+    notes.push(`Arrows: 10 mm stands for ${perCentimetre.toPrecision(2)} N; the longest is ${drawn.largestForce.toPrecision(4)} N.`);
+  }
+  return notes.join(" ");
 }

@@ -1,0 +1,198 @@
+"""What the code itself writes for the documentation, when the site is built.
+
+Figures of the reference case, an example report, the table of a solution's variables, the count of
+operations by model, and the help of every command.
+"""
+
+from __future__ import annotations
+
+import inspect
+import os
+import sys
+from pathlib import Path
+from types import UnionType
+from typing import Any, get_args, get_origin, get_type_hints
+
+os.environ.setdefault("MPLBACKEND", "agg")
+GENERATED = Path(__file__).parent / "generated"
+FIGURES = ("motion", "path", "torque", "share", "contact_force", "contact_track", "singularity")
+PICTURES = ("mechanism", *FIGURES)
+PAGES = ("cli.md", "operations.md", "variables.md")  # pieces that pages take in
+REPORT = "report.html"
+FILES = (*(f"{name}.png" for name in PICTURES), *PAGES, REPORT)
+
+
+def on_pre_build(config: Any) -> None:
+    """MkDocs calls this before it collects files."""
+    generate(GENERATED)
+
+
+def generate(folder: Path) -> None:
+    """Write all of `FILES`."""
+    import matplotlib.pyplot as plt
+
+    import condyle
+    from condyle.report.figures import PLOTS
+    from condyle.report.page import write_report
+
+    folder.mkdir(exist_ok=True)
+    text_pages(folder)
+    solution = reference_solution(1000.0)
+    for name in FIGURES:
+        PLOTS[name](solution).savefig(folder / f"{name}.png", dpi=110)
+    draw_mechanism(condyle.load("masticatory")).savefig(folder / "mechanism.png", dpi=110)
+    plt.close("all")
+    write_report(reference_solution(100.0), folder / REPORT)
+
+
+def text_pages(folder: Path) -> None:
+    """Write `PAGES`."""
+    pages = {"cli.md": command_help(), "operations.md": operation_counts()}
+    pages["variables.md"] = variable_table(reference_solution(100.0))
+    for name, text in pages.items():
+        (folder / name).write_text(text, encoding="utf-8")
+
+
+def reference_solution(rate: float) -> Any:
+    """The reference case at `rate` samples a second."""
+    import condyle
+    from condyle.motion import Motion, bundled_reference
+
+    motion = Motion.from_csv(bundled_reference()[0], rate=rate)
+    model = condyle.derive(condyle.load("masticatory"), backend="interpreted")
+    return model.solve(motion, condyle.reference_load())
+
+
+def variable_table(solution: Any) -> str:
+    """Every variable of a solution: dimensions, unit and meaning."""
+    lines = ["| variable | dimensions | unit | what it is |", "|---|---|---|---|"]
+    for name, variable in solution.data_vars.items():
+        dims, units = ", ".join(variable.dims), variable.attrs.get("units", "1")
+        meaning = variable.attrs.get("long_name", "")
+        if flags := variable.attrs.get("flag_meanings"):
+            meaning += ": " + ", ".join(f"{i} {f}" for i, f in enumerate(str(flags).split()))
+        lines.append(f"| `{name}` | {dims} | {units} | {meaning} |")
+    return "\n".join(lines) + "\n"
+
+
+def operation_counts() -> str:
+    """Operations a sample of Models 1 and 2: every subexpression once, and written out."""
+    import condyle
+    from condyle.dynamics import FORMULATIONS
+    from condyle.dynamics.equations import closure_function, core_function, direct_function
+
+    mechanism = condyle.load("masticatory")
+    closure = count(closure_function(mechanism))
+    lines = [
+        "| formulation | shared, Model 1 | shared, Model 2 | ratio "
+        "| written out, Model 1 | written out, Model 2 | ratio |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for name in ("momentum", "lagrange", "hessian", "newton_euler", "virtual_power"):
+        one = count(direct_function(mechanism, FORMULATIONS[name]))
+        core = count(core_function(mechanism, FORMULATIONS[name]))
+        two = [core[i] + closure[i] for i in range(2)]
+        lines.append(
+            f"| `{name}` | {one[0]} | {two[0]} | {two[0] / one[0]:.0%} "
+            f"| {one[1]:.1e} | {two[1]:.1e} | {two[1] / one[1]:.1%} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def count(function: Any) -> tuple[int, int]:
+    """Operations of a CasADi function: as it is, and with nothing shared."""
+    import casadi as ca
+
+    leaves = (ca.OP_INPUT, ca.OP_CONST)
+    size: dict[int, int] = {}
+    shared = written_out = 0
+    for k in range(function.n_instructions()):
+        op = function.instruction_id(k)
+        arguments, results = function.instruction_input(k), function.instruction_output(k)
+        if op in leaves:
+            size[results[0]] = 0
+        elif op == ca.OP_OUTPUT:
+            written_out += size[arguments[0]]
+        else:
+            shared += 1
+            size[results[0]] = 1 + sum(size[i] for i in arguments)
+    return shared, written_out
+
+
+def command_help() -> str:
+    """Arguments and options of every command, from the functions that the terminal calls."""
+    from condyle.cli import commands  # noqa: F401 - registers them
+    from condyle.cli.app import app
+
+    return "\n\n".join(_section(c.callback, c.name) for c in app.registered_commands)
+
+
+def _section(function: Any, name: str | None) -> str:
+    text = inspect.getdoc(function) or ""
+    lines = [f"## condyle {name or function.__name__}", "", text]
+    hints = get_type_hints(function, include_extras=True)
+    parameters = inspect.signature(function).parameters.values()
+    rows = [_row(p.name, hints[p.name], p.default) for p in parameters]
+    if rows:
+        lines += ["", "| argument or option | value | what it does |", "|---|---|---|", *rows]
+    return "\n".join(lines)
+
+
+def _row(name: str, hint: Any, default: Any) -> str:
+    kind, info = get_args(hint)[:2]
+    one = next((k for k in get_args(kind) if k is not type(None)), kind)
+    one = one if get_origin(kind) is UnionType else kind
+    repeated = get_origin(one) is list
+    one = get_args(one)[0] if repeated else one
+    if type(info).__name__ == "ArgumentInfo":
+        label, value = f"`{name.upper()}`", ""
+    else:
+        # Typer takes the first spelling for a default where a default may stand.
+        spelled = [d for d in (info.default, *(info.param_decls or ())) if isinstance(d, str)]
+        flag = name.replace("_", "-")
+        spelled = spelled or [f"--{flag}", *([f"--no-{flag}"] if one is bool else [])]
+        label = ", ".join(f"`{o}`" for o in spelled)
+        value = "" if one is bool else one.__name__.lower() + (" (repeatable)" if repeated else "")
+    text = info.help or ""
+    if default is inspect.Parameter.empty:
+        text += " Required."
+    elif default not in (None, False, True) and "Default" not in text:
+        text += f" Default: `{default}`."
+    return f"| {label} | {value} | {text} |"
+
+
+def draw_mechanism(mechanism: Any) -> Any:
+    """The mechanism at home, in space."""
+    import matplotlib.pyplot as plt
+    import numpy as np
+
+    from condyle.report.scene import contact_patch, place, platform_hull
+
+    home = place(mechanism, np.zeros((1, 6)), np.zeros((1, len(mechanism.chains))))
+    figure = plt.figure(figsize=(6.4, 5.2))
+    axes = figure.add_subplot(projection="3d")
+    vertices, faces = platform_hull(mechanism)  # {M} is {S} at home
+    axes.plot_trisurf(*(1e3 * vertices.T), triangles=faces, color="#c9b48a", alpha=0.55)
+    for drawing in home.chains.values():
+        at = {name: 1e3 * np.atleast_2d(point)[0] for name, point in drawing.points.items()}
+        for rod in drawing.rods:
+            ends = np.array([at[rod.start], at[rod.end]]).T
+            color = "#0072b2" if rod.moving else "#555555"
+            axes.plot(*ends, color=color, linewidth=1.5 + 1.5 * rod.thickness)
+        for ball in drawing.balls:
+            axes.scatter(*at[ball], color="#d55e00", s=18)
+    for contact in mechanism.contacts:
+        patch = contact_patch(contact, home.contacts[contact.name], 0.06)
+        axes.plot_trisurf(
+            *(1e3 * patch.vertices.T), triangles=patch.faces, color="#009e73", alpha=0.45
+        )
+    for name, point in home.contacts.items():
+        axes.scatter(*(1e3 * point[0]), color="#009e73", s=60, label=name)
+    axes.set(xlabel="X [mm]", ylabel="Y [mm]", zlabel="Z [mm]", aspect="equal")
+    axes.view_init(elev=18, azim=-35)
+    figure.tight_layout()
+    return figure
+
+
+if __name__ == "__main__":
+    generate(Path(sys.argv[1]) if len(sys.argv) > 1 else GENERATED)

@@ -1,0 +1,16 @@
+"""From the motion to joint coordinates, as encoders would read them, and back to the poses."""
+
+import numpy as np
+
+import condyle
+from condyle.kinematics.forward import ForwardKinematics
+
+mechanism = condyle.load("masticatory")
+solution = condyle.derive(mechanism).solve(condyle.reference_motion())
+encoders = solution["joint"].values + np.random.default_rng(0).normal(0, 1e-5, (5001, 6))
+
+found = ForwardKinematics(mechanism).solve(encoders)
+error = np.abs(found.pose - solution["pose"].values).max(axis=0)
+print(f"{found.found.sum()} poses found, condition at most {found.condition.max():.2f}")
+print(f"position error: {error[:3].max() * 1e3:.4f} mm, angle error: {error[3:].max():.2e} rad")
+print(f"largest joint residual: {np.abs(found.residual).max():.3e} rad")

@@ -1,0 +1,36 @@
+"""A mechanism of one's own: change the bundled one, write it as a file, move it."""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+import condyle
+
+# A heavier platform, and condyles that slide on steeper planes through the same home points.
+bundled = condyle.load("masticatory")
+contacts = []
+for contact in bundled.contacts:
+    x, _, z = contact.point
+    plane = contact.surface.model_copy(update={"slope": (-0.8, 0.0), "offset": z + 0.8 * x})
+    contacts.append(contact.model_copy(update={"surface": plane}))
+platform = bundled.platform.model_copy(update={"mass": 0.3})
+robot = bundled.replace(name="heavy", platform=platform, contacts=contacts)
+
+with tempfile.TemporaryDirectory() as folder:
+    path = Path(folder) / "heavy.toml"
+    condyle.dump(robot, path)
+    robot = condyle.load(path)
+
+# Open and close once, a push of 20 N on the incisor.
+t = np.linspace(0.0, 1.0, 201)
+opening = (1.0 - np.cos(2 * np.pi * t)) / 2
+motion = condyle.Motion.from_arrays(
+    t, {"X": 0.002 * opening, "Y": 0 * t, "alpha": 0 * t, "beta": 0.08 * opening}
+)
+load = condyle.Load.constant([0.0, 0.0, -20.0], point="incisor")
+solution = condyle.derive(robot).solve(motion, load)
+for warning in solution.warnings:
+    print("warning:", warning)
+peak = float(abs(solution["torque"]).max())
+print(f"largest effort: {peak:.6f} N m")

@@ -1,0 +1,9 @@
+"""The benchmark: our kernels, the interpreter and other engines, in one run on one core.
+
+Every row is checked against the interpreter before it is timed. Peers live in the repository's
+`benchmarks/peers` and take part when the command runs from its root and their packages are there.
+"""
+
+from .run import Benchmark, run_benchmark
+
+__all__ = ["Benchmark", "run_benchmark"]

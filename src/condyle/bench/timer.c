@@ -1,0 +1,66 @@
+/* Times a kernel from C, where a control loop would call it. */
+#include <stddef.h>
+#include <stdint.h>
+#include <time.h>
+
+typedef void (*One)(const double *, const double *, double *);
+typedef void (*Batch)(const double *, const double *const *, ptrdiff_t, size_t, double *, size_t,
+                      uint8_t *);
+typedef int (*Casadi)(const double **, double **, long long *, double *, int);
+
+static double now(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+/* Seconds an evaluation over `count` samples, `inputs` apart; with `dependent`, each waits for the
+ * result of the one before. */
+double time_one(One f, const double *table, double *samples, size_t count, size_t inputs,
+                double *out, int dependent) {
+    double start = now(), wait = 0;
+    for (size_t i = 0; i < count; i++) {
+        double *sample = samples + i * inputs;
+        if (dependent) sample[0] += wait;
+        f(table, sample, out);
+        wait = 1e-300 * out[0];
+    }
+    return (now() - start) / (double)count;
+}
+
+double time_batch(Batch f, const double *table, const double *const *in, size_t count, double *out,
+                  uint8_t *status) {
+    double start = now();
+    f(table, in, 1, count, out, count, status);
+    return (now() - start) / (double)count;
+}
+
+double time_casadi(Casadi f, double *samples, size_t count, size_t inputs, double *out,
+                   long long *iw, double *w, int dependent) {
+    double start = now(), wait = 0;
+    for (size_t i = 0; i < count; i++) {
+        double *sample = samples + i * inputs;
+        if (dependent) sample[0] += wait;
+        const double *in[1] = {sample};
+        double *res[1] = {out};
+        f(in, res, iw, w, 0);
+        wait = 1e-300 * out[0];
+    }
+    return (now() - start) / (double)count;
+}
+
+/* Clock rate: a chain of additions takes one cycle each. */
+double clock_rate(long count) {
+    double start = now();
+    long x = 0;
+    for (long i = 0; i < count; i++) {
+#if defined(__x86_64__)
+        __asm__ volatile("add $1, %0" : "+r"(x));
+#elif defined(__aarch64__)
+        __asm__ volatile("add %0, %0, #1" : "+r"(x));
+#else
+        x += 1;
+#endif
+    }
+    return (double)count / (now() - start);
+}

@@ -1,0 +1,219 @@
+"""condyle solve: its table, its digits, and rows that never influence each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.mechanism import COORDINATES
+from condyle.model import Model, with_point
+
+NAMES = ("X", "Y", "alpha", "beta")
+LOAD = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+
+
+def header(names: tuple[str, ...] = NAMES) -> list[str]:
+    return [prefix + name for prefix in ("", "d", "dd") for name in names]
+
+
+def draw(count: int, seed: int = 0) -> tuple[np.ndarray, ...]:
+    rng = np.random.default_rng(seed)
+    q = rng.uniform(-1, 1, (count, 4)) * [0.002, 0.002, 0.05, 0.08]
+    return q, rng.normal(0, 0.5, (count, 4)), rng.normal(0, 5, (count, 4))
+
+
+@pytest.fixture
+def model(reference: condyle.Mechanism) -> Model:
+    return condyle.derive(reference)
+
+
+def test_columns_and_digits(
+    condyle_command: Callable[..., Any],
+    write_csv: Callable[..., Path],
+    read_csv: Callable[..., Any],
+    model: Model,
+) -> None:
+    """Columns in the contract's order; every cell is the double that Python gets, 17 digits."""
+    q, q1, q2 = draw(9)
+    wrench = np.random.default_rng(1).normal(0, 5, (9, 6))
+    write_csv([*header(), *LOAD], np.hstack([q, q1, q2, wrench]), "states.csv")
+    outcome = condyle_command("solve", "masticatory", "--states", "states.csv", "--out", "out.csv")
+    assert outcome.status == 0 and outcome.out == "9 rows solved: out.csv\n"
+    columns, rows = read_csv("out.csv")
+    chains, contacts = model.mechanism.chain_names, model.mechanism.contact_names
+    assert columns == [
+        *(f"tau_{name}" for name in chains),
+        *(f"contact_{name}" for name in contacts),
+        *COORDINATES,
+        *(f"joint_{name}" for name in chains),
+    ]
+    found = model.evaluate(q, q1, q2, with_point(wrench, model.load_point("right_molar")))
+    t = found.torques
+    wanted = np.hstack([t.torque, t.contact_force, found.poses.pose, found.posture.joint])
+    np.testing.assert_array_equal(np.array(rows, dtype=float), wanted)
+    assert all(cell == f"{float(cell):.17g}" for row in rows for cell in row)
+
+
+def test_rows_never_influence_each_other(
+    condyle_command: Callable[..., Any],
+    write_csv: Callable[..., Path],
+    read_csv: Callable[..., Any],
+) -> None:
+    """37 rows, some out of reach: in any order and alone the same text, to the last digit."""
+    q, q1, q2 = draw(37, seed=3)
+    q[[4, 11, 12, 30]] += [0.5, 0, 0, 0]
+    rows = np.hstack([q, q1, q2])
+    order = np.random.default_rng(0).permutation(37)
+
+    def lines(rows: np.ndarray) -> list[list[str]]:
+        write_csv(header(), rows, "states.csv")
+        arguments = ("--states", "states.csv", "--out", "out.csv", "--flag")
+        assert condyle_command("solve", "masticatory", *arguments).status == 0
+        return read_csv("out.csv")[1]
+
+    together = lines(rows)
+    assert lines(rows[order]) == [together[i] for i in order]
+    for i in (0, 5, 11, 36):
+        assert lines(rows[i : i + 1]) == [together[i]]
+
+
+@pytest.mark.parametrize("names", [("Y", "Z", "alpha", "beta"), ("beta", "X", "gamma", "Y")])
+def test_any_valid_set_of_coordinates(
+    condyle_command: Callable[..., Any],
+    write_csv: Callable[..., Path],
+    read_csv: Callable[..., Any],
+    model: Model,
+    names: tuple[str, ...],
+) -> None:
+    """The same states in other coordinates, columns in any order: the same torques."""
+    q, q1, q2 = draw(12)
+    found = model.evaluate(q, q1, q2, np.zeros((12, 9)))
+    columns = [COORDINATES.index(name) for name in names]
+    poses = (found.poses.pose, found.poses.rate, found.poses.acceleration)
+    cells = np.hstack([a[:, columns] for a in poses])
+    mix = np.random.default_rng(2).permutation(12)
+    write_csv([header(names)[i] for i in mix], cells[:, mix], "states.csv")
+    outcome = condyle_command("solve", "masticatory", "--states", "states.csv", "--out", "out.csv")
+    assert outcome.status == 0, outcome.err
+    table = np.array(read_csv("out.csv")[1], dtype=float)
+    torque = found.torques.torque
+    np.testing.assert_allclose(table[:, :6], torque, atol=1e-11 * np.abs(torque).max())
+    np.testing.assert_allclose(table[:, 8:14], found.poses.pose, atol=1e-13)
+
+
+def test_flagged_rows_are_kept_and_empty(
+    condyle_command: Callable[..., Any],
+    write_csv: Callable[..., Path],
+    read_csv: Callable[..., Any],
+) -> None:
+    q, q1, q2 = draw(6)
+    q[2, 0], q[4, 3] = 0.3, 1.5
+    write_csv(header(), np.hstack([q, q1, q2]), "states.csv")
+    arguments = ("solve", "masticatory", "--states", "states.csv", "--out", "out.csv")
+    assert condyle_command(*arguments, "--flag").status == 0
+    columns, rows = read_csv("out.csv")
+    assert columns[-1] == "status" and len(columns) == 21 and len(rows) == 6
+    assert [row[-1] for row in rows] == ["ok", "ok", "unreachable", "ok", "unreachable", "ok"]
+    for i, row in enumerate(rows):
+        assert all((cell == "") == (i in (2, 4)) for cell in row[:-1])
+    Path("out.csv").unlink()
+    outcome = condyle_command(*arguments)
+    assert outcome.status == 2 and "at row 3" in outcome.err and not Path("out.csv").exists()
+    assert 'chain "temporalis_left" cannot reach M' in outcome.err
+    good = [i for i in range(6) if i not in (2, 4)]
+    write_csv(header(), np.hstack([q, q1, q2])[good], "states.csv")
+    assert condyle_command(*arguments).status == 0
+    assert read_csv("out.csv")[1] == [rows[i][:-1] for i in good]
+    assert condyle_command(*arguments, "--flag").status == 0
+    assert read_csv("out.csv")[1] == [rows[i] for i in good]
+
+
+def test_a_singular_row_has_its_own_status(
+    condyle_command: Callable[..., Any],
+    write_csv: Callable[..., Path],
+    read_csv: Callable[..., Any],
+    tmp_path: Path,
+) -> None:
+    """Six level rods of a cube: none can turn the platform about the vertical at home."""
+    chains = []
+    for i in range(6):
+        angle = np.pi / 3 * i
+        out = np.array([np.cos(angle), np.sin(angle), 0])
+        side = np.array([-out[1], out[0], 0])
+        joint, tip = 0.05 * out, 0.12 * out + [0, 0, 0.03 * (-1) ** i]
+        base = tip + 0.03 * (out * np.sin(0.3) + np.array([0, 0, np.cos(0.3)]))
+        places = {"base": base, "axis": side, "crank_tip": tip, "platform": joint}
+        text = "".join(f"{k} = {[float(x) for x in v]}\n" for k, v in places.items())
+        coupler = "{ mass = 0.01, com = 0.5, transverse = 1e-6, axial = 1e-8 }"
+        chains.append(
+            f'[[chain]]\nname = "c{i}"\nkind = "RSS"\n{text}'
+            f"crank = {{ inertia = 1e-5 }}\ncoupler = {coupler}\n"
+        )
+    inertia = "{ xx = 1e-4, yy = 1e-4, zz = 1e-4 }"
+    head = f'name = "star"\n[platform]\nmass = 1.0\ninertia = {inertia}\n'
+    (tmp_path / "star.toml").write_text(head + "".join(chains))
+    states = np.zeros((3, 18))
+    states[0, :6], states[2, 0] = [1e-3, 0, 0, 0.02, 0.03, 0.1], 0.5
+    write_csv(header(COORDINATES), states, "states.csv")
+    arguments = ("solve", "star.toml", "--states", "states.csv", "--out", "out.csv")
+    assert condyle_command(*arguments, "--flag").status == 0
+    rows = read_csv("out.csv")[1]
+    assert [row[-1] for row in rows] == ["ok", "singular", "unreachable"]
+    assert set(rows[1][:-1]) == {""} and "" not in rows[0]
+    Path("out.csv").unlink()
+    outcome = condyle_command(*arguments)
+    assert outcome.status == 2 and "singular at row 2" in outcome.err
+    assert not Path("out.csv").exists()
+
+
+def test_loads_are_optional_and_act_at_their_point(
+    condyle_command: Callable[..., Any],
+    write_csv: Callable[..., Path],
+    read_csv: Callable[..., Any],
+) -> None:
+    """A force at a point is the force at another and the moment between; moments have no point."""
+    q, q1, q2 = np.zeros((3, 1, 4))
+    arm = np.subtract([25.2, -24.8, 9.89], [52.75, 0, 4.63]) / 1000
+    force = np.array([3.0, -2.0, -40.0])
+
+    def torques(columns: tuple[str, ...], load: Any, *options: str) -> np.ndarray:
+        write_csv([*header(), *columns], np.hstack([q, q1, q2, [load]]), "states.csv")
+        arguments = ("--states", "states.csv", "--out", "out.csv", *options)
+        assert condyle_command("solve", "masticatory", *arguments).status == 0
+        return np.array(read_csv("out.csv")[1], dtype=float)[0, :8]
+
+    at_molar = torques(LOAD[:3], force)
+    assert (torques(LOAD[:3], force, "--load-point", "right_molar") == at_molar).all()
+    shifted = torques(LOAD, [*force, *np.cross(arm, force)], "--load-point", "incisor")
+    np.testing.assert_allclose(shifted, at_molar, atol=1e-12)
+    assert np.abs(torques(LOAD[:3], force, "--load-point", "incisor") - at_molar).max() > 1e-2
+    rest = torques((), [])
+    both = torques(LOAD[3:], [0.1, 0.2, 0.3])
+    assert (torques(LOAD[3:], [0.1, 0.2, 0.3], "--load-point", "incisor") == both).all()
+    assert np.abs(both - rest).max() > 1e-2
+    assert (torques(LOAD, [0.0] * 6) == rest).all()
+
+
+def test_bounds_warn_and_strict_refuses(
+    condyle_command: Callable[..., Any], write_csv: Callable[..., Path]
+) -> None:
+    states = np.zeros((3, 12))
+    states[1, 1], states[2, 1] = 0.0031, 0.004  # bounds end 3 mm to the side
+    write_csv(header(), states, "states.csv")
+    arguments = ("solve", "masticatory", "--states", "states.csv", "--out", "out.csv")
+    outcome = condyle_command(*arguments)
+    assert outcome.status == 0 and Path("out.csv").exists()
+    assert '"left_condyle" is outside its bounds in 2 rows, by up to 1 mm in row 3' in outcome.err
+    Path("out.csv").unlink()
+    outcome = condyle_command(*arguments, "--strict")
+    assert outcome.status == 2 and '"left_condyle" is outside' in outcome.err
+    assert [path.name for path in Path().iterdir()] == ["states.csv"]
+    states[1:, 1] = 0.0029
+    write_csv(header(), states, "states.csv")
+    outcome = condyle_command(*arguments, "--strict", "--quiet")
+    assert (outcome.status, outcome.out, outcome.err) == (0, "", "")
