@@ -172,7 +172,7 @@ def draw_mechanism(mechanism: Any) -> Any:
     figure = plt.figure(figsize=(6.4, 5.2))
     axes = figure.add_subplot(projection="3d")
     vertices, faces = platform_hull(mechanism)  # {M} is {S} at home
-    axes.plot_trisurf(*(1e3 * vertices.T), triangles=faces, color="#c9b48a", alpha=0.55)
+    axes.plot_trisurf(*(1e3 * vertices.T), triangles=faces, color="#e4d5b5", alpha=0.4)
     for drawing in home.chains.values():
         at = {name: 1e3 * np.atleast_2d(point)[0] for name, point in drawing.points.items()}
         for rod in drawing.rods:
@@ -189,8 +189,9 @@ def draw_mechanism(mechanism: Any) -> Any:
     for name, point in home.contacts.items():
         axes.scatter(*(1e3 * point[0]), color="#009e73", s=60, label=name)
     axes.set(xlabel="X [mm]", ylabel="Y [mm]", zlabel="Z [mm]", aspect="equal")
-    axes.view_init(elev=18, azim=-35)
-    figure.tight_layout()
+    axes.set(xticks=[-20, 20, 60], yticks=[-80, -40, 0, 40, 80], zticks=[0, 40, 80])
+    axes.view_init(elev=18, azim=-50)
+    figure.subplots_adjust(0, 0, 1, 1)
     return figure
 
 

@@ -132,6 +132,7 @@ def assemble(
     """The labelled dataset of an evaluation along a motion."""
     mechanism = model.mechanism
     e, t, p = evaluation.poses, evaluation.torques, evaluation.posture
+    assert t.contact_force is not None
     ok = evaluation.status == 0
     efforts = [FAMILIES[chain.kind].effort_unit for chain in mechanism.chains]
     joints = [FAMILIES[chain.kind].joint_unit for chain in mechanism.chains]

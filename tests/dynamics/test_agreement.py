@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -119,6 +120,24 @@ def test_near_crank_singularities(reference: Mechanism, backend: str) -> None:
         error = np.abs(got.torques.torque - wanted.torques.torque).max(axis=1)
         error /= np.abs(wanted.torques.torque).max(axis=1)
         assert (error < 1e-13 / sine**2).all()
+
+
+@pytest.mark.parametrize(
+    "options", [{"contacts": 3}, {"contacts": 2, "surface": "quadratic"}], ids=str
+)
+def test_backends_agree_far_from_home(options: dict[str, Any]) -> None:
+    """Kernels with a fixed number of Newton steps: the branch of home, or a second look."""
+    raw = random_mechanism(np.random.default_rng(1), **options)
+    mechanism = parse(toml_text(raw))
+    wanted_by, got_by = (condyle.derive(mechanism, backend=b) for b in ("interpreted", "auto"))
+    unit = np.array([0.006 if name in "XYZ" else 0.2 for name in wanted_by.independent])
+    q = np.random.default_rng(0).uniform(-1, 1, (400, len(unit))) * unit
+    wanted, got = (m.evaluate(q, q, q, np.zeros((400, 9))) for m in (wanted_by, got_by))
+    np.testing.assert_array_equal(got.status, wanted.status)
+    ok = wanted.status == 0
+    assert 50 < ok.sum() < 400
+    error = np.abs(got.torques.torque - wanted.torques.torque)[ok].max(axis=1)
+    assert (error < 1e-9 * np.abs(wanted.torques.torque[ok]).max(axis=1)).all()
 
 
 def test_names_that_do_not_exist(reference: Mechanism) -> None:

@@ -75,6 +75,35 @@ def plain_newton_euler(pose: Jet, wrench: Array) -> dict[str, Any]:
     return {"tau": x[:, 12], "at_B": x[:, :3], "at_M": x[:, 3:6], "turn": x[:, 8:11]}
 
 
+def test_published_numbers() -> None:
+    """Radii 3 and 1 m, height 2 m, 2.5 and 10 degrees; steel tubes and bars of 3/4 the length."""
+    mechanism, density = condyle.load("gough-stewart"), 76000 / 9.81
+
+    def ring(radius: float, height: float, degrees: list[float]) -> Array:
+        a = np.radians(degrees)
+        return np.stack([radius * np.cos(a), radius * np.sin(a), 0 * a + height], axis=1)
+
+    base = ring(3.0, -2.0, [-2.5, 2.5, 117.5, 122.5, 237.5, 242.5])
+    top = ring(1.0, 0.0, [-50, 50, 70, 170, 190, 290])
+    close([c.base for c in mechanism.chains], base, 1e-9)
+    close([c.platform for c in mechanism.chains], top, 1e-9)
+    size = 0.75 * np.linalg.norm(top - base, axis=1)[0]
+    outer, inner = 0.05, 0.03
+    for body, (a, b) in {"cylinder": (outer, inner), "piston": (inner, 0.0)}.items():
+        mass = density * np.pi * (a**2 - b**2) * size
+        wanted = [mass, size / 2, mass * (3 * (a**2 + b**2) + size**2) / 12]
+        wanted.append(mass * (a**2 + b**2) / 2)
+        for chain in mechanism.chains:
+            table = getattr(chain, body)
+            got = [table.mass, table.com, table.transverse, table.axial]
+            np.testing.assert_allclose(got, wanted, rtol=1e-4)
+    plate = density * np.pi * 0.05
+    inertia = mechanism.platform.inertia
+    np.testing.assert_allclose(mechanism.platform.mass, plate, rtol=1e-6)
+    np.testing.assert_allclose(inertia.zz, plate / 2, rtol=1e-6)
+    np.testing.assert_allclose(inertia.xx, plate * (3 + 0.05**2) / 12, rtol=1e-6)
+
+
 @pytest.fixture(scope="module")
 def wanted() -> list[dict[str, Any]]:
     q, q1, q2, wrench = states()

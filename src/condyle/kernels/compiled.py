@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..dynamics import FORMULATIONS
+from ..errors import InputError
 from ..kinematics.contact import indices
 from ..mechanism.home import independent_coordinates
 from ..mechanism.mechanism import Mechanism
@@ -92,11 +93,12 @@ class Kernel:
         Returns: name -> (N, columns), and status (N,): 0 ok, 1 unreachable, 2 look again.
         """
         inputs = np.asarray(inputs, dtype=np.float64)
+        self._check(inputs.shape[1:])
         count = len(inputs)
         results = np.empty((self._columns, count))
         status = np.empty(count, dtype=np.uint8)
         row, column = inputs.strides
-        if row % 8:  # a view into a record, say
+        if row % 8 or column % 8:  # a view into a record, say
             inputs = np.asfortranarray(inputs)
             row, column = inputs.strides
         base = inputs.ctypes.data
@@ -130,9 +132,14 @@ class Kernel:
     def one(self, sample: np.ndarray) -> np.ndarray:
         """Evaluate one sample, (inputs,), at least latency: all outputs in a row, (columns,)."""
         sample = np.ascontiguousarray(sample, dtype=np.float64)
+        self._check(sample.shape)
         result = np.empty(self._columns)
         self._library.one(self._table.ctypes.data, sample.ctypes.data, result.ctypes.data)
         return result
+
+    def _check(self, shape: tuple[int, ...]) -> None:
+        if shape != (self.inputs,):
+            raise InputError(f"a sample of this kernel has {self.inputs} numbers; got {shape}")
 
     def in_order(self, lanes: np.ndarray) -> np.ndarray:
         """Lane results (N, n) in the order of the mechanism's chains."""
@@ -304,17 +311,17 @@ class Compiled:
         """
         if self._failed or (len(load) and (load[:, 6:] != load[0, 6:]).any()):
             return self.interpreted.solve(q, q1, q2, load, outputs)
-        moment = bool(load[:, 3:6].any())
         point = load[0, 6:] if len(load) else np.zeros(3)
         try:
-            kernel = self.kernel(point, outputs, moment)
+            # With moments even where all are zero: no sample's digits depend on its company.
+            kernel = self.kernel(point, outputs, moment=True)
         except CompilerError as error:
             if self._required:
                 raise
             self._failed = True
             notice(f"{error}; the interpreter gives the same numbers, slower", "compiler")
             return self.interpreted.solve(q, q1, q2, load, outputs)
-        columns = [q, q1, q2, load[:, : 6 if moment else 3]]
+        columns = [q, q1, q2, load[:, :6]]
         inputs = np.empty((len(q), kernel.inputs), order="F")
         np.concatenate(columns, axis=1, out=inputs)
         found, status = kernel.run(inputs, threads)

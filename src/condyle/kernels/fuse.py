@@ -75,7 +75,12 @@ def fuse(graph: Graph, roots: Sequence[Value], chain: int) -> tuple[Graph, list[
             moved[v] = _sum(new, found, chain, note)
         else:
             args = tuple(moved[a] for a in node.args)
-            moved[v] = note(new.copy(node, args))
+            if node.op == "sum" and all(new.nodes[a].op == "neg" for a in args):
+                # One sign after the sum instead of one a lane.
+                total = new.copy(node, tuple(new.nodes[a].args[0] for a in args))
+                moved[v] = note(new.apply("neg", note(total)))
+            else:
+                moved[v] = note(new.copy(node, args))
     return new, [moved[v] for v in roots]
 
 

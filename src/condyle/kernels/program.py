@@ -7,7 +7,7 @@ this runs lanes in a vector register (one evaluation) or samples (a batch).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import casadi as ca
@@ -114,6 +114,33 @@ class Program:
 
 
 @dataclass(frozen=True)
+class Basis:
+    """Pi, the rates that the contacts allow: identity rows, and `rest` for the other rows.
+
+    Torques of least norm do not depend on which basis it is, so it can be a sparse one.
+    """
+
+    identity: Sequence[int]
+    others: Sequence[int]
+    rest: ca.SX
+
+    def pull(self, f: ca.SX) -> ca.SX:
+        """Pi^T f, with a column for each of f."""
+        own = f[list(self.identity), :]
+        return own + self.rest.T @ f[list(self.others), :] if len(self.others) else own
+
+
+def twist_basis(motion: WholeMotion, dep: list[int]) -> Basis:
+    """Twists with N^T [V; omega] = 0, by the components that stand where `dep` do at home.
+
+    At home R_omega is the identity, so they are determined as well as the coordinates are.
+    """
+    N = motion.frame.N
+    ind = [i for i in range(6) if i not in dep]
+    return Basis(ind, dep, -solve_small(N[dep, :].T, N[ind, :].T))
+
+
+@dataclass(frozen=True)
 class ChainTerms:
     """What the chains of one group contribute, lane by lane, dual to the state's rates."""
 
@@ -141,24 +168,17 @@ def build(spec: KernelSpec, careful: bool = False) -> Program:
         placement = newton(contacts, spec.dependent, q)
     motion = whole_motion(contacts, spec.dependent, placement, q1, q2)
     formulation = FORMULATIONS[spec.formulation]
-    twist = twist_state(ca.SX(0, 1), motion.R, motion.twist, motion.twist_rate)
-
-    # Dual to X_EE' both routes meet: C and M_J belong to those coordinates.
     dep = indices(spec.dependent)
-    ind = [i for i in range(6) if i not in dep]
     if spec.route == "direct":
         state = independent_state(q, q1, q2, placement.pose())
-        to_independent: Callable[[ca.SX], ca.SX] = lambda f: f  # noqa: E731
-    else:
-        state = twist if formulation.uses_twist else _pose_state(p, placement, motion)
-        E = motion.E if formulation.uses_twist else ca.SX.eye(6)
-
-        def to_independent(f: ca.SX) -> ca.SX:
-            in_pose = E.T @ f
-            return in_pose[ind] + motion.M_J[dep, :].T @ in_pose[dep]
-
-    if formulation.uses_twist and spec.route == "core":
+        basis = Basis(range(spec.m), [], ca.SX(0, spec.m))
+    elif formulation.uses_twist:
         state = twist_state(placement.position, motion.R, motion.twist, motion.twist_rate)
+        basis = twist_basis(motion, dep)
+    else:
+        state = _pose_state(p, placement, motion)
+        ind = [i for i in range(6) if i not in dep]
+        basis = Basis(ind, dep, motion.M_J[dep, :])
 
     fold = formulation.name == "virtual_power" and "share" not in spec.outputs
     chains = [_chain_terms(p, group, spec.formulation, state, g, fold) for group in _groups(spec)]
@@ -169,12 +189,12 @@ def build(spec: KernelSpec, careful: bool = False) -> Program:
     parts |= _chain_parts(p, chains, "share" in spec.outputs)
     parts["bite"] = bite
 
-    A = [to_independent(c.row) for c in chains]
+    A = [basis.pull(c.row) for c in chains]
     if "share" in spec.outputs:
-        b = ca.horzcat(*(to_independent(part) for part in parts.values()))
+        b = ca.horzcat(*(basis.pull(part) for part in parts.values()))
     else:
         total = _sum(list(parts.values()))
-        b = to_independent(total)
+        b = basis.pull(total)
     solve = gram_schmidt if careful or spec.n == m else normal_equations
     shares, quality = solve(p, A, b)
     torque = [_sum(ca.horzsplit(s)) for s in shares]
@@ -363,9 +383,9 @@ def _contact_forces(
     torque: Lanes,
     known: tuple[dict[str, ca.SX], Sequence[ChainTerms]] | None,
 ) -> ca.SX:
-    """lambda along the unit normals, from the dependent rows of C^T mu = Q - J^T tau."""
+    """lambda along the unit normals, from the dependent rows of G mu = Q - J^T tau."""
     dep = indices(spec.dependent)
-    E = motion.E
+    G = motion.frame.N
     if known is None:
         # Route `direct` has no equations across the contacts: take them from virtual power.
         g = p.parameters("gravity")
@@ -380,11 +400,10 @@ def _contact_forces(
         parts, chains = known[0], list(known[1])
         Q = _sum(list(parts.values()))
         if not FORMULATIONS[spec.formulation].uses_twist:
-            E = ca.SX.eye(6)
-    pulled = p.total([(E.T @ c.row)[dep] * t for c, t in zip(chains, torque, strict=True)])
-    C = motion.frame.N.T @ motion.E
-    left = (E.T @ Q)[dep] - pulled
-    mu = solve_small(C[:, dep].T, left)
+            G = motion.E.T @ G
+    pulled = p.total([c.row[dep] * t for c, t in zip(chains, torque, strict=True)])
+    left = Q[dep] - pulled
+    mu = solve_small(G[dep, :], left)
     if spec.parallel:
         # mu_mean grad (phi_1 + phi_2) / 2 + mu_difference grad (phi_1 - phi_2)
         mu = ca.vertcat(mu[0] / 2 + mu[1], mu[0] / 2 - mu[1])

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import casadi as ca
 
@@ -28,6 +29,7 @@ from .rotation import Bryant
 
 STEPS = 5
 RESIDUAL = 1e-13  # metres off a surface that count as on it
+ROUNDING = 1e-24  # square of a step that is as good as none
 SHORT = 2e-4  # radians of the second step at the most; the first is exact whatever its length
 
 
@@ -96,7 +98,9 @@ def _one_angle(contacts: Sequence[ContactSymbols], angle: int, q: ca.SX) -> Plac
     bryant = Bryant(*(ca.substitute(v, unknown, turn) for v in (bryant.cos, bryant.sin)))
     Z = -(heights[0] + heights[1]) / 2
     short = ca.fmax(1 - ca.fabs(steps[1]) / SHORT, 0)
-    reach = ca.fmin(short, _converged(heights[0] - heights[1]))
+    # The slope changes its sign where the branch of home meets another.
+    same = ca.fmax(inverse_slope * _home_slope(contacts, angle), 0)
+    reach = ca.fmin(ca.fmin(short, same), _converged(heights[0] - heights[1]))
     return Placement(ca.vertcat(q[:2], Z), bryant, reach)
 
 
@@ -118,6 +122,12 @@ def _circles(
         a, b = ca.jacobian(p, unknown[0]), ca.jacobian(p, unknown[1])
         circles.append(_Circle(a, b, ca.substitute(p, unknown, ca.SX.zeros(2))))
     return circles, bryant, unknown
+
+
+def _home_slope(contacts: Sequence[ContactSymbols], angle: int) -> ca.SX:
+    """d (phi_1 - phi_2) / d angle at home."""
+    frame = contact_frame(contacts, ca.SX.zeros(3), ca.SX.eye(3))
+    return frame.N[angle, 0] - frame.N[angle, 1]
 
 
 def _far(angle: ca.SX) -> ca.SX:
@@ -170,12 +180,26 @@ def _all_at_once(
     pose = ca.SX.zeros(6)
     # At home R_omega is the identity.
     pose[ind], pose[dep] = q, parasitic_jacobian(home.N.T, dependent)[dep, :] @ q
+    lengths = [_square(contacts, pose)]
     for _ in range(STEPS):
-        pose[dep] = pose[dep] - solve_small(*_linear(contacts, dep, pose))
+        step = ca.SX.zeros(6)
+        step[dep] = solve_small(*_linear(contacts, dep, pose))
+        pose = pose - step
+        lengths.append(_square(contacts, step))
     off = ca.SX(0.0)
     for phi in ca.vertsplit(residuals(contacts, pose)):
         off = ca.fmax(off, ca.fabs(phi))
-    return Placement(pose[:3], Bryant.of(pose[3:]), _converged(off))
+    # As in `Closure`: steps that shrink to a quarter do not leave the branch of home.
+    reach = ca.fmin(_converged(off), 1 - lengths[0])
+    for before, after in pairwise(lengths[:3]):
+        reach = ca.fmin(reach, 1 - after / (before / 16 + ROUNDING))
+    return Placement(pose[:3], Bryant.of(pose[3:]), ca.fmax(reach, 0))
+
+
+def _square(contacts: Sequence[ContactSymbols], step: ca.SX) -> ca.SX:
+    """Squared length of a change of pose, dimensionless: angles, and lengths by the levers'."""
+    lever = sum((ca.dot(c.point, c.point) for c in contacts), ca.SX(0)) / len(contacts)
+    return ca.dot(step[:3], step[:3]) / lever + ca.dot(step[3:], step[3:])
 
 
 def _converged(off: ca.SX) -> ca.SX:

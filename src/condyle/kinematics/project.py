@@ -81,8 +81,9 @@ def project_home(mechanism: Mechanism) -> Projection:
     length = characteristic_length(mechanism)
     scale = np.array([1.0, 1.0, 1.0, 1 / length, 1 / length, 1 / length])
     displacement = _nearest_root(residuals(contacts, x), x, scale)
-    moves = [_nearest_root(c.phi(c.point + d), d, np.ones(3)) for c in contacts]
-    if displacement is None or any(move is None for move in moves):
+    found = [_nearest_root(c.phi(c.point + d), d, np.ones(3)) for c in contacts]
+    moves = [move for move in found if move is not None]
+    if displacement is None or len(moves) < len(found):
         raise InputError(
             f"{mechanism.name}: no pose near home puts the contacts "
             f"{', '.join(mechanism.contact_names)} on their surfaces; move the surfaces"

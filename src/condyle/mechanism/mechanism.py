@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from functools import cached_property
@@ -123,11 +124,11 @@ class Contact(Table):
             raise ValueError(f"side is missing, and ball_radius and one_sided need it: {expected}")
         if self.side is not None and self.side not in known:
             raise ValueError(f'side: {expected}, got "{self.side}"')
-        radius = getattr(self.surface, "radius", None)
-        if self.side == "inside" and radius is not None and (self.ball_radius or 0.0) >= radius:
+        room, ball = getattr(self.surface, "radius", math.inf), self.ball_radius or 0.0
+        if self.side == "inside" and ball >= room:
             raise ValueError(
-                f"ball_radius: a ball of radius {self.ball_radius * 1e3:g} mm has no room inside a "
-                f"{self.surface.kind} of radius {radius * 1e3:g} mm"
+                f"ball_radius: a ball of radius {ball * 1e3:g} mm has no room inside a "
+                f"{self.surface.kind} of radius {room * 1e3:g} mm"
             )
         return self
 

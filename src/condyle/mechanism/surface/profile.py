@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Annotated, Literal
 
 import numpy as np
@@ -25,9 +26,9 @@ def _horizontal(value: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def _rising(points: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
-    for k, ((before, _), (after, _)) in enumerate(zip(points, points[1:], strict=False)):
+    for k, ((before, _), (after, _)) in enumerate(pairwise(points), 2):
         if not before < after:
-            raise ValueError(f"s must rise from point to point; point {k + 2} is not beyond the last")
+            raise ValueError(f"s must rise from point to point; point {k} is not beyond the last")
     return points
 
 

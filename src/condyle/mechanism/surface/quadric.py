@@ -19,7 +19,7 @@ def about_itself(A: np.ndarray, centre: np.ndarray, level: float) -> tuple[float
     The origin is where the line from the centre to O_M meets the surface.
     """
     ray = -centre
-    if not ray @ A @ ray > 0:
+    if not ray @ A @ ray > 1e-12 * level:
         ray = np.linalg.eigh(A)[1][:, -1]
     origin = centre + ray * np.sqrt(level / (ray @ A @ ray))
     lever = origin - centre
