@@ -216,6 +216,7 @@ class Model:
         load: Load | None = None,
         load_point: str | None = None,
         flag: bool = False,
+        reactions: bool = False,
     ) -> Solution:
         """Torques along a motion under a load.
 
@@ -223,6 +224,7 @@ class Model:
                 load_point: platform point the load acts at; default: the load's own, else
                 right_molar.
                 flag: keep samples that cannot be computed, empty and with a status.
+                reactions: forces and moments in every joint too.
         Raises: UnreachableError, SingularError: for such samples, unless `flag`.
                 InputError: if motion or load do not fit the mechanism.
         """
@@ -241,7 +243,15 @@ class Model:
         if not flag:
             self.require_ok(evaluation, motion.t)
         seconds = time.perf_counter() - start
-        return assemble(self, motion, load, wrench, name, evaluation, residual, seconds)
+        solution = assemble(self, motion, load, wrench, name, evaluation, residual, seconds)
+        if not reactions:
+            return solution
+        from .dynamics.reactions import reaction_variables
+        from .dynamics.reactions import reactions as joint_reactions
+
+        found = joint_reactions(self, evaluation)
+        variables, coordinates = reaction_variables(self.mechanism, found)
+        return solution.assign(variables).assign_coords(coordinates)
 
     def independent_motion(
         self, motion: Motion

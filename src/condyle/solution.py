@@ -94,6 +94,15 @@ class Solution(xr.Dataset):
         columns |= named_columns("contact_", self["contact"].values, self["contact_force"].values)
         columns |= named_columns("", self["coordinate"].values, self["pose"].values)
         columns |= named_columns("joint_", self["chain"].values, self["joint"].values)
+        for variable in self.data_vars:
+            if str(variable).startswith("reaction_"):
+                owners = self[self[variable].dims[1]].values
+                for i, axis in enumerate(AXES):
+                    prefix, values = f"{variable}_", self[variable].values[:, :, i]
+                    columns |= {
+                        f"{name}_{axis}": column
+                        for name, column in named_columns(prefix, owners, values).items()
+                    }
         if self["status"].values.any():
             columns["status"] = [STATUS_NAMES[i] for i in self["status"].values]
         return columns

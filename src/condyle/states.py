@@ -10,7 +10,7 @@ from .errors import BoundsError, InputError
 from .mechanism.mechanism import COORDINATES
 from .model import STATUS_NAMES, Model, with_point
 from .motion import Table, TableWriter, iter_table
-from .solution import BOUND_TOLERANCE, WRENCH, bound_margins, lift_off, named_columns
+from .solution import AXES, BOUND_TOLERANCE, WRENCH, bound_margins, lift_off, named_columns
 
 CHUNK_ROWS = 65536
 
@@ -22,6 +22,7 @@ def solve_file(
     load_point: str | None = None,
     flag: bool = False,
     strict: bool = False,
+    reactions: bool = False,
 ) -> tuple[int, list[str]]:
     """Solve every row of a states file; the output appears whole or not at all.
 
@@ -29,6 +30,7 @@ def solve_file(
 
     Args:    states: CSV with 6 - k pose coordinates, their rates dX... and accelerations
              ddX..., and optionally Fx, Fy, Fz, Mx, My, Mz.
+             reactions: columns reaction_<joint>_<chain>_x, _y, _z ... too.
     Returns: number of rows, and warnings.
     Raises:  InputError, UnreachableError, SingularError, BoundsError: nothing is written then.
     """
@@ -38,7 +40,7 @@ def solve_file(
     rows = 0
     with TableWriter(out) as writer:
         for table in iter_table(states, CHUNK_ROWS, known=known):
-            columns, margins, lifted = solve_table(model, table, load_point, flag, rows)
+            columns, margins, lifted = solve_table(model, table, load_point, flag, rows, reactions)
             for i, name in enumerate(model.mechanism.contact_names):
                 outside = np.flatnonzero(margins[:, i] < -BOUND_TOLERANCE)
                 if outside.size:
@@ -68,7 +70,12 @@ def solve_file(
 
 
 def solve_table(
-    model: Model, table: Table, load_point: str | None, flag: bool, first_row: int
+    model: Model,
+    table: Table,
+    load_point: str | None,
+    flag: bool,
+    first_row: int,
+    reactions: bool = False,
 ) -> tuple[dict[str, np.ndarray | list[str]], np.ndarray, np.ndarray]:
     """Output columns for the rows of one table; bound margins and lift-off, (N, k)."""
     names = state_coordinates(model, table)
@@ -96,6 +103,12 @@ def solve_table(
     for prefix, (labels, array) in values.items():
         assert array is not None
         columns |= named_columns(prefix, labels, np.where(ok[:, None], array, np.nan))
+    if reactions:
+        from .dynamics.reactions import reactions as joint_reactions
+
+        for name, reaction in joint_reactions(model, evaluation).items():
+            array = np.where(ok[:, None], reaction.array, np.nan)
+            columns |= {f"reaction_{name}_{axis}": array[:, i] for i, axis in enumerate(AXES)}
     if flag:
         columns["status"] = [STATUS_NAMES[i] for i in evaluation.status]
     margins = bound_margins(mechanism, evaluation.posture.contact_point)

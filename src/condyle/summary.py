@@ -20,7 +20,7 @@ class Summary:
 
     def __str__(self) -> str:
         d = self.data
-        width = max(map(len, [*d["peak_effort"], *d["peak_contact_force"]]))
+        width = max(map(len, [*d["peak_effort"], *d["peak_contact_force"]]), default=0)
         lines = [
             f"{d['mechanism']}: {d['samples']} samples, {d['time'][0]:g} to {d['time'][1]:g} s, "
             f"{d['formulation']}/{d['route']}, {d['seconds']:.2f} s",

@@ -8,6 +8,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 
@@ -66,7 +67,7 @@ def own_rows(
     samples = reachable_samples(reference, SAMPLES)
     load = np.hstack([samples[:, 3 * m :], np.zeros((SAMPLES, 3)), np.tile(point, (SAMPLES, 1))])
     states = [samples[:, i * m : (i + 1) * m] for i in range(3)]
-    right = reference.torques(*states, load)[0].torque
+    right = reference.torques(states[0], states[1], states[2], load)[0].torque
     name = mechanism.name
     for formulation in formulations:
         for outputs in ((), ("contact",)) if formulation == "virtual_power" else ((),):
@@ -97,8 +98,15 @@ def _kernel_rows(
     # Lanes stand family by family in what C returns.
     wrong = _error(kernel.in_order(got), right[:256])
     for dependent, what in ((0, "one"), (1, "one, dependent")):
-        run = lambda d=dependent: timer.library.time_one(  # noqa: E731
-            one, table, _at(packed), len(packed), packed.shape[1], _at(out), d
+        run = partial(
+            timer.library.time_one,
+            one,
+            table,
+            _at(packed),
+            len(packed),
+            packed.shape[1],
+            _at(out),
+            dependent,
         )
         yield Row(f"{label}: {what}", *_timed(run, seconds), wrong, kernel.facts["operations"])
     pointers = (ctypes.c_void_p * columns.shape[1])(
@@ -106,8 +114,14 @@ def _kernel_rows(
     )
     status = np.empty(len(samples), dtype=np.uint8)
     wrong = _error(kernel.in_order(kernel.run(columns)[0]["torque"]), right)
-    run = lambda: timer.library.time_batch(  # noqa: E731
-        batch, table, pointers, ctypes.c_size_t(len(samples)), _at(out), _at(status)
+    run = partial(
+        timer.library.time_batch,
+        batch,
+        table,
+        pointers,
+        ctypes.c_size_t(len(samples)),
+        _at(out),
+        _at(status),
     )
     yield Row(f"{label}: batch", *_timed(run, seconds), wrong, kernel.facts["operations"])
 
@@ -121,7 +135,7 @@ def _threads_row(label: str, kernel: Kernel, samples: np.ndarray, seconds: float
         kernel.run(many, threads=threads)
         return (time.perf_counter() - start) / len(many)
 
-    one, two = (_timed(lambda t=t: run(t), seconds) for t in (1, 2))
+    one, two = (_timed(partial(run, t), seconds) for t in (1, 2))
     row = Row(f"{label}: batch, two threads", *two, 0.0, kernel.facts["operations"])
     row.note = f"{one[0] / two[0]:.2f} x one thread ({one[0] * 1e9:.1f} ns)"
     return row
@@ -132,7 +146,7 @@ def _interpreter_row(
 ) -> Row:
     def run() -> float:
         start = time.perf_counter()
-        model.torques(*states, load)
+        model.torques(states[0], states[1], states[2], load)
         return (time.perf_counter() - start) / len(load)
 
     return Row(f"{label}: batch", *_timed(run, seconds), 0.0, None)
@@ -158,8 +172,16 @@ def _straight_rows(
     packed, out = np.ascontiguousarray(samples), np.empty(16)
     got = np.asarray(function(samples[:256].T).full()).T
     for dependent, what in ((0, "one"), (1, "one, dependent")):
-        run = lambda d=dependent: timer.library.time_casadi(  # noqa: E731
-            call, _at(packed), len(packed), packed.shape[1], _at(out), _at(iw), _at(w), d
+        run = partial(
+            timer.library.time_casadi,
+            call,
+            _at(packed),
+            len(packed),
+            packed.shape[1],
+            _at(out),
+            _at(iw),
+            _at(w),
+            dependent,
         )
         yield Row(f"{label}: {what}", *_timed(run, seconds), _error(got, right[:256]), None)
 
@@ -184,7 +206,7 @@ def ready_rows(mechanism: str) -> Iterator[Row]:
         "print(time.perf_counter() - t)\n"
     )
     with tempfile.TemporaryDirectory(prefix="condyle-bench-") as cache:
-        times = []
+        times: list[float] = []
         for _ in range(6):
             done = subprocess.run(
                 [sys.executable, "-c", program],
@@ -207,7 +229,8 @@ def _environment(**extra: str) -> dict[str, str]:
 def _timed(run: Callable[[], float], seconds: float) -> tuple[float, float]:
     """Median and spread of repeats for about so many seconds."""
     run()
-    times, end = [], time.perf_counter() + seconds
+    times: list[float] = []
+    end = time.perf_counter() + seconds
     while len(times) < 5 or time.perf_counter() < end:
         times.append(run())
     return spread(times)

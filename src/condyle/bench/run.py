@@ -54,10 +54,9 @@ class Benchmark:
         width = max(len(row.name) for row in self.rows)
         lines = [f"{'':<{width}}  {'median':>12}  {'spread':>7}  {'error':>8}"]
         for r in self.rows:
-            spread_text = f"{r.spread / r.seconds:.0%}" if r.seconds else ""
-            lines.append(
-                f"{r.name:<{width}}  {_time(r.seconds):>12}  {spread_text:>7}  {r.error:8.1e}  {r.note}"
-            )
+            wide = f"{r.spread / r.seconds:.0%}" if r.seconds else ""
+            numbers = f"{_time(r.seconds):>12}  {wide:>7}  {r.error:8.1e}"
+            lines.append(f"{r.name:<{width}}  {numbers}  {r.note}")
         lines += ["", *(f"{name}: {value:.3g}" for name, value in self.ratios.items())]
         lines += [f"not run: {name} ({why})" for name, why in self.unavailable.items()]
         f = self.facts

@@ -47,6 +47,13 @@ Rate = Annotated[
     float | None,
     typer.Option(help="Samples a second of the results. Default: those of the motion."),
 ]
+Reactions = Annotated[
+    bool, typer.Option("--reactions", help="Forces and moments in every joint too.")
+]
+Backend = Annotated[
+    str,
+    typer.Option(help="compiled, interpreted, or auto (compiled where there is a C compiler)."),
+]
 Flag = Annotated[
     bool,
     typer.Option("--flag", help="Keep samples that cannot be computed: empty, with a status."),

@@ -34,6 +34,11 @@ def run(
     smooth: options.Smooth = None,
     rate: options.Rate = None,
     figures: Annotated[bool, typer.Option("--figures", help="Draw figures too.")] = False,
+    reactions: options.Reactions = False,
+    report: Annotated[
+        bool, typer.Option("--report", help="Write the page of condyle report too.")
+    ] = False,
+    backend: options.Backend = "auto",
     strict: options.Strict = False,
     flag: options.Flag = False,
     quiet: options.Quiet = False,
@@ -49,8 +54,8 @@ def run(
 
     machine = condyle.load(mechanism)
     path, acting = motion_and_load(motion, load, units, landmark, smooth, rate)
-    model = condyle.derive(machine, formulation, route)
-    solution = model.solve(path, acting, load_point, flag)
+    model = condyle.derive(machine, formulation, route, backend)
+    solution = model.solve(path, acting, load_point, flag, reactions)
     if strict:
         require_inside(solution.warnings)
     folder, stem = output_folder(out), file_stem(machine.name)
@@ -59,7 +64,13 @@ def run(
     if figures:
         from ..report.figures import save_solution_figures
 
-        files += save_solution_figures(solution, out)
+        files += save_solution_figures(solution, folder)
+    if report:
+        from ..report.page import write_report
+
+        inputs = [file for file in (motion, load) if file is not None]
+        inputs += [Path(mechanism)] if Path(mechanism).is_file() else []
+        files.append(write_report(solution, folder / f"{stem}.html", files=inputs))
     warn(solution.warnings)
     summary = summarize(solution)
     if as_json:
@@ -67,4 +78,4 @@ def run(
         return
     say(quiet, str(summary))
     say(quiet, "\nResults: " + ", ".join(str(f) for f in files))
-    say(quiet, "Next: condyle compare (all models side by side), condyle run --figures")
+    say(quiet, f"Next: condyle report {files[0]}, condyle compare (all models side by side)")

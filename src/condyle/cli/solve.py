@@ -20,6 +20,8 @@ def solve(
     load_point: options.LoadPoint = None,
     formulation: options.Formulation = "virtual_power",
     route: options.Route = "core",
+    reactions: options.Reactions = False,
+    backend: options.Backend = "auto",
     strict: options.Strict = False,
     flag: options.Flag = False,
     quiet: options.Quiet = False,
@@ -29,7 +31,7 @@ def solve(
 
     from ..states import solve_file
 
-    model = condyle.derive(condyle.load(mechanism), formulation, route)
-    rows, warnings = solve_file(model, states, out, load_point, flag, strict)
+    model = condyle.derive(condyle.load(mechanism), formulation, route, backend)
+    rows, warnings = solve_file(model, states, out, load_point, flag, strict, reactions)
     warn(warnings)
     say(quiet, f"{rows} rows solved: {out}")

@@ -98,8 +98,8 @@ class Kernel:
         results = np.empty((self._columns, count))
         status = np.empty(count, dtype=np.uint8)
         row, column = inputs.strides
-        if row % 8 or column % 8:  # a view into a record, say
-            inputs = np.asfortranarray(inputs)
+        if row % 8 or column % 8 or not inputs.flags.aligned:  # a view into a record, say
+            inputs = np.array(inputs, order="F")
             row, column = inputs.strides
         base = inputs.ctypes.data
 

@@ -370,7 +370,10 @@ def gram_schmidt(p: Program, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
 def _margin(p: Program, placement: Placement, chains: Sequence[ChainTerms]) -> ca.SX:
     """Least of the dimensionless reaches: not negative where the pose can be reached."""
     least = p.least([c.law.reach for c in chains])
-    return least if placement.reach is None else ca.fmin(least, placement.reach)
+    if placement.reach is None:
+        return least
+    # A pose that Newton did not find is not unreachable but unknown: 0, to be looked at again.
+    return least * placement.reach if placement.iterated else ca.fmin(least, placement.reach)
 
 
 def _contact_forces(

@@ -162,11 +162,13 @@ class Placement:
     """A pose that satisfies the contacts: O_M, the Bryant angles, and whether it is real.
 
     reach: dimensionless; the contacts can be met where it is not negative (None: always).
+    iterated: found in a fixed number of steps; `reach` is then 0 where they were too few.
     """
 
     position: ca.SX
     bryant: Bryant
     reach: ca.SX | None
+    iterated: bool = False
 
     def pose(self) -> ca.SX:
         """X_EE, (6,)."""

@@ -101,7 +101,7 @@ def _one_angle(contacts: Sequence[ContactSymbols], angle: int, q: ca.SX) -> Plac
     # The slope changes its sign where the branch of home meets another.
     same = ca.fmax(inverse_slope * _home_slope(contacts, angle), 0)
     reach = ca.fmin(ca.fmin(short, same), _converged(heights[0] - heights[1]))
-    return Placement(ca.vertcat(q[:2], Z), bryant, reach)
+    return Placement(ca.vertcat(q[:2], Z), bryant, reach, iterated=True)
 
 
 def _circles(
@@ -193,7 +193,7 @@ def _all_at_once(
     reach = ca.fmin(_converged(off), 1 - lengths[0])
     for before, after in pairwise(lengths[:3]):
         reach = ca.fmin(reach, 1 - after / (before / 16 + ROUNDING))
-    return Placement(pose[:3], Bryant.of(pose[3:]), ca.fmax(reach, 0))
+    return Placement(pose[:3], Bryant.of(pose[3:]), ca.fmax(reach, 0), iterated=True)
 
 
 def _square(contacts: Sequence[ContactSymbols], step: ca.SX) -> ca.SX:

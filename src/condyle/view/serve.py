@@ -147,7 +147,9 @@ class View:
             self._wake.clear()
             now = time.monotonic()
             with self._lock:
-                moved = self.playback is not None and self.playback.advance(now - before)
+                # Time spent waiting for a hand is no time of the solution.
+                passed = now - before if playing else 0.0
+                moved = self.playback is not None and self.playback.advance(passed)
                 before = now
                 if self._closed or not (asked or moved):
                     continue

@@ -1,0 +1,270 @@
+"""The documentation tells the truth: its blocks and commands run, its links and names exist.
+
+A ```python block is run, page by page in one namespace and one folder, with the ```console
+commands between. It is left alone only where it is an excerpt of the sources, word for word, or
+where a line `<!-- not run: why -->` stands above it.
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+import shlex
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+import yaml
+
+import condyle
+from condyle.mechanism import bundled_text
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+PAGES = [*([ROOT / "README.md"] * (ROOT / "README.md").exists()), *sorted(DOCS.rglob("*.md"))]
+PAGES = [page for page in PAGES if "generated" not in page.parts]
+# Servers and long work: of these commands only the options are looked at.
+LONG = {"view", "bench", "compare"}
+BLOCK = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```", re.MULTILINE | re.DOTALL)
+EQUATIONS = 67
+
+
+@dataclass(frozen=True)
+class Block:
+    kind: str
+    text: str
+    line: int
+    skipped: bool
+
+
+def blocks(page: Path) -> Iterator[Block]:
+    text = page.read_text(encoding="utf-8")
+    for match in BLOCK.finditer(text):
+        before = text[: match.start()].rstrip().rpartition("\n")[2]
+        skipped = before.startswith("<!-- not run:")
+        yield Block(match[1], match[2], text.count("\n", 0, match.start()) + 2, skipped)
+
+
+def name_of(page: Path) -> str:
+    return str(page.relative_to(ROOT))
+
+
+@pytest.fixture(scope="session")
+def sources() -> str:
+    return "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "src").rglob("*.py"))
+
+
+@pytest.fixture
+def hooks(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    monkeypatch.syspath_prepend(str(DOCS))
+    return importlib.import_module("hooks")
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> None:
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    monkeypatch.setenv("CONDYLE_BACKEND", "interpreted")
+    monkeypatch.setenv("CONDYLE_CACHE", str(tmp_path_factory.getbasetemp() / "docs-kernels"))
+
+
+def put_files_of_a_reader(folder: Path) -> None:
+    """Files that commands in the text name without making them."""
+    (folder / "my.toml").write_text(bundled_text("masticatory"), encoding="utf-8")
+    q = ("X", "Y", "alpha", "beta")
+    names = [prefix + name for prefix in ("", "d", "dd") for name in q]
+    chains = [f"joint_{name}" for name in condyle.load("masticatory").chain_names]
+    for name, columns in (("states.csv", names), ("encoders.csv", chains)):
+        rows = [",".join(columns), *[",".join(["0"] * len(columns))] * 2]
+        (folder / name).write_text("\n".join(rows), encoding="utf-8")
+
+
+def run_page(page: Path, command: Callable[..., Any], sources: str) -> int:
+    """Run a page's blocks in order; returns how many."""
+    namespace: dict[str, Any] = {"__name__": "page"}
+    count = 0
+    put_files_of_a_reader(Path.cwd())
+    for block in blocks(page):
+        if block.kind == "python" and not block.skipped and block.text not in sources:
+            code = "\n" * (block.line - 1) + block.text
+            exec(compile(code, str(page), "exec"), namespace)
+            count += 1
+        if block.kind == "console" and not block.skipped:
+            for line in block.text.splitlines():
+                words = shlex.split(line.removeprefix("$ "), comments=True)
+                if words[:1] == ["condyle"]:
+                    run_command(command, words[1:])
+                    count += 1
+    return count
+
+
+def run_command(command: Callable[..., Any], words: list[str]) -> None:
+    outcome = command(words[0], "--help") if words[0] in LONG else command(*words)
+    assert outcome.status == 0, f"condyle {shlex.join(words)}: {outcome.err}"
+    if words[0] in LONG:
+        for word in words:
+            assert not word.startswith("--") or word in outcome.out, f"no option {word}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_blocks_and_commands_run(
+    page: Path,
+    condyle_command: Callable[..., Any],  # also moves to an empty folder
+    sources: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    if page.name == "kernels.md":
+        from condyle.kernels.compiler import CompilerError, find_compiler
+
+        monkeypatch.setenv("CONDYLE_BACKEND", "compiled")
+        try:
+            find_compiler()
+        except CompilerError as error:
+            pytest.skip(f"kernels need a compiler: {error}")
+    run_page(page, condyle_command, sources)
+
+
+def test_blocks_are_found(condyle_command: Callable[..., Any], sources: str) -> None:
+    assert run_page(DOCS / "tutorial.md", condyle_command, sources) == 8
+    assert all(block.text in sources for block in blocks(DOCS / "chains.md") if block.kind)
+
+
+def test_inline_commands_exist() -> None:
+    from condyle.cli import commands  # noqa: F401 - registers them
+    from condyle.cli.app import app
+
+    known = {c.name or c.callback.__name__ for c in app.registered_commands if c.callback}
+    for page in PAGES:
+        used = re.findall(r"`condyle ([a-z]+)", page.read_text(encoding="utf-8"))
+        assert set(used) <= known, name_of(page)
+
+
+# Example -> the number in its last line, and how near it must be.
+EXAMPLES = {
+    "compare_surfaces": (-6.4285, 1e-3),
+    "forward_kinematics": (2.979e-05, 1e-7),
+    "own_mechanism": (0.244891, 2e-6),
+    "reference": (0.925334, 2e-6),
+    "states_batch": (0.055638, 2e-6),
+}
+
+
+def test_every_example_is_listed() -> None:
+    assert {path.stem for path in (ROOT / "examples").glob("*.py")} == set(EXAMPLES)
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_examples(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    path = ROOT / "examples" / f"{name}.py"
+    exec(compile(path.read_text(encoding="utf-8"), str(path), "exec"), {"__name__": "__main__"})
+    last = capsys.readouterr().out.splitlines()[-1]
+    number = float(re.findall(r"[-+]?\d[\d.]*(?:e[-+]?\d+)?", last)[-1])
+    wanted, tolerance = EXAMPLES[name]
+    assert number == pytest.approx(wanted, abs=tolerance), last
+
+
+def anchor(heading: str) -> str:
+    """As the site makes it."""
+    return re.sub(r"[-\s]+", "-", re.sub(r"[^\w\s-]", "", heading).strip().lower())
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_links_lead_somewhere(page: Path, hooks: ModuleType) -> None:
+    text = BLOCK.sub("", page.read_text(encoding="utf-8"))
+    made = {DOCS / "generated" / name for name in hooks.FILES}
+    for link in re.findall(r"\]\(([^)\s]+)\)", text):
+        if re.match(r"\w+:", link):
+            continue
+        path, _, part = link.partition("#")
+        target = (page.parent / path).resolve() if path else page
+        assert target.exists() or target in made, f"{link} leads nowhere"
+        if part and target.suffix == ".md":
+            headings = re.findall(r"^#+ (.+)$", target.read_text(encoding="utf-8"), re.MULTILINE)
+            assert part in map(anchor, headings), f"{link}: no such heading"
+    for name in re.findall(r'^--8<-- "(.+)"$', text, re.MULTILINE):
+        assert name in hooks.PAGES
+
+
+class _Loader(yaml.SafeLoader):
+    """Reads mkdocs.yml."""
+
+
+_Loader.add_multi_constructor("tag:yaml.org,2002:python/", lambda loader, suffix, node: suffix)
+
+
+def test_every_page_is_in_the_navigation() -> None:
+    settings = yaml.load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"), _Loader)
+
+    def leaves(entry: Any) -> Iterator[str]:
+        for value in entry.values() if isinstance(entry, dict) else entry:
+            yield from [value] if isinstance(value, str) else leaves(value)
+
+    pages = {str(p.relative_to(DOCS)) for p in PAGES if DOCS in p.parents}
+    assert set(leaves(settings["nav"])) == pages
+
+
+def table_rows(page: Path) -> list[list[str]]:
+    lines = page.read_text(encoding="utf-8").splitlines()
+    return [[c.strip() for c in line.strip("|").split("|")] for line in lines if line[:1] == "|"]
+
+
+def test_every_equation_has_a_home() -> None:
+    homes: dict[int, str] = {}
+    for eq, *cells in table_rows(DOCS / "theory" / "equations.md"):
+        if found := re.fullmatch(r"\((\d+)\)(?:-\((\d+)\))?", eq):
+            for number in range(int(found[1]), int(found[2] or found[1]) + 1):
+                assert number not in homes, f"({number}) stands twice"
+                homes[number] = cells[1]
+                assert "`condyle." in cells[1], f"({number}) has no home"
+    assert sorted(homes) == list(range(1, EQUATIONS + 1))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_names_of_code_exist(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    names = re.findall(r"`(condyle(?:\.\w+)+)[^`]*`|^::: (condyle(?:\.\w+)+)", text, re.MULTILINE)
+    for name in {a or b for a, b in names} - {"condyle.toml"}:
+        assert exists(name), f"{name} does not exist"
+
+
+def exists(name: str) -> bool:
+    """Whether a dotted name leads to a module, class, function, method or field."""
+    parts = name.split(".")
+    for i in range(len(parts), 0, -1):
+        try:
+            thing: Any = importlib.import_module(".".join(parts[:i]))
+        except ModuleNotFoundError:
+            continue
+        for part in parts[i:]:
+            fields = {**getattr(thing, "__annotations__", {}), **vars(thing)}
+            if not hasattr(thing, part) and part not in fields:
+                return False
+            thing = getattr(thing, part, None)
+        return True
+    return False
+
+
+def test_every_variable_and_command_is_described(hooks: ModuleType, tmp_path: Path) -> None:
+    hooks.text_pages(tmp_path)
+    variables = (tmp_path / "variables.md").read_text(encoding="utf-8")
+    for name in hooks.reference_solution(100.0).data_vars:
+        row = next(r for r in variables.splitlines() if r.startswith(f"| `{name}` |"))
+        assert all(cell.strip() for cell in row.strip("|").split("|")), row
+    commands = (tmp_path / "cli.md").read_text(encoding="utf-8")
+    assert "## condyle run" in commands and "`--load-point`" in commands
+    assert "`--quiet`, `-q`" in commands and "--as-json" not in commands
+    for row in (tmp_path / "operations.md").read_text(encoding="utf-8").splitlines()[2:]:
+        shared, written_out = (float(cell.strip(" %")) for cell in re.findall(r"[\d.]+%", row))
+        assert written_out < 5 < 75 < shared < 100, row  # the gap that sharing closes
+
+
+def test_nothing_is_fetched_from_elsewhere() -> None:
+    for path in [*PAGES, ROOT / "mkdocs.yml", DOCS / "style.css", DOCS / "hooks.py"]:
+        text = path.read_text(encoding="utf-8")
+        assert not re.search(r"!\[[^]]*\]\(https?:|<script|@import|<link", text), path
+
+
+def test_generated_files_are_not_kept() -> None:
+    assert "/generated/" in (DOCS / ".gitignore").read_text(encoding="utf-8")

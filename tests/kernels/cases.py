@@ -1,0 +1,111 @@
+"""Mechanisms with states of them, and how results are compared."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from oracles import description
+from oracles.random_mechanism import random_mechanism, random_state, toml_text
+
+from condyle.kernels.compiled import Kernel
+from condyle.kernels.result import Torques
+from condyle.mechanism import Mechanism, load, parse
+
+Array = np.ndarray
+BUNDLED = ("masticatory", "masticatory-curved", "gough-stewart", "hexaglide")
+MIXED = ("RSS", "PSS", "SPS")
+RANDOM: dict[str, dict[str, Any]] = {
+    "rss_k0_n9": {"contacts": 0, "chains": 9, "tilted_gravity": True},
+    "rss_k1_n8_quadratic": {"contacts": 1, "chains": 8, "surface": "quadratic"},
+    "rss_k2_n6_sphere": {"surface": "sphere"},
+    "rss_k2_n6_profile": {"surface": "profile"},
+    "rss_k2_n6_ball": {"surface": "ellipsoid", "ball_radius": 3.0},
+    "pss_k2_n6_cylinder": {"families": ("PSS",), "surface": "cylinder"},
+    "sps_k2_n6_ellipsoid": {"families": ("SPS",), "surface": "ellipsoid"},
+    "mixed_k0_n9": {"families": MIXED, "contacts": 0, "chains": 9},
+    "mixed_k2_n8": {"families": MIXED, "chains": 8},
+    "mixed_k3_n8_curved": {"families": MIXED, "contacts": 3, "chains": 8, "surface": "quadratic"},
+    "mixed_k4_n6": {"families": MIXED, "contacts": 4},
+    "mixed_k5_n9": {"families": MIXED, "contacts": 5, "chains": 9},
+}
+BUNDLED_FOLDER = description.Path(description.__file__).parents[2] / "src/condyle/mechanism/bundled"
+SCALES = (0.0, 0.05, 1.0, 1.0)  # home, near it, and far
+
+
+@dataclass(frozen=True)
+class Case:
+    """A mechanism and N of its states; load: (N, 9) as `Model.evaluate` takes it."""
+
+    mechanism: Mechanism
+    q: Array
+    q1: Array
+    q2: Array
+    load: Array
+
+    @property
+    def arguments(self) -> tuple[Array, Array, Array, Array]:
+        return self.q, self.q1, self.q2, self.load
+
+    @property
+    def point(self) -> Array:
+        return self.load[0, 6:]
+
+    @property
+    def samples(self) -> Array:
+        """Inputs of a kernel with moments, (N, 3 m + 6)."""
+        return np.hstack([self.q, self.q1, self.q2, self.load[:, :6]])
+
+    def repeated(self, count: int) -> Case:
+        """`count` states, all different: those of the case, drawn together by a common factor."""
+        rows = np.arange(count) % len(self.q)
+        near = np.linspace(1.0, 0.5, count)[:, None]
+        scaled = (a[rows] * near for a in (self.q, self.q1, self.q2))
+        return Case(self.mechanism, *scaled, self.load[rows])
+
+
+@cache
+def case(name: str) -> Case:
+    """A bundled mechanism, or one of `RANDOM`, at home, near it and away from it."""
+    if name in BUNDLED:
+        raw, mechanism = description.load(BUNDLED_FOLDER / f"{name}.toml"), load(name)
+    else:
+        raw = random_mechanism(np.random.default_rng(sum(map(ord, name))), **RANDOM[name])
+        mechanism = parse(toml_text(raw))
+    rng = np.random.default_rng(3)
+    found = [random_state(rng, raw, 3, scale, condition=100.0) for scale in SCALES]
+    q, q1, q2, wrench = (
+        np.concatenate([state[key] for state in found]) for key in ("q", "qd", "qdd", "wrench")
+    )
+    point = mechanism.platform.points.get(found[0]["load_point"], (0.0, 0.0, 0.0))
+    return Case(mechanism, q, q1, q2, np.hstack([wrench, np.tile(point, (len(wrench), 1))]))
+
+
+def error(got: Any, wanted: Any) -> float:
+    """Largest difference over the largest component; inf where only one of them is finite."""
+    got, wanted = np.asarray(got, dtype=float), np.asarray(wanted, dtype=float)
+    assert got.shape == wanted.shape
+    if not wanted.size:
+        return 0.0
+    if (np.isfinite(got) != np.isfinite(wanted)).any():
+        return np.inf
+    scale = np.nanmax(np.abs(wanted))
+    return float(np.nanmax(np.abs(got - wanted)) / (scale or 1.0))
+
+
+def errors(got: Torques, wanted: Torques) -> dict[str, float]:
+    """Relative errors of all results that both have."""
+    names = ("torque", "share", "contact_force", "rate", "acceleration")
+    pairs = {name: (getattr(got, name), getattr(wanted, name)) for name in names}
+    if got.poses is not None and wanted.poses is not None:
+        for name in ("pose", "rate", "acceleration"):
+            pairs[f"poses.{name}"] = getattr(got.poses, name), getattr(wanted.poses, name)
+    return {k: error(a, b) for k, (a, b) in pairs.items() if a is not None and b is not None}
+
+
+def ones(kernel: Kernel, samples: Array) -> dict[str, Array]:
+    """What `one` says of samples, as `Kernel.run` returns it."""
+    rows = np.array([kernel.one(sample) for sample in samples])
+    return {name: rows[:, a : a + count] for name, (a, count) in kernel.outputs.items()}

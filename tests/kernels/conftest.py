@@ -1,0 +1,58 @@
+"""A cache folder of these tests' own, and a compiler that is quick because it does not optimise."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from condyle.kernels import notice
+from condyle.kernels.compiler import CompilerError, find_compiler
+
+try:
+    COMPILER = find_compiler().command
+except CompilerError as error:
+    pytest.skip(str(error), allow_module_level=True)
+
+
+@pytest.fixture(scope="session")
+def kernel_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One folder for all tests (of all workers), so that no kernel is built twice."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "built-kernels"
+    folder.mkdir(exist_ok=True, mode=0o700)
+    return folder
+
+
+@pytest.fixture(scope="module", autouse=True)
+def kernel_cache(kernel_folder: Path) -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("CONDYLE_CACHE", str(kernel_folder))
+        for name in ("CONDYLE_BACKEND", "CONDYLE_LANES"):
+            patch.delenv(name, raising=False)
+        yield
+
+
+@pytest.fixture(autouse=True)
+def nothing_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(notice, "_said", set())
+
+
+@pytest.fixture(scope="session")
+def quick_command(kernel_folder: Path) -> str:
+    """The compiler without optimisation: builds take half a second."""
+    return script(kernel_folder / "quick", f'exec {shlex.join(COMPILER)} "$@" -O0')
+
+
+@pytest.fixture
+def quick(quick_command: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", quick_command)
+
+
+def script(path: Path, body: str) -> str:
+    """A shell script as a command for CC."""
+    path.write_text(f"#!/bin/sh\n{body}\n", encoding="utf-8")
+    return shlex.join(["/bin/sh", str(path)])
