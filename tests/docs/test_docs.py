@@ -30,6 +30,8 @@ PAGES = [page for page in PAGES if "generated" not in page.parts]
 LONG = {"view", "bench", "compare"}
 BLOCK = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```", re.MULTILINE | re.DOTALL)
 EQUATIONS = 67
+# Blocks and commands of some pages, so that a test that finds none of them fails.
+RUN = {"tutorial.md": 8, "forward-kinematics.md": 3}
 
 
 @dataclass(frozen=True)
@@ -123,11 +125,11 @@ def test_blocks_and_commands_run(
             find_compiler()
         except CompilerError as error:
             pytest.skip(f"kernels need a compiler: {error}")
-    run_page(page, condyle_command, sources)
+    count = run_page(page, condyle_command, sources)
+    assert count == RUN.get(page.name, count)
 
 
-def test_blocks_are_found(condyle_command: Callable[..., Any], sources: str) -> None:
-    assert run_page(DOCS / "tutorial.md", condyle_command, sources) == 8
+def test_excerpts_are_of_the_sources(sources: str) -> None:
     assert all(block.text in sources for block in blocks(DOCS / "chains.md") if block.kind)
 
 
@@ -147,7 +149,7 @@ EXAMPLES = {
     "forward_kinematics": (2.979e-05, 1e-7),
     "own_mechanism": (0.244891, 2e-6),
     "reference": (0.925334, 2e-6),
-    "states_batch": (0.055638, 2e-6),
+    "states_batch": (0.055845, 2e-6),
 }
 
 

@@ -164,10 +164,13 @@ def _ratios(rows: list[Row], clock: float, lanes: int) -> dict[str, float]:
     own = f"{REFERENCE} virtual_power"
     one, batch = by_name[f"{own}: one"], by_name[f"{own}: batch"]
     ratios: dict[str, float] = {}
-    cpp = [t for n, t in by_name.items() if n.startswith("peer pinocchio-") and "python" not in n]
-    if cpp:
-        ratios["one evaluation, times faster than Pinocchio C++ at its best"] = min(cpp) / one
-        ratios["batch, times faster than Pinocchio C++ a sample"] = min(cpp) / batch
+    # The cut tree is the problem as it stands; the free couplers leave half of it to hand-written
+    # code, and are the quickest way to use Pinocchio that we know.
+    for tree, what in (("tree", "the cut tree"), ("free", "free couplers, the rest by hand")):
+        cpp = [t for n, t in by_name.items() if n.startswith(f"peer pinocchio-{tree}")]
+        if cpp:
+            ratios[f"one evaluation, times faster than Pinocchio C++ ({what})"] = min(cpp) / one
+            ratios[f"batch, times faster than Pinocchio C++ ({what})"] = min(cpp) / batch
     straight = by_name[f"{REFERENCE} CasADi straight-line C, gcc: one"]
     ratios["one evaluation, times faster than straight-line C"] = straight / one
     count = operations[f"{own}: batch"]
