@@ -11,7 +11,7 @@ run: $(VENV)/run.stamp
 	$(BIN)/condyle run --out results --figures
 
 test: $(VENV)/test.stamp
-	$(BIN)/ruff check src tests benchmarks
+	$(BIN)/ruff check src tests benchmarks examples docs
 	$(BIN)/mypy
 	$(BIN)/pytest --numprocesses 2
 
@@ -19,7 +19,7 @@ bench: $(VENV)/bench.stamp
 	$(BIN)/condyle bench --out results/bench.json
 
 docs: $(VENV)/docs.stamp
-	$(BIN)/mkdocs build --strict
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 clean:
 	rm -rf $(VENV) results site build

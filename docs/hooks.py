@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import inspect
 import os
-import sys
 from pathlib import Path
 from types import UnionType
 from typing import Any, get_args, get_origin, get_type_hints
@@ -161,16 +160,47 @@ def _row(name: str, hint: Any, default: Any) -> str:
     return f"| {label} | {value} | {text} |"
 
 
+def readme_picture() -> Any:
+    """The mechanism at home, and motion and torques of the reference case."""
+    import matplotlib.pyplot as plt
+
+    import condyle
+
+    solution = reference_solution(1000.0)
+    t, chains = solution["time"], solution["chain"].values
+    figure = plt.figure(figsize=(11, 4.2))
+    draw_on(figure.add_axes((0.03, 0.08, 0.38, 0.92), projection="3d"), condyle.load("masticatory"))
+    motion, torque = (figure.add_axes((0.51, bottom, 0.31, 0.33)) for bottom in (0.6, 0.12))
+    for name in ("X", "Z"):
+        motion.plot(t, 1e3 * solution["pose"].sel(coordinate=name), label=f"{name} [mm]")
+    motion.plot(t, 57.29578 * solution["pose"].sel(coordinate="beta"), label="beta [deg]")
+    for i, name in enumerate(chains):
+        style = {"color": f"C{i // 2}", "linestyle": ("-", "--")[i % 2]}
+        torque.plot(t, solution["torque"].sel(chain=name), label=name.replace("_", " "), **style)
+    motion.set(title="motion", xlim=(0, 5), xticklabels=[])
+    torque.set(title="torques [N m]", xlabel="time [s]", xlim=(0, 5))
+    for axes in (motion, torque):
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=8)
+        axes.spines[["top", "right"]].set_visible(False)
+    return figure
+
+
 def draw_mechanism(mechanism: Any) -> Any:
     """The mechanism at home, in space."""
     import matplotlib.pyplot as plt
+
+    figure = plt.figure(figsize=(6.4, 5.2))
+    draw_on(figure.add_axes((0.0, 0.0, 1.0, 1.0), projection="3d"), mechanism)
+    return figure
+
+
+def draw_on(axes: Any, mechanism: Any) -> None:
+    """Draw the mechanism at home on axes in space."""
     import numpy as np
 
     from condyle.report.scene import contact_patch, place, platform_hull
 
     home = place(mechanism, np.zeros((1, 6)), np.zeros((1, len(mechanism.chains))))
-    figure = plt.figure(figsize=(6.4, 5.2))
-    axes = figure.add_subplot(projection="3d")
     vertices, faces = platform_hull(mechanism)  # {M} is {S} at home
     axes.plot_trisurf(*(1e3 * vertices.T), triangles=faces, color="#e4d5b5", alpha=0.4)
     for drawing in home.chains.values():
@@ -191,9 +221,9 @@ def draw_mechanism(mechanism: Any) -> Any:
     axes.set(xlabel="X [mm]", ylabel="Y [mm]", zlabel="Z [mm]", aspect="equal")
     axes.set(xticks=[-20, 20, 60], yticks=[-80, -40, 0, 40, 80], zticks=[0, 40, 80])
     axes.view_init(elev=18, azim=-50)
-    figure.subplots_adjust(0, 0, 1, 1)
-    return figure
 
 
-if __name__ == "__main__":
-    generate(Path(sys.argv[1]) if len(sys.argv) > 1 else GENERATED)
+if __name__ == "__main__":  # the picture of the README, which is kept in the repository
+    images = Path(__file__).parent / "images"
+    images.mkdir(exist_ok=True)
+    readme_picture().savefig(images / "reference.png", dpi=100)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from condyle.errors import InputError
 from condyle.motion import Load, Motion
 from condyle.report.scene import contact_patch, place, platform_hull, rotations
 from condyle.solution import Solution
+from condyle.view import open_view
 from condyle.view.playback import Playback
 from condyle.view.readout import number, status_html, tables_html
 from condyle.view.session import Session
@@ -174,6 +177,19 @@ def test_playback_runs_with_the_clock_and_stops_at_the_end(chewing: Solution) ->
     assert playback.now == chewing["time"].values[-1]
     playback.play()
     assert playback.index == 0, "from the end, play starts over"
+
+
+def test_play_begins_where_it_stands_however_long_it_stood(chewing: Solution) -> None:
+    view = open_view(None, chewing, port=0)
+    try:
+        time.sleep(1.5)
+        begun = time.monotonic()
+        view.wish("play", view.panel.toggle)
+        time.sleep(0.4)
+        assert view.playback is not None
+        assert 0 < view.playback.now <= time.monotonic() - begun + 0.02
+    finally:
+        view.close()
 
 
 def test_playback_of_failed_samples_keeps_the_picture(reference: condyle.Mechanism) -> None:

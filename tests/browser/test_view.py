@@ -153,19 +153,24 @@ def test_files_open_and_bad_ones_are_refused(tab: Tab, view: View, tmp_path: Pat
 
 
 def test_dragging_the_platform_moves_it(tab: Tab, view: View) -> None:
-    """The gizmo's drag as viser reports it, start to end."""
-    control = view.stage.control
-    control.position = view.stage.scale * np.array([0.0, 0.0, -0.004])
-
-    class Event:
-        phase = "update"
-
-    view.panel._dragged(Event())
-    assert view.dragging
-    Event.phase = "end"
-    view.panel._dragged(Event())
-    tab.page.locator('[data-table="pose"]').filter(has_not_text="-0.00").wait_for()
-    assert not view.dragging and view.snapshot.pose[2] < -0.002
+    """Pulled down by the blue arrow, the jaw opens: Z is no independent coordinate here."""
+    tab.page.get_by_role("button", name="Top").click()
+    tab.page.get_by_role("button", name="Oblique").click()
+    tab.page.wait_for_timeout(1000)
+    pixels = tab.picture("canvas")
+    blue = (pixels[..., 2] > 180) & (pixels[..., 0] < 100) & (np.ptp(pixels, axis=-1) > 90)
+    row_, column = (int(v) for v in np.argwhere(blue & (pixels[..., 1] > 110))[0])
+    mouse = tab.page.mouse
+    mouse.move(column, row_ + 6)
+    tab.page.wait_for_timeout(400)
+    mouse.down()
+    for step in range(1, 9):
+        mouse.move(column, row_ + 6 + 5 * step)
+        tab.page.wait_for_timeout(100)
+    mouse.up()
+    tab.page.locator('[data-table="pose"]').filter(has_not_text="beta °0.00").wait_for()
+    tab.page.wait_for_timeout(500)
+    assert not view.dragging and view.snapshot.pose[2] < -0.001
 
 
 def test_the_page_is_for_this_machine_only(view: View) -> None:

@@ -22,14 +22,14 @@ RANDOM: dict[str, dict[str, Any]] = {
     "rss_k1_n8_quadratic": {"contacts": 1, "chains": 8, "surface": "quadratic"},
     "rss_k2_n6_sphere": {"surface": "sphere"},
     "rss_k2_n6_profile": {"surface": "profile"},
-    "rss_k2_n6_ball": {"surface": "ellipsoid", "ball_radius": 3.0},
+    "rss_k1_n6_ball": {"contacts": 1, "surface": "quadratic", "ball_radius": 3.0},
     "pss_k2_n6_cylinder": {"families": ("PSS",), "surface": "cylinder"},
     "sps_k2_n6_ellipsoid": {"families": ("SPS",), "surface": "ellipsoid"},
-    "mixed_k0_n9": {"families": MIXED, "contacts": 0, "chains": 9},
+    "mixed_k0_n7": {"families": MIXED, "contacts": 0, "chains": 7},
     "mixed_k2_n8": {"families": MIXED, "chains": 8},
-    "mixed_k3_n8_curved": {"families": MIXED, "contacts": 3, "chains": 8, "surface": "quadratic"},
+    "mixed_k3_n9_curved": {"families": MIXED, "contacts": 3, "chains": 9, "surface": "quadratic"},
     "mixed_k4_n6": {"families": MIXED, "contacts": 4},
-    "mixed_k5_n9": {"families": MIXED, "contacts": 5, "chains": 9},
+    "mixed_k5_n6": {"families": MIXED, "contacts": 5},
 }
 BUNDLED_FOLDER = description.Path(description.__file__).parents[2] / "src/condyle/mechanism/bundled"
 SCALES = (0.0, 0.05, 1.0, 1.0)  # home, near it, and far
@@ -72,10 +72,11 @@ def case(name: str) -> Case:
     if name in BUNDLED:
         raw, mechanism = description.load(BUNDLED_FOLDER / f"{name}.toml"), load(name)
     else:
-        raw = random_mechanism(np.random.default_rng(sum(map(ord, name))), **RANDOM[name])
+        rng = np.random.default_rng(sum(map(ord, name)))
+        raw = random_mechanism(rng, condition=100.0, **RANDOM[name])
         mechanism = parse(toml_text(raw))
     rng = np.random.default_rng(3)
-    found = [random_state(rng, raw, 3, scale, condition=100.0) for scale in SCALES]
+    found = [random_state(rng, raw, 3, scale) for scale in SCALES]
     q, q1, q2, wrench = (
         np.concatenate([state[key] for state in found]) for key in ("q", "qd", "qdd", "wrench")
     )

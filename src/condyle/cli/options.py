@@ -12,7 +12,10 @@ Mechanism = Annotated[
 ]
 Formulation = Annotated[
     str,
-    typer.Option(help="How the equations are derived: virtual_power, momentum, lagrange."),
+    typer.Option(
+        help="How the equations are derived: virtual_power, momentum, lagrange, hessian, "
+        "newton_euler."
+    ),
 ]
 Route = Annotated[
     str, typer.Option(help="core (through six coordinates) or direct (the independent ones).")

@@ -26,7 +26,7 @@ from ..mechanism.home import (
 )
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from .batch import evaluate
-from .contact import ContactSymbols, indices, residuals
+from .contact import ContactSymbols, closed_form_available, indices, residuals
 from .rotation import rotation
 
 SMALLEST_PIECE = 2.0**-10  # of the way from home
@@ -55,13 +55,16 @@ def contact_symbols(mechanism: Mechanism) -> list[ContactSymbols]:
 class Closure:
     """Solves a mechanism's poses for one choice of prescribed functions."""
 
-    def __init__(self, mechanism: Mechanism, prescribed: ca.Function) -> None:
-        """Args: prescribed: g(X_EE), (6) -> (6 - k)."""
+    def __init__(
+        self, mechanism: Mechanism, prescribed: ca.Function, two_branches: bool = False
+    ) -> None:
+        """Args: prescribed: g(X_EE), (6) -> (6 - k); two_branches: whether there are no more."""
         x, rate = ca.SX.sym("x", 6), ca.SX.sym("rate", 6)
         conditions = ca.vertcat(residuals(contact_symbols(mechanism), x), prescribed(x))
         K = ca.jacobian(conditions, x)
         bias = ca.jtimes(K @ rate, x, rate)
         self._k = len(mechanism.contacts)
+        self._two_branches = two_branches
         self._conditions = ca.Function("conditions", [x], [conditions, K])
         self._bias = ca.Function("bias", [x, rate], [bias])
         home, K_home = evaluate(self._conditions, np.zeros((1, 6)))
@@ -92,10 +95,12 @@ class Closure:
             piece[active] *= np.where(ok, 2.0, 0.5)
             active = active[(done[active] < 1) & (piece[active] >= SMALLEST_PIECE)]
         reached = done == 1
-        # The straight way may leave the surfaces where another would not: then one bold leap.
-        missed = np.flatnonzero(~reached & np.isfinite(s).all(axis=1))
-        pose[missed], reached[missed] = self._newton(pose[missed] * 0, s[missed], bold=True)
-        # Branches meet where K is singular, so the sign of its determinant tells them apart.
+        if self._two_branches:
+            # The straight way may leave the surfaces where another would not: one bold leap, to
+            # be judged by its branch.
+            missed = np.flatnonzero(~reached & np.isfinite(s).all(axis=1))
+            pose[missed], reached[missed] = self._newton(pose[missed] * 0, s[missed], bold=True)
+        # Branches meet where K is singular, and the sign of its determinant changes.
         reached &= np.linalg.slogdet(self._jacobian(pose)).sign == self._branch
         pose[~reached] = np.nan
         return pose, reached
@@ -161,7 +166,12 @@ def coordinate_closure(mechanism: Mechanism, names: Sequence[str]) -> Closure:
             f"determine {', '.join(dependent)} from them. Available: {_sets(usable)}"
         )
     x = ca.SX.sym("x", 6)
-    return Closure(mechanism, ca.Function("coordinates", [x], [x[indices(names)]]))
+    kinds = [contact.surface.kind for contact in mechanism.contacts]
+    return Closure(
+        mechanism,
+        ca.Function("coordinates", [x], [x[indices(names)]]),
+        two_branches=closed_form_available(kinds, dependent),
+    )
 
 
 def landmark_closure(mechanism: Mechanism, landmark: str) -> Closure:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable
 from functools import partial
 from html import escape
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import viser
 
-from ..errors import CondyleError
+from ..errors import InputError
 from ..mechanism import bundled_mechanisms, load, parse
 from ..solution import open_solution
 from .readout import COLOURS, status_html, tables_html
@@ -28,7 +29,7 @@ SPEEDS = {"0.1×": 0.1, "0.25×": 0.25, "0.5×": 0.5, "1×": 1.0, "2×": 2.0}
 
 
 class Panel:
-    """The controls of one mechanism. They call the view and never compute."""
+    """The controls of one mechanism. They note wishes; the view's worker fulfils them."""
 
     def __init__(self, server: viser.ViserServer, view: View) -> None:
         self._gui = server.gui
@@ -46,8 +47,23 @@ class Panel:
             self._add_files()
         self._tables = self._gui.add_html("")
         views = self._gui.add_button_group("View", tuple(VIEWS))
-        views.on_click(lambda event: view.look_from(event.target.value))
-        view.stage.control.on_update(self._dragged)
+        views.on_click(lambda _: view.wish("camera", partial(view.look_from, views.value)))
+        self._follow_drags()
+
+    def _hear(self, kind: str, handle: Any, action: Callable[[Any], None]) -> None:
+        """Wish `action(value)` when a hand changes a handle, not when the panel itself does."""
+
+        # On viser's own thread: a pool's thread might read the value after the worker's next one.
+        async def heard(event: Any) -> None:
+            if event.client_id is not None:
+                self._view.wish(kind, partial(action, handle.value))
+
+        handle.on_update(heard)
+
+    def _press(self, label: str, action: Callable[[], None], **options: Any) -> Any:
+        button = self._gui.add_button(label, **options)
+        button.on_click(lambda _: self._view.wish(label, action))
+        return button
 
     def _add_pose(self) -> None:
         session = self._view.session
@@ -55,65 +71,68 @@ class Panel:
         self._sliders: dict[str, Any] = {}
         for c in self._coordinates.values():
             low, high = round_outwards(c.low * c.scale, c.high * c.scale)
-            slider: Any = self._gui.add_slider(
-                f"{c.name} [{c.unit}]",
-                min=low,
-                max=high,
-                step=0.01,
-                initial_value=0.0,
-            )
-            slider.on_update(partial(self._moved, c.name))
+            slider = self._gui.add_slider(f"{c.name} [{c.unit}]", low, high, 0.01, 0.0)
+            self._hear(c.name, slider, partial(self.move, c.name))
             self._sliders[c.name] = slider
-        self._gui.add_button("Go home").on_click(lambda _: self._go_home())
+        self._known = session.q.copy()
+        self._press("Go home", self.go_home)
         show = self._gui.add_checkbox("Drag the platform in the scene", True)
         control = self._view.stage.control
-        show.on_update(lambda _: setattr(control, "visible", show.value))
+        self._hear("control", show, lambda on: setattr(control, "visible", on))
 
     def _add_load(self) -> None:
         mechanism = self._view.session.mechanism
         weight = mechanism.platform.mass * float(np.linalg.norm(mechanism.gravity))
         most = float(np.ceil(max(WEIGHTS * weight, LEAST_LOAD)))
+        session = self._view.session
         with self._gui.add_folder("Load on the platform"):
-            self._load = [
-                self._gui.add_slider(f"{name} [N]", -most, most, most / 500, 0.0)
-                for name in ("Fx", "Fy", "Fz")
-            ]
-            points = self._view.session.load_points
-            here = self._view.session.load_point
-            self._load_point = self._gui.add_dropdown("at", points, initial_value=here)
-        for slider in self._load:
-            slider.on_update(self._loaded)
-        self._load_point.on_update(self._loaded)
+            for axis, name in enumerate(("Fx", "Fy", "Fz")):
+                slider = self._gui.add_slider(f"{name} [N]", -most, most, most / 500, 0.0)
+                self._hear(name, slider, partial(self.push, axis))
+            here, points = session.load_point, session.load_points
+            at = self._gui.add_dropdown("at", points, initial_value=here)
+            self._hear("at", at, lambda point: session.set_load(session.load, point))
 
     def _add_player(self) -> None:
         self._player_note = self._gui.add_markdown("No solution is open. Open one (.nc) here:")
         upload = self._gui.add_upload_button("Open a solution", mime_type=".nc")
-        upload.on_upload(lambda _: self._open_solution(upload.value.name, upload.value.content))
+        upload.on_upload(lambda _: self._view.wish("open", partial(self.open_nc, upload.value)))
         self._time: Any = self._gui.add_slider("t [s]", 0.0, 1.0, 0.001, 0.0, disabled=True)
-        self._play = self._gui.add_button("Play", disabled=True)
+        self._play = self._press("Play", self.toggle, disabled=True)
         self._speed = self._gui.add_dropdown("Speed", tuple(SPEEDS), initial_value="1×")
-        self._time.on_update(self._scrubbed)
-        self._play.on_click(lambda _: self._toggle())
-        self._speed.on_update(lambda _: self._set_speed())
+        self._hear("time", self._time, self.seek)
+        self._hear("speed", self._speed, self.set_speed)
 
     def _add_files(self) -> None:
         bundled = self._gui.add_dropdown("Bundled", ("-", *bundled_mechanisms()))
-        bundled.on_update(lambda event: self._open_bundled(event, bundled.value))
+        self._hear("open", bundled, self.open_bundled)
         upload = self._gui.add_upload_button("Open a mechanism (.toml)", mime_type=".toml")
-        upload.on_upload(lambda _: self._open_mechanism(upload.value.name, upload.value.content))
+        upload.on_upload(lambda _: self._view.wish("open", partial(self.open_toml, upload.value)))
         dark = self._gui.add_checkbox("Dark page", self._view.dark)
-        dark.on_update(lambda _: self._view.set_dark(dark.value))
+        self._hear("dark", dark, self._view.set_dark)
+
+    def _follow_drags(self) -> None:
+        stage = self._view.stage
+
+        async def dragged(event: Any) -> None:
+            action = partial(self.drag, stage.held_pose(), event.phase != "end")
+            self._view.wish("drag", action)
+
+        stage.control.on_update(dragged)
 
     def show(self, snapshot: Snapshot) -> None:
         """Bring words, numbers and sliders to a snapshot."""
         self._status.content = status_html(snapshot)
         self._tables.content = tables_html(snapshot)
-        for name, slider in self._sliders.items():
-            c = self._coordinates[name]
-            value = self._view.session.q[self._view.session.model.independent.index(name)]
-            shown = float(np.clip(value * c.scale, slider.min, slider.max))
-            if abs(slider.value - shown) > 0.005:
-                slider.value = shown
+        session = self._view.session
+        for name, before, value in zip(
+            session.model.independent, self._known, session.q, strict=True
+        ):
+            # A slider that a hand has just moved further must not be set back.
+            if value != before:
+                c, slider = self._coordinates[name], self._sliders[name]
+                slider.value = float(np.clip(value * c.scale, slider.min, slider.max))
+        self._known = session.q.copy()
         if self._playback is not None:
             self._time.value = self._playback.now
             self._play.label = "Pause" if self._playback.playing else "Play"
@@ -125,6 +144,7 @@ class Panel:
         self._time.min, self._time.max = first, last
         self._time.step = max((last - first) / max(len(playback.time) - 1, 1), 1e-6)
         self._time.disabled = self._play.disabled = False
+        playback.speed = SPEEDS[self._speed.value]
         options = playback.solution.options
         self._player_note.content = (
             f"{len(playback.time)} samples, {options['formulation']}/{options['route']}"
@@ -138,106 +158,80 @@ class Panel:
             f'padding:4px 8px;font-size:13px;white-space:pre-wrap">{escape(message)}</div>'
         )
 
-    def _moved(self, name: str, event: Any) -> None:
-        if event.client_id is None:
-            return  # the panel itself set the slider
-        with self._view.lock:
-            self._leave_playback()
-            c = self._coordinates[name]
-            self._view.session.set_coordinate(name, self._sliders[name].value / c.scale)
-        self._view.refresh()
+    def move(self, name: str, value: float) -> None:
+        """Set a coordinate, in the unit of its slider."""
+        self._take_over()
+        session = self._view.session
+        session.set_coordinate(name, value / self._coordinates[name].scale)
+        i = session.model.independent.index(name)
+        self._known[i] = session.q[i]
 
-    def _dragged(self, event: Any) -> None:
-        with self._view.lock:
-            self._leave_playback()
-            self._view.dragging = event.phase != "end"
-            self._view.session.drag_to(self._view.stage.held_pose())
-        self._view.refresh()
+    def drag(self, pose: np.ndarray, holding: bool) -> None:
+        """Follow the drag control, held at X_EE (6,) or let go there."""
+        self._take_over()
+        self._view.dragging = holding
+        self._view.session.drag_to(pose)
 
-    def _go_home(self) -> None:
-        with self._view.lock:
-            self._leave_playback()
-            self._view.session.go_home()
-        self._view.refresh()
+    def go_home(self) -> None:
+        self._take_over()
+        self._view.session.go_home()
 
-    def _loaded(self, event: Any) -> None:
-        if event.client_id is None:
-            return
-        with self._view.lock:
-            force = np.array([handle.value for handle in self._load])
-            self._view.session.set_load(force, self._load_point.value)
-        self._view.refresh()
+    def push(self, axis: int, value: float) -> None:
+        """Set one component of the load [N]."""
+        force = self._view.session.load.copy()
+        force[axis] = value
+        self._view.session.set_load(force)
 
-    def _leave_playback(self) -> None:
+    def _take_over(self) -> None:
         """A hand on the mechanism ends the playing; the pose goes on from where it was."""
         if self._view.playback is None:
             return
-        pose = self._view.snapshot.pose
         self._view.playback.pause()
         self._view.playback = None
-        self._view.session.take_pose(pose)
+        self._view.session.take_pose(self._view.snapshot.pose)
 
-    def _resume_playback(self) -> Playback | None:
-        if self._playback is not None:
-            self._view.playback = self._playback
+    def _player(self) -> Playback:
+        """The playback, on the page again if a hand had taken over."""
+        assert self._playback is not None  # its controls are disabled before
+        self._view.playback = self._playback
         return self._playback
 
-    def _toggle(self) -> None:
-        with self._view.lock:
-            playback = self._resume_playback()
-            if playback is not None:
-                (playback.pause if playback.playing else playback.play)()
-        self._view.refresh()
+    def toggle(self) -> None:
+        player = self._player()
+        (player.pause if player.playing else player.play)()
 
-    def _scrubbed(self, event: Any) -> None:
-        if event.client_id is None:
-            return
-        with self._view.lock:
-            playback = self._resume_playback()
-            if playback is not None:
-                playback.seek(self._time.value)
-        self._view.refresh()
+    def seek(self, time: float) -> None:
+        self._player().seek(time)
 
-    def _set_speed(self) -> None:
+    def set_speed(self, speed: str) -> None:
         if self._playback is not None:
-            self._playback.speed = SPEEDS[self._speed.value]
+            self._playback.speed = SPEEDS[speed]
 
-    def _open_bundled(self, event: Any, name: str) -> None:
-        if event.client_id is not None and name != "-":
-            self._try(lambda: self._view.open_mechanism(load(name)))
+    def open_bundled(self, name: str) -> None:
+        if name != "-":
+            self._view.open_mechanism(load(name))
 
-    def _open_mechanism(self, name: str, content: bytes) -> None:
-        self._try(lambda: self._view.open_mechanism(parse(decoded(name, content), name)))
-
-    def _open_solution(self, name: str, content: bytes) -> None:
-        def read() -> None:
-            with tempfile.TemporaryDirectory() as folder:
-                path = Path(folder) / "solution.nc"
-                path.write_bytes(content)
-                try:
-                    solution = open_solution(path)
-                except CondyleError as error:
-                    raise CondyleError(str(error).replace(str(path), name)) from None
-            self._view.play_solution(solution)
-
-        self._try(read)
-
-    def _try(self, action: Any) -> None:
+    def open_toml(self, file: Any) -> None:
+        """Open an uploaded mechanism."""
         try:
-            action()
-        except CondyleError as error:
-            self.say_error(str(error))
+            text = file.content.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            raise InputError(f"{file.name} is not a text file (UTF-8 expected)") from None
+        self._view.open_mechanism(parse(text, file.name))
+
+    def open_nc(self, file: Any) -> None:
+        """Open an uploaded solution."""
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "solution.nc"
+            path.write_bytes(file.content)
+            try:
+                solution = open_solution(path)
+            except InputError as error:
+                raise InputError(str(error).replace(str(path), file.name)) from None
+        self._view.play_solution(solution)
 
 
 def round_outwards(low: float, high: float) -> tuple[float, float]:
     """Ends of a slider, at most two digits longer than needed."""
     step = 10.0 ** np.floor(np.log10(high - low) - 1)
     return float(np.floor(low / step) * step), float(np.ceil(high / step) * step)
-
-
-def decoded(name: str, content: bytes) -> str:
-    """The text of an uploaded file."""
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise CondyleError(f"{name} is not a text file (UTF-8 expected)") from None

@@ -1,7 +1,7 @@
 """The live page: viser's server, its sliders, and the one thread that moves the mechanism.
 
-Callbacks only note what is wanted; one worker computes the latest wish and draws it. So a fast
-hand never makes a queue, and no pose can stop the page.
+Callbacks only note what is wanted; one worker fulfils the latest wish of each kind and draws. So a
+fast hand never makes a queue, no pose can stop the page, and state needs no locks.
 """
 
 from __future__ import annotations
@@ -10,10 +10,12 @@ import contextlib
 import io
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import viser
 
+from ..errors import CondyleError
 from ..mechanism import Mechanism, load
 from ..solution import Solution, open_solution
 from .panel import Panel
@@ -54,7 +56,8 @@ class View:
         # Pictures of rooms would come from the network.
         self._server.scene.configure_environment_map(None)
         self.host = host
-        self._lock = threading.RLock()
+        self._wishes: dict[str, Callable[[], None]] = {}
+        self._noting = threading.Lock()
         self._wake = threading.Event()
         self._closed = False
         self.dragging = False
@@ -64,42 +67,42 @@ class View:
             self.play_solution(solution)
         self._worker = threading.Thread(target=self._work, name="condyle-view", daemon=True)
         self._worker.start()
-        self.refresh()
+        self._wake.set()
 
     @property
     def url(self) -> str:
         return f"http://{self.host}:{self._server.get_port()}"
 
-    @property
-    def lock(self) -> threading.RLock:
-        """Held while the session or the playback changes."""
-        return self._lock
+    def wish(self, kind: str, action: Callable[[], None]) -> None:
+        """Let the worker call `action` soon, in place of an earlier wish of the same kind.
 
-    def refresh(self) -> None:
-        """Compute and draw soon, whatever is wanted by then."""
+        A CondyleError that it raises is shown on the page.
+        """
+        with self._noting:
+            self._wishes.pop(kind, None)  # the latest wish goes last
+            self._wishes[kind] = action
         self._wake.set()
 
     def open_mechanism(self, mechanism: Mechanism) -> None:
-        """Show another mechanism, at home. Raises: CondyleError: if it cannot be."""
+        """Show another mechanism, at home; for the worker.
+
+        Raises: CondyleError: if it cannot be; the page keeps what it had.
+        """
         session = Session(mechanism)  # before anything is cleared
-        with self._lock:
-            self.playback = None
-            self._enter(session)
-        self.refresh()
+        self.playback = None
+        self._enter(session)
 
     def play_solution(self, solution: Solution) -> None:
-        """Show a solution and its mechanism, at its first sample."""
+        """Show a solution and its mechanism, at its first sample; for the worker."""
         playback = Playback(solution)
-        with self._lock:
-            if playback.mechanism != self.session.mechanism:
-                self._enter(Session(playback.mechanism))
-            self.playback = playback
-            points = self.session.mechanism.platform.points
-            guides = list(points.values())[:1] or [(0.0, 0.0, 0.0)]
-            guides += [contact.point for contact in self.session.mechanism.contacts]
-            self.stage.show_paths([playback.path(point) for point in guides])
-            self.panel.show_playback(playback)
-        self.refresh()
+        if playback.mechanism != self.session.mechanism:
+            self._enter(Session(playback.mechanism))
+        self.playback = playback
+        points = self.session.mechanism.platform.points
+        guides = list(points.values())[:1] or [(0.0, 0.0, 0.0)]
+        guides += [contact.point for contact in self.session.mechanism.contacts]
+        self.stage.show_paths([playback.path(point) for point in guides])
+        self.panel.show_playback(playback)
 
     def set_dark(self, dark: bool) -> None:
         """Draw the page dark or light."""
@@ -146,24 +149,30 @@ class View:
             asked = self._wake.is_set()
             self._wake.clear()
             now = time.monotonic()
-            with self._lock:
-                # Time spent waiting for a hand is no time of the solution.
-                passed = now - before if playing else 0.0
+            # Time spent waiting for a hand is no time of the solution.
+            passed = now - before if playing else 0.0
+            before = now
+            try:
                 moved = self.playback is not None and self.playback.advance(passed)
-                before = now
-                if self._closed or not (asked or moved):
-                    continue
-                self._draw()
+                self._fulfil()
+                if asked or moved:
+                    self._draw()
+            except CondyleError as error:
+                self.panel.say_error(str(error))
+            except Exception as error:  # the page must say it and go on
+                self.panel.say_error(f"{type(error).__name__}: {error}")
+
+    def _fulfil(self) -> None:
+        with self._noting:
+            wishes, self._wishes = self._wishes, {}
+        for action in wishes.values():
+            action()
 
     def _draw(self) -> None:
-        try:
-            source = self.playback or self.session
-            self.snapshot = source.snapshot()
-            with self._server.atomic():
-                self.stage.show(self.snapshot, self.dragging)
-                self.panel.show(self.snapshot)
-        except Exception as error:  # the page must say it and go on
-            self.panel.say_error(f"{type(error).__name__}: {error}")
+        self.snapshot = (self.playback or self.session).snapshot()
+        with self._server.atomic():
+            self.stage.show(self.snapshot, self.dragging)
+            self.panel.show(self.snapshot)
 
 
 def open_view(

@@ -1,0 +1,1 @@
+"""Expressions to fast code: interpreted, one evaluation, batches; cache."""

@@ -1,0 +1,1 @@
+"""Section 3: rotation, contacts and parasitic motion, chains, closure, singularity."""

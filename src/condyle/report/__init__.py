@@ -1,0 +1,1 @@
+"""Tables, figures, the scene, the page."""
