@@ -90,7 +90,7 @@ def platform(mechanism: Mechanism) -> dict[str, Stage]:
 def chain() -> dict[str, Stage]:
     """Angles, M_3i, its rate, the force dual to q_ri': eqs (12)-(23), (33)-(40)."""
     G, u, w, joint, *N_rows, g = (sp.Matrix(CONSTANTS[i : i + 3]) for i in range(0, 24, 3))
-    l, L, branch, I_c, m_i, c_i, I_t, I_a = CONSTANTS[24:]  # noqa: E741, the paper's letters
+    l, L, branch, I_c, m_i, c_i, I_t, I_a = CONSTANTS[24:]
     to_home = sp.Matrix.hstack(*N_rows).T
     theta, beta, gamma = Q_R
     R = R_X(X_EE[3]) * R_Y(X_EE[4]) * R_Z(X_EE[5])

@@ -195,7 +195,12 @@ def assemble(
         "rod_beta": variable(by_chain, p.beta, "rad", "rod angle beta_i"),
         "rod_gamma": variable(by_chain, p.gamma, "rad", "rod angle gamma_i"),
         "load": variable(("time", "component"), wrench, "N, N m", "load on the platform in {S}"),
-        "J_A": variable(by_chain, s.J_A, ", ".join(f"m^2/{unit}" for unit in joint.split(", ")), "diagonal of J_A, eq. (26)"),
+        "J_A": variable(
+            by_chain,
+            s.J_A,
+            ", ".join(f"m^2/{unit}" for unit in joint.split(", ")),
+            "diagonal of J_A, eq. (26)",
+        ),
         "transmission": variable(by_chain, s.transmission, "1", "J_A made dimensionless"),
         "J_W_sigma": variable(
             ("time", "independent"), s.J_W_sigma, "1", "singular values of the dimensionless J_W"
