@@ -248,7 +248,7 @@ def _chain_terms(
         law = family.law(constants, M.position, M.velocity, M.acceleration, g)
     else:
         law = FORMULATIONS[formulation].chain(family, constants, M, g)
-    if formulation != "virtual_power" or not family.idle:
+    if p.spec.formulation != "virtual_power" or not family.idle:
         # A lane without a chain has neither J nor force; elsewhere idle constants see to that.
         active = p.lane_constants(index, "active")
         forces = {name: active * f for name, f in law.forces.items()}
