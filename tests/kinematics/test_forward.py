@@ -1,0 +1,101 @@
+"""Forward kinematics inverts inverse kinematics, and says how well it fits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.errors import UnreachableError
+from condyle.joints import pose_file
+from condyle.kinematics.forward import ForwardKinematics
+from condyle.mechanism import bundled_mechanisms
+from condyle.motion import read_table, write_table
+
+
+def poses_and_joints(name: str, count: int, size: float) -> tuple[np.ndarray, np.ndarray]:
+    model = condyle.derive(condyle.load(name), backend="interpreted")
+    m = model.mechanism.degrees_of_freedom
+    unit = [model.characteristic_length if c in "XYZ" else 1.0 for c in model.independent]
+    q = np.random.default_rng(7).uniform(-size, size, (count, m)) * unit
+    result = model.kernel.solve(q, 0 * q, 0 * q, np.zeros((count, 9)))
+    assert result.poses is not None
+    pose = result.poses.pose[result.reached]
+    return pose, model.posture(pose).joint
+
+
+@pytest.mark.parametrize("name", bundled_mechanisms())
+def test_inverts_inverse_kinematics(name: str) -> None:
+    pose, joints = poses_and_joints(name, 200, 0.1)
+    found = ForwardKinematics(condyle.load(name)).solve(joints)
+    assert found.found.all()
+    np.testing.assert_allclose(found.pose, pose, rtol=0, atol=1e-12)
+    assert np.abs(found.residual).max() < 1e-11
+    assert (found.condition >= 1).all()
+
+
+def test_turns_of_a_joint_do_not_matter() -> None:
+    pose, joints = poses_and_joints("masticatory", 20, 0.05)
+    joints[:, 2] += 2 * np.pi
+    found = ForwardKinematics(condyle.load("masticatory")).solve(joints)
+    np.testing.assert_allclose(found.pose, pose, rtol=0, atol=1e-12)
+
+
+def test_noise_is_spread_in_the_least_squares_sense() -> None:
+    """At the solution the residual is orthogonal to every motion that the contacts allow."""
+    mechanism = condyle.load("masticatory")
+    _pose, joints = poses_and_joints("masticatory", 30, 0.05)
+    noise = 1e-4 * np.random.default_rng(1).normal(size=joints.shape)
+    forward = ForwardKinematics(mechanism)
+    found = forward.solve(joints + noise)
+    assert found.found.all()
+    left = np.linalg.norm(found.residual, axis=1)
+    assert (left > 0).all() and (left <= np.linalg.norm(noise, axis=1) + 1e-15).all()
+    step = 1e-6
+    model = condyle.derive(mechanism, backend="interpreted")
+    columns = [0, 1, 3, 4]
+    for k in range(4):
+        moved = []
+        for sign in (1, -1):
+            q = found.pose[:, columns].copy()
+            q[:, k] += sign * step
+            zero = np.zeros_like(q)
+            result = model.kernel.solve(q, zero, zero, np.zeros((len(q), 9)))
+            assert result.poses is not None
+            moved.append(model.posture(result.poses.pose).joint)
+        slope = (moved[0] - moved[1]) / (2 * step)
+        cosine = (slope * found.residual).sum(axis=1) / np.linalg.norm(slope, axis=1) / left
+        assert np.abs(cosine).max() < 1e-5
+
+
+def test_a_sample_without_a_pose_is_missing_alone() -> None:
+    _pose, joints = poses_and_joints("gough-stewart", 5, 0.05)
+    joints[2] = np.nan
+    found = ForwardKinematics(condyle.load("gough-stewart")).solve(joints)
+    np.testing.assert_array_equal(found.found, [True, True, False, True, True])
+    assert np.isnan(found.pose[2]).all() and not np.isnan(found.pose[[0, 1, 3, 4]]).any()
+
+
+def test_file_in_file_out(tmp_path: Path) -> None:
+    mechanism = condyle.load("masticatory")
+    pose, joints = poses_and_joints("masticatory", 20, 0.05)
+    columns = {f"joint_{name}": joints[:, i] for i, name in enumerate(mechanism.chain_names)}
+    write_table(tmp_path / "joints.csv", {"t": np.arange(20.0), **columns})
+    report = pose_file(mechanism, tmp_path / "joints.csv", tmp_path / "poses.csv")
+    assert (report.rows, report.missing) == (20, 0)
+    table = read_table(tmp_path / "poses.csv")
+    assert table.names == ("t", "X", "Y", "Z", "alpha", "beta", "gamma", "residual", "condition")
+    np.testing.assert_allclose(table.require(table.names[1:7]), pose, rtol=0, atol=1e-12)
+
+
+def test_joints_that_no_pose_has(tmp_path: Path) -> None:
+    mechanism = condyle.load("gough-stewart")
+    columns = {f"joint_{name}": np.array([0.0, -50.0]) for name in mechanism.chain_names}
+    write_table(tmp_path / "joints.csv", columns)
+    with pytest.raises(UnreachableError, match="row 2"):
+        pose_file(mechanism, tmp_path / "joints.csv", tmp_path / "poses.csv")
+    assert not (tmp_path / "poses.csv").exists()
+    report = pose_file(mechanism, tmp_path / "joints.csv", tmp_path / "poses.csv", flag=True)
+    assert report.missing == 1
