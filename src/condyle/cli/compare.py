@@ -9,7 +9,7 @@ import typer
 
 from . import options
 from .app import MAIN, app
-from .inputs import motion_and_load, output_folder, say
+from .inputs import file_stem, motion_and_load, output_folder, say
 
 
 @app.command(rich_help_panel=MAIN)
@@ -24,13 +24,16 @@ def compare(
     smooth: options.Smooth = None,
     rate: options.Rate = None,
     figures: Annotated[bool, typer.Option(help="Draw Figures 5 to 9 of the paper.")] = True,
+    report: Annotated[
+        bool, typer.Option("--report", help="Write the page of condyle report, with the tables.")
+    ] = False,
     quiet: options.Quiet = False,
 ) -> None:
     """All models on one motion: differences, Tables 1 and 2, Figures 5 to 9 of the paper."""
     import condyle
 
     from ..analysis.compare import compare as compare_models
-    from ..report.tables import save_tables
+    from ..report.tables import save_tables, tables
 
     machine = condyle.load(mechanism)
     path, acting = motion_and_load(motion, load, units, landmark, smooth, rate)
@@ -41,5 +44,13 @@ def compare(
         from ..report.figures import save_figures
 
         files += save_figures(comparison.solution, comparison, out)
+    if report:
+        from ..report.page import write_report
+
+        inputs = [file for file in (motion, load) if file is not None]
+        page = out / f"{file_stem(machine.name)}.html"
+        files.append(
+            write_report(comparison.solution, page, tables=tables(comparison), files=inputs)
+        )
     say(quiet, str(comparison))
     say(quiet, "\nResults: " + ", ".join(str(f) for f in files))
