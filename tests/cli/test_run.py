@@ -183,6 +183,39 @@ def test_contacts_of_any_number_have_a_run(
         assert solution["contact_force"].shape == (9, contacts)
 
 
+def test_samples_near_a_singularity_are_counted(
+    condyle_command: Callable[..., Any], write_csv: Callable[..., Path]
+) -> None:
+    """A way along X to a nanometre before the temporal cranks are stretched."""
+    model = condyle.derive(condyle.load("masticatory"), backend="interpreted")
+    low, high = 0.0, 0.05
+    while high - low > 1e-10:
+        q = np.array([[(low + high) / 2, 0, 0, 0]])
+        reached = model.evaluate(q, 0 * q, 0 * q, np.zeros((1, 9))).torques.reached[0]
+        low, high = (q[0, 0], high) if reached else (low, q[0, 0])
+    header, rows = motion("plain")
+    rows[:, 1:] = 0
+    rows[:, 1] = (low - 1e-9) * np.sin(np.pi / 2 * rows[:, 0])
+    write_csv(header, rows, "motion.csv")
+    outcome = condyle_command("run", "--motion", "motion.csv")
+    assert outcome.status == 0, outcome.err
+    solution = condyle.open_solution("results/masticatory.nc")
+    near = int((solution["singularity_ratio"] < 1e-3).sum())
+    assert 0 < near < 10 and f"; {near} samples below 1e-3" in outcome.out
+    assert f"{near} samples are near a singularity" in outcome.err
+    assert outcome.out.count("at t = 1 s; ") == 1
+
+
+def test_results_are_written_all_or_none(
+    condyle_command: Callable[..., Any], write_csv: Callable[..., Path]
+) -> None:
+    write_csv(*motion("plain"), "motion.csv")
+    Path("results/masticatory.csv").mkdir(parents=True)
+    outcome = condyle_command("run", "--motion", "motion.csv")
+    assert outcome.status == 2 and "masticatory.csv: is a folder" in outcome.err
+    assert [path.name for path in Path("results").iterdir()] == ["masticatory.csv"]
+
+
 def test_names_never_leave_the_folder(
     condyle_command: Callable[..., Any], write_csv: Callable[..., Path], tmp_path: Path
 ) -> None:

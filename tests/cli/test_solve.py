@@ -59,24 +59,29 @@ def test_columns_and_digits(
     assert all(cell == f"{float(cell):.17g}" for row in rows for cell in row)
 
 
+@pytest.mark.parametrize("names", [NAMES, ("Y", "Z", "alpha", "beta")])
 def test_rows_never_influence_each_other(
     condyle_command: Callable[..., Any],
     write_csv: Callable[..., Path],
     read_csv: Callable[..., Any],
+    names: tuple[str, ...],
 ) -> None:
-    """37 rows, some out of reach: in any order and alone the same text, to the last digit."""
+    """37 rows, some out of reach, some without a moment: in any order and alone the same text."""
     q, q1, q2 = draw(37, seed=3)
     q[[4, 11, 12, 30]] += [0.5, 0, 0, 0]
-    rows = np.hstack([q, q1, q2])
+    load = np.random.default_rng(4).normal(0, 5, (37, 6))
+    load[:20, 3:] = 0
+    rows = np.hstack([q, q1, q2, load])
     order = np.random.default_rng(0).permutation(37)
 
     def lines(rows: np.ndarray) -> list[list[str]]:
-        write_csv(header(), rows, "states.csv")
+        write_csv([*header(names), *LOAD], rows, "states.csv")
         arguments = ("--states", "states.csv", "--out", "out.csv", "--flag")
         assert condyle_command("solve", "masticatory", *arguments).status == 0
         return read_csv("out.csv")[1]
 
     together = lines(rows)
+    assert {row[-1] for row in together} == {"ok", "unreachable"}
     assert lines(rows[order]) == [together[i] for i in order]
     for i in (0, 5, 11, 36):
         assert lines(rows[i : i + 1]) == [together[i]]
@@ -104,6 +109,22 @@ def test_any_valid_set_of_coordinates(
     torque = found.torques.torque
     np.testing.assert_allclose(table[:, :6], torque, atol=1e-11 * np.abs(torque).max())
     np.testing.assert_allclose(table[:, 8:14], found.poses.pose, atol=1e-13)
+
+
+def test_tables_as_spreadsheets_write_them(
+    condyle_command: Callable[..., Any],
+    write_csv: Callable[..., Path],
+    read_csv: Callable[..., Any],
+) -> None:
+    """Semicolons and decimal commas: the same result to the last digit."""
+    path = write_csv(header(), np.hstack(draw(5)), "states.csv")
+    arguments = ("solve", "masticatory", "--states", "states.csv", "--out", "out.csv")
+    assert condyle_command(*arguments).status == 0
+    wanted = read_csv("out.csv")
+    text = path.read_text().replace(",", ";").replace(".", ",")
+    path.write_bytes(b"\xef\xbb\xbf" + text.replace("\n", "\r\n").encode())
+    assert condyle_command(*arguments).status == 0
+    assert read_csv("out.csv") == wanted
 
 
 def test_flagged_rows_are_kept_and_empty(

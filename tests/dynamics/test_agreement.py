@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from oracles.random_mechanism import random_mechanism, random_state, toml_text
 
@@ -48,7 +48,7 @@ def compare_all(mechanism: Mechanism, *samples: np.ndarray) -> int:
     return len(others)
 
 
-@settings(max_examples=6, deadline=None, derandomize=True)
+@settings(max_examples=6, deadline=None, derandomize=True, phases=[Phase.generate])
 @given(
     seed=st.integers(0, 10**6),
     chains=st.sampled_from([6, 8]),

@@ -103,37 +103,32 @@ def test_parasitic_jacobian(contacts: int) -> None:
         np.testing.assert_array_equal(M_J[free], np.eye(6 - contacts))
 
 
-def test_far_from_home_the_branch_is_that_of_home() -> None:
+@pytest.mark.parametrize("seed", [1, 23])
+def test_far_from_home_the_branch_is_that_of_home(seed: int) -> None:
     """A pose found at once is the one found by following small steps."""
-    raw, mechanism = drawn(3)
+    raw = random_mechanism(np.random.default_rng(seed), contacts=3)
+    mechanism = parse(toml_text(raw))
     names = independent_coordinates(mechanism)
-    far = np.array([0.01 if name in "XYZ" else 0.7 for name in names])
-    q = far * np.array(np.meshgrid(*[[-1, 1]] * len(names))).reshape(len(names), -1).T
+    far = np.array([0.005 if name in "XYZ" else 0.15 for name in names])
+    q = np.random.default_rng(0).uniform(-1, 1, (24, 3)) * far
     found = coordinate_closure(mechanism, names).solve(q, q, q)
-    followed = 0
-    for sample, pose, reached in zip(q, found.pose, found.reached, strict=True):
-        try:
-            wanted = complete_state(raw, names, sample, 0 * sample, 0 * sample, steps=25)[0]
-        except (ValueError, np.linalg.LinAlgError):
-            continue
-        if np.abs(wanted).max() < 1.5:
-            assert reached
-            np.testing.assert_allclose(pose, wanted, atol=1e-12)
-            followed += 1
-    assert followed > 3 and np.ptp(found.pose[found.reached, 3:]) > 1
+    assert 8 < found.reached.sum() < 24 and np.ptp(found.pose[found.reached, 3:]) > 0.2
+    for sample, pose in zip(q[found.reached], found.pose[found.reached], strict=True):
+        wanted = complete_state(raw, names, sample, 0 * sample, 0 * sample, steps=30)[0]
+        np.testing.assert_allclose(pose, wanted, atol=1e-11)
 
 
 def test_contacts_that_hold_badly_still_hold() -> None:
-    """Two balls 2 mm apart on nearly the same plane: steps stall far above rounding."""
-    raw = random_mechanism(np.random.default_rng(3), contacts=3)
+    """Two balls 0.2 mm apart on nearly the same plane: steps stall far above rounding."""
+    raw = random_mechanism(np.random.default_rng(6), contacts=3)
     near, other = raw["contact"][0], raw["contact"][2]
-    other["point"] = [p + step for p, step in zip(near["point"], (0.3, 0.2, 0.1), strict=True)]
-    slope = [s + step for s, step in zip(near["surface"]["slope"], (0.001, -0.002), strict=True)]
+    other["point"] = [p + step for p, step in zip(near["point"], (0.15, 0.1, 0.05), strict=True)]
+    slope = [s + step for s, step in zip(near["surface"]["slope"], (0.0005, -0.001), strict=True)]
     offset = other["point"][2] - np.dot(slope, other["point"][:2])
     other["surface"] = {"kind": "plane", "slope": slope, "offset": float(offset)}
     mechanism = parse(toml_text(raw))
     condition = condition_of(constraint_jacobian(mechanism), dependent_coordinates(mechanism))
-    assert 2e3 < condition < 1e4
+    assert 9e3 < condition < 1e4
     names = independent_coordinates(mechanism)
     q = np.random.default_rng(0).uniform(-1, 1, (100, 3)) * [
         0.0005 if name in "XYZ" else 0.01 for name in names

@@ -120,7 +120,7 @@ def build(recipe: str, make: Make, say: Callable[[str, str], None]) -> Entry:
     except (OSError, CondyleError) as error:
         # A full disk may fail the compiler: elsewhere it may do.
         entry = build_apart(recipe, make)
-        why = getattr(error, "strerror", None) or error
+        why = getattr(error, "strerror", None) or str(error).partition("\n")[0]
         say(
             f"the kernel cache {folder} cannot be used ({why}); kernels are built for this "
             "process alone",

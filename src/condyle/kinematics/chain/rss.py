@@ -30,6 +30,8 @@ from .family import (
     rod_spin,
 )
 
+LEVEL = 1e-15  # sine of a shaft's tilt below which its crank plane is level to rounding
+
 
 class RSSFamily(Family):
     kind = "RSS"
@@ -65,8 +67,8 @@ class RSSFamily(Family):
         y = np.cross(z, x)
         level = np.array([-z[1], z[0]])
         size = np.linalg.norm(level)
-        level = level / size if size > 1e-9 else np.array([1.0, 0.0])
-        if size <= 1e-9:
+        level = level / size if size > LEVEL else np.array([1.0, 0.0])
+        if size <= LEVEL:
             z = np.array([0.0, 0.0, np.sign(z[2])])  # the crank plane is level to rounding
         N = rod_frame(coupler)
         values = {

@@ -12,6 +12,7 @@ from .cylinder import Cylinder
 from .ellipsoid import Ellipsoid
 from .expression import Expression
 from .parallel import Parallel
+from .parallel_quadric import ParallelQuadric
 from .plane import Plane
 from .profile import Profile
 from .quadratic import Quadratic
@@ -37,6 +38,8 @@ def of_form(form: str) -> Any:
 
     A form is a kind, "parallel ..." for the place of a ball's centre, or "expression ...".
     """
+    if form == "parallel-quadric":
+        return ParallelQuadric(None, 0.0)
     first, _, rest = form.partition(" ")
     if first == "parallel":
         return Parallel(of_form(rest), 0.0)

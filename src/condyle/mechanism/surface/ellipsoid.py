@@ -10,6 +10,8 @@ from pydantic import Field
 
 from ..quantities import Number, Point, PositiveLength, Vector
 from .base import Coordinates, Scalar, SurfaceTable
+from .parallel import Parallel
+from .parallel_quadric import cheapest
 from .quadric import about_itself, value
 
 
@@ -39,6 +41,15 @@ class Ellipsoid(SurfaceTable):
         R = bryant_matrix(self.rotation)
         A = (R * (s / (2 * np.square(self.semi_axes)))) @ R.T
         return about_itself(A, np.array(self.centre), s / 2)
+
+    def quadric(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+        """A, origin, b, e of phi = d^T A d + b . d + e, d = p - origin."""
+        c = np.array(self.constants())
+        A = c[[7, 10, 11, 10, 8, 12, 11, 12, 9]].reshape(3, 3)
+        return A, c[:3], c[3:6], float(c[6])
+
+    def parallel(self, distance: float, point: Coordinates) -> Parallel:
+        return cheapest(Parallel.near(self, distance, point))
 
 
 def bryant_matrix(angles: tuple[Number, Number, Number]) -> np.ndarray:

@@ -102,10 +102,13 @@ class Parallel(Smooth):
         return float(np.linalg.eigvalsh(np.eye(3) + self.distance * across @ H @ across / size)[0])
 
     def _at(self, point: Any, constants: Any) -> Any:
-        c = self.constants() if constants is None else constants
-        c = c if hasattr(c, "numel") else ca.DM(c)
+        c = self._numbers(constants)
         touching = _functions(self.wall, c.numel() - 8)[1]
         return touching(ca.vertcat(point[0], point[1], point[2]), c)
+
+    def _numbers(self, constants: Any) -> Any:
+        c = self.constants() if constants is None else constants
+        return c if hasattr(c, "numel") else ca.DM(c)
 
 
 def _functions(wall: Any, count: int) -> tuple[ca.Function, ca.Function]:

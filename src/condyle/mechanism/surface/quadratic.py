@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from typing import Literal
 
+import numpy as np
 from pydantic import Field
 
 from ..quantities import Curvature, Length, Number
 from .base import Coordinates, Scalar, SurfaceTable
+from .parallel import Parallel
+from .parallel_quadric import cheapest
 
 
 class Quadratic(SurfaceTable):
@@ -24,6 +27,14 @@ class Quadratic(SurfaceTable):
         c = self.constants() if constants is None else constants
         x, y, z = point[0], point[1], point[2]
         return z - c[0] - (c[1] + c[3] * x + c[4] * y) * x - (c[2] + c[5] * y) * y
+
+    def quadric(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+        """A, origin, b, e of phi = d^T A d + b . d + e, d = p - origin."""
+        A = -np.array([[self.xx, self.xy / 2, 0], [self.xy / 2, self.yy, 0], [0, 0, 0]])
+        return A, np.zeros(3), np.array([-self.slope[0], -self.slope[1], 1.0]), -self.offset
+
+    def parallel(self, distance: float, point: Coordinates) -> Parallel:
+        return cheapest(Parallel.near(self, distance, point))
 
     def constants(self) -> tuple[float, ...]:
         return (self.offset, *self.slope, self.xx, self.xy, self.yy)
