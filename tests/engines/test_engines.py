@@ -19,7 +19,10 @@ MODULES = {"pinocchio": "pinocchio", "mujoco": "mujoco", "newton_euler": "numpy"
 PLANES: list[dict[str, Any]] = [
     {"contacts": contacts, "chains": chains} for contacts in range(4) for chains in (6, 8)
 ]
-PLANES += [{"contacts": 2, "chains": 4}, {"contacts": 5, "chains": 6}]
+PLANES += [
+    {"contacts": contacts, "chains": chains}
+    for contacts, chains in ((2, 4), (5, 6), (5, 1), (3, 3), (2, 12))
+]
 CLASS: list[dict[str, Any]] = [
     {"families": (kind,), "contacts": contacts} for kind in FAMILIES for contacts in (0, 2)
 ]
@@ -41,6 +44,34 @@ def engine(name: str, raw: dict[str, Any]) -> Callable[..., dict[str, Any]]:
     from oracles.newton_euler import inverse_dynamics
 
     return lambda *state: inverse_dynamics(raw, *state)
+
+
+def level_cranks(raw: dict[str, Any], tilt: float) -> None:
+    """Lay the cranks of two chains level, but for a tilt [rad] of their shafts."""
+    for chain, sign in zip(raw["chain"][:2], (1, -1), strict=True):
+        tip = np.array(chain["crank_tip"])
+        out = (np.array(chain["platform"]) - tip) * [1, 1, 0]
+        out /= np.linalg.norm(out)
+        across = np.cross([0, 0, 1], out)
+        crank = -25 * (0.9 * out + 0.4 * across)
+        lean = np.cross([0, 0, 1], crank / np.linalg.norm(crank))
+        chain["base"] = (tip - crank).tolist()
+        chain["axis"] = (sign * (np.array([0, 0, 1]) + tilt * lean)).tolist()
+
+
+@pytest.mark.parametrize("tilt", [0.0, 1e-13, 8e-10, 1e-6])
+def test_shafts_that_are_upright_or_nearly(tilt: float) -> None:
+    raw = random_mechanism(np.random.default_rng(5))
+    level_cranks(raw, tilt)
+    by_engine = engine("newton_euler", raw)
+    states = random_state(np.random.default_rng(1), raw, 2, scale=0.3)
+    model = condyle.derive(parse(toml_text(raw)), backend="interpreted")
+    load = with_point(states["wrench"], model.load_point("right_molar"))
+    torque = model.evaluate(states["q"], states["qd"], states["qdd"], load).torques.torque
+    given = ("pose", "pose_rate", "pose_acceleration", "wrench")
+    for i in range(2):
+        wanted = by_engine(*(states[key][i] for key in given), "right_molar")["tau"]
+        np.testing.assert_allclose(torque[i], wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())
 
 
 @pytest.mark.parametrize("name", MODULES)
