@@ -45,7 +45,12 @@ def condyle_command(
 ) -> Callable[..., Outcome]:
     """Runs `condyle ...` in this process, in an empty folder."""
     from condyle.cli import main
+    from condyle.kernels.compiler import CompilerError, find_compiler
 
+    try:
+        find_compiler()
+    except CompilerError:  # else the notice of it would mix with what is said on stderr
+        monkeypatch.setenv("CONDYLE_BACKEND", "interpreted")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("TERM", "dumb")
 

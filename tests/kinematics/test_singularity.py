@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 from oracles.closure import complete_state
-from oracles.pinocchio_engine import PinocchioEngine
 from oracles.random_mechanism import random_mechanism, random_state, toml_text
 
 import condyle
@@ -98,6 +97,9 @@ def test_a_singular_pose_is_an_error_that_names_it() -> None:
 @pytest.mark.parametrize("contacts", range(6))
 def test_measures_are_those_of_the_actuator_jacobian(contacts: int) -> None:
     """J_A theta' + J_W q' = 0 with the joints' Jacobian of Pinocchio, by numpy's own SVD."""
+    pytest.importorskip("pinocchio", reason="pin is not installed (it is in the `test` extra)")
+    from oracles.pinocchio_engine import PinocchioEngine
+
     raw = random_mechanism(np.random.default_rng(contacts), contacts=contacts)
     mechanism = parse(toml_text(raw))
     model, engine = condyle.derive(mechanism), PinocchioEngine(raw)
