@@ -88,7 +88,6 @@ def test_models_do_not_disturb_each_other() -> None:
     )
 
 
-@pytest.mark.usefixtures("quick")
 def test_rows_of_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """However a file is cut: also where only some of its rows have moments."""
     c = case("masticatory").repeated(300)

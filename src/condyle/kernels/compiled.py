@@ -184,7 +184,7 @@ def _recipe(spec: KernelSpec, compiler: Compiler) -> str:
         generator_digest(),
         version("casadi"),
         spec.text(),
-        repr(compiler.flags),
+        repr((compiler.command, compiler.flags)),
         str(compiler.lanes),
         compiler.identity,
     )
