@@ -25,7 +25,10 @@ FLAGS = (
     "-fPIC",
     "-shared",
 )
-NATIVE = ("-march=native", "-mcpu=native", "")  # the first that the compiler takes
+# What is made for this processor: the first that the compiler takes. GCC would keep scalars in
+# integer registers when it runs out of others, on the ports that arithmetic needs.
+IN_VECTORS = "-mtune-ctrl=^inter_unit_moves_to_vec,^inter_unit_moves_from_vec"
+NATIVE = (("-march=native", IN_VECTORS), ("-march=native",), ("-mcpu=native",), ())
 SECONDS = 300  # a build that takes longer has gone wrong
 
 
@@ -84,8 +87,7 @@ def _find(cc: str, path: str, lanes: str) -> Compiler:
         for native in NATIVE:
             macros = _macros(command, native)
             if macros is not None:
-                flags = (*FLAGS, native) if native else FLAGS
-                return Compiler(command, flags, macros, _lanes(lanes, macros))
+                return Compiler(command, (*FLAGS, *native), macros, _lanes(lanes, macros))
         tried.append(f"{shlex.join(command)} (does not work)")
     raise CompilerError(f"no C compiler: tried {', '.join(tried) or 'nothing'}")
 
@@ -102,9 +104,9 @@ def _candidates(cc: str) -> list[tuple[str, ...]]:
     return found
 
 
-def _macros(command: tuple[str, ...], native: str) -> str | None:
+def _macros(command: tuple[str, ...], native: tuple[str, ...]) -> str | None:
     """Everything the compiler defines for this processor: its version and instruction sets."""
-    call = [*command, *([native] if native else []), "-dM", "-E", "-x", "c", "-"]
+    call = [*command, *native, "-dM", "-E", "-x", "c", "-"]
     try:
         done = subprocess.run(
             call, capture_output=True, text=True, timeout=SECONDS, stdin=subprocess.DEVNULL

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -17,6 +18,8 @@ from ..mechanism.surface import of_form
 from .spec import KernelSpec
 
 Slot = tuple[int, int]  # start, count
+Vector = tuple[float, ...]
+INERTIA = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # order of an inertia's entries
 
 
 @dataclass(frozen=True)
@@ -39,8 +42,9 @@ class Layout:
         inputs = [f"{name}_{i}" for name in names for i in range(spec.m)]
         inputs += [f"force_{i}" for i in range(3)]
         inputs += [f"moment_{i}" for i in range(3)] if spec.moment else []
-        sizes = {"gravity": 3, "mass": 1, "first_moment": 3, "inertia": 6, "load_point": 3}
-        sizes["branch"] = 1
+        body = {"mass": 1, "first_moment": 3, "inertia": 6}
+        sizes = {"gravity": 3, **body, **{f"folded_{name}": n for name, n in body.items()}}
+        sizes |= {"load_point": 3, "branch": 1}
         if spec.parallel:
             sizes |= {"slope": 2, "mean": 3, "mean_offset": 1, "difference": 3, "gap": 1}
         else:
@@ -66,12 +70,10 @@ class Layout:
 
     def parameter_values(self, mechanism: Mechanism, load_point: np.ndarray) -> np.ndarray:
         """Shared numbers of a mechanism and the point its load acts at, (size,)."""
-        inertia = mechanism.platform.inertia
         values: dict[str, Any] = {
             "gravity": mechanism.gravity,
-            "mass": mechanism.platform.mass,
-            "first_moment": np.zeros(3),
-            "inertia": [getattr(inertia, name) for name in ("xx", "yy", "zz", "xy", "xz", "yz")],
+            **_body(mechanism, {}),
+            **{f"folded_{name}": v for name, v in _body(mechanism, end_masses(mechanism)).items()},
             "load_point": load_point,
             "branch": 1.0,
         }
@@ -114,6 +116,34 @@ class Layout:
             for i, chain in enumerate(mechanism.chains)
             if chain.kind == kind
         ]
+
+
+def end_masses(mechanism: Mechanism) -> dict[Vector, float]:
+    """Masses [kg] of the chains that move with the platform's joints, by the joints' points."""
+    masses: dict[Vector, float] = {}
+    for chain in mechanism.chains:
+        family = FAMILIES[chain.kind]
+        constants = family.named(ca.SX(ca.DM(family.vector(family.constants(chain)))))
+        found = [float(ca.evalf(mass)) for mass in family.end_masses(constants).values()]
+        masses[tuple(chain.platform)] = masses.get(tuple(chain.platform), 0.0) + sum(found)
+    return masses
+
+
+def _body(mechanism: Mechanism, points: dict[Vector, float]) -> dict[str, Any]:
+    """Mass, first moment and inertia about O_M, in {M}, of the platform and point masses on it.
+
+    Sums are exact before they are rounded: what a symmetric mechanism makes zero is zero.
+    """
+    platform, xx = mechanism.platform, range(3)
+    own = platform.inertia.tensor()
+    second = [[math.fsum(m * p[i] * p[j] for p, m in points.items()) for j in xx] for i in xx]
+    trace = math.fsum(second[i][i] for i in xx)
+    inertia = [own[i, j] + (trace if i == j else 0.0) - second[i][j] for i, j in INERTIA]
+    return {
+        "mass": platform.mass + math.fsum(points.values()),
+        "first_moment": [math.fsum(m * p[i] for p, m in points.items()) for i in xx],
+        "inertia": inertia,
+    }
 
 
 def specialise(spec: KernelSpec, parameters: np.ndarray, lanes: list[np.ndarray]) -> KernelSpec:

@@ -14,7 +14,7 @@ import casadi as ca
 
 from ..dynamics import FORMULATIONS
 from ..dynamics.formulation import Body
-from ..kinematics.chain import FAMILIES, Constants, Law
+from ..kinematics.chain import FAMILIES, Constants, Family, Law
 from ..kinematics.contact import (
     Placement,
     closed_form,
@@ -24,7 +24,7 @@ from ..kinematics.contact import (
 )
 from ..kinematics.iteration import newton
 from ..kinematics.parasitic import WholeMotion, whole_motion
-from ..kinematics.state import State, independent_state, pose_state, twist_state
+from ..kinematics.state import PointMotion, State, independent_state, pose_state, twist_state
 from .graph import Graph, Value, read
 from .layout import Layout
 from .spec import KernelSpec
@@ -47,12 +47,13 @@ class Output:
 
 @dataclass
 class Program:
-    """Inputs, definitions and outputs of a kernel as one graph."""
+    """Inputs, definitions and outputs of a kernel as one graph; `early` as in `build`."""
 
     spec: KernelSpec
     layout: Layout
     graph: Graph = field(default_factory=Graph)
     outputs: list[Output] = field(default_factory=list)
+    early: bool = False
     _free: list[ca.SX] = field(default_factory=list)
     _known: dict[str, Value] = field(default_factory=dict)
 
@@ -149,12 +150,13 @@ class ChainTerms:
     row: ca.SX
 
 
-def build(spec: KernelSpec, careful: bool = False) -> Program:
+def build(spec: KernelSpec, careful: bool = False, early: bool = False) -> Program:
     """The program of a spec.
 
     Args: careful: solve for the torques by `gram_schmidt` where `normal_equations` are quicker.
+          early: fewer operations after one another, for more of them in all.
     """
-    p = Program(spec, Layout.of(spec))
+    p = Program(spec, Layout.of(spec), early=early)
     m = spec.m
     q, q1, q2 = (p.inputs(name, m) for name in ("q", "q1", "q2"))
     force = p.inputs("force", 3)
@@ -180,9 +182,9 @@ def build(spec: KernelSpec, careful: bool = False) -> Program:
         ind = [i for i in range(6) if i not in dep]
         basis = Basis(ind, dep, motion.M_J[dep, :])
 
-    fold = formulation.name == "virtual_power" and "share" not in spec.outputs
+    fold = folds(spec)
     chains = [_chain_terms(p, group, spec.formulation, state, g, fold) for group in _groups(spec)]
-    body = _body(p, chains if fold else [])
+    body = _body(p, fold)
     r = state.R @ p.parameters("load_point")
     bite = -(state.B.T @ ca.vertcat(force, ca.cross(r, force) + moment))
     parts = {"platform": formulation.platform(state, body, g)}
@@ -225,6 +227,11 @@ def build(spec: KernelSpec, careful: bool = False) -> Program:
     return p
 
 
+def folds(spec: KernelSpec) -> bool:
+    """Whether a chain's bodies act as one, with end masses that are part of the platform."""
+    return spec.formulation == "virtual_power" and "share" not in spec.outputs
+
+
 def _groups(spec: KernelSpec) -> list[tuple[int, str]]:
     return [(index, kind) for index, (kind, _) in enumerate(spec.chains)]
 
@@ -245,39 +252,52 @@ def _chain_terms(
     constants: Constants = family.named(p.lane_constants(index, "constants"))
     M = state.point(p.lane_constants(index, "joint"))
     if fold:
-        law = family.law(constants, M.position, M.velocity, M.acceleration, g)
+        law, force = _folded(family, constants, M, g, p.early)
+        forces = {"chains": force}
     else:
         law = FORMULATIONS[formulation].chain(family, constants, M, g)
+        forces = law.forces
     if p.spec.formulation != "virtual_power" or not family.idle:
         # A lane without a chain has neither J nor force; elsewhere idle constants see to that.
         active = p.lane_constants(index, "active")
-        forces = {name: active * f for name, f in law.forces.items()}
-        law = replace(law, forces=forces, J=active * law.J)
-    row = state.pull(law.J, M.lever)
-    if fold:
-        force = _sum([*law.forces.values(), law.J * _sum([*law.efforts.values(), ca.SX(0)])])
-        return ChainTerms(law, {"chains": state.pull(force, M.lever)}, row)
-    return ChainTerms(law, {k: state.pull(f, M.lever) for k, f in law.forces.items()}, row)
+        forces = {name: active * f for name, f in forces.items()}
+        law = replace(law, J=active * law.J)
+    pulled = {name: state.pull(f, M.lever) for name, f in forces.items()}
+    return ChainTerms(law, pulled, state.pull(law.J, M.lever))
 
 
-def _body(p: Program, folded: Sequence[ChainTerms]) -> Body:
-    """The platform, with the end masses of the chains if they are folded into it."""
-    mass, first = p.parameters("mass"), p.parameters("first_moment")
-    i = p.parameters("inertia")
+def _folded(
+    family: Family, c: Constants, M: PointMotion, g: ca.SX, early: bool
+) -> tuple[Law, ca.SX]:
+    """A chain's law, and all its force on M but that of its end masses, (3,).
+
+    Early, the force is ready one step after the joint's acceleration, of which it is an affine
+    function; that takes a few operations more.
+    """
+    held: list[ca.SX] = []
+    acceleration = ca.SX.sym("acceleration")
+
+    def let(value: ca.SX) -> ca.SX:
+        held.append(value)
+        return acceleration
+
+    law = family.law(c, M.position, M.velocity, M.acceleration, g, let if early else ca.SX)
+    force = _sum(list(law.forces.values())) + law.J * law.effort
+    if held:
+        slope = ca.jacobian(force, acceleration)
+        rest = ca.substitute(force, acceleration, 0)
+        law = replace(law, acceleration=held[0])
+        force = rest + slope * held[0]
+    return law, force
+
+
+def _body(p: Program, folded: bool) -> Body:
+    """The platform, alone or with the end masses of the chains folded into it."""
+    mass, first, i = (
+        p.parameters(f"{'folded_' if folded else ''}{name}")
+        for name in ("mass", "first_moment", "inertia")
+    )
     inertia = ca.vertcat(*(ca.horzcat(*(i[k] for k in row)) for row in _SYMMETRIC))
-    if any(c.law.end_masses for c in folded):
-        terms = []
-        for index, chain in enumerate(folded):
-            end = _sum(list(chain.law.end_masses.values())) if chain.law.end_masses else ca.SX(0)
-            joint = p.lane_constants(index, "joint")
-            tensor = end * (ca.dot(joint, joint) * ca.SX.eye(3) - joint @ joint.T)
-            unique = [tensor[k // 3, k % 3] for k in (0, 4, 8, 1, 2, 5)]
-            terms.append(ca.vertcat(end, end * joint, *unique))
-        added = p.total(terms)
-        mass, first = mass + added[0], first + added[1:4]
-        inertia = inertia + ca.vertcat(
-            *(ca.horzcat(*(added[4 + k] for k in row)) for row in _SYMMETRIC)
-        )
     return Body(mass, first, inertia)
 
 
@@ -298,41 +318,55 @@ def _chain_parts(p: Program, chains: Sequence[ChainTerms], apart: bool) -> dict[
 
 
 def normal_equations(p: Program, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
-    """Least-norm solutions tau = A (A^T A)^-1 b, by L D L^T.
+    """Least-norm solutions tau = A (A^T A)^-1 b.
 
     Quick, since all its sums run at once, and good to rounding times the square of the condition
-    number; where the quality it returns is small, `gram_schmidt` has to do the work.
+    number; where the quality it returns is negative, `gram_schmidt` has to do the work.
 
     Args:    A: (m,) a group, lane values; b: (m, r).
-    Returns: tau, (r,) a group as rows; the least pivot less `CONDITIONED` times its column's
-             square, negative where the columns of A are too nearly dependent.
+    Returns: tau, (r,) a group as rows; 1, or -1 where columns of A are too nearly dependent: a
+             pivot is below `CONDITIONED` times its column's square.
     """
     m = b.shape[0]
     pairs = [(j, k) for j in range(m) for k in range(j, m)]
     products = p.total([ca.vertcat(*(a[j] * a[k] for j, k in pairs)) for a in A])
-    G = [[ca.SX(0)] * m for _ in range(m)]
+    G = ca.SX(m, m)
     for (j, k), product in zip(pairs, ca.vertsplit(products), strict=True):
-        G[j][k] = product
-    pivots, z, quality = [], [b[k, :] for k in range(m)], ca.SX(1.0)
-    L = [[ca.SX(0)] * m for _ in range(m)]
-    rows = [[G[j][k] for k in range(m)] for j in range(m)]
-    for k in range(m):
-        d = rows[k][k]
-        inverse = 1 / d
-        pivots.append(inverse)
-        if k:
-            quality = ca.fmin(quality, d - CONDITIONED * G[k][k])
-        for j in range(k + 1, m):
-            L[j][k] = rows[k][j] * inverse
-        for j in range(k + 1, m):
-            for i in range(j, m):
-                rows[j][i] = rows[j][i] - L[j][k] * rows[k][i]
-            z[j] = z[j] - L[j][k] * z[k]
-    y = [z[k] * pivots[k] for k in range(m)]
-    for k in reversed(range(m)):
-        for j in range(k + 1, m):
-            y[k] = y[k] - L[j][k] * y[j]
-    return [_sum([a[k] * y[k] for k in range(m)]) for a in A], quality
+        G[j, k] = G[k, j] = product
+    y, excess = _definite_solve(G, b, ca.diag(G))
+    least = excess[0]
+    for value in excess[1:]:
+        least = ca.fmin(least, value)
+    return [a.T @ y for a in A], 2 * (least >= 0) - 1
+
+
+def _definite_solve(G: ca.SX, b: ca.SX, lengths: ca.SX) -> tuple[ca.SX, list[ca.SX]]:
+    """G^-1 b for a symmetric, positive definite G, eliminating two rows at a time.
+
+    Half as many divisions as row by row, and they are what the rest waits for.
+
+    Args:    lengths: (m,), what the pivots were before anything was eliminated.
+    Returns: the solution, and how much the pivots exceed `CONDITIONED` times `lengths`, each
+             times a positive number.
+    """
+    m = G.shape[0]
+    if m == 0:
+        return ca.SX(0, b.shape[1]), []
+    if m == 1:
+        return b * (1 / G), [G - CONDITIONED * lengths]
+    u, v, w = G[0, 0], G[0, 1], G[1, 1]
+    determinant = u * w - v * v
+    scale = 1 / determinant
+    u, v, w = u * scale, v * scale, w * scale
+    inverse = ca.vertcat(ca.horzcat(w, -v), ca.horzcat(-v, u))
+    excess = [
+        G[0, 0] - CONDITIONED * lengths[0],
+        determinant - CONDITIONED * (G[0, 0] * lengths[1]),
+    ]
+    B = G[:2, 2:]
+    gain = inverse @ B
+    rest, more = _definite_solve(G[2:, 2:] - B.T @ gain, b[2:, :] - gain.T @ b[:2, :], lengths[2:])
+    return ca.vertcat(inverse @ b[:2, :] - gain @ rest, rest), excess + more
 
 
 def gram_schmidt(p: Program, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
@@ -394,7 +428,7 @@ def _contact_forces(
         g = p.parameters("gravity")
         state = twist_state(placement.position, motion.R, motion.twist, motion.twist_rate)
         chains = [_chain_terms(p, gr, "virtual_power", state, g, True) for gr in _groups(spec)]
-        body = _body(p, chains)
+        body = _body(p, True)
         r = state.R @ p.parameters("load_point")
         Q = FORMULATIONS["virtual_power"].platform(state, body, g)
         Q = Q - ca.vertcat(force, ca.cross(r, force) + moment)

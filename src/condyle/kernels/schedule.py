@@ -16,13 +16,24 @@ from .graph import Graph, Value
 ISSUE = 2  # arithmetic statements a cycle
 
 
-def scheduled(graph: Graph, values: Sequence[Value]) -> list[Value]:
-    """The values in an order that shortens one evaluation; arguments stay first."""
+def scheduled(
+    graph: Graph, values: Sequence[Value], bundles: Sequence[Sequence[Value]] = ()
+) -> list[Value]:
+    """The values in an order that shortens one evaluation; arguments stay first.
+
+    Args: bundles: values that are computed together; the first stands for the others, which are
+          left out.
+    """
+    stands = {v: bundle[0] for bundle in bundles for v in bundle}
+    args = {v: {stands.get(a, a) for a in graph.nodes[v].args} for v in values}
+    for v, first in stands.items():
+        args[first] |= args[v]
+    values = _sorted([v for v in values if stands.get(v, v) == v], args)
     position = {v: i for i, v in enumerate(values)}
     users: dict[Value, list[Value]] = {v: [] for v in values}
     waiting: dict[Value, int] = {}
     for v in values:
-        inside = {a for a in graph.nodes[v].args if a in position}
+        inside = {a for a in args[v] if a in position}
         waiting[v] = len(inside)
         for a in inside:
             users[a].append(v)
@@ -51,7 +62,37 @@ def scheduled(graph: Graph, values: Sequence[Value]) -> list[Value]:
             for u in users[v]:
                 waiting[u] -= 1
                 if not waiting[u]:
-                    at = max(done[a] for a in graph.nodes[u].args if a in done)
+                    at = max(done[a] for a in args[u] if a in done)
                     heapq.heappush(future, (at, position[u], u))
         cycle += 1
     return order
+
+
+def _sorted(values: list[Value], args: dict[Value, set[Value]]) -> list[Value]:
+    """Arguments first, otherwise in the given order."""
+    order: list[Value] = []
+    seen = set[Value]()
+    inside = set(values)
+    for root in values:
+        stack = [root]
+        while stack:
+            v = stack[-1]
+            missing = [a for a in args[v] if a in inside and a not in seen]
+            if missing:
+                stack += missing
+                continue
+            stack.pop()
+            if v not in seen:
+                seen.add(v)
+                order.append(v)
+    return order
+
+
+def ready_times(graph: Graph, values: Sequence[Value]) -> dict[Value, int]:
+    """Cycles after which values can be there at the earliest."""
+    ready: dict[Value, int] = {}
+    for v in values:
+        node = graph.nodes[v]
+        start = max((ready.get(a, 0) for a in node.args), default=0)
+        ready[v] = start + LATENCY.get(node.op, 4 if node.args else 0)
+    return ready

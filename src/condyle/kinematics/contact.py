@@ -109,8 +109,8 @@ def contact_bias(
     for contact, n, r in zip(contacts, frame.gradients, frame.levers, strict=True):
         swing = ca.cross(omega, r)
         v, at = (twist[:3] + swing, position + r) if contact.anchored else (swing, r)
-        curving = contact.bending(at, v)
-        biases.append(curving + ca.dot(n, ca.cross(omega, swing)))
+        spinning = ca.dot(n, omega) * ca.dot(r, omega) - ca.dot(n, r) * ca.dot(omega, omega)
+        biases.append(contact.bending(at, v) + spinning)
     return ca.vertcat(*biases)
 
 

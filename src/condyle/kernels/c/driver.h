@@ -2,16 +2,17 @@
  * lose digits is done again, carefully. */
 
 void prepare(const double *par, const double *const *lane, double *table) {
-    prepare_quick(par, lane, table);
-#ifdef CAREFUL
-    prepare_careful(par, lane, table + QUICK_TABLE);
+    prepare_quick(par, lane, table + QUICK_TABLE);
+    prepare_step(par, lane, table + STEP_TABLE);
+#if CAREFUL
+    prepare_careful(par, lane, table + CAREFUL_TABLE);
 #endif
 }
 
 void one(const double *restrict table, const double *restrict in, double *restrict out) {
-    quick(table, in, out);
-#ifdef CAREFUL
-    if (__builtin_expect(!(out[QUALITY] >= 0), 0)) careful(table + QUICK_TABLE, in, out);
+    quick(table + QUICK_TABLE, in, out);
+#if CAREFUL
+    if (__builtin_expect(!(out[QUALITY] >= 0), 0)) careful(table + CAREFUL_TABLE, in, out);
 #endif
 }
 
@@ -39,17 +40,14 @@ void batch(const double *restrict table, const double *const *in, ptrdiff_t stri
             }
             from = here, at = 0;
         }
-        step(table, from, at, result);
-#ifdef CAREFUL
-        mask poor = ~(result[QUALITY] >= 0);
-        int64_t any = 0;
-        for (int i = 0; i < W; i++) any |= poor[i];
-        if (__builtin_expect(any != 0, 0))
+        step(table + STEP_TABLE, from, at, result);
+#if CAREFUL
+        if (__builtin_expect(any(~(result[QUALITY] >= 0)), 0))
             for (size_t i = 0; i < some; i++) {
                 double sample[INPUTS], again[OUTPUTS];
-                if (!poor[i]) continue;
+                if (result[QUALITY][i] >= 0) continue;
                 for (int k = 0; k < INPUTS; k++) sample[k] = from[k][at + i];
-                careful(table + QUICK_TABLE, sample, again);
+                careful(table + CAREFUL_TABLE, sample, again);
                 for (int k = 0; k < OUTPUTS; k++) result[k][i] = again[k];
             }
 #endif

@@ -26,8 +26,26 @@ typedef double unaligned __attribute__((vector_size(8 * W), aligned(8)));
 
 INLINE vec load(const double *p) { return *(const unaligned *)p; }
 INLINE void store(double *p, vec v) { *(unaligned *)p = v; }
+#if W == 8 && defined(__AVX512F__)
+INLINE void store_some(double *p, vec v, int some) {
+    _mm512_mask_storeu_pd(p, (__mmask8)((1 << some) - 1), (__m512d)v);
+}
+#else
+INLINE void store_some(double *p, vec v, int some) {
+    for (int i = 0; i < some; i++) p[i] = v[i];
+}
+#endif
 INLINE vec spread(double x) { return x - (vec){}; }
 INLINE vec choose(mask m, vec a, vec b) { return (vec)((m & (mask)a) | (~m & (mask)b)); }
+#if W == 8 && defined(__AVX512DQ__)
+INLINE int any(mask m) { return _mm512_movepi64_mask((__m512i)m) != 0; }
+#else
+INLINE int any(mask m) {
+    int64_t found = 0;
+    for (int i = 0; i < W; i++) found |= m[i];
+    return found != 0;
+}
+#endif
 INLINE vec le_v(vec a, vec b) { return choose(a <= b, spread(1.0), spread(0.0)); }
 INLINE vec lt_v(vec a, vec b) { return choose(a < b, spread(1.0), spread(0.0)); }
 INLINE double le_s(double a, double b) { return a <= b; }
@@ -67,10 +85,31 @@ INLINE vec rsqrt_v(vec a) { return 1.0 / sqrt_v(a); }
 INLINE double sqrt_s(double a) { return __builtin_sqrt(a); }
 INLINE double rsqrt_s(double a) { return 1.0 / __builtin_sqrt(a); }
 
-/* Sum and minimum over the lanes. */
+/* Sum and minimum over the lanes; the sums of two or four vectors in fewer steps than one by one. */
 #if W == 8 && defined(__AVX512F__)
 INLINE double lanes_sum(vec v) { return _mm512_reduce_add_pd((__m512d)v); }
 INLINE double lanes_least(vec v) { return _mm512_reduce_min_pd((__m512d)v); }
+INLINE __m512d pair_sums(vec a, vec b) { /* a b a b a b a b */
+    return _mm512_add_pd(_mm512_unpacklo_pd((__m512d)a, (__m512d)b),
+                         _mm512_unpackhi_pd((__m512d)a, (__m512d)b));
+}
+INLINE __m256d halves_sum(__m512d v) {
+    return _mm256_add_pd(_mm512_castpd512_pd256(v), _mm512_extractf64x4_pd(v, 1));
+}
+INLINE void lanes_sums_2(vec a, vec b, double *sum_a, double *sum_b) {
+    __m256d v = halves_sum(pair_sums(a, b));
+    __m128d s = _mm_add_pd(_mm256_castpd256_pd128(v), _mm256_extractf128_pd(v, 1));
+    *sum_a = s[0], *sum_b = s[1];
+}
+INLINE void lanes_sums_4(vec a, vec b, vec c, vec d, double *sum_a, double *sum_b, double *sum_c,
+                         double *sum_d) {
+    __m512d ab = pair_sums(a, b), cd = pair_sums(c, d);
+    /* Quarters 0 2 of both and quarters 1 3 of both, then one half on the other. */
+    __m512d both = _mm512_add_pd(_mm512_shuffle_f64x2(ab, cd, 0x88), _mm512_shuffle_f64x2(ab, cd, 0xdd));
+    __m256d low = _mm512_castpd512_pd256(both), high = _mm512_extractf64x4_pd(both, 1);
+    __m256d s = _mm256_add_pd(_mm256_permute2f128_pd(low, high, 0x20), _mm256_permute2f128_pd(low, high, 0x31));
+    *sum_a = s[0], *sum_b = s[1], *sum_c = s[2], *sum_d = s[3];
+}
 #else
 INLINE double lanes_sum(vec v) {
     double s = v[0];
@@ -82,11 +121,19 @@ INLINE double lanes_least(vec v) {
     for (int i = 1; i < W; i++) s = fmin_s(s, v[i]);
     return s;
 }
+INLINE void lanes_sums_2(vec a, vec b, double *sum_a, double *sum_b) {
+    *sum_a = lanes_sum(a), *sum_b = lanes_sum(b);
+}
+INLINE void lanes_sums_4(vec a, vec b, vec c, vec d, double *sum_a, double *sum_b, double *sum_c,
+                         double *sum_d) {
+    lanes_sums_2(a, b, sum_a, sum_b), lanes_sums_2(c, d, sum_c, sum_d);
+}
 #endif
 
 /* Sine and cosine: reduction by pi/2 in three parts, then minimax polynomials (Cephes). Full
  * accuracy for |x| < 2^20; beyond that, and for what is not finite, the library's. */
 #define TURNS_LIMIT 1048576.0
+#define EIGHTH 0.785 /* below pi/4 nothing is taken off the angle */
 #define POLYNOMIALS                                                                              \
     s = r + r * z * (-1.66666666666666307295e-1 + z * (8.33333333332211858878e-3 + z *           \
         (-1.98412698295895385996e-4 + z * (2.75573136213857245213e-6 + z *                       \
@@ -96,39 +143,50 @@ INLINE double lanes_least(vec v) {
         (2.08757008419747316778e-9 - z * 1.13585365213876817300e-11)))));
 
 INLINE void sincos_s(double x, double *sine, double *cosine) {
-    if (__builtin_expect(!(fabs(x) < TURNS_LIMIT), 0)) {
-        *sine = sin(x), *cosine = cos(x);
-        return;
+    double r = x, z, s, c;
+    int64_t turns = 0;
+    if (__builtin_expect(!(fabs(x) < EIGHTH), 0)) {
+        if (!(fabs(x) < TURNS_LIMIT)) {
+            *sine = sin(x), *cosine = cos(x);
+            return;
+        }
+        double n = x * 6.36619772367581382433e-1 + 6755399441055744.0;
+        memcpy(&turns, &n, 8);
+        n -= 6755399441055744.0;
+        r = ((x - n * 1.57079625129699707031) - n * 7.54978941586159635335e-8)
+            - n * 5.39030285815811905290e-15;
     }
-    double n = x * 6.36619772367581382433e-1 + 6755399441055744.0;
-    int64_t turns;
-    memcpy(&turns, &n, 8);
-    n -= 6755399441055744.0;
-    double r = ((x - n * 1.57079625129699707031) - n * 7.54978941586159635335e-8)
-               - n * 5.39030285815811905290e-15;
-    double z = r * r, s, c;
+    z = r * r;
     POLYNOMIALS
-    double a = turns & 1 ? c : s, b = turns & 1 ? s : c;
-    *sine = turns & 2 ? -a : a;
-    *cosine = (turns + 1) & 2 ? -b : b;
+    if (__builtin_expect(turns & 3, 0)) {
+        double a = turns & 1 ? c : s, b = turns & 1 ? s : c;
+        s = turns & 2 ? -a : a;
+        c = (turns + 1) & 2 ? -b : b;
+    }
+    *sine = s, *cosine = c;
 }
 
 INLINE void sincos_v(vec x, vec *sine, vec *cosine) {
+    vec r = x, z, s, c;
+    if (__builtin_expect(!any(~(fabs_v(x) < EIGHTH)), 1)) {
+        z = r * r;
+        POLYNOMIALS
+        *sine = s, *cosine = c;
+        return;
+    }
     vec n = x * 6.36619772367581382433e-1 + 6755399441055744.0;
     mask turns = (mask)n;
     n -= 6755399441055744.0;
-    vec r = ((x - n * 1.57079625129699707031) - n * 7.54978941586159635335e-8)
-            - n * 5.39030285815811905290e-15;
-    vec z = r * r, s, c;
+    r = ((x - n * 1.57079625129699707031) - n * 7.54978941586159635335e-8)
+        - n * 5.39030285815811905290e-15;
+    z = r * r;
     POLYNOMIALS
     mask odd = -(turns & 1);
     vec a = choose(odd, c, s), b = choose(odd, s, c);
     vec sin_x = (vec)((mask)a ^ ((turns & 2) << 62));
     vec cos_x = (vec)((mask)b ^ (((turns + 1) & 2) << 62));
     mask far = ~(fabs_v(x) < TURNS_LIMIT);
-    int64_t any = 0;
-    for (int i = 0; i < W; i++) any |= far[i];
-    if (__builtin_expect(any != 0, 0))
+    if (__builtin_expect(any(far), 0))
         for (int i = 0; i < W; i++)
             if (far[i]) sin_x[i] = sin(x[i]), cos_x[i] = cos(x[i]);
     *sine = sin_x, *cosine = cos_x;

@@ -15,6 +15,7 @@ Numbers of a chain enter as named constants, so that one expression serves every
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
@@ -22,6 +23,8 @@ import casadi as ca
 import numpy as np
 
 from ..rotation import rotation, rotation_y, rotation_z
+
+Let = Callable[[ca.SX], ca.SX]
 
 NEAR_X = np.cos(np.radians(5.0))  # a rod this near X_S takes Y_S for its frame
 
@@ -114,6 +117,8 @@ class Law:
 
     forces:     body name -> force dual to M' (inertia less gravity).
     efforts:    body name -> effort at the joint, worth J effort on M, that `forces` leaves out.
+    inertias:   body name -> constant inertia at the joint whose effort, inertia times
+                `acceleration`, `efforts` leaves out.
     end_masses: body name -> constant mass at M whose force, end_mass (M'' - g), `forces` leaves
                 out: it can be folded into the platform's inertia once for all samples.
     """
@@ -124,16 +129,31 @@ class Law:
     rate: ca.SX
     acceleration: ca.SX
     efforts: dict[str, ca.SX] = field(default_factory=dict)
+    inertias: dict[str, ca.SX] = field(default_factory=dict)
     end_masses: dict[str, ca.SX] = field(default_factory=dict)
+
+    @property
+    def effort(self) -> ca.SX:
+        """All efforts at the joint."""
+        total = ca.SX(0)
+        for inertia in self.inertias.values():
+            total += inertia
+        total *= self.acceleration
+        for effort in self.efforts.values():
+            total += effort
+        return total
 
     def complete(self, A: ca.SX, g: ca.SX) -> Law:
         """The same law with everything among the forces."""
-        forces = dict(self.forces)
+        forces = {name: ca.SX.zeros(3) for name in (*self.efforts, *self.inertias)}
+        forces |= self.forces
         for name, effort in self.efforts.items():
-            forces[name] = forces.get(name, ca.SX.zeros(3)) + self.J * effort
+            forces[name] += self.J * effort
+        for name, inertia in self.inertias.items():
+            forces[name] += self.J * (inertia * self.acceleration)
         for name, mass in self.end_masses.items():
-            forces[name] = forces.get(name, ca.SX.zeros(3)) + mass * (A - g)
-        return replace(self, forces=forces, efforts={}, end_masses={})
+            forces[name] += mass * (A - g)
+        return replace(self, forces=forces, efforts={}, inertias={}, end_masses={})
 
 
 class Family(ABC):
@@ -168,9 +188,16 @@ class Family(ABC):
     def loop(self, c: Constants, M: ca.SX) -> Loop:
         """Inverse kinematics in closed form, on the branch of home."""
 
+    def end_masses(self, c: Constants) -> dict[str, ca.SX]:
+        """`Law.end_masses`, from constants alone."""
+        return {}
+
     @abstractmethod
-    def law(self, c: Constants, M: ca.SX, V: ca.SX, A: ca.SX, g: ca.SX) -> Law:
-        """Virtual power: forces on M from its motion."""
+    def law(self, c: Constants, M: ca.SX, V: ca.SX, A: ca.SX, g: ca.SX, let: Let = ca.SX) -> Law:
+        """Virtual power: forces on M from its motion.
+
+        Args: let: passes the joint's acceleration on, or puts a symbol in its place.
+        """
 
     @abstractmethod
     def explain(self, chain: Any, pose: np.ndarray) -> str:
@@ -252,26 +279,36 @@ def rod_inertia(n: ca.SX, transverse: ca.SX, axial: ca.SX) -> ca.SX:
     return transverse * ca.SX.eye(3) + (axial - transverse) * (n @ n.T)
 
 
+def rod_masses(
+    mass: ca.SX, com: ca.SX, transverse: ca.SX, length: ca.SX
+) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """A rod from S to M as three constants on its ends, m_MM, m_SM and m_SS.
+
+    Its kinetic energy is (m_MM M'^2 + 2 m_SM S'.M' + m_SS S'^2) / 2 plus the axial part.
+    """
+    bend = transverse / length**2
+    return mass * com**2 + bend, mass * com * (1 - com) - bend, mass * (1 - com) ** 2 + bend
+
+
 def axial_force(
     e: ca.SX, e_rate: ca.SX, e_acceleration: ca.SX, Y: ca.SX, length: ca.SX, axial: ca.SX
 ) -> ca.SX:
     """Force dual to e' that the axial inertia of a rod of constant length needs, (3,) [N].
 
-    The rod turns with N_i0 Ry(beta) Rz(gamma), so its axial rate is nu = beta' sin(gamma). With
-    y = Y.e, u = Y x e and p = |e|^2 - y^2 (so that sin(gamma) = y / |e|):
+    The rod turns with N_i0 Ry(beta) Rz(gamma), so its axial rate is beta' s with s = sin(gamma).
+    With s = Y.e / L and u = Y x e / L^2:
 
-        beta'  = u.e' / p,    beta'' = (u.e'' + 2 y y' beta') / p,
-        force  = axial / |e|^2 [ (|e|^2 beta'' - u.e'') / p u - y beta'^2 Y ],
+        beta'  = u.e' / (1 - s^2),    beta'' = (u.e'' + 2 s s' beta') / (1 - s^2),
+        force  = axial [(beta'' - u.e'') / (1 - s^2) u - s beta'^2 Y / L],
 
     up to a multiple of e, which does no work.
     """
-    y, y_rate = ca.dot(Y, e), ca.dot(Y, e_rate)
-    u = ca.cross(Y, e)
-    square = length * length
-    inverse_p = 1 / (square - y * y)
-    beta_rate = ca.dot(u, e_rate) * inverse_p
+    along, across = Y / length, Y / length**2
+    s, u = ca.dot(along, e), ca.cross(across, e)
+    inverse = 1 / (1 - s * s)
+    beta_rate = ca.dot(u, e_rate) * inverse
     bending = ca.dot(u, e_acceleration)
-    beta_acceleration = (bending + 2 * y * y_rate * beta_rate) * inverse_p
-    gain = axial / square
-    along_u = gain * inverse_p * (square * beta_acceleration - bending)
-    return along_u * u - (gain * y * beta_rate * beta_rate) * Y
+    twice_s_rate = ca.dot(2 * along, e_rate)
+    beta_acceleration = (bending + s * twice_s_rate * beta_rate) * inverse
+    along_u = axial * inverse * (beta_acceleration - bending)
+    return along_u * u - (axial * s * beta_rate * beta_rate) * along

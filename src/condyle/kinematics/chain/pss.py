@@ -16,6 +16,7 @@ from .family import (
     Family,
     Joint,
     Law,
+    Let,
     Link,
     Loop,
     axial_force,
@@ -25,6 +26,7 @@ from .family import (
     rod_frame,
     rod_guide,
     rod_inertia,
+    rod_masses,
     rod_spin,
 )
 
@@ -106,34 +108,34 @@ class PSSFamily(Family):
             cos_gamma=cos_gamma,
         )
 
-    def law(self, c: Constants, M: ca.SX, V: ca.SX, A: ca.SX, g: ca.SX) -> Law:
+    def end_masses(self, c: Constants) -> dict[str, ca.SX]:
+        return {"rods": rod_masses(c.mass, c.com, c.transverse, c.L)[0]}
+
+    def law(self, c: Constants, M: ca.SX, V: ca.SX, A: ca.SX, g: ca.SX, let: Let = ca.SX) -> Law:
         _, root, e, _ = self._close(c, M)
         inverse = c.branch * (1 / ca.sqrt(root))  # 1 / e.a
         J = e * inverse
         rate = ca.dot(J, V)
         e_rate = V - c.axis * rate
         # e.(A - a x'') + |e'|^2 = 0
-        acceleration = ca.dot(J, A) + ca.dot(e_rate, e_rate) * inverse
+        acceleration = let(ca.dot(J, A) + ca.dot(e_rate, e_rate) * inverse)
         S_acceleration = c.axis * acceleration
 
-        # The rod as three constants on its ends, as in the RSS chain.
-        bend = c.transverse / c.L**2
-        m_MM = c.mass * c.com**2 + bend
-        m_SM = c.mass * c.com * (1 - c.com) - bend
-        m_SS = c.mass * (1 - c.com) ** 2 + bend
+        _, m_SM, m_SS = rod_masses(c.mass, c.com, c.transverse, c.L)
         axial = axial_force(e, e_rate, A - S_acceleration, c.Y, c.L, c.axial)
         # m (1 - com) = m_SM + m_SS splits the weight that the slider carries.
-        weight = ca.dot(c.axis, g)
-        rod_effort = ca.dot(c.axis, m_SM * (A - g) - axial) + m_SS * acceleration - m_SS * weight
-        slider_effort = c.slider * acceleration - c.slider * weight
         return Law(
-            forces={"rods": m_SM * (S_acceleration - g) + axial},
+            forces={"rods": m_SM * S_acceleration - m_SM * g + axial},
             J=J,
             reach=root / c.L**2,
             rate=rate,
             acceleration=acceleration,
-            efforts={"sliders": slider_effort, "rods": rod_effort},
-            end_masses={"rods": m_MM},
+            efforts={
+                "sliders": -c.slider * ca.dot(c.axis, g),
+                "rods": ca.dot(c.axis, m_SM * A - axial) - (m_SM + m_SS) * ca.dot(c.axis, g),
+            },
+            inertias={"sliders": c.slider, "rods": m_SS},
+            end_masses=self.end_masses(c),
         )
 
     def explain(self, chain: Any, pose: np.ndarray) -> str:

@@ -18,6 +18,7 @@ from .family import (
     Family,
     Joint,
     Law,
+    Let,
     Link,
     Loop,
     axial_force,
@@ -27,6 +28,7 @@ from .family import (
     rod_frame,
     rod_guide,
     rod_inertia,
+    rod_masses,
     rod_spin,
 )
 
@@ -137,51 +139,46 @@ class RSSFamily(Family):
             cos_gamma=cos_gamma,
         )
 
-    def law(self, c: Constants, M: ca.SX, V: ca.SX, A: ca.SX, g: ca.SX) -> Law:
+    def end_masses(self, c: Constants) -> dict[str, ca.SX]:
+        return {"couplers": rod_masses(c.mass, c.com, c.transverse, c.L)[0]}
+
+    def law(self, c: Constants, M: ca.SX, V: ca.SX, A: ca.SX, g: ca.SX, let: Let = ca.SX) -> Law:
         d = M - c.G
-        a = d[0] * c.level[0] + d[1] * c.level[1]
-        b = ca.dot(d, c.steep)
-        k = ca.dot(d, d) * (0.5 / c.l) + (c.l**2 - c.L**2) * (0.5 / c.l)
+        # Both vectors of the crank plane times l: constants, as all that is made of constants.
+        level, steep = c.l * ca.vertcat(c.level[0], c.level[1], 0), c.l * c.steep
+        a, b = ca.dot(d, level), ca.dot(d, steep)
+        k = ca.dot(d, d) * 0.5 + (c.l**2 - c.L**2) * 0.5
         h = a * a + b * b
         root = h - k * k
-        inverse_s = 1 / ca.sqrt(root)
-        scale = c.l * (1 / h)
-        k_h, s_h = k * scale, c.branch * root * scale * inverse_s
-        x, y = a * k_h - b * s_h, b * k_h + a * s_h  # l cos, l sin
+        inverse_h = 1 / h
+        inverse_e_t = -c.branch * (1 / ca.sqrt(root))  # t is the tangent, e.t = -branch sqrt(root)
+        k_h, s_h = k * inverse_h, root * inverse_e_t * inverse_h
+        cosine, sine = a * k_h + b * s_h, b * k_h - a * s_h
 
-        level = ca.vertcat(c.level[0], c.level[1], 0)
-        e = d - x * level - y * c.steep
-        r = d - e
-        t = x * c.steep - y * level
-        inverse_e_t = (-c.branch / c.l) * inverse_s  # e.t = -l s
+        r = cosine * level + sine * steep
+        t = cosine * steep - sine * level
+        e = d - r
         J = e * inverse_e_t
         rate = ca.dot(J, V)
         e_rate = V - t * rate
         rate2 = rate * rate
-        # e.(A - S'') + |e'|^2 = 0 with S'' = t theta'' - r theta'^2 and e.r = l (k - l)
-        square = ca.dot(e_rate, e_rate) + (c.l * k - c.l**2) * rate2
-        acceleration = ca.dot(J, A) + square * inverse_e_t
+        # e.(A - S'') + |e'|^2 = 0 with S'' = t theta'' - r theta'^2 and e.r = k - l^2
+        square = ca.dot(e_rate, e_rate) + (k - c.l**2) * rate2
+        acceleration = let(ca.dot(J, A) + square * inverse_e_t)
         S_acceleration = t * acceleration - r * rate2
 
-        # The rod as three constants on its ends: kinetic energy
-        # (m_MM M'^2 + 2 m_SM S'.M' + m_SS S'^2) / 2 plus the axial part.
-        bend = c.transverse / c.L**2
-        m_MM = c.mass * c.com**2 + bend
-        m_SM = c.mass * c.com * (1 - c.com) - bend
-        m_SS = c.mass * (1 - c.com) ** 2 + bend
+        _, m_SM, m_SS = rod_masses(c.mass, c.com, c.transverse, c.L)
         axial = axial_force(e, e_rate, A - S_acceleration, c.Y, c.L, c.axial)
         # m (1 - com) = m_SM + m_SS splits the weight that the crank carries.
-        crank_torque = (
-            (m_SS * c.l**2) * acceleration + ca.dot(t, m_SM * (A - g) - axial) - m_SS * ca.dot(t, g)
-        )
         return Law(
-            forces={"couplers": m_SM * (S_acceleration - g) + axial},
+            forces={"couplers": m_SM * S_acceleration - m_SM * g + axial},
             J=J,
-            reach=root / c.L**2,
+            reach=root * (1 / (c.l * c.L) ** 2),
             rate=rate,
             acceleration=acceleration,
-            efforts={"cranks": c.crank * acceleration, "couplers": crank_torque},
-            end_masses={"couplers": m_MM},
+            efforts={"couplers": ca.dot(t, m_SM * A - (m_SM + m_SS) * g - axial)},
+            inertias={"cranks": c.crank, "couplers": m_SS * c.l**2},
+            end_masses=self.end_masses(c),
         )
 
     def explain(self, chain: Any, pose: np.ndarray) -> str:

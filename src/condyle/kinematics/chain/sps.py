@@ -17,6 +17,7 @@ from .family import (
     Family,
     Joint,
     Law,
+    Let,
     Link,
     Loop,
     rod_angles,
@@ -94,7 +95,10 @@ class SPSFamily(Family):
             cos_gamma=cos_gamma,
         )
 
-    def law(self, c: Constants, M: ca.SX, V: ca.SX, A: ca.SX, g: ca.SX) -> Law:
+    def end_masses(self, c: Constants) -> dict[str, ca.SX]:
+        return {"pistons": c.piston_mass}
+
+    def law(self, c: Constants, M: ca.SX, V: ca.SX, A: ca.SX, g: ca.SX, let: Let = ca.SX) -> Law:
         """With w = r u'' across the leg, W = |V|^2 - r'^2 = r^2 |u'|^2 and z = com_piston / r:
 
         cylinder: (m com^2 + I) w / r^2 - (m com / r) (g across u),
@@ -145,7 +149,7 @@ class SPSFamily(Family):
                 "cylinders": about_B * w_u + arm * u_g + c.cylinder_axial * spin_u,
                 "pistons": about_M * w_u + lag * (u_A - u_g + swing) + c.piston_axial * spin_u,
             },
-            end_masses={"pistons": c.piston_mass},
+            end_masses=self.end_masses(c),
         )
 
     def explain(self, chain: Any, pose: np.ndarray) -> str:

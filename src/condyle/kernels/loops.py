@@ -1,0 +1,209 @@
+"""A batch: W samples in a vector, chain after chain.
+
+A sample's computation falls into parts: what all chains share, what each chain adds to sums, what
+follows from those sums, and so on. Chains join a sum one after the other, by fused multiply-adds
+where a term is one, so that few of their values have to be kept. The statements of long chains
+run in a loop; what a later part needs of them stays in arrays `x<value>_`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import groupby
+
+from .graph import REDUCTIONS, Value
+from .printer import Printer, fold
+from .program import Program
+
+ABREAST = 2  # chains whose statements alternate, to keep both arithmetic ports busy
+LONG = 700  # statements of a chain above which one at a time is enough
+TRIGONOMETRY = 12  # operations of half a sine and cosine
+SUM, LEAST = "sum", "least"
+
+Part = tuple[int, int | None]  # phase, and group of chains
+
+
+class Loops(Printer):
+    """The parts of a program as loops."""
+
+    shared = "vec"
+
+    def __init__(self, program: Program, width: int) -> None:
+        super().__init__(program, width, [count for _, count in program.spec.chains], 1)
+        self.uses: dict[Value, list[Value]] = {v: [] for v in self.varying}
+        for v in self.varying:
+            for a in self.g.nodes[v].args:
+                if a in self.uses:
+                    self.uses[a].append(v)
+        self.wanted = {v for o in program.outputs for v in o.nodes}
+        self.absorbed = self._absorbed()
+        ordered = sorted(self.varying, key=lambda v: self._rank(self._part(v)))
+        self.parts = [(part, list(values)) for part, values in groupby(ordered, self._part)]
+        per_chain = sum(1 for v in self.varying if self.g.nodes[v].group is not None)
+        self.rolled = per_chain > LONG
+        self.kept = self._kept() if self.rolled else set()
+        self.here: Part = (0, None)
+
+    def function(self, name: str) -> str:
+        """`static void name(table, in, at, out)`, for the samples from `at` on."""
+        lines = [
+            f"static void {name}(const double *restrict table, const double *const *in, size_t at,",
+            "    vec *restrict out) {",
+        ]
+        for v in sorted(self.kept):
+            group = self.g.nodes[v].group or 0
+            lines.append(f"  vec x{v}_[{self.counts[group]}];")
+        for part, values in self.parts:
+            self.here = part
+            own = self.statements(values, 0) if part[1] is None else self._chains(part, values)
+            lines += [f"  {s}" for s in own]
+        self.here = (-1, None)
+        return "\n".join([*lines, *self._outputs(), "}", ""])
+
+    def operations(self) -> int:
+        """Vector operations of a block; a fused multiply-add counts one."""
+        total = 0
+        for v in self.varying:
+            node = self.g.nodes[v]
+            copies = 1 if node.group is None else self.copies[node.group]
+            if node.op in REDUCTIONS:
+                # What is absorbed joins the sum by operations of its own.
+                total += sum(
+                    self.copies[g] for g, t in self.lane_terms(v) if t not in self.absorbed
+                )
+                total += len(self.shared_terms(v))
+            elif node.op in ("sin", "cos"):
+                total += TRIGONOMETRY
+            elif node.op not in ("neg", "input") and not self._contracted(v):
+                total += copies
+        return total
+
+    def _contracted(self, v: Value) -> bool:
+        """A product that the one addition it is for takes in."""
+        if self.g.nodes[v].op != "mul" or v in self.wanted or len(self.uses[v]) != 1:
+            return False
+        user = self.uses[v][0]
+        return self._part(user) == self._part(v) and self.g.nodes[user].op in ("add", "sub", "neg")
+
+    # -- parts -----------------------------------------------------------------------------
+
+    def _part(self, v: Value) -> Part:
+        node = self.g.nodes[v]
+        return node.phase, node.group
+
+    @staticmethod
+    def _rank(part: Part) -> tuple[int, int]:
+        """Shared values of a phase come before its chains."""
+        return part[0], -1 if part[1] is None else part[1]
+
+    def _absorbed(self) -> set[Value]:
+        """Lane values that only one sum over the chains wants: they become steps of that sum."""
+        found: set[Value] = set()
+        for v in self.varying:
+            if self.g.nodes[v].op == SUM:
+                for _, t in self.lane_terms(v):
+                    self._absorb(t, found)
+        return found
+
+    def _absorb(self, v: Value, found: set[Value]) -> None:
+        node = self.g.nodes[v]
+        steps = {"mul": (), "fma": (2,), "fnma": (2,), "add": (0, 1), "sub": (0, 1)}
+        if v not in self.uses or len(self.uses[v]) != 1 or v in self.wanted or node.op not in steps:
+            return
+        found.add(v)
+        for i in steps[node.op]:
+            self._absorb(node.args[i], found)
+
+    def _kept(self) -> set[Value]:
+        """Lane values that a later part, or an output, needs."""
+        kept = set(self.wanted)
+        for v in self.varying:
+            node = self.g.nodes[v]
+            if node.op not in REDUCTIONS:
+                kept |= {a for a in node.args if self._part(a) != self._part(v)}
+        return {v for v in kept if self.g.nodes[v].varies and self.g.nodes[v].group is not None}
+
+    # -- statements ------------------------------------------------------------------------
+
+    def _chains(self, part: Part, values: list[Value]) -> Iterator[str]:
+        """Statements of a group's chains, and the sums that they join."""
+        group = part[1]
+        assert group is not None
+        sums = [
+            (v, t)
+            for v in self.varying
+            if self.g.nodes[v].op in REDUCTIONS
+            for _, t in self.lane_terms(v)
+            if self._part(t) == part
+        ]
+        plain = [v for v in values if v not in self.absorbed]
+        count = self.counts[group]
+        if self.rolled:
+            yield from (f"vec r{v} = {start};" for v, start in self._started(sums, group))
+            yield f"for (int c = 0; c < {count}; c++) {{"
+            yield from (f"  {s}" for s in self.statements(plain, 0))
+            for v, t in sums:
+                yield from (f"  {s}" for s in self._steps(v, t, 0))
+            yield from (f"  x{v}_[c] = x{v}_0;" for v in plain if v in self.kept)
+            yield "}"
+            return
+        yield from (f"vec r{v} = {start};" for v, start in self._started(sums, group))
+        for first in range(0, count, ABREAST):
+            some = range(first, min(first + ABREAST, count))
+            rows = [list(self.statements(plain, c)) for c in some]
+            yield from (s for row in zip(*rows, strict=True) for s in row)
+            for c in some:
+                for v, t in sums:
+                    yield from self._steps(v, t, c)
+
+    def _started(self, sums: list[tuple[Value, Value]], group: int) -> Iterator[tuple[Value, str]]:
+        """What reductions are before the first of a mechanism's chains joins them."""
+        for v, _ in sums:
+            if self.lane_terms(v)[0][0] == group:
+                yield v, "spread(0.0)" if self.g.nodes[v].op == SUM else "spread(HUGE_VAL)"
+
+    def _steps(self, v: Value, t: Value, copy: int, sign: str = "+") -> Iterator[str]:
+        """A chain's term joins a reduction."""
+        node = self.g.nodes[t]
+        if self.g.nodes[v].op == LEAST:
+            yield f"r{v} = fmin_v(r{v}, {self.name(t, copy)});"
+            return
+        if t not in self.absorbed:
+            yield f"r{v} = r{v} {sign} {self.name(t, copy)};"
+            return
+        other = {"+": "-", "-": "+"}[sign]
+        if node.op in ("add", "sub"):
+            yield from self._steps(v, node.args[0], copy, sign)
+            yield from self._steps(v, node.args[1], copy, sign if node.op == "add" else other)
+            return
+        if node.op != "mul":
+            yield from self._steps(v, node.args[2], copy, sign)
+        a, b = (self.name(x, copy) for x in node.args[:2])
+        yield f"r{v} = r{v} {other if node.op == 'fnma' else sign} {a} * {b};"
+
+    def _outputs(self) -> Iterator[str]:
+        slot = 0
+        for o in self.program.outputs:
+            for group, v in enumerate(o.nodes):
+                for c in range(self.counts[group] if o.lane else 1):
+                    name = self.name(v, c)
+                    yield f"  out[{slot}] = {f'spread({name})' if self.is_scalar(v) else name};"
+                    slot += 1
+
+    # -- names -----------------------------------------------------------------------------
+
+    def name(self, v: Value, copy: int) -> str:
+        if v in self.kept and self._part(v) != self.here:
+            return f"x{v}_[{self.lane(copy)}]"
+        return super().name(v, copy)
+
+    def lane(self, copy: int) -> str:
+        return "c" if self.rolled and self.here[1] is not None else str(copy)
+
+    def sample(self, i: object) -> str:
+        return f"load(in[{i}] + at)"
+
+    def reduction(self, v: Value) -> str:
+        shared = [self.repeated(v, t, count) for count, t in self.shared_terms(v)]
+        terms = [f"r{v}", *shared] if self.lane_terms(v) else shared
+        return " + ".join(terms) if self.g.nodes[v].op == SUM else fold("fmin_v", terms)

@@ -1,0 +1,101 @@
+"""One evaluation as a straight line: chains in the lanes of vectors, shared values scalar."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from .graph import Value
+from .printer import Printer, fold, padded_counts
+from .program import Program
+from .schedule import ready_times, scheduled
+
+NEAR = 12  # cycles between sums that are worth waiting for
+
+
+class Straight(Printer):
+    """Statements in the order of `scheduled`; lanes beyond a vector's width are further copies."""
+
+    shared = "double"
+
+    def __init__(self, program: Program, width: int) -> None:
+        copies = [count // width for count in padded_counts(program, width)]
+        super().__init__(program, width, copies, width)
+
+    def function(self, name: str) -> str:
+        head = f"static void {name}(const double *restrict table, const double *restrict in, "
+        head += "double *restrict out) {"
+        return "\n".join([head, *self._body(), *self.outputs(), "}", ""])
+
+    def _body(self) -> Iterator[str]:
+        bundles = {bundle[0]: bundle for bundle in self._bundles()}
+        order = scheduled(self.g, self.varying, list(bundles.values()))
+        done: set[Value] = set()
+        for v in order:
+            if v in done:
+                continue
+            if v in bundles:
+                yield f"  {self._sums(bundles[v])}"
+                continue
+            node = self.g.nodes[v]
+            pair = [v]
+            if node.op in ("sin", "cos"):
+                pair = [w for w in self._pair(v, order) if w is not None]
+            done.update(pair)
+            for c in range(1 if node.group is None else self.copies[node.group]):
+                yield from (f"  {s}" for s in self.statements(pair, c))
+
+    def _bundles(self) -> list[list[Value]]:
+        """Sums over the lanes by fours and twos, of those that are ready at about one time."""
+        ready = ready_times(self.g, self.varying)
+        sums = [v for v in self.varying if self.g.nodes[v].op == "sum" and self.lane_terms(v)]
+        waiting = sorted((v for v in sums if not self.shared_terms(v)), key=lambda v: ready[v])
+        bundles = []
+        while waiting:
+            near = [v for v in waiting if ready[v] <= ready[waiting[0]] + NEAR]
+            size = 4 if len(near) >= 4 else 2 if len(near) >= 2 else 1
+            if size > 1:
+                bundles.append(waiting[:size])
+            waiting = waiting[size:]
+        return bundles
+
+    def _sums(self, bundle: list[Value]) -> str:
+        names = [f"x{v}" for v in bundle]
+        terms = [" + ".join(self._lane_names(v)) for v in bundle]
+        targets = ", ".join(f"&{name}" for name in names)
+        call = f"lanes_sums_{len(bundle)}({', '.join(terms)}, {targets})"
+        return f"double {', '.join(names)}; {call};"
+
+    def _lane_names(self, v: Value) -> list[str]:
+        """Vectors whose lanes a reduction takes together."""
+        terms = self.lane_terms(v)
+        return [self.name(t, c) for group, t in terms for c in range(self.copies[group])]
+
+    def sample(self, i: object) -> str:
+        return f"in[{i}]"
+
+    def reduction(self, v: Value) -> str:
+        lanes = self._lane_names(v)
+        shared = [self.repeated(v, t, count) for count, t in self.shared_terms(v)]
+        if self.g.nodes[v].op == "sum":
+            return " + ".join([f"lanes_sum({' + '.join(lanes)})", *shared])
+        return fold("fmin_s", [f"lanes_least({fold('fmin_v', lanes)})", *shared])
+
+    def outputs(self) -> Iterator[str]:
+        slot = 0
+        for o in self.program.outputs:
+            if not o.lane:
+                yield f"  out[{slot}] = {self.name(o.nodes[0], 0)};"
+                slot += 1
+                continue
+            for group, v in enumerate(o.nodes):
+                for c in range(self.copies[group]):
+                    yield from self._stored(slot + c * self.width, v, group, c)
+                slot += self.counts[group]
+
+    def _stored(self, at: int, v: Value, group: int, copy: int) -> Iterator[str]:
+        used = min(self.width, self.counts[group] - copy * self.width)
+        name = f"spread({self.name(v, copy)})" if self.is_scalar(v) else self.name(v, copy)
+        if used == self.width:
+            yield f"  store(out + {at}, {name});"
+        else:
+            yield f"  store_some(out + {at}, {name}, {used});"
