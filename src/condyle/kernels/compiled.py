@@ -7,7 +7,6 @@ mechanism's numbers.
 from __future__ import annotations
 
 import ctypes
-import os
 from collections.abc import Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property, lru_cache
@@ -29,6 +28,7 @@ from .layout import Layout, specialise
 from .notice import notice
 from .result import PoseRates, Torques
 from .spec import OUTPUTS, KernelSpec, kernel_spec
+from .threads import workers
 
 if TYPE_CHECKING:
     from .interpreted import Interpreted
@@ -119,9 +119,9 @@ class Kernel:
             )
 
         starts = range(0, count, CHUNK)
-        workers = min(threads or _processors(), len(starts))
-        if workers > 1:
-            with ThreadPoolExecutor(workers) as pool:
+        hands = min(workers(threads), len(starts))
+        if hands > 1:
+            with ThreadPoolExecutor(hands) as pool:
                 list(pool.map(piece, starts))
         else:
             for start in starts:
@@ -249,12 +249,6 @@ def _aligned(count: int) -> np.ndarray:
 
 def _pointer(a: np.ndarray) -> Any:
     return a.ctypes.data_as(_doubles)
-
-
-def _processors() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 class Compiled:
