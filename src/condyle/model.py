@@ -392,22 +392,26 @@ def derive(
 def choose_kernel(
     mechanism: Mechanism, formulation: str, route: str, backend: str
 ) -> Interpreted | Compiled:
-    """The kernel of a backend; `CONDYLE_BACKEND` decides what auto means, if it is set."""
+    """The kernel of a backend; `CONDYLE_BACKEND` decides what auto means, if it is set.
+
+    Raises: InputError:    for an unknown backend.
+            CompilerError: if compiled is asked for and there is no compiler.
+    """
     from .kernels.compiled import Compiled
-    from .kernels.compiler import CompilerError
+    from .kernels.compiler import REMEDY, CompilerError
     from .kernels.interpreted import Interpreted
     from .kernels.notice import notice
 
-    chosen = os.environ.get("CONDYLE_BACKEND", "auto") if backend == "auto" else backend
+    chosen = os.environ.get("CONDYLE_BACKEND") or "auto" if backend == "auto" else backend
     if chosen not in BACKENDS:
         raise InputError(f'no backend "{chosen}".{did_you_mean(chosen, BACKENDS)}')
     if chosen != "interpreted":
         try:
-            return Compiled(mechanism, formulation, route)
+            return Compiled(mechanism, formulation, route, required=chosen == "compiled")
         except CompilerError as error:
             if chosen == "compiled":
-                raise
-            notice(f"{error}; the interpreter gives the same numbers, slower")
+                raise CompilerError(f"{error}. {REMEDY}") from None
+            notice(f"{error}; the interpreter gives the same numbers, slower", "compiler")
     return Interpreted(mechanism, formulation_named(formulation), route)
 
 

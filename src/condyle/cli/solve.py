@@ -33,8 +33,6 @@ def solve(
     from ..states import solve_file
 
     model = condyle.derive(condyle.load(mechanism), formulation, route, backend)
-    rows, warnings = solve_file(
-        model, states, out, load_point, flag, strict, reactions, threads
-    )
+    rows, warnings = solve_file(model, states, out, load_point, flag, strict, reactions, threads)
     warn(warnings)
     say(quiet, f"{rows} rows solved: {out}")
