@@ -26,6 +26,7 @@ from kernels.cases import case, error
 
 NAME = "gough-stewart"
 SLOWER = "; the interpreter gives the same numbers, slower\n"
+HANGS = "exec sleep 60"
 REMEDY = "Install gcc or clang, name another compiler in CC"
 
 
@@ -66,7 +67,8 @@ def answering(body: str) -> Callable[[Path, pytest.MonkeyPatch], None]:
     real = shlex.join(find_compiler().command)
 
     def use(tmp_path: Path, patch: pytest.MonkeyPatch) -> None:
-        patch.setattr(compiler, "SECONDS", 1.0)
+        if body == HANGS:
+            patch.setattr(compiler, "SECONDS", 0.5)
         script(
             tmp_path,
             patch,
@@ -82,7 +84,8 @@ def silent(body: str) -> Callable[[Path, pytest.MonkeyPatch], None]:
     """A compiler that is of no use from the start."""
 
     def use(tmp_path: Path, patch: pytest.MonkeyPatch) -> None:
-        patch.setattr(compiler, "ASKING", 0.5)
+        if body == HANGS:
+            patch.setattr(compiler, "ASKING", 0.5)
         script(tmp_path, patch, body)
 
     return use
@@ -109,12 +112,12 @@ USELESS: dict[str, tuple[Callable[[Path, pytest.MonkeyPatch], None], str]] = {
     "is no compiler": (silent("echo hello"), "compiler (does not work)"),
     "no text": (silent("printf '__VERS\\377\\376'"), "compiler (does not work)"),
     "dies": (silent("kill -9 $$"), "compiler (does not work)"),
-    "hangs": (silent("exec sleep 60"), "compiler (does not answer)"),
+    "hangs": (silent(HANGS), "compiler (does not answer)"),
 }
 BROKEN: dict[str, tuple[Callable[[Path, pytest.MonkeyPatch], None], str]] = {
     "error": (answering("printf 'wrong \\377\\n' >&2\nexit 1"), "failed: wrong \ufffd"),
     "dies": (answering("kill -9 $$"), "failed: exit status -9"),
-    "hangs": (answering("exec sleep 60"), "timed out"),
+    "hangs": (answering(HANGS), "timed out"),
     "builds nothing": (answering("exit 0"), "said nothing and built nothing"),
     "no library": (answering('echo hello > "$out"'), "no kernel could be built and loaded"),
     "no functions": (
@@ -155,11 +158,16 @@ def test_same_numbers_and_one_notice(
     "useless", [("useless", "none"), ("broken", "error")], indirect=True, ids="-".join
 )
 def test_one_notice_for_many_models(
-    useless: tuple[str, str], capsys: pytest.CaptureFixture[str]
+    useless: tuple[str, str],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    """Whatever it is that is wrong with the compiler next."""
     for _ in range(2):
         check_numbers(Model(case(NAME).mechanism))
     check_numbers(Model(case(NAME).mechanism, route="direct"))
+    monkeypatch.setenv("CC", "no-such-cc")
+    check_numbers(Model(case(NAME).mechanism))
     assert capsys.readouterr().err.count("condyle: ") == 1
 
 
