@@ -448,6 +448,20 @@ def test_show_and_clear(condyle_command: Callable[..., Any], folder: Path) -> No
     assert condyle_command("cache", "--clear").out.startswith("Removed 0 kernels, 0.0 MB")
 
 
+def test_shown_while_others_build(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A workplace that goes while it is looked at is no error."""
+    kept()
+    real = Path.glob
+
+    def gone(path: Path, pattern: str) -> Any:
+        found = list(real(path, pattern))
+        return [*found, folder / f"{cache.BUILD}gone"] if path == folder else found
+
+    monkeypatch.setattr(Path, "glob", gone)
+    monkeypatch.setattr(Path, "is_dir", lambda path: True)
+    assert cache.contents().kernels == 1
+
+
 def test_what_cannot_be_cleared(
     condyle_command: Callable[..., Any], folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

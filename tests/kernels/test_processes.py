@@ -54,7 +54,7 @@ for _ in range(150):
     what = dice.random()
     if what < 0.05:
         cache.clear()
-    elif what < 0.1:
+    elif what < 0.3:
         cache.contents()
     entry = cache.find(recipe) if what < 0.7 else cache.build(recipe, make, say)
     if entry:

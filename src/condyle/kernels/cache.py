@@ -150,7 +150,12 @@ def contents() -> Contents:
     folder = cache_folder()
     entries = _entries(folder)
     kernels = sum(p.suffix == ".json" and _whole(folder, p.stem) is not None for p in entries)
-    half_built = [path for place in folder.glob(f"{BUILD}*") for path in place.rglob("*")]
+    half_built = [
+        Path(top, name)
+        for place in folder.glob(f"{BUILD}*")
+        for top, _, files in os.walk(place)  # which takes folders that go meanwhile
+        for name in files
+    ]
     size = 0
     for path in entries + half_built:
         with suppress(OSError):  # gone meanwhile
