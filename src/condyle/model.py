@@ -176,15 +176,22 @@ class Model:
         return result, status
 
     def evaluate(
-        self, q: np.ndarray, q1: np.ndarray, q2: np.ndarray, load: np.ndarray
+        self,
+        q: np.ndarray,
+        q1: np.ndarray,
+        q2: np.ndarray,
+        load: np.ndarray,
+        threads: int | None = None,
     ) -> Evaluation:
         """Inverse dynamics at samples of the independent coordinates, with all that follows.
 
         Args: q, q1, q2: (N, m) each, in the order of `independent` [m, rad; per s; per s^2].
               load: (N, 9): force [N] and moment [N m] in {S}, and the point they act at, in {M}.
+              threads: at most so many; default: the processors at hand. Results do not depend
+              on it.
         """
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            torques = self.kernel.solve(q, q1, q2, load)
+            torques = self.kernel.solve(q, q1, q2, load, threads=threads)
             poses = torques.poses
             assert poses is not None
             posture = self.posture(poses.pose)
@@ -217,6 +224,7 @@ class Model:
         load_point: str | None = None,
         flag: bool = False,
         reactions: bool = False,
+        threads: int | None = None,
     ) -> Solution:
         """Torques along a motion under a load.
 
@@ -225,6 +233,7 @@ class Model:
                 right_molar.
                 flag: keep samples that cannot be computed, empty and with a status.
                 reactions: forces and moments in every joint too.
+                threads: at most so many; results do not depend on it.
         Raises: UnreachableError, SingularError: for such samples, unless `flag`.
                 InputError: if motion or load do not fit the mechanism.
         """
@@ -239,7 +248,7 @@ class Model:
         point = self.load_point(name) if loaded else np.zeros(3)
         name = (name or DEFAULT_LOAD_POINT) if loaded else None
         q, q1, q2, residual = self.independent_motion(motion)
-        evaluation = self.evaluate(q, q1, q2, with_point(wrench, point))
+        evaluation = self.evaluate(q, q1, q2, with_point(wrench, point), threads)
         if not flag:
             self.require_ok(evaluation, motion.t)
         seconds = time.perf_counter() - start
@@ -383,22 +392,26 @@ def derive(
 def choose_kernel(
     mechanism: Mechanism, formulation: str, route: str, backend: str
 ) -> Interpreted | Compiled:
-    """The kernel of a backend; `CONDYLE_BACKEND` decides what auto means, if it is set."""
+    """The kernel of a backend; `CONDYLE_BACKEND` decides what auto means, if it is set.
+
+    Raises: InputError:    for an unknown backend.
+            CompilerError: if compiled is asked for and there is no compiler.
+    """
     from .kernels.compiled import Compiled
-    from .kernels.compiler import CompilerError
+    from .kernels.compiler import REMEDY, CompilerError
     from .kernels.interpreted import Interpreted
     from .kernels.notice import notice
 
-    chosen = os.environ.get("CONDYLE_BACKEND", "auto") if backend == "auto" else backend
+    chosen = os.environ.get("CONDYLE_BACKEND") or "auto" if backend == "auto" else backend
     if chosen not in BACKENDS:
         raise InputError(f'no backend "{chosen}".{did_you_mean(chosen, BACKENDS)}')
     if chosen != "interpreted":
         try:
-            return Compiled(mechanism, formulation, route)
+            return Compiled(mechanism, formulation, route, required=chosen == "compiled")
         except CompilerError as error:
             if chosen == "compiled":
-                raise
-            notice(f"{error}; the interpreter gives the same numbers, slower")
+                raise CompilerError(f"{error}. {REMEDY}") from None
+            notice(f"{error}; the interpreter gives the same numbers, slower", "compiler")
     return Interpreted(mechanism, formulation_named(formulation), route)
 
 

@@ -23,6 +23,7 @@ def solve_file(
     flag: bool = False,
     strict: bool = False,
     reactions: bool = False,
+    threads: int | None = None,
 ) -> tuple[int, list[str]]:
     """Solve every row of a states file; the output appears whole or not at all.
 
@@ -31,6 +32,7 @@ def solve_file(
     Args:    states: CSV with 6 - k pose coordinates, their rates dX... and accelerations
              ddX..., and optionally Fx, Fy, Fz, Mx, My, Mz.
              reactions: columns reaction_<joint>_<chain>_x, _y, _z ... too.
+             threads: at most so many; the file does not depend on it.
     Returns: number of rows, and warnings.
     Raises:  InputError, UnreachableError, SingularError, BoundsError: nothing is written then.
     """
@@ -40,7 +42,9 @@ def solve_file(
     rows = 0
     with TableWriter(out) as writer:
         for table in iter_table(states, CHUNK_ROWS, known=known):
-            columns, margins, lifted = solve_table(model, table, load_point, flag, rows, reactions)
+            columns, margins, lifted = solve_table(
+                model, table, load_point, flag, rows, reactions, threads
+            )
             for i, name in enumerate(model.mechanism.contact_names):
                 outside = np.flatnonzero(margins[:, i] < -BOUND_TOLERANCE)
                 if outside.size:
@@ -76,6 +80,7 @@ def solve_table(
     flag: bool,
     first_row: int,
     reactions: bool = False,
+    threads: int | None = None,
 ) -> tuple[dict[str, np.ndarray | list[str]], np.ndarray, np.ndarray]:
     """Output columns for the rows of one table; bound margins and lift-off, (N, k)."""
     names = state_coordinates(model, table)
@@ -88,7 +93,7 @@ def solve_table(
             wrench[:, part] = table.require(group)
     if load_point is not None or "Fx" in table.columns:
         point = model.load_point(load_point)
-    evaluation = model.evaluate(q, q1, q2, with_point(wrench, point))
+    evaluation = model.evaluate(q, q1, q2, with_point(wrench, point), threads)
     ok = evaluation.status == 0
     if not flag and not ok.all():
         model.require_ok(evaluation, row_offset=first_row)

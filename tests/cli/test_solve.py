@@ -10,6 +10,9 @@ import numpy as np
 import pytest
 
 import condyle
+from condyle.kernels import compiled
+from condyle.kernels.compiled import Compiled
+from condyle.kernels.compiler import CompilerError, find_compiler
 from condyle.mechanism import COORDINATES
 from condyle.model import Model, with_point
 
@@ -238,3 +241,36 @@ def test_bounds_warn_and_strict_refuses(
     write_csv(header(), states, "states.csv")
     outcome = condyle_command(*arguments, "--strict", "--quiet")
     assert (outcome.status, outcome.out, outcome.err) == (0, "", "")
+
+
+def test_threads(
+    condyle_command: Callable[..., Any],
+    write_csv: Callable[..., Path],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """--threads reaches the kernel, and the file is the same to the byte, with and without."""
+    try:
+        find_compiler()
+    except CompilerError as error:
+        pytest.skip(str(error))
+    asked = []
+    real = Compiled.solve
+
+    def spy(self: Compiled, *arguments: Any, **options: Any) -> Any:
+        asked.append(options.get("threads"))
+        return real(self, *arguments, **options)
+
+    monkeypatch.setattr(Compiled, "solve", spy)
+    monkeypatch.setattr(compiled, "CHUNK", 8)
+    write_csv(header(), np.hstack(draw(50)), "states.csv")
+    arguments = ("solve", "masticatory", "--states", "states.csv", "--out", "out.csv")
+    texts = []
+    for options in ((), ("--threads", 1), ("--threads", 3)):
+        assert condyle_command(*arguments, *options).status == 0
+        texts.append(Path("out.csv").read_bytes())
+    assert texts[1] == texts[0] and texts[2] == texts[0]
+    assert asked == [None, 1, 3]
+    for command in (arguments, ("run", "masticatory")):
+        outcome = condyle_command(*command, "--threads", 0)
+        assert outcome.status == 2 and "--threads" in outcome.err
+    assert condyle_command("run", "--threads", 2).status == 0 and asked[3:] == [2]

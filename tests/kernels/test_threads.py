@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from condyle import states
+from condyle.errors import InputError
 from condyle.kernels import compiled
 from condyle.kernels.compiled import Kernel
 from condyle.model import Model
@@ -45,6 +46,16 @@ def test_threads(kernel: Kernel, samples: np.ndarray) -> None:
     assert set(alone[1]) >= {0, 1}
     for threads in (2, 3, None):
         same(kernel.run(samples, threads=threads), alone)
+
+
+@pytest.mark.parametrize("threads", [0, -1])
+@pytest.mark.parametrize("backend", ["compiled", "interpreted"])
+def test_fewer_than_one_thread(backend: str, threads: int) -> None:
+    c = case("masticatory")
+    model = Model(c.mechanism, backend=backend)
+    for call in (model.evaluate, model.torques):
+        with pytest.raises(InputError, match=f"threads is {threads}; expected 1 or more"):
+            call(*c.arguments, threads=threads)
 
 
 def test_chunks(kernel: Kernel, samples: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import signal
 import sys
+from contextlib import suppress
 from typing import Annotated
 
 import typer
@@ -40,10 +42,24 @@ def _root(
     pass
 
 
+def _terminated(number: int, frame: object) -> None:
+    sys.exit(128 + number)
+
+
+def _end_in_order() -> None:
+    """End by signals as by errors, so that half-written files are removed."""
+    for name in ("SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) == signal.SIG_DFL:
+            with suppress(ValueError):  # not the main thread
+                signal.signal(number, _terminated)
+
+
 def main() -> None:
     """Entry point of the `condyle` command."""
     from . import commands  # noqa: F401 - registers them
 
+    _end_in_order()
     try:
         app()
     except CondyleError as error:

@@ -17,7 +17,8 @@ def cache(
     from ..kernels import cache as kernels
 
     had = kernels.clear() if clear else kernels.contents()
-    what = f"{had.kernels} kernels, {had.size / 1e6:.1f} MB"
+    count = "1 kernel" if had.kernels == 1 else f"{had.kernels} kernels"
+    what = f"{count}, {had.size / 1e6:.1f} MB"
     typer.echo(f"Removed {what} from {had.folder}" if clear else f"{had.folder}: {what}")
-    if not clear and had.kernels:
+    if not clear and had.size:
         typer.echo("Next: condyle cache --clear removes them; they are built again when needed")

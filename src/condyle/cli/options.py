@@ -57,6 +57,10 @@ Backend = Annotated[
     str,
     typer.Option(help="compiled, interpreted, or auto (compiled where there is a C compiler)."),
 ]
+Threads = Annotated[
+    int | None,
+    typer.Option(min=1, help="At most so many threads. Default: all processors. Same results."),
+]
 Flag = Annotated[
     bool,
     typer.Option("--flag", help="Keep samples that cannot be computed: empty, with a status."),

@@ -39,6 +39,7 @@ def run(
         bool, typer.Option("--report", help="Write the page of condyle report too.")
     ] = False,
     backend: options.Backend = "auto",
+    threads: options.Threads = None,
     strict: options.Strict = False,
     flag: options.Flag = False,
     quiet: options.Quiet = False,
@@ -55,7 +56,7 @@ def run(
     machine = condyle.load(mechanism)
     path, acting = motion_and_load(motion, load, units, landmark, smooth, rate)
     model = condyle.derive(machine, formulation, route, backend)
-    solution = model.solve(path, acting, load_point, flag, reactions)
+    solution = model.solve(path, acting, load_point, flag, reactions, threads)
     if strict:
         require_inside(solution.warnings)
     folder, stem = output_folder(out), file_stem(machine.name)

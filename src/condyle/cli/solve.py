@@ -22,6 +22,7 @@ def solve(
     route: options.Route = "core",
     reactions: options.Reactions = False,
     backend: options.Backend = "auto",
+    threads: options.Threads = None,
     strict: options.Strict = False,
     flag: options.Flag = False,
     quiet: options.Quiet = False,
@@ -32,6 +33,6 @@ def solve(
     from ..states import solve_file
 
     model = condyle.derive(condyle.load(mechanism), formulation, route, backend)
-    rows, warnings = solve_file(model, states, out, load_point, flag, strict, reactions)
+    rows, warnings = solve_file(model, states, out, load_point, flag, strict, reactions, threads)
     warn(warnings)
     say(quiet, f"{rows} rows solved: {out}")

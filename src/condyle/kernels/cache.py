@@ -3,7 +3,8 @@
 An entry is a shared library, named by its recipe and by its own content, and a manifest that
 names the library. Both appear by renaming, the manifest last, so that processes may race and may
 be killed at any time: a manifest always stands for a whole library, and a library that is not
-what its manifest says is never loaded.
+what its manifest says is never loaded. Who builds holds a shared lock on the folder; who finds it
+free first removes what killed builds have left.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import stat
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,7 +28,13 @@ import platformdirs
 
 from ..errors import CondyleError
 
-STALE_SECONDS = 3600  # a folder of a killed build is cleared after this
+try:
+    import fcntl
+except ImportError:  # not POSIX
+    fcntl = None  # type: ignore[assignment]
+
+STALE_SECONDS = 3600  # older than any build: cleared even where folders cannot be locked
+ROOM = 1 << 22  # bytes; no library is larger
 BUILD = "condyle-build-"  # what such a folder's name begins with
 ENTRY = re.compile(r"[0-9a-f]{40}(\.json|-[0-9a-f]{16}\.so)")  # files that are ours to remove
 
@@ -50,7 +58,11 @@ class Entry:
 
 @dataclass(frozen=True)
 class Contents:
-    """What a cache holds."""
+    """What a cache holds.
+
+    kernels: those that are whole.
+    size:    of all that is there [bytes], also of what is broken or half built.
+    """
 
     folder: Path
     kernels: int
@@ -60,7 +72,7 @@ class Contents:
 def cache_folder() -> Path:
     """Where kernels are kept: `CONDYLE_CACHE`, else the user's cache folder."""
     if chosen := os.environ.get("CONDYLE_CACHE"):
-        return Path(chosen).absolute()
+        return Path(os.path.expanduser(chosen)).absolute()
     return Path(platformdirs.user_cache_dir("condyle")) / "kernels"
 
 
@@ -79,17 +91,7 @@ def find(recipe: str) -> Entry | None:
     if recipe in _apart:
         return _apart[recipe]
     folder = cache_folder()
-    if not _trusted(folder):
-        return None
-    try:
-        manifest = json.loads((folder / f"{recipe}.json").read_text(encoding="utf-8"))
-        facts = manifest["facts"]
-        library = folder / facts["library"]
-        if manifest["seal"] != _seal(recipe, facts) or _hash(library) != facts["sha256"]:
-            return None
-        return Entry(library, facts, True)
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
+    return _whole(folder, recipe) if _trusted(folder) else None
 
 
 def build(recipe: str, make: Make, say: Callable[[str, str], None]) -> Entry:
@@ -101,13 +103,13 @@ def build(recipe: str, make: Make, say: Callable[[str, str], None]) -> Entry:
     """
     folder = cache_folder()
     try:
-        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        if not _trusted(folder):
-            raise PermissionError(0, "it belongs to or can be written by others")
-        _sweep(folder)
-        with tempfile.TemporaryDirectory(
-            prefix=BUILD, dir=folder, ignore_cleanup_errors=True
-        ) as name:
+        _prepare(folder)
+        with (
+            _held(folder),
+            tempfile.TemporaryDirectory(
+                prefix=BUILD, dir=folder, ignore_cleanup_errors=True
+            ) as name,
+        ):
             library, facts = make(Path(name))
             facts["sha256"] = _hash(library)
             facts["library"] = f"{recipe}-{facts['sha256'][:16]}.so"
@@ -118,12 +120,13 @@ def build(recipe: str, make: Make, say: Callable[[str, str], None]) -> Entry:
             os.replace(manifest, folder / f"{recipe}.json")
         return Entry(folder / facts["library"], facts, False)
     except (OSError, CondyleError) as error:
-        # A full disk may fail the compiler: elsewhere it may do.
+        if isinstance(error, CondyleError) and _has_room(folder):
+            raise  # not the disk's fault
         entry = build_apart(recipe, make)
         why = getattr(error, "strerror", None) or str(error).partition("\n")[0]
         say(
             f"the kernel cache {folder} cannot be used ({why}); kernels are built for this "
-            "process alone",
+            "process alone. CONDYLE_CACHE names another folder",
             "cache",
         )
         return entry
@@ -144,34 +147,53 @@ def build_apart(recipe: str, make: Make) -> Entry:
 
 def contents() -> Contents:
     """How many kernels there are and what they take [bytes]."""
-    folder, kernels, size = cache_folder(), 0, 0
-    for path in _entries(folder):
-        try:
+    folder = cache_folder()
+    entries = _entries(folder)
+    kernels = sum(p.suffix == ".json" and _whole(folder, p.stem) is not None for p in entries)
+    half_built = [
+        Path(top, name)
+        for place in folder.glob(f"{BUILD}*")
+        for top, _, files in os.walk(place)  # which takes folders that go meanwhile
+        for name in files
+    ]
+    size = 0
+    for path in entries + half_built:
+        with suppress(OSError):  # gone meanwhile
             size += path.stat().st_size
-        except FileNotFoundError:  # cleared meanwhile
-            continue
-        kernels += path.suffix == ".json"
     return Contents(folder, kernels, size)
 
 
 def clear() -> Contents:
-    """Remove every kernel and nothing else; returns what there was.
+    """Remove every kernel and nothing else; returns what there was. Builds go on undisturbed.
 
     Raises: CacheError: if the folder cannot be written.
     """
     had = contents()
-    try:
-        for path in _entries(had.folder):
-            path.unlink(missing_ok=True)
-        for path in had.folder.glob(f"{BUILD}*"):
-            shutil.rmtree(path, ignore_errors=True)
-    except OSError as error:
-        raise CacheError(f"{had.folder} cannot be cleared: {error.strerror}") from None
+    if had.folder.is_dir():
+        try:
+            with _held(had.folder):
+                for path in _entries(had.folder):
+                    path.unlink(missing_ok=True)
+        except OSError as error:
+            raise CacheError(f"{had.folder} cannot be cleared: {error.strerror}") from None
     return had
 
 
-def _entries(folder: Path) -> Iterator[Path]:
-    return (path for path in folder.glob("*") if ENTRY.fullmatch(path.name))
+def _entries(folder: Path) -> list[Path]:
+    return [path for path in folder.glob("*") if ENTRY.fullmatch(path.name)]
+
+
+def _whole(folder: Path, recipe: str) -> Entry | None:
+    """The entry of a recipe, if its library is the one that its manifest was written for."""
+    try:
+        manifest = json.loads((folder / f"{recipe}.json").read_text(encoding="utf-8"))
+        facts = manifest["facts"]
+        library = folder / facts["library"]
+        if manifest["seal"] != _seal(recipe, facts) or _hash(library) != facts["sha256"]:
+            return None
+        return Entry(library, facts, True)
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
 
 
 def _seal(recipe: str, facts: Facts) -> str:
@@ -182,10 +204,24 @@ def _hash(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
+def _prepare(folder: Path) -> None:
+    """Make the folder.
+
+    Raises: OSError: if there cannot be one that only we can write.
+    """
+    if not folder.is_absolute():
+        raise FileNotFoundError(0, "there is no home folder")
+    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    if not _trusted(folder):
+        raise PermissionError(0, "it belongs to or can be written by others")
+
+
 def _trusted(folder: Path) -> bool:
     """Whether nobody else can put libraries there."""
+    if not folder.is_absolute() or not folder.is_dir():
+        return False
     if not hasattr(os, "getuid"):
-        return folder.is_dir()
+        return True
     try:
         about = folder.stat()
     except OSError:
@@ -194,11 +230,59 @@ def _trusted(folder: Path) -> bool:
     return mine and not about.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
-def _sweep(folder: Path) -> None:
-    """Remove what killed builds left behind."""
+def _has_room(folder: Path) -> bool:
+    """Whether a library as large as any would fit."""
+    try:
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(bytes(ROOM))
+        return True
+    except OSError:
+        return False
+
+
+@contextmanager
+def _held(folder: Path) -> Iterator[None]:
+    """Keep others from sweeping the folder; sweep it first if nobody holds it."""
+    handle = os.open(folder, os.O_RDONLY) if fcntl else -1
+    try:
+        _sweep(folder, alone=_locked(handle, exclusive=True))
+        _locked(handle, exclusive=False)
+        yield
+    finally:
+        if fcntl:
+            os.close(handle)
+
+
+def _locked(handle: int, exclusive: bool) -> bool:
+    """Lock an open folder, for oneself at once or not at all; some file systems have no locks."""
+    if fcntl is None:
+        return False
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB if exclusive else fcntl.LOCK_SH)
+    except OSError:
+        return False
+    return True
+
+
+def _sweep(folder: Path, alone: bool) -> None:
+    """Remove what killed builds left behind.
+
+    Args: alone: nobody else builds. Otherwise only what is too old to be in use goes.
+    """
     for path in folder.glob(f"{BUILD}*"):
-        try:
-            if time.time() - path.stat().st_mtime > STALE_SECONDS:
+        with suppress(OSError):
+            if alone or time.time() - path.stat().st_mtime > STALE_SECONDS:
                 shutil.rmtree(path, ignore_errors=True)
-        except OSError:
-            continue
+    if alone:
+        for path in _entries(folder):
+            if path.suffix == ".so" and not _named(path):
+                with suppress(OSError):
+                    path.unlink()
+
+
+def _named(library: Path) -> bool:
+    """Whether a manifest stands for the library."""
+    try:
+        return library.name.encode() in library.with_name(f"{library.name[:40]}.json").read_bytes()
+    except OSError:
+        return False

@@ -7,7 +7,6 @@ mechanism's numbers.
 from __future__ import annotations
 
 import ctypes
-import os
 from collections.abc import Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property, lru_cache
@@ -24,11 +23,12 @@ from ..kinematics.contact import indices
 from ..mechanism.home import independent_coordinates
 from ..mechanism.mechanism import Mechanism
 from . import cache
-from .compiler import Compiler, CompilerError, find_compiler
+from .compiler import REMEDY, Compiler, CompilerError, find_compiler
 from .layout import Layout, specialise
 from .notice import notice
 from .result import PoseRates, Torques
 from .spec import OUTPUTS, KernelSpec, kernel_spec
+from .threads import workers
 
 if TYPE_CHECKING:
     from .interpreted import Interpreted
@@ -119,9 +119,9 @@ class Kernel:
             )
 
         starts = range(0, count, CHUNK)
-        workers = min(threads or _processors(), len(starts))
-        if workers > 1:
-            with ThreadPoolExecutor(workers) as pool:
+        hands = min(workers(threads), len(starts))
+        if hands > 1:
+            with ThreadPoolExecutor(hands) as pool:
                 list(pool.map(piece, starts))
         else:
             for start in starts:
@@ -165,17 +165,22 @@ def _loaded(spec: KernelSpec, compiler: Compiler) -> tuple[cache.Entry, ctypes.C
     def make(folder: Path) -> tuple[Path, dict[str, Any]]:
         return _make(folder, spec, compiler)
 
+    ways = (
+        lambda: cache.find(recipe),
+        lambda: cache.build(recipe, make, notice),
+        lambda: cache.build_apart(recipe, make),
+    )
+    problem: Exception | None = None
     try:
-        entry = cache.find(recipe) or cache.build(recipe, make, notice)
-        try:
-            return entry, _load(str(entry.library))
-        except OSError as error:  # a disk that may not hold programs, or was cleared just now
-            entry = cache.build_apart(recipe, make)
-            library = _load(str(entry.library))
-            notice(f"a cached kernel cannot be loaded ({error}); it was built again", "cache")
-            return entry, library
+        for way in ways:
+            if (entry := way()) is not None:
+                try:
+                    return entry, _load(str(entry.library))
+                except OSError as error:  # built with another C library, or cleared just now
+                    problem = error
     except (OSError, AttributeError, NotImplementedError) as error:
-        raise CompilerError(f"no kernel could be built and loaded: {error}") from error
+        problem = error
+    raise CompilerError(f"no kernel could be built and loaded: {problem}") from problem
 
 
 def _recipe(spec: KernelSpec, compiler: Compiler) -> str:
@@ -197,6 +202,7 @@ def _make(folder: Path, spec: KernelSpec, compiler: Compiler) -> tuple[Path, dic
     text, library = folder / "kernel.c", folder / "kernel.so"
     text.write_text(source.text, encoding="utf-8")
     compiler.build(text, library)
+    _load(str(library))  # only what can be loaded is kept
     facts = {
         "spec": spec.text(),
         "outputs": source.outputs,
@@ -249,12 +255,6 @@ def _aligned(count: int) -> np.ndarray:
 
 def _pointer(a: np.ndarray) -> Any:
     return a.ctypes.data_as(_doubles)
-
-
-def _processors() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 class Compiled:
@@ -317,7 +317,7 @@ class Compiled:
             kernel = self.kernel(point, outputs, moment=True)
         except CompilerError as error:
             if self._required:
-                raise
+                raise CompilerError(f"{error}. {REMEDY}") from None
             self._failed = True
             notice(f"{error}; the interpreter gives the same numbers, slower", "compiler")
             return self.interpreted.solve(q, q1, q2, load, outputs)

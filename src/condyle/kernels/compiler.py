@@ -30,6 +30,11 @@ FLAGS = (
 IN_VECTORS = "-mtune-ctrl=^inter_unit_moves_to_vec,^inter_unit_moves_from_vec"
 NATIVE = (("-march=native", IN_VECTORS), ("-march=native",), ("-mcpu=native",), ())
 SECONDS = 300  # a build that takes longer has gone wrong
+ASKING = 30  # seconds in which a compiler says what it is
+REMEDY = (
+    "Install gcc or clang, name another compiler in CC, or take the interpreter "
+    "(--backend interpreted)"
+)
 
 
 class CompilerError(CondyleError):
@@ -55,17 +60,19 @@ class Compiler:
         """Compile C into a shared library.
 
         Raises: CompilerError: with the first lines of what the compiler said.
+                OSError: if the library cannot be looked at.
         """
         call = [*self.command, *self.flags, str(source), "-o", str(library), "-lm"]
         try:
-            done = subprocess.run(
-                call, capture_output=True, text=True, timeout=SECONDS, stdin=subprocess.DEVNULL
-            )
+            done = _run(call, SECONDS)
         except (OSError, subprocess.TimeoutExpired) as error:
             raise CompilerError(f"{self.command[0]} could not be run: {error}") from None
         if done.returncode:
             said = "\n".join((done.stderr or done.stdout).splitlines()[:5])
-            raise CompilerError(f"{shlex.join(self.command)} failed: {said}")
+            why = said or f"exit status {done.returncode}"
+            raise CompilerError(f"{shlex.join(self.command)} failed: {why}")
+        if not library.exists():
+            raise CompilerError(f"{shlex.join(self.command)} said nothing and built nothing")
 
 
 def find_compiler() -> Compiler:
@@ -74,21 +81,35 @@ def find_compiler() -> Compiler:
     Raises: CompilerError: if there is none that works.
     """
     names = ("CC", "PATH", "CONDYLE_LANES")
-    return _find(*(os.environ.get(name, "").strip() for name in names))
+    found = _find(*(os.environ.get(name, "").strip() for name in names))
+    if isinstance(found, str):
+        raise CompilerError(found)
+    return found
 
 
 @lru_cache(maxsize=8)
-def _find(cc: str, path: str, lanes: str) -> Compiler:
+def _find(cc: str, path: str, lanes: str) -> Compiler | str:
+    """The compiler, or why there is none: that too may have taken long to find out."""
+    try:
+        return _search(cc, path, lanes)
+    except CompilerError as error:
+        return str(error)
+
+
+def _search(cc: str, path: str, lanes: str) -> Compiler:
     tried = []
     for command in _candidates(cc):
         if shutil.which(command[0], path=path or None) is None:
             tried.append(f"{command[0]} (not found)")
             continue
-        for native in NATIVE:
-            macros = _macros(command, native)
-            if macros is not None:
-                return Compiler(command, (*FLAGS, *native), macros, _lanes(lanes, macros))
-        tried.append(f"{shlex.join(command)} (does not work)")
+        try:
+            for native in NATIVE:
+                macros = _macros(command, native)
+                if macros is not None:
+                    return Compiler(command, (*FLAGS, *native), macros, _lanes(lanes, macros))
+            tried.append(f"{shlex.join(command)} (does not work)")
+        except subprocess.TimeoutExpired:
+            tried.append(f"{shlex.join(command)} (does not answer)")
     raise CompilerError(f"no C compiler: tried {', '.join(tried) or 'nothing'}")
 
 
@@ -108,15 +129,24 @@ def _macros(command: tuple[str, ...], native: tuple[str, ...]) -> str | None:
     """Everything the compiler defines for this processor: its version and instruction sets."""
     call = [*command, *native, "-dM", "-E", "-x", "c", "-"]
     try:
-        done = subprocess.run(
-            call, capture_output=True, text=True, timeout=SECONDS, stdin=subprocess.DEVNULL
-        )
-    except (OSError, subprocess.TimeoutExpired):
+        done = _run(call, ASKING)
+    except OSError:
         return None
     if done.returncode or "__VERSION__" not in done.stdout:
         return None
     where = shutil.which(command[0]) or command[0]
     return f"{where}\n{platform.machine()}\n{done.stdout}"
+
+
+def _run(call: list[str], seconds: float) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        call,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        timeout=seconds,
+        stdin=subprocess.DEVNULL,
+    )
 
 
 def _lanes(chosen: str, macros: str) -> int:

@@ -25,6 +25,7 @@ from ..mechanism.home import characteristic_length, independent_coordinates
 from ..mechanism.mechanism import Mechanism
 from .result import PoseRates, Torques
 from .spec import OUTPUTS
+from .threads import workers
 
 
 class Interpreted:
@@ -59,7 +60,10 @@ class Interpreted:
 
         Args: outputs: what is wanted besides the efforts, of `OUTPUTS`; here only the contact
               forces cost extra.
+              threads: makes no difference here.
+        Raises: InputError: for less than one thread.
         """
+        workers(threads)
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             poses = self.poses(q, q1, q2)
             return self.torques(q, q1, q2, load, poses, "contact" in outputs)

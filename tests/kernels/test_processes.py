@@ -1,0 +1,256 @@
+"""Processes that build the same kernels, or are killed while they do."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import shutil
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from condyle.kernels import cache, compiled
+from condyle.kernels.compiled import Kernel
+from condyle.kernels.compiler import find_compiler
+from condyle.model import Model
+from kernels.cases import case, error
+from kernels.children import PATIENCE, end, start, wait_for
+
+SOLVE = """
+import json, sys
+from condyle.kernels import cache
+from condyle.model import Model
+from kernels.cases import case
+c = case("gough-stewart")
+kernel = Model(c.mechanism, backend="compiled").kernel.kernel(c.point, (), True)
+sys.stdin.readline()  # the others are as far
+"""
+RUN = """
+values, status = kernel.run(c.samples)
+print(json.dumps([kernel.cached, kernel.in_order(values["torque"]).tolist()]))
+"""
+SOLVE_TOGETHER = SOLVE.replace(
+    "kernel = ", 'print("here", flush=True)\nsys.stdin.readline()\nkernel = '
+)
+
+# Builds of a few bytes, each different, so that any mixture shows.
+JUGGLE = """
+import hashlib, os, random, sys
+from condyle.kernels import cache
+dice = random.Random(int(sys.argv[1]))
+def make(place):
+    library = place / "kernel.so"
+    library.write_bytes(b"whole %d %d " % (os.getpid(), dice.randrange(10**6)) * 1000)
+    return library, {}
+def say(text, about):
+    sys.exit(text)
+print("here", flush=True)
+sys.stdin.readline()
+for _ in range(150):
+    recipe = cache.digest(str(dice.randrange(4)))
+    what = dice.random()
+    if what < 0.05:
+        cache.clear()
+    elif what < 0.3:
+        cache.contents()
+    entry = cache.find(recipe) if what < 0.7 else cache.build(recipe, make, say)
+    if entry:
+        try:
+            data = entry.library.read_bytes()
+        except FileNotFoundError:
+            continue  # cleared since
+        if hashlib.sha256(data).hexdigest() != entry.facts["sha256"]:
+            sys.exit("not the library of the manifest")
+print("done")
+"""
+
+# Dies at some step of a build, as by a power cut.
+DIE = """
+import os, signal, sys
+from pathlib import Path
+from condyle.kernels import cache
+step = int(sys.argv[1])
+steps = 0
+def dying(real):
+    def call(*arguments, **options):
+        global steps
+        steps += 1
+        if steps == step:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return real(*arguments, **options)
+    return call
+os.replace, Path.write_text = dying(os.replace), dying(Path.write_text)
+def make(place):
+    (place / "kernel.c").write_text("source")
+    (place / "kernel.so").write_bytes(b"library")
+    return place / "kernel.so", {}
+cache.build(cache.digest("one"), make, print)
+print("alive")
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("CONDYLE_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+def kernel() -> Kernel:
+    c = case("gough-stewart")
+    return Model(c.mechanism, backend="compiled").kernel.kernel(c.point, (), True)
+
+
+def check(kernel: Kernel) -> None:
+    """Right numbers."""
+    c = case("gough-stewart")
+    wanted = Model(c.mechanism, backend="interpreted").kernel.solve(*c.arguments).torque
+    assert error(kernel.in_order(kernel.run(c.samples)[0]["torque"]), wanted) < 1e-10
+
+
+def check_clean(folder: Path, kernels: int = 1) -> None:
+    """Whole kernels, two files each, and nothing else."""
+    assert cache.contents().kernels == kernels
+    assert len(list(folder.iterdir())) == 2 * kernels
+
+
+@pytest.mark.usefixtures("quick")
+def test_processes_race(folder: Path) -> None:
+    """All compile at the same time; all get the same right numbers; one kernel is left."""
+    children = [start(SOLVE_TOGETHER + RUN) for _ in range(3)]
+    for child in children:
+        assert child.stdout.readline() == "here\n", child.stderr.read()
+    for child in children:
+        child.stdin.write("\n\n")
+        child.stdin.flush()
+    said = [child.communicate(timeout=PATIENCE) for child in children]
+    assert [err for _, err in said] == [""] * 3
+    torques = [json.loads(out)[1] for out, _ in said]
+    assert torques[0] == torques[1] == torques[2]
+    c = case("gough-stewart")
+    wanted = Model(c.mechanism, backend="interpreted").kernel.solve(*c.arguments).torque
+    assert error(np.array(torques[0]), wanted) < 1e-10
+    check_clean(folder)
+    again = kernel()
+    assert again.cached
+    check(again)
+
+
+def test_many_build_find_and_clear(folder: Path) -> None:
+    """Whatever is found is whole, and nobody's build fails."""
+    children = [start(JUGGLE, seed) for seed in range(3)]
+    for child in children:
+        assert child.stdout.readline() == "here\n", child.stderr.read()
+    for child in children:
+        child.stdin.write("\n")
+        child.stdin.flush()
+    said = [child.communicate(timeout=PATIENCE) for child in children]
+    assert said == [("done\n", "")] * 3
+    cache.clear()
+    assert list(folder.iterdir()) == []
+
+
+@pytest.mark.usefixtures("quick")
+def test_killed_while_compiling(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, quick_command: str
+) -> None:
+    started = tmp_path / "started"
+    slow = tmp_path / "slow"
+    slow.write_text(
+        f'#!/bin/sh\ncase "$*" in *-dM*) exec {quick_command} "$@";; esac\n'
+        f"echo > {shlex.quote(str(started))}\nexec sleep {PATIENCE}\n"
+    )
+    monkeypatch.setenv("CC", f"/bin/sh {shlex.quote(str(slow))}")
+    child = start(SOLVE)
+    wait_for(started.exists, child)
+    end(child, signal.SIGKILL)
+    assert [path.name.startswith(cache.BUILD) for path in folder.iterdir()] == [True]
+    monkeypatch.setenv("CC", quick_command)
+    built = kernel()
+    assert not built.cached
+    check(built)
+    check_clean(folder)
+
+
+def test_killed_at_any_step(folder: Path) -> None:
+    """Writing the source and the manifest, moving the library and the manifest."""
+    recipe = cache.digest("one")
+
+    def make(place: Path) -> tuple[Path, dict[str, str]]:
+        (place / "kernel.so").write_bytes(b"library")
+        return place / "kernel.so", {}
+
+    for step in (1, 2, 3, 4):
+        child = start(DIE, step)
+        out, err = child.communicate(timeout=PATIENCE)
+        assert (child.returncode, out, err) == (-signal.SIGKILL, "", "")
+        assert cache.find(recipe) is None
+        assert any(name.startswith(cache.BUILD) for name in os.listdir(folder))
+        cache.build(recipe, make, lambda *words: pytest.fail(str(words)))
+        assert cache.find(recipe) is not None
+        check_clean(folder)
+        shutil.rmtree(folder)
+    child = start(DIE, 5)
+    assert child.communicate(timeout=PATIENCE) == ("alive\n", "")
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_library_put_in_place_of_ours_is_never_loaded(folder: Path, tmp_path: Path) -> None:
+    """Not even opened: opening runs its code."""
+    first = kernel()
+    library = folder / first.facts["library"]
+    mark = tmp_path / "it ran"
+    source = tmp_path / "evil.c"
+    source.write_text(
+        "#include <stdio.h>\n__attribute__((constructor)) void evil(void) {"
+        f' FILE *f = fopen("{mark}", "w"); if (f) fclose(f); }}\n'
+    )
+    find_compiler().build(source, tmp_path / "evil.so")
+    os.replace(tmp_path / "evil.so", library)
+    child = start(SOLVE + RUN)
+    out, err = child.communicate("\n", timeout=PATIENCE)
+    assert err == "" and not mark.exists()
+    cached, torque = json.loads(out)
+    assert not cached
+    c = case("gough-stewart")
+    assert error(torque, first.in_order(first.run(c.samples)[0]["torque"])) == 0
+    check_clean(folder)
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_library_that_no_longer_loads_is_built_again(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Whole, but of another machine, say."""
+    recipe = compiled._recipe(kernel().spec, find_compiler())
+    facts = cache.find(recipe).facts
+    cache.clear()
+
+    def make(place: Path) -> tuple[Path, dict[str, object]]:
+        (place / "kernel.so").write_bytes(b"\x7fELF of another machine")
+        return place / "kernel.so", dict(facts)
+
+    cache.build(recipe, make, lambda *words: pytest.fail(str(words)))
+    assert cache.find(recipe) is not None
+    again = kernel()
+    assert not again.cached and kernel().cached
+    check(again)
+    assert cache.contents().kernels == 1
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.usefixtures("quick")
+def test_kernels_of_one_process_go_with_it(folder: Path, tmp_path: Path) -> None:
+    """Nothing can be kept: one notice, right numbers, and nothing stays behind."""
+    folder.write_text("a file")
+    (tmp_path / "tmp").mkdir()
+    hold = "import tempfile\ntempfile.tempdir = sys.argv[1]\n"
+    child = start(SOLVE.replace("c = ", hold + "c = ", 1) + RUN, tmp_path / "tmp")
+    out, err = child.communicate("\n", timeout=PATIENCE)
+    assert err.count("\n") == 1 and f"cache {folder} cannot be used" in err
+    c = case("gough-stewart")
+    wanted = Model(c.mechanism, backend="interpreted").kernel.solve(*c.arguments).torque
+    assert error(json.loads(out)[1], wanted) < 1e-10
+    assert list((tmp_path / "tmp").iterdir()) == []

@@ -1,0 +1,203 @@
+"""A file of any length goes through in flat memory, and whole or not at all."""
+
+from __future__ import annotations
+
+import gc
+import os
+import signal
+import tracemalloc
+from pathlib import Path
+from threading import Event, Thread
+from typing import Any
+
+import numpy as np
+import pytest
+
+from condyle import states
+from condyle.errors import CondyleError
+from condyle.model import Model
+from condyle.states import solve_file
+from kernels.cases import case
+from kernels.children import PATIENCE, end, start, wait_for
+
+NAME = "masticatory"
+CHUNK = 200
+HEADER = ",".join(p + n for p in ("", "d", "dd") for n in ("X", "Y", "alpha", "beta")) + "\n"
+
+SOLVE = f"""
+import sys
+from condyle import states
+states.CHUNK_ROWS = {CHUNK}
+from condyle.cli import main
+sys.argv = ["condyle", "solve", "{NAME}", *sys.argv[1:]]
+main()
+"""
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    return Model(case(NAME).mechanism, backend="interpreted")
+
+
+@pytest.fixture(autouse=True)
+def short_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(states, "CHUNK_ROWS", CHUNK)
+
+
+def rows(count: int) -> list[str]:
+    c = case(NAME)
+    samples = np.tile(c.samples[:3, :12], (count // 3 + 1, 1))[:count]  # at home: always good
+    samples[:, 0] += np.linspace(-1e-4, 1e-4, count)
+    return [",".join(map(repr, row)) + "\n" for row in samples.tolist()]
+
+
+def write(path: Path, count: int, **spoiled: str) -> Path:
+    """A states file; `row_7="..."` puts something else in row 7, counted from 1."""
+    lines = rows(count)
+    for name, text in spoiled.items():
+        lines[int(name.removeprefix("row_")) - 1] = text + "\n"
+    path.write_text(HEADER + "".join(lines))
+    return path
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def peak(model: Model, folder: Path, count: int) -> int:
+    """Bytes at most in use while a file is solved."""
+    path = write(folder / f"{count}.csv", count)
+    gc.collect()
+    tracemalloc.start()
+    try:
+        assert solve_file(model, path, folder / "out.csv")[0] == count
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize("backend", ["interpreted", "compiled"])
+@pytest.mark.usefixtures("quick")
+def test_memory_does_not_grow(backend: str, tmp_path: Path) -> None:
+    model = Model(case(NAME).mechanism, backend=backend)
+    solve_file(model, write(tmp_path / "first.csv", CHUNK), tmp_path / "out.csv")
+    few, many = (peak(model, tmp_path, count) for count in (3 * CHUNK, 15 * CHUNK))
+    assert many < 1.5 * few
+
+
+def test_as_in_one_piece(model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write(tmp_path / "states.csv", 2 * CHUNK + 7)
+    solve_file(model, path, tmp_path / "pieces.csv")
+    monkeypatch.setattr(states, "CHUNK_ROWS", 65536)
+    solve_file(model, path, tmp_path / "whole.csv")
+    assert (tmp_path / "pieces.csv").read_bytes() == (tmp_path / "whole.csv").read_bytes()
+    assert names(tmp_path) == ["pieces.csv", "states.csv", "whole.csv"]
+
+
+STOPS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL]
+
+# Something wrong in row 733 of 900, which is line 734.
+LATE = {
+    "unreachable": ("0,3" + ",0" * 10, "row 733"),
+    "not a number": ("0,x" + ",0" * 10, 'line 734, column "Y": got "x"'),
+    "a hole": ("0,nan" + ",0" * 10, 'line 734, column "Y": got "nan"'),
+    "an empty cell": ("0," + ",0" * 10, 'line 734, column "Y": the cell is empty'),
+    "too few cells": ("0,0", "line 734: 2 cells, expected 12"),
+    "an empty line": ("", "line 734: is empty"),
+    "too large": ("0,0,0,0,1e200" + ",0" * 7, "row 733"),
+}
+
+
+@pytest.mark.parametrize("old", [None, "old"])
+@pytest.mark.parametrize("kind", LATE)
+def test_a_bad_row_late(model: Model, tmp_path: Path, kind: str, old: str | None) -> None:
+    """The error names it, counted from the top of the file; nothing is written."""
+    text, said = LATE[kind]
+    path = write(tmp_path / "states.csv", 900, row_733=text)
+    out = tmp_path / "out.csv"
+    if old:
+        out.write_text(old)
+    with pytest.raises(CondyleError) as failure:
+        solve_file(model, path, out)
+    assert said in str(failure.value)
+    assert names(tmp_path) == (["out.csv"] if old else []) + ["states.csv"]
+    assert not old or out.read_text() == old
+
+
+def test_bad_rows_late_that_are_kept(model: Model, tmp_path: Path) -> None:
+    path = write(tmp_path / "states.csv", 900, row_733=LATE["unreachable"][0])
+    assert solve_file(model, path, tmp_path / "out.csv", flag=True)[0] == 900
+    lines = (tmp_path / "out.csv").read_text().splitlines()
+    assert len(lines) == 901 and lines[733].endswith(",unreachable")
+    assert all(line.endswith(",ok") for i, line in enumerate(lines) if i not in (0, 733))
+
+
+def test_warnings_count_rows_of_the_file(model: Model, tmp_path: Path) -> None:
+    path = write(tmp_path / "states.csv", 900, row_733="0,0.004" + ",0" * 10)
+    _, warnings = solve_file(model, path, tmp_path / "out.csv")
+    assert any("in 1 rows" in text and "in row 733" in text for text in warnings)
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), MemoryError()])
+def test_interrupted(
+    model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException
+) -> None:
+    real, calls = states.solve_table, []
+
+    def stops(*arguments: Any) -> Any:
+        calls.append(names(tmp_path))
+        if len(calls) == 3:
+            raise error
+        return real(*arguments)
+
+    monkeypatch.setattr(states, "solve_table", stops)
+    path = write(tmp_path / "states.csv", 900)
+    (tmp_path / "out.csv").write_text("old")
+    with pytest.raises(type(error)):
+        solve_file(model, path, tmp_path / "out.csv")
+    assert len(calls[-1]) == 3  # the temporary file was there
+    assert names(tmp_path) == ["out.csv", "states.csv"]
+    assert (tmp_path / "out.csv").read_text() == "old"
+
+
+@pytest.mark.parametrize("number", STOPS)
+def test_stopped_from_outside(tmp_path: Path, number: signal.Signals) -> None:
+    """Amid a file that comes through a pipe: no half file, and the old one as it was."""
+    pipe, out = tmp_path / "states", tmp_path / "out.csv"
+    os.mkfifo(pipe)
+    out.write_text("old")
+    child = start(SOLVE, "--states", pipe, "--out", out, "--backend", "interpreted")
+    with open(pipe, "w") as file:
+        file.write(HEADER + "".join(rows(4 * CHUNK)))
+        file.flush()
+        wait_for(lambda: any(p.stat().st_size for p in tmp_path.glob(".out.csv*.part")), child)
+        end(child, number)
+    assert child.returncode != 0
+    assert out.read_text() == "old"
+    assert "Traceback" not in child.stderr.read()
+    if number != signal.SIGKILL:
+        assert names(tmp_path) == ["out.csv", "states"]
+
+
+def test_through_pipes(tmp_path: Path) -> None:
+    """In and out: a row as soon as its chunk is done, no file in between."""
+    pipe = tmp_path / "states"
+    os.mkfifo(pipe)
+    child = start(SOLVE, "--states", pipe, "--out", "/dev/stdout", "--backend", "interpreted", "-q")
+    seen = Event()
+
+    def feed() -> None:
+        with open(pipe, "w") as file:
+            file.write(HEADER + "".join(rows(4 * CHUNK)))
+            file.flush()
+            seen.wait(PATIENCE)
+
+    feeder = Thread(target=feed)
+    feeder.start()
+    assert child.stdout.readline().startswith("tau_")
+    assert feeder.is_alive()
+    seen.set()
+    assert child.stdout.read().count("\n") == 4 * CHUNK
+    feeder.join()
+    assert (child.wait(PATIENCE), child.stderr.read()) == (0, "")
+    assert names(tmp_path) == ["states"]
