@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import time
 from collections.abc import Callable, Iterator
 from io import BytesIO
 from pathlib import Path
@@ -79,6 +80,21 @@ class Tab:
 
         shot = self.page.locator(selector).first.screenshot()
         return np.asarray(Image.open(BytesIO(shot)).convert("RGB")).astype(int)
+
+    def changed_picture(self, selector: str, before: np.ndarray) -> np.ndarray:
+        """Pixels once they clearly differ from those before and have come to rest.
+
+        Raises: AssertionError: if they do not within the limit.
+        """
+        last = before
+        end = time.monotonic() + PATIENCE / 1000
+        while time.monotonic() < end:
+            now = self.picture(selector)
+            moved = now.shape != before.shape or np.abs(now - before).max() > 50
+            if moved and now.shape == last.shape and np.array_equal(now, last):
+                return now
+            last = now
+        raise AssertionError(f"{selector} still looks as it did")
 
     def wait(self, script: str, argument: Any = None) -> None:
         """Until a JavaScript function of `argument` returns true."""
