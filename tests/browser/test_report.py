@@ -99,7 +99,13 @@ def test_play_advances_time_and_pause_stops_it(tab: Tab) -> None:
     assert tab.page.inner_text("#play") == "Pause"
     tab.page.click("#play")
     stopped = index(tab)
-    tab.page.wait_for_timeout(300)
+    tab.page.evaluate(
+        """() => new Promise((done) => {
+            let pictures = 20;
+            const next = () => (pictures-- ? requestAnimationFrame(next) : done());
+            next();
+        })"""
+    )
     assert index(tab) == stopped
     tab.wait("(n) => Number(document.getElementById('stage').dataset.sample) === n", stopped)
     assert np.abs(tab.picture("#stage") - before).max() > 50, "the mechanism moved"

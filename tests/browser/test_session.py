@@ -218,6 +218,7 @@ def test_readout_escapes_names_and_writes_the_numbers(reference: condyle.Mechani
         assert "<b>jaw" not in text and "&lt;b&gt;jaw" in text
     assert number(-0.0001, 2) == "0.00" and number(np.nan, 2, "N") == "–"
     assert number(-1.5, 1, "N m") == "-1.5 N m"
+    assert number(-4078.78431, 4, "N") == "-4078.78 N" and number(298452.0, 4) == "298452"
 
 
 def test_turns_agree_with_each_other() -> None:
