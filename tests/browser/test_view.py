@@ -35,7 +35,6 @@ def ready(tab: Tab) -> Tab:
 
 
 HANDLE = (54, 142, 226)  # blue arrow of the drag control
-HOVERED = (255, 255, 64)
 
 
 def near(pixels: np.ndarray, colour: tuple[int, int, int]) -> np.ndarray:
@@ -55,6 +54,11 @@ def fill(tab: Tab, label: str, value: float) -> None:
 
 def is_red(pixels: np.ndarray) -> np.ndarray:
     return (pixels[..., 0] > 150) & (pixels[..., 1] < 110) & (pixels[..., 2] < 110)
+
+
+def is_yellow(pixels: np.ndarray) -> np.ndarray:
+    """As the drag control is where the mouse is over it."""
+    return (pixels[..., :2] > 200).all(axis=-1) & (pixels[..., 2] < 190)
 
 
 def row(tab: Tab, table: str, name: str) -> list[str]:
@@ -169,7 +173,7 @@ def test_dragging_the_platform_moves_it(tab: Tab, view: View) -> None:
     y, x = (int(v) for v in np.argwhere(blue)[0] + [top, left])  # the tip of the arrow
     mouse = tab.page.mouse
     mouse.move(x, y + 10)
-    tab.picture_where("canvas", lambda p: near(p, HOVERED).sum() > 20, "the arrow under the mouse")
+    tab.picture_where("canvas", lambda p: is_yellow(p).sum() > 20, "the arrow under the mouse")
     mouse.down()
     for step in range(1, 9):
         mouse.move(x, y + 10 + 5 * step)
