@@ -163,6 +163,11 @@ def test_playback_shows_the_solutions_numbers(chewing: Solution) -> None:
     assert np.allclose(balls, at["contact_point"].values, atol=1e-12)
 
 
+def test_speeds_of_one_unit_have_it_in_the_heading(chewing: Solution) -> None:
+    tables = tables_html(Playback(chewing).snapshot())
+    assert tables.count("rad/s") == 1
+
+
 def test_playback_runs_with_the_clock_and_stops_at_the_end(chewing: Solution) -> None:
     playback = Playback(chewing)
     assert not playback.advance(1.0), "it is not playing"

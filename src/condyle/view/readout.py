@@ -50,6 +50,7 @@ def _pose(s: Snapshot) -> str:
 
 def _chains(s: Snapshot) -> str:
     rows = []
+    units = {FAMILIES[chain.kind].joint_unit for chain in s.mechanism.chains}
     for i, chain in enumerate(s.mechanism.chains):
         family = FAMILIES[chain.kind]
         angle = family.joint_unit == "rad"
@@ -62,11 +63,12 @@ def _chains(s: Snapshot) -> str:
             "" if limit is None else number(100 * abs(s.torque[i]) / limit, 0, "%"),
         ]
         if s.rate is not None:
-            row.append(number(s.rate[i], 3, f"{family.joint_unit}/s"))
+            row.append(number(s.rate[i], 3, "" if len(units) == 1 else f"{family.joint_unit}/s"))
         if s.reach is not None:
             row.append(number(s.reach[i], 3))
         rows.append(row)
-    last = "speed" if s.reach is None else "reach"
+    speed = f"{units.pop()}/s" if len(units) == 1 else "speed"
+    last = speed if s.reach is None else "reach"
     return _table(["Chain", "joint", "effort", "of limit", last], rows, "chains")
 
 
