@@ -8,12 +8,16 @@ from __future__ import annotations
 
 import inspect
 import os
+import runpy
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 from types import UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
 os.environ.setdefault("MPLBACKEND", "agg")
 GENERATED = Path(__file__).parent / "generated"
+EXAMPLES = Path(__file__).parents[1] / "examples"
 FIGURES = ("motion", "path", "torque", "share", "contact_force", "contact_track", "singularity")
 PICTURES = ("mechanism", *FIGURES)
 PAGES = ("cli.md", "operations.md", "variables.md")  # pieces that pages take in
@@ -22,8 +26,16 @@ FILES = (*(f"{name}.png" for name in PICTURES), *PAGES, REPORT)
 
 
 def on_pre_build(config: Any) -> None:
-    """MkDocs calls this before it collects files."""
+    """MkDocs calls this before it collects files; an example that fails ends the build."""
+    run_examples()
     generate(GENERATED)
+
+
+def run_examples(folder: Path = EXAMPLES) -> None:
+    """Run every example of the repository; raises what one raises."""
+    for path in sorted(folder.glob("*.py")):
+        with redirect_stdout(StringIO()):
+            runpy.run_path(str(path), run_name="__main__")
 
 
 def generate(folder: Path) -> None:
@@ -41,7 +53,7 @@ def generate(folder: Path) -> None:
         PLOTS[name](solution).savefig(folder / f"{name}.png", dpi=110)
     draw_mechanism(condyle.load("masticatory")).savefig(folder / "mechanism.png", dpi=110)
     plt.close("all")
-    write_report(reference_solution(100.0), folder / REPORT)
+    write_report(reference_solution(100.0, reactions=True), folder / REPORT)
 
 
 def text_pages(folder: Path) -> None:
@@ -52,14 +64,14 @@ def text_pages(folder: Path) -> None:
         (folder / name).write_text(text, encoding="utf-8")
 
 
-def reference_solution(rate: float) -> Any:
+def reference_solution(rate: float, reactions: bool = False) -> Any:
     """The reference case at `rate` samples a second."""
     import condyle
     from condyle.motion import Motion, bundled_reference
 
     motion = Motion.from_csv(bundled_reference()[0], rate=rate)
     model = condyle.derive(condyle.load("masticatory"), backend="interpreted")
-    return model.solve(motion, condyle.reference_load())
+    return model.solve(motion, condyle.reference_load(), reactions=reactions)
 
 
 def variable_table(solution: Any) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import time
 from collections.abc import Callable, Iterator
 from io import BytesIO
 from pathlib import Path
@@ -30,7 +31,7 @@ OPTIONS = (
     "--disable-component-update",
     "--disable-sync",
 )
-PATIENCE = 60_000  # milliseconds; software rendering on a busy machine is slow
+PATIENCE = 120_000  # milliseconds; software rendering on a busy machine is slow
 
 
 def _missing(what: str) -> None:
@@ -79,6 +80,37 @@ class Tab:
 
         shot = self.page.locator(selector).first.screenshot()
         return np.asarray(Image.open(BytesIO(shot)).convert("RGB")).astype(int)
+
+    def picture_where(
+        self, selector: str, holds: Callable[[np.ndarray], bool], what: str
+    ) -> np.ndarray:
+        """Pixels of an element once `holds` is true of them and they have come to rest.
+
+        Raises: AssertionError: saying `what` was waited for, at the limit.
+        """
+        last = np.zeros((0, 0, 3), dtype=int)
+        end = time.monotonic() + PATIENCE / 1000
+        while time.monotonic() < end:
+            now = self.picture(selector)
+            if np.array_equal(now, last) and holds(now):
+                return now
+            last = now
+        raise AssertionError(f"{selector} never showed this: {what}")
+
+    def changed_picture(self, selector: str, before: np.ndarray) -> np.ndarray:
+        """Pixels once they clearly differ from those before and have come to rest."""
+        return self.picture_where(
+            selector,
+            lambda now: now.shape != before.shape or np.abs(now - before).max() > 50,
+            "a change",
+        )
+
+    def until(self, holds: Callable[[], bool], what: str) -> None:
+        """Until `holds`, which looks at this side of the connection."""
+        end = time.monotonic() + PATIENCE / 1000
+        while not holds():
+            assert time.monotonic() < end, f"never came true: {what}"
+            self.page.wait_for_timeout(20)  # lets the page go on
 
     def wait(self, script: str, argument: Any = None) -> None:
         """Until a JavaScript function of `argument` returns true."""

@@ -99,7 +99,13 @@ def test_play_advances_time_and_pause_stops_it(tab: Tab) -> None:
     assert tab.page.inner_text("#play") == "Pause"
     tab.page.click("#play")
     stopped = index(tab)
-    tab.page.wait_for_timeout(300)
+    tab.page.evaluate(
+        """() => new Promise((done) => {
+            let pictures = 20;
+            const next = () => (pictures-- ? requestAnimationFrame(next) : done());
+            next();
+        })"""
+    )
     assert index(tab) == stopped
     tab.wait("(n) => Number(document.getElementById('stage').dataset.sample) === n", stopped)
     assert np.abs(tab.picture("#stage") - before).max() > 50, "the mechanism moved"
@@ -206,18 +212,43 @@ def test_controls_have_names(tab: Tab) -> None:
     assert nameless == 0
 
 
+LOOK = """() => {
+    const { eye, center, projection } = document.getElementById('stage')._fullLayout.scene.camera;
+    return [...['x', 'y', 'z'].map((k) => eye[k] - center[k]), projection.type];
+}"""
+
+
 def test_camera_presets_look_from_their_sides(tab: Tab) -> None:
-    eye = "() => document.getElementById('stage')._fullLayout.scene.camera.eye"
     pictures = {}
-    for name, axis in (("Front", "x"), ("Side", "y"), ("Top", "z")):
+    for name, direction in (("Front", (1, 0, 0)), ("Side", (0, -1, 0)), ("Top", (0, 0, 1))):
+        before = tab.picture("#stage")
         tab.page.click(f"#cameras button:text-is('{name}')")
-        tab.wait(f"() => Math.abs(({eye})().{axis}) > 1")
-        found = tab.page.evaluate(eye)
-        assert [abs(found[k]) > 1 for k in "xyz"] == [k == axis for k in "xyz"]
-        tab.page.wait_for_timeout(300)
-        pictures[name] = tab.picture("#stage")
-        assert pictures[name].std() > 8
+        tab.wait(
+            f"(wanted) => ({LOOK})().slice(0, 3).every((v, k) => "
+            "Math.abs(v / 3 - wanted[k]) < 1e-6)",
+            list(direction),
+        )
+        assert tab.page.evaluate(LOOK)[3] == "orthographic"
+        pictures[name] = tab.changed_picture("#stage", before)
+        inner = pictures[name][3:-3, 3:-3]  # neighbours may share a row of pixels
+        drawn = np.abs(inner - inner[0, 0]).max(axis=-1) > 30
+        rows, columns = np.nonzero(drawn)
+        height, width = drawn.shape
+        fill = max(np.ptp(rows) / height, np.ptp(columns) / width)
+        assert fill > 0.7, "the mechanism fills the view"
+        for edge in (drawn[0], drawn[-1], drawn[:, 0], drawn[:, -1]):
+            assert not edge.any(), "nothing is cut off"
     assert np.abs(pictures["Front"] - pictures["Side"]).max() > 50
+
+
+def test_preset_fits_again_when_the_window_changes(tab: Tab) -> None:
+    tab.page.click("#cameras button:text-is('Top')")
+    ratio = "() => document.getElementById('stage')._fullLayout.scene.aspectratio.x"
+    tab.wait(f"() => ({LOOK})()[3] === 'orthographic'")
+    wide = tab.page.evaluate(ratio)
+    tab.page.set_viewport_size({"width": 390, "height": 844})
+    tab.wait(f"(before) => Math.abs(({ratio})() - before) > 0.01", wide)
+    assert tab.page.locator("#cameras button[aria-pressed=true]").all_inner_texts() == ["Top"]
 
 
 def test_zooming_one_plot_zooms_all(tab: Tab) -> None:

@@ -163,6 +163,11 @@ def test_playback_shows_the_solutions_numbers(chewing: Solution) -> None:
     assert np.allclose(balls, at["contact_point"].values, atol=1e-12)
 
 
+def test_speeds_of_one_unit_have_it_in_the_heading(chewing: Solution) -> None:
+    tables = tables_html(Playback(chewing).snapshot())
+    assert tables.count("rad/s") == 1
+
+
 def test_playback_runs_with_the_clock_and_stops_at_the_end(chewing: Solution) -> None:
     playback = Playback(chewing)
     assert not playback.advance(1.0), "it is not playing"
@@ -218,6 +223,7 @@ def test_readout_escapes_names_and_writes_the_numbers(reference: condyle.Mechani
         assert "<b>jaw" not in text and "&lt;b&gt;jaw" in text
     assert number(-0.0001, 2) == "0.00" and number(np.nan, 2, "N") == "–"
     assert number(-1.5, 1, "N m") == "-1.5 N m"
+    assert number(-4078.78431, 4, "N") == "-4078.78 N" and number(298452.0, 4) == "298452"
 
 
 def test_turns_agree_with_each_other() -> None:

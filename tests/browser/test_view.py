@@ -29,8 +29,17 @@ def tab(open_tab: Callable[..., Tab], view: View) -> Tab:
 
 def ready(tab: Tab) -> Tab:
     tab.page.wait_for_selector("[data-level]")
-    tab.page.wait_for_timeout(1500)  # the scene's meshes arrive after the panel
+    # The scene's meshes arrive after the panel, and the blue arrow of the handle last.
+    tab.picture_where("canvas", lambda pixels: near(pixels, HANDLE).sum() > 20, "the handle")
     return tab
+
+
+HANDLE = (54, 142, 226)  # blue arrow of the drag control
+
+
+def near(pixels: np.ndarray, colour: tuple[int, int, int]) -> np.ndarray:
+    """Which pixels have nearly that colour."""
+    return np.abs(pixels - colour).max(axis=-1) < 25
 
 
 def fill(tab: Tab, label: str, value: float) -> None:
@@ -41,6 +50,15 @@ def fill(tab: Tab, label: str, value: float) -> None:
     )
     field.fill(str(value))
     field.press("Enter")
+
+
+def is_red(pixels: np.ndarray) -> np.ndarray:
+    return (pixels[..., 0] > 150) & (pixels[..., 1] < 110) & (pixels[..., 2] < 110)
+
+
+def is_yellow(pixels: np.ndarray) -> np.ndarray:
+    """As the drag control is where the mouse is over it."""
+    return (pixels[..., :2] > 200).all(axis=-1) & (pixels[..., 2] < 190)
 
 
 def row(tab: Tab, table: str, name: str) -> list[str]:
@@ -76,8 +94,7 @@ def test_a_slider_moves_the_mechanism_and_the_numbers(tab: Tab, view: View) -> N
     assert at.pose[4] == pytest.approx(np.radians(8))
     assert after[1] == f"{np.degrees(at.joint[2]):.2f} °"
     assert after[2] == f"{at.torque[2]:.4f} N m"
-    tab.page.wait_for_timeout(1000)
-    assert np.abs(tab.picture("canvas") - picture).max() > 50, "the mechanism moved"
+    tab.changed_picture("canvas", picture)
 
 
 def test_a_load_changes_efforts_and_contact_forces(tab: Tab, view: View) -> None:
@@ -98,10 +115,7 @@ def test_poses_out_of_bounds_and_out_of_reach_say_so_and_the_page_lives(
     told = wait_for_level(tab, "unreachable")
     assert 'chain "temporalis_left" cannot reach M' in told
     assert row(tab, "chains", "temporalis_left")[2] == "–"
-    tab.page.wait_for_timeout(1000)
-    pixels = tab.picture("canvas")
-    red = (pixels[..., 0] > 150) & (pixels[..., 1] < 110) & (pixels[..., 2] < 110)
-    assert red.sum() > 2000, "the platform is drawn in red"
+    tab.picture_where("canvas", lambda p: is_red(p).sum() > 2000, "the platform in red")
     tab.page.get_by_role("button", name="Go home").click()
     wait_for_level(tab, "calm")
     assert row(tab, "chains", "temporalis_left")[2] == "0.0145 N m"
@@ -155,19 +169,21 @@ def test_files_open_and_bad_ones_are_refused(tab: Tab, view: View, tmp_path: Pat
 def test_dragging_the_platform_moves_it(tab: Tab, view: View) -> None:
     """Pulled down by the blue arrow, the jaw opens: Z is no independent coordinate here."""
     top, left = 420, 440  # the middle of the scene, without the blue rods
-    pixels = tab.picture("canvas")[top:620, left:560]
-    blue = np.abs(pixels - [54, 142, 226]).max(axis=-1) < 12
+    blue = near(tab.picture("canvas")[top:620, left:560], HANDLE)
     y, x = (int(v) for v in np.argwhere(blue)[0] + [top, left])  # the tip of the arrow
     mouse = tab.page.mouse
     mouse.move(x, y + 10)
-    tab.page.wait_for_timeout(400)
+    tab.picture_where("canvas", lambda p: is_yellow(p).sum() > 20, "the arrow under the mouse")
     mouse.down()
     for step in range(1, 9):
         mouse.move(x, y + 10 + 5 * step)
-        tab.page.wait_for_timeout(100)
+        # A step of the hand is seen by the page before the next one.
+        tab.page.evaluate("() => new Promise((done) => requestAnimationFrame(done))")
+    tab.until(lambda: view.snapshot.pose[2] < -0.001, "the platform follows the hand")
+    assert view.dragging
     mouse.up()
+    tab.until(lambda: not view.dragging, "the hand lets go")
     tab.wait("() => Number(document.querySelectorAll('[data-table=pose] td')[3].textContent) < -1")
-    assert not view.dragging and view.snapshot.pose[2] < -0.001
 
 
 def test_the_page_is_for_this_machine_only(view: View) -> None:

@@ -233,3 +233,6 @@ def test_compare_in_short(condyle_command: Callable[..., Any]) -> None:
     for text in ("lagrange direct", "Table 1", "101 samples", "Table 2"):
         assert text in outcome.out
     assert {path.suffix for path in Path("compared").iterdir()} >= {".csv"}
+    assert condyle_command("report", "compared/masticatory-compare.nc").status == 0
+    page = Path("compared/masticatory-compare.html").read_text(encoding="utf-8")
+    assert "Table 1. Computational time" in page and "Table 2. Mean norm" in page

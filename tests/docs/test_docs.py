@@ -231,6 +231,21 @@ def test_names_of_code_exist(page: Path) -> None:
         assert exists(name), f"{name} does not exist"
 
 
+def test_everything_public_is_in_the_reference() -> None:
+    text = (DOCS / "reference" / "api.md").read_text(encoding="utf-8")
+    described = set(re.findall(r"^::: condyle\.[\w.]*?(\w+)$", text, re.MULTILINE))
+    assert set(condyle.__all__) - {"__version__"} <= described
+    assert {"Torques", "ForwardKinematics", "Posture", "write_report", "open_view"} <= described
+
+
+def test_example_that_fails_ends_the_build(hooks: ModuleType, tmp_path: Path) -> None:
+    (tmp_path / "good.py").write_text("assert __name__ == '__main__'")
+    hooks.run_examples(tmp_path)
+    (tmp_path / "wrong.py").write_text("assert 1 == 2")
+    with pytest.raises(AssertionError):
+        hooks.run_examples(tmp_path)
+
+
 def exists(name: str) -> bool:
     """Whether a dotted name leads to a module, class, function, method or field."""
     parts = name.split(".")

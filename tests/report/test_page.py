@@ -22,7 +22,7 @@ from condyle.report.page.columns import BUDGET, Columns
 from condyle.report.page.html import fill, json_for_script, tag
 from condyle.report.page.panels import reaction_magnitudes
 from condyle.report.scene import DARK, LIGHT, styles
-from condyle.report.tables import Table
+from condyle.report.tables import Table, kept_tables, with_tables
 from condyle.solution import Solution
 
 ATTACK = "</script><img src=x onerror=alert(1)>{{style}}"
@@ -183,6 +183,31 @@ def test_what_was_run_is_named_with_hashes(solution: Solution, tmp_path: Path) -
     assert solution.attrs["mechanism"] in text
 
 
+def test_files_are_named_with_the_hashes_of_what_was_read(
+    reference: condyle.Mechanism, tmp_path: Path
+) -> None:
+    """Without being named again; a copy that is stands there once."""
+    motion, load = bundled_reference()
+    contents = [Path(file).read_bytes() for file in (motion, load)]
+    hashes = [hashlib.sha256(content).hexdigest() for content in contents]
+    solution = condyle.derive(reference).solve(
+        Motion.from_csv(motion, rate=10), condyle.Load.from_csv(load)
+    )
+    text = Elements(report_html(solution)).text
+    assert all(text.count(found) == 1 for found in hashes)
+    assert "sha256" not in text, "a hash is no option"
+    copy = tmp_path / "copy.csv"
+    copy.write_bytes(contents[0])
+    text = Elements(report_html(solution, files=[copy])).text
+    assert text.count(hashes[0]) == 1 and str(copy) not in text
+
+
+def test_heading_names_files_without_their_folders(page: str, solution: Solution) -> None:
+    heading = Elements(page).text.split("Mechanism")[0]
+    assert "motion: chewing-incisor.csv; load: " in heading
+    assert str(Path(solution.options["motion"]).parent) not in heading
+
+
 def test_a_missing_file_leaves_no_page(solution: Solution, tmp_path: Path) -> None:
     out = tmp_path / "report.html"
     out.write_text("before")
@@ -203,11 +228,68 @@ def test_tables_and_reactions_stand_on_the_page(solution: Solution) -> None:
     page = report_html(added, tables=[table])
     text = Elements(page).text
     assert "Table 1. Seconds" in text and "GM1 <a>" in text and "n=5" in text
-    assert "Largest reactions" in text and "7 N" in text
+    assert "Largest force at the ball joints" in text and "7 N" in text
     panel = next(p for p in payload(page)["panels"] if p["id"] == "reaction_ball")
     assert len(panel["sets"][0]["lines"]) == 6
     magnitudes = reaction_magnitudes(added, "reaction_ball")[""]
     assert np.allclose(magnitudes["masseter_left"], 7.0)
+
+
+def test_solution_keeps_its_tables_for_any_later_page(solution: Solution, tmp_path: Path) -> None:
+    table = Table("table-1", "Table 1. Time", ("Model", "s"), [["GM1", "1.5"]], [{"s": 1}], ["n=5"])
+    keeping = with_tables(solution, [table])
+    assert "tables" not in solution.attrs, "a copy keeps them"
+    keeping.save(tmp_path / "kept.nc")
+    again = condyle.open_solution(tmp_path / "kept.nc")
+    assert kept_tables(again)[0].markdown() == table.markdown()
+    assert "Table 1. Time" in Elements(report_html(again)).text
+    assert "Table 1. Time" not in Elements(report_html(again, tables=[])).text
+    assert kept_tables(solution) == []
+
+
+def test_small_contact_forces_have_arrows_of_a_scale_of_their_own(page: str) -> None:
+    drawn = payload(page)["machine"]
+    lengths = {k: s["largest"] * s["metresPerNewton"] for k, s in drawn["scales"].items()}
+    assert lengths["contact"] == pytest.approx(lengths["load"])
+    assert drawn["scales"]["contact"]["largest"] < 0.2 * drawn["scales"]["load"]["largest"]
+    assert [arrow["into"] for arrow in drawn["arrows"]] == [True, True, False]
+
+
+def test_forces_of_one_size_share_a_scale(reference: condyle.Mechanism) -> None:
+    t = np.linspace(0, 1, 11)
+    still = Motion.from_arrays(t, {n: 0 * t for n in ("X", "Y", "alpha", "beta")})
+    push = condyle.Load.constant([0, 0, -20], point="incisor")
+    solved = condyle.derive(reference).solve(still, push)
+    scales = payload(report_html(solved))["machine"]["scales"]
+    assert scales["contact"]["metresPerNewton"] == scales["load"]["metresPerNewton"]
+
+
+def test_camera_sees_every_end_of_the_mechanism(page: str, solution: Solution) -> None:
+    drawn = payload(page)["machine"]
+    seen = np.array(drawn["extent"])
+    low, high = np.array(drawn["range"]).T
+    assert ((seen >= low - 1e-12) & (seen <= high + 1e-12)).all()
+    balls = solution["contact_point"].values.reshape(-1, 3)
+    for direction in itertools.product((-1, 0, 1), repeat=3):
+        assert (balls @ direction).max() <= (seen @ direction).max() + 1e-12
+    assert drawn["triad"]["arm"] == 0.02
+
+
+def test_moment_of_the_load_is_plotted(reference: condyle.Mechanism) -> None:
+    t = np.linspace(0, 1, 11)
+    still = Motion.from_arrays(t, {n: 0 * t for n in ("X", "Y", "alpha", "beta")})
+    twist = condyle.Load.constant([0, 0, 0], [0, 0.1, 0], point="incisor")
+    data = payload(report_html(condyle.derive(reference).solve(still, twist)))
+    assert "load" not in {panel["id"] for panel in data["panels"]}
+    moment = next(panel for panel in data["panels"] if panel["id"] == "moment")
+    assert moment["unit"] == "N m" and [n["label"] for n in moment["sets"][0]["lines"]][1] == "My"
+
+
+def test_surface_that_cannot_be_drawn_is_named(
+    solution: Solution, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("condyle.report.page.machine._surfaces", lambda *_: iter(()))
+    assert payload(report_html(solution))["machine"]["undrawn"] == ["left_condyle", "right_condyle"]
 
 
 @pytest.mark.parametrize("name", ["gough-stewart", "hexaglide"])
@@ -282,6 +364,8 @@ def test_colours_can_be_told_apart(palette: tuple[str, ...], ground: str, vision
 def test_styles_pair_left_and_right_and_never_repeat() -> None:
     pairs = styles(["jaw_left", "jaw_right", "lid_left", "lid_right"])
     assert [s.colour for s in pairs] == [0, 0, 1, 1]
+    alone = styles(["left_condyle", "right_condyle"])
+    assert [(s.colour, s.dash) for s in alone] == [(0, "solid"), (1, "dash")]
     assert pairs[0].dash == pairs[2].dash != pairs[1].dash
     many = styles([f"leg_{i}" for i in range(20)])
     assert len({(s.colour, s.dash) for s in many}) == 20

@@ -33,13 +33,16 @@ def compare(
     import condyle
 
     from ..analysis.compare import compare as compare_models
-    from ..report.tables import save_tables, tables
+    from ..report.tables import save_tables, tables, with_tables
 
     machine = condyle.load(mechanism)
     path, acting = motion_and_load(motion, load, units, landmark, smooth, rate)
     comparison = compare_models(machine, path, acting, load_point)
     output_folder(out)
     files = save_tables(comparison, out)
+    solution = with_tables(comparison.solution, tables(comparison))
+    files.append(out / f"{file_stem(machine.name)}-compare.nc")
+    solution.save(files[-1])
     if figures:
         from ..report.figures import save_figures
 
@@ -49,8 +52,6 @@ def compare(
 
         inputs = [file for file in (motion, load) if file is not None]
         page = out / f"{file_stem(machine.name)}.html"
-        files.append(
-            write_report(comparison.solution, page, tables=tables(comparison), files=inputs)
-        )
+        files.append(write_report(solution, page, files=inputs))
     say(quiet, str(comparison))
     say(quiet, "\nResults: " + ", ".join(str(f) for f in files))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from condyle.errors import InputError
 from condyle.motion.arrays import as_samples, check_rising
+from condyle.motion.digest import digest
 from condyle.motion.table import read_table
 
 FORCE = ("Fx", "Fy", "Fz")
@@ -26,12 +27,14 @@ class Load:
                 wrench: Fx, Fy, Fz, Mx, My, Mz, (N, 6), [N, N m]; (1, 6) if it does not change.
                 point: name of the platform point; None leaves the choice to the mechanism.
                 source: where the load came from, for messages.
+                sha256: hash of the file that was read, or None.
     """
 
     t: np.ndarray
     wrench: np.ndarray
     point: str | None = None
     source: str = "load"
+    sha256: str | None = None
 
     @classmethod
     def from_csv(cls, path: str | os.PathLike[str], point: str | None = None) -> Load:
@@ -41,7 +44,8 @@ class Load:
         force = table.require(FORCE)
         moment = table.require(MOMENT) if set(MOMENT) & set(table.columns) else None
         check_rising(t, table.where)
-        return cls.from_arrays(t, force, moment, point, table.source)
+        load = cls.from_arrays(t, force, moment, point, table.source)
+        return replace(load, sha256=digest(path))
 
     @classmethod
     def from_arrays(

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from condyle.errors import InputError
 from condyle.motion.arrays import as_samples, check_rising
+from condyle.motion.digest import digest
 from condyle.motion.smoothing import Smoothing, parse_cutoff, smoothing_spline
 from condyle.motion.table import read_table
 from condyle.motion.units import LANDMARK, POSE, Units, parse_units
@@ -44,6 +45,7 @@ class Motion:
         value, rate, acceleration: (N, m), [m, rad], [m/s, rad/s], [m/s^2, rad/s^2].
         source: where the samples came from, for messages.
         smoothing: what was smoothed away, or None.
+        sha256: hash of the file that was read, or None.
     """
 
     kind: Kind
@@ -55,6 +57,7 @@ class Motion:
     acceleration: np.ndarray
     source: str
     smoothing: Smoothing | None = None
+    sha256: str | None = None
 
     def __len__(self) -> int:
         return len(self.t)
@@ -75,7 +78,7 @@ class Motion:
         t = table.require(["t"])[:, 0]
         values = {name: column for name, column in table.columns.items() if name != "t"}
         check_rising(t, table.where)
-        return cls.from_arrays(
+        motion = cls.from_arrays(
             t,
             values,
             units=units,
@@ -85,6 +88,7 @@ class Motion:
             times=times,
             source=table.source,
         )
+        return replace(motion, sha256=digest(path))
 
     @classmethod
     def from_arrays(

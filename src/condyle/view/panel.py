@@ -76,14 +76,14 @@ class Panel:
             self._sliders[c.name] = slider
         self._known = session.q.copy()
         self._press("Go home", self.go_home)
-        show = self._gui.add_checkbox("Drag the platform in the scene", True)
+        show = self._gui.add_checkbox("Handle to drag", True)
         control = self._view.stage.control
         self._hear("control", show, lambda on: setattr(control, "visible", on))
 
     def _add_load(self) -> None:
         mechanism = self._view.session.mechanism
         weight = mechanism.platform.mass * float(np.linalg.norm(mechanism.gravity))
-        most = float(np.ceil(max(WEIGHTS * weight, LEAST_LOAD)))
+        most = round_outwards(0.0, max(WEIGHTS * weight, LEAST_LOAD))[1]
         session = self._view.session
         with self._gui.add_folder("Load on the platform"):
             for axis, name in enumerate(("Fx", "Fy", "Fz")):

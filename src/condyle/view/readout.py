@@ -13,7 +13,8 @@ from .snapshot import Snapshot
 
 COLOURS = {"calm": "#2b8a3e", "warning": "#b35c00", "unreachable": "#c92a2a"}
 SIGNS = {"calm": "✓", "warning": "⚠", "unreachable": "✕"}
-_CELL = "padding:1px 6px;text-align:right;font-variant-numeric:tabular-nums"
+_CELL = "padding:1px 5px;text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums"
+DIGITS = 6  # most significant digits
 _HEAD = "opacity:.65;font-weight:400"
 _NAME = "padding:1px 6px 1px 0;text-align:left;font-weight:500;white-space:nowrap"
 
@@ -49,6 +50,7 @@ def _pose(s: Snapshot) -> str:
 
 def _chains(s: Snapshot) -> str:
     rows = []
+    units = {FAMILIES[chain.kind].joint_unit for chain in s.mechanism.chains}
     for i, chain in enumerate(s.mechanism.chains):
         family = FAMILIES[chain.kind]
         angle = family.joint_unit == "rad"
@@ -61,11 +63,12 @@ def _chains(s: Snapshot) -> str:
             "" if limit is None else number(100 * abs(s.torque[i]) / limit, 0, "%"),
         ]
         if s.rate is not None:
-            row.append(number(s.rate[i], 3, f"{family.joint_unit}/s"))
+            row.append(number(s.rate[i], 3, "" if len(units) == 1 else f"{family.joint_unit}/s"))
         if s.reach is not None:
             row.append(number(s.reach[i], 3))
         rows.append(row)
-    last = "speed" if s.reach is None else "reach"
+    speed = f"{units.pop()}/s" if len(units) == 1 else "speed"
+    last = speed if s.reach is None else "reach"
     return _table(["Chain", "joint", "effort", "of limit", last], rows, "chains")
 
 
@@ -85,9 +88,10 @@ def _singularity(s: Snapshot) -> str:
 
 
 def number(value: float, decimals: int, unit: str = "") -> str:
-    """A number with its unit, or a dash where there is none."""
+    """A number with its unit, or a dash where there is none; large ones have fewer decimals."""
     if not np.isfinite(value):
         return "–"
+    decimals = min(decimals, max(DIGITS - 1 - int(np.log10(max(abs(value), 1.0))), 0))
     text = f"{value:.{decimals}f}"
     return f"{text if float(text) else text.replace('-', '')} {unit}".rstrip()
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from ..mechanism import Mechanism
+from ..mechanism import Contact, Mechanism
 from ..report.scene import LIGHT, Rod, contact_patch, place, platform_hull, styles
 from .shapes import bryant_angles, matrix, quaternion, turn_onto, unit_rod
 from .snapshot import Snapshot
@@ -15,8 +15,8 @@ from .snapshot import Snapshot
 RGB = tuple[int, int, int]
 
 EXTENT = 3.0  # scene units across the mechanism
-ARROW = EXTENT / 3  # of the largest force,
-LEAST_WEIGHTS = 5  # unless it is less than this many weights of the platform
+ARROW = EXTENT / 3  # of the largest load or contact force,
+LEAST_WEIGHTS = {"load": 5.0, "contact": 0.5}  # unless less than so many weights of the platform
 AMBIENT = 2.0
 NEUTRAL: RGB = (125, 136, 148)
 PLATFORM: RGB = (176, 190, 205)
@@ -25,7 +25,6 @@ BALL: RGB = (194, 24, 91)
 ALARM: RGB = (201, 42, 42)
 WARNING: RGB = (224, 160, 74)
 LOAD: RGB = (70, 80, 92)
-PUSH: RGB = (116, 95, 138)
 BODY = {"calm": PLATFORM, "warning": WARNING, "unreachable": ALARM}
 VIEWS = {
     "Front": ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
@@ -55,7 +54,8 @@ class Stage:
         self.centre = self.scale * (low + high) / 2
         self._radius = 0.017
         weight = mechanism.platform.mass * float(np.linalg.norm(mechanism.gravity))
-        self.largest_force = LEAST_WEIGHTS * weight or 1.0  # [N], of the longest arrow
+        # Force of the longest arrow of each kind [N].
+        self.largest_force = {kind: n * weight or 1.0 for kind, n in LEAST_WEIGHTS.items()}
         self._rods: dict[tuple[str, str], Any] = {}
         self._drawings = home.chains
         self._add_static(home)
@@ -80,7 +80,7 @@ class Stage:
 
     def _arrow_kinds(self) -> list[tuple[str, RGB, int]]:
         count = len(self.mechanism.contacts)
-        return [("load", LOAD, 1)] + ([("contact", PUSH, count)] if count else [])
+        return [("load", LOAD, 1)] + ([("contact", BALL, count)] if count else [])
 
     def _add_static(self, home: Any) -> None:
         """Lights and contact surfaces."""
@@ -124,7 +124,7 @@ class Stage:
             "/ghost/body", self.scale * vertices, faces, color=ALARM, wireframe=True
         )
         for i, contact in enumerate(self.mechanism.contacts):
-            radius = self.scale * contact.ball_radius if contact.ball_radius else 3.5 * self._radius
+            radius = self._ball_radius(contact)
             at = self.scale * np.asarray(contact.point)
             self._scene.add_icosphere(f"/platform/ball{i}", radius, BALL, position=at)
             self._scene.add_label(f"/platform/ball{i}/name", contact.name)
@@ -132,6 +132,10 @@ class Stage:
             at = self.scale * np.asarray(point)
             self._scene.add_icosphere(f"/platform/landmark{i}", self._radius, LOAD, position=at)
             self._scene.add_label(f"/platform/landmark{i}/name", name)
+
+    def _ball_radius(self, contact: Contact) -> float:
+        """In scene units: its own, where the file gives one."""
+        return self.scale * contact.ball_radius if contact.ball_radius else 3.5 * self._radius
 
     def _add_chains(self) -> None:
         vertices, faces = unit_rod()
@@ -189,20 +193,23 @@ class Stage:
         handle.color = ALARM if broken and rod.moving else self._colours[chain, rod.body]
 
     def _show_forces(self, snapshot: Snapshot) -> None:
-        load = snapshot.load[None]
-        forces = {"load": (load, self.scale * snapshot.scene.on_platform(tuple(snapshot.load_at)))}
+        """A load leaves its point; a contact force points at the skin of the ball it pushes."""
+        load_at = self.scale * snapshot.scene.on_platform(tuple(snapshot.load_at))
+        forces = {"load": (snapshot.load[None], load_at)}
         if "contact" in self._arrows:
             balls = [snapshot.scene.contacts[c.name][0] for c in self.mechanism.contacts]
             forces["contact"] = snapshot.force_vector, self.scale * np.array(balls)
-        sizes = [np.linalg.norm(force, axis=1) for force, _ in forces.values()]
-        here = float(np.nan_to_num(np.concatenate(sizes)).max(initial=0.0))
-        per_newton = ARROW / max(here, self.largest_force)
+        radii = np.array([[self._ball_radius(c)] for c in self.mechanism.contacts])
         for name, (force, at) in forces.items():
             handle = self._arrows[name]
             handle.visible = bool(np.isfinite(force).all()) and bool(force.any())
-            if handle.visible:
-                tips = at + force * per_newton
-                handle.points = np.stack([at, tips], axis=1).astype(np.float32)
+            if not handle.visible:
+                continue
+            size = np.linalg.norm(force, axis=1, keepdims=True)
+            arrow = force * ARROW / max(float(size.max()), self.largest_force[name])
+            if name == "contact":
+                at = at - arrow - radii * force / np.maximum(size, 1e-300)
+            handle.points = np.stack([at, at + arrow], axis=1).astype(np.float32)
 
     def show_paths(self, paths: list[np.ndarray]) -> None:
         """Draw the paths (N, 3) [m] of a solution, in place of those before."""

@@ -20,6 +20,12 @@ if TYPE_CHECKING:
     from ..tables import Table
 
 
+_WORDS = {
+    "characteristic_length": "characteristic length [m]",
+    "contact_residual_of_given_pose": "contact residual of the given pose [m]",
+}
+
+
 @dataclass(frozen=True)
 class Fact:
     """A number worth knowing at once: what, how much, and where."""
@@ -141,22 +147,24 @@ def _peak_cells(
     return [f"{value:.4g} {unit}", f"{solution['time'].values[sample]:g} s", use]
 
 
-def reaction_table(solution: Solution) -> Markup:
-    """Largest magnitude of every reaction."""
-    rows = []
+def reaction_tables(solution: Solution) -> Markup:
+    """Largest magnitude of every reaction: a table for each kind, a row for each joint."""
+    found = []
     time = solution["time"].values
     for name in reaction_variables(solution):
         unit = solution[name].attrs.get("units", "")
         title = str(solution[name].attrs.get("long_name", name))
+        rows = []
         for group, lines in reaction_magnitudes(solution, name).items():
             for label, values in lines.items():
                 if np.isfinite(values).any():
                     k = int(np.nanargmax(values))
                     what = f"{group} {label}".strip()
-                    rows.append([what, title, f"{values[k]:.4g} {unit}", f"{time[k]:g} s"])
-    if not rows:
-        return Markup("")
-    return table(["Where", "Reaction", "Largest", "at"], rows, "Largest reactions")
+                    rows.append([what, f"{values[k]:.4g} {unit}", f"{time[k]:g} s"])
+        if rows:
+            caption = f"Largest {title[:1].lower() + title[1:]}"
+            found.append(table(["Where", "Largest", "at"], rows, caption))
+    return tag("div", *found, class_="grid tables") if found else Markup("")
 
 
 def given_tables(tables: Sequence[Table]) -> Markup:
@@ -168,36 +176,40 @@ def given_tables(tables: Sequence[Table]) -> Markup:
 def provenance(solution: Solution, files: Sequence[Path]) -> Markup:
     """What was run: options, files and their hashes, version, and the mechanism itself."""
     text = solution.attrs["mechanism"]
-    listed = [
-        ["mechanism as solved (below)", len(text.encode()), _sha256(text.encode())],
-        *(_file_row(Path(file)) for file in files),
+    chosen = solution.options
+    listed = [["mechanism as solved (below)", hashlib.sha256(text.encode()).hexdigest()]]
+    listed += [
+        [str(chosen[name]), chosen[f"{name}_sha256"]]
+        for name in ("motion", "load")
+        if chosen.get(f"{name}_sha256")
     ]
-    options = [[_words(key), _said(value)] for key, value in solution.options.items()]
+    known = {row[1] for row in listed}
+    listed += [row for file in files if (row := _file_row(Path(file)))[1] not in known]
+    rows = [[name, tag("code", digest)] for name, digest in listed]
+    options = [
+        [_words(key), _said(value)] for key, value in chosen.items() if not key.endswith("_sha256")
+    ]
     return tag(
         "section",
         tag("h2", "What was run"),
         tag("p", f"{solution.attrs.get('title', '')}, by {solution.attrs.get('source', '')}."),
         table(["Option", "Value"], options, "Options"),
-        table(["File", "Bytes", "SHA-256"], listed, "Files"),
+        table(["File", "SHA-256"], rows, "Files"),
         tag("details", tag("summary", "The mechanism, in SI (TOML)"), tag("pre", text)),
         id="run",
     )
 
 
-def _file_row(path: Path) -> list[Any]:
+def _file_row(path: Path) -> list[str]:
     try:
         content = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
-    return [str(path), len(content), _sha256(content)]
-
-
-def _sha256(content: bytes) -> Markup:
-    return tag("code", hashlib.sha256(content).hexdigest())
+    return [str(path), hashlib.sha256(content).hexdigest()]
 
 
 def _words(key: str) -> str:
-    return key.replace("_", " ").replace(" seconds", " time [s]")
+    return _WORDS.get(key) or key.replace("_", " ").replace(" seconds", " time [s]")
 
 
 def _said(value: Any) -> str:

@@ -6,8 +6,9 @@ A point is one of {"fixed": [x, y, z]} in {S}, {"platform": [x, y, z]} in {M}, o
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 
 SIZE = 0.26  # the size that radii and arrows are stated in, over the diagonal of everything
 ARROW = 0.9  # longest arrow
+ONE_SCALE = 0.4  # of loads and contact forces, if the smaller ones are at least this part
+TRIAD = 0.4  # arms of the coordinate triad, before they are rounded
+ROUND = (1.0, 2.0, 5.0, 10.0)
 
 
 def machine(solution: Solution, columns: Columns) -> dict[str, Any]:
@@ -33,9 +37,12 @@ def machine(solution: Solution, columns: Columns) -> dict[str, Any]:
     size = SIZE * float(np.linalg.norm(np.nanmax(cloud, axis=0) - np.nanmin(cloud, axis=0)))
     rods, joints = _chains(mechanism, scene, columns)
     arrows = [*_contact_arrows(solution, scene, columns, size), *_load_arrow(solution, columns)]
-    largest = max((arrow.largest for arrow in arrows), default=0.0)
-    scale = ARROW * size / largest if largest else 0.0
-    tips = [scene.on_platform(arrow.at) + scale * arrow.force for arrow in arrows]
+    scales = _scales(arrows, size)
+    ends = [a.far_end(scene.on_platform(a.at), scales[a.kind]["metresPerNewton"]) for a in arrows]
+    low, high = _box(np.vstack([cloud, *ends]), size)
+    arm = _rounded(TRIAD * size)
+    triad = low + arm * np.vstack([np.zeros(3), np.eye(3)])
+    surfaces = list(_surfaces(mechanism, scene, size))
     return {
         "size": size,
         "pose": [
@@ -53,12 +60,14 @@ def machine(solution: Solution, columns: Columns) -> dict[str, Any]:
             {"name": name, "at": {"platform": list(point)}}
             for name, point in mechanism.platform.points.items()
         ],
-        "surfaces": list(_surfaces(mechanism, scene, size)),
+        "surfaces": surfaces,
+        "undrawn": _undrawn(mechanism, surfaces),
         "arrows": [arrow.description for arrow in arrows],
-        "metresPerNewton": scale,
-        "largestForce": largest,
+        "scales": {kind: scale for kind, scale in scales.items() if scale["largest"]},
         "traces": list(_traces(solution)),
-        "range": _range(np.vstack([cloud, *tips]), size),
+        "range": [[float(a), float(b)] for a, b in zip(low, high, strict=True)],
+        "triad": {"origin": low.tolist(), "arm": arm},
+        "extent": _extremes(np.vstack([cloud, *ends, triad])).tolist(),
     }
 
 
@@ -110,14 +119,23 @@ def _surfaces(mechanism: Mechanism, scene: Scene, size: float) -> Iterator[dict[
         }
 
 
+def _undrawn(mechanism: Mechanism, surfaces: Sequence[dict[str, Any]]) -> list[str]:
+    """Contacts of whose surface there is nothing to draw."""
+    drawn = {surface["name"] for surface in surfaces if surface["faces"]}
+    return [name for name in mechanism.contact_names if name not in drawn]
+
+
 @dataclass(frozen=True)
 class Arrow:
-    """A force, (N, 3) [N] in {S}, at a point of the platform; `start`: how far off it begins."""
+    """A force, (N, 3) [N] in {S}, at a point of the platform; `gap`: how far off the arrow ends.
+
+    A load leaves its point; a contact force points at the ball that it pushes.
+    """
 
     kind: str
     at: tuple[float, ...]
     force: np.ndarray
-    start: float
+    gap: float
     columns: list[int]
 
     @property
@@ -126,9 +144,42 @@ class Arrow:
         return float(size[np.isfinite(size)].max(initial=0.0))
 
     @property
+    def into(self) -> bool:
+        return self.kind == "contact"
+
+    def far_end(self, at: np.ndarray, scale: float) -> np.ndarray:
+        """The end away from the platform's point at (N, 3), (N, 3) [m]."""
+        return at + (-scale if self.into else scale) * self.force
+
+    @property
     def description(self) -> dict[str, Any]:
         at = {"platform": list(self.at)}
-        return {"kind": self.kind, "at": at, "from": self.start, "columns": self.columns}
+        return {
+            "kind": self.kind,
+            "at": at,
+            "gap": self.gap,
+            "into": self.into,
+            "columns": self.columns,
+        }
+
+
+def _scales(arrows: Sequence[Arrow], size: float) -> dict[str, dict[str, float]]:
+    """Of each kind of force: metres a newton, and the largest [N].
+
+    Small contact forces under a large load have a scale of their own, or nobody would see them.
+    """
+    largest: dict[str, float] = {}
+    for arrow in arrows:
+        largest[arrow.kind] = max(largest.get(arrow.kind, 0.0), arrow.largest)
+    most = max(largest.values(), default=0.0)
+    together = all(value >= ONE_SCALE * most for value in largest.values() if value)
+    return {
+        kind: {
+            "largest": value,
+            "metresPerNewton": ARROW * size / (most if together else value) if value else 0.0,
+        }
+        for kind, value in largest.items()
+    }
 
 
 def _contact_arrows(
@@ -172,7 +223,20 @@ def _cloud(scene: Scene, hull: np.ndarray) -> np.ndarray:
     return np.vstack([*clouds, corners.reshape(-1, 3), *scene.contacts.values(), hull])
 
 
-def _range(cloud: np.ndarray, size: float) -> list[list[float]]:
-    """Box round everything that is ever shown, [[x0, x1], [y0, y1], [z0, z1]] [m]."""
-    low, high = np.nanmin(cloud, axis=0), np.nanmax(cloud, axis=0)
-    return [[a - 0.15 * size, b + 0.15 * size] for a, b in zip(low, high, strict=True)]
+def _box(cloud: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
+    """Corners, (3,) each, of a box round everything that is ever shown [m]."""
+    spare = 0.15 * size
+    return np.nanmin(cloud, axis=0) - spare, np.nanmax(cloud, axis=0) + spare
+
+
+def _extremes(cloud: np.ndarray) -> np.ndarray:
+    """The points that lie furthest out in 26 directions, (E, 3): what a camera must see."""
+    points = cloud[np.isfinite(cloud).all(axis=1)]
+    steps = np.array(list(product((-1.0, 0.0, 1.0), repeat=3)))
+    return points[np.unique(np.argmax(points @ steps.T, axis=0))]
+
+
+def _rounded(length: float) -> float:
+    """The nearest of 1, 2, 5 times a power of ten."""
+    power = 10.0 ** np.floor(np.log10(length))
+    return float(power * min(ROUND, key=lambda digit: abs(digit - length / power)))

@@ -199,10 +199,11 @@ def _shares(solution: Solution, columns: Columns) -> Iterator[Panel]:
 
 
 def _contacts(solution: Solution, columns: Columns) -> Iterator[Panel]:
-    load = variable_lines(solution, "load", "component")
-    force = [
+    load = [
         Line(line.label, line.column, line.values, style)
-        for line, style in zip(load[:3], styles(list("abc")), strict=True)
+        for line, style in zip(
+            variable_lines(solution, "load", "component"), styles(list("abc")) * 2, strict=True
+        )
     ]
     if solution.sizes["contact"]:
         yield panel(
@@ -229,10 +230,12 @@ def _contacts(solution: Solution, columns: Columns) -> Iterator[Panel]:
                 {"": margins},
                 note="Negative: outside the bounds.",
             )
-    if any(np.any(line.values) for line in force):
-        point = solution.options.get("load_point")
-        at = f" at {point}" if point else ""
-        yield panel(columns, "contacts", "load", f"Load{at}", Shown("N"), {"": force})
+    point = solution.options.get("load_point")
+    at = f" at {point}" if point else ""
+    for name, lines, unit in (("load", load[:3], "N"), ("moment", load[3:], "N m")):
+        if any(np.any(line.values) for line in lines):
+            title = f"{'Load' if name == 'load' else 'Moment of the load'}{at}"
+            yield panel(columns, "contacts", name, title, Shown(unit), {"": lines})
 
 
 def _singularity(solution: Solution, columns: Columns) -> Iterator[Panel]:

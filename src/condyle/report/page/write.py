@@ -7,7 +7,7 @@ import hashlib
 import os
 from collections.abc import Sequence
 from importlib.resources import files as package_files
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
 from ...atomic import write_text
@@ -19,7 +19,7 @@ from .facts import (
     fact_cards,
     given_tables,
     provenance,
-    reaction_table,
+    reaction_tables,
     warnings_box,
 )
 from .html import Markup, fill, json_for_script, tag, text
@@ -59,7 +59,8 @@ def write_report(
 
     Args:   solution: what to show; more samples than a page can carry are thinned, extremes kept.
             path: the HTML file.
-            tables: of `condyle.report.tables`, to print on it.
+            tables: of `condyle.report.tables`, to print on it; default: those that the solution
+                keeps, which `condyle compare` puts there.
             files: inputs of the run, to be named with their hashes.
     Returns: the path.
     Raises: InputError: if a file cannot be read or the report cannot be written.
@@ -77,6 +78,8 @@ def report_html(
     """The report as text; see `write_report`."""
     from plotly.offline import get_plotlyjs
 
+    from ..tables import kept_tables
+
     scripts = [_lines(get_plotlyjs()), _script()]
     name, options = solution.attrs["mechanism_name"], solution.options
     parts = {
@@ -86,14 +89,14 @@ def report_html(
         "name": text(name),
         "subtitle": text(
             f"Inverse dynamics by {options['formulation']}, route {options['route']}; motion: "
-            f"{options['motion']}; load: {options['load']}"
+            f"{PurePath(options['motion']).name}; load: {PurePath(options['load']).name}"
         ),
         "version": text(solution.attrs.get("source", "condyle")),
         "warnings": warnings_box(solution.warnings),
         "facts": fact_cards(solution),
         "chains": chain_table(solution),
-        "reactions": reaction_table(solution),
-        "tables": given_tables(tables or ()),
+        "reactions": reaction_tables(solution),
+        "tables": given_tables(kept_tables(solution) if tables is None else tables),
         "run": provenance(solution, [Path(file) for file in files or ()]),
         "payload": json_for_script(_payload(solution)),
         "plotly": tag("script", Markup(scripts[0])),

@@ -26,9 +26,14 @@ class Style:
 
 
 def styles(names: Sequence[str]) -> list[Style]:
-    """A style for each name: a left and a right one share their colour and differ in dash."""
+    """A style for each name: a left and a right one share their colour and differ in dash.
+
+    Where there is one pair alone, they differ in colour too.
+    """
     stems = [_SIDE.sub("", name) for name in names]
     paired = any(stems.count(stem) == 2 for stem in stems)
+    if paired and len(names) == 2:
+        return [Style(0, DASHES[0]), Style(1, DASHES[1])]
     groups = list(dict.fromkeys(stems)) if paired else list(names)
     seen: dict[str, int] = {}
     result = []

@@ -9,6 +9,7 @@ from ...analysis.compare import Comparison
 from ...atomic import write_text
 from .differences import differences
 from .indices import table_2
+from .keep import kept_tables, with_tables
 from .seconds import table_1
 from .table import Table
 
@@ -16,10 +17,12 @@ __all__ = [
     "Table",
     "comparison_text",
     "differences",
+    "kept_tables",
     "save_tables",
     "table_1",
     "table_2",
     "tables",
+    "with_tables",
 ]
 
 

@@ -31,6 +31,7 @@ function sampleAt(t) {
 
 function shown(value, decimals) {
   if (!Number.isFinite(value)) return "\u2013";
+  if (decimals > 6) return value === 0 ? "0" : value.toExponential(2);
   const text = value.toFixed(decimals);
   return Number(text) === 0 ? text.replace("-", "") : text;
 }

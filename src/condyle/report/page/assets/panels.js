@@ -14,7 +14,7 @@ const sizeOf = (node) => ({ width: node.clientWidth, height: node.clientHeight }
 function axisLook() {
   return {
     color: css("--soft"), gridcolor: css("--line"), zerolinecolor: css("--line"), linecolor: css("--line"),
-    tickfont: { size: 11 }, automargin: false,
+    tickfont: { size: 11 }, automargin: false, exponentformat: "power",
   };
 }
 

@@ -8,7 +8,7 @@ function resizePlots() {
     if (part.graph._fullLayout) Plotly.relayout(part.graph, sizeOf(part.plot));
     part.move(clock.index);
   }
-  if (stageReady) Plotly.relayout(stageNode, sizeOf(stageNode));
+  resizeStage();
 }
 
 // The drawing buffer of WebGL is empty when the printer looks; a picture is not.

@@ -2,29 +2,67 @@
 
 const stageNode = document.getElementById("stage");
 const drawn = payload.machine;
-// away: the axis along which a view looks, whose ticks would stand on one spot.
+// Front, side and top are drawn without perspective, as on an engineer's sheet.
 const CAMERAS = {
-  Front: { eye: { x: 1.9, y: 0, z: 0 }, up: { x: 0, y: 0, z: 1 }, away: "x" },
-  Side: { eye: { x: 0, y: -2.3, z: 0 }, up: { x: 0, y: 0, z: 1 }, away: "y" },
-  Top: { eye: { x: 0, y: 0, z: 2.1 }, up: { x: 1, y: 0, z: 0 }, away: "z" },
-  Oblique: { eye: { x: 1.15, y: -1.15, z: 0.6 }, up: { x: 0, y: 0, z: 1 }, away: null },
+  Front: { from: [1, 0, 0], up: [0, 0, 1], flat: true },
+  Side: { from: [0, -1, 0], up: [0, 0, 1], flat: true },
+  Top: { from: [0, 0, 1], up: [1, 0, 0], flat: true },
+  Oblique: { from: [1.15, -1.15, 0.6], up: [0, 0, 1], flat: false },
 };
-// Boxes far from a cube need a wider view.
-const distance = (() => {
-  const sides = drawn.range.map(([low, high]) => high - low);
-  return Math.hypot(...sides) / Math.cbrt(sides[0] * sides[1] * sides[2]) / 1.83;
-})();
-const eyeOf = (name) => Object.fromEntries(Object.entries(CAMERAS[name].eye).map(([axis, v]) => [axis, v * distance]));
+const HALF_FIELD = Math.tan(Math.PI / 8);  // of plotly's perspective
+const FILL = 0.86;  // of the canvas
+const FLAT_DISTANCE = 3;
+// Plotly takes the light's place through the projection, and the flat one looks the other way.
+const LIGHT = { false: { x: 2000, y: -3000, z: 6000 }, true: { x: -2000, y: 3000, z: -6000 } };
 
-let view = "Oblique";
+// Scene units: the middle of the box is the origin, its longest side is 1.
+const sides = drawn.range.map(([low, high]) => high - low);
+const longest = Math.max(...sides);
+const middle = drawn.range.map(([low, high]) => (low + high) / 2);
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const xyz = (v) => ({ x: v[0], y: v[1], z: v[2] });
+
+// Camera and scale with which a view shows everything, as large as it fits.
+function fitted(name) {
+  const { from, up, flat } = CAMERAS[name];
+  const aspect = stageNode.clientWidth / Math.max(stageNode.clientHeight, 1);
+  const away = unit(from), right = unit(cross(up, from)), above = cross(away, right);
+  const points = drawn.extent.map((p) => minus(p, middle).map((v) => v / longest));
+  let centre = [0, 0, 0], scale = 1, distance = FLAT_DISTANCE;
+  // Perspective moves the middle a little with the distance.
+  for (let pass = 0; pass < 4; pass++) {
+    const seen = points.map((p) => {
+      const q = minus(p, centre), depth = dot(q, away);
+      const near = flat ? 1 : Math.max(distance - depth, 0.1);
+      return { x: dot(q, right), y: dot(q, above), depth, near };
+    });
+    const span = (axis) => {
+      const angles = seen.map((p) => p[axis] / p.near);
+      const low = Math.min(...angles), high = Math.max(...angles), back = flat ? 1 : distance;
+      return [back * (low + high) / 2, (high - low) / 2];
+    };
+    const [[x, wide], [y, high]] = [span("x"), span("y")];
+    centre = plus(plus(centre, right, x), above, y);
+    if (flat) scale = FILL * Math.min(aspect / wide, 1 / high);
+    else distance = Math.max(...seen.map((p) =>
+      p.depth + Math.max(Math.abs(p.x - x) / aspect, Math.abs(p.y - y)) / (HALF_FIELD * FILL)));
+  }
+  centre = centre.map((v) => v * scale);
+  return {
+    camera: { eye: xyz(plus(centre, away, distance)), center: xyz(centre), up: xyz(up), projection: { type: flat ? "orthographic" : "perspective" } },
+    aspectratio: xyz(sides.map((side) => scale * side / longest)),
+  };
+}
+
+let view = "Oblique", flat = CAMERAS.Oblique.flat;
 const layersShown = Object.fromEntries(
-  ["platform", "chains", "surfaces", "forces", "traces", "labels"]
+  ["platform", "chains", "surfaces", "forces", "traces", "labels", "axes"]
     .filter((layer) => (layer !== "surfaces" || drawn.surfaces.length) && (layer !== "forces" || drawn.arrows.length))
     .map((layer) => [layer, true]));
 const NEUTRAL = { light: "#7d8894", dark: "#8d98a5" };
 const PLATFORM = { light: "#c9d3de", dark: "#5b6877" };
 const SURFACE = { light: "#e5b567", dark: "#b98a3c" };
-const FORCE = { contact: 4, load: 5 };  // colours of the palette that chains seldom reach
+const FORCE = { contact: "--cursor", load: "--ink" };
 
 const rodRadius = 0.022 * drawn.size;
 const lastGood = { index: 0 };
@@ -40,10 +78,11 @@ function bodies(index) {
   for (const joint of drawn.joints) joints.sphere(position(joint, index), 1.9 * rodRadius, NEUTRAL[theme], 12);
   for (const ball of drawn.balls) balls.sphere(position(ball.at, index), ball.radius, css("--cursor"), 18);
   for (const arrow of drawn.arrows) {
-    const vector = arrow.columns.map((c) => column(c)[index] * drawn.metresPerNewton);
-    // From the ball's skin, or a small force would hide in it.
-    const from = plus(position(arrow.at, index), unit(vector), arrow.from);
-    forces.arrow(from, vector, 0.026 * drawn.size, colour(FORCE[arrow.kind]));
+    const perNewton = drawn.scales[arrow.kind]?.metresPerNewton ?? 0;
+    const vector = arrow.columns.map((c) => column(c)[index] * perNewton);
+    // At the ball's skin, or a small force would hide in it.
+    const near = plus(position(arrow.at, index), unit(vector), arrow.into ? -arrow.gap : arrow.gap);
+    forces.arrow(arrow.into ? minus(near, vector) : near, vector, 0.026 * drawn.size, css(FORCE[arrow.kind]));
   }
   const platform = new Solids();
   for (const v of drawn.hull.vertices) platform.vertex(onPlatform(v));
@@ -59,7 +98,7 @@ function solidTrace(name, solids) {
     facecolor: solids.colours, hoverinfo: "skip", flatshading: name === "platform",
     opacity: name === "platform" ? 0.45 : 1,
     lighting: { ambient: 0.62, diffuse: 0.75, specular: 0.12, roughness: 0.7, fresnel: 0.05 },
-    lightposition: { x: 2000, y: -3000, z: 6000 },
+    lightposition: LIGHT[flat],
   };
 }
 
@@ -102,7 +141,8 @@ function labelTrace(index) {
   return {
     type: "scatter3d", mode: "markers+text", name: "landmarks",
     x: places.map((p) => p[0]), y: places.map((p) => p[1]), z: places.map((p) => p[2]),
-    text: named.map((item) => plain(item.name)), textposition: "top center",
+    text: named.map((item) => plain(item.name)),
+    textposition: named.map((_, n) => n < drawn.landmarks.length ? "top right" : "bottom center"),
     textfont: { size: 11, color: css("--ink") }, hoverinfo: "skip",
     marker: { size: named.map((_, n) => n < drawn.landmarks.length ? 4 : 0.1), color: css("--ink") },
   };
@@ -111,16 +151,28 @@ function labelTrace(index) {
 // Plotly reads a little HTML in labels; a name is only text.
 const plain = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
 
+// The directions of {S}, with arms of a round length: cleaner than ticks in space.
+function triadTraces() {
+  const { origin: corner, arm } = drawn.triad;
+  const solids = new Solids();
+  const tips = [0, 1, 2].map((n) => [0, 1, 2].map((i) => (i === n ? arm : 0)));
+  for (const tip of tips) solids.arrow(corner, tip, 0.02 * drawn.size, css("--soft"));
+  const places = tips.map((tip) => plus(corner, tip, 1.22).map((v) => 1e3 * v));
+  return [
+    solidTrace("axes", solids),
+    {
+      type: "scatter3d", mode: "text", name: "axes", x: places.map((p) => p[0]), y: places.map((p) => p[1]), z: places.map((p) => p[2]),
+      text: ["X", "Y", "Z"], textfont: { size: 12, color: css("--soft") }, hoverinfo: "skip",
+    },
+  ];
+}
+
 function stageLayout() {
-  const axis = (name, n) => ({
-    title: { text: name, font: { size: 12 } }, range: drawn.range[n].map((v) => 1e3 * v),
-    tickfont: { size: 10 }, color: css("--soft"), gridcolor: css("--line"), zerolinecolor: css("--line"),
-    visible: CAMERAS[view]?.away !== name.toLowerCase(), showbackground: false, showspikes: false, nticks: 5,
-  });
+  const axis = (n) => ({ range: drawn.range[n].map((v) => 1e3 * v), visible: false, showspikes: false });
   return {
     ...sizeOf(stageNode), margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, paper_bgcolor: "rgba(0,0,0,0)", hovermode: false,
     uirevision: "stage",
-    scene: { aspectmode: "data", xaxis: axis("X", 0), yaxis: axis("Y", 1), zaxis: axis("Z", 2), dragmode: "orbit" },
+    scene: { aspectmode: "manual", xaxis: axis(0), yaxis: axis(1), zaxis: axis(2), dragmode: "orbit" },
   };
 }
 
@@ -133,6 +185,7 @@ function stageTraces(index) {
   traces.push({ ...labelTrace(index), layer: "labels" });
   traces.push(...surfaceTraces().map((t) => ({ ...t, layer: "surfaces" })));
   traces.push(...pathTraces().map((t) => ({ ...t, layer: "traces" })));
+  traces.push(...triadTraces().map((t) => ({ ...t, layer: "axes" })));
   setPose(index);
   layerOf = traces.map((t) => t.layer);
   for (const trace of traces) {
@@ -148,7 +201,8 @@ async function drawStage() {
   stageBusy = true;
   setPose(lastGood.index);
   const layout = stageLayout();
-  layout.scene.camera = stageNode.layout?.scene?.camera ?? { eye: eyeOf("Oblique"), up: CAMERAS.Oblique.up };
+  const before = stageNode.layout?.scene;
+  Object.assign(layout.scene, before ? { camera: before.camera, aspectratio: before.aspectratio } : fitted(view));
   await Plotly.react(stageNode, stageTraces(lastGood.index), layout, { displayModeBar: false, responsive: false });
   if (!stageReady) stageNode.on("plotly_relayout", turnedByHand);
   stageReady = true;
@@ -187,13 +241,26 @@ function showAlerts(index) {
 
 function setCamera(name) {
   view = name;
-  const { up, away } = CAMERAS[name];
   for (const button of document.querySelectorAll("#cameras button")) {
     button.setAttribute("aria-pressed", String(button.textContent === name));
   }
-  const change = { "scene.camera.eye": eyeOf(name), "scene.camera.up": up, "scene.camera.center": { x: 0, y: 0, z: 0 } };
-  for (const axis of ["x", "y", "z"]) change[`scene.${axis}axis.visible`] = axis !== away;
-  Plotly.relayout(stageNode, change);
+  flat = CAMERAS[name].flat;
+  if (!stageReady) return;
+  const solids = stageNode.data.flatMap((trace, n) => (trace.type === "mesh3d" ? [n] : []));
+  Plotly.update(stageNode, { lightposition: LIGHT[flat] }, change(name), solids);
+}
+
+function change(name) {
+  const { camera, aspectratio } = fitted(name);
+  return {
+    "scene.camera.eye": camera.eye, "scene.camera.up": camera.up, "scene.camera.center": camera.center,
+    "scene.camera.projection.type": camera.projection.type, "scene.aspectratio": aspectratio,
+  };
+}
+
+// The canvas has another size; a preset is fitted to it again.
+function resizeStage() {
+  if (stageReady) Plotly.relayout(stageNode, { ...sizeOf(stageNode), ...(view ? change(view) : {}) });
 }
 
 // A view turned by hand is no preset any more.
@@ -201,7 +268,6 @@ function turnedByHand(event) {
   if (!event["scene.camera"]) return;
   view = null;
   for (const button of document.querySelectorAll("#cameras button")) button.setAttribute("aria-pressed", "false");
-  Plotly.relayout(stageNode, { "scene.xaxis.visible": true, "scene.yaxis.visible": true, "scene.zaxis.visible": true });
 }
 
 function setLayer(layer, on) {
@@ -210,13 +276,17 @@ function setLayer(layer, on) {
   if (numbers.length) Plotly.restyle(stageNode, { visible: on }, numbers);
 }
 
+const short = (value, digits) => Number(value.toPrecision(digits));
+const lengthText = (metres) => (metres < 1 ? `${short(1e3 * metres, 3)} mm` : `${short(metres, 3)} m`);
+
 function stageNote() {
   const notes = [];
   const { samples: kept, total } = payload.columns;
   if (kept < total) notes.push(`The page shows ${kept} of ${total} samples, the largest and smallest values among them.`);
-  if (drawn.largestForce) {
-    const perCentimetre = 0.01 / drawn.metresPerNewton;
-    notes.push(`Arrows: 10 mm stands for ${perCentimetre.toPrecision(2)} N; the longest is ${drawn.largestForce.toPrecision(4)} N.`);
-  }
+  notes.push(`Arms of the axes: ${lengthText(drawn.triad.arm)}.`);
+  const arrows = Object.entries(drawn.scales).map(([kind, { metresPerNewton, largest }]) =>
+    `${{ load: "load", contact: "contact forces" }[kind]} ${lengthText(drawn.triad.arm)} for ${short(drawn.triad.arm / metresPerNewton, 2)} N, at most ${short(largest, 4)} N`);
+  if (arrows.length) notes.push(`Arrows: ${arrows.join("; ")}.`);
+  if (drawn.undrawn.length) notes.push(`Not drawn, because the surface's equation is not in the solution: ${drawn.undrawn.join(", ")}.`);
   return notes.join(" ");
 }
