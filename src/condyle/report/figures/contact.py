@@ -109,12 +109,14 @@ def draw_bounds(axes: Axes, bounds: Bounds, across: str, up: str) -> None:
 
 
 def draw_surface(axes: Axes, contact: Contact) -> None:
-    """The surface at the y of the home point, within the view."""
+    """Where the centre of the ball can be, at the y of the home point and within the view."""
     (x0, x1), (z0, z1) = axes.get_xlim(), axes.get_ylim()
     x, z = np.meshgrid(np.linspace(x0, x1, GRID), np.linspace(z0, z1, GRID))
     p = ca.SX.sym("p", 3)
-    phi = ca.Function("phi", [p], [contact.surface.phi(p)])
+    phi = ca.Function("phi", [p], [contact.locus.phi(p)])
     where = np.column_stack([x.ravel(), np.full(x.size, contact.point[1] * 1e3), z.ravel()]) / 1e3
     value = evaluate(phi, where)[0].reshape(x.shape)
+    value[~np.isfinite(value)] = np.nan  # a ball far from its wall
     axes.contour(x, z, value, levels=[0.0], colors=PALETTE[2], linewidths=1.0, zorder=1)
-    axes.plot([], [], color=PALETTE[2], lw=1.0, label="surface")
+    label = "surface" if contact.ball_radius is None else "surface, less the ball's radius"
+    axes.plot([], [], color=PALETTE[2], lw=1.0, label=label)
