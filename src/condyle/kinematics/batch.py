@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import casadi as ca
 import numpy as np
 
@@ -20,12 +22,13 @@ def evaluate(function: ca.Function, *inputs: np.ndarray) -> list[np.ndarray]:
     given = [np.ascontiguousarray(_samples(a, count), dtype=float) for a in inputs]
     outputs = [np.empty((count, function.numel_out(i))) for i in range(function.n_out())]
     for block, starts in _blocks(count):
-        buffer, run = function.map(block).buffer()
+        mapped: Any = function.map(block)
+        buffer, run = mapped.buffer()
         for start in starts:
             for i, a in enumerate(given):
-                buffer.set_arg(i, memoryview(a[start : start + block]))
+                buffer.set_arg(i, a[start : start + block].data)
             for i, a in enumerate(outputs):
-                buffer.set_res(i, memoryview(a[start : start + block]))
+                buffer.set_res(i, a[start : start + block].data)
             run()
     return outputs
 

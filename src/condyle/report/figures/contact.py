@@ -63,7 +63,8 @@ def contact_track(solution: Solution) -> Figure:
             frame(axes)
             axes.set(xlabel=f"{across} [mm]", ylabel=f"{up} [mm]")
             axes.set_title(f"{readable(name)}, {view}")
-        draw_surface(grid[1, k], contacts[name])
+        if contacts[name].surface.known:
+            draw_surface(grid[1, k], contacts[name])
     figure.set_layout_engine("compressed", w_pad=0.12)  # made for axes of fixed shape
     entries: dict[str, Any] = {}
     for axes in grid.ravel():
