@@ -146,7 +146,7 @@ def test_a_ball_runs_on_the_line_of_its_centre(reference: condyle.Mechanism) -> 
         track = next(a for a in axes.get_lines() if a.get_label() == "contact point").get_xydata()
         off = track[:, 1] - np.interp(track[:, 0], *line[np.argsort(line[:, 0])].T)
         assert np.abs(off).max() < 1e-3  # mm
-        assert "surface, less the ball's radius" in words(figure)
+        assert "surface at the home y, less the ball's radius" in words(figure)
 
 
 def test_contact_track_against_bounds(solution: Solution) -> None:

@@ -81,6 +81,7 @@ def frame(axes: Axes) -> None:
     width = 1.15 * max(x1 - x0, (y1 - y0) / VIEW_RATIO)
     x, y, height = (x0 + x1) / 2, (y0 + y1) / 2, VIEW_RATIO * width
     axes.set(xlim=(x - width / 2, x + width / 2), ylim=(y - height / 2, y + height / 2))
+    axes.locator_params(axis="x", nbins=5)
     axes.set_aspect("equal", adjustable="box")
 
 
@@ -119,5 +120,7 @@ def draw_surface(axes: Axes, contact: Contact) -> None:
     value = evaluate(phi, where)[0].reshape(x.shape)
     value[~np.isfinite(value)] = np.nan  # a ball far from its wall
     axes.contour(x, z, value, levels=[0.0], colors=PALETTE[2], linewidths=1.0, zorder=1)
-    label = "surface" if contact.ball_radius is None else "surface, less the ball's radius"
+    label = "surface at the home y"
+    if contact.ball_radius is not None:
+        label += ", less the ball's radius"
     axes.plot([], [], color=PALETTE[2], lw=1.0, label=label)
