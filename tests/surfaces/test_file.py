@@ -79,6 +79,11 @@ LINE = {"kind": "profile", "direction": [1.0, 0.0], "points": [[0, 0], [1, 1], [
         ({"kind": "expression", "function": "p[2]"}, {}, "'expression' is unknown"),
         ({"slope": [0, 0], "offset": 1}, {}, "`kind` is missing"),
         (SPHERE, {"side": "below"}, 'expected "inside" or "outside" for a sphere, got "below"'),
+        (
+            {"kind": "ellipsoid", "centre": [0, 0, 0], "semi_axes": [1, 2, 3]},
+            {"side": "below"},
+            'expected "inside" or "outside" for an ellipsoid',
+        ),
         (LINE, {"side": "inside"}, 'expected "below" or "above" for a profile, got "inside"'),
         (SPHERE, {"side": "left"}, "side: expected"),
         (SPHERE, {"ball_radius": 3}, "side is missing"),

@@ -10,8 +10,8 @@ import pytest
 
 import condyle
 from condyle.analysis.compare import compare
-from condyle.errors import InputError
-from condyle.mechanism import Contact, Mechanism, dumps
+from condyle.errors import InputError, MechanismError
+from condyle.mechanism import Contact, Mechanism, dumps, parse
 from condyle.mechanism.surface import Expression, Unknown
 from condyle.model import Model
 from condyle.motion import Motion
@@ -61,6 +61,22 @@ def test_every_backend_and_model(machine: Mechanism, motion: Motion, solution: S
     assert all(pair.torque < 1e-11 for pair in comparison.differences())
     assert "virtual_power direct" in str(comparison)  # not available, and why
     assert comparison.mechanism.contact_names == machine.contact_names
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("phi", "message"),
+    [
+        (lambda p: 0 * p[2], "cannot hold the platform"),
+        (lambda p: ca.log(-1 - p[0] ** 2), "no normal at the contact point"),
+        (lambda p: p[2] + 1.1 * p[0], r"\+8\.88937 mm off the surface"),
+    ],
+)
+def test_surfaces_that_hold_nothing(reference: Mechanism, phi, message: str) -> None:
+    more = {"surface": Expression(phi)}
+    held = tuple(contact.model_copy(update=more) for contact in reference.contacts)
+    with pytest.raises(MechanismError, match=message):
+        condyle.derive(reference.replace(contacts=held))
 
 
 def test_a_mechanism_file_cannot_hold_it(machine: Mechanism, tmp_path: Path) -> None:
@@ -124,9 +140,6 @@ def test_commands_on_a_saved_solution(solution: Solution, condyle_command, tmp_p
 
 
 def test_a_file_cannot_write_the_note(machine: Mechanism, saved: Solution) -> None:
-    from condyle.errors import MechanismError
-    from condyle.mechanism import parse
-
     with pytest.raises(MechanismError, match="the kind 'expression' is unknown; available"):
         parse(saved.attrs["mechanism"])
 
