@@ -53,6 +53,7 @@ class Posture:
     joint, beta, gamma: (N, n) [rad or m, rad, rad], principal values.
     reach:         (N, n), negative where a chain cannot reach its joint.
     contact_point: (N, k, 3) [m], ball centres in {S}.
+    contact_normal: (N, k, 3), unit normals of the surfaces there, in {S}.
     cos_gamma:     (N, n); near 0 beta_i and gamma_i lose their meaning.
     """
 
@@ -62,6 +63,7 @@ class Posture:
     cos_gamma: np.ndarray
     reach: np.ndarray
     contact_point: np.ndarray
+    contact_normal: np.ndarray
     singularity: Singularity
 
 
@@ -205,7 +207,7 @@ class Model:
         n, k = len(self.mechanism.chains), len(self.mechanism.contacts)
         count, m = len(pose), 6 - k
         outputs = evaluate(self._posture_function, pose)
-        q_r, cos_gamma, J_A, J_A_scale, J_W, rod_length, M_J, reach, points = outputs
+        q_r, cos_gamma, J_A, J_A_scale, J_W, rod_length, M_J, reach, *places = outputs
         J_W = J_W.reshape(count, 6, n).transpose(0, 2, 1)
         M_J = M_J.reshape(count, m, 6).transpose(0, 2, 1)
         joint, beta, gamma = q_r.reshape(count, 3, n).transpose(1, 0, 2)
@@ -213,9 +215,8 @@ class Model:
         singularity = measure(
             J_A, J_A_scale, J_W @ M_J, rod_length, angles, self.characteristic_length
         )
-        return Posture(
-            joint, beta, gamma, cos_gamma, reach, points.reshape(count, k, 3), singularity
-        )
+        points, normals = (a.reshape(count, k, 3) for a in places)
+        return Posture(joint, beta, gamma, cos_gamma, reach, points, normals, singularity)
 
     def solve(
         self,

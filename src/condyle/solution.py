@@ -15,8 +15,7 @@ from .atomic import replacing
 from .errors import InputError
 from .kinematics.chain import FAMILIES
 from .kinematics.singularity import KINDS, NEAR
-from .mechanism import dumps, parse
-from .mechanism.files import written_in_python
+from .mechanism.files import recall, record
 from .mechanism.home import home_warnings
 from .mechanism.mechanism import COORDINATES, Mechanism
 from .model import STATUS_NAMES
@@ -29,6 +28,10 @@ if TYPE_CHECKING:
 AXES = ("x", "y", "z")
 WRENCH = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 POSE_UNITS = "m, m, m, rad, rad, rad"
+LIFT_OFF = {
+    "units": "1",
+    "long_name": "whether a one-sided contact would have to pull: the ball lifts off",
+}
 
 
 class Solution(xr.Dataset):
@@ -44,14 +47,9 @@ class Solution(xr.Dataset):
     def mechanism(self) -> Mechanism:
         """The mechanism that was solved.
 
-        Raises: InputError: if a surface of it was a Python expression, which cannot be kept.
+        In the place of a surface written in Python is an `Unknown` one, which has no equation.
         """
-        if not self.attrs["mechanism"]:
-            raise InputError(
-                f"{self.attrs['mechanism_name']} has a surface written in Python, which a "
-                "solution cannot keep"
-            )
-        return parse(self.attrs["mechanism"], self.attrs["mechanism_name"])
+        return recall(self.attrs["mechanism"], self.attrs["mechanism_name"])
 
     @property
     def warnings(self) -> list[str]:
@@ -88,21 +86,27 @@ class Solution(xr.Dataset):
                     write_table(temporary, self.columns())
 
     def columns(self) -> dict[str, np.ndarray | list[str]]:
-        """Columns of the CSV: t, tau_<chain>, contact_<contact>, pose, joint_<chain>."""
+        """Columns of the CSV: t, tau_<chain>, contact_<contact>, pose, joint_<chain>.
+
+        Then reactions, if there are any, lift_off_<contact> (0 or 1) of one-sided contacts, and
+        status, if a sample failed.
+        """
         columns: dict[str, np.ndarray | list[str]] = {"t": self["time"].values}
         columns |= named_columns("tau_", self["chain"].values, self["torque"].values)
         columns |= named_columns("contact_", self["contact"].values, self["contact_force"].values)
         columns |= named_columns("", self["coordinate"].values, self["pose"].values)
         columns |= named_columns("joint_", self["chain"].values, self["joint"].values)
         for variable in self.data_vars:
-            if str(variable).startswith("reaction_"):
+            if str(variable).startswith("reaction_") or variable == "contact_force_vector":
                 owners = self[self[variable].dims[1]].values
+                name = "reaction_contact" if variable == "contact_force_vector" else variable
                 for i, axis in enumerate(AXES):
-                    prefix, values = f"{variable}_", self[variable].values[:, :, i]
+                    prefix, values = f"{name}_", self[variable].values[:, :, i]
                     columns |= {
                         f"{name}_{axis}": column
                         for name, column in named_columns(prefix, owners, values).items()
                     }
+        columns |= lift_off_columns(self.mechanism, self["lift_off"].values)
         if self["status"].values.any():
             columns["status"] = [STATUS_NAMES[i] for i in self["status"].values]
         return columns
@@ -125,7 +129,12 @@ def open_solution(path: str | Path) -> Solution:
         raise InputError(f"{path} is not a NetCDF solution: {error}") from None
     if "mechanism" not in dataset.attrs or "torque" not in dataset:
         raise InputError(f"{path} is NetCDF, but not a condyle solution")
-    return Solution(dataset.data_vars, dataset.coords, dataset.attrs)
+    solution = Solution(dataset.data_vars, dataset.coords, dataset.attrs)
+    if "lift_off" not in solution:  # written before there were one-sided contacts
+        force = solution["contact_force"]
+        lifted = lift_off(solution.mechanism, force.values)
+        solution["lift_off"] = force.dims, lifted, LIFT_OFF
+    return solution
 
 
 def assemble(
@@ -173,13 +182,16 @@ def assemble(
         "lift_off": (
             ("time", "contact"),
             lift_off(mechanism, t.contact_force) & ok[:, None],
-            {
-                "units": "1",
-                "long_name": "whether a one-sided contact would have to pull: the ball lifts off",
-            },
+            LIFT_OFF,
         ),
         "contact_point": variable(
             ("time", "contact", "axis"), p.contact_point, "m", "centre of the contact ball in {S}"
+        ),
+        "contact_normal": variable(
+            ("time", "contact", "axis"),
+            p.contact_normal,
+            "1",
+            "unit normal of the surface at the contact in {S}",
         ),
         "bound_margin": variable(
             ("time", "contact"),
@@ -260,7 +272,7 @@ def assemble(
         "source": f"condyle {__version__}",
         "condyle_version": __version__,
         "mechanism_name": mechanism.name,
-        "mechanism": "" if written_in_python(mechanism) else dumps(mechanism),
+        "mechanism": record(mechanism),
         "options": json.dumps(options),
         "warnings": json.dumps(run_warnings(mechanism, solution, residual)),
     }
@@ -290,6 +302,15 @@ def lift_off(mechanism: Mechanism, force: np.ndarray) -> np.ndarray:
     """Whether one-sided contacts would have to pull at contact forces (N, k), (N, k)."""
     push = np.array([c.push if c.one_sided else 0 for c in mechanism.contacts], dtype=float)
     return push * force < -FORCE_TOLERANCE
+
+
+def lift_off_columns(mechanism: Mechanism, lifted: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns lift_off_<contact>, 0 or 1, of the contacts that can lift off."""
+    return {
+        f"lift_off_{contact.name}": lifted[:, i].astype(int)
+        for i, contact in enumerate(mechanism.contacts)
+        if contact.one_sided
+    }
 
 
 def run_warnings(mechanism: Mechanism, solution: Solution, residual: float | None) -> list[str]:

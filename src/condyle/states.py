@@ -10,7 +10,15 @@ from .errors import BoundsError, InputError
 from .mechanism.mechanism import COORDINATES
 from .model import STATUS_NAMES, Model, with_point
 from .motion import Table, TableWriter, iter_table
-from .solution import AXES, BOUND_TOLERANCE, WRENCH, bound_margins, lift_off, named_columns
+from .solution import (
+    AXES,
+    BOUND_TOLERANCE,
+    WRENCH,
+    bound_margins,
+    lift_off,
+    lift_off_columns,
+    named_columns,
+)
 
 CHUNK_ROWS = 65536
 
@@ -114,12 +122,13 @@ def solve_table(
         for name, reaction in joint_reactions(model, evaluation).items():
             array = np.where(ok[:, None], reaction.array, np.nan)
             columns |= {f"reaction_{name}_{axis}": array[:, i] for i, axis in enumerate(AXES)}
-    if flag:
-        columns["status"] = [STATUS_NAMES[i] for i in evaluation.status]
-    margins = bound_margins(mechanism, evaluation.posture.contact_point)
     force = evaluation.torques.contact_force
     assert force is not None
     lifted = lift_off(mechanism, force) & ok[:, None]
+    columns |= lift_off_columns(mechanism, lifted)
+    if flag:
+        columns["status"] = [STATUS_NAMES[i] for i in evaluation.status]
+    margins = bound_margins(mechanism, evaluation.posture.contact_point)
     return columns, np.where(ok[:, None], margins, np.inf), lifted
 
 

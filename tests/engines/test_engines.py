@@ -27,6 +27,19 @@ CLASS: list[dict[str, Any]] = [
     {"families": (kind,), "contacts": contacts} for kind in FAMILIES for contacts in (0, 2)
 ]
 CLASS += [{"families": tuple(FAMILIES), "chains": 8, "contacts": 1}, {"rod_along_x": True}]
+SURFACES: list[dict[str, Any]] = [
+    {"surface": "quadratic", "contacts": contacts, "chains": chains}
+    for contacts, chains in ((1, 6), (2, 6), (2, 8), (3, 6), (3, 8))
+]
+SURFACES += [
+    {"surface": "quadratic", "families": families, "contacts": contacts}
+    for families, contacts in ((("PSS",), 1), (("SPS",), 3), (tuple(FAMILIES), 2))
+]
+SURFACES += [
+    {"surface": ("sphere", "cylinder", "ellipsoid"), "contacts": 3},
+    {"surface": ("profile", "ellipsoid"), "families": tuple(FAMILIES), "chains": 8},
+    {"surface": ("ellipsoid", "plane"), "ball_radius": 4.0},
+]
 
 
 def engine(name: str, raw: dict[str, Any]) -> Callable[..., dict[str, Any]]:
@@ -75,7 +88,7 @@ def test_shafts_that_are_upright_or_nearly(tilt: float) -> None:
 
 
 @pytest.mark.parametrize("name", MODULES)
-@pytest.mark.parametrize("options", PLANES + CLASS, ids=str)
+@pytest.mark.parametrize("options", PLANES + CLASS + SURFACES, ids=str)
 def test_an_outside_engine_agrees(options: dict[str, Any], name: str) -> None:
     rng = np.random.default_rng(100 + len(str(options)))
     raw = random_mechanism(rng, tilted_gravity=True, **options)

@@ -88,3 +88,4 @@ def test_units_in_the_check(name: str, joint: str, effort: str) -> None:
 
     text = str(describe(condyle.load(name)))
     assert f"joint [{joint}], effort [{effort}]" in text
+    assert ("6 chains, 1 contact, 5 degrees" in text) == (name == "hexaglide")

@@ -6,12 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from oracles.random_mechanism import random_mechanism
 
 import condyle
 from condyle.errors import UnreachableError
 from condyle.joints import pose_file
 from condyle.kinematics.forward import ForwardKinematics
 from condyle.mechanism import bundled_mechanisms
+from condyle.mechanism.files import from_data
 from condyle.motion import read_table, write_table
 
 
@@ -88,6 +90,24 @@ def test_file_in_file_out(tmp_path: Path) -> None:
     table = read_table(tmp_path / "poses.csv")
     assert table.names == ("t", "X", "Y", "Z", "alpha", "beta", "gamma", "residual", "condition")
     np.testing.assert_allclose(table.require(table.names[1:7]), pose, rtol=0, atol=1e-12)
+
+
+def test_residuals_of_chains_that_turn_and_slide(tmp_path: Path) -> None:
+    """Redundant encoders, one of them wrong: radians and metres never share a column."""
+    raw = random_mechanism(np.random.default_rng(3), families=("RSS", "PSS"), chains=6)
+    mechanism = from_data(raw)
+    names = [f"joint_{name}" for name in mechanism.chain_names]
+    write_table(tmp_path / "joints.csv", dict.fromkeys(names, np.zeros(2)) | {names[0]: [0, 1e-4]})
+    report = pose_file(mechanism, tmp_path / "joints.csv", tmp_path / "poses.csv")
+    table = read_table(tmp_path / "poses.csv")
+    assert table.names[6:] == ("residual_m", "residual_rad", "condition")
+    found = ForwardKinematics(mechanism).solve(np.array([[0.0] * 6, [1e-4] + [0.0] * 5]))
+    for unit, kind in (("rad", "RSS"), ("m", "PSS")):
+        mine = [chain.kind == kind for chain in mechanism.chains]
+        worst = np.abs(found.residual[:, mine]).max(axis=1)
+        np.testing.assert_allclose(table.columns[f"residual_{unit}"], worst, rtol=1e-12, atol=1e-15)
+        assert f"{report.residual[unit]:.3g} {unit}" in str(report)
+        assert worst[0] < 1e-15 < 1e-7 < worst[1]
 
 
 def test_joints_that_no_pose_has(tmp_path: Path) -> None:

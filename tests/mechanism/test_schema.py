@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from oracles.random_mechanism import random_mechanism
+from oracles.random_mechanism import SURFACES, random_mechanism, random_surface
 
 from condyle.mechanism import bundled_text, json_schema
+from condyle.mechanism.files import from_data
 from condyle.mechanism.starter import starter_text
 
 Schema = dict[str, Any]
@@ -101,6 +102,25 @@ def test_the_schema_accepts_good_files(schema: Schema, raw: dict[str, Any]) -> N
     for contacts in range(6):
         described = random_mechanism(np.random.default_rng(contacts), contacts=contacts)
         assert accepts(described, schema)
+
+
+@pytest.mark.parametrize("kind", SURFACES)
+def test_options_of_a_ball_may_stand_with_the_surface(
+    schema: Schema, raw: dict[str, Any], kind: str
+) -> None:
+    """Reader and schema agree on both places, for every kind."""
+    accepts = Validator(schema).fits
+    side = "outside" if kind in ("sphere", "cylinder", "ellipsoid") else "above"
+    options = {"side": side, "ball_radius": 3.0, "one_sided": True}
+    contact = raw["contact"][0]
+    table = random_surface(np.random.default_rng(0), kind, np.array(contact["point"]), np.zeros(2))
+    for where in ({"surface": table} | options, {"surface": table | options}):
+        raw["contact"][0] = contact | where
+        assert accepts(raw, schema)
+        found = from_data(raw, at_home=False).contacts[0]
+        assert (found.side, found.ball_radius, found.one_sided) == (side, 0.003, True)
+    raw["contact"][0]["surface"]["one_sided"] = "yes"
+    assert not accepts(raw, schema)
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -15,6 +17,8 @@ import condyle
 from condyle.dynamics.reactions import reaction_places, reaction_variables, reactions
 from condyle.mechanism import Mechanism
 from condyle.model import Evaluation, Model
+from condyle.motion import read_table, write_table
+from condyle.states import solve_file
 
 # Our joint -> the oracle's link and whether it is its force or its moment.
 JOINTS = {
@@ -168,6 +172,25 @@ def test_variables_of_mixed_families_have_no_holes() -> None:
     assert [kinds[name] for name in dataset["chain_PSS"].values] == ["PSS"] * 3
     assert dataset["reaction_rail_force"].dims == ("time", "chain_PSS", "axis")
     assert dataset["reaction_platform_joint"].dims == ("time", "chain", "axis")
+
+
+def test_columns_of_files_have_the_names_of_the_reactions(tmp_path: Path) -> None:
+    """`run` and `solve` write the same columns, contact forces as vectors included."""
+    machine = case("mixed_k3").mechanism
+    model = Model(machine, backend="interpreted")
+    t = np.linspace(0, 1, 6)
+    motion = condyle.Motion.from_arrays(t, {name: 0 * t for name in model.independent})
+    columns = model.solve(motion, reactions=True).columns()
+    places = reaction_places(machine)
+    wanted = {f"reaction_{place.name}_{axis}" for place in places for axis in "xyz"}
+    assert {name for name in columns if name.startswith("reaction_")} == wanted
+    states = {p + name: 0 * t for p in ("", "d", "dd") for name in model.independent}
+    write_table(tmp_path / "states.csv", states)
+    solve_file(model, tmp_path / "states.csv", tmp_path / "out.csv", reactions=True)
+    table = read_table(tmp_path / "out.csv")
+    assert {name for name in table.names if name.startswith("reaction_")} == wanted
+    for name in wanted:
+        np.testing.assert_array_equal(table.columns[name], columns[name])
 
 
 @pytest.mark.parametrize("name", ["rss", "pss", "sps_k0"])

@@ -17,6 +17,7 @@ from matplotlib.patches import Rectangle
 import condyle
 from condyle.analysis.compare import Comparison
 from condyle.kinematics.rotation import rotation
+from condyle.mechanism.surface import Plane, Quadratic
 from condyle.report import figures
 from condyle.report.figures import PLOTS, SolutionPlots, figure_5, figure_8, figure_9
 from condyle.report.figures.chains import groups, heading, styles
@@ -122,6 +123,30 @@ def test_failed_samples_are_shaded(solution: Solution, mixed: Solution) -> None:
         return PLOTS["torque"](one).axes[0].findobj(Rectangle)
 
     assert len(shades(mixed)) == len(shades(solution)) + 1
+
+
+def test_a_ball_runs_on_the_line_of_its_centre(reference: condyle.Mechanism) -> None:
+    """With a ball radius the file gives the wall; the track is a radius off it."""
+    radius, lift = 0.004, 0.013215 + 0.004 * np.hypot(1.0, 1.1)
+    for wall in (
+        Plane(slope=(-1.1, 0.0), offset=lift),
+        Quadratic(slope=(-1.1, 0.0), offset=lift),
+    ):
+        more = {"surface": wall, "side": "below", "ball_radius": radius}
+        contacts = tuple(c.model_copy(update=more) for c in reference.contacts)
+        model = condyle.derive(reference.replace(contacts=contacts), backend="interpreted")
+        t = np.linspace(0, 1, 20)
+        motion = condyle.Motion.from_arrays(
+            t, {"X": 3e-3 * t, "Y": 0 * t, "alpha": 0 * t, "beta": 0 * t}
+        )
+        figure = PLOTS["contact_track"](model.solve(motion))
+        axes = figure.axes[2]
+        assert "left condyle, from the side" in axes.get_title("left")
+        line = np.vstack([path.vertices for path in axes.collections[0].get_paths()])
+        track = next(a for a in axes.get_lines() if a.get_label() == "contact point").get_xydata()
+        off = track[:, 1] - np.interp(track[:, 0], *line[np.argsort(line[:, 0])].T)
+        assert np.abs(off).max() < 1e-3  # mm
+        assert "surface at the home y, less the ball's radius" in words(figure)
 
 
 def test_contact_track_against_bounds(solution: Solution) -> None:

@@ -100,6 +100,11 @@ def test_expression() -> None:
     assert not wave.closed and wave.constants() == ()
 
 
+def test_expression_of_no_function() -> None:
+    with pytest.raises(InputError, match="needs a function of a point, got 3"):
+        Expression(3)  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize(
     "function",
     [lambda p: 3.0, lambda p: p, lambda p: p[0] + ca.SX.sym("other"), lambda p: ca.MX.sym("x")],

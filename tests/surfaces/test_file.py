@@ -9,10 +9,9 @@ import pytest
 from oracles.random_mechanism import toml_text
 
 import condyle
-from condyle.errors import InputError, MechanismError
+from condyle.errors import MechanismError
 from condyle.mechanism import Mechanism, dumps, json_schema, parse
 from condyle.mechanism.home import home_residuals
-from condyle.mechanism.surface import Expression
 from condyle.report.check import describe
 
 from .cases import BALL, CLOSED, KINDS, ball_options, table
@@ -80,6 +79,11 @@ LINE = {"kind": "profile", "direction": [1.0, 0.0], "points": [[0, 0], [1, 1], [
         ({"kind": "expression", "function": "p[2]"}, {}, "'expression' is unknown"),
         ({"slope": [0, 0], "offset": 1}, {}, "`kind` is missing"),
         (SPHERE, {"side": "below"}, 'expected "inside" or "outside" for a sphere, got "below"'),
+        (
+            {"kind": "ellipsoid", "centre": [0, 0, 0], "semi_axes": [1, 2, 3]},
+            {"side": "below"},
+            'expected "inside" or "outside" for an ellipsoid',
+        ),
         (LINE, {"side": "inside"}, 'expected "below" or "above" for a profile, got "inside"'),
         (SPHERE, {"side": "left"}, "side: expected"),
         (SPHERE, {"ball_radius": 3}, "side is missing"),
@@ -113,19 +117,6 @@ def test_direction_of_three_numbers(raw: dict[str, Any]) -> None:
     flat = parse(spoiled(raw, surface))
     solid = parse(spoiled(raw, surface | {"direction": [*surface["direction"], 0.0]}))
     assert flat == solid
-
-
-def test_python_expressions_stay_in_python(reference: Mechanism) -> None:
-    plane = Expression(lambda p: p[2] + 1.1 * p[0] - 0.013215)
-    contacts = tuple(type(c)(name=c.name, point=c.point, surface=plane) for c in reference.contacts)
-    machine = reference.replace(contacts=contacts)
-    with pytest.raises(InputError, match=r"left_condyle, right_condyle is a Python expression"):
-        dumps(machine)
-    model = condyle.derive(machine, backend="interpreted")
-    solution = model.solve(condyle.reference_motion(), condyle.reference_load())
-    assert np.isfinite(solution["torque"]).all()
-    with pytest.raises(InputError, match="a surface written in Python"):
-        _ = solution.mechanism
 
 
 def test_schema_knows_the_kinds() -> None:

@@ -88,6 +88,31 @@ def test_the_flag_survives_a_file(reference: Mechanism, chewing: Motion, tmp_pat
     assert again.mechanism == one_sided(reference)
 
 
+def test_columns_of_contacts_that_can_lift_off(reference: Mechanism, chewing: Motion) -> None:
+    solution = solve(one_sided(reference, "below", "right_condyle"), chewing)
+    columns = solution.columns()
+    assert [name for name in columns if name.startswith("lift_off")] == ["lift_off_right_condyle"]
+    np.testing.assert_array_equal(columns["lift_off_right_condyle"], solution["lift_off"][:, 1])
+    assert not any(name.startswith("lift_off") for name in solve(reference, chewing).columns())
+
+
+def test_a_file_from_before_there_was_lift_off(
+    reference: Mechanism, chewing: Motion, tmp_path: Path
+) -> None:
+    solution = solve(one_sided(reference), chewing)
+    solution.drop_vars("lift_off").save(tmp_path / "old.nc")
+    again = condyle.open_solution(tmp_path / "old.nc")
+    np.testing.assert_array_equal(again["lift_off"], solution["lift_off"])
+    assert again["lift_off"].attrs == solution["lift_off"].attrs
+    assert summarize(again).data == summarize(solution).data
+
+
+def test_compiled_kernels_flag_the_same_samples(reference: Mechanism, chewing: Motion) -> None:
+    machine = one_sided(reference)
+    compiled = condyle.derive(machine).solve(chewing, condyle.reference_load())
+    np.testing.assert_array_equal(compiled["lift_off"], solve(machine, chewing)["lift_off"])
+
+
 def test_rows_of_a_states_file(reference: Mechanism, condyle_command, tmp_path: Path) -> None:
     condyle.dump(one_sided(reference), tmp_path / "m.toml")
     rows = ["X,Y,alpha,beta,dX,dY,dalpha,dbeta,ddX,ddY,ddalpha,ddbeta,Fx,Fy,Fz"]
@@ -97,11 +122,14 @@ def test_rows_of_a_states_file(reference: Mechanism, condyle_command, tmp_path: 
     outcome = condyle_command(
         "solve", "m.toml", "--states", "states.csv", "--out", "o.csv", "--flag"
     )
-    assert outcome.status == 0
+    assert outcome.status == 0, outcome.err
     lines = (tmp_path / "o.csv").read_text().splitlines()
     columns = lines[0].split(",")
     left = [float(line.split(",")[columns.index("contact_left_condyle")]) for line in lines[1:]]
     assert [line.split(",")[columns.index("status")] for line in lines[1:]] == ["ok"] * 4
     pulls = [row for row, force in enumerate(left, 1) if force > 0]
+    flags = [line.split(",")[columns.index("lift_off_left_condyle")] for line in lines[1:]]
+    assert flags == ["1" if row in pulls else "0" for row in range(1, 5)]
+    assert columns[-3:] == ["lift_off_left_condyle", "lift_off_right_condyle", "status"]
     assert len(pulls) == 2
     assert f'"left_condyle" lifts off in 2 rows, first in row {pulls[0]}' in outcome.err

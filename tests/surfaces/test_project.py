@@ -20,6 +20,8 @@ from condyle.kinematics.project import project_home
 from condyle.mechanism.files import from_data
 from condyle.mechanism.home import characteristic_length
 
+from .cases import CLOSED, KINDS, ball_options
+
 
 def phi_of(mechanism: condyle.Mechanism) -> ca.Function:
     x = ca.SX.sym("x", 6)
@@ -65,8 +67,16 @@ def test_nearest(options: dict[str, Any]) -> None:
         assert np.linalg.norm(point - contact.point) < 1.5e-3
 
 
-def test_check_gives_points_for_the_file(condyle_command, tmp_path: Path) -> None:
-    raw = shaken(5, surface="quadratic")
+@pytest.mark.parametrize("ball", [0.0, 4.0])
+@pytest.mark.parametrize("kind", KINDS)
+def test_check_gives_points_for_the_file(
+    condyle_command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, kind: str, ball: float
+) -> None:
+    monkeypatch.setenv("CONDYLE_BACKEND", "interpreted")
+    raw = shaken(5, surface=kind)
+    if ball:
+        for contact in raw["contact"]:
+            contact |= ball_options(kind, first=kind not in CLOSED) | {"ball_radius": ball}
     path = tmp_path / "off.toml"
     path.write_text(toml_text(raw))
     refused = condyle_command("check", path)

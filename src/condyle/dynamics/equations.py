@@ -169,10 +169,10 @@ def closure_function(mechanism: Mechanism) -> ca.Function:
 
 
 def posture_function(mechanism: Mechanism) -> ca.Function:
-    """X_EE -> joint coordinates (n, 3), J_A, J_W and contact points.
+    """X_EE -> joint coordinates (n, 3), J_A, J_W, contact points and normals.
 
     Outputs: q_r (n, 3), cos_gamma (n,), J_A (n,), J_A_scale (n,), J_W (n, 6) dual to X_EE' and
-    the rods' lengths (n,), M_J (6, m), reach (n,), contact points (3, k).
+    the rods' lengths (n,), M_J (6, m), reach (n,), contact points (3, k), unit normals (3, k).
     """
     X = ca.SX.sym("X", 6)
     state = pose_state(X, ca.SX.zeros(6), ca.SX.zeros(6))
@@ -187,6 +187,7 @@ def posture_function(mechanism: Mechanism) -> ca.Function:
         loops.append(loop)
         J_W.append(2 * state.pull(loop.rod, M.lever).T)
     points = ca.horzcat(ca.SX(3, 0), *(X[:3] + r for r in frame.levers))
+    normals = ca.horzcat(ca.SX(3, 0), *(n / ca.norm_2(n) for n in frame.gradients))
     columns = [
         ca.vertcat(*(loop.q_r.T for loop in loops)),
         *(
@@ -198,6 +199,7 @@ def posture_function(mechanism: Mechanism) -> ca.Function:
         M_J,
         ca.vertcat(*(loop.reach for loop in loops)),
         points,
+        normals,
     ]
     return _function("posture", [X], columns)
 

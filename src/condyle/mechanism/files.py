@@ -14,9 +14,9 @@ from pydantic import TypeAdapter, ValidationError
 from ..errors import InputError, MechanismError, did_you_mean
 from .chain import Chain
 from .home import holding_problems, home_problem
-from .mechanism import COORDINATES, Contact, Mechanism, structural_problems
+from .mechanism import COORDINATES, SIDE_OPTIONS, Contact, Mechanism, structural_problems
 from .quantities import PER_METRE
-from .surface import Expression
+from .surface import Plane, Unknown
 
 _BUNDLED = files(__package__) / "bundled"
 
@@ -81,11 +81,15 @@ def read_tables(text: str, source: str) -> dict[str, Any]:
 
 
 def from_data(
-    data: Mapping[str, Any], source: str = "mechanism", at_home: bool = True
+    data: Mapping[str, Any],
+    source: str = "mechanism",
+    at_home: bool = True,
+    notes: bool = False,
 ) -> Mechanism:
     """A mechanism from the tables of a file, lengths in its `length_unit`.
 
     Args: at_home: whether the contacts must be on their surfaces and hold the platform.
+          notes: whether a note may stand in the place of a surface, as `record` leaves it.
     """
     data = dict(data)
     unit = data.pop("length_unit", "m")
@@ -93,7 +97,7 @@ def from_data(
     if not isinstance(unit, str) or unit not in PER_METRE:
         problems.append(f'length_unit: expected "m" or "mm", got {_shown(unit)}')
         unit = "m"
-    context = {"per_metre": PER_METRE[unit]}
+    context = {"per_metre": PER_METRE[unit], "notes": notes}
     # Names that Python has for a key of the file are no keys of the file.
     aliased = {name for name, field in Mechanism.model_fields.items() if field.alias}
     for key in aliased & data.keys():
@@ -113,7 +117,7 @@ def from_data(
     return mechanism
 
 
-def _contact_problems(data: Mapping[str, Any], context: Mapping[str, float]) -> Iterator[str]:
+def _contact_problems(data: Mapping[str, Any], context: Mapping[str, Any]) -> Iterator[str]:
     """Contacts that are off their surface at home or cannot hold the platform.
 
     They are found also where other parts of the file are not valid yet.
@@ -136,7 +140,7 @@ def _contact_problems(data: Mapping[str, Any], context: Mapping[str, float]) -> 
     yield from holding_problems(draft)
 
 
-def _valid(kind: Any, tables: Any, context: Mapping[str, float]) -> list[Any]:
+def _valid(kind: Any, tables: Any, context: Mapping[str, Any]) -> list[Any]:
     """Each table as a `kind`, None where it is none."""
     adapter, found = TypeAdapter(kind), []
     for table in tables if isinstance(tables, list) else ():
@@ -213,21 +217,55 @@ def dumps(mechanism: Mechanism) -> str:
 
     Raises: InputError: if a surface is a Python expression, which a file cannot hold.
     """
-    import tomli_w
-
     if names := written_in_python(mechanism):
         raise InputError(
             f"{mechanism.name}: the surface of {', '.join(names)} is a Python expression; a "
             "mechanism file holds kinds and numbers only. Use a kind of surface instead"
         )
+    return _toml(_tables(mechanism))
 
+
+def record(mechanism: Mechanism) -> str:
+    """The mechanism as a solution keeps it: as `dumps`, with notes of surfaces from Python."""
+    python = written_in_python(mechanism)
+    if not python:
+        return dumps(mechanism)
+    stand_in = {"surface": Plane(slope=(0.0, 0.0), offset=0.0)}
+    contacts = tuple(
+        contact.model_copy(update=stand_in) if contact.name in python else contact
+        for contact in mechanism.contacts
+    )
+    data = _tables(mechanism.model_copy(update={"contacts": contacts}))
+    for table, contact in zip(data["contact"], mechanism.contacts, strict=True):
+        if contact.name in python:
+            table["surface"] = {"kind": Unknown.kind, "closed": contact.surface.closed}
+    note = f"# The surface of {', '.join(python)} was written in Python; a file cannot hold it.\n"
+    return note + _toml(data)
+
+
+def recall(text: str, source: str = "mechanism") -> Mechanism:
+    """The mechanism of a solution, from what `record` made of it.
+
+    A surface from Python comes back as an `Unknown` one, which can be shown but not computed with.
+    """
+    return from_data(read_tables(text, source), source, at_home=False, notes=True)
+
+
+def _tables(mechanism: Mechanism) -> dict[str, Any]:
+    """The tables of a file in SI."""
     data = mechanism.model_dump(by_alias=True, exclude_none=True, exclude_defaults=False)
-    return tomli_w.dumps(_without_empty({"length_unit": "m", **data}))
+    return _without_empty({"length_unit": "m", **data})
+
+
+def _toml(data: dict[str, Any]) -> str:
+    import tomli_w
+
+    return tomli_w.dumps(data)
 
 
 def written_in_python(mechanism: Mechanism) -> list[str]:
-    """Names of contacts whose surface is a Python expression."""
-    return [c.name for c in mechanism.contacts if isinstance(c.surface, Expression)]
+    """Names of contacts whose surface is, or was, a Python expression."""
+    return [c.name for c in mechanism.contacts if c.surface.kind == Unknown.kind]
 
 
 def _without_empty(value: Any) -> Any:
@@ -256,4 +294,8 @@ def json_schema() -> dict[str, Any]:
         "description": "unit of every length in the file; all else is SI",
     }
     schema["properties"] = {"length_unit": unit, **schema["properties"]}
+    kinds, contact = schema["$defs"], schema["$defs"]["Contact"]["properties"]
+    for surface in contact["surface"]["discriminator"]["mapping"].values():
+        table = kinds[surface.rpartition("/")[2]]["properties"]
+        table |= {key: contact[key] for key in SIDE_OPTIONS}
     return schema

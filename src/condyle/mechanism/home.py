@@ -64,7 +64,7 @@ def condition_of(jacobian: np.ndarray, names: tuple[str, ...]) -> float:
     singular = np.linalg.svd(columns, compute_uv=False)
     scale = np.linalg.norm(jacobian, 2)
     # Rounding must not turn a coordinate the contacts ignore into one they determine.
-    if singular[-1] < 1e-13 * scale or not np.isfinite(singular).all():
+    if singular[-1] <= 1e-13 * scale or not np.isfinite(singular).all():
         return float("inf")
     return float(singular[0] / singular[-1])
 

@@ -119,7 +119,9 @@ class Contact(Table):
     @model_validator(mode="after")
     def _sided(self) -> Self:
         known = sides(self.surface.closed)
-        expected = f'expected "{known[0]}" or "{known[1]}" for a {self.surface.kind}'
+        kind = self.surface.kind
+        article = "an" if kind[0] in "aeiou" else "a"
+        expected = f'expected "{known[0]}" or "{known[1]}" for {article} {kind}'
         if self.side is None and (self.ball_radius is not None or self.one_sided):
             raise ValueError(f"side is missing, and ball_radius and one_sided need it: {expected}")
         if self.side is not None and self.side not in known:
@@ -128,7 +130,7 @@ class Contact(Table):
         if self.side == "inside" and ball >= room:
             raise ValueError(
                 f"ball_radius: a ball of radius {ball * 1e3:g} mm has no room inside a "
-                f"{self.surface.kind} of radius {room * 1e3:g} mm"
+                f"{kind} of radius {room * 1e3:g} mm"
             )
         return self
 

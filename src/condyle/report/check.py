@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sized
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,7 +25,7 @@ class Description:
         d, s = self.data, self.data["singularity"]
         width = max(len(name) for name in [*d["chains"], *d["contacts"]])
         lines = [
-            f"{d['name']}: {len(d['chains'])} chains, {len(d['contacts'])} contacts, "
+            f"{d['name']}: {_count(d['chains'], 'chain')}, {_count(d['contacts'], 'contact')}, "
             f"{d['degrees_of_freedom']} degrees of freedom, "
             f"actuation redundancy {d['redundancy']}",
             f"independent coordinates: {', '.join(d['independent'])}",
@@ -58,6 +59,10 @@ class Description:
             f"  near: {s['near']}",
         ]
         return "\n".join(lines)
+
+
+def _count(items: Sized, word: str) -> str:
+    return f"{len(items)} {word}" + "s" * (len(items) != 1)
 
 
 def describe(mechanism: Mechanism) -> Description:

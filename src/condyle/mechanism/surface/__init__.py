@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 import casadi as ca
-from pydantic import Field, ValidatorFunctionWrapHandler, WrapValidator
+from pydantic import Field, ValidationInfo, ValidatorFunctionWrapHandler, WrapValidator
 
 from .base import SurfaceTable, sides
 from .cylinder import Cylinder
@@ -17,10 +18,18 @@ from .plane import Plane
 from .profile import Profile
 from .quadratic import Quadratic
 from .sphere import Sphere
+from .unknown import Unknown
 
 
-def _written_in_python(value: Any, from_file: ValidatorFunctionWrapHandler) -> Any:
-    return value if isinstance(value, Expression) else from_file(value)
+def _written_in_python(
+    value: Any, from_file: ValidatorFunctionWrapHandler, info: ValidationInfo
+) -> Any:
+    if isinstance(value, Expression | Unknown):
+        return value
+    notes = (info.context or {}).get("notes", False)
+    if notes and isinstance(value, Mapping) and value.get("kind") == Unknown.kind:
+        return Unknown(bool(value.get("closed")))
+    return from_file(value)
 
 
 Surface = Annotated[
@@ -59,6 +68,7 @@ __all__ = [
     "Sphere",
     "Surface",
     "SurfaceTable",
+    "Unknown",
     "of_form",
     "sides",
 ]

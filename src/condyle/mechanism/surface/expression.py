@@ -24,7 +24,8 @@ class Expression(Smooth):
     mechanism file names kinds and numbers, and nothing in it is evaluated.
 
     Args:   function: (3,) SX -> scalar SX;  closed: whether the surface has an inside.
-    Raises: InputError: if `function` does not return a scalar expression of the point alone.
+    Raises: InputError: if `function` is none, or does not return a scalar expression of the point
+            alone.
     """
 
     function: Callable[[ca.SX], Any]
@@ -34,6 +35,8 @@ class Expression(Smooth):
     kind: ClassVar[str] = "expression"
 
     def __post_init__(self) -> None:
+        if not callable(self.function):
+            raise InputError(f"a surface needs a function of a point, got {self.function!r}")
         p = ca.SX.sym("p", 3)
         value = self.function(p)
         if not isinstance(value, ca.SX) or value.shape != (1, 1):

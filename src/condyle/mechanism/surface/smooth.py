@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import casadi as ca
 
 
 class Smooth:
-    """What has an equation phi(point, constants), twice differentiable."""
+    """What has an equation phi(point, constants), twice differentiable.
+
+    known: whether that equation is at hand.
+    """
+
+    known: ClassVar[bool] = True
 
     def phi(self, point: Any, constants: Any = None) -> Any:
         raise NotImplementedError

@@ -63,7 +63,8 @@ def contact_track(solution: Solution) -> Figure:
             frame(axes)
             axes.set(xlabel=f"{across} [mm]", ylabel=f"{up} [mm]")
             axes.set_title(f"{readable(name)}, {view}")
-        draw_surface(grid[1, k], contacts[name])
+        if contacts[name].surface.known:
+            draw_surface(grid[1, k], contacts[name])
     figure.set_layout_engine("compressed", w_pad=0.12)  # made for axes of fixed shape
     entries: dict[str, Any] = {}
     for axes in grid.ravel():
@@ -80,6 +81,7 @@ def frame(axes: Axes) -> None:
     width = 1.15 * max(x1 - x0, (y1 - y0) / VIEW_RATIO)
     x, y, height = (x0 + x1) / 2, (y0 + y1) / 2, VIEW_RATIO * width
     axes.set(xlim=(x - width / 2, x + width / 2), ylim=(y - height / 2, y + height / 2))
+    axes.locator_params(axis="x", nbins=5)
     axes.set_aspect("equal", adjustable="box")
 
 
@@ -109,12 +111,16 @@ def draw_bounds(axes: Axes, bounds: Bounds, across: str, up: str) -> None:
 
 
 def draw_surface(axes: Axes, contact: Contact) -> None:
-    """The surface at the y of the home point, within the view."""
+    """Where the centre of the ball can be, at the y of the home point and within the view."""
     (x0, x1), (z0, z1) = axes.get_xlim(), axes.get_ylim()
     x, z = np.meshgrid(np.linspace(x0, x1, GRID), np.linspace(z0, z1, GRID))
     p = ca.SX.sym("p", 3)
-    phi = ca.Function("phi", [p], [contact.surface.phi(p)])
+    phi = ca.Function("phi", [p], [contact.locus.phi(p)])
     where = np.column_stack([x.ravel(), np.full(x.size, contact.point[1] * 1e3), z.ravel()]) / 1e3
     value = evaluate(phi, where)[0].reshape(x.shape)
+    value[~np.isfinite(value)] = np.nan  # a ball far from its wall
     axes.contour(x, z, value, levels=[0.0], colors=PALETTE[2], linewidths=1.0, zorder=1)
-    axes.plot([], [], color=PALETTE[2], lw=1.0, label="surface")
+    label = "surface at the home y"
+    if contact.ball_radius is not None:
+        label += ", less the ball's radius"
+    axes.plot([], [], color=PALETTE[2], lw=1.0, label=label)

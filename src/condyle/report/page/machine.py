@@ -108,6 +108,8 @@ def _chains(
 
 def _surfaces(mechanism: Mechanism, scene: Scene, size: float) -> Iterator[dict[str, Any]]:
     for contact in mechanism.contacts:
+        if not contact.surface.known:
+            continue
         patch = contact_patch(contact, scene.contacts[contact.name], size)
         finite = np.where(np.isfinite(patch.vertices), patch.vertices, 0.0)
         yield {
@@ -187,7 +189,11 @@ def _contact_arrows(
 ) -> Iterator[Arrow]:
     forces = solution["contact_force"].values
     for i, contact in enumerate(solution.mechanism.contacts):
-        vector = forces[:, i, None] * contact_normals(contact, scene.contacts[contact.name])
+        if contact.surface.known:
+            normals = contact_normals(contact, scene.contacts[contact.name])
+        else:
+            normals = solution["contact_normal"].values[:, i]
+        vector = forces[:, i, None] * normals
         numbers = columns.add_vector(f"contact_vector.{contact.name}", vector)
         # From the ball's skin, or a small force would hide in it.
         yield Arrow("contact", contact.point, vector, ball_radius(contact, size), numbers)

@@ -70,7 +70,12 @@ def contact_patch(contact: Contact, track: np.ndarray, size: float) -> Patch:
 
 
 def contact_profile(contact: Contact, low: float, high: float, y: float) -> np.ndarray | None:
-    """The locus of the centre over x = low..high at `y`, (M, 3) [m]; None where it is upright."""
+    """The locus of the centre over x = low..high at `y`, (M, 3) [m].
+
+    None where it is upright, and for a surface whose equation is not known.
+    """
+    if not contact.surface.known:
+        return None
     frame = _frame(contact)
     if not np.array_equal(frame, np.eye(3)):
         return None

@@ -1,0 +1,151 @@
+"""A surface written in Python: in models, in `compare`, in files and on pages of a solution."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import condyle
+from condyle.analysis.compare import compare
+from condyle.errors import InputError, MechanismError
+from condyle.mechanism import Contact, Mechanism, dumps, parse
+from condyle.mechanism.surface import Expression, Unknown
+from condyle.model import Model
+from condyle.motion import Motion
+from condyle.report.figures import PLOTS
+from condyle.report.page import write_report
+from condyle.solution import Solution
+
+from .cases import close
+
+
+def wave(p: ca.SX) -> ca.SX:
+    return p[2] + 1.1 * p[0] - 0.013215 - 1e-4 * ca.sin(60 * (p[0] + 0.02665))
+
+
+@pytest.fixture(scope="module")
+def machine(reference: Mechanism) -> Mechanism:
+    """The left ball in a waved socket, the right one free to lift off its plane."""
+    left, right = reference.contacts
+    left = left.model_copy(update={"surface": Expression(wave)})
+    right = right.model_copy(update={"side": "below", "one_sided": True})
+    return reference.replace(contacts=(left, right))
+
+
+@pytest.fixture(scope="module")
+def motion() -> Motion:
+    t = np.linspace(0, 1, 25)
+    swing = np.sin(2 * np.pi * t)
+    sizes = {"X": 3e-3, "Y": 1e-3, "alpha": 0.01, "beta": 0.05}
+    return Motion.from_arrays(t, {name: size * swing for name, size in sizes.items()})
+
+
+@pytest.fixture(scope="module")
+def solution(machine: Mechanism, motion: Motion) -> Solution:
+    return Model(machine, backend="interpreted").solve(motion)
+
+
+@pytest.fixture
+def saved(solution: Solution, tmp_path: Path) -> Solution:
+    solution.save(tmp_path / "s.nc", tmp_path / "s.csv")
+    return condyle.open_solution(tmp_path / "s.nc")
+
+
+def test_every_backend_and_model(machine: Mechanism, motion: Motion, solution: Solution) -> None:
+    by_default = condyle.derive(machine).solve(motion)
+    close(by_default["torque"].values, solution["torque"].values, 1e-11)
+    comparison = compare(machine, motion, formulations=["virtual_power", "lagrange"])
+    assert all(pair.torque < 1e-11 for pair in comparison.differences())
+    assert "virtual_power direct" in str(comparison)  # not available, and why
+    assert comparison.mechanism.contact_names == machine.contact_names
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("phi", "message"),
+    [
+        (lambda p: 0 * p[2], "cannot hold the platform"),
+        (lambda p: ca.log(-1 - p[0] ** 2), "no normal at the contact point"),
+        (lambda p: p[2] + 1.1 * p[0], r"\+8\.88937 mm off the surface"),
+    ],
+)
+def test_surfaces_that_hold_nothing(reference: Mechanism, phi, message: str) -> None:
+    more = {"surface": Expression(phi)}
+    held = tuple(contact.model_copy(update=more) for contact in reference.contacts)
+    with pytest.raises(MechanismError, match=message):
+        condyle.derive(reference.replace(contacts=held))
+
+
+def test_a_mechanism_file_cannot_hold_it(machine: Mechanism, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="the surface of left_condyle is a Python expression"):
+        condyle.dump(machine, tmp_path / "m.toml")
+    assert not (tmp_path / "m.toml").exists()
+
+
+def test_a_solution_keeps_a_note_of_it(machine: Mechanism, saved: Solution) -> None:
+    """All but the equation comes back, and nothing computes without it."""
+    again = saved.mechanism
+    left, right = again.contacts
+    assert left == machine.contacts[0].model_copy(update={"surface": Unknown()})
+    assert right == machine.contacts[1]
+    assert (again.platform, again.chains) == (machine.platform, machine.chains)
+    assert saved.attrs["mechanism"].startswith(
+        "# The surface of left_condyle was written in Python"
+    )
+    for compute in (condyle.derive, dumps):
+        with pytest.raises(InputError, match="Python"):
+            compute(again)
+    restored = again.replace(contacts=(machine.contacts[0], right))
+    assert restored == machine
+
+
+def test_options_of_the_note(machine: Mechanism, motion: Motion) -> None:
+    """Whether the surface is closed decides what its sides are called."""
+    centre, radius = (-0.02665, 0.072, 0.04253 - 0.026), 0.03
+    shell = Expression(
+        lambda p: ca.sqrt(sum((p[i] - centre[i]) ** 2 for i in range(3))) - radius,
+        closed=True,
+    )
+    ball = {"surface": shell, "side": "inside", "ball_radius": 0.004}
+    left = machine.contacts[0].model_copy(update=ball)
+    held = machine.replace(contacts=(left, machine.contacts[1]))
+    found = Model(held, backend="interpreted").solve(motion).mechanism.contacts[0]
+    assert found.surface == Unknown(closed=True)
+    assert (found.side, found.ball_radius) == ("inside", 0.004)
+
+
+def test_unit_normals_are_kept(machine: Mechanism, saved: Solution) -> None:
+    point, normal = (saved[name].values[:, 0] for name in ("contact_point", "contact_normal"))
+    slope = 1.1 - 6e-3 * np.cos(60 * (point[:, 0] + 0.02665))
+    wanted = np.column_stack([slope, 0 * slope, 1 + 0 * slope]) / np.hypot(slope, 1)[:, None]
+    close(normal, wanted, 1e-14)
+
+
+def test_figures_and_report_of_a_saved_solution(saved: Solution, tmp_path: Path) -> None:
+    for draw in PLOTS.values():
+        draw(saved)
+    page = write_report(saved, tmp_path / "s.html").read_text()
+    assert "was written in Python" in page
+    assert "contact_vector.left_condyle" in page
+
+
+def test_commands_on_a_saved_solution(solution: Solution, condyle_command, tmp_path: Path) -> None:
+    solution.save(tmp_path / "s.nc")
+    assert condyle_command("report", "s.nc").status == 0
+    viewed = condyle_command("view", "--solution", "s.nc", "--no-browser")
+    assert viewed.status == 2 and "written in Python" in viewed.err
+
+
+def test_a_file_cannot_write_the_note(machine: Mechanism, saved: Solution) -> None:
+    with pytest.raises(MechanismError, match="the kind 'expression' is unknown; available"):
+        parse(saved.attrs["mechanism"])
+
+
+def test_a_contact_may_hold_an_unknown_surface() -> None:
+    contact = Contact(name="c", point=(0.0, 0.0, 0.0), surface=Unknown(closed=True), side="inside")
+    for ask in (lambda s: s.phi((0, 0, 0)), lambda s: s.constants(), lambda s: s.form):
+        with pytest.raises(InputError, match=r"mechanism\.replace"):
+            ask(contact.surface)
