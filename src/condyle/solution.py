@@ -20,6 +20,7 @@ from .mechanism.files import written_in_python
 from .mechanism.home import home_warnings
 from .mechanism.mechanism import COORDINATES, Mechanism
 from .model import STATUS_NAMES
+from .progress import step
 
 if TYPE_CHECKING:
     from .model import Evaluation, Model
@@ -74,7 +75,7 @@ class Solution(xr.Dataset):
         """Write as NetCDF (.nc) or CSV (.csv): every file whole, or none of them."""
         from .motion import write_table
 
-        with ExitStack() as stack:
+        with step("writing results"), ExitStack() as stack:
             for path in paths:
                 suffix = Path(path).suffix.lower()
                 if suffix not in (".nc", ".csv"):

@@ -43,7 +43,7 @@ def test_columns_and_digits(
     wrench = np.random.default_rng(1).normal(0, 5, (9, 6))
     write_csv([*header(), *LOAD], np.hstack([q, q1, q2, wrench]), "states.csv")
     outcome = condyle_command("solve", "masticatory", "--states", "states.csv", "--out", "out.csv")
-    assert outcome.status == 0 and outcome.out == "9 rows solved: out.csv\n"
+    assert outcome.status == 0 and outcome.out.startswith("9 rows solved: out.csv\n")
     columns, rows = read_csv("out.csv")
     chains, contacts = model.mechanism.chain_names, model.mechanism.contact_names
     assert columns == [

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import re
 import sys
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import typer
+from typing import TYPE_CHECKING
 
 from ..errors import BoundsError, InputError
 
@@ -60,19 +56,10 @@ def file_stem(name: str) -> str:
     return re.sub(r"[^\w.+-]+", "_", name)
 
 
-def say(quiet: bool, text: str) -> None:
-    if not quiet:
-        typer.echo(text)
-
-
 def warn(warnings: list[str]) -> None:
     """Warnings on stderr, so that they never mix with results."""
     for warning in warnings:
         print(f"condyle: warning: {warning}", file=sys.stderr)
-
-
-def say_json(data: Mapping[str, Any]) -> None:
-    typer.echo(json.dumps(data, indent=2, allow_nan=False))
 
 
 def require_inside(warnings: list[str]) -> None:

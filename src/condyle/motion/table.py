@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from condyle.errors import InputError, did_you_mean
+from condyle.progress import step
 
 CHUNK_ROWS = 16_384
 
@@ -83,16 +84,18 @@ def iter_table(
     chunk_rows: int = CHUNK_ROWS,
     *,
     known: Collection[str] | None = None,
+    doing: str = "reading",
 ) -> Iterator[Table]:
     """Read a CSV file of numbers, of any length, in tables of up to `chunk_rows` rows.
 
     Args:   known: column names that may occur; others are an error. None: any may.
+            doing: what is done with the rows, to be shown as progress through the file.
     Yields: Table: at least one, none of them empty, all with the same columns.
     Raises: InputError: for whatever is not a table of finite numbers, with line and column. Chunks
             before the one with the error have been yielded by then.
     """
     source = os.fspath(path)
-    with _open(path) as file:
+    with _open(path) as file, step(f"{doing} {Path(path).name}", _size(path)) as advance:
         parser, line = _read_header(source, file)
         if known is not None:
             _allow(source, parser.names, known)
@@ -108,6 +111,7 @@ def iter_table(
                 columns = {name: values[:, j].copy() for j, name in enumerate(parser.names)}
                 yield Table(source, columns, line)
                 line += size
+            advance(sum(map(len, read)))
         if line == first:
             raise InputError(f"{source}: has column names but no rows of numbers")
 
@@ -241,6 +245,11 @@ def _open(path: str | os.PathLike[str]) -> Iterator[TextIOWrapper]:
         raise InputError(f"{path}: is not UTF-8 text ({error}); save it as CSV UTF-8") from error
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
+
+
+def _size(path: str | os.PathLike[str]) -> int | None:
+    """Bytes in a file, None for a pipe."""
+    return os.path.getsize(path) if os.path.isfile(path) else None
 
 
 _CONTROL = bytes(set(range(32)) - set(b"\t\n\r\f"))
