@@ -12,7 +12,7 @@ import xarray as xr
 
 from . import __version__
 from .atomic import replacing
-from .errors import InputError
+from .errors import InputError, no_such_file
 from .kinematics.chain import FAMILIES
 from .kinematics.singularity import KINDS, NEAR
 from .mechanism import dumps, parse
@@ -118,10 +118,12 @@ def open_solution(path: str | Path) -> Solution:
 
     Raises: InputError: if the file is missing or is not a condyle solution.
     """
+    if Path(path).is_dir():
+        raise InputError(f"{path}: is a folder; give the name of a solution (.nc) in it")
     try:
         dataset = xr.load_dataset(path, engine="h5netcdf")
     except FileNotFoundError:
-        raise InputError(f"solution file {path} does not exist") from None
+        raise no_such_file(path) from None
     except Exception as error:
         raise InputError(f"{path} is not a NetCDF solution: {error}") from None
     if "mechanism" not in dataset.attrs or "torque" not in dataset:

@@ -48,7 +48,7 @@ def test_the_ways_programs_and_spreadsheets_write_a_table(csv_file, content):
         ("t,x\n", "no rows"),
         ("t,x\n,\n\n", "no rows"),
         ("0,1\n1,2\n", "line 1: got numbers, expected the names"),
-        ("t,x,\n0,1,2\n", "line 1: column 3 of 3 has no name"),
+        ("t,x,\n0,1,2\n", 'line 2: got "2" in column 3, which has no name'),
         ("t,x,x\n0,1,2\n", 'line 1: column "x" is given more than once'),
         ("t,x\n0,1\n1,abc\n", 'line 3, column "x": got "abc", expected a number'),
         ("t,x\n0,1\n1,1_0\n", 'line 3, column "x": got "1_0", expected a number'),

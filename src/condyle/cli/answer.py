@@ -12,6 +12,8 @@ from typing import Any, Literal
 
 import typer
 
+FEW = 4  # files that a line names
+
 
 @dataclass(frozen=True)
 class Answer:
@@ -41,8 +43,10 @@ class Answer:
 
 
 def files_line(files: list[Path]) -> str:
-    """'Results: a.nc, a.csv'."""
-    return "Results: " + ", ".join(map(str, files))
+    """'Results: a.nc, a.csv'; of many files the first few."""
+    few = files if len(files) <= FEW else files[: FEW - 1]
+    more = f" and {len(files) - len(few)} more in {files[0].parent}" if few != files else ""
+    return f"Results: {', '.join(map(str, few))}{more}"
 
 
 def command_line(command: str, *words: object, **options: object) -> str:

@@ -99,3 +99,6 @@ def main() -> None:
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(1)
+    except OSError as error:  # of the machine, such as a folder that went away
+        print(f"condyle: {error}", file=sys.stderr)
+        sys.exit(2)

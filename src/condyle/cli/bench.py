@@ -18,7 +18,7 @@ from .inputs import output_folder
 def bench(
     out: Annotated[Path | None, typer.Option(help="JSON file for the results.")] = None,
     seconds: Annotated[
-        float, typer.Option(help="How long each row of the table is timed (s).", min=0.01)
+        float, typer.Option(help="How long each row of the table is timed (s).", min=0.01, max=600)
     ] = 1.0,
 ) -> Answer:
     """How fast it is on this machine.

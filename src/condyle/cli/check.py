@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from . import options
 from .answer import Answer, command_line
 from .app import BEGIN, command
-from .inputs import warn
-
-if TYPE_CHECKING:
-    from ..mechanism import Mechanism
+from .inputs import chews, warn
 
 Project = Annotated[
     bool,
@@ -39,13 +36,8 @@ def check(mechanism: options.Mechanism, project: Project = False) -> Answer:
     machine = condyle.load(mechanism)
     description = describe(machine)
     warn(home_warnings(machine))
-    then = command_line("run" if _chews(machine) else "view", mechanism)
+    then = command_line("run" if chews(machine) else "view", mechanism)
     return Answer(f"{description}\n", description.data, then, "result")
-
-
-def _chews(machine: Mechanism) -> bool:
-    """Whether the bundled motion and load are made for such a mechanism."""
-    return len(machine.contacts) == 2 and {"incisor", "right_molar"} <= {*machine.platform.points}
 
 
 def _projection(mechanism: str) -> Answer | None:

@@ -43,7 +43,7 @@ def compare(
     from ..report.tables import save_tables, tables
 
     machine = condyle.load(mechanism)
-    path, acting = motion_and_load(motion, load, units, landmark, smooth, rate)
+    path, acting = motion_and_load(machine, motion, load, units, landmark, smooth, rate)
     comparison = compare_models(machine, path, acting, load_point)
     output_folder(out)
     files = save_tables(comparison, out)

@@ -31,6 +31,8 @@ def new(
     stem = path.name.removesuffix(".toml")
     text = starter_text(stem)
     try:
+        if stem.startswith("."):
+            raise InputError("a hidden file")
         parse(text)
     except InputError:
         raise InputError(

@@ -47,7 +47,7 @@ def run(
     from ..summary import summarize
 
     machine = condyle.load(mechanism)
-    path, acting = motion_and_load(motion, load, units, landmark, smooth, rate)
+    path, acting = motion_and_load(machine, motion, load, units, landmark, smooth, rate)
     model = condyle.derive(machine, formulation, route, backend)
     solution = model.solve(path, acting, load_point, flag, reactions)
     if strict:
