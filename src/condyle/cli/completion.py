@@ -41,23 +41,24 @@ def one_of(*names: str) -> Callable[[str], list[str]]:
 
 
 def mechanisms(incomplete: str) -> list[str]:
-    """Bundled mechanisms, files of the folder that end in .toml, and folders."""
-    folder = Path(incomplete if incomplete.endswith("/") else Path(incomplete).parent)
+    """Bundled mechanisms, and files that end in .toml and folders where the word leads."""
+    place = incomplete[: incomplete.rfind("/") + 1]
     try:
-        beside = sorted(folder.iterdir())
+        beside = sorted(Path(place).iterdir())
     except OSError:
         beside = []
-    paths = [f"{path}/" if path.is_dir() else str(path) for path in beside if _fits(path)]
-    names = [*bundled(), *paths]
-    return [name for name in names if name.startswith(incomplete.removeprefix("./"))]
+    paths = [f"{place}{path.name}{'/' * path.is_dir()}" for path in beside if _fits(path)]
+    return [name for name in (*bundled(), *paths) if name.startswith(incomplete)]
 
 
 def points(context: typer.Context, incomplete: str) -> list[str]:
     """Points of the platform, from the mechanism named before on the line."""
+    # Words stay in `args` while the option that is being completed has no value.
+    words = [*context.args, context.params.get("mechanism") or "masticatory"]
     try:
-        tables = tomllib.loads(_text(context.params.get("mechanism") or "masticatory"))
+        tables = tomllib.loads(_text(next(w for w in words if w in bundled() or ".toml" in w)))
         names = list(tables["platform"]["points"])
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, StopIteration):
         return []
     return [name for name in names if name.startswith(incomplete)]
 
