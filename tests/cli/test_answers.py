@@ -68,7 +68,7 @@ def command(
     Path("my path.csv").write_bytes(bundled_reference()[0].read_bytes())
     states = [prefix + name for prefix in ("", "d", "dd") for name in ("X", "Y", "alpha", "beta")]
     joints = [f"joint_{name}" for name in condyle.load("masticatory").chain_names]
-    tables = {"states": (states, 0), "joints": (joints, 0), "far": (joints, 50)}
+    tables = {"states": (states, 0), "joints": (joints, 0), "far": (joints, 3)}
     for name, (columns, value) in tables.items():
         row = ",".join([str(value)] * len(columns))
         Path(f"{name}.csv").write_text(f"{','.join(columns)}\n{row}\n")

@@ -111,22 +111,6 @@ def test_any_valid_set_of_coordinates(
     np.testing.assert_allclose(table[:, 8:14], found.poses.pose, atol=1e-13)
 
 
-def test_tables_as_spreadsheets_write_them(
-    condyle_command: Callable[..., Any],
-    write_csv: Callable[..., Path],
-    read_csv: Callable[..., Any],
-) -> None:
-    """Semicolons and decimal commas: the same result to the last digit."""
-    path = write_csv(header(), np.hstack(draw(5)), "states.csv")
-    arguments = ("solve", "masticatory", "--states", "states.csv", "--out", "out.csv")
-    assert condyle_command(*arguments).status == 0
-    wanted = read_csv("out.csv")
-    text = path.read_text().replace(",", ";").replace(".", ",")
-    path.write_bytes(b"\xef\xbb\xbf" + text.replace("\n", "\r\n").encode())
-    assert condyle_command(*arguments).status == 0
-    assert read_csv("out.csv") == wanted
-
-
 def test_flagged_rows_are_kept_and_empty(
     condyle_command: Callable[..., Any],
     write_csv: Callable[..., Path],
