@@ -135,10 +135,10 @@ def command_help() -> str:
     from condyle.cli import commands  # noqa: F401 - registers them
     from condyle.cli.app import app
 
-    return "\n\n".join(_section(c.callback, c.name) for c in app.registered_commands)
+    return "\n\n".join(_section(c.callback, c.name, c.epilog) for c in app.registered_commands)
 
 
-def _section(function: Any, name: str | None) -> str:
+def _section(function: Any, name: str | None, epilog: str | None) -> str:
     text = inspect.getdoc(function) or ""
     lines = [f"## condyle {name or function.__name__}", "", text]
     hints = get_type_hints(function, include_extras=True)
@@ -146,6 +146,9 @@ def _section(function: Any, name: str | None) -> str:
     rows = [_row(p.name, hints[p.name], p.default) for p in parameters]
     if rows:
         lines += ["", "| argument or option | value | what it does |", "|---|---|---|", *rows]
+    if epilog:
+        label, _, example = epilog.partition(": ")
+        lines += ["", f"{label}: `{example}`"]
     return "\n".join(lines)
 
 

@@ -7,7 +7,9 @@ stderr and exits with status 2. The facts behind a message are attributes of the
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 
 class CondyleError(Exception):
@@ -61,7 +63,24 @@ class BoundsError(SampleError):
 def did_you_mean(name: str, available: Iterable[str]) -> str:
     """' Did you mean "x"? Available: ...' for a name that is not among `available`."""
     choices = sorted(available)
-    near = difflib.get_close_matches(name, choices, n=1)
+    near = nearest(name, choices)
     guess = f' Did you mean "{near[0]}"?' if near else ""
     listed = f" Available: {', '.join(choices)}." if choices else " None is available."
     return guess + listed
+
+
+def nearest(name: str, available: Iterable[str]) -> list[str]:
+    """Up to three names like `name`, the most alike first; the same in other letters counts."""
+    choices = sorted(available)
+    same = [choice for choice in choices if choice.casefold() == name.casefold()]
+    return same or difflib.get_close_matches(name, choices, n=3)
+
+
+def no_such_file(path: str | os.PathLike[str]) -> InputError:
+    """The error for a file that is not there, with names like it in its folder."""
+    folder = Path(path).parent.resolve()
+    if not folder.is_dir():
+        return InputError(f"{path}: no such file; the folder {folder} does not exist")
+    near = nearest(Path(path).name, os.listdir(folder))
+    guess = f" Did you mean {' or '.join(near)}?" if near else ""
+    return InputError(f"{path}: no such file in {folder}.{guess}")

@@ -13,6 +13,7 @@ from .kinematics.forward import ForwardKinematics
 from .mechanism.mechanism import COORDINATES, Mechanism
 from .model import check_home
 from .motion import read_table, write_table
+from .progress import step
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,8 @@ def pose_file(
     check_home(mechanism)
     names = [f"joint_{name}" for name in mechanism.chain_names]
     table = read_table(joints, known=("t", *names))
-    solution = ForwardKinematics(mechanism).solve(table.require(names))
+    with step("finding poses"):
+        solution = ForwardKinematics(mechanism).solve(table.require(names))
     missing = np.flatnonzero(~solution.found)
     if missing.size and not flag:
         raise UnreachableError(

@@ -32,6 +32,7 @@ from .mechanism.home import (
     independent_coordinates,
 )
 from .mechanism.mechanism import COORDINATES, Mechanism
+from .progress import step
 
 if TYPE_CHECKING:
     from .kernels.compiled import Compiled
@@ -103,7 +104,8 @@ class Model:
         self.mechanism = mechanism
         self.formulation = formulation_named(formulation).name
         self.route = route
-        self.kernel = choose_kernel(mechanism, self.formulation, route, backend)
+        with step("deriving the equations"):
+            self.kernel = choose_kernel(mechanism, self.formulation, route, backend)
         self.derivation_seconds = time.perf_counter() - start
 
     @property
@@ -248,8 +250,9 @@ class Model:
         loaded = np.any(wrench) or name is not None
         point = self.load_point(name) if loaded else np.zeros(3)
         name = (name or DEFAULT_LOAD_POINT) if loaded else None
-        q, q1, q2, residual = self.independent_motion(motion)
-        evaluation = self.evaluate(q, q1, q2, with_point(wrench, point), threads)
+        with step("solving"):
+            q, q1, q2, residual = self.independent_motion(motion)
+            evaluation = self.evaluate(q, q1, q2, with_point(wrench, point), threads)
         if not flag:
             self.require_ok(evaluation, motion.t)
         seconds = time.perf_counter() - start

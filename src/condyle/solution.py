@@ -12,13 +12,14 @@ import xarray as xr
 
 from . import __version__
 from .atomic import replacing
-from .errors import InputError
+from .errors import InputError, no_such_file
 from .kinematics.chain import FAMILIES
 from .kinematics.singularity import KINDS, NEAR
 from .mechanism.files import recall, record
 from .mechanism.home import home_warnings
 from .mechanism.mechanism import COORDINATES, Mechanism
 from .model import STATUS_NAMES
+from .progress import step
 
 if TYPE_CHECKING:
     from .model import Evaluation, Model
@@ -72,7 +73,7 @@ class Solution(xr.Dataset):
         """Write as NetCDF (.nc) or CSV (.csv): every file whole, or none of them."""
         from .motion import write_table
 
-        with ExitStack() as stack:
+        with step("writing results"), ExitStack() as stack:
             for path in paths:
                 suffix = Path(path).suffix.lower()
                 if suffix not in (".nc", ".csv"):
@@ -121,10 +122,12 @@ def open_solution(path: str | Path) -> Solution:
 
     Raises: InputError: if the file is missing or is not a condyle solution.
     """
+    if Path(path).is_dir():
+        raise InputError(f"{path}: is a folder; give the name of a solution (.nc) in it")
     try:
         dataset = xr.load_dataset(path, engine="h5netcdf")
     except FileNotFoundError:
-        raise InputError(f"solution file {path} does not exist") from None
+        raise no_such_file(path) from None
     except Exception as error:
         raise InputError(f"{path} is not a NetCDF solution: {error}") from None
     if "mechanism" not in dataset.attrs or "torque" not in dataset:

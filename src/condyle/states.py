@@ -49,7 +49,7 @@ def solve_file(
     lifts: dict[str, tuple[int, int]] = {}
     rows = 0
     with TableWriter(out) as writer:
-        for table in iter_table(states, CHUNK_ROWS, known=known):
+        for table in iter_table(states, CHUNK_ROWS, known=known, doing="solving"):
             columns, margins, lifted = solve_table(
                 model, table, load_point, flag, rows, reactions, threads
             )

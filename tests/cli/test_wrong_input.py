@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import condyle
 from condyle.mechanism import bundled_text
 
 NAMES = ("X", "Y", "alpha", "beta")
@@ -52,6 +53,8 @@ LOADED = table(LOAD, [[0, 0, 0, -5], [1, 0, 0, -5]])
 SOLVE = ("solve", "masticatory", "--states", "in.csv", "--out", "out.csv")
 RUN = ("run", "--motion", "in.csv", "--out", "out")
 CHECK = ("check", "in.toml")
+POSE = ("pose", "masticatory", "--joints", "in.csv", "--out", "out.csv")
+JOINTS = [f"joint_{name}" for name in condyle.load("masticatory").chain_names]
 
 Case = tuple[tuple[str, ...], str | bytes | None, str]
 CASES: dict[str, Case] = {
@@ -172,7 +175,38 @@ CASES: dict[str, Case] = {
     "load falls": (("run", "--load", "in.csv"), table(LOAD, [[1, 0, 0, 0], [0, 0, 0, 0]]), "rise"),
     "load text": (("run", "--load", "in.csv"), table(LOAD, [[0, "a", 0, 0]]), 'got "a"'),
     "load point of run": (("run", "--load-point", "nose"), None, 'no point "nose"'),
+    "bundled motion elsewhere": (("run", "gough-stewart"), None, "Name one of your own: --motion"),
+    # keys and kinds
+    "key misspelt": (CHECK, toml("mass = 0.2 ", "mas = 0.2 "), 'Did you mean "mass"'),
+    "key of a chain": (CHECK, toml("crank_tip =", "cranktip ="), 'Did you mean "crank_tip"'),
+    "key of a surface": (CHECK, toml("offset =", "ofset ="), 'Did you mean "offset"'),
+    "table misspelt": (CHECK, toml("[[chain]]", "[[chains]]"), 'Did you mean "chain"'),
+    "chain family": (CHECK, toml('kind = "RSS"', 'kind = "rss"'), 'Did you mean "RSS"'),
+    "surface kind": (CHECK, toml('kind = "plane"', 'kind = "plain"'), 'Did you mean "plane"'),
+    "column in small letters": (SOLVE, states([0], header=["x", *STATES[1:]]), 'mean "X"'),
+    # joints
+    "joints missing": (POSE, None, "in.csv: no such file"),
+    "joints empty": (POSE, "", "is empty"),
+    "joints of others": (POSE, "joint_left\n0\n", "joint_left"),
+    "joints nan": (POSE, table(JOINTS, [["nan"] * 6]), 'got "nan"'),
+    "joints unreachable": (POSE, table(JOINTS, [[3] * 6]), "no pose has the joint coordinates"),
+    "poses in a folder": ((*POSE[:5], "."), table(JOINTS, [[0] * 6]), "is a folder"),
+    # solutions
+    "solution missing": (("plot", "a.nc"), None, "a.nc: no such file"),
+    "solution is a folder": (("report", "."), None, "is a folder"),
+    "solution is none": (("report", "in.csv"), "t\n0\n", "is not a NetCDF solution"),
+    "solution empty": (("plot", "in.csv"), "", "is not a NetCDF solution"),
+    "solution to view": (("view", "--no-browser", "--solution", "a.nc"), None, "no such file"),
+    "figure": (("plot", "--figure", "torq"), None, 'Did you mean "torque"'),
+    # commands, options and numbers
+    "command": (("chekc",), None, "'check'"),
+    "option": (("run", "--montion", "a.csv"), None, "--motion"),
+    "port": (("view", "--port", "99999"), None, "65535"),
+    "seconds of a row": (("bench", "--seconds", "nan"), None, "--seconds"),
+    "bench in a folder": (("bench", "--out", "."), None, "is a folder"),
+    "bench below a file": (("bench", "--out", "in.csv/a.json"), "", "--out in.csv"),
     # names
+    "new hidden": (("new", ".."), None, "cannot be the name"),
     "new with a quote": (("new", 'a"b'), None, "cannot be the name"),
     "new without a name": (("new", ""), None, "cannot be the name"),
     "new in no folder": (("new", "no/where"), None, "does not exist"),

@@ -94,7 +94,7 @@ PROBLEMS: dict[str, tuple[Change, str]] = {
     "impossible piston": (put("SPS", "piston", "axial", value=1.0), "no rigid body has such"),
     "infinite mass": (put("SPS", "cylinder", "mass", value=float("inf")), "expected a finite"),
     "axis of a leg": (put("SPS", "axis", value=[0, 0, 1]), "axis: is not a key of the file"),
-    "unknown kind": (put("SPS", "kind", value="SPR"), "'SPR' is unknown; available:"),
+    "unknown kind": (put("SPS", "kind", value="SPR"), "'SPR' is unknown. Did you mean"),
 }
 
 

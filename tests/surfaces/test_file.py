@@ -75,7 +75,7 @@ LINE = {"kind": "profile", "direction": [1.0, 0.0], "points": [[0, 0], [1, 1], [
     [
         (SPHERE | {"radius": -1}, {}, "surface.radius: expected a value above"),
         (SPHERE | {"colour": 1}, {}, "surface.colour: is not a key"),
-        ({"kind": "torus"}, {}, "'torus' is unknown; available: 'plane', 'quadratic', 'sphere'"),
+        ({"kind": "torus"}, {}, "'torus' is unknown. Available: cylinder, ellipsoid, plane"),
         ({"kind": "expression", "function": "p[2]"}, {}, "'expression' is unknown"),
         ({"slope": [0, 0], "offset": 1}, {}, "`kind` is missing"),
         (SPHERE, {"side": "below"}, 'expected "inside" or "outside" for a sphere, got "below"'),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +18,7 @@ from ..dynamics import formulation as formulation_named
 from ..errors import UnsupportedError
 from ..mechanism.mechanism import Mechanism
 from ..model import Model, with_point
+from ..progress import step
 from .indices import Indices, indices
 from .runs import InterpretedModel, Run, Samples, run
 
@@ -125,12 +126,14 @@ def compare(
     solution = model.solve(motion, load, load_point)
     samples = samples_of(model, solution)
     models, unavailable = [], []
-    for name in names:
-        for route in ROUTES:
+    kinds = list(product(names, ROUTES))
+    with step("deriving every model", len(kinds)) as advance:
+        for name, route in kinds:
             try:
                 models.append(InterpretedModel(mechanism, name, route))
             except UnsupportedError as error:
                 unavailable.append(Unavailable(f"{name} {route}", str(error)))
+            advance(1)
 
     condition = float("nan")
     if reason := why_not_free(mechanism):
@@ -140,7 +143,11 @@ def compare(
         models += [InterpretedModel(free, name, "core") for name in names]
         posture = models[-1].posture(samples.pose)
         condition = float(posture.singularity.condition.max())
-    runs = [run(one, samples) for one in models]
+    runs = []
+    with step("running every model", len(models)) as advance:
+        for one in models:
+            runs.append(run(one, samples))
+            advance(1)
     held = bool(mechanism.contacts)
     return Comparison(
         solution,

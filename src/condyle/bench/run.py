@@ -8,7 +8,7 @@ import platform
 import sys
 import tempfile
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -21,6 +21,7 @@ from ..dynamics import FORMULATIONS
 from ..kernels.compiler import find_compiler
 from ..mechanism import bundled_text, load
 from ..model import Model
+from ..progress import step
 from .own import TOLERANCE, Timer, own_rows, reachable_samples, ready_rows
 from .rows import Row, spread
 
@@ -67,36 +68,36 @@ class Benchmark:
         return "\n".join(lines)
 
 
-def run_benchmark(seconds: float = 1.0, say: Callable[[str], None] = lambda _: None) -> Benchmark:
+def run_benchmark(seconds: float = 1.0) -> Benchmark:
     """Measure everything on one core; takes a minute or two.
 
-    Args: seconds: timing, a row; say: told what is being measured.
+    Args: seconds: timing, a row.
     """
     processors = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set()
     rows: list[Row] = []
     unavailable: dict[str, str] = {}
 
-    def add(found: Iterator[Row]) -> None:
-        for row in found:
-            say(f"{row.name}: {_time(row.seconds)}")
-            if row.error > TOLERANCE:
-                row.note = f"WRONG by {row.error:.1e}; its time means nothing"
-            rows.append(row)
+    def add(found: Iterator[Row], what: str) -> None:
+        with step(f"timing {what}"):
+            for row in found:
+                if row.error > TOLERANCE:
+                    row.note = f"WRONG by {row.error:.1e}; its time means nothing"
+                rows.append(row)
 
     if processors:
         os.sched_setaffinity(0, {max(processors)})
     try:
-        add(own_rows(load(REFERENCE), seconds, list(FORMULATIONS), threads=False))
+        add(own_rows(load(REFERENCE), seconds, list(FORMULATIONS), threads=False), REFERENCE)
         for name in OTHERS:
-            add(own_rows(load(name), seconds, ["virtual_power"], threads=False))
-        add(_peer_rows(seconds, unavailable))
-        add(ready_rows(REFERENCE))
+            add(own_rows(load(name), seconds, ["virtual_power"], threads=False), name)
+        add(_peer_rows(seconds, unavailable), "other engines")
+        add(ready_rows(REFERENCE), "a fresh start")
         clock = Timer().clock_rate()
     finally:
         if processors:
             os.sched_setaffinity(0, processors)
     if len(processors) > 1:
-        add(_two_threads(seconds))
+        add(_two_threads(seconds), "two threads")
     compiler = find_compiler()
     facts = {
         "processor": _processor(),

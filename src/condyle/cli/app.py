@@ -1,18 +1,29 @@
-"""The command line: one thin file a command, errors on stderr with exit status 2."""
+"""The command line: one thin file a command, errors on stderr with exit status 2.
+
+A command does its work and returns an `Answer`; that it is printed for people, as JSON or not at
+all, and that a bar shows how far the work is, is the same for all and stands here.
+"""
 
 from __future__ import annotations
 
+import inspect
 import signal
 import sys
+from collections.abc import Callable
 from contextlib import suppress
-from typing import Annotated
+from functools import wraps
+from typing import Annotated, Any, get_type_hints
 
 import typer
 
 from .. import __version__
 from ..errors import CondyleError
+from . import options
+from .answer import Answer
+from .bar import progress_bar
 
-MAIN, LOOK, MAKE = "Compute", "Look", "Files and upkeep"
+# The chapters of the help page.
+BEGIN, COMPUTE, LOOK, UPKEEP = "Begin", "Compute", "Look", "Upkeep"
 
 app = typer.Typer(
     name="condyle",
@@ -20,11 +31,47 @@ app = typer.Typer(
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
     help=(
-        "Dynamics of redundantly actuated parallel mechanisms whose platform the base also holds "
-        "at point contacts."
+        "Motor torques and contact forces of parallel robots whose platform also touches the "
+        "base, as a jaw does."
     ),
-    epilog="Start with [bold]condyle run[/bold]: it solves the bundled chewing robot.",
+    epilog="Start with [bold]condyle run[/bold]: it solves the bundled chewing robot. "
+    "[bold]condyle COMMAND --help[/bold] shows units and an example.",
 )
+
+Command = Callable[..., Answer]
+
+
+def command(chapter: str, *, example: str) -> Callable[[Command], Command]:
+    """Register a function as the command of its name, with `--quiet` and `--json` as well.
+
+    Args: chapter: of the help page;  example: one line to copy, shown below the options.
+    """
+
+    def register(work: Command) -> Command:
+        @wraps(work)
+        def shown(*, quiet: bool, as_json: bool, **given: Any) -> None:
+            with progress_bar(not quiet and not as_json):
+                answer = work(**given)
+            answer.give(quiet, as_json)
+
+        _take(shown, work, quiet=options.Quiet, as_json=options.Json)
+        app.command(rich_help_panel=chapter, epilog=f"Example: {example}")(shown)
+        return work
+
+    return register
+
+
+def _take(shown: Callable[..., None], work: Command, **switches: Any) -> None:
+    """Give `shown` the parameters of `work`, and some switches."""
+    hints = get_type_hints(work, include_extras=True) | switches
+    parameters = [
+        *inspect.signature(work).parameters.values(),
+        *(inspect.Parameter(s, inspect.Parameter.KEYWORD_ONLY, default=False) for s in switches),
+    ]
+    parameters = [one.replace(annotation=hints[one.name]) for one in parameters]
+    hints.pop("return", None)
+    shown.__annotations__ = hints
+    shown.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
 
 
 def _version(value: bool) -> None:
@@ -68,3 +115,6 @@ def main() -> None:
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(1)
+    except OSError as error:  # of the machine, such as a folder that went away
+        print(f"condyle: {error}", file=sys.stderr)
+        sys.exit(2)

@@ -3,26 +3,38 @@
 from __future__ import annotations
 
 import json
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from .app import LOOK, app
+from .answer import Answer, files_line
+from .app import UPKEEP, command
+from .inputs import output_folder
 
 
-@app.command(rich_help_panel=LOOK)
+@command(UPKEEP, example="condyle bench --seconds 0.2 --out bench.json")
 def bench(
     out: Annotated[Path | None, typer.Option(help="JSON file for the results.")] = None,
-    seconds: Annotated[float, typer.Option(help="Timing, a row.", min=0.01)] = 1.0,
-) -> None:
-    """Time the kernels, the interpreter and, from the repository, other engines: one table."""
-    from ..atomic import write_text
+    seconds: Annotated[
+        float, typer.Option(help="How long each row of the table is timed (s).", min=0.01, max=600)
+    ] = 1.0,
+) -> Answer:
+    """How fast it is on this machine.
+
+    One table: every way to compute, on one core. From the repository other engines are timed too.
+    """
+    from ..atomic import replacing
     from ..bench import run_benchmark
 
-    result = run_benchmark(seconds, say=lambda text: typer.echo(text, err=True))
-    typer.echo(str(result))
-    if out is not None:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        write_text(out, json.dumps(result.data(), indent=1))
-        typer.echo(f"Results: {out}")
+    with ExitStack() as stack:  # a file that cannot be written is found before the minutes pass
+        if out is not None:
+            output_folder(out.parent)
+            temporary = stack.enter_context(replacing(out))
+        result = run_benchmark(seconds)
+        if out is not None:
+            temporary.write_text(json.dumps(result.data(), indent=1), encoding="utf-8")
+    files = [out] if out else []
+    text = f"{result}\n{files_line(files)}" if out else str(result)
+    return Answer(text, result.data() | {"files": files}, "condyle cache", "result")

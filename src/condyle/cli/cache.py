@@ -6,19 +6,26 @@ from typing import Annotated
 
 import typer
 
-from .app import MAKE, app
+from .answer import Answer
+from .app import UPKEEP, command
 
 
-@app.command(rich_help_panel=MAKE)
+@command(UPKEEP, example="condyle cache --clear")
 def cache(
-    clear: Annotated[bool, typer.Option("--clear", help="Remove every kernel.")] = False,
-) -> None:
-    """Show or clear the compiled kernels."""
+    clear: Annotated[bool, typer.Option("--clear", help="Remove all of it.")] = False,
+) -> Answer:
+    """Compiled code kept on disk: show or clear it.
+
+    It is built when it is first needed, in a second or two, and then found again.
+    """
     from ..kernels import cache as kernels
 
     had = kernels.clear() if clear else kernels.contents()
     count = "1 kernel" if had.kernels == 1 else f"{had.kernels} kernels"
     what = f"{count}, {had.size / 1e6:.1f} MB"
-    typer.echo(f"Removed {what} from {had.folder}" if clear else f"{had.folder}: {what}")
-    if not clear and had.size:
-        typer.echo("Next: condyle cache --clear removes them; they are built again when needed")
+    return Answer(
+        f"Removed {what} from {had.folder}" if clear else f"{had.folder}: {what}",
+        {"folder": had.folder, "kernels": had.kernels, "bytes": had.size, "cleared": clear},
+        "condyle cache --clear" if had.size and not clear else "condyle run",
+        "result",
+    )

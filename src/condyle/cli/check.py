@@ -7,8 +7,9 @@ from typing import Annotated
 import typer
 
 from . import options
-from .app import LOOK, app
-from .inputs import say_json, warn
+from .answer import Answer, command_line
+from .app import BEGIN, command
+from .inputs import chews, warn
 
 Project = Annotated[
     bool,
@@ -19,30 +20,28 @@ Project = Annotated[
 ]
 
 
-@app.command(rich_help_panel=LOOK)
-def check(
-    mechanism: options.Mechanism, project: Project = False, as_json: options.Json = False
-) -> None:
-    """Describe a mechanism at home, or list every problem in its file."""
+@command(BEGIN, example="condyle check jaw.toml")
+def check(mechanism: options.Mechanism, project: Project = False) -> Answer:
+    """What a mechanism is, or all that is wrong with its file.
+
+    Its chains, contacts and freedoms, and how near it is to a singular pose where it starts.
+    """
     import condyle
 
     from ..mechanism.home import home_warnings
     from ..report.check import describe
 
-    if project and _show_projection(mechanism, as_json):
-        return
+    if project and (nearest := _projection(mechanism)) is not None:
+        return nearest
     machine = condyle.load(mechanism)
     description = describe(machine)
     warn(home_warnings(machine))
-    if as_json:
-        say_json(description.data)
-        return
-    typer.echo(str(description))
-    typer.echo(f"\nNext: condyle run {mechanism}")
+    then = command_line("run" if chews(machine) else "view", mechanism)
+    return Answer(f"{description}\n", description.data, then, "result")
 
 
-def _show_projection(mechanism: str, as_json: bool) -> bool:
-    """Show the nearest home on the surfaces; False if the file's home is there already."""
+def _projection(mechanism: str) -> Answer | None:
+    """The nearest home on the surfaces; None if the file's home is there already."""
     from ..kinematics.project import project_home
     from ..mechanism.files import from_data, read_tables, read_text
     from ..mechanism.quantities import PER_METRE
@@ -50,10 +49,11 @@ def _show_projection(mechanism: str, as_json: bool) -> bool:
     tables = read_tables(read_text(mechanism), mechanism)
     projection = project_home(from_data(tables, mechanism, at_home=False))
     if not projection.needed:
-        return False
-    if as_json:
-        say_json(projection.data())
-    else:
-        typer.echo(projection.text(PER_METRE[tables.get("length_unit", "m")]))
-        typer.echo(f"\nNext: change the points in the file, then condyle check {mechanism}")
-    return True
+        return None
+    text = projection.text(PER_METRE[tables.get("length_unit", "m")])
+    return Answer(
+        f"{text}\n\nChange the points in the file to these, then check again.",
+        projection.data(),
+        command_line("check", mechanism, project=True),
+        "result",
+    )

@@ -1,6 +1,7 @@
 """Every command, in the order of the help page."""
 
 # isort: off
-from . import run, solve, compare, pose  # noqa: F401
-from . import check, plot, report, view, bench  # noqa: F401
-from . import new, schema, reference, cache  # noqa: F401
+from . import new, check, reference  # noqa: F401
+from . import run, solve, pose, compare  # noqa: F401
+from . import plot, report, view  # noqa: F401
+from . import bench, cache, schema  # noqa: F401

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from . import options
-from .app import MAIN, app
-from .inputs import file_stem, motion_and_load, output_folder, say
+from .answer import Answer, command_line, files_line
+from .app import COMPUTE, command
+from .inputs import file_stem, motion_and_load, output_folder, warn
+
+if TYPE_CHECKING:
+    from ..analysis.compare import Comparison
 
 
-@app.command(rich_help_panel=MAIN)
+@command(COMPUTE, example="condyle compare jaw.toml --motion path.csv --load bite.csv")
 def compare(
     mechanism: options.Mechanism = "masticatory",
     motion: options.Motion = None,
@@ -27,16 +31,19 @@ def compare(
     report: Annotated[
         bool, typer.Option("--report", help="Write the page of condyle report, with the tables.")
     ] = False,
-    quiet: options.Quiet = False,
-) -> None:
-    """All models on one motion: differences, Tables 1 and 2, Figures 5 to 9 of the paper."""
+) -> Answer:
+    """Every way to derive the equations, side by side.
+
+    How far their numbers differ and what they cost, with and without the contacts: Tables 1 and 2
+    and Figures 5 to 9 of the paper.
+    """
     import condyle
 
     from ..analysis.compare import compare as compare_models
     from ..report.tables import save_tables, tables, with_tables
 
     machine = condyle.load(mechanism)
-    path, acting = motion_and_load(motion, load, units, landmark, smooth, rate)
+    path, acting = motion_and_load(machine, motion, load, units, landmark, smooth, rate)
     comparison = compare_models(machine, path, acting, load_point)
     output_folder(out)
     files = save_tables(comparison, out)
@@ -53,5 +60,30 @@ def compare(
         inputs = [file for file in (motion, load) if file is not None]
         page = out / f"{file_stem(machine.name)}.html"
         files.append(write_report(solution, page, files=inputs))
-    say(quiet, str(comparison))
-    say(quiet, "\nResults: " + ", ".join(str(f) for f in files))
+    warn(solution.warnings)
+    then = command_line(
+        "run",
+        mechanism,
+        motion=motion,
+        load=load,
+        load_point=load_point,
+        out=out if out != Path("results") else None,
+        units=units if units != "m,rad" else None,
+        landmark=landmark,
+        smooth=smooth,
+        rate=rate,
+        report=True,
+    )
+    return Answer(f"{comparison}\n{files_line(files)}", _data(comparison) | {"files": files}, then)
+
+
+def _data(comparison: Comparison) -> dict[str, Any]:
+    from ..report.tables import tables
+
+    return {
+        "mechanism": comparison.mechanism.name,
+        "samples": comparison.samples,
+        **{table.name.replace("-", "_"): table.records for table in tables(comparison)},
+        "unavailable": {one.label: one.reason for one in comparison.unavailable},
+        "warnings": comparison.solution.warnings,
+    }

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import re
 import sys
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import typer
+from typing import TYPE_CHECKING
 
 from ..errors import BoundsError, InputError
 
 if TYPE_CHECKING:
+    from ..mechanism import Mechanism
     from ..motion import Load, Motion
 
 
 def motion_and_load(
+    machine: Mechanism,
     motion: Path | None,
     load: Path | None,
     units: str = "m,rad",
@@ -27,6 +25,13 @@ def motion_and_load(
 ) -> tuple[Motion, Load]:
     """The files named, or the reference case where none is."""
     from ..motion import Load, Motion, bundled_reference
+
+    if motion is None and not chews(machine, landmark):
+        raise InputError(
+            "the bundled motion is the path of a jaw's incisor on two contacts, not one for "
+            f'"{machine.name}". Name one of your own: --motion with a CSV of t and '
+            f"{machine.degrees_of_freedom} pose coordinates"
+        )
 
     reference_path, reference_load = bundled_reference()
     if motion is None and units != "m,rad":
@@ -39,6 +44,12 @@ def motion_and_load(
         motion or reference_path, units=units, landmark=landmark, cutoff=smooth, rate=rate
     )
     return path, acting
+
+
+def chews(machine: Mechanism, landmark: str | None = None) -> bool:
+    """Whether the bundled motion is one for such a mechanism."""
+    named = landmark is not None or "incisor" in machine.platform.points
+    return named and len(machine.contacts) == 2
 
 
 def output_folder(path: Path) -> Path:
@@ -60,19 +71,10 @@ def file_stem(name: str) -> str:
     return re.sub(r"[^\w.+-]+", "_", name)
 
 
-def say(quiet: bool, text: str) -> None:
-    if not quiet:
-        typer.echo(text)
-
-
 def warn(warnings: list[str]) -> None:
     """Warnings on stderr, so that they never mix with results."""
     for warning in warnings:
         print(f"condyle: warning: {warning}", file=sys.stderr)
-
-
-def say_json(data: Mapping[str, Any]) -> None:
-    typer.echo(json.dumps(data, indent=2, allow_nan=False))
 
 
 def require_inside(warnings: list[str]) -> None:

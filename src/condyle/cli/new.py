@@ -8,15 +8,19 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
-from .app import MAKE, app
+from .answer import Answer, command_line
+from .app import BEGIN, command
 
 
-@app.command(rich_help_panel=MAKE)
+@command(BEGIN, example="condyle new my-robot")
 def new(
     name: Annotated[str, typer.Argument(help="Name of the mechanism; the file is NAME.toml.")],
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
-) -> None:
-    """Write a commented starter file: a small mechanism that works, to change step by step."""
+) -> Answer:
+    """A mechanism file to start from.
+
+    A small mechanism that works, with a comment on every number, to change step by step.
+    """
     from ..atomic import write_text
     from ..mechanism import parse
     from ..mechanism.starter import starter_text
@@ -27,10 +31,12 @@ def new(
     stem = path.name.removesuffix(".toml")
     text = starter_text(stem)
     try:
+        if stem.startswith("."):
+            raise InputError("a hidden file")
         parse(text)
     except InputError:
         raise InputError(
             f'"{stem}" cannot be the name of a mechanism; use letters, digits, - and _'
         ) from None
     write_text(path, text)
-    typer.echo(f"Wrote {path}. Next: condyle check {path}")
+    return Answer(f"Wrote {path}", {"files": [path]}, command_line("check", path))

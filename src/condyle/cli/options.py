@@ -7,55 +7,90 @@ from typing import Annotated
 
 import typer
 
+from . import completion
+
 Mechanism = Annotated[
-    str, typer.Argument(help="Mechanism file (TOML), or the name of a bundled mechanism.")
+    str,
+    typer.Argument(
+        help="Mechanism file (TOML), or the name of a bundled mechanism: "
+        + ", ".join(completion.bundled())
+        + ".",
+        autocompletion=completion.mechanisms,
+    ),
 ]
 Formulation = Annotated[
     str,
     typer.Option(
-        help="How the equations are derived: virtual_power, momentum, lagrange, hessian, "
-        "newton_euler."
+        help=f"How the equations are derived: {', '.join(completion.FORMULATIONS)}. "
+        "All give the same numbers.",
+        autocompletion=completion.one_of(*completion.FORMULATIONS),
     ),
 ]
 Route = Annotated[
-    str, typer.Option(help="core (through six coordinates) or direct (the independent ones).")
+    str,
+    typer.Option(
+        help="How the contacts enter the equations: core (afterwards; any contacts) or direct "
+        "(at once; flat contacts only). Both give the same numbers.",
+        autocompletion=completion.one_of(*completion.ROUTES),
+    ),
 ]
 LoadPoint = Annotated[
     str | None,
-    typer.Option(help="Platform point the load acts at. Default: right_molar if there is one."),
+    typer.Option(
+        help="Platform point the load acts at. Default: right_molar if there is one.",
+        autocompletion=completion.points,
+    ),
 ]
 Motion = Annotated[
     Path | None,
-    typer.Option(help="Motion to follow (CSV). Default: the bundled chewing path (synthetic)."),
+    typer.Option(
+        help="Motion to follow (CSV): t (s) and pose coordinates such as X, Y (m), alpha, beta "
+        "(rad), or the path x, y, z (m) of a landmark. Default: the bundled chewing path "
+        "(synthetic)."
+    ),
 ]
 Load = Annotated[
     Path | None,
     typer.Option(
-        help="Load on the platform (CSV). Default: the bundled bite force (synthetic) with the "
-        "bundled motion, else none."
+        help="Load on the platform (CSV): t (s), Fx, Fy, Fz (N) and, if you like, Mx, My, Mz "
+        "(N m). Default: the bundled bite force (synthetic) with the bundled motion, else none."
     ),
 ]
 Units = Annotated[
-    str, typer.Option(help="Units of the motion's lengths and angles: m,rad or mm,deg ...")
+    str,
+    typer.Option(
+        help="Units of the motion's lengths (m, cm, mm, um) and angles (rad, deg), as in mm,deg.",
+        autocompletion=completion.one_of(*completion.UNITS),
+    ),
 ]
 Landmark = Annotated[
     str | None,
-    typer.Option(help="Platform point whose path x, y, z is given. Default: incisor."),
+    typer.Option(
+        help="Platform point whose path x, y, z is given. Default: incisor.",
+        autocompletion=completion.points,
+    ),
 ]
 Smooth = Annotated[
     str | None,
-    typer.Option(help="Smooth a measured motion: cut-off in Hz, or auto (10 Hz)."),
+    typer.Option(
+        help="Smooth a measured motion: what is quicker than so many Hz goes; auto is 10 Hz.",
+        autocompletion=completion.one_of("auto"),
+    ),
 ]
 Rate = Annotated[
     float | None,
-    typer.Option(help="Samples a second of the results. Default: those of the motion."),
+    typer.Option(help="Samples a second (Hz) of the results. Default: those of the motion."),
 ]
 Reactions = Annotated[
     bool, typer.Option("--reactions", help="Forces and moments in every joint too.")
 ]
 Backend = Annotated[
     str,
-    typer.Option(help="compiled, interpreted, or auto (compiled where there is a C compiler)."),
+    typer.Option(
+        help="compiled, interpreted (the same numbers, slower), or auto: compiled where there is "
+        "a C compiler.",
+        autocompletion=completion.one_of(*completion.BACKENDS),
+    ),
 ]
 Threads = Annotated[
     int | None,
@@ -66,5 +101,7 @@ Flag = Annotated[
     typer.Option("--flag", help="Keep samples that cannot be computed: empty, with a status."),
 ]
 Strict = Annotated[bool, typer.Option("--strict", help="A contact outside its bounds is an error.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
-Json = Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")]
+Quiet = Annotated[
+    bool, typer.Option("--quiet", "-q", help="Print only what was asked for, and errors.")
+]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")]

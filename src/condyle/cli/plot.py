@@ -8,35 +8,42 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError, did_you_mean
-from .app import LOOK, app
+from . import completion
+from .answer import Answer, command_line
+from .app import LOOK, command
 from .inputs import output_folder
 
+RESULT = Path("results/masticatory.nc")  # of `condyle run` as it stands
 
-@app.command(rich_help_panel=LOOK)
+
+@command(LOOK, example=f"condyle plot {RESULT} --figure torque --figure load")
 def plot(
     solution: Annotated[
-        Path | None, typer.Argument(help="Solution (.nc) of a run. Without: list the figures.")
+        Path | None, typer.Argument(help="Results (.nc) of a run. Without: list the figures.")
     ] = None,
     figure: Annotated[
-        list[str] | None, typer.Option(help="Figure to draw; repeat for more. Default: all.")
+        list[str] | None,
+        typer.Option(
+            help="Figure to draw; repeat for more. Default: all.",
+            autocompletion=completion.one_of(*completion.FIGURES),
+        ),
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder for PNG and SVG files.")] = Path("figures"),
-) -> None:
-    """List the figures, or draw them from a solution."""
+) -> Answer:
+    """Figures of a run, to look at or to print."""
     import condyle
 
-    from ..report.figures import PLOTS, save
+    from ..report.figures import PLOTS, save_each
 
     for name in figure or ():
         if name not in PLOTS:
             raise InputError(f'no figure "{name}".{did_you_mean(name, PLOTS)}')
     if solution is None:
-        for name, draw in PLOTS.items():
-            typer.echo(f"{name:<14} {(draw.__doc__ or '').strip().splitlines()[0]}")
-        typer.echo("Next: condyle plot results/masticatory.nc --figure torque")
-        return
+        shows = {name: (draw.__doc__ or "").strip().splitlines()[0] for name, draw in PLOTS.items()}
+        text = "\n".join(f"{name:<14} {what}" for name, what in shows.items())
+        then = command_line("plot", RESULT) if RESULT.is_file() else "condyle run --figures"
+        return Answer(text, {"figures": shows}, then, "result")
     data = condyle.open_solution(solution)
-    folder = output_folder(out)
-    for name in figure or PLOTS:
-        for path in save(PLOTS[name](data), folder, name):
-            typer.echo(f"Wrote {path}")
+    files = save_each({name: PLOTS[name] for name in figure or PLOTS}, data, output_folder(out))
+    text = "\n".join(f"Wrote {path}" for path in files)
+    return Answer(text, {"files": files}, command_line("report", solution))

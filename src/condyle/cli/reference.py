@@ -7,18 +7,24 @@ from typing import Annotated
 
 import typer
 
-from .app import MAKE, app
+from .answer import Answer, command_line
+from .app import BEGIN, command
 from .inputs import output_folder
 
 
-@app.command(rich_help_panel=MAKE)
+@command(BEGIN, example="condyle reference --out case")
 def reference(
     out: Annotated[Path, typer.Option(help="Folder for the files.")] = Path(),
-) -> None:
-    """Write the reference chewing path and bite force. Both are synthetic, not measured."""
+) -> Answer:
+    """The bundled motion and bite force as files.
+
+    Examples of the tables that condyle run reads. Both are synthetic, not measured.
+    """
     from ..motion import write_reference
 
-    output_folder(out)
-    for path in write_reference(out):
-        typer.echo(f"Wrote {path}")
-    typer.echo("Next: condyle run --motion " + str(out / "chewing-incisor.csv"))
+    motion, load = write_reference(output_folder(out))
+    return Answer(
+        f"Wrote {motion}\nWrote {load}",
+        {"files": [motion, load]},
+        command_line("run", motion=motion, load=load),
+    )

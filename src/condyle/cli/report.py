@@ -7,25 +7,35 @@ from typing import Annotated
 
 import typer
 
-from .app import LOOK, app
+from .answer import Answer, command_line
+from .app import LOOK, command
 
 
-@app.command(rich_help_panel=LOOK)
+@command(LOOK, example="condyle report results/masticatory.nc")
 def report(
-    solution: Annotated[Path, typer.Argument(help="Solution (.nc) of a run.")],
+    solution: Annotated[Path, typer.Argument(help="Results (.nc) of a run.")],
     out: Annotated[
-        Path | None, typer.Option(help="HTML file. Default: beside the solution.")
+        Path | None, typer.Option(help="HTML file. Default: beside the results.")
     ] = None,
     file: Annotated[
         list[Path] | None,
         typer.Option(help="Input of the run to name with its hash; repeat for more."),
     ] = None,
-) -> None:
-    """One HTML file that shows a solution: moving mechanism, linked plots, tables, warnings."""
+) -> Answer:
+    """A run as one web page to send.
+
+    One HTML file that opens without a network: the moving mechanism, linked plots, tables and
+    every warning.
+    """
     import condyle
 
     from ..report.page import write_report
 
     data = condyle.open_solution(solution)
     path = write_report(data, out or solution.with_suffix(".html"), files=[solution, *(file or ())])
-    typer.echo(f"Wrote {path} ({path.stat().st_size / 1e6:.1f} MB). Next: open it in a browser")
+    size = path.stat().st_size
+    return Answer(
+        f"Wrote {path} ({size / 1e6:.1f} MB); open it in a browser",
+        {"files": [path], "bytes": size},
+        command_line("view", solution=solution),
+    )

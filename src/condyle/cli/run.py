@@ -8,19 +8,15 @@ from typing import Annotated
 import typer
 
 from . import options
-from .app import MAIN, app
-from .inputs import (
-    file_stem,
-    motion_and_load,
-    output_folder,
-    require_inside,
-    say,
-    say_json,
-    warn,
+from .answer import Answer, command_line, files_line
+from .app import COMPUTE, command
+from .inputs import file_stem, motion_and_load, output_folder, require_inside, warn
+
+
+@command(
+    COMPUTE,
+    example="condyle run jaw.toml --motion path.csv --units mm,deg --load bite.csv --report",
 )
-
-
-@app.command(rich_help_panel=MAIN)
 def run(
     mechanism: options.Mechanism = "masticatory",
     motion: options.Motion = None,
@@ -42,10 +38,8 @@ def run(
     threads: options.Threads = None,
     strict: options.Strict = False,
     flag: options.Flag = False,
-    quiet: options.Quiet = False,
-    as_json: options.Json = False,
-) -> None:
-    """Torques of a mechanism along a motion under a load.
+) -> Answer:
+    """Torques and contact forces along a motion.
 
     Without arguments: the bundled chewing robot, a synthetic chewing path and bite force.
     """
@@ -54,7 +48,7 @@ def run(
     from ..summary import summarize
 
     machine = condyle.load(mechanism)
-    path, acting = motion_and_load(motion, load, units, landmark, smooth, rate)
+    path, acting = motion_and_load(machine, motion, load, units, landmark, smooth, rate)
     model = condyle.derive(machine, formulation, route, backend)
     solution = model.solve(path, acting, load_point, flag, reactions, threads)
     if strict:
@@ -74,9 +68,8 @@ def run(
         files.append(write_report(solution, folder / f"{stem}.html", files=inputs))
     warn(solution.warnings)
     summary = summarize(solution)
-    if as_json:
-        say_json(summary.data | {"files": [str(f) for f in files]})
-        return
-    say(quiet, str(summary))
-    say(quiet, "\nResults: " + ", ".join(str(f) for f in files))
-    say(quiet, f"Next: condyle report {files[0]}, condyle compare (all models side by side)")
+    return Answer(
+        f"{summary}\n\n{files_line(files)}",
+        summary.data | {"files": files},
+        command_line("view", solution=files[0]) if report else command_line("report", files[0]),
+    )

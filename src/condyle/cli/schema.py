@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from .app import MAKE, app
-from .inputs import say_json
+import json
+
+from .answer import Answer
+from .app import UPKEEP, command
 
 
-@app.command(rich_help_panel=MAKE)
-def schema() -> None:
-    """Print the JSON schema of mechanism files."""
+@command(UPKEEP, example="condyle schema > condyle.schema.json")
+def schema() -> Answer:
+    """The format of mechanism files, for editors.
+
+    A JSON schema: an editor that knows it completes keys and marks mistakes while you type.
+    """
     from ..mechanism import json_schema
 
-    say_json(json_schema())
+    data = json_schema()
+    return Answer(json.dumps(data, indent=2), data, "condyle check masticatory", "document")

@@ -8,14 +8,22 @@ from typing import Annotated
 import typer
 
 from . import options
-from .app import MAIN, app
-from .inputs import say, warn
+from .answer import Answer, command_line
+from .app import COMPUTE, command
+from .inputs import warn
 
 
-@app.command(rich_help_panel=MAIN)
+@command(COMPUTE, example="condyle solve jaw.toml --states states.csv --out torques.csv")
 def solve(
     mechanism: options.Mechanism,
-    states: Annotated[Path, typer.Option(help="States to solve (CSV), one a row.")],
+    states: Annotated[
+        Path,
+        typer.Option(
+            help="States to solve (CSV), one a row: pose coordinates such as X, Y (m), alpha, "
+            "beta (rad), their rates dX ... (per s) and accelerations ddX ... (per s^2), and if "
+            "you like Fx, Fy, Fz (N), Mx, My, Mz (N m)."
+        ),
+    ],
     out: Annotated[Path, typer.Option(help="File for the results (CSV).")],
     load_point: options.LoadPoint = None,
     formulation: options.Formulation = "virtual_power",
@@ -25,9 +33,11 @@ def solve(
     threads: options.Threads = None,
     strict: options.Strict = False,
     flag: options.Flag = False,
-    quiet: options.Quiet = False,
-) -> None:
-    """Torques of independent states: pose coordinates, rates (dX), accelerations (ddX), Fx ..."""
+) -> Answer:
+    """The same for separate states, one a row.
+
+    For tables of any length: rows never influence each other.
+    """
     import condyle
 
     from ..states import solve_file
@@ -35,4 +45,12 @@ def solve(
     model = condyle.derive(condyle.load(mechanism), formulation, route, backend)
     rows, warnings = solve_file(model, states, out, load_point, flag, strict, reactions, threads)
     warn(warnings)
-    say(quiet, f"{rows} rows solved: {out}")
+    data = {
+        "mechanism": model.mechanism.name,
+        "formulation": model.formulation,
+        "route": model.route,
+        "rows": rows,
+        "warnings": warnings,
+        "files": [out],
+    }
+    return Answer(f"{rows} rows solved: {out}", data, command_line("view", mechanism))

@@ -8,19 +8,28 @@ from typing import Annotated
 import typer
 
 from . import options
+from .answer import command_line
 from .app import LOOK, app
 
 
-@app.command(rich_help_panel=LOOK)
+@app.command(rich_help_panel=LOOK, epilog="Example: condyle view jaw.toml")
 def view(
     mechanism: options.Mechanism = "masticatory",
     solution: Annotated[
-        Path | None, typer.Option(help="Solution (.nc) to play back; brings its own mechanism.")
+        Path | None, typer.Option(help="Results (.nc) to play back; they bring their mechanism.")
     ] = None,
     port: Annotated[int, typer.Option(help="Port on 127.0.0.1.", min=1, max=65535)] = 8080,
     browser: Annotated[bool, typer.Option(help="Open the page in a browser.")] = True,
+    quiet: options.Quiet = False,
 ) -> None:
-    """A local page on which to move the platform and read torques, forces and reach."""
+    """A mechanism to move by hand, in the browser.
+
+    A page of this machine alone: move the platform and read torques, contact forces and reach, or
+    play back a run. It stays until Ctrl-C.
+    """
     from ..view import serve
 
     serve(None if solution else mechanism, solution, port=port, open_browser=browser)
+    if not quiet:
+        then = ("report", solution) if solution else ("check", mechanism)
+        typer.echo(f"Next: {command_line(*then)}")

@@ -22,6 +22,7 @@ from ..errors import InputError
 from ..kinematics.contact import indices
 from ..mechanism.home import independent_coordinates
 from ..mechanism.mechanism import Mechanism
+from ..progress import step
 from . import cache
 from .compiler import REMEDY, Compiler, CompilerError, find_compiler
 from .layout import Layout, specialise
@@ -198,10 +199,11 @@ def _recipe(spec: KernelSpec, compiler: Compiler) -> str:
 def _make(folder: Path, spec: KernelSpec, compiler: Compiler) -> tuple[Path, dict[str, Any]]:
     from .emit import emit
 
-    source = emit(spec, compiler.lanes)
-    text, library = folder / "kernel.c", folder / "kernel.so"
-    text.write_text(source.text, encoding="utf-8")
-    compiler.build(text, library)
+    with step("building a kernel"):
+        source = emit(spec, compiler.lanes)
+        text, library = folder / "kernel.c", folder / "kernel.so"
+        text.write_text(source.text, encoding="utf-8")
+        compiler.build(text, library)
     _load(str(library))  # only what can be loaded is kept
     facts = {
         "spec": spec.text(),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
+from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -64,7 +65,7 @@ def read_text(source: str | Path) -> str:
     except UnicodeDecodeError:
         raise InputError(f"{source} is not a text file (UTF-8 expected)") from None
     except OSError as error:
-        raise InputError(f"{source} cannot be read: {error.strerror}") from None
+        raise InputError(f'mechanism file "{source}" cannot be read: {error.strerror}') from None
 
 
 def parse(text: str, source: str = "mechanism") -> Mechanism:
@@ -101,7 +102,7 @@ def from_data(
     # Names that Python has for a key of the file are no keys of the file.
     aliased = {name for name, field in Mechanism.model_fields.items() if field.alias}
     for key in aliased & data.keys():
-        problems.append(f"{key}: {_message({'type': 'extra_forbidden'})}")
+        problems.append(f"{key}: {_message({'type': 'extra_forbidden', 'loc': (key,)})}")
         del data[key]
     mechanism = None
     try:
@@ -180,7 +181,7 @@ def _message(problem: Any) -> str:
     kind, got, context = problem["type"], problem.get("input"), problem.get("ctx", {})
     expected = {
         "missing": "is missing",
-        "extra_forbidden": "is not a key of the file format; remove it or mend its spelling",
+        "extra_forbidden": "is not a key of the file format; remove it or mend its spelling.",
         "float_type": f"expected a number, got {_shown(got)}",
         "finite_number": f"expected a finite number, got {_shown(got)}",
         "greater_than": f"expected a value above {context.get('gt')}, got {_shown(got)}",
@@ -198,13 +199,48 @@ def _message(problem: Any) -> str:
         "bool_type": f"expected true or false, got {_shown(got)}",
         "value_error": str(context.get("error", "")),
         "literal_error": f"expected {context.get('expected')}, got {_shown(got)}",
-        "union_tag_invalid": f"the kind {_shown(context.get('tag'))} is unknown; "
-        f"available: {context.get('expected_tags')}",
+        "union_tag_invalid": f"the kind {_shown(context.get('tag'))} is unknown."
+        + did_you_mean(str(context.get("tag")), _quoted(context.get("expected_tags"))),
         "union_tag_not_found": "the key `kind` is missing",
     }.get(kind)
     if expected is None:
         expected = re.sub(r"^Value error, ", "", problem["msg"]) + f", got {_shown(got)}"
+    if kind == "extra_forbidden":
+        expected += did_you_mean(str(problem["loc"][-1]), _keys(problem["loc"][:-1]))
     return expected
+
+
+def _quoted(text: Any) -> list[str]:
+    """a, b of "'a', 'b'"."""
+    return re.findall("'([^']*)'", str(text))
+
+
+def _keys(location: Iterable[Any]) -> list[str]:
+    """Keys that a table may have, by its place as pydantic gives it."""
+    schema = _schema()
+    here = schema
+    for part in location:
+        here = here.get("items", {}) if isinstance(part, int) else _inside(here, part)
+        here = _followed(here, schema)
+    return list(here.get("properties", {}))
+
+
+def _inside(here: Mapping[str, Any], part: str) -> Any:
+    """The schema of a key, or of one of several kinds."""
+    kinds = here.get("discriminator", {}).get("mapping", {})
+    return {"$ref": kinds[part]} if part in kinds else here.get("properties", {}).get(part, {})
+
+
+def _followed(here: Mapping[str, Any], schema: Mapping[str, Any]) -> Any:
+    """A schema with its reference, if it is one, looked up."""
+    here = next((one for one in here.get("anyOf", ()) if "$ref" in one), here)
+    name = str(here.get("$ref", "")).rpartition("/")[2]
+    return schema["$defs"][name] if name else here
+
+
+@lru_cache(maxsize=1)
+def _schema() -> dict[str, Any]:
+    return json_schema()
 
 
 def _shown(value: Any) -> str:

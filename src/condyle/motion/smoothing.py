@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from condyle import progress
 from condyle.errors import InputError
 from condyle.motion.units import ANGLE_UNITS, POSE
 
@@ -96,7 +97,8 @@ def smoothing_spline(t: np.ndarray, values: np.ndarray, cutoff: float) -> BSplin
     spline_gain = np.sinc(half_turn / math.pi) ** (2 * (_DEGREE + 1))
     mu = (math.sqrt(2) - 1) * spline_gain / (2 * math.sin(half_turn)) ** (2 * _ORDER)
     A = B.T @ B + mu * samples_per_knot * (D.T @ D)
-    coefficients = spsolve(A.tocsc(), B.T @ values).reshape(size, -1)
+    with progress.step("smoothing"):
+        coefficients = spsolve(A.tocsc(), B.T @ values).reshape(size, -1)
     return BSpline(knots, coefficients, _DEGREE)
 
 

@@ -2,13 +2,12 @@
 
 Comma, semicolon or tab between the columns, decimal point or decimal comma, with or without quotes
 and byte order mark (UTF-8, or UTF-16 as "Unicode text" is saved), any line ends, spaces around
-names, empty lines at the end, a first line "sep=;".
+names, empty lines at the end, empty columns without a name, a first line "sep=;".
 """
 
 from __future__ import annotations
 
 import csv
-import difflib
 import math
 import os
 import re
@@ -21,7 +20,8 @@ from pathlib import Path
 
 import numpy as np
 
-from condyle.errors import InputError, did_you_mean
+from condyle.errors import InputError, did_you_mean, no_such_file
+from condyle.progress import step
 
 CHUNK_ROWS = 16_384
 
@@ -83,16 +83,18 @@ def iter_table(
     chunk_rows: int = CHUNK_ROWS,
     *,
     known: Collection[str] | None = None,
+    doing: str = "reading",
 ) -> Iterator[Table]:
     """Read a CSV file of numbers, of any length, in tables of up to `chunk_rows` rows.
 
     Args:   known: column names that may occur; others are an error. None: any may.
+            doing: what is done with the rows, to be shown as progress through the file.
     Yields: Table: at least one, none of them empty, all with the same columns.
     Raises: InputError: for whatever is not a table of finite numbers, with line and column. Chunks
             before the one with the error have been yielded by then.
     """
     source = os.fspath(path)
-    with _open(path) as file:
+    with _open(path) as file, step(f"{doing} {Path(path).name}", _size(path)) as advance:
         parser, line = _read_header(source, file)
         if known is not None:
             _allow(source, parser.names, known)
@@ -108,15 +110,22 @@ def iter_table(
                 columns = {name: values[:, j].copy() for j, name in enumerate(parser.names)}
                 yield Table(source, columns, line)
                 line += size
+            advance(sum(map(len, read)))
         if line == first:
             raise InputError(f"{source}: has column names but no rows of numbers")
 
 
 class _Parser:
-    """From lines to numbers, for one file. Remembers its separator and its decimal sign."""
+    """From lines to numbers, for one file. Remembers its separator and its decimal sign.
 
-    def __init__(self, source: str, names: Sequence[str], separator: str) -> None:
-        self.source, self.names, self.separator = source, names, separator
+    Attributes: names: of the columns;  header: the same with "" where a column has no name, whose
+                cells must be empty.
+    """
+
+    def __init__(self, source: str, header: Sequence[str], separator: str) -> None:
+        self.source, self.header, self.separator = source, header, separator
+        self.names = [name for name in header if name]
+        self._nameless = [i for i, name in enumerate(header) if not name]
         self.blank = separator + ' "\n\t'
         self.decimal = ""
 
@@ -129,6 +138,8 @@ class _Parser:
         if plain and all(line.isascii() and not _ODD.search(line) for line in lines):
             text = (line.replace(",", ".") for line in lines) if comma else lines
             rows = [line.split(self.separator) for line in text]
+            if self._nameless:
+                rows = [self._named(row) for row in rows]
             if all(len(row) == len(self.names) for row in rows):
                 with suppress(ValueError):  # the careful way says where
                     cells = chain.from_iterable(rows)
@@ -137,6 +148,12 @@ class _Parser:
                         self.decimal = sign
                         return values.reshape(len(rows), len(self.names))
         return np.array([self._row(line, first_line + i) for i, line in enumerate(lines)])
+
+    def _named(self, row: list[str]) -> list[str]:
+        """The cells of columns with a name; none where the row needs a careful look."""
+        if len(row) != len(self.header) or any(row[i].strip() for i in self._nameless):
+            return []
+        return [cell for cell, name in zip(row, self.header, strict=True) if name]
 
     def _row(self, text: str, line: int) -> list[float]:
         where = f"{self.source}, line {line}"
@@ -148,17 +165,28 @@ class _Parser:
             cells = next(_split([text], self.separator))
         except csv.Error as error:
             raise InputError(f"{where}: cannot be read ({error})") from error
-        if len(cells) != len(self.names):
+        while len(cells) > len(self.header) and not cells[-1].strip():
+            cells.pop()
+        while len(cells) < len(self.header) and not self.header[len(cells)]:
+            cells.append("")
+        if len(cells) != len(self.header):
             hint = ""
-            if self.separator == "," and len(cells) > len(self.names):
+            if self.separator == "," and len(cells) > len(self.header):
                 hint = " Decimal commas need semicolons between the columns."
             raise InputError(
-                f"{where}: {len(cells)} cells, expected {len(self.names)}"
+                f"{where}: {len(cells)} cells, expected {len(self.header)}"
                 f" ({', '.join(self.names)}).{hint}"
             )
+        for i, (cell, name) in enumerate(zip(cells, self.header, strict=True)):
+            if cell.strip() and not name:
+                raise InputError(
+                    f'{where}: got "{_short(cell)}" in column {i + 1}, which has no name; name the '
+                    "column or delete it"
+                )
         return [
             self._number(cell.strip(), f'{where}, column "{name}"')
-            for cell, name in zip(cells, self.names, strict=True)
+            for cell, name in zip(cells, self.header, strict=True)
+            if name
         ]
 
     def _number(self, cell: str, where: str) -> float:
@@ -181,7 +209,8 @@ class _Parser:
                 f'{where}: got "{_short(cell)}", expected a finite number.'
                 " Fill the gap or leave the row out."
             )
-        raise InputError(f'{where}: got "{_short(cell)}", expected a number')
+        hint = " Thousands are written without separators." if _GROUPED.fullmatch(cell) else ""
+        raise InputError(f'{where}: got "{_short(cell)}", expected a number.{hint}')
 
 
 def _split(lines: Iterable[str], separator: str) -> Iterator[list[str]]:
@@ -190,6 +219,7 @@ def _split(lines: Iterable[str], separator: str) -> Iterator[list[str]]:
 
 _ODD = re.compile('[_"]')  # what float() would take and we would not, or has to be unpacked
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_GROUPED = re.compile(r"[+-]?\d{1,3}([., '\u2019\u00a0\u202f]\d{3})+([.,]\d+)?")
 _NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)|n/?a|#\S+", re.IGNORECASE)
 
 
@@ -200,7 +230,7 @@ def _read_header(source: str, file: TextIOWrapper) -> tuple[_Parser, int]:
         line += 1
         if text.lower().startswith("sep=") and len(text.rstrip("\n")) == 5:
             separator = text[4]
-        elif text.strip():
+        elif text.strip(';, "\t\n'):
             break
     else:
         raise InputError(f"{source}: is empty; expected a row of column names, then numbers")
@@ -210,10 +240,12 @@ def _read_header(source: str, file: TextIOWrapper) -> tuple[_Parser, int]:
     where = f"{source}, line {line}"
     if all(_NUMBER.fullmatch(name.replace(",", ".")) for name in names):
         raise InputError(f"{where}: got numbers, expected the names of the columns")
-    if "" in names:
-        nth = names.index("") + 1
-        raise InputError(f"{where}: column {nth} of {len(names)} has no name; name or delete it")
-    if twice := sorted({name for name in names if names.count(name) > 1}):
+    if len(names) == 1 and re.search(r"[\s|]", names[0]):
+        raise InputError(
+            f'{where}: got one column, "{_short(names[0])}"; expected commas, semicolons or tabs '
+            "between the columns"
+        )
+    if twice := sorted({name for name in names if name and names.count(name) > 1}):
         raise InputError(f"{where}: {_listed(twice)} given more than once")
     return _Parser(source, names, separator), line + 1
 
@@ -234,7 +266,7 @@ def _open(path: str | os.PathLike[str]) -> Iterator[TextIOWrapper]:
             with TextIOWrapper(raw, encoding="utf-16" if wide else "utf-8-sig") as text:
                 yield text
     except FileNotFoundError as error:
-        raise InputError(_missing(Path(path))) from error
+        raise no_such_file(path) from error
     except IsADirectoryError as error:
         raise InputError(f"{path}: is a folder; give the name of a CSV file in it") from error
     except UnicodeError as error:
@@ -243,16 +275,12 @@ def _open(path: str | os.PathLike[str]) -> Iterator[TextIOWrapper]:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
 
 
+def _size(path: str | os.PathLike[str]) -> int | None:
+    """Bytes in a file, None for a pipe."""
+    return os.path.getsize(path) if os.path.isfile(path) else None
+
+
 _CONTROL = bytes(set(range(32)) - set(b"\t\n\r\f"))
-
-
-def _missing(path: Path) -> str:
-    folder = path.parent.resolve()
-    if not folder.is_dir():
-        return f"{path}: no such file; the folder {folder} does not exist"
-    near = difflib.get_close_matches(path.name, os.listdir(folder), n=3)
-    guess = f" Did you mean {' or '.join(near)}?" if near else ""
-    return f"{path}: no such file in {folder}.{guess}"
 
 
 def _allow(source: str, names: Iterable[str], known: Collection[str]) -> None:

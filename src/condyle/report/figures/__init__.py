@@ -44,13 +44,14 @@ def save_figures(
 
     Returns: the paths: figure-5-motion.png, figure-5-motion.svg, ...
     """
-    return [
-        *save(figure_5(solution), folder, "figure-5-motion"),
-        *save(figure_6(solution), folder, "figure-6-jacobian"),
-        *save(figure_7(solution), folder, "figure-7-load"),
-        *save(figure_8(comparison), folder, "figure-8-torque"),
-        *save(figure_9(solution), folder, "figure-9-share"),
-    ]
+    figures = {
+        "figure-5-motion": figure_5,
+        "figure-6-jacobian": figure_6,
+        "figure-7-load": figure_7,
+        "figure-8-torque": lambda _: figure_8(comparison),
+        "figure-9-share": figure_9,
+    }
+    return save_each(figures, solution, folder)
 
 
 def save_solution_figures(solution: Solution, folder: str | os.PathLike[str]) -> list[Path]:

@@ -12,6 +12,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from ...atomic import replacing
+from ...progress import step
 from .style import STYLE
 
 if TYPE_CHECKING:
@@ -50,4 +51,9 @@ def save_each(
     folder: str | os.PathLike[str],
 ) -> list[Path]:
     """Draw and write figures by name."""
-    return [path for name, draw in plots.items() for path in save(draw(solution), folder, name)]
+    paths = []
+    with step("drawing figures", len(plots)) as advance:
+        for name, draw in plots.items():
+            paths += save(draw(solution), folder, name)
+            advance(1)
+    return paths

@@ -11,6 +11,7 @@ from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
 from ...atomic import write_text
+from ...progress import step
 from ..scene import DARK, LIGHT
 from .alerts import alerts
 from .columns import Columns
@@ -65,7 +66,8 @@ def write_report(
     Returns: the path.
     Raises: InputError: if a file cannot be read or the report cannot be written.
     """
-    write_text(path, report_html(solution, tables=tables, files=files))
+    with step("writing the report"):
+        write_text(path, report_html(solution, tables=tables, files=files))
     return Path(path)
 
 

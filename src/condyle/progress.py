@@ -1,0 +1,46 @@
+"""How far long work is: the work says it, and whoever watches shows it.
+
+    with step("drawing figures", total=5) as advance:
+        for figure in figures:
+            ...
+            advance(1)
+
+Nobody watches unless asked to; then a step costs next to nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from contextvars import ContextVar
+
+Advance = Callable[[float], None]
+# What is done and how much of it there is, None if that is not known -> a step to be entered.
+Watcher = Callable[[str, float | None], AbstractContextManager[Advance]]
+
+_watcher: ContextVar[Watcher | None] = ContextVar("watcher", default=None)
+
+
+@contextmanager
+def watched_by(watcher: Watcher) -> Iterator[None]:
+    """Let `watcher` see the steps of everything inside the block."""
+    token = _watcher.set(watcher)
+    try:
+        yield
+    finally:
+        _watcher.reset(token)
+
+
+@contextmanager
+def step(what: str, total: float | None = None) -> Iterator[Advance]:
+    """A piece of work that may last; yields a function to be told how much more is done."""
+    watcher = _watcher.get()
+    if watcher is None:
+        yield _unwatched
+    else:
+        with watcher(what, total) as advance:
+            yield advance
+
+
+def _unwatched(amount: float) -> None:
+    pass

@@ -1,0 +1,255 @@
+"""The bar on a terminal, and the steps that long work reports."""
+
+from __future__ import annotations
+
+import io
+import os
+import select
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.analysis.compare import compare
+from condyle.cli import bar
+from condyle.kernels.compiler import CompilerError, find_compiler
+from condyle.motion import Motion, iter_table
+from condyle.progress import Advance, step, watched_by
+from condyle.report.figures import save_figures, save_solution_figures
+from condyle.report.page import write_report
+from condyle.states import solve_file
+
+pty = pytest.importorskip("pty", reason="terminals of this kind are on Unix only")
+PATIENCE = 60  # seconds for a picture that never comes
+STATES = [prefix + name for prefix in ("", "d", "dd") for name in ("X", "Y", "alpha", "beta")]
+
+
+@dataclass
+class Terminal:
+    """A terminal, and what it was sent."""
+
+    end: int
+    stream: TextIO
+    sent: str = ""
+
+    def wait_for(self, text: str) -> None:
+        while text not in self.sent:
+            assert self._more(PATIENCE), f"no {text!r} in {self.sent!r}"
+
+    def all(self) -> str:
+        while self._more(0):
+            pass
+        return self.sent
+
+    def _more(self, seconds: float) -> bool:
+        ready = bool(select.select([self.end], [], [], seconds)[0])
+        if ready:
+            self.sent += os.read(self.end, 65536).decode()
+        return ready
+
+
+@pytest.fixture
+def terminal(monkeypatch: pytest.MonkeyPatch) -> Iterator[Terminal]:
+    monkeypatch.setattr(bar, "DELAY", 0)
+    for name in ("NO_COLOR", "FORCE_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("TERM", "xterm")
+    ours, theirs = pty.openpty()
+    with os.fdopen(theirs, "w") as stream:
+        yield Terminal(ours, stream)
+    os.close(ours)
+
+
+@pytest.fixture
+def on_terminal(terminal: Terminal, monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
+    """Puts the terminal in the place of stderr; to be called in the test, as pytest puts its own
+    there before each."""
+    return lambda: monkeypatch.setattr(sys, "stderr", terminal.stream)
+
+
+def test_a_bar_shows_the_innermost_step_and_goes(
+    terminal: Terminal, on_terminal: Callable[[], None]
+) -> None:
+    on_terminal()
+    with bar.progress_bar(True):
+        with step("shearing", 4) as advance:
+            advance(1)
+            terminal.wait_for("shearing")
+            terminal.wait_for("25%")
+            advance(2)
+            terminal.wait_for("75%")
+            with step("sharpening"):
+                terminal.wait_for("sharpening")
+        terminal.wait_for("working")
+        print("a warning", file=sys.stderr)
+    sent = terminal.all()
+    assert "a warning" in sent
+    last = sent.rpartition("\x1b[?25h")[2]  # the cursor is back, the line wiped
+    assert last.endswith("\x1b[2K") and "working" not in last
+
+
+@pytest.mark.parametrize("why", ["quick", "not wanted", "no terminal"])
+def test_no_bar(
+    terminal: Terminal,
+    on_terminal: Callable[[], None],
+    monkeypatch: pytest.MonkeyPatch,
+    why: str,
+) -> None:
+    on_terminal()
+    if why == "quick":
+        monkeypatch.setattr(bar, "DELAY", 3600)
+    if why == "no terminal":
+        monkeypatch.setattr(sys, "stderr", io.StringIO())
+    with bar.progress_bar(why != "not wanted"), step("shearing", 4) as advance:
+        advance(4)
+    assert terminal.all() == ""
+
+
+@pytest.mark.parametrize("switch", [None, "--quiet", "--json"])
+def test_a_bar_of_a_command(
+    condyle_command: Callable[..., Any],
+    terminal: Terminal,
+    on_terminal: Callable[[], None],
+    monkeypatch: pytest.MonkeyPatch,
+    switch: str | None,
+) -> None:
+    """On stderr, while it works; never with --quiet or --json; stdout has the answer alone."""
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("CONDYLE_BACKEND", "interpreted")
+
+    def solve(*_: Any) -> tuple[int, list[str]]:
+        with step("solving a file", 10) as advance:
+            advance(4)
+            if switch is None:
+                terminal.wait_for("40%")
+        return 10, []
+
+    monkeypatch.setattr("condyle.states.solve_file", solve)
+    on_terminal()
+    words = ("solve", "masticatory", "--states", "a.csv", "--out", "b.csv")
+    outcome = condyle_command(*words, *([switch] if switch else ()))
+    assert outcome.status == 0 and "\x1b" not in outcome.out
+    assert ("solving a file" in terminal.all()) == (switch is None)
+    assert switch is None or terminal.sent == ""
+
+
+def test_a_bar_goes_when_work_fails(terminal: Terminal, on_terminal: Callable[[], None]) -> None:
+    on_terminal()
+    with pytest.raises(KeyboardInterrupt), bar.progress_bar(True), step("shearing"):
+        terminal.wait_for("shearing")
+        raise KeyboardInterrupt
+    assert terminal.all().endswith("\x1b[2K")
+
+
+@dataclass
+class Watcher:
+    """Notes every step: what, how much there is and how much was done; and that each ends."""
+
+    steps: dict[str, list[float | None]] = field(default_factory=dict)
+    open: int = 0
+
+    @contextmanager
+    def __call__(self, what: str, total: float | None) -> Iterator[Advance]:
+        noted: list[float | None] = [total, 0]
+        self.steps[what] = noted
+
+        def advance(amount: float) -> None:
+            assert noted[1] is not None
+            noted[1] += amount
+
+        self.open += 1
+        try:
+            yield advance
+        finally:
+            self.open -= 1
+
+
+@pytest.fixture
+def watcher() -> Iterator[Watcher]:
+    watcher = Watcher()
+    with watched_by(watcher):
+        yield watcher
+    assert watcher.open == 0
+
+
+def interpreted() -> condyle.Model:
+    return condyle.derive(condyle.load("masticatory"), backend="interpreted")
+
+
+def path(**options: Any) -> Motion:
+    return Motion.from_csv(condyle.motion.bundled_reference()[0], **options)
+
+
+def test_rows_of_a_file(watcher: Watcher, tmp_path: Path) -> None:
+    """Progress is by bytes of the file, to its end."""
+    states = tmp_path / "states.csv"
+    np.savetxt(states, np.zeros((50, 12)), delimiter=",", header=",".join(STATES), comments="")
+    solve_file(interpreted(), states, tmp_path / "out.csv")
+    assert "deriving the equations" in watcher.steps
+    total, done = watcher.steps["solving states.csv"]
+    header = len(",".join(STATES)) + 1
+    assert (total, done) == (states.stat().st_size, states.stat().st_size - header)
+    assert all(watcher.open == 1 for _ in iter_table(states, 10))
+    assert watcher.steps["reading states.csv"] == [total, done]
+
+
+def test_steps_of_a_run(watcher: Watcher, tmp_path: Path) -> None:
+    solution = interpreted().solve(path(rate=20, cutoff="auto"))
+    assert {"smoothing", "solving"} <= set(watcher.steps)
+    solution.save(tmp_path / "a.nc")
+    assert "writing results" in watcher.steps
+    write_report(solution, tmp_path / "a.html")
+    assert "writing the report" in watcher.steps
+
+
+def test_steps_of_a_comparison(
+    watcher: Watcher, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    comparison = compare(
+        condyle.load("masticatory"), path(rate=20), formulations=["momentum", "virtual_power"]
+    )
+    assert watcher.steps["deriving every model"] == [4, 4]
+    assert watcher.steps["running every model"] == [6, 6]
+    monkeypatch.setattr("condyle.report.figures.files.save", lambda *_: [])
+    save_figures(comparison.solution, comparison, tmp_path)
+    assert watcher.steps["drawing figures"] == [5, 5]
+    save_solution_figures(comparison.solution, tmp_path)
+    assert watcher.steps["drawing figures"] == [10, 10]
+
+
+def test_building_a_kernel(
+    watcher: Watcher, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    try:
+        find_compiler()
+    except CompilerError as error:
+        pytest.skip(f"kernels need a compiler: {error}")
+    monkeypatch.setenv("CONDYLE_CACHE", str(tmp_path))
+    model = condyle.derive(condyle.load("gough-stewart"), backend="compiled")
+    zero = np.zeros((1, 6))
+    model.torques(zero, zero, zero, np.zeros((1, 9)))
+    assert "building a kernel" in watcher.steps
+
+
+def test_finding_poses(watcher: Watcher, tmp_path: Path) -> None:
+    from condyle.joints import pose_file
+
+    mechanism = condyle.load("masticatory")
+    joints = tmp_path / "joints.csv"
+    joints.write_text(",".join(f"joint_{n}" for n in mechanism.chain_names) + "\n0,0,0,0,0,0\n")
+    pose_file(mechanism, joints, tmp_path / "out.csv")
+    assert "finding poses" in watcher.steps
+
+
+def test_the_library_never_loads_a_bar() -> None:
+    sources = Path(condyle.__file__).parent
+    for file in sources.rglob("*.py"):
+        inside = file.relative_to(sources).parts
+        assert inside[0] == "cli" or "import rich" not in file.read_text(encoding="utf-8")
+        assert inside[0] == "cli" or "from rich" not in file.read_text(encoding="utf-8")
