@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from condyle.bench.own import TOLERANCE, own_rows
-from condyle.bench.rows import Row, spread
+from condyle.bench.own import own_probes, thread_probes
+from condyle.bench.rows import TOLERANCE, Probe, Row, spread, timed
 from condyle.bench.run import Benchmark
 from condyle.mechanism import load
 
 
 def test_every_row_is_right() -> None:
-    rows = list(own_rows(load("gough-stewart"), 0.01, ["virtual_power"], threads=True))
+    machine = load("gough-stewart")
+    rows = list(timed([*own_probes(machine, ["virtual_power"]), *thread_probes(machine)], 1))
     names = [row.name for row in rows]
     for what in ("one", "one, dependent", "batch", "batch, two threads"):
         assert f"gough-stewart virtual_power: {what}" in names
@@ -19,6 +20,18 @@ def test_every_row_is_right() -> None:
     for row in rows:
         assert row.error < TOLERANCE, row.name
         assert row.seconds > 0
+
+
+def test_a_wrong_row_says_so() -> None:
+    right, wrong = timed([Probe("a", lambda: 1.0, 1e-12), Probe("b", lambda: 1.0, 1e-3)], 3)
+    assert right.note == "" and "WRONG by 1.0e-03" in wrong.note
+
+
+def test_ratios_are_taken_within_rounds() -> None:
+    """A machine that becomes slower half way changes no ratio."""
+    slow, quick = iter([2.0, 2.0, 20.0, 2.0]), iter([1.0, 1.0, 10.0, 1.0])
+    a, b = timed([Probe("a", lambda: next(slow), 0.0), Probe("b", lambda: next(quick), 0.0)], 3)
+    assert a.over(b) == 2.0
 
 
 def test_median_and_spread() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import subprocess
 import sys
 import tempfile
@@ -12,17 +13,19 @@ from functools import partial
 from importlib.resources import files
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 
+from ..dynamics.equations import has_closed_form
 from ..kernels.compiled import Kernel
 from ..kernels.compiler import find_compiler
 from ..mechanism.mechanism import Mechanism
 from ..model import Model
-from .rows import Row, spread
+from .rows import Probe, Row, spread
 from .straight_line import torque_function
 
 SAMPLES = 4096
-TOLERANCE = 1e-9
+INTERPRETED = 256  # samples a call of the interpreter
 
 
 class Timer:
@@ -38,7 +41,7 @@ class Timer:
 
     def clock_rate(self) -> float:
         """Cycles a second, measured: the best of a few runs."""
-        return max(self.library.clock_rate(ctypes.c_long(30_000_000)) for _ in range(5))
+        return max(self.library.clock_rate(ctypes.c_long(3_000_000)) for _ in range(3))
 
 
 def reachable_samples(model: Model, count: int, seed: int = 0) -> np.ndarray:
@@ -56,10 +59,8 @@ def reachable_samples(model: Model, count: int, seed: int = 0) -> np.ndarray:
     return np.concatenate(found)[:count]
 
 
-def own_rows(
-    mechanism: Mechanism, seconds: float, formulations: list[str], threads: bool
-) -> Iterator[Row]:
-    """Rows of one mechanism."""
+def own_probes(mechanism: Mechanism, formulations: list[str]) -> Iterator[Probe]:
+    """What is timed of one mechanism."""
     timer = Timer()
     point = np.array(mechanism.platform.points.get("right_molar", (0.01, 0.02, 0.005)))
     reference = Model(mechanism, backend="interpreted")
@@ -70,125 +71,113 @@ def own_rows(
     right = reference.torques(states[0], states[1], states[2], load)[0].torque
     name = mechanism.name
     for formulation in formulations:
-        for outputs in ((), ("contact",)) if formulation == "virtual_power" else ((),):
-            kernel = Kernel(mechanism, formulation, "core", point, outputs)
-            label = f"{name} {formulation}" + (" + contact forces" if outputs else "")
-            yield from _kernel_rows(label, kernel, timer, samples, right, seconds)
-            if threads and not outputs and formulation == "virtual_power":
-                yield _threads_row(label, kernel, samples, seconds)
-    yield _interpreter_row(f"{name} interpreter", reference, states, load, seconds)
+        label = f"{name} {formulation}"
+        variants: list[tuple[str, str, tuple[str, ...]]] = [("", "core", ())]
+        if formulation == "virtual_power":
+            variants.append((" + contact forces", "core", ("contact",)))
+        elif has_closed_form(mechanism):
+            variants.append((", direct", "direct", ()))
+        for what, route, outputs in variants:
+            kernel = Kernel(mechanism, formulation, route, point, outputs)
+            yield from _kernel_probes(label + what, kernel, timer, samples, right)
+    q, q1, q2, wrench = (a[:INTERPRETED] for a in (*states, load))
+    yield _python_probe(
+        f"{name} interpreter: batch", lambda: reference.torques(q, q1, q2, wrench), INTERPRETED
+    )
     if all(c.locus.form == "plane" for c in mechanism.contacts):
         label = f"{name} CasADi straight-line C, gcc"
-        yield from _straight_rows(label, mechanism, point, timer, samples, right, seconds)
+        yield from _straight_probes(label, mechanism, point, timer, samples, right)
 
 
-def _kernel_rows(
-    label: str,
-    kernel: Kernel,
-    timer: Timer,
-    samples: np.ndarray,
-    right: np.ndarray,
-    seconds: float,
-) -> Iterator[Row]:
+def _kernel_probes(
+    label: str, kernel: Kernel, timer: Timer, samples: np.ndarray, right: np.ndarray
+) -> Iterator[Probe]:
     one, batch, table = (ctypes.c_void_p(a) for a in kernel.address)
-    packed = np.ascontiguousarray(samples)
-    columns = np.asfortranarray(samples)
-    out = np.empty(64 * len(samples))
+    packed, columns = np.ascontiguousarray(samples), np.asfortranarray(samples)
+    out, status = np.empty(64 * len(samples)), np.empty(len(samples), dtype=np.uint8)
     got = np.array([kernel.one(s) for s in samples[:256]])[:, : right.shape[1]]
     # Lanes stand family by family in what C returns.
     wrong = _error(kernel.in_order(got), right[:256])
+    operations = kernel.facts["operations"]
     for dependent, what in ((0, "one"), (1, "one, dependent")):
-        run = partial(
-            timer.library.time_one,
-            one,
-            table,
-            _at(packed),
-            len(packed),
-            packed.shape[1],
-            _at(out),
-            dependent,
-        )
-        yield Row(f"{label}: {what}", *_timed(run, seconds), wrong, kernel.facts["operations"])
+
+        def run(dependent: int = dependent) -> float:
+            return timer.library.time_one(
+                one, table, _at(packed), len(packed), packed.shape[1], _at(out), dependent
+            )
+
+        yield Probe(f"{label}: {what}", run, wrong, operations)
     pointers = (ctypes.c_void_p * columns.shape[1])(
         *(columns[:, j].ctypes.data for j in range(columns.shape[1]))
     )
-    status = np.empty(len(samples), dtype=np.uint8)
+
+    def blocks() -> float:
+        return timer.library.time_batch(
+            batch, table, pointers, ctypes.c_size_t(len(columns)), _at(out), _at(status)
+        )
+
     wrong = _error(kernel.in_order(kernel.run(columns)[0]["torque"]), right)
-    run = partial(
-        timer.library.time_batch,
-        batch,
-        table,
-        pointers,
-        ctypes.c_size_t(len(samples)),
-        _at(out),
-        _at(status),
-    )
-    yield Row(f"{label}: batch", *_timed(run, seconds), wrong, kernel.facts["operations"])
+    yield Probe(f"{label}: batch", blocks, wrong, operations)
 
 
-def _threads_row(label: str, kernel: Kernel, samples: np.ndarray, seconds: float) -> Row:
-    """Two threads over one, by the same call from Python on many samples."""
+def thread_probes(mechanism: Mechanism) -> Iterator[Probe]:
+    """One thread and two, by the same call from Python on many samples."""
+    kernel = Kernel(mechanism, "virtual_power", "core", np.array([0.01, 0.02, 0.005]))
+    samples = reachable_samples(Model(mechanism, backend="interpreted"), SAMPLES)
     many = np.asfortranarray(np.tile(samples, (64, 1)))
-
-    def run(threads: int) -> float:
-        start = time.perf_counter()
-        kernel.run(many, threads=threads)
-        return (time.perf_counter() - start) / len(many)
-
-    one, two = (_timed(partial(run, t), seconds) for t in (1, 2))
-    row = Row(f"{label}: batch, two threads", *two, 0.0, kernel.facts["operations"])
-    row.note = f"{one[0] / two[0]:.2f} x one thread ({one[0] * 1e9:.1f} ns)"
-    return row
+    label = f"{mechanism.name} virtual_power: batch"
+    for threads, what in ((1, "one thread"), (2, "two threads")):
+        yield _python_probe(
+            f"{label}, {what}", partial(kernel.run, many, threads=threads), len(many)
+        )
 
 
-def _interpreter_row(
-    label: str, model: Model, states: list[np.ndarray], load: np.ndarray, seconds: float
-) -> Row:
+def _python_probe(name: str, call: Callable[[], object], count: int) -> Probe:
+    """A call from Python that evaluates `count` samples, all of them right by definition."""
+
     def run() -> float:
         start = time.perf_counter()
-        model.torques(states[0], states[1], states[2], load)
-        return (time.perf_counter() - start) / len(load)
+        call()
+        return (time.perf_counter() - start) / count
 
-    return Row(f"{label}: batch", *_timed(run, seconds), 0.0, None)
+    return Probe(name, run, 0.0)
 
 
-def _straight_rows(
+def _straight_probes(
     label: str,
     mechanism: Mechanism,
     point: np.ndarray,
     timer: Timer,
     samples: np.ndarray,
     right: np.ndarray,
-    seconds: float,
-) -> Iterator[Row]:
+) -> Iterator[Probe]:
     function = torque_function(mechanism, "virtual_power", point)
     folder = Path(tempfile.mkdtemp(prefix="condyle-bench-"))
     (folder / "straight.c").write_text(_generated(function), encoding="utf-8")
     library = folder / "straight.so"
     find_compiler().build(folder / "straight.c", library)
     call = ctypes.CDLL(str(library)).straight_line
-    size_w, size_iw = function.sz_w(), function.sz_iw()
-    w, iw = np.empty(size_w + 1), np.empty(size_iw + 1, dtype=np.int64)
+    w, iw = np.empty(function.sz_w() + 1), np.empty(function.sz_iw() + 1, dtype=np.int64)
     packed, out = np.ascontiguousarray(samples), np.empty(16)
     got = np.asarray(function(samples[:256].T).full()).T
     for dependent, what in ((0, "one"), (1, "one, dependent")):
-        run = partial(
-            timer.library.time_casadi,
-            call,
-            _at(packed),
-            len(packed),
-            packed.shape[1],
-            _at(out),
-            _at(iw),
-            _at(w),
-            dependent,
-        )
-        yield Row(f"{label}: {what}", *_timed(run, seconds), _error(got, right[:256]), None)
+
+        def run(dependent: int = dependent) -> float:
+            return timer.library.time_casadi(
+                call,
+                _at(packed),
+                len(packed),
+                packed.shape[1],
+                _at(out),
+                _at(iw),
+                _at(w),
+                dependent,
+            )
+
+        yield Probe(f"{label}: {what}", run, _error(got, right[:256]))
 
 
-def _generated(function) -> str:
-    import casadi as ca
-
+def _generated(function: ca.Function) -> str:
     generator = ca.CodeGenerator("straight", {"with_header": False})
     generator.add(function)
     return generator.dump()
@@ -210,7 +199,7 @@ def ready_rows(mechanism: str) -> Iterator[Row]:
         for _ in range(6):
             done = subprocess.run(
                 [sys.executable, "-c", program],
-                env=_environment(CONDYLE_CACHE=cache),
+                env={**os.environ, "CONDYLE_CACHE": cache},
                 capture_output=True,
                 text=True,
                 check=True,
@@ -218,22 +207,6 @@ def ready_rows(mechanism: str) -> Iterator[Row]:
             times.append(float(done.stdout.split()[-1]))
     yield Row(f"{mechanism}: file to ready kernel, cold", times[0], 0.0, 0.0, None)
     yield Row(f"{mechanism}: file to ready kernel, cached", *spread(times[1:]), 0.0, None)
-
-
-def _environment(**extra: str) -> dict[str, str]:
-    import os
-
-    return {**os.environ, **extra}
-
-
-def _timed(run: Callable[[], float], seconds: float) -> tuple[float, float]:
-    """Median and spread of repeats for about so many seconds."""
-    run()
-    times: list[float] = []
-    end = time.perf_counter() + seconds
-    while len(times) < 5 or time.perf_counter() < end:
-        times.append(run())
-    return spread(times)
 
 
 def _error(got: np.ndarray, right: np.ndarray) -> float:

@@ -1,19 +1,35 @@
-"""A row of the benchmark's table."""
+"""Rows of the benchmark's table, timed side by side."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from statistics import median, quantiles
+
+TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class Probe:
+    """Something to time.
+
+    run:        does some milliseconds of work; seconds an evaluation.
+    error:      largest difference from the interpreter's torques, relative to the largest.
+    operations: vector operations of a batch step, a fused multiply-add counting one.
+    """
+
+    name: str
+    run: Callable[[], float]
+    error: float
+    operations: int | None = None
+    note: str = ""
 
 
 @dataclass
 class Row:
-    """One measurement.
+    """One line of the table.
 
-    seconds:    median; `spread`: the width of its middle half.
-    error:      largest difference from the interpreter's torques, relative to the largest.
-    operations: vector operations of a batch step, a fused multiply-add counting one.
+    seconds: median; `spread`: the width of its middle half; `times`: round by round.
     """
 
     name: str
@@ -22,6 +38,36 @@ class Row:
     error: float
     operations: int | None
     note: str = ""
+    times: list[float] = field(default_factory=list, repr=False)
+
+    def over(self, other: Row) -> float:
+        """How many times longer this takes: the median over rounds, where both were timed in each.
+
+        A machine that is slow for a while is slow for both.
+        """
+        if len(self.times) != len(other.times):
+            return self.seconds / other.seconds
+        return median(a / b for a, b in zip(self.times, other.times, strict=True))
+
+
+def timed(
+    probes: Sequence[Probe], rounds: int, begun: Callable[[int], None] = lambda _: None
+) -> Iterator[Row]:
+    """Rows of probes that are run in turn, round after round.
+
+    Args: begun: told of each round that begins.
+    """
+    times: list[list[float]] = [[] for _ in probes]
+    for probe in probes:
+        probe.run()  # warms up
+    for number in range(rounds):
+        begun(number)
+        for probe, own in zip(probes, times, strict=True):
+            own.append(probe.run())
+    for probe, own in zip(probes, times, strict=True):
+        wrong = probe.error > TOLERANCE
+        note = f"WRONG by {probe.error:.1e}; its time means nothing" if wrong else probe.note
+        yield Row(probe.name, *spread(own), probe.error, probe.operations, note, own)
 
 
 def spread(times: Sequence[float]) -> tuple[float, float]:

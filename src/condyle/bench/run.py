@@ -6,12 +6,13 @@ import importlib
 import os
 import platform
 import sys
-import tempfile
 import tomllib
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 import numpy as np
@@ -22,10 +23,12 @@ from ..kernels.compiler import find_compiler
 from ..mechanism import bundled_text, load
 from ..model import Model
 from ..progress import step
-from .own import TOLERANCE, Timer, own_rows, reachable_samples, ready_rows
-from .rows import Row, spread
+from .own import Timer, own_probes, reachable_samples, ready_rows, thread_probes
+from .rows import Probe, Row, timed
 
 REFERENCE = "masticatory"
+CYCLE = "one cycle of the clock"
+ROUNDS = 40  # in which each row has about a second, other engines' included
 OTHERS = ("masticatory-curved", "gough-stewart", "hexaglide")
 
 
@@ -45,7 +48,7 @@ class Benchmark:
     def data(self) -> dict[str, Any]:
         """For JSON."""
         return {
-            "rows": [asdict(row) for row in self.rows],
+            "rows": [{k: v for k, v in asdict(row).items() if k != "times"} for row in self.rows],
             "ratios": self.ratios,
             "facts": self.facts,
             "unavailable": self.unavailable,
@@ -69,60 +72,64 @@ class Benchmark:
 
 
 def run_benchmark(seconds: float = 1.0) -> Benchmark:
-    """Measure everything on one core; takes a minute or two.
+    """Measure everything, on one core but for what is about two; takes some minutes.
 
-    Args: seconds: timing, a row.
+    Everything is timed in turn, round after round, and ratios are taken within rounds: a machine
+    that others slow down for a while still gives fair ones.
+
+    Args: seconds: about how long each row is timed.
     """
-    processors = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set()
-    rows: list[Row] = []
+    rounds = max(5, round(seconds * ROUNDS))
     unavailable: dict[str, str] = {}
-
-    def add(found: Iterator[Row], what: str) -> None:
-        with step(f"timing {what}"):
-            for row in found:
-                if row.error > TOLERANCE:
-                    row.note = f"WRONG by {row.error:.1e}; its time means nothing"
-                rows.append(row)
-
-    if processors:
-        os.sched_setaffinity(0, {max(processors)})
-    try:
-        add(own_rows(load(REFERENCE), seconds, list(FORMULATIONS), threads=False), REFERENCE)
-        for name in OTHERS:
-            add(own_rows(load(name), seconds, ["virtual_power"], threads=False), name)
-        add(_peer_rows(seconds, unavailable), "other engines")
-        add(ready_rows(REFERENCE), "a fresh start")
-        clock = Timer().clock_rate()
-    finally:
-        if processors:
-            os.sched_setaffinity(0, processors)
-    if len(processors) > 1:
-        add(_two_threads(seconds), "two threads")
+    timer = Timer()
+    probes = [Probe(CYCLE, lambda: 1 / timer.clock_rate(), 0.0)]
+    with _one_core() as processors:
+        with step("building kernels"):
+            probes += own_probes(load(REFERENCE), list(FORMULATIONS))
+            for name in OTHERS:
+                probes += own_probes(load(name), ["virtual_power"])
+        with step("building other engines"):
+            probes += _peer_probes(unavailable)
+        rows = _timed(probes, rounds)
+        with step("starting afresh"):
+            rows += ready_rows(REFERENCE)
+    if processors > 1:
+        rows += _timed(list(thread_probes(load(REFERENCE))), rounds)
     compiler = find_compiler()
     facts = {
         "processor": _processor(),
-        "clock": clock,
+        "clock": 1 / rows[0].seconds,
         "lanes": compiler.lanes,
         "compiler": compiler.command[0],
         "flags": list(compiler.flags),
+        "rounds": rounds,
         "python": platform.python_version(),
         "versions": {"condyle": __version__, **{p: version(p) for p in ("casadi", "numpy")}},
     }
-    return Benchmark(rows, _ratios(rows, clock, compiler.lanes), facts, unavailable)
+    return Benchmark(rows, _ratios(rows, compiler.lanes), facts, unavailable)
 
 
-def _two_threads(seconds: float) -> Iterator[Row]:
-    from ..kernels.compiled import Kernel
-    from .own import _threads_row
+@contextmanager
+def _one_core() -> Iterator[int]:
+    """Keeps this process on one processor; yields how many it had."""
+    if not hasattr(os, "sched_getaffinity"):
+        yield os.cpu_count() or 1
+        return
+    processors = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {max(processors)})
+    try:
+        yield len(processors)
+    finally:
+        os.sched_setaffinity(0, processors)
 
-    mechanism = load(REFERENCE)
-    kernel = Kernel(mechanism, "virtual_power", "core", np.array([0.01, 0.02, 0.005]))
-    samples = reachable_samples(Model(mechanism, backend="interpreted"), 4096)
-    yield _threads_row(f"{REFERENCE} virtual_power", kernel, samples, seconds)
+
+def _timed(probes: list[Probe], rounds: int) -> list[Row]:
+    with step("timing", rounds) as advance:
+        return list(timed(probes, rounds, lambda number: advance(min(number, 1))))
 
 
-def _peer_rows(seconds: float, unavailable: dict[str, str]) -> Iterator[Row]:
-    """Rows of the other engines, where the repository's `benchmarks` is at hand."""
+def _peer_probes(unavailable: dict[str, str]) -> Iterator[Probe]:
+    """The other engines, where the repository's `benchmarks` is at hand."""
     sys.path.insert(0, str(Path.cwd()))
     try:
         peers = importlib.import_module("benchmarks.peers")
@@ -148,48 +155,56 @@ def _peer_rows(seconds: float, unavailable: dict[str, str]) -> Iterator[Row]:
             unavailable[name] = why
             continue
         try:
-            peer.prepare(raw, Path(tempfile.mkdtemp(prefix="condyle-peer-")))
+            peer.prepare(raw, Path(str(peers.__file__)).parent / "build")
             error = float(np.abs(peer.solve(q, q1, q2, force) - right).max() / np.abs(right).max())
-            times = peer.time_one(q, q1, q2, force, seconds)
         except (peers.PeerError, OSError) as problem:
             unavailable[name] = str(problem).splitlines()[0]
             continue
+
+        def run(peer: Any = peer) -> float:
+            return median(peer.time_one(q, q1, q2, force, 0.0))
+
         note = f"ready in {peer.facts['prepare_seconds']:.1f} s"
-        yield Row(f"peer {name}: one", *spread(times), error, None, note)
+        yield Probe(f"peer {name}: one", run, error, None, note)
 
 
-def _ratios(rows: list[Row], clock: float, lanes: int) -> dict[str, float]:
+def _ratios(rows: list[Row], lanes: int) -> dict[str, float]:
     """The bars, from rows of this run."""
-    by_name = {row.name: row.seconds for row in rows}
-    operations = {row.name: row.operations for row in rows}
-    own = f"{REFERENCE} virtual_power"
+    by_name = {row.name: row for row in rows}
+    own, curved = f"{REFERENCE} virtual_power", "masticatory-curved virtual_power"
     one, batch = by_name[f"{own}: one"], by_name[f"{own}: batch"]
     ratios: dict[str, float] = {}
     # The cut tree is the problem as it stands; the free couplers leave half of it to hand-written
     # code, and are the quickest way to use Pinocchio that we know.
     for tree, what in (("tree", "the cut tree"), ("free", "free couplers, the rest by hand")):
-        cpp = [t for n, t in by_name.items() if n.startswith(f"peer pinocchio-{tree}")]
+        cpp = [row for name, row in by_name.items() if name.startswith(f"peer pinocchio-{tree}")]
         if cpp:
-            ratios[f"one evaluation, times faster than Pinocchio C++ ({what})"] = min(cpp) / one
-            ratios[f"batch, times faster than Pinocchio C++ ({what})"] = min(cpp) / batch
+            best = min(cpp, key=lambda row: row.seconds)
+            ratios[f"one evaluation, times faster than Pinocchio C++ ({what})"] = best.over(one)
+            ratios[f"batch, times faster than Pinocchio C++ ({what})"] = best.over(batch)
     straight = by_name[f"{REFERENCE} CasADi straight-line C, gcc: one"]
-    ratios["one evaluation, times faster than straight-line C"] = straight / one
-    count = operations[f"{own}: batch"]
-    assert count is not None
-    floor = count / (2 * clock * lanes)
-    ratios["floor of the batch [ns a sample]"] = floor * 1e9
-    ratios["batch over its floor"] = batch / floor
-    contact = by_name[f"{own} + contact forces: one"] / one
-    ratios["one evaluation with contact forces over without"] = contact
-    ratios["batch with contact forces over without"] = (
-        by_name[f"{own} + contact forces: batch"] / batch
-    )
-    curved = "masticatory-curved virtual_power"
-    ratios["curved over planar, one evaluation"] = by_name[f"{curved}: one"] / one
-    ratios["curved over planar, batch"] = by_name[f"{curved}: batch"] / batch
+    ratios["one evaluation, times faster than straight-line C"] = straight.over(one)
+    assert batch.operations is not None
+    cycles = batch.operations / (2 * lanes)
+    ratios["floor of the batch [ns a sample]"] = cycles * by_name[CYCLE].seconds * 1e9
+    ratios["batch over its floor"] = batch.over(by_name[CYCLE]) / cycles
+    for what, row in (("one evaluation", one), ("batch", batch)):
+        shape = row.name.rsplit(": ", 1)[1]
+        with_forces = by_name[f"{own} + contact forces: {shape}"]
+        ratios[f"{what} with contact forces over without"] = with_forces.over(row)
+        ratios[f"{what}, curved over planar"] = by_name[f"{curved}: {shape}"].over(row)
+        for formulation in ("momentum", "lagrange"):
+            other = by_name[f"{REFERENCE} {formulation}: {shape}"]
+            ratios[f"{what}, {formulation} over virtual_power"] = other.over(row)
+    for formulation in ("momentum", "lagrange"):
+        routes = (by_name[f"{REFERENCE} {formulation}{r}: one"] for r in (", direct", ""))
+        ratios[f"one evaluation, {formulation}, direct over core"] = next(routes).over(next(routes))
+    threads = [by_name.get(f"{own}: batch, {what}") for what in ("one thread", "two threads")]
+    if threads[0] and threads[1]:
+        ratios["two threads, times faster than one"] = threads[0].over(threads[1])
     ready = f"{REFERENCE}: file to ready kernel"
-    ratios["file to ready kernel, cold [s]"] = by_name[f"{ready}, cold"]
-    ratios["file to ready kernel, cached [s]"] = by_name[f"{ready}, cached"]
+    ratios["file to ready kernel, cold [s]"] = by_name[f"{ready}, cold"].seconds
+    ratios["file to ready kernel, cached [s]"] = by_name[f"{ready}, cached"].seconds
     return ratios
 
 
