@@ -92,7 +92,6 @@ def own_probes(mechanism: Mechanism, formulations: list[str]) -> Iterator[Probe]
 def _kernel_probes(
     label: str, kernel: Kernel, timer: Timer, samples: np.ndarray, right: np.ndarray
 ) -> Iterator[Probe]:
-    one, batch, table = (ctypes.c_void_p(a) for a in kernel.address)
     packed, columns = np.ascontiguousarray(samples), np.asfortranarray(samples)
     out, status = np.empty(64 * len(samples)), np.empty(len(samples), dtype=np.uint8)
     got = np.array([kernel.one(s) for s in samples[:256]])[:, : right.shape[1]]
@@ -102,6 +101,7 @@ def _kernel_probes(
     for dependent, what in ((0, "one"), (1, "one, dependent")):
 
         def run(dependent: int = dependent) -> float:
+            one, _, table = _addresses(kernel)
             return timer.library.time_one(
                 one, table, _at(packed), len(packed), packed.shape[1], _at(out), dependent
             )
@@ -112,12 +112,18 @@ def _kernel_probes(
     )
 
     def blocks() -> float:
+        _, batch, table = _addresses(kernel)
         return timer.library.time_batch(
             batch, table, pointers, ctypes.c_size_t(len(columns)), _at(out), _at(status)
         )
 
     wrong = _error(kernel.in_order(kernel.run(columns)[0]["torque"]), right)
     yield Probe(f"{label}: batch", blocks, wrong, operations)
+
+
+def _addresses(kernel: Kernel) -> list[ctypes.c_void_p]:
+    """Of `one`, `batch` and the table, while the kernel that owns them is there."""
+    return [ctypes.c_void_p(address) for address in kernel.address]
 
 
 def thread_probes(mechanism: Mechanism) -> Iterator[Probe]:
