@@ -18,7 +18,6 @@ from .program import Program
 ABREAST = 2  # chains whose statements alternate, to keep both arithmetic ports busy
 LONG = 700  # statements of a chain above which one at a time is enough
 TRIGONOMETRY = 12  # operations of half a sine and cosine
-SUM, LEAST = "sum", "least"
 
 Part = tuple[int, int | None]  # phase, and group of chains
 
@@ -100,7 +99,7 @@ class Loops(Printer):
         """Lane values that only one sum over the chains wants: they become steps of that sum."""
         found: set[Value] = set()
         for v in self.varying:
-            if self.g.nodes[v].op == SUM:
+            if self.g.nodes[v].op == "sum":
                 for _, t in self.lane_terms(v):
                     self._absorb(t, found)
         return found
@@ -137,35 +136,31 @@ class Loops(Printer):
             if self._part(t) == part
         ]
         plain = [v for v in values if v not in self.absorbed]
-        count = self.counts[group]
-        if self.rolled:
-            yield from (f"vec r{v} = {start};" for v, start in self._started(sums, group))
-            yield f"for (int c = 0; c < {count}; c++) {{"
-            yield from (f"  {s}" for s in self.statements(plain, 0))
-            for v, t in sums:
-                yield from (f"  {s}" for s in self._steps(v, t, 0))
-            yield from (f"  x{v}_[c] = x{v}_0;" for v in plain if v in self.kept)
-            yield "}"
-            return
+        count, abreast = self.counts[group], 1 if self.rolled else ABREAST
         yield from (f"vec r{v} = {start};" for v, start in self._started(sums, group))
-        for first in range(0, count, ABREAST):
-            some = range(first, min(first + ABREAST, count))
+        if self.rolled:
+            yield f"for (int c = 0; c < {count}; c++) {{"
+        for first in range(0, 1 if self.rolled else count, abreast):
+            some = range(first, min(first + abreast, count))
             rows = [list(self.statements(plain, c)) for c in some]
             yield from (s for row in zip(*rows, strict=True) for s in row)
             for c in some:
                 for v, t in sums:
                     yield from self._steps(v, t, c)
+        if self.rolled:
+            yield from (f"x{v}_[c] = x{v}_0;" for v in plain if v in self.kept)
+            yield "}"
 
     def _started(self, sums: list[tuple[Value, Value]], group: int) -> Iterator[tuple[Value, str]]:
         """What reductions are before the first of a mechanism's chains joins them."""
         for v, _ in sums:
             if self.lane_terms(v)[0][0] == group:
-                yield v, "spread(0.0)" if self.g.nodes[v].op == SUM else "spread(HUGE_VAL)"
+                yield v, "spread(0.0)" if self.g.nodes[v].op == "sum" else "spread(HUGE_VAL)"
 
     def _steps(self, v: Value, t: Value, copy: int, sign: str = "+") -> Iterator[str]:
         """A chain's term joins a reduction."""
         node = self.g.nodes[t]
-        if self.g.nodes[v].op == LEAST:
+        if self.g.nodes[v].op == "least":
             yield f"r{v} = fmin_v(r{v}, {self.name(t, copy)});"
             return
         if t not in self.absorbed:
@@ -206,4 +201,4 @@ class Loops(Printer):
     def reduction(self, v: Value) -> str:
         shared = [self.repeated(v, t, count) for count, t in self.shared_terms(v)]
         terms = [f"r{v}", *shared] if self.lane_terms(v) else shared
-        return " + ".join(terms) if self.g.nodes[v].op == SUM else fold("fmin_v", terms)
+        return " + ".join(terms) if self.g.nodes[v].op == "sum" else fold("fmin_v", terms)
