@@ -430,7 +430,8 @@ def test_a_system_without_locks(folder: Path, monkeypatch: pytest.MonkeyPatch) -
 
 def test_show_and_clear(condyle_command: Callable[..., Any], folder: Path) -> None:
     outcome = condyle_command("cache")
-    assert (outcome.status, outcome.out) == (0, f"{folder}: 0 kernels, 0.0 MB\n")
+    assert outcome.status == 0
+    assert outcome.out.splitlines()[0] == f"{folder}: 0 kernels, 0.0 MB"
     assert not folder.exists()
     kept()
     cache.build(OTHER, Maker(), quiet)
@@ -443,7 +444,8 @@ def test_show_and_clear(condyle_command: Callable[..., Any], folder: Path) -> No
     assert shown.status == 0 and f"{folder}: 1 kernel, 3.0 MB\n" in shown.out
     assert "condyle cache --clear" in shown.out
     cleared = condyle_command("cache", "--clear")
-    assert (cleared.status, cleared.out) == (0, f"Removed 1 kernel, 3.0 MB from {folder}\n")
+    assert cleared.status == 0
+        assert cleared.out.splitlines()[0] == f"Removed 1 kernel, 3.0 MB from {folder}"
     assert names(folder) == ["notes.txt"]
     assert condyle_command("cache", "--clear").out.startswith("Removed 0 kernels, 0.0 MB")
 
