@@ -31,6 +31,7 @@ _HOMES = {
     "Motion": "motion",
     "reference_load": "motion",
     "reference_motion": "motion",
+    "trial_motion": "motion",
     "Solution": "solution",
     "open_solution": "solution",
 }
@@ -46,7 +47,7 @@ if TYPE_CHECKING:
     )
     from .mechanism import Mechanism, bundled_mechanisms, dump, dumps, load
     from .model import Model, derive
-    from .motion import Load, Motion, reference_load, reference_motion
+    from .motion import Load, Motion, reference_load, reference_motion, trial_motion
     from .solution import Solution, open_solution
 
 __all__ = [*_HOMES, "__version__"]

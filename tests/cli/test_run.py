@@ -236,3 +236,10 @@ def test_compare_in_short(condyle_command: Callable[..., Any]) -> None:
     assert condyle_command("report", "compared/masticatory-compare.nc").status == 0
     page = Path("compared/masticatory-compare.html").read_text(encoding="utf-8")
     assert "Table 1. Computational time" in page and "Table 2. Mean norm" in page
+
+
+def test_without_a_motion_any_mechanism_gets_one(condyle_command: Callable[..., Any]) -> None:
+    outcome = condyle_command("run", "hexaglide", "--rate", "20")
+    assert outcome.status == 0
+    assert "no --motion" in outcome.err and "synthetic" in outcome.err
+    assert Path("results/hexaglide.nc").is_file()

@@ -175,7 +175,7 @@ CASES: dict[str, Case] = {
     "load falls": (("run", "--load", "in.csv"), table(LOAD, [[1, 0, 0, 0], [0, 0, 0, 0]]), "rise"),
     "load text": (("run", "--load", "in.csv"), table(LOAD, [[0, "a", 0, 0]]), 'got "a"'),
     "load point of run": (("run", "--load-point", "nose"), None, 'no point "nose"'),
-    "bundled motion elsewhere": (("run", "gough-stewart"), None, "Name one of your own: --motion"),
+    "landmark elsewhere": (("run", "gough-stewart", "--landmark", "nose"), None, "--landmark nose"),
     # keys and kinds
     "key misspelt": (CHECK, toml("mass = 0.2 ", "mas = 0.2 "), 'Did you mean "mass"'),
     "key of a chain": (CHECK, toml("crank_tip =", "cranktip ="), 'Did you mean "crank_tip"'),

@@ -445,7 +445,7 @@ def test_show_and_clear(condyle_command: Callable[..., Any], folder: Path) -> No
     assert "condyle cache --clear" in shown.out
     cleared = condyle_command("cache", "--clear")
     assert cleared.status == 0
-        assert cleared.out.splitlines()[0] == f"Removed 1 kernel, 3.0 MB from {folder}"
+    assert cleared.out.splitlines()[0] == f"Removed 1 kernel, 3.0 MB from {folder}"
     assert names(folder) == ["notes.txt"]
     assert condyle_command("cache", "--clear").out.startswith("Removed 0 kernels, 0.0 MB")
 

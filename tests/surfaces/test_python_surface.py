@@ -140,7 +140,7 @@ def test_commands_on_a_saved_solution(solution: Solution, condyle_command, tmp_p
 
 
 def test_a_file_cannot_write_the_note(machine: Mechanism, saved: Solution) -> None:
-    with pytest.raises(MechanismError, match="the kind 'expression' is unknown. Available"):
+    with pytest.raises(MechanismError, match="the kind 'expression' is unknown"):
         parse(saved.attrs["mechanism"])
 
 

@@ -9,7 +9,7 @@ import typer
 from . import options
 from .answer import Answer, command_line
 from .app import BEGIN, command
-from .inputs import chews, warn
+from .inputs import warn
 
 Project = Annotated[
     bool,
@@ -36,7 +36,7 @@ def check(mechanism: options.Mechanism, project: Project = False) -> Answer:
     machine = condyle.load(mechanism)
     description = describe(machine)
     warn(home_warnings(machine))
-    then = command_line("run" if chews(machine) else "view", mechanism)
+    then = command_line("run", mechanism)
     return Answer(f"{description}\n", description.data, then, "result")
 
 

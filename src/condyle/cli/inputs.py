@@ -23,23 +23,31 @@ def motion_and_load(
     smooth: str | None = None,
     rate: float | None = None,
 ) -> tuple[Motion, Load]:
-    """The files named, or the reference case where none is."""
-    from ..motion import Load, Motion, bundled_reference
+    """The files named; without a motion the reference case, or a trial motion if it is no jaw."""
+    from ..mechanism.home import independent_coordinates
+    from ..motion import Load, Motion, bundled_reference, trial_motion
 
-    if motion is None and not chews(machine, landmark):
-        raise InputError(
-            "the bundled motion is the path of a jaw's incisor on two contacts, not one for "
-            f'"{machine.name}". Name one of your own: --motion with a CSV of t and '
-            f"{machine.degrees_of_freedom} pose coordinates"
-        )
-
-    reference_path, reference_load = bundled_reference()
     if motion is None and units != "m,rad":
         raise InputError("--units is for a motion of your own; name it with --motion")
+    reference_path, reference_load = bundled_reference()
+    reference = motion is None and chews(machine, landmark)
+    if motion is None and landmark is not None and not reference:
+        raise InputError(
+            f'--landmark {landmark}: "{machine.name}" has no jaw\'s two contacts for the bundled '
+            "path. Name a motion of t, x, y, z with --motion"
+        )
     if load is not None:
         acting = Load.from_csv(load)
     else:
-        acting = Load.from_csv(reference_load) if motion is None else Load.zero()
+        acting = Load.from_csv(reference_load) if reference else Load.zero()
+    if motion is None and not reference:
+        warn(
+            [
+                f'no --motion: "{machine.name}" is given a trial motion (synthetic) that sways '
+                f"{', '.join(independent_coordinates(machine))} about home"
+            ]
+        )
+        return trial_motion(machine, cutoff=smooth, rate=rate), acting
     path = Motion.from_csv(
         motion or reference_path, units=units, landmark=landmark, cutoff=smooth, rate=rate
     )

@@ -11,6 +11,7 @@ from condyle.motion.reference import (
 from condyle.motion.smoothing import AUTO_CUTOFF, Smoothing
 from condyle.motion.table import Table, iter_table, read_table
 from condyle.motion.table_writer import TableWriter, write_table
+from condyle.motion.trial import trial_motion
 from condyle.motion.units import LANDMARK, POSE, Units, parse_units
 
 __all__ = [
@@ -29,6 +30,7 @@ __all__ = [
     "read_table",
     "reference_load",
     "reference_motion",
+    "trial_motion",
     "write_reference",
     "write_table",
 ]

@@ -73,12 +73,17 @@ def _incisor_path() -> dict[str, np.ndarray]:
     bundled file in the last digit.
     """
     u = _TIMES - _REST
-    s = np.clip(u / _RAMP, 0, 1)
-    w = s**5 * (126 - 420 * s + 540 * s**2 - 315 * s**3 + 70 * s**4)
+    w = rise(u / _RAMP)
     phase = 2 * np.pi / _PERIOD * u
     opening = w * ((1 - np.cos(phase)) / 2)
     columns = {"x": -0.00255 * opening, "y": 0.002 * w * np.sin(phase), "z": -0.015 * opening}
     return {name: column + 0.0 for name, column in columns.items()}  # + 0.0 turns -0 into 0
+
+
+def rise(s: np.ndarray) -> np.ndarray:
+    """From 0 at 0 to 1 at 1, with four smooth derivatives."""
+    s = np.clip(s, 0, 1)
+    return s**5 * (126 - 420 * s + 540 * s**2 - 315 * s**3 + 70 * s**4)
 
 
 def _bite_force() -> dict[str, np.ndarray]:
