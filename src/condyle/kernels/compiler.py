@@ -25,10 +25,15 @@ FLAGS = (
     "-fPIC",
     "-shared",
 )
-# What is made for this processor: the first that the compiler takes. GCC would keep scalars in
-# integer registers when it runs out of others, on the ports that arithmetic needs.
-IN_VECTORS = "-mtune-ctrl=^inter_unit_moves_to_vec,^inter_unit_moves_from_vec"
-NATIVE = (("-march=native", IN_VECTORS), ("-march=native",), ("-mcpu=native",), ())
+# GCC alone takes these. Without the first it keeps scalars in integer registers when it runs out of
+# others, on the ports that arithmetic needs; the others order a batch's statements.
+GCC = (
+    "-mtune-ctrl=^inter_unit_moves_to_vec,^inter_unit_moves_from_vec",
+    "-fschedule-insns",
+    "-fsched-pressure",
+)
+# What is made for this processor: the first that the compiler takes.
+NATIVE = (("-march=native", *GCC), ("-march=native",), ("-mcpu=native",), ())
 SECONDS = 300  # a build that takes longer has gone wrong
 ASKING = 30  # seconds in which a compiler says what it is
 REMEDY = (
