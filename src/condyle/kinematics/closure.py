@@ -91,6 +91,9 @@ class Closure:
             goal = np.minimum(done[active] + piece[active], 1.0)
             target = self._home + (s[active] - self._home) * goal[:, None]
             x, ok = self._newton(pose[active], target)
+            # Branches meet where K is singular, and the sign of its determinant changes: a leap
+            # from one to the other was too long.
+            ok &= self._on_branch(x)
             pose[active[ok]], done[active[ok]] = x[ok], goal[ok]
             piece[active] *= np.where(ok, 2.0, 0.5)
             active = active[(done[active] < 1) & (piece[active] >= SMALLEST_PIECE)]
@@ -100,8 +103,7 @@ class Closure:
             # be judged by its branch.
             missed = np.flatnonzero(~reached & np.isfinite(s).all(axis=1))
             pose[missed], reached[missed] = self._newton(pose[missed] * 0, s[missed], bold=True)
-        # Branches meet where K is singular, and the sign of its determinant changes.
-        reached &= np.linalg.slogdet(self._jacobian(pose)).sign == self._branch
+        reached &= self._on_branch(pose)
         pose[~reached] = np.nan
         return pose, reached
 
@@ -138,6 +140,9 @@ class Closure:
             last[active] = size
             active = active[~(converged[active] | failed)]
         return x, converged
+
+    def _on_branch(self, pose: np.ndarray) -> np.ndarray:
+        return np.linalg.slogdet(self._jacobian(pose)).sign == self._branch
 
     def _jacobian(self, pose: np.ndarray) -> np.ndarray:
         return _square(evaluate(self._conditions, pose)[1])

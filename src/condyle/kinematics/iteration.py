@@ -1,50 +1,52 @@
 """Dependent coordinates where they have no closed form: Newton's method as one expression.
 
-A fixed number of steps, for kernels that cannot loop until it is enough. The residual that is
-left says whether it was; where not, the sample needs `Closure`, which follows it from home.
+A fixed number of steps, for kernels that cannot loop until it is enough. What they leave behind
+says whether it was; where not, the sample needs `Closure`, which follows it from home.
 
-Most mechanisms on curved surfaces z = f(x, y) depend in Z and one angle. Their difference of phi
-is one equation in that angle, solved from its second-order Taylor expansion at home; the angle's
-cosine and sine are turned along, without trigonometry.
+Most mechanisms on curved surfaces z = f(x, y) depend in Z and one angle; see `one_angle`. The
+others follow the sample from home in pieces, as `Closure` does.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import casadi as ca
 
 from .contact import (
     ContactSymbols,
     Placement,
+    contact_bias,
     contact_frame,
     indices,
-    parasitic_jacobian,
-    residuals,
     solve_small,
 )
-from .rotation import Bryant
+from .one_angle import one_angle
+from .parasitic import gyration
+from .rotation import Bryant, turn_by, turned
 
-STEPS = 5
-RESIDUAL = 1e-13  # metres off a surface that count as on it
-ROUNDING = 1e-24  # square of a step that is as good as none
-SHORT = 2e-4  # radians of the second step at the most; the first is exact whatever its length
+PIECES = (2, 4, 6)  # of the way from home with one contact, with two, and with more
+SHRINK = 0.1  # of a step to the next in the same piece: `Closure` is content with a quarter
+TINY = 1e-10  # steps that need not shrink
+FOLD = 0.05  # least determinant of C_dep over home's, and least 1 - 2 h
+FAR = 0.7  # with more than two contacts, the longest way whose pieces are short enough
+CLOSED = 1e-13  # a last step that is as good as none
+NOTHING = 1e-30  # keeps steps of zero from making 0 / 0
 
 
 def newton(contacts: Sequence[ContactSymbols], dependent: Sequence[str], q: ca.SX) -> Placement:
     """A pose with phi = 0, from q in the order of X_EE.
 
-    Its `reach` is near 1 where the steps sufficed, and 0 where they did not.
+    Its `reach` is 1 where the steps sufficed, and 0 where they did not.
     """
     dep = indices(dependent)
     if all(_is_graph(c) for c in contacts) and 2 in dep:
         if len(dep) == 1:
             return _height(contacts[0], q)
         if len(dep) == 2 and max(dep) >= 3:
-            return _one_angle(contacts, max(dep), q)
-    return _all_at_once(contacts, dependent, q)
+            return one_angle(contacts, max(dep), q)
+    return _followed(contacts, dep, q)
 
 
 def _is_graph(contact: ContactSymbols) -> bool:
@@ -61,157 +63,159 @@ def _height(contact: ContactSymbols, q: ca.SX) -> Placement:
     return Placement(ca.vertcat(q[:2], Z), bryant, None)
 
 
-@dataclass(frozen=True)
-class _Circle:
-    """Ball centre as an angle turns: cos a + sin b + k, (3,) each, with Z left out."""
+def _followed(contacts: Sequence[ContactSymbols], dep: list[int], q: ca.SX) -> Placement:
+    """All dependent coordinates at once, along the straight way from home.
 
-    a: ca.SX
-    b: ca.SX
-    k: ca.SX
-
-    def at(self, turn: ca.SX) -> ca.SX:
-        return turn[0] * self.a + turn[1] * self.b + self.k
-
-    def slope(self, turn: ca.SX) -> ca.SX:
-        return turn[0] * self.b - turn[1] * self.a
-
-
-def _one_angle(contacts: Sequence[ContactSymbols], angle: int, q: ca.SX) -> Placement:
-    """Z and one angle: Newton on phi_1 - phi_2 = 0, which is free of Z."""
-    first, second = contacts
-    circles, bryant, unknown = _circles(contacts, angle, q)
-    turn = _far(_taylor(contacts, angle, q))
-    inverse_slope, steps = ca.SX(0), []
-    for last in (False, False, True):
-        p, r = (c.at(turn) for c in circles)
-        off = first.phi(p) - second.phi(r)
-        if not last:  # the last step is so short that the slope before it does
-            slopes = (
-                ca.dot(contact.gradient(point), circle.slope(turn))
-                for contact, circle, point in zip(contacts, circles, (p, r), strict=True)
-            )
-            inverse_slope = 1 / (next(slopes) - next(slopes))
-        steps.append(-off * inverse_slope)
-        turn = _turned(turn, _near(steps[-1]) if len(steps) > 1 else _far(steps[-1]))
-    p, r = (c.at(turn) for c in circles)
-    heights = first.phi(p), second.phi(r)
-    bryant = Bryant(*(ca.substitute(v, unknown, turn) for v in (bryant.cos, bryant.sin)))
-    Z = -(heights[0] + heights[1]) / 2
-    short = ca.fmax(1 - ca.fabs(steps[1]) / SHORT, 0)
-    # The slope changes its sign where the branch of home meets another.
-    same = ca.fmax(inverse_slope * _home_slope(contacts, angle), 0)
-    reach = ca.fmin(ca.fmin(short, same), _converged(heights[0] - heights[1]))
-    return Placement(ca.vertcat(q[:2], Z), bryant, reach, iterated=True)
-
-
-def _circles(
-    contacts: Sequence[ContactSymbols], angle: int, q: ca.SX
-) -> tuple[list[_Circle], Bryant, ca.SX]:
-    unknown = ca.SX.sym("turn", 2)
-    given = iter(ca.vertsplit(q[2:]))
-    cos, sin = [], []
-    for i in (3, 4, 5):
-        value = None if i == angle else next(given)
-        cos.append(unknown[0] if value is None else ca.cos(value))
-        sin.append(unknown[1] if value is None else ca.sin(value))
-    bryant = Bryant(ca.vertcat(*cos), ca.vertcat(*sin))
-    R, base = bryant.rotation(), ca.vertcat(q[:2], 0)
-    circles = []
-    for contact in contacts:
-        p = contact.at(base, R)
-        a, b = ca.jacobian(p, unknown[0]), ca.jacobian(p, unknown[1])
-        circles.append(_Circle(a, b, ca.substitute(p, unknown, ca.SX.zeros(2))))
-    return circles, bryant, unknown
-
-
-def _home_slope(contacts: Sequence[ContactSymbols], angle: int) -> ca.SX:
-    """d (phi_1 - phi_2) / d angle at home."""
-    frame = contact_frame(contacts, ca.SX.zeros(3), ca.SX.eye(3))
-    return frame.N[angle, 0] - frame.N[angle, 1]
-
-
-def _far(angle: ca.SX) -> ca.SX:
-    """Cosine and sine of 2 atan(angle / 2): near those of the angle, and of exactly unit length."""
-    t = angle / 2
-    scale = 1 / (1 + t * t)
-    return ca.vertcat((1 - t * t) * scale, 2 * t * scale)
-
-
-def _near(angle: ca.SX) -> ca.SX:
-    """Cosine and sine of an angle below `SHORT`, whose fourth power is below rounding."""
-    square = angle * angle
-    return ca.vertcat(1 - square * 0.5, angle * (1 - square * (1 / 6)))
-
-
-def _turned(turn: ca.SX, by: ca.SX) -> ca.SX:
-    return ca.vertcat(turn[0] * by[0] - turn[1] * by[1], turn[1] * by[0] + turn[0] * by[1])
-
-
-def _taylor(contacts: Sequence[ContactSymbols], angle: int, q: ca.SX) -> ca.SX:
-    """The dependent angle to second order in q, about home.
-
-    From E(angle, q) = 0: E_a g = -E_q, E_a H = -(E_qq + E_qa g^T + g E_qa^T + E_aa g g^T).
+    Each piece is a step that follows the bend of the contacts, and one of Newton that shows how
+    good it was. There is one branch at a time as long as C_dep keeps the sign of its determinant;
+    small steps and a determinant away from zero leave no room for a fold between them.
     """
-    m = q.shape[0]
-    v = ca.SX.sym("v", m + 1)  # q, then the angle
-    circles, _, _ = _circles(contacts, angle, v[:m])
-    turn = ca.vertcat(ca.cos(v[m]), ca.sin(v[m]))
-    E = contacts[0].phi(circles[0].at(turn)) - contacts[1].phi(circles[1].at(turn))
-    H, gradient = ca.hessian(E, v)
-    H, gradient = ca.substitute([H, gradient], [v], [ca.SX.zeros(m + 1)])
-    inverse = 1 / gradient[m]
-    g = -gradient[:m] * inverse
-    E_qa = H[:m, m]
-    bend = -(H[:m, :m] + E_qa @ g.T + g @ E_qa.T + H[m, m] * (g @ g.T)) * inverse
-    value = ca.dot(g, q)
-    for i in range(m):
-        for j in range(i, m):
-            value += (bend[i, j] * (0.5 if i == j else 1.0)) * (q[i] * q[j])
-    return value
+    unit = _Unit.of(contacts)
+    pose = _Pose(ca.SX.zeros(3), [ca.SX([1, 0])] * 3)
+    home = _Contacts.at(contacts, dep, pose).determinant
+    sure = []
+    for goal in _way(dep, q, PIECES[min(len(dep), len(PIECES)) - 1]):
+        pose = pose.with_goal(goal, dep)
+        here = _Contacts.at(contacts, dep, pose)
+        step, fold = here.bent_step(unit)
+        pose = pose.moved(dep, step)
+        there = _Contacts.at(contacts, dep, pose)
+        rest = there.step()
+        pose = pose.moved(dep, rest)
+        shrunk = unit.square(rest, dep) < SHRINK**2 * unit.square(step, dep) + TINY**2
+        sure += [fold > FOLD, shrunk]
+        sure += [c.determinant * home > FOLD * home * home for c in (here, there)]
+    pose = pose.moved(dep, _Contacts.at(contacts, dep, pose).bent_step(unit)[0])
+    last = _Contacts.at(contacts, dep, pose)
+    pose = pose.moved(dep, last.step())
+    phi = _phi(contacts, pose)
+    sure.append(unit.square(solve_small(last.C, phi), dep) < CLOSED**2)
+    if len(dep) > 2:
+        sure.append(pose.square(unit) < FAR**2)
+    reach = ca.SX(1)
+    for condition in sure:
+        reach = reach * condition  # 0 and 1: no comparison with what is no number holds
+    return Placement(pose.position, pose.bryant, reach, iterated=True)
 
 
-def _all_at_once(
-    contacts: Sequence[ContactSymbols], dependent: Sequence[str], q: ca.SX
-) -> Placement:
-    """Newton on all dependent coordinates, from home's tangent."""
-    dep = indices(dependent)
-    ind = [i for i in range(6) if i not in dep]
-    home = contact_frame(contacts, ca.SX.zeros(3), ca.SX.eye(3))
-    pose = ca.SX.zeros(6)
-    # At home R_omega is the identity.
-    pose[ind], pose[dep] = q, parasitic_jacobian(home.N.T, dependent)[dep, :] @ q
-    lengths = [_square(contacts, pose)]
-    for _ in range(STEPS):
-        step = ca.SX.zeros(6)
-        step[dep] = solve_small(*_linear(contacts, dep, pose))
-        pose = pose - step
-        lengths.append(_square(contacts, step))
-    off = ca.SX(0.0)
-    for phi in ca.vertsplit(residuals(contacts, pose)):
-        off = ca.fmax(off, ca.fabs(phi))
-    # As in `Closure`: steps that shrink to a quarter do not leave the branch of home.
-    reach = ca.fmin(_converged(off), 1 - lengths[0])
-    for before, after in pairwise(lengths[:3]):
-        reach = ca.fmin(reach, 1 - after / (before / 16 + ROUNDING))
-    return Placement(pose[:3], Bryant.of(pose[3:]), ca.fmax(reach, 0), iterated=True)
+@dataclass(frozen=True)
+class _Unit:
+    """Sizes of steps where lengths and angles meet: lengths count as angles by the levers'.
+
+    lever: mean square of the contact points' distances from O_M [m^2].
+    """
+
+    lever: ca.SX
+
+    @staticmethod
+    def of(contacts: Sequence[ContactSymbols]) -> _Unit:
+        return _Unit(sum((ca.dot(c.point, c.point) for c in contacts), ca.SX(0)) / len(contacts))
+
+    def dot(self, a: ca.SX, b: ca.SX, dep: Sequence[int]) -> ca.SX:
+        weight = ca.vertcat(*(1 / self.lever if i < 3 else ca.SX(1) for i in dep))
+        return ca.dot(weight * a, b)
+
+    def square(self, step: ca.SX, dep: Sequence[int]) -> ca.SX:
+        return self.dot(step, step, dep)
 
 
-def _square(contacts: Sequence[ContactSymbols], step: ca.SX) -> ca.SX:
-    """Squared length of a change of pose, dimensionless: angles, and lengths by the levers'."""
-    lever = sum((ca.dot(c.point, c.point) for c in contacts), ca.SX(0)) / len(contacts)
-    return ca.dot(step[:3], step[:3]) / lever + ca.dot(step[3:], step[3:])
+@dataclass(frozen=True)
+class _Pose:
+    """O_M, (3,), and the cosine and sine of each angle."""
+
+    position: ca.SX
+    turns: list[ca.SX]
+
+    @property
+    def bryant(self) -> Bryant:
+        return Bryant(*(ca.vertcat(*(turn[i] for turn in self.turns)) for i in (0, 1)))
+
+    def square(self, unit: _Unit) -> ca.SX:
+        """Squared size of the move from home: lengths by the levers', angles by their chords."""
+        chords = sum((2 * (1 - turn[0]) for turn in self.turns), ca.SX(0))
+        return ca.dot(self.position, self.position) / unit.lever + chords
+
+    def with_goal(self, goal: _Pose, dep: Sequence[int]) -> _Pose:
+        """With the independent coordinates of another pose."""
+        position = ca.vertcat(*((self if i in dep else goal).position[i] for i in range(3)))
+        return _Pose(position, [(self if i + 3 in dep else goal).turns[i] for i in range(3)])
+
+    def moved(self, dep: Sequence[int], step: ca.SX) -> _Pose:
+        """After a step of the dependent coordinates; angles to second order."""
+        position, turns = ca.SX(self.position), list(self.turns)
+        for i, change in zip(dep, ca.vertsplit(step), strict=True):
+            if i < 3:
+                position[i] += change
+            else:
+                turns[i - 3] = turned(turns[i - 3], turn_by(change))
+        return _Pose(position, turns)
 
 
-def _converged(off: ca.SX) -> ca.SX:
-    """Near 1 where a residual [m] is at rounding, 0 beyond `RESIDUAL`."""
-    return ca.fmax(1 - ca.fabs(off) / RESIDUAL, 0)
+def _way(dep: Sequence[int], q: ca.SX, pieces: int) -> list[_Pose]:
+    """Poses with the independent coordinates of equal parts of the way from home to q."""
+    given = iter(ca.vertsplit(q))
+    values = [ca.SX(0) if i in dep else next(given) for i in range(6)]
+    first = [ca.vertcat(ca.cos(v / pieces), ca.sin(v / pieces)) for v in values[3:]]
+    goals, turns = [], first
+    for part in range(1, pieces + 1):
+        goals.append(_Pose(ca.vertcat(*values[:3]) * (part / pieces), turns))
+        turns = [turned(turn, by) for turn, by in zip(turns, first, strict=True)]
+    return goals
 
 
-def _linear(contacts: Sequence[ContactSymbols], dep: list[int], pose: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """C_dep, (k, k), and phi, (k,), at a pose."""
-    bryant = Bryant.of(pose[3:])
-    R = bryant.rotation()
-    frame = contact_frame(contacts, pose[:3], R)
-    C = frame.N.T @ ca.diagcat(ca.SX.eye(3), bryant.angular_velocity())
-    phi = ca.vertcat(*(c.phi(c.at(pose[:3], R)) for c in contacts))
-    return C[:, dep], phi
+def _phi(contacts: Sequence[ContactSymbols], pose: _Pose) -> ca.SX:
+    R = pose.bryant.rotation()
+    return ca.vertcat(*(c.phi(c.at(pose.position, R)) for c in contacts))
+
+
+@dataclass(frozen=True)
+class _Contacts:
+    """phi, (k,), at a pose, and C, (k, k), its derivative in the dependent coordinates."""
+
+    contacts: Sequence[ContactSymbols]
+    dep: list[int]
+    pose: _Pose
+    phi: ca.SX
+    C: ca.SX
+
+    @staticmethod
+    def at(contacts: Sequence[ContactSymbols], dep: list[int], pose: _Pose) -> _Contacts:
+        bryant = pose.bryant
+        R = bryant.rotation()
+        frame = contact_frame(contacts, pose.position, R)
+        C = frame.N.T @ ca.diagcat(ca.SX.eye(3), bryant.angular_velocity())
+        return _Contacts(contacts, dep, pose, _phi(contacts, pose), C[:, dep])
+
+    @property
+    def determinant(self) -> ca.SX:
+        return ca.det(self.C)
+
+    def step(self) -> ca.SX:
+        """Newton's."""
+        return -solve_small(self.C, self.phi)
+
+    def bent_step(self, unit: _Unit) -> tuple[ca.SX, ca.SX]:
+        """To the root of the quadratic along Newton's step s, which also leads to near folds.
+
+            b = C^-1 phi''(s, s),   h = -(s . b) / (s . s),
+            t s - t^2 (b + h s) / 2   with   t = 2 / (1 + sqrt(1 - 2 h)).
+
+        Returns: the step, and 1 - 2 h: negative where the quadratic has no root.
+        """
+        s = self.step()
+        b = solve_small(self.C, self._bend(s))
+        h = -unit.dot(s, b, self.dep) / (unit.square(s, self.dep) + NOTHING)
+        fold = 1 - 2 * h
+        t = 2 / (1 + ca.sqrt(ca.fmax(fold, 0)))
+        return t * s - (t * t / 2) * (b + h * s), fold
+
+    def _bend(self, s: ca.SX) -> ca.SX:
+        """phi'' that constant rates s of the dependent coordinates make, (k,)."""
+        rate = ca.SX.zeros(6)
+        rate[self.dep] = s
+        bryant = self.pose.bryant
+        turning = gyration(bryant, rate[3:])
+        twist = ca.vertcat(rate[:3], bryant.angular_velocity() @ rate[3:])
+        frame = contact_frame(self.contacts, self.pose.position, bryant.rotation())
+        bias = contact_bias(self.contacts, frame, self.pose.position, twist)
+        return bias + frame.N[3:, :].T @ turning

@@ -17,6 +17,7 @@ from .contact import (
     parasitic_jacobian,
     solve_small,
 )
+from .rotation import Bryant
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ def whole_motion(
     M_J = parasitic_jacobian(C, dependent)
     rate = M_J @ q_rate
     twist = E @ rate
-    turning = gyration(placement, rate[3:])
+    turning = gyration(placement.bryant, rate[3:])
     dep = indices(dependent)
     ind = [i for i in range(6) if i not in dep]
     acceleration = ca.SX(6, 1)
@@ -64,9 +65,9 @@ def whole_motion(
     return WholeMotion(rate, acceleration, twist, twist_rate, M_J, E, R, frame)
 
 
-def gyration(placement: Placement, angle_rates: ca.SX) -> ca.SX:
+def gyration(bryant: Bryant, angle_rates: ca.SX) -> ca.SX:
     """R_omega' (alpha', beta', gamma'), (3,): the angular acceleration that rates alone make."""
-    c, s = placement.bryant.cos, placement.bryant.sin
+    c, s = bryant.cos, bryant.sin
     a1, b1, g1 = angle_rates[0], angle_rates[1], angle_rates[2]
     return ca.vertcat(
         c[1] * b1 * g1,

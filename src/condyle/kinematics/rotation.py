@@ -64,3 +64,24 @@ def rotation(angles: ca.SX) -> ca.SX:
 def angular_velocity_matrix(angles: ca.SX) -> ca.SX:
     """R_omega of (alpha, beta, gamma) [rad], (3, 3)."""
     return Bryant.of(angles).angular_velocity()
+
+
+def turn_by(angle: ca.SX) -> ca.SX:
+    """Cosine and sine, (2,), of 2 atan(angle / 2): near those of the angle, of length 1."""
+    t = angle / 2
+    scale = 1 / (1 + t * t)
+    return ca.vertcat((1 - t * t) * scale, 2 * t * scale)
+
+
+def turned(turn: ca.SX, by: ca.SX) -> ca.SX:
+    """Cosine and sine of the sum of two angles, from theirs, (2,) each."""
+    return ca.vertcat(turn[0] * by[0] - turn[1] * by[1], turn[1] * by[0] + turn[0] * by[1])
+
+
+def turned_slightly(turn: ca.SX, x: ca.SX) -> ca.SX:
+    """The same for an angle x whose fourth power is below rounding."""
+    c, s = turn[0], turn[1]
+    return ca.vertcat(
+        c - x * (s + x * (c / 2 - x * (s / 6))),
+        s + x * (c - x * (s / 2 + x * (c / 6))),
+    )
