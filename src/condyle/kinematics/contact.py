@@ -10,7 +10,7 @@ columns of the dependent and the independent coordinates,
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -47,6 +47,10 @@ class ContactSymbols:
     def bending(self, position: ca.SX, velocity: ca.SX) -> ca.SX:
         """v^T (d2 phi / d position2) v."""
         return self.surface.bending(position, velocity, self.constants)
+
+    def started_at(self, position: ca.SX) -> ContactSymbols:
+        """For ball centres near `position`: see `Smooth.started_at`."""
+        return replace(self, surface=self.surface.started_at(position, self.constants))
 
     def at(self, position: ca.SX, R: ca.SX) -> ca.SX:
         """Where the ball centre is when O_M is at `position`, (3,)."""

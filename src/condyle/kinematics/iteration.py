@@ -26,13 +26,27 @@ from .one_angle import one_angle
 from .parasitic import gyration
 from .rotation import Bryant, turn_by, turned
 
-PIECES = (2, 4, 6)  # of the way from home with one contact, with two, and with more
-SHRINK = 0.1  # of a step to the next in the same piece: `Closure` is content with a quarter
 TINY = 1e-10  # steps that need not shrink
-FOLD = 0.05  # least determinant of C_dep over home's, and least 1 - 2 h
-FAR = 0.7  # with more than two contacts, the longest way whose pieces are short enough
 CLOSED = 1e-13  # a last step that is as good as none
 NOTHING = 1e-30  # keeps steps of zero from making 0 / 0
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """How the way from home is followed, and when to believe it.
+
+    shrink: of a step to the next in the same piece, at the most; `Closure`: a quarter.
+    fold:   least 1 - 2 h, and least determinant of C_dep over home's.
+    far:    the longest way whose pieces are short enough.
+    """
+
+    pieces: int
+    shrink: float
+    fold: float
+    far: float | None = None
+
+
+PLANS = (_Plan(2, 0.25, 0.05), _Plan(4, 0.1, 0.1), _Plan(6, 0.1, 0.15, 0.7))  # by contacts
 
 
 def newton(contacts: Sequence[ContactSymbols], dependent: Sequence[str], q: ca.SX) -> Placement:
@@ -72,26 +86,29 @@ def _followed(contacts: Sequence[ContactSymbols], dep: list[int], q: ca.SX) -> P
     """
     unit = _Unit.of(contacts)
     pose = _Pose(ca.SX.zeros(3), [ca.SX([1, 0])] * 3)
-    home = _Contacts.at(contacts, dep, pose).determinant
+    there = _Contacts.at([c.started_at(c.point) for c in contacts], dep, pose)
+    home = there.determinant
     sure = []
-    for goal in _way(dep, q, PIECES[min(len(dep), len(PIECES)) - 1]):
+    plan = PLANS[min(len(dep), len(PLANS)) - 1]
+    for goal in _way(dep, q, plan.pieces):
         pose = pose.with_goal(goal, dep)
-        here = _Contacts.at(contacts, dep, pose)
+        here = there.at_pose(pose)
         step, fold = here.bent_step(unit)
         pose = pose.moved(dep, step)
-        there = _Contacts.at(contacts, dep, pose)
+        there = here.at_pose(pose)
         rest = there.step()
         pose = pose.moved(dep, rest)
-        shrunk = unit.square(rest, dep) < SHRINK**2 * unit.square(step, dep) + TINY**2
-        sure += [fold > FOLD, shrunk]
-        sure += [c.determinant * home > FOLD * home * home for c in (here, there)]
-    pose = pose.moved(dep, _Contacts.at(contacts, dep, pose).bent_step(unit)[0])
-    last = _Contacts.at(contacts, dep, pose)
+        shrunk = unit.square(rest, dep) < plan.shrink**2 * unit.square(step, dep) + TINY**2
+        sure += [fold > plan.fold, shrunk]
+        sure += [c.determinant * home > plan.fold * home * home for c in (here, there)]
+    there = there.at_pose(pose)
+    pose = pose.moved(dep, there.bent_step(unit)[0])
+    last = there.at_pose(pose)
     pose = pose.moved(dep, last.step())
     phi = _phi(contacts, pose)
     sure.append(unit.square(solve_small(last.C, phi), dep) < CLOSED**2)
-    if len(dep) > 2:
-        sure.append(pose.square(unit) < FAR**2)
+    if plan.far is not None:
+        sure.append(pose.square(unit) < plan.far**2)
     reach = ca.SX(1)
     for condition in sure:
         reach = reach * condition  # 0 and 1: no comparison with what is no number holds
@@ -185,6 +202,12 @@ class _Contacts:
         frame = contact_frame(contacts, pose.position, R)
         C = frame.N.T @ ca.diagcat(ca.SX.eye(3), bryant.angular_velocity())
         return _Contacts(contacts, dep, pose, _phi(contacts, pose), C[:, dep])
+
+    def at_pose(self, pose: _Pose) -> _Contacts:
+        """The contacts at another pose nearby."""
+        R = self.pose.bryant.rotation()
+        here = [c.started_at(c.at(self.pose.position, R)) for c in self.contacts]
+        return _Contacts.at(here, self.dep, pose)
 
     @property
     def determinant(self) -> ca.SX:

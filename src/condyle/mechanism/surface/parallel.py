@@ -18,7 +18,7 @@ infinite, never wrong.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
@@ -28,7 +28,8 @@ import numpy as np
 from .smooth import Smooth
 
 ON_THE_WAY = (1 / 3, 2 / 3)  # parts of the way from home at which Newton makes one step,
-STEPS = 6  # and how many it makes at the point itself
+STEPS = 6  # and how many it makes at the point itself,
+AGAIN = 2  # or from the foot of a point nearby
 CONVERGED = 1e-10  # metres off the foot's conditions
 STILL = 1e-15  # metres of a step that is rounding
 DIRECTIONS, STARTS, HOME_STEPS = 1000, 20, 50  # with which the foot of home is looked for
@@ -40,6 +41,7 @@ class Parallel(Smooth):
     """Points at a signed distance [m] from a wall, positive along its normal.
 
     centre, foot, multiplier: a point near the surface, its foot and mu there: where Newton begins.
+    start: foot and mu, (4,), with which it begins instead: see `started_at`.
     """
 
     wall: Any
@@ -47,6 +49,7 @@ class Parallel(Smooth):
     centre: tuple[float, ...] = (0.0, 0.0, 0.0)
     foot: tuple[float, ...] = (0.0, 0.0, 0.0)
     multiplier: float = 0.0
+    start: Any = field(default=None, compare=False)
 
     @staticmethod
     @lru_cache(maxsize=256)
@@ -82,11 +85,16 @@ class Parallel(Smooth):
 
     def bending(self, point: ca.SX, velocity: ca.SX, constants: Any = None) -> ca.SX:
         """v . dn/dt, from the velocity of the foot."""
-        _, n, size, H, inverse, along = self._at(point, constants)
+        _, n, size, H, inverse, along, _ = self._at(point, constants)
         still = inverse @ velocity
         foot_velocity = still - along * (ca.dot(n, still) / ca.dot(n, along))
         turn = (H @ foot_velocity) / size
         return ca.dot(velocity, turn) - ca.dot(velocity, n) * ca.dot(n, turn)
+
+    def started_at(self, point: ca.SX, constants: Any = None) -> Parallel:
+        c = self._numbers(constants)
+        start = c[4:8] if self.start is None else self._at(point, c)[-1]
+        return replace(self, start=start)
 
     def grip(self) -> float:
         """Smallest eigenvalue of 1 + distance * curvature at the foot of `centre`.
@@ -103,8 +111,15 @@ class Parallel(Smooth):
 
     def _at(self, point: Any, constants: Any) -> Any:
         c = self._numbers(constants)
-        touching = _functions(self.wall, c.numel() - 8)[1]
-        return touching(ca.vertcat(point[0], point[1], point[2]), c)
+        p = ca.vertcat(point[0], point[1], point[2])
+        equation, touching = _functions(self.wall, c.numel() - 8)
+        if self.start is None:
+            return touching(p, c)
+        w, mu = self.start[:3], self.start[3]
+        for _ in range(AGAIN):
+            w, mu = newton_step(equation, p, w, mu, c[8:])
+        phi, _, *more = _at_foot(equation, p, w, mu, c)
+        return [phi, *more]
 
     def _numbers(self, constants: Any) -> Any:
         c = self.constants() if constants is None else constants
@@ -129,19 +144,25 @@ def _equation(wall: Any, count: int) -> ca.Function:
 
 
 def _touching(equation: ca.Function, count: int) -> ca.Function:
-    """(p, constants) -> phi, n, |grad g|, H, (1 + mu H)^-1, (1 + mu H)^-1 n."""
+    """(p, constants) -> phi, n, |grad g|, H, (1 + mu H)^-1, (1 + mu H)^-1 n, foot and mu."""
     p, c = ca.SX.sym("p", 3), ca.SX.sym("c", count + 8)
     home, w, mu, wall = c[1:4], c[4:7], c[7], c[8:]
     for part in (*ON_THE_WAY, *[1.0] * STEPS):
         w, mu = newton_step(equation, home + part * (p - home) if part < 1 else p, w, mu, wall)
-    g, a, H = equation(w, wall)
+    phi, converged, *more = _at_foot(equation, p, w, mu, c)
+    return ca.Function("touching", [p, c], [phi / converged, *more])
+
+
+def _at_foot(equation: ca.Function, p: ca.SX, w: ca.SX, mu: ca.SX, c: ca.SX) -> list[ca.SX]:
+    """phi, whether w is the foot, and the rest of what `_touching` returns."""
+    g, a, H = equation(w, c[8:])
     size = ca.norm_2(a)
     n = a / size
     off = p - w - mu * a
     converged = ca.dot(off, off) + g * g <= CONVERGED**2
-    phi = ((ca.dot(n, p - w) + g / size) - c[0]) / converged
+    phi = (ca.dot(n, p - w) + g / size) - c[0]
     inverse = ca.inv_minor(ca.SX.eye(3) + mu * H)
-    return ca.Function("touching", [p, c], [phi, n, size, H, inverse, inverse @ n])
+    return [phi, converged, n, size, H, inverse, inverse @ n, ca.vertcat(w, mu)]
 
 
 def newton_step(equation: ca.Function, p: Any, w: Any, mu: Any, constants: Any) -> tuple[Any, Any]:

@@ -11,14 +11,14 @@ the safer one. All else is as for any `Parallel`, at a fraction of its cost.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from .parallel import CONVERGED, Parallel
+from .parallel import AGAIN, CONVERGED, Parallel
 
 GUESSES = 2  # from the normal at a guessed foot to a better one,
 STEPS = 5  # and steps of Newton then
@@ -44,15 +44,24 @@ class ParallelQuadric(Parallel):
     def bending(self, point: ca.SX, velocity: ca.SX, constants: Any = None) -> ca.SX:
         """v . dn/dt, in principal axes."""
         c = self._numbers(constants)
-        *_, size, _, shrink, a = self._at(point, c)
+        *_, size, _, shrink, a, _ = self._at(point, c)
         v, n, h = _axes(c).T @ velocity, a / size, c[13:16]
         still, along = shrink * v, shrink * n
         turn = h * (still - along * (ca.dot(n, still) / ca.dot(n, along))) / size
         return ca.dot(v, turn) - ca.dot(v, n) * ca.dot(n, turn)
 
+    def started_at(self, point: ca.SX, constants: Any = None) -> ParallelQuadric:
+        return replace(self, start=self._at(point, constants)[-1])
+
     def _at(self, point: Any, constants: Any) -> Any:
-        p = ca.vertcat(point[0], point[1], point[2])
-        return _touching()(p, self._numbers(constants))
+        p, c = ca.vertcat(point[0], point[1], point[2]), self._numbers(constants)
+        if self.start is None:
+            return _touching()(p, c)
+        y, mu = _axes(c).T @ (p - c[1:4]), self.start
+        for _ in range(AGAIN):
+            mu = _stepped(y, mu, c)
+        phi, _, *more = _at_foot(y, mu, c)
+        return [phi, *more]
 
 
 def cheapest(general: Parallel) -> Parallel:
@@ -71,25 +80,35 @@ def _axes(c: ca.SX) -> ca.SX:
 
 @lru_cache(maxsize=1)
 def _touching() -> ca.Function:
-    """(p, constants) -> phi, n, |grad g|, H, and in principal axes 1 / (1 + mu h), grad g."""
+    """(p, constants) -> phi, n, |grad g|, H, and in principal axes 1 / (1 + mu h), grad g; mu."""
     p, c = ca.SX.sym("p", 3), ca.SX.sym("c", COUNT)
-    axes, h, b, e = _axes(c), c[13:16], c[16:19], c[19]
-    y = w = axes.T @ (p - c[1:4])
+    h, b = c[13:16], c[16:19]
+    y = w = _axes(c).T @ (p - c[1:4])
     for _ in range(GUESSES):
         a = h * w + b
         w = y - a * (c[0] / ca.norm_2(a))
     mu = c[0] / ca.norm_2(h * w + b)
     for _ in range(STEPS):
-        g, a, shrink, _ = _foot(y, mu, h, b, e)
-        mu = mu + g / ca.dot(a, a * shrink)
-    g, a, shrink, w = _foot(y, mu, h, b, e)
+        mu = _stepped(y, mu, c)
+    phi, converged, *more = _at_foot(y, mu, c)
+    return ca.Function("touching", [p, c], [phi / converged, *more])
+
+
+def _stepped(y: ca.SX, mu: ca.SX, c: ca.SX) -> ca.SX:
+    g, a, shrink, _ = _foot(y, mu, c[13:16], c[16:19], c[19])
+    return mu + g / ca.dot(a, a * shrink)
+
+
+def _at_foot(y: ca.SX, mu: ca.SX, c: ca.SX) -> list[ca.SX]:
+    """phi, whether mu has converged, and the rest of what `_touching` returns."""
+    axes, h = _axes(c), c[13:16]
+    g, a, shrink, w = _foot(y, mu, h, c[16:19], c[19])
     size = ca.norm_2(a)
     stretch = 1 + mu * h
     least = ca.fmin(ca.fmin(stretch[0], stretch[1]), stretch[2])
     converged = (ca.fabs(g) <= CONVERGED) * (least > 0)
-    phi = ((ca.dot(a, y - w) + g) / size - c[0]) / converged
-    outputs = [phi, axes @ (a / size), size, axes @ ca.diag(h) @ axes.T, shrink, a]
-    return ca.Function("touching", [p, c], outputs)
+    phi = (ca.dot(a, y - w) + g) / size - c[0]
+    return [phi, converged, axes @ (a / size), size, axes @ ca.diag(h) @ axes.T, shrink, a, mu]
 
 
 def _foot(y: ca.SX, mu: ca.SX, h: ca.SX, b: ca.SX, e: ca.SX) -> tuple[ca.SX, ...]:

@@ -28,3 +28,10 @@ class Smooth:
         p = ca.SX.sym("p", 3)
         change = ca.jtimes(ca.gradient(self.phi(p, constants), p), p, velocity)
         return ca.dot(ca.substitute(change, p, point), velocity)
+
+    def started_at(self, point: ca.SX, constants: Any = None) -> Smooth:
+        """The surface for points near `point`, which need not search as far as any point would.
+
+        It is the less exact the farther they are; it may be this surface itself.
+        """
+        return self
