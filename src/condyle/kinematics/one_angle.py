@@ -44,6 +44,8 @@ def one_angle(contacts: Sequence[ContactSymbols], angle: int, q: ca.SX) -> Place
     margin = ca.fmin(margin, SHORT - ca.fabs(step))
     turn = turned_slightly(turn, step)
     bryant = Bryant(*(ca.substitute(v, unknown, turn) for v in (bryant.cos, bryant.sin)))
+    # At cos(beta) = 0 Bryant angles are not independent: no way from home leads past it.
+    margin = ca.fmin(margin, bryant.cos[1])
     first, second = (c.phi(c.at(base, bryant.rotation())) for c in contacts)
     # Written so that what is no number is not sure.
     closed = ca.fabs((first - second) * (slope * inverse)) < CLOSED
