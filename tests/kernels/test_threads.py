@@ -43,7 +43,7 @@ def same(got: Results, wanted: Results) -> None:
 
 def test_threads(kernel: Kernel, samples: np.ndarray) -> None:
     alone = kernel.run(samples, threads=1)
-    assert set(alone[1]) >= {0, 1}
+    assert 0 in alone[1] and alone[1].any()
     for threads in (2, 3, None):
         same(kernel.run(samples, threads=threads), alone)
 
