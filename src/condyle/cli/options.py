@@ -45,8 +45,8 @@ Motion = Annotated[
     Path | None,
     typer.Option(
         help="Motion to follow (CSV): t (s) and pose coordinates such as X, Y (m), alpha, beta "
-        "(rad), or the path x, y, z (m) of a landmark. Default: the bundled chewing path "
-        "(synthetic)."
+        "(rad), or the path x, y, z (m) of a landmark. Default: the bundled chewing path, "
+        "for mechanisms that are no jaw a trial motion about home (both synthetic)."
     ),
 ]
 Load = Annotated[
