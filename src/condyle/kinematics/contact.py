@@ -52,6 +52,11 @@ class ContactSymbols:
         """For ball centres near `position`: see `Smooth.started_at`."""
         return replace(self, surface=self.surface.started_at(position, self.constants))
 
+    @property
+    def square_lever(self) -> ca.SX:
+        """|T|^2 [m^2]."""
+        return ca.dot(self.point, self.point)
+
     def at(self, position: ca.SX, R: ca.SX) -> ca.SX:
         """Where the ball centre is when O_M is at `position`, (3,)."""
         lever = R @ self.point

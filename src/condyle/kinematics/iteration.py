@@ -43,10 +43,11 @@ class _Plan:
     pieces: int
     shrink: float
     fold: float
-    far: float | None = None
+    far: float
 
 
-PLANS = (_Plan(2, 0.25, 0.05), _Plan(4, 0.1, 0.1), _Plan(6, 0.1, 0.15, 0.7))  # by contacts
+# By the number of contacts; the more there are, the nearer lie the folds.
+PLANS = (_Plan(4, 0.25, 0.05, 1.5), _Plan(4, 0.1, 0.1, 1.5), _Plan(6, 0.1, 0.2, 0.7))
 
 
 def newton(contacts: Sequence[ContactSymbols], dependent: Sequence[str], q: ca.SX) -> Placement:
@@ -107,8 +108,7 @@ def _followed(contacts: Sequence[ContactSymbols], dep: list[int], q: ca.SX) -> P
     pose = pose.moved(dep, last.step())
     phi = _phi(contacts, pose)
     sure.append(unit.square(solve_small(last.C, phi), dep) < CLOSED**2)
-    if plan.far is not None:
-        sure.append(pose.square(unit) < plan.far**2)
+    sure.append(pose.square(unit) < plan.far**2)
     reach = ca.SX(1)
     for condition in sure:
         reach = reach * condition  # 0 and 1: no comparison with what is no number holds
@@ -126,7 +126,7 @@ class _Unit:
 
     @staticmethod
     def of(contacts: Sequence[ContactSymbols]) -> _Unit:
-        return _Unit(sum((ca.dot(c.point, c.point) for c in contacts), ca.SX(0)) / len(contacts))
+        return _Unit(sum((c.square_lever for c in contacts), ca.SX(0)) / len(contacts))
 
     def dot(self, a: ca.SX, b: ca.SX, dep: Sequence[int]) -> ca.SX:
         weight = ca.vertcat(*(1 / self.lever if i < 3 else ca.SX(1) for i in dep))

@@ -16,7 +16,7 @@ from .contact import ContactSymbols, Placement, contact_frame
 from .rotation import Bryant, turned, turned_slightly
 
 CLOSED = 1e-13  # radians that are as good as none
-FAR = 0.5  # least cosine of the angle: the branch on the other side of the circle begins far off
+NEAR = 0.55  # least product of the angles' cosines: farther off, other branches look the same
 SHORT = 2e-4  # radians of the last step at the most
 BENT = 0.45  # E E'' / E'^2 at the most: from one half on there need be no root
 
@@ -34,7 +34,9 @@ def one_angle(contacts: Sequence[ContactSymbols], angle: int, q: ca.SX) -> Place
     # The branch of home ends at a fold, where the slope changes its sign: none on the way.
     margin = slope * side
     turn = _osculating(E, slope, bend, side)
-    margin = ca.fmin(margin, turn[0] - FAR)
+    c = ca.substitute(bryant.cos, unknown, turn)
+    away = ca.dot(base, base) / (contacts[0].square_lever + contacts[1].square_lever)
+    margin = ca.fmin(margin, c[0] * c[1] * c[2] - away - NEAR)
     E, slope, bend = equation(turn)
     margin = ca.fmin(margin, ca.fmin(slope * side, BENT * slope * slope - ca.fabs(E * bend)))
     turn = turned(turn, _osculating(E, slope, bend, side))
