@@ -37,6 +37,7 @@ def one_angle(contacts: Sequence[ContactSymbols], angle: int, q: ca.SX) -> Place
     c = ca.substitute(bryant.cos, unknown, turn)
     away = ca.dot(base, base) / (contacts[0].square_lever + contacts[1].square_lever)
     margin = ca.fmin(margin, c[0] * c[1] * c[2] - away - NEAR)
+    margin = ca.fmin(margin, ca.fmin(c[0], c[1]))  # then all three are positive
     E, slope, bend = equation(turn)
     margin = ca.fmin(margin, ca.fmin(slope * side, BENT * slope * slope - ca.fabs(E * bend)))
     turn = turned(turn, _osculating(E, slope, bend, side))
@@ -46,8 +47,6 @@ def one_angle(contacts: Sequence[ContactSymbols], angle: int, q: ca.SX) -> Place
     margin = ca.fmin(margin, SHORT - ca.fabs(step))
     turn = turned_slightly(turn, step)
     bryant = Bryant(*(ca.substitute(v, unknown, turn) for v in (bryant.cos, bryant.sin)))
-    # At cos(beta) = 0 Bryant angles are not independent: no way from home leads past it.
-    margin = ca.fmin(margin, bryant.cos[1])
     first, second = (c.phi(c.at(base, bryant.rotation())) for c in contacts)
     # Written so that what is no number is not sure.
     closed = ca.fabs((first - second) * (slope * inverse)) < CLOSED
