@@ -190,3 +190,18 @@ def test_a_landmark_needs_two_contacts(reference: Mechanism) -> None:
         landmark_closure(reference, "incisors")
     with pytest.raises(InputError, match=r"two contacts; this mechanism has 0"):
         landmark_closure(reference.replace(contacts=()), "incisor")
+
+
+def test_a_leap_to_another_branch_is_made_in_smaller_pieces() -> None:
+    """From home, Newton's steps shrink all the way to a pose on the wrong branch."""
+    rng = np.random.default_rng(103)
+    raw = random_mechanism(rng, contacts=3, chains=9, surface="cylinder")
+    mechanism = parse(toml_text(raw))
+    names = independent_coordinates(mechanism)
+    q = np.array([[-0.01644455, 0.01753188, 0.13332819]])
+    way = np.linspace(0, 1, 200)[:, None] * q
+    closure = coordinate_closure(mechanism, names)
+    found = closure.solve(way, 0 * way, 0 * way)
+    assert found.reached.all()
+    assert np.abs(np.diff(found.pose, axis=0)).max() < 0.05
+    assert off(mechanism, found.pose) < 1e-15
