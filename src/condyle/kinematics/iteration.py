@@ -46,8 +46,14 @@ class _Plan:
     far: float
 
 
-# By the number of contacts; the more there are, the nearer lie the folds.
-PLANS = (_Plan(4, 0.25, 0.05, 1.5), _Plan(4, 0.1, 0.1, 1.5), _Plan(6, 0.1, 0.2, 0.7))
+# By the number of contacts: the more there are the nearer lie the folds, the fewer the ways.
+PLANS = (
+    _Plan(4, 0.25, 0.05, 1.5),
+    _Plan(4, 0.1, 0.1, 1.5),
+    _Plan(6, 0.1, 0.2, 0.7),
+    _Plan(4, 0.1, 0.2, 0.7),
+    _Plan(2, 0.1, 0.2, 0.7),
+)
 
 
 def newton(contacts: Sequence[ContactSymbols], dependent: Sequence[str], q: ca.SX) -> Placement:
@@ -82,15 +88,15 @@ def _followed(contacts: Sequence[ContactSymbols], dep: list[int], q: ca.SX) -> P
     """All dependent coordinates at once, along the straight way from home.
 
     Each piece is a step that follows the bend of the contacts, and one of Newton that shows how
-    good it was. There is one branch at a time as long as C_dep keeps the sign of its determinant;
-    small steps and a determinant away from zero leave no room for a fold between them.
+    good it was. Branches meet at folds, where the determinant of C_dep changes its sign; steps
+    that shrink quickly and determinants away from zero leave a fold little room between them.
     """
     unit = _Unit.of(contacts)
     pose = _Pose(ca.SX.zeros(3), [ca.SX([1, 0])] * 3)
     there = _Contacts.at([c.started_at(c.point) for c in contacts], dep, pose)
     home = there.determinant
     sure = []
-    plan = PLANS[min(len(dep), len(PLANS)) - 1]
+    plan = PLANS[len(dep) - 1]
     for goal in _way(dep, q, plan.pieces):
         pose = pose.with_goal(goal, dep)
         here = there.at_pose(pose)
