@@ -29,7 +29,7 @@ def test_a_wrong_row_says_so() -> None:
 
 def test_ratios_are_taken_within_rounds() -> None:
     """A machine that becomes slower half way changes no ratio."""
-    slow, quick = iter([2.0, 2.0, 20.0, 2.0]), iter([1.0, 1.0, 10.0, 1.0])
+    slow, quick = iter([2.0, 2.0, 9.0, 20.0, 2.0, 2.0]), iter([1.0, 1.0, 9.0, 10.0, 1.0, 1.0])
     a, b = timed([Probe("a", lambda: next(slow), 0.0), Probe("b", lambda: next(quick), 0.0)], 3)
     assert a.over(b) == 2.0
 

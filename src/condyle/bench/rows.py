@@ -58,11 +58,10 @@ def timed(
     Args: begun: told of each round that begins.
     """
     times: list[list[float]] = [[] for _ in probes]
-    for probe in probes:
-        probe.run()  # warms up
     for number in range(rounds):
         begun(number)
         for probe, own in zip(probes, times, strict=True):
+            probe.run()  # brings its code and data into the caches
             own.append(probe.run())
     for probe, own in zip(probes, times, strict=True):
         wrong = probe.error > TOLERANCE

@@ -64,3 +64,30 @@ double clock_rate(long count) {
     }
     return (double)count / (now() - start);
 }
+
+#if defined(__AVX512F__)
+#define W 8
+#elif defined(__AVX2__)
+#define W 4
+#else
+#define W 2
+#endif
+typedef double vec __attribute__((vector_size(8 * W)));
+
+/* Seconds a fused multiply-add of vectors takes at best, while nothing else is done. */
+double vector_operation(long count) {
+    vec b = (vec){} + 0.999, c = (vec){} + 1e-3;
+    vec a0 = c, a1 = b, a2 = c + 1, a3 = b + 1, a4 = c + 2, a5 = b + 2, a6 = c + 3, a7 = b + 3,
+        a8 = c + 4, a9 = b + 4, a10 = c + 5, a11 = b + 5;
+    double start = now();
+    for (long i = 0; i < count; i += 12) {
+        a0 = a0 * b + c, a1 = a1 * b + c, a2 = a2 * b + c, a3 = a3 * b + c;
+        a4 = a4 * b + c, a5 = a5 * b + c, a6 = a6 * b + c, a7 = a7 * b + c;
+        a8 = a8 * b + c, a9 = a9 * b + c, a10 = a10 * b + c, a11 = a11 * b + c;
+    }
+    double seconds = now() - start;
+    vec all = a0 + a1 + a2 + a3 + a4 + a5 + a6 + a7 + a8 + a9 + a10 + a11;
+    volatile double used = all[0];
+    (void)used;
+    return seconds / (double)count;
+}

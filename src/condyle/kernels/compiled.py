@@ -34,7 +34,8 @@ from .threads import workers
 if TYPE_CHECKING:
     from .interpreted import Interpreted
 
-CHUNK = 4096  # samples a thread takes at a time
+CHUNK = 1024  # samples that are worth a thread
+PIECES = 4  # that a thread takes one after another: few, since handing them out takes time
 LOOK_AGAIN = 2  # status of samples that the interpreter has to decide
 
 _doubles = ctypes.POINTER(ctypes.c_double)
@@ -103,9 +104,11 @@ class Kernel:
             inputs = np.array(inputs, order="F")
             row, column = inputs.strides
         base = inputs.ctypes.data
+        hands = workers(threads)
+        size = max(CHUNK, -(-count // (PIECES * hands)))
 
         def piece(start: int) -> None:
-            end = min(start + CHUNK, count)
+            end = min(start + size, count)
             columns = (ctypes.c_void_p * self.inputs)(
                 *(base + start * row + k * column for k in range(self.inputs))
             )
@@ -119,10 +122,9 @@ class Kernel:
                 status.ctypes.data + start,
             )
 
-        starts = range(0, count, CHUNK)
-        hands = min(workers(threads), len(starts))
-        if hands > 1:
-            with ThreadPoolExecutor(hands) as pool:
+        starts = range(0, count, size)
+        if min(hands, len(starts)) > 1:
+            with ThreadPoolExecutor(min(hands, len(starts))) as pool:
                 list(pool.map(piece, starts))
         else:
             for start in starts:
