@@ -1,6 +1,5 @@
 /* Times a kernel from C, where a control loop would call it. */
-#include <stddef.h>
-#include <stdint.h>
+#include "../kernels/c/vector.h"
 #include <time.h>
 
 typedef void (*One)(const double *, const double *, double *);
@@ -64,15 +63,6 @@ double clock_rate(long count) {
     }
     return (double)count / (now() - start);
 }
-
-#if defined(__AVX512F__)
-#define W 8
-#elif defined(__AVX2__)
-#define W 4
-#else
-#define W 2
-#endif
-typedef double vec __attribute__((vector_size(8 * W)));
 
 /* Seconds a fused multiply-add of vectors takes at best, while nothing else is done. */
 double vector_operation(long count) {
