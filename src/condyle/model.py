@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -19,6 +19,7 @@ from .dynamics import ROUTES
 from .dynamics import formulation as formulation_named
 from .dynamics.equations import part_names, posture_function, require_closed_form
 from .errors import InputError, MechanismError, SingularError, UnreachableError, did_you_mean
+from .kernels.spec import OUTPUTS
 from .kinematics.batch import evaluate
 from .kinematics.chain import FAMILIES
 from .kinematics.closure import Closure, coordinate_closure, landmark_closure
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from .solution import Solution
 
 DEFAULT_LOAD_POINT = "right_molar"
+CONDITION = "condition"
 BACKENDS = ("auto", "compiled", "interpreted")
 OK, UNREACHABLE, SINGULAR_STATUS = 0, 1, 2
 STATUS_NAMES = ("ok", "unreachable", "singular")
@@ -158,10 +160,17 @@ class Model:
     ) -> tuple[Torques, np.ndarray]:
         """Efforts alone, as fast as the machine.
 
-        Args:    as for `evaluate`; outputs: what is wanted besides, of contact, share, motion
-                 and joint: ask for less, pay for less; threads: at most so many.
+        Args:    as for `evaluate`; outputs: what is wanted besides, of contact, share, motion,
+                 joint and condition: ask for less, pay for less; threads: at most so many.
         Returns: the efforts, and the status of the samples (N,), an index into `STATUS_NAMES`.
+        Raises:  InputError: for an output that is none of these.
         """
+        for name in outputs:
+            if name not in (*OUTPUTS, CONDITION):
+                raise InputError(f'no output "{name}".{did_you_mean(name, (*OUTPUTS, CONDITION))}')
+        conditioned = CONDITION in outputs
+        if conditioned:
+            outputs = {*outputs, "motion"} - {CONDITION}
         result = self.kernel.solve(q, q1, q2, load, outputs, threads)
         status = np.where(result.reached, OK, UNREACHABLE)
         doubtful = np.flatnonzero(result.uncertain & result.reached)
@@ -177,6 +186,11 @@ class Model:
                 regular = (ratio >= SINGULAR) & np.isfinite(result.torque[doubtful]).all(axis=1)
             status[doubtful[~regular]] = SINGULAR_STATUS
         result.torque[status != OK] = np.nan
+        if conditioned:
+            assert result.poses is not None
+            with np.errstate(invalid="ignore", divide="ignore"):
+                condition = self.posture(result.poses.pose).singularity.condition
+            result = replace(result, condition=condition)
         return result, status
 
     def evaluate(

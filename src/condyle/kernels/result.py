@@ -28,6 +28,7 @@ class Torques:
     reached:       (N,), where every chain and contact can be.
     poses:         of the same samples.
     uncertain:     (N,), samples so near a singularity that `Posture` has to judge them.
+    condition:     (N,), condition number of the dimensionless J_W M_J.
     """
 
     torque: np.ndarray
@@ -38,3 +39,4 @@ class Torques:
     reached: np.ndarray
     poses: PoseRates | None
     uncertain: np.ndarray
+    condition: np.ndarray | None = None
