@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from .interpreted import Interpreted
 
 CHUNK = 1024  # samples that are worth a thread
-PIECES = 4  # that a thread takes one after another: few, since handing them out takes time
+PIECES = 2  # that a thread takes one after another: few, since handing them out takes time
 LOOK_AGAIN = 2  # status of samples that the interpreter has to decide
 
 _doubles = ctypes.POINTER(ctypes.c_double)
