@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..dynamics import FORMULATIONS
-from ..errors import InputError
+from ..errors import InputError, UnsupportedError
 from ..kinematics.contact import indices
 from ..mechanism.home import independent_coordinates
 from ..mechanism.mechanism import Mechanism
@@ -181,7 +181,7 @@ def _loaded(spec: KernelSpec, compiler: Compiler) -> tuple[cache.Entry, ctypes.C
                     return entry, _load(str(entry.library))
                 except OSError as error:  # built with another C library, or cleared just now
                     problem = error
-    except (OSError, AttributeError, NotImplementedError) as error:
+    except (OSError, AttributeError, UnsupportedError) as error:
         problem = error
     raise CompilerError(f"no kernel could be built and loaded: {problem}") from problem
 

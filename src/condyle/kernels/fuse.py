@@ -10,9 +10,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from .graph import Graph, Value, reachable
+from .graph import Graph, Node, Value, reachable
 
 LATENCY = {"div": 14, "sqrt": 18, "sin": 40, "cos": 40, "sum": 22, "least": 22, "atan2": 80}
+
+
+def latency(node: Node) -> int:
+    """Cycles from a node's arguments to its value."""
+    return LATENCY.get(node.op, 4) if node.args else 0
 
 
 @dataclass(frozen=True)
@@ -42,7 +47,7 @@ def fuse(graph: Graph, roots: Sequence[Value], chain: int) -> tuple[Graph, list[
         if value not in ready:
             node = new.nodes[value]
             start = max((ready[note(a)] for a in node.args), default=0)
-            ready[value] = start + (LATENCY.get(node.op, 4) if node.args else 0)
+            ready[value] = start + latency(node)
         return value
 
     def terms(v: Value, sign: int) -> list[Term]:

@@ -16,6 +16,8 @@ from dataclasses import dataclass, field
 
 import casadi as ca
 
+from ..errors import UnsupportedError
+
 Value = int  # a node's number
 
 _BINARY = {
@@ -28,6 +30,17 @@ _BINARY = {
     ca.OP_FMAX: "fmax",
     ca.OP_LE: "le",  # 1 or 0
     ca.OP_LT: "lt",
+    ca.OP_EQ: "eq",
+    ca.OP_NE: "ne",
+    ca.OP_AND: "and",
+    ca.OP_OR: "or",
+    ca.OP_IF_ELSE_ZERO: "where",
+    ca.OP_POW: "pow",
+    ca.OP_CONSTPOW: "pow",
+    ca.OP_FMOD: "fmod",
+    ca.OP_REMAINDER: "remainder",
+    ca.OP_COPYSIGN: "copysign",
+    ca.OP_HYPOT: "hypot",
 }
 _UNARY = {
     ca.OP_NEG: "neg",
@@ -35,6 +48,25 @@ _UNARY = {
     ca.OP_SIN: "sin",
     ca.OP_COS: "cos",
     ca.OP_FABS: "fabs",
+    ca.OP_NOT: "not",
+    ca.OP_SIGN: "sign",
+    ca.OP_FLOOR: "floor",
+    ca.OP_CEIL: "ceil",
+    ca.OP_EXP: "exp",
+    ca.OP_EXPM1: "expm1",
+    ca.OP_LOG: "log",
+    ca.OP_LOG1P: "log1p",
+    ca.OP_TAN: "tan",
+    ca.OP_ASIN: "asin",
+    ca.OP_ACOS: "acos",
+    ca.OP_ATAN: "atan",
+    ca.OP_SINH: "sinh",
+    ca.OP_COSH: "cosh",
+    ca.OP_TANH: "tanh",
+    ca.OP_ASINH: "asinh",
+    ca.OP_ACOSH: "acosh",
+    ca.OP_ATANH: "atanh",
+    ca.OP_ERF: "erf",
 }
 REDUCTIONS = ("sum", "least")
 
@@ -211,6 +243,13 @@ def read(
 
 
 def _operation(graph: Graph, op: int, args: list[Value]) -> Value:
+    if op in (ca.OP_CONSTPOW, ca.OP_POW):
+        exponent = graph.nodes[args[1]]
+        if exponent.op == "const" and exponent.data[0] in (2.0, 3.0, 4.0):
+            square = graph.apply("mul", args[0], args[0])
+            if exponent.data[0] == 2.0:
+                return square
+            return graph.apply("mul", square, args[0] if exponent.data[0] == 3.0 else square)
     if op in _BINARY:
         return graph.apply(_BINARY[op], args[0], args[1])
     if op in _UNARY:
@@ -221,16 +260,9 @@ def _operation(graph: Graph, op: int, args: list[Value]) -> Value:
         return graph.apply("add", args[0], args[0])
     if op == ca.OP_INV:
         return graph.apply("div", graph.const(1.0), args[0])
-    if op == ca.OP_CONSTPOW or op == ca.OP_POW:
-        exponent = graph.nodes[args[1]]
-        if exponent.op == "const" and exponent.data[0] in (2.0, 3.0, 4.0):
-            square = graph.apply("mul", args[0], args[0])
-            if exponent.data[0] == 2.0:
-                return square
-            return graph.apply("mul", square, args[0] if exponent.data[0] == 3.0 else square)
     if op == ca.OP_ASSIGN:
         return args[0]
-    raise NotImplementedError(f"operation {op} has no code yet")
+    raise UnsupportedError(f"CasADi's operation number {op} has no C in kernels")
 
 
 def reachable(graph: Graph, roots: Sequence[Value]) -> list[Value]:

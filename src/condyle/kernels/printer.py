@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -35,7 +36,7 @@ class Table:
         return table
 
 
-class Printer:
+class Printer(ABC):
     """Names and statements of a program's values.
 
     shared: C's type of values that all chains share.
@@ -135,13 +136,13 @@ class Printer:
         names = ((a, self.name(a, copy)) for a in self.g.nodes[v].args)
         return [f"spread({name})" if vector and self.is_scalar(a) else name for a, name in names]
 
+    @abstractmethod
     def sample(self, i: object) -> str:
         """A sample's input."""
-        raise NotImplementedError
 
+    @abstractmethod
     def reduction(self, v: Value) -> str:
         """A sum or minimum over the lanes."""
-        raise NotImplementedError
 
     def lane_terms(self, v: Value) -> list[tuple[int, Value]]:
         """Group and value of a reduction's terms that differ from lane to lane."""

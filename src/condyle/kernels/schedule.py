@@ -10,7 +10,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Sequence
 
-from .fuse import LATENCY
+from .fuse import latency
 from .graph import Graph, Value
 
 ISSUE = 2  # arithmetic statements a cycle
@@ -39,8 +39,7 @@ def scheduled(
             users[a].append(v)
     way: dict[Value, int] = {}
     for v in reversed(values):
-        latency = LATENCY.get(graph.nodes[v].op, 4 if graph.nodes[v].args else 0)
-        way[v] = latency + max((way[u] for u in users[v]), default=0)
+        way[v] = latency(graph.nodes[v]) + max((way[u] for u in users[v]), default=0)
 
     order: list[Value] = []
     future: list[tuple[int, int, Value]] = []  # ready at a later cycle
@@ -57,8 +56,7 @@ def scheduled(
         for _ in range(min(ISSUE, len(ready))):
             _, _, v = heapq.heappop(ready)
             order.append(v)
-            node = graph.nodes[v]
-            done[v] = cycle + LATENCY.get(node.op, 4 if node.args else 0)
+            done[v] = cycle + latency(graph.nodes[v])
             for u in users[v]:
                 waiting[u] -= 1
                 if not waiting[u]:
@@ -94,5 +92,5 @@ def ready_times(graph: Graph, values: Sequence[Value]) -> dict[Value, int]:
     for v in values:
         node = graph.nodes[v]
         start = max((ready.get(a, 0) for a in node.args), default=0)
-        ready[v] = start + LATENCY.get(node.op, 4 if node.args else 0)
+        ready[v] = start + latency(node)
     return ready

@@ -192,8 +192,46 @@ INLINE void sincos_v(vec x, vec *sine, vec *cosine) {
     *sine = sin_x, *cosine = cos_x;
 }
 
-INLINE double atan2_s(double y, double x) { return atan2(y, x); }
-INLINE vec atan2_v(vec y, vec x) {
-    for (int i = 0; i < W; i++) y[i] = atan2(y[i], x[i]);
-    return y;
-}
+/* What surfaces written in Python may use besides: lane by lane, by the library. */
+#define ONE_ARGUMENT(name, value)                                                                 \
+    INLINE double name##_s(double a) { return value; }                                            \
+    INLINE vec name##_v(vec x) {                                                                  \
+        for (int i = 0; i < W; i++) x[i] = name##_s(x[i]);                                        \
+        return x;                                                                                 \
+    }
+#define TWO_ARGUMENTS(name, value)                                                                \
+    INLINE double name##_s(double a, double b) { return value; }                                  \
+    INLINE vec name##_v(vec x, vec y) {                                                           \
+        for (int i = 0; i < W; i++) x[i] = name##_s(x[i], y[i]);                                  \
+        return x;                                                                                 \
+    }
+TWO_ARGUMENTS(atan2, atan2(a, b))
+TWO_ARGUMENTS(pow, pow(a, b))
+TWO_ARGUMENTS(fmod, fmod(a, b))
+TWO_ARGUMENTS(remainder, remainder(a, b))
+TWO_ARGUMENTS(copysign, copysign(a, b))
+TWO_ARGUMENTS(hypot, hypot(a, b))
+TWO_ARGUMENTS(eq, a == b)
+TWO_ARGUMENTS(ne, a != b)
+TWO_ARGUMENTS(and, a != 0 && b != 0)
+TWO_ARGUMENTS(or, a != 0 || b != 0)
+TWO_ARGUMENTS(where, a != 0 ? b : 0)
+ONE_ARGUMENT(not, a == 0)
+ONE_ARGUMENT(sign, a < 0 ? -1 : a > 0 ? 1 : a)
+ONE_ARGUMENT(floor, floor(a))
+ONE_ARGUMENT(ceil, ceil(a))
+ONE_ARGUMENT(exp, exp(a))
+ONE_ARGUMENT(expm1, expm1(a))
+ONE_ARGUMENT(log, log(a))
+ONE_ARGUMENT(log1p, log1p(a))
+ONE_ARGUMENT(tan, tan(a))
+ONE_ARGUMENT(asin, asin(a))
+ONE_ARGUMENT(acos, acos(a))
+ONE_ARGUMENT(atan, atan(a))
+ONE_ARGUMENT(sinh, sinh(a))
+ONE_ARGUMENT(cosh, cosh(a))
+ONE_ARGUMENT(tanh, tanh(a))
+ONE_ARGUMENT(asinh, asinh(a))
+ONE_ARGUMENT(acosh, acosh(a))
+ONE_ARGUMENT(atanh, atanh(a))
+ONE_ARGUMENT(erf, erf(a))

@@ -9,6 +9,7 @@ derivatives come from CasADi.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import Any, ClassVar
 
 from ..quantities import Table
@@ -28,16 +29,16 @@ class SurfaceTable(Smooth, Table):
     kind: str
     closed: ClassVar[bool] = False
 
+    @abstractmethod
     def phi(self, point: Coordinates, constants: Coordinates | None = None) -> Scalar:
         """How far a point (3,) is off the surface [m], positive along the normal.
 
         Args: constants: `constants()` of this or another surface of the kind; default: its own.
         """
-        raise NotImplementedError
 
+    @abstractmethod
     def constants(self) -> tuple[float, ...]:
         """The numbers of the equation, SI."""
-        raise NotImplementedError
 
     @property
     def form(self) -> str:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Any, ClassVar
 
 import casadi as ca
 
 
-class Smooth:
+class Smooth(ABC):
     """What has an equation phi(point, constants), twice differentiable.
 
     known: whether that equation is at hand.
@@ -15,8 +16,9 @@ class Smooth:
 
     known: ClassVar[bool] = True
 
+    @abstractmethod
     def phi(self, point: Any, constants: Any = None) -> Any:
-        raise NotImplementedError
+        """How far a point, (3,), is off the surface [m], positive along the normal."""
 
     def gradient(self, point: ca.SX, constants: Any = None) -> ca.SX:
         """d phi / d point, (3,): along the unit normal."""
