@@ -135,13 +135,8 @@ class Law:
     @property
     def effort(self) -> ca.SX:
         """All efforts at the joint."""
-        total = ca.SX(0)
-        for inertia in self.inertias.values():
-            total += inertia
-        total *= self.acceleration
-        for effort in self.efforts.values():
-            total += effort
-        return total
+        inertia = sum(self.inertias.values(), ca.SX(0))
+        return inertia * self.acceleration + sum(self.efforts.values(), ca.SX(0))
 
     def complete(self, A: ca.SX, g: ca.SX) -> Law:
         """The same law with everything among the forces."""
