@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
+from condyle.atomic import replacing
 from condyle.motion.load import Load
 from condyle.motion.path import Motion
-from condyle.motion.table_writer import write_table
 
 MOTION_FILE = "chewing-incisor.csv"
 LOAD_FILE = "bite-force.csv"
@@ -43,12 +43,12 @@ def reference_load() -> Load:
 
 
 def write_reference(folder: str | os.PathLike[str]) -> list[Path]:
-    """Write the reference motion and load as CSV files into `folder`; returns their paths."""
-    t = [f"{time:.3f}" for time in _TIMES]
-    files = {MOTION_FILE: _incisor_path(), LOAD_FILE: _bite_force()}
-    paths = [Path(folder) / name for name in files]
-    for path, columns in zip(paths, files.values(), strict=True):
-        write_table(path, {"t": t, **columns})
+    """Copy the bundled motion and load into `folder`, as they are; returns their paths."""
+    paths = []
+    for source in bundled_reference():
+        paths.append(Path(folder) / source.name)
+        with replacing(paths[-1]) as temporary:
+            temporary.write_bytes(source.read_bytes())
     return paths
 
 
@@ -69,8 +69,8 @@ def _incisor_path() -> dict[str, np.ndarray]:
         opening = w(u) (1 - cos(2 pi u / T)) / 2,   side = w(u) sin(2 pi u / T),   u = t - 1 s
 
     with w the polynomial of degree 9 that rises from 0 to 1 with four smooth derivatives.
-    The power s**5 is numpy's vectorised one; on a processor without AVX-512 it may differ from the
-    bundled file in the last digit.
+    numpy's sines differ in the last digit from processor to processor, and so may these numbers
+    from those of the bundled file.
     """
     u = _TIMES - _REST
     w = rise(u / _RAMP)
