@@ -14,7 +14,7 @@ from condyle.motion import (
 
 
 def test_the_bundled_files_are_what_their_formulas_say():
-    """To the last digits: numpy's sines differ in them from processor to processor."""
+    """To rounding, which the terms of w, up to 540, magnify."""
     motion_file, load_file = bundled_reference()
     motion, load = read_table(motion_file), read_table(load_file)
     assert motion.rows == load.rows == 5001
@@ -24,7 +24,7 @@ def test_the_bundled_files_are_what_their_formulas_say():
     phase = 2 * np.pi * u / 0.8
     opening = w * (1 - np.cos(phase)) / 2
     path = np.column_stack([-0.00255 * opening, 0.002 * w * np.sin(phase), -0.015 * opening])
-    np.testing.assert_allclose(motion.require(["x", "y", "z"]), path, rtol=0, atol=1e-16)
+    np.testing.assert_allclose(motion.require(["x", "y", "z"]), path, rtol=0, atol=2e-15)
     down = np.zeros(5001)
     for cycle in range(5):
         v = u - (0.8 * cycle + 0.5)
