@@ -44,8 +44,8 @@ def condyle_command(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> Callable[..., Outcome]:
     """Runs `condyle ...` in this process, in an empty folder."""
+    from condyle.backends.compiler import CompilerError, find_compiler
     from condyle.cli import main
-    from condyle.kernels.compiler import CompilerError, find_compiler
 
     try:
         find_compiler()

@@ -32,8 +32,8 @@ _HOMES = {
     "reference_load": "motion",
     "reference_motion": "motion",
     "trial_motion": "motion",
-    "Solution": "solution",
-    "open_solution": "solution",
+    "Solution": "results.solution",
+    "open_solution": "results.solution",
 }
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from .mechanism import Mechanism, bundled_mechanisms, dump, dumps, load
     from .model import Model, derive
     from .motion import Load, Motion, reference_load, reference_motion, trial_motion
-    from .solution import Solution, open_solution
+    from .results.solution import Solution, open_solution
 
 __all__ = [*_HOMES, "__version__"]
 

@@ -19,7 +19,6 @@ from .dynamics import ROUTES
 from .dynamics import formulation as formulation_named
 from .dynamics.equations import part_names, posture_function, require_closed_form
 from .errors import InputError, MechanismError, SingularError, UnreachableError, did_you_mean
-from .kernels.spec import OUTPUTS
 from .kinematics.batch import evaluate
 from .kinematics.chain import FAMILIES
 from .kinematics.closure import Closure, coordinate_closure, landmark_closure
@@ -34,13 +33,14 @@ from .mechanism.home import (
 )
 from .mechanism.mechanism import COORDINATES, Mechanism
 from .progress import step
+from .questions.spec import OUTPUTS
 
 if TYPE_CHECKING:
     from .kernels.compiled import Compiled
     from .kernels.interpreted import Interpreted
     from .kernels.result import PoseRates, Torques
     from .motion import Load, Motion
-    from .solution import Solution
+    from .results.solution import Solution
 
 DEFAULT_LOAD_POINT = "right_molar"
 CONDITION = "condition"
@@ -255,7 +255,7 @@ class Model:
                 InputError: if motion or load do not fit the mechanism.
         """
         from .motion import Load
-        from .solution import assemble
+        from .results.solution import assemble
 
         start = time.perf_counter()
         load = load or Load.zero()
@@ -415,10 +415,10 @@ def choose_kernel(
     Raises: InputError:    for an unknown backend.
             CompilerError: if compiled is asked for and there is no compiler.
     """
+    from .backends.compiler import REMEDY, CompilerError
+    from .backends.notice import notice
     from .kernels.compiled import Compiled
-    from .kernels.compiler import REMEDY, CompilerError
     from .kernels.interpreted import Interpreted
-    from .kernels.notice import notice
 
     chosen = os.environ.get("CONDYLE_BACKEND") or "auto" if backend == "auto" else backend
     if chosen not in BACKENDS:

@@ -15,7 +15,7 @@ import pytest
 
 import condyle
 from condyle.report.page import write_report
-from condyle.solution import Solution
+from condyle.results.solution import Solution
 
 CHROMIUM = ("/usr/bin/chromium", "chromium", "chromium-browser", "google-chrome")
 OPTIONS = (

@@ -12,7 +12,7 @@ import pytest
 import condyle
 from condyle.motion import Motion
 from condyle.report.page import write_report
-from condyle.solution import Solution
+from condyle.results.solution import Solution
 
 from .conftest import Tab
 

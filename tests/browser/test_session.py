@@ -11,7 +11,7 @@ import condyle
 from condyle.errors import InputError
 from condyle.motion import Load, Motion
 from condyle.report.scene import contact_patch, place, platform_hull, rotations
-from condyle.solution import Solution
+from condyle.results.solution import Solution
 from condyle.view import open_view
 from condyle.view.playback import Playback
 from condyle.view.readout import number, status_html, tables_html

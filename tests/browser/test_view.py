@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.solution import Solution
+from condyle.results.solution import Solution
 from condyle.view import View, open_view
 
 from .conftest import PATIENCE, Tab

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import condyle
+from condyle.backends.compiler import CompilerError, find_compiler
 from condyle.kernels import compiled
 from condyle.kernels.compiled import Compiled
-from condyle.kernels.compiler import CompilerError, find_compiler
 from condyle.mechanism import COORDINATES
 from condyle.model import Model, with_point
 

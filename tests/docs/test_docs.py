@@ -118,7 +118,7 @@ def test_blocks_and_commands_run(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     if page.name == "kernels.md":
-        from condyle.kernels.compiler import CompilerError, find_compiler
+        from condyle.backends.compiler import CompilerError, find_compiler
 
         monkeypatch.setenv("CONDYLE_BACKEND", "compiled")
         try:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from condyle.kernels import notice
-from condyle.kernels.compiler import CompilerError, find_compiler
+from condyle.backends import notice
+from condyle.backends.compiler import CompilerError, find_compiler
 
 try:
     COMPILER = find_compiler().command

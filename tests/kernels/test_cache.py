@@ -16,11 +16,12 @@ from typing import Any
 import platformdirs
 import pytest
 
+from condyle.backends import cache, compiler
+from condyle.backends.compiler import Compiler, find_compiler
 from condyle.errors import CondyleError
-from condyle.kernels import cache, compiled, compiler
+from condyle.kernels import compiled
 from condyle.kernels.compiled import _recipe
-from condyle.kernels.compiler import Compiler, find_compiler
-from condyle.kernels.spec import KernelSpec, kernel_spec
+from condyle.questions.spec import KernelSpec, kernel_spec
 from kernels.cases import case
 
 RECIPE, OTHER = cache.digest("one"), cache.digest("other")

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from condyle.backends import cache, compiler
+from condyle.backends.compiler import CompilerError, find_compiler
 from condyle.errors import InputError
-from condyle.kernels import cache, compiler
-from condyle.kernels.compiler import CompilerError, find_compiler
 from condyle.model import Model
 from kernels.cases import case, error
 

@@ -13,11 +13,11 @@ from random import Random
 import casadi as ca
 import pytest
 
+from condyle.backends.c.emit import CHAIN
 from condyle.errors import UnsupportedError
-from condyle.kernels.emit import CHAIN
-from condyle.kernels.fuse import fuse
-from condyle.kernels.graph import _UNARY, Graph, Value, reachable, read
-from condyle.kernels.schedule import scheduled
+from condyle.graph.fuse import fuse
+from condyle.graph.graph import _UNARY, Graph, Value, reachable, read
+from condyle.graph.schedule import scheduled
 
 Numbers = dict[Value, Fraction]
 EXACT: dict[str, Callable[..., Fraction]] = {

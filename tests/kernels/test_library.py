@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.kernels.graph import _BINARY, _UNARY
+from condyle.graph.graph import _BINARY, _UNARY
 from condyle.mechanism.surface import Expression
 from condyle.model import Model
 from kernels.cases import Case, case, error

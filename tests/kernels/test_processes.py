@@ -12,16 +12,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from condyle.kernels import cache, compiled
+from condyle.backends import cache
+from condyle.backends.compiler import find_compiler
+from condyle.kernels import compiled
 from condyle.kernels.compiled import Kernel
-from condyle.kernels.compiler import find_compiler
 from condyle.model import Model
 from kernels.cases import case, error
 from kernels.children import PATIENCE, end, start, wait_for
 
 SOLVE = """
 import json, sys
-from condyle.kernels import cache
+from condyle.backends import cache
 from condyle.model import Model
 from kernels.cases import case
 c = case("gough-stewart")
@@ -39,7 +40,7 @@ SOLVE_TOGETHER = SOLVE.replace(
 # Builds of a few bytes, each different, so that any mixture shows.
 JUGGLE = """
 import hashlib, os, random, sys
-from condyle.kernels import cache
+from condyle.backends import cache
 dice = random.Random(int(sys.argv[1]))
 def make(place):
     library = place / "kernel.so"
@@ -71,7 +72,7 @@ print("done")
 DIE = """
 import os, signal, sys
 from pathlib import Path
-from condyle.kernels import cache
+from condyle.backends import cache
 step = int(sys.argv[1])
 steps = 0
 def dying(real):

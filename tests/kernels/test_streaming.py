@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from condyle import states
 from condyle.errors import CondyleError
 from condyle.model import Model
-from condyle.states import solve_file
+from condyle.results import states
+from condyle.results.states import solve_file
 from kernels.cases import case
 from kernels.children import PATIENCE, end, start, wait_for
 
@@ -26,7 +26,7 @@ HEADER = ",".join(p + n for p in ("", "d", "dd") for n in ("X", "Y", "alpha", "b
 
 SOLVE = f"""
 import sys
-from condyle import states
+from condyle.results import states
 states.CHUNK_ROWS = {CHUNK}
 from condyle.cli import main
 sys.argv = ["condyle", "solve", "{NAME}", *sys.argv[1:]]

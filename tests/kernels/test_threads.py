@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from condyle import states
 from condyle.errors import InputError
 from condyle.kernels import compiled
 from condyle.kernels.compiled import Kernel
 from condyle.model import Model
-from condyle.states import solve_file
+from condyle.results import states
+from condyle.results.states import solve_file
 from kernels.cases import Case, case
 
 Results = tuple[dict[str, np.ndarray], np.ndarray]

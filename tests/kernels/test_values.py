@@ -7,8 +7,8 @@ import pytest
 
 from condyle.dynamics import FORMULATIONS
 from condyle.kernels.compiled import Compiled
-from condyle.kernels.spec import OUTPUTS
 from condyle.model import Model
+from condyle.questions.spec import OUTPUTS
 from kernels.cases import Case, case, error, errors, ones
 
 BATCH, ONE = 1e-11, 1e-12

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from condyle.kernels import emit
-from condyle.kernels.compiler import find_compiler
+from condyle.backends.c import emit
+from condyle.backends.compiler import find_compiler
 
 WIDTHS = (2, 4, 8)
 ZERO = 1e-24  # what three parts of pi / 2 leave of a multiple of it
@@ -68,7 +68,7 @@ DOUBLES = np.ctypeslib.ndpointer(np.float64)
 def vector(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Functions:
     folder = tmp_path_factory.mktemp("vector")
     source, library = folder / "vector.c", folder / "vector.so"
-    header = (Path(emit.__file__).parent / "c" / "vector.h").read_text(encoding="utf-8")
+    header = (Path(emit.__file__).parent / "vector.h").read_text(encoding="utf-8")
     source.write_text(f"#define W {request.param}\n{header}\n{FUNCTIONS}", encoding="utf-8")
     find_compiler().build(source, library)
     return Functions(ctypes.CDLL(str(library)), request.param)

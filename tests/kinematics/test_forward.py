@@ -10,11 +10,11 @@ from oracles.random_mechanism import random_mechanism
 
 import condyle
 from condyle.errors import UnreachableError
-from condyle.joints import pose_file
 from condyle.kinematics.forward import ForwardKinematics
 from condyle.mechanism import bundled_mechanisms
 from condyle.mechanism.files import from_data
 from condyle.motion import read_table, write_table
+from condyle.results.poses import pose_file
 
 
 def poses_and_joints(name: str, count: int, size: float) -> tuple[np.ndarray, np.ndarray]:

@@ -18,7 +18,7 @@ from condyle.dynamics.reactions import reaction_places, reaction_variables, reac
 from condyle.mechanism import Mechanism
 from condyle.model import Evaluation, Model
 from condyle.motion import read_table, write_table
-from condyle.states import solve_file
+from condyle.results.states import solve_file
 
 # Our joint -> the oracle's link and whether it is its force or its moment.
 JOINTS = {

@@ -6,7 +6,7 @@ import pytest
 import condyle
 from condyle.analysis.compare import Comparison, compare
 from condyle.motion import Load, Motion, bundled_reference
-from condyle.solution import Solution
+from condyle.results.solution import Solution
 
 
 @pytest.fixture(scope="session")

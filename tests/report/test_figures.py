@@ -22,7 +22,7 @@ from condyle.report import figures
 from condyle.report.figures import PLOTS, SolutionPlots, figure_5, figure_8, figure_9
 from condyle.report.figures.chains import groups, heading, styles
 from condyle.report.figures.motion import track
-from condyle.solution import Solution
+from condyle.results.solution import Solution
 
 
 def curves(axes: Axes) -> dict[str, np.ndarray]:

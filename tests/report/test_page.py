@@ -23,7 +23,7 @@ from condyle.report.page.html import fill, json_for_script, tag
 from condyle.report.page.panels import reaction_magnitudes
 from condyle.report.scene import DARK, LIGHT, styles
 from condyle.report.tables import Table, kept_tables, with_tables
-from condyle.solution import Solution
+from condyle.results.solution import Solution
 
 ATTACK = "</script><img src=x onerror=alert(1)>{{style}}"
 

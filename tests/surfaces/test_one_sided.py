@@ -12,8 +12,8 @@ from condyle.mechanism import Mechanism
 from condyle.mechanism.surface import Plane, Sphere
 from condyle.model import Model
 from condyle.motion import Motion
-from condyle.solution import Solution, lift_off
-from condyle.summary import summarize
+from condyle.results.solution import Solution, lift_off
+from condyle.results.summary import summarize
 
 
 def one_sided(reference: Mechanism, side: str = "below", *names: str) -> Mechanism:

@@ -17,7 +17,7 @@ from condyle.model import Model
 from condyle.motion import Motion
 from condyle.report.figures import PLOTS
 from condyle.report.page import write_report
-from condyle.solution import Solution
+from condyle.results.solution import Solution
 
 from .cases import close
 

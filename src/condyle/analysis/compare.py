@@ -24,7 +24,7 @@ from .runs import InterpretedModel, Run, Samples, run
 
 if TYPE_CHECKING:
     from ..motion import Load, Motion
-    from ..solution import Solution
+    from ..results.solution import Solution
 
 
 @dataclass(frozen=True)

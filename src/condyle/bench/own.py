@@ -16,9 +16,9 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
+from ..backends.compiler import find_compiler
 from ..dynamics.equations import has_closed_form
 from ..kernels.compiled import Kernel
-from ..kernels.compiler import find_compiler
 from ..mechanism.mechanism import Mechanism
 from ..model import Model
 from .rows import Probe, Row, spread

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
+from ..backends.compiler import find_compiler
 from ..dynamics import FORMULATIONS
-from ..kernels.compiler import find_compiler
 from ..mechanism import bundled_text, load
 from ..model import Model
 from ..progress import step

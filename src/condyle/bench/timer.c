@@ -1,5 +1,5 @@
 /* Times a kernel from C, where a control loop would call it. */
-#include "../kernels/c/vector.h"
+#include "../backends/c/vector.h"
 #include <time.h>
 
 typedef void (*One)(const double *, const double *, double *);

@@ -18,7 +18,7 @@ def cache(
 
     It is built when it is first needed, in a second or two, and then found again.
     """
-    from ..kernels import cache as kernels
+    from ..backends import cache as kernels
 
     had = kernels.clear() if clear else kernels.contents()
     count = "1 kernel" if had.kernels == 1 else f"{had.kernels} kernels"

@@ -33,7 +33,7 @@ def pose(
     """
     import condyle
 
-    from ..joints import pose_file
+    from ..results.poses import pose_file
 
     report = pose_file(condyle.load(mechanism), joints, out, flag)
     text = f"{report}\n{files_line([out])}"

@@ -45,7 +45,7 @@ def run(
     """
     import condyle
 
-    from ..summary import summarize
+    from ..results.summary import summarize
 
     machine = condyle.load(mechanism)
     path, acting = motion_and_load(machine, motion, load, units, landmark, smooth, rate)

@@ -40,7 +40,7 @@ def solve(
     """
     import condyle
 
-    from ..states import solve_file
+    from ..results.states import solve_file
 
     model = condyle.derive(condyle.load(mechanism), formulation, route, backend)
     rows, warnings = solve_file(model, states, out, load_point, flag, strict, reactions, threads)

@@ -17,19 +17,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..backends import cache
+from ..backends.compiler import REMEDY, Compiler, CompilerError, find_compiler
+from ..backends.notice import notice
+from ..backends.threads import workers
 from ..dynamics import FORMULATIONS
 from ..errors import InputError, UnsupportedError
 from ..kinematics.contact import indices
 from ..mechanism.home import independent_coordinates
 from ..mechanism.mechanism import Mechanism
 from ..progress import step
-from . import cache
-from .compiler import REMEDY, Compiler, CompilerError, find_compiler
-from .layout import Layout, specialise
-from .notice import notice
+from ..questions.layout import Layout, specialise
+from ..questions.spec import OUTPUTS, KernelSpec, kernel_spec
 from .result import PoseRates, Torques
-from .spec import OUTPUTS, KernelSpec, kernel_spec
-from .threads import workers
 
 if TYPE_CHECKING:
     from .interpreted import Interpreted
@@ -199,7 +199,7 @@ def _recipe(spec: KernelSpec, compiler: Compiler) -> str:
 
 
 def _make(folder: Path, spec: KernelSpec, compiler: Compiler) -> tuple[Path, dict[str, Any]]:
-    from .emit import emit
+    from ..backends.c.emit import emit
 
     with step("building a kernel"):
         source = emit(spec, compiler.lanes)
@@ -224,7 +224,7 @@ def generator_digest() -> str:
     """A hash of all code that decides what a kernel's C looks like."""
     package = files("condyle")
     parts: list[bytes] = []
-    for room in ("kernels", "kinematics", "dynamics", "mechanism"):
+    for room in ("mechanism", "kinematics", "dynamics", "graph", "questions", "backends", "kernels"):
         for path in sorted(Path(str(package / room)).rglob("*")):
             if path.suffix in (".py", ".h"):
                 parts += [str(path.name).encode(), path.read_bytes()]

@@ -9,6 +9,7 @@ from collections.abc import Collection
 
 import numpy as np
 
+from ..backends.threads import workers
 from ..dynamics.distribution import minimum_norm
 from ..dynamics.equations import (
     closure_function,
@@ -23,9 +24,8 @@ from ..kinematics.closure import coordinate_closure
 from ..kinematics.contact import indices
 from ..mechanism.home import characteristic_length, independent_coordinates
 from ..mechanism.mechanism import Mechanism
+from ..questions.spec import OUTPUTS
 from .result import PoseRates, Torques
-from .spec import OUTPUTS
-from .threads import workers
 
 
 class Interpreted:

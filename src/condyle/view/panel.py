@@ -14,7 +14,7 @@ import viser
 
 from ..errors import InputError
 from ..mechanism import bundled_mechanisms, load, parse
-from ..solution import open_solution
+from ..results.solution import open_solution
 from .readout import COLOURS, status_html, tables_html
 from .snapshot import Snapshot
 from .stage import VIEWS

@@ -7,7 +7,7 @@ import numpy as np
 from ..kinematics.singularity import KINDS
 from ..model import STATUS_NAMES
 from ..report.scene import place
-from ..solution import Solution
+from ..results.solution import Solution
 from .session import force_vectors, state_messages
 from .snapshot import Level, Snapshot
 

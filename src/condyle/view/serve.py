@@ -17,7 +17,7 @@ import viser
 
 from ..errors import CondyleError
 from ..mechanism import Mechanism, load
-from ..solution import Solution, open_solution
+from ..results.solution import Solution, open_solution
 from .panel import Panel
 from .playback import Playback
 from .session import Session

@@ -15,7 +15,7 @@ from ..kinematics.singularity import KINDS, NEAR
 from ..mechanism import COORDINATES, Mechanism
 from ..model import DEFAULT_LOAD_POINT, OK, UNREACHABLE, Evaluation, Model
 from ..report.scene import contact_normals, place
-from ..solution import BOUND_TOLERANCE, bound_margins, lift_off
+from ..results.solution import BOUND_TOLERANCE, bound_margins, lift_off
 from .snapshot import Level, Snapshot
 
 CENTRE = "mass centre"  # where the load acts besides the platform's points

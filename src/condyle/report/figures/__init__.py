@@ -21,7 +21,7 @@ from .torque import figure_8
 
 if TYPE_CHECKING:
     from ...analysis.compare import Comparison
-    from ...solution import Solution
+    from ...results.solution import Solution
 
 __all__ = [
     "PLOTS",

@@ -18,7 +18,7 @@ from .panels import finish, legend, lines
 from .style import ALERT, GREY, PALETTE, house, new_figure, nothing_to_draw
 
 if TYPE_CHECKING:
-    from ...solution import Solution
+    from ...results.solution import Solution
 
 NO_CONTACTS = "this mechanism has no contacts"
 VIEWS = (("from above", "x", "y"), ("from the side", "x", "z"))

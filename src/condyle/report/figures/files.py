@@ -16,7 +16,7 @@ from ...progress import step
 from .style import STYLE
 
 if TYPE_CHECKING:
-    from ...solution import Solution
+    from ...results.solution import Solution
 
 FORMATS = ("png", "svg")
 

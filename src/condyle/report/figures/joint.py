@@ -12,7 +12,7 @@ from .panels import finish, limits, lines
 from .style import house, new_figure
 
 if TYPE_CHECKING:
-    from ...solution import Solution
+    from ...results.solution import Solution
 
 ROWS = (("joint", "coordinate"), ("joint_rate", "rate"), ("joint_acceleration", "acceleration"))
 

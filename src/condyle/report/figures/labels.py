@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ...analysis.paper import is_stand_in, is_synthetic
 
 if TYPE_CHECKING:
-    from ...solution import Solution
+    from ...results.solution import Solution
 
 TIME = "time [s]"
 COORDINATE = {"alpha": "α", "beta": "β", "gamma": "γ"}

@@ -13,7 +13,7 @@ from .panels import finish, legend, lines
 from .style import PALETTE, XYZ, house, new_figure
 
 if TYPE_CHECKING:
-    from ...solution import Solution
+    from ...results.solution import Solution
 
 VIEWS = (
     ("side (sagittal)", "X", "Z"),

@@ -12,7 +12,7 @@ from .labels import TIME
 from .style import DARK, GREY, look
 
 if TYPE_CHECKING:
-    from ...solution import Solution
+    from ...results.solution import Solution
 
 REACH = 2.5  # a limit beyond this many times the data would flatten them
 

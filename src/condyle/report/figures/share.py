@@ -15,7 +15,7 @@ from .style import house, new_figure
 from .torque import chains_of, effort_label, scale_by_unit
 
 if TYPE_CHECKING:
-    from ...solution import Solution
+    from ...results.solution import Solution
 
 PAPER_ORDER = ("platform", "cranks", "couplers")
 

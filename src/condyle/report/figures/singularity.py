@@ -14,7 +14,7 @@ from .panels import finish, legend, legend_beside, lines
 from .style import ALERT, DASHES, house, new_figure
 
 if TYPE_CHECKING:
-    from ...solution import Solution
+    from ...results.solution import Solution
 
 # Joint unit -> unit of J_A on the axis, from m^2 per joint unit, and the factor to it.
 J_A_UNITS = {"rad": ("mm²/rad", 1e6), "m": ("mm", 1e3)}

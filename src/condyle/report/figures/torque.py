@@ -15,7 +15,7 @@ from .style import house, new_figure
 if TYPE_CHECKING:
     from ...analysis.compare import Comparison
     from ...analysis.runs import Run
-    from ...solution import Solution
+    from ...results.solution import Solution
 
 
 @house

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...solution import BOUND_TOLERANCE
+from ...results.solution import BOUND_TOLERANCE
 from .columns import Columns
 from .panels import effort_limits, speed_limits
 
 if TYPE_CHECKING:
-    from ...solution import Solution
+    from ...results.solution import Solution
 
 NEAR_SINGULAR = "near a singularity"
 

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import InputError
-from ...summary import summarize
+from ...results.summary import summarize
 from .html import Markup, table, tag
 from .panels import effort_limits, reaction_magnitudes, reaction_variables, speed_limits
 
 if TYPE_CHECKING:
-    from ...solution import Solution
+    from ...results.solution import Solution
     from ..tables import Table
 
 

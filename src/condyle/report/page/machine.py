@@ -19,7 +19,7 @@ from .columns import Columns
 
 if TYPE_CHECKING:
     from ...mechanism import Mechanism
-    from ...solution import Solution
+    from ...results.solution import Solution
 
 SIZE = 0.26  # the size that radii and arrows are stated in, over the diagonal of everything
 ARROW = 0.9  # longest arrow

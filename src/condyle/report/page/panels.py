@@ -13,7 +13,7 @@ from .columns import Columns
 from .units import Shown, shown
 
 if TYPE_CHECKING:
-    from ...solution import Solution
+    from ...results.solution import Solution
 
 LIMITS_IN_VIEW = 0.25  # of a limit: peaks above this bring the limit into view
 MAX_BOUND = 1e9  # metres; a margin without a bound is infinite

@@ -10,7 +10,7 @@ from ..scene import contact_profile
 from .columns import Columns
 
 if TYPE_CHECKING:
-    from ...solution import Solution
+    from ...results.solution import Solution
 
 MILLI = 1e3
 VIEWS = {"above": (0, 1), "side": (0, 2)}

@@ -29,7 +29,7 @@ from .panels import time_panels
 from .tracks import track_panels
 
 if TYPE_CHECKING:
-    from ...solution import Solution
+    from ...results.solution import Solution
     from ..tables import Table
 
 _ASSETS = package_files(__package__) / "assets"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from .table import Table
 
 if TYPE_CHECKING:
-    from ...solution import Solution
+    from ...results.solution import Solution
 
 _FIELDS = ("name", "title", "columns", "rows", "notes")
 

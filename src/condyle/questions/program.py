@@ -14,6 +14,8 @@ import casadi as ca
 
 from ..dynamics import FORMULATIONS
 from ..dynamics.formulation import Body
+from ..dynamics.least_norm import Lanes, gram_schmidt, normal_equations
+from ..graph.graph import Graph, Value, read
 from ..kinematics.chain import FAMILIES, Constants, Family, Law
 from ..kinematics.contact import (
     Placement,
@@ -25,9 +27,7 @@ from ..kinematics.contact import (
 from ..kinematics.iteration import newton
 from ..kinematics.parasitic import WholeMotion, whole_motion
 from ..kinematics.state import PointMotion, State, independent_state, pose_state, twist_state
-from .graph import Graph, Value, read
 from .layout import Layout
-from .least_norm import Lanes, gram_schmidt, normal_equations
 from .spec import KernelSpec
 
 

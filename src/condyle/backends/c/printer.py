@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from .graph import REDUCTIONS, Value, reachable
-from .program import Program
+from ...graph.graph import REDUCTIONS, Value, reachable
+from ...questions.program import Program
 
 INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
 

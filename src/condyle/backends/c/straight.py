@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from .graph import Value
+from ...graph.graph import Value
+from ...graph.schedule import ready_times, scheduled
+from ...questions.program import Program
 from .printer import Printer, fold, padded_counts
-from .program import Program
-from .schedule import ready_times, scheduled
 
 NEAR = 12  # cycles between sums that are worth waiting for
 

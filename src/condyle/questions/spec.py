@@ -53,7 +53,7 @@ def kernel_spec(
     outputs: tuple[str, ...] = (),
     moment: bool = False,
 ) -> KernelSpec:
-    """The spec of a mechanism's kernel; see `condyle.kernels.layout.specialise` for `zeros`."""
+    """The spec of a mechanism's kernel; see `condyle.questions.layout.specialise` for `zeros`."""
     counts: dict[str, int] = {}
     for chain in mechanism.chains:
         counts[chain.kind] = counts.get(chain.kind, 0) + 1

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .graph import REDUCTIONS, Value
+from ...graph.graph import REDUCTIONS, Value
 from .printer import INFIX, Printer, arithmetic, fold, number
 
 

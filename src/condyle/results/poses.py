@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from .errors import UnreachableError
-from .kinematics.chain import FAMILIES
-from .kinematics.forward import ForwardKinematics
-from .mechanism.mechanism import COORDINATES, Mechanism
-from .model import check_home
-from .motion import read_table, write_table
-from .progress import step
+from ..errors import UnreachableError
+from ..kinematics.chain import FAMILIES
+from ..kinematics.forward import ForwardKinematics
+from ..mechanism.mechanism import COORDINATES, Mechanism
+from ..model import check_home
+from ..motion import read_table, write_table
+from ..progress import step
 
 
 @dataclass(frozen=True)

@@ -10,21 +10,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from . import __version__
-from .atomic import replacing
-from .errors import InputError, no_such_file
-from .kinematics.chain import FAMILIES
-from .kinematics.singularity import KINDS, NEAR
-from .mechanism.files import recall, record
-from .mechanism.home import home_warnings
-from .mechanism.mechanism import COORDINATES, Mechanism
-from .model import STATUS_NAMES
-from .progress import step
+from .. import __version__
+from ..atomic import replacing
+from ..errors import InputError, no_such_file
+from ..kinematics.chain import FAMILIES
+from ..kinematics.singularity import KINDS, NEAR
+from ..mechanism.files import recall, record
+from ..mechanism.home import home_warnings
+from ..mechanism.mechanism import COORDINATES, Mechanism
+from ..model import STATUS_NAMES
+from ..progress import step
 
 if TYPE_CHECKING:
-    from .model import Evaluation, Model
-    from .motion import Load, Motion
-    from .report.figures import SolutionPlots
+    from ..model import Evaluation, Model
+    from ..motion import Load, Motion
+    from ..report.figures import SolutionPlots
 
 AXES = ("x", "y", "z")
 WRENCH = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
@@ -65,13 +65,13 @@ class Solution(xr.Dataset):
     @property
     def plot(self) -> SolutionPlots:  # type: ignore[override]
         """Figures: `solution.plot.torque()` and friends; xarray's own are there too."""
-        from .report.figures import SolutionPlots
+        from ..report.figures import SolutionPlots
 
         return SolutionPlots(self)
 
     def save(self, *paths: str | Path) -> None:
         """Write as NetCDF (.nc) or CSV (.csv): every file whole, or none of them."""
-        from .motion import write_table
+        from ..motion import write_table
 
         with step("writing results"), ExitStack() as stack:
             for path in paths:

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from .errors import BoundsError, InputError
-from .mechanism.mechanism import COORDINATES
-from .model import STATUS_NAMES, Model, with_point
-from .motion import Table, TableWriter, iter_table
+from ..errors import BoundsError, InputError
+from ..mechanism.mechanism import COORDINATES
+from ..model import STATUS_NAMES, Model, with_point
+from ..motion import Table, TableWriter, iter_table
 from .solution import (
     AXES,
     BOUND_TOLERANCE,
@@ -117,7 +117,7 @@ def solve_table(
         assert array is not None
         columns |= named_columns(prefix, labels, np.where(ok[:, None], array, np.nan))
     if reactions:
-        from .dynamics.reactions import reactions as joint_reactions
+        from ..dynamics.reactions import reactions as joint_reactions
 
         for name, reaction in joint_reactions(model, evaluation).items():
             array = np.where(ok[:, None], reaction.array, np.nan)

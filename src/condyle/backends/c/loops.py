@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import groupby
 
-from .graph import REDUCTIONS, Value
+from ...graph.graph import REDUCTIONS, Value
+from ...questions.program import Program
 from .printer import Printer, fold
-from .program import Program
 
 ABREAST = 2  # chains whose statements alternate, to keep both arithmetic ports busy
 LONG = 700  # statements of a chain above which one at a time is enough

@@ -12,11 +12,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from importlib.resources import files
 
-from .fuse import fuse
+from ...graph.fuse import fuse
+from ...questions.program import Output, Program, build, folds
+from ...questions.spec import KernelSpec
 from .loops import Loops
 from .prepare import prepare
-from .program import Output, Program, build, folds
-from .spec import KernelSpec
 from .straight import Straight
 
 CHAIN = 5
@@ -70,7 +70,7 @@ def emit(spec: KernelSpec, width: int) -> Source:
 
 
 def _text(name: str) -> str:
-    return (files(__package__) / "c" / name).read_text(encoding="utf-8")
+    return (files(__package__) / name).read_text(encoding="utf-8")
 
 
 def fused(program: Program) -> Program:

@@ -1,0 +1,1 @@
+"""How a graph runs. These rooms know nothing of mechanics."""

@@ -1,0 +1,1 @@
+"""What can be asked: each question once, as expressions over chains as lanes."""
