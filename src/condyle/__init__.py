@@ -25,8 +25,8 @@ _HOMES = {
     "dump": "mechanism",
     "dumps": "mechanism",
     "load": "mechanism",
-    "Model": "model",
-    "derive": "model",
+    "Model": "results.model",
+    "derive": "results.model",
     "Load": "motion",
     "Motion": "motion",
     "reference_load": "motion",
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
         UnsupportedError,
     )
     from .mechanism import Mechanism, bundled_mechanisms, dump, dumps, load
-    from .model import Model, derive
+    from .results.model import Model, derive
     from .motion import Load, Motion, reference_load, reference_motion, trial_motion
     from .results.solution import Solution, open_solution
 

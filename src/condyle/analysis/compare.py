@@ -17,10 +17,10 @@ from ..dynamics import FORMULATIONS, ROUTES
 from ..dynamics import formulation as formulation_named
 from ..errors import UnsupportedError
 from ..mechanism.mechanism import Mechanism
-from ..model import Model, with_point
+from ..model.evaluator import Evaluator, with_point
 from ..progress import step
 from .indices import Indices, indices
-from .runs import InterpretedModel, Run, Samples, run
+from .runs import TimedModel, Run, Samples, run
 
 if TYPE_CHECKING:
     from ..motion import Load, Motion
@@ -122,7 +122,7 @@ def compare(
     """
     names = [formulation_named(name).name for name in formulations or FORMULATIONS]
     # The first derivation also pays for imports, so it is not one of those that are timed.
-    model = InterpretedModel(mechanism, names[0], "core")
+    model = TimedModel(mechanism, names[0], "core")
     solution = model.solve(motion, load, load_point)
     samples = samples_of(model, solution)
     models, unavailable = [], []
@@ -130,7 +130,7 @@ def compare(
     with step("deriving every model", len(kinds)) as advance:
         for name, route in kinds:
             try:
-                models.append(InterpretedModel(mechanism, name, route))
+                models.append(TimedModel(mechanism, name, route))
             except UnsupportedError as error:
                 unavailable.append(Unavailable(f"{name} {route}", str(error)))
             advance(1)
@@ -140,9 +140,9 @@ def compare(
         unavailable.append(Unavailable("without contacts", reason))
     else:
         free = mechanism.replace(contacts=(), dependent=None)
-        models += [InterpretedModel(free, name, "core") for name in names]
-        posture = models[-1].posture(samples.pose)
-        condition = float(posture.singularity.condition.max())
+        models += [TimedModel(free, name, "core") for name in names]
+        measures = models[-1].configuration(samples.pose).singularity
+        condition = float(measures.condition.max())
     runs = []
     with step("running every model", len(models)) as advance:
         for one in models:
@@ -158,7 +158,7 @@ def compare(
     )
 
 
-def samples_of(model: Model, solution: Solution) -> Samples:
+def samples_of(model: Evaluator, solution: Solution) -> Samples:
     """The motion and load of a solution."""
     wrench, name = solution["load"].values, solution.options["load_point"]
     point = model.load_point(name) if name is not None or wrench.any() else np.zeros(3)

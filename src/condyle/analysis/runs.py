@@ -7,26 +7,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kernels.interpreted import Interpreted
 from ..mechanism.mechanism import COORDINATES, Mechanism
-from ..model import Model
+from ..results.model import Model
 from .paper import Seconds
 
 
-class InterpretedModel(Model):
-    """A model run by the interpreter, so that its derivation and its numbers are timed apart.
+class TimedModel(Model):
+    """A model run by numpy, so that its derivation and its numbers are timed apart.
 
     A compiled kernel would mix in the compiler's seconds, or none where the kernel is cached; the
     benchmark is the place for those.
 
-    Attributes: symbolic: seconds of the derivation.
+    Attributes: symbolic: seconds of the derivation: the graph of the efforts.
     """
-
-    kernel: Interpreted
 
     def __init__(self, mechanism: Mechanism, formulation: str, route: str) -> None:
         start = clock()
-        super().__init__(mechanism, formulation, route, backend="interpreted")
+        super().__init__(mechanism, formulation, route, backend="numpy")
+        self.kernel("inverse", ())
         self.symbolic = clock() - start
 
 
@@ -71,38 +69,23 @@ class Run:
         return f"{self.formulation} {self.route}" + ("" if self.contacts else ", no contacts")
 
 
-def run(model: InterpretedModel, samples: Samples) -> Run:
-    """Compute the samples by a model, and time its torques."""
+def run(model: TimedModel, samples: Samples) -> Run:
+    """Compute the samples by a model, and time its torques.
+
+    Contact forces, shares and configurations are not in the seconds.
+    """
     columns = [COORDINATES.index(name) for name in model.independent]
     q, q1, q2 = (a[:, columns] for a in (samples.pose, samples.rate, samples.acceleration))
-    numeric = numeric_seconds(model, q, q1, q2, samples.load)
-    found = model.kernel.solve(q, q1, q2, samples.load)
-    assert found.share is not None and found.contact_force is not None
+    start = clock()
+    model.torques(q, q1, q2, samples.load)
+    numeric = clock() - start
+    found = model.torques(q, q1, q2, samples.load, ("contact", "share"))
     return Run(
         model.formulation,
         model.route,
         bool(model.mechanism.contacts),
         Seconds(model.symbolic, numeric),
-        found.torque,
-        found.share,
-        found.contact_force,
+        found.effort,
+        found["share"],
+        found["contact_force"],
     )
-
-
-def numeric_seconds(
-    model: InterpretedModel, q: np.ndarray, q1: np.ndarray, q2: np.ndarray, load: np.ndarray
-) -> float:
-    """Seconds of torques alone.
-
-    Route `core` closes the contacts in a step of its own, which counts; without contacts the pose
-    is given. Contact forces, postures and checks are not counted.
-    """
-    kernel = model.kernel
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        start = clock()
-        poses = kernel.poses(q, q1, q2)
-        closed = clock()
-        kernel.torques(q, q1, q2, load, poses, contact_forces=False)
-        end = clock()
-    own_step = model.route == "core" and model.mechanism.contacts
-    return end - (start if own_step else closed)

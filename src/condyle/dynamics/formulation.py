@@ -34,6 +34,10 @@ class Formulation(Protocol):
 
     name: ClassVar[str]
     uses_twist: ClassVar[bool]  # whether route `core` works in twist coordinates
+    # Whether a chain's bodies can act as one, with end masses that are part of the platform, and
+    # whether idle constants (`Family.idle`) alone make a lane do nothing.
+    lumps: ClassVar[bool] = False
+    idles: ClassVar[bool] = False
 
     def platform(self, state: State, body: Body, g: ca.SX) -> ca.SX:
         """Inertia less gravity of the platform, dual to the state's c', (m,)."""

@@ -30,6 +30,8 @@ from .joint_space import JointState, joint_space_law
 class Hessian:
     name: ClassVar[str] = "hessian"
     uses_twist: ClassVar[bool] = False
+    lumps: ClassVar[bool] = False
+    idles: ClassVar[bool] = False
 
     def platform(self, state: State, body: Body, g: ca.SX) -> ca.SX:
         V, omega_M = state.twist[:3], state.R.T @ state.twist[3:]

@@ -58,6 +58,13 @@ class JointMotion:
         return Law(on_M, J, self.loop.reach, self.rate[0], self.acceleration[0])
 
 
+def chain_jacobians(family: Family, c: Constants, q_r: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """M_1, (3, 3), with M' = M_1 q_r', and its inverse ([Cheng2023] eqs 16, 17)."""
+    q = ca.SX.sym("q_r", 3)
+    M_1 = ca.substitute(ca.jacobian(family.tip(c, q), q), q, q_r)
+    return M_1, solve_small(M_1, ca.SX.eye(3))
+
+
 LinkForce = Callable[[Link, JointState, ca.SX], ca.SX]
 Bias = Callable[[ca.SX, JointState], ca.SX]
 

@@ -22,6 +22,8 @@ from .joint_space import JointState, joint_space_law
 class Lagrange:
     name: ClassVar[str] = "lagrange"
     uses_twist: ClassVar[bool] = False
+    lumps: ClassVar[bool] = False
+    idles: ClassVar[bool] = False
 
     def platform(self, state: State, body: Body, g: ca.SX) -> ca.SX:
         """Eqs (48)-(52)."""

@@ -23,6 +23,8 @@ from .joint_space import JointState, joint_space_law
 class Momentum:
     name: ClassVar[str] = "momentum"
     uses_twist: ClassVar[bool] = False
+    lumps: ClassVar[bool] = False
+    idles: ClassVar[bool] = False
 
     def platform(self, state: State, body: Body, g: ca.SX) -> ca.SX:
         """Eqs (29)-(32)."""

@@ -27,6 +27,8 @@ from .joint_space import JointState, joint_motion
 class NewtonEuler:
     name: ClassVar[str] = "newton_euler"
     uses_twist: ClassVar[bool] = True
+    lumps: ClassVar[bool] = False
+    idles: ClassVar[bool] = False
 
     def platform(self, state: State, body: Body, g: ca.SX) -> ca.SX:
         """Newton, and Euler about O_M, which the mass centre is S / m away from."""

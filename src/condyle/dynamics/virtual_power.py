@@ -18,6 +18,8 @@ from .formulation import Body
 class VirtualPower:
     name: ClassVar[str] = "virtual_power"
     uses_twist: ClassVar[bool] = True
+    lumps: ClassVar[bool] = True
+    idles: ClassVar[bool] = True
 
     def platform(self, state: State, body: Body, g: ca.SX) -> ca.SX:
         """Newton and Euler about O_M, with a first moment S = R s:

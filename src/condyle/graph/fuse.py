@@ -10,14 +10,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from . import operations
 from .graph import Graph, Node, Value, reachable
-
-LATENCY = {"div": 14, "sqrt": 18, "sin": 40, "cos": 40, "sum": 22, "least": 22, "atan2": 80}
 
 
 def latency(node: Node) -> int:
     """Cycles from a node's arguments to its value."""
-    return LATENCY.get(node.op, 4) if node.args else 0
+    return operations.latency(node.op) if node.args else 0
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,8 @@
-"""Expressions as a graph of scalar operations, ready to print as code.
+"""Expressions as a graph of hash-consed scalar operations, ready to run.
 
-CasADi's instruction list becomes hash-consed nodes. Two properties decide how a node is printed:
+Two properties decide how a node is computed:
 
-- `group`: None for values that all chains share, else the chain family whose lanes it varies over;
+- `group`: None for values that all lanes share, else the group of lanes that it varies over;
 - `varies`: whether it changes from sample to sample; the rest is computed once a mechanism.
 
 Reductions (`sum`, `least`) take lane values to shared ones. Arc functions whose angle is only
@@ -14,62 +14,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-import casadi as ca
-
-from ..errors import UnsupportedError
+from .operations import REDUCTIONS
 
 Value = int  # a node's number
-
-_BINARY = {
-    ca.OP_ADD: "add",
-    ca.OP_SUB: "sub",
-    ca.OP_MUL: "mul",
-    ca.OP_DIV: "div",
-    ca.OP_ATAN2: "atan2",
-    ca.OP_FMIN: "fmin",
-    ca.OP_FMAX: "fmax",
-    ca.OP_LE: "le",  # 1 or 0
-    ca.OP_LT: "lt",
-    ca.OP_EQ: "eq",
-    ca.OP_NE: "ne",
-    ca.OP_AND: "and",
-    ca.OP_OR: "or",
-    ca.OP_IF_ELSE_ZERO: "where",
-    ca.OP_POW: "pow",
-    ca.OP_CONSTPOW: "pow",
-    ca.OP_FMOD: "fmod",
-    ca.OP_REMAINDER: "remainder",
-    ca.OP_COPYSIGN: "copysign",
-    ca.OP_HYPOT: "hypot",
-}
-_UNARY = {
-    ca.OP_NEG: "neg",
-    ca.OP_SQRT: "sqrt",
-    ca.OP_SIN: "sin",
-    ca.OP_COS: "cos",
-    ca.OP_FABS: "fabs",
-    ca.OP_NOT: "not",
-    ca.OP_SIGN: "sign",
-    ca.OP_FLOOR: "floor",
-    ca.OP_CEIL: "ceil",
-    ca.OP_EXP: "exp",
-    ca.OP_EXPM1: "expm1",
-    ca.OP_LOG: "log",
-    ca.OP_LOG1P: "log1p",
-    ca.OP_TAN: "tan",
-    ca.OP_ASIN: "asin",
-    ca.OP_ACOS: "acos",
-    ca.OP_ATAN: "atan",
-    ca.OP_SINH: "sinh",
-    ca.OP_COSH: "cosh",
-    ca.OP_TANH: "tanh",
-    ca.OP_ASINH: "asinh",
-    ca.OP_ACOSH: "acosh",
-    ca.OP_ATANH: "atanh",
-    ca.OP_ERF: "erf",
-}
-REDUCTIONS = ("sum", "least")
-
+VARYING = ("input", "lane_input")  # leaves that change from sample to sample
 
 @dataclass(frozen=True)
 class Node:
@@ -91,8 +39,12 @@ class Graph:
     _known: dict[tuple[object, ...], Value] = field(default_factory=dict)
 
     def leaf(self, op: str, *data: object, group: int | None = None) -> Value:
-        """A stored value: ("input", i), ("parameter", i), ("lane", g, i) or ("const", x)."""
-        return self._node(op, (), data, group, op == "input", 0)
+        """A stored value.
+
+        ("input", i) of a sample, ("lane_input", g, i) of a sample and lane, ("parameter", i),
+        ("lane", g, i), or ("const", x).
+        """
+        return self._node(op, (), data, group, op in VARYING, 0)
 
     def const(self, value: float) -> Value:
         return self.leaf("const", float(value))
@@ -214,55 +166,6 @@ class Graph:
         y, x = arc.args
         square = self.apply("add", self.apply("mul", x, x), self.apply("mul", y, y))
         return self.apply("div", y if op == "sin" else x, self.apply("sqrt", square))
-
-
-def read(
-    graph: Graph, outputs: Sequence[ca.SX], known: dict[str, Value], free: Sequence[ca.SX]
-) -> list[list[Value]]:
-    """Nodes of expressions, entry by entry.
-
-    Args: known: symbol name -> node, for every symbol in `free`, the symbols that occur.
-    """
-    symbols = ca.vertcat(*free)
-    function = ca.Function("expressions", [symbols], [ca.densify(o) for o in outputs])
-    names = [free_symbol.name() for free_symbol in free]
-    work: dict[int, Value] = {}
-    found: list[list[Value]] = [[-1] * o.numel() for o in outputs]
-    for k in range(function.n_instructions()):
-        op = function.instruction_id(k)
-        ins, outs = function.instruction_input(k), function.instruction_output(k)
-        if op == ca.OP_CONST:
-            work[outs[0]] = graph.const(function.instruction_constant(k))
-        elif op == ca.OP_INPUT:
-            work[outs[0]] = known[names[ins[1]]]
-        elif op == ca.OP_OUTPUT:
-            found[outs[0]][outs[1]] = work[ins[0]]
-        else:
-            work[outs[0]] = _operation(graph, op, [work[i] for i in ins])
-    return found
-
-
-def _operation(graph: Graph, op: int, args: list[Value]) -> Value:
-    if op in (ca.OP_CONSTPOW, ca.OP_POW):
-        exponent = graph.nodes[args[1]]
-        if exponent.op == "const" and exponent.data[0] in (2.0, 3.0, 4.0):
-            square = graph.apply("mul", args[0], args[0])
-            if exponent.data[0] == 2.0:
-                return square
-            return graph.apply("mul", square, args[0] if exponent.data[0] == 3.0 else square)
-    if op in _BINARY:
-        return graph.apply(_BINARY[op], args[0], args[1])
-    if op in _UNARY:
-        return graph.apply(_UNARY[op], args[0])
-    if op == ca.OP_SQ:
-        return graph.apply("mul", args[0], args[0])
-    if op == ca.OP_TWICE:
-        return graph.apply("add", args[0], args[0])
-    if op == ca.OP_INV:
-        return graph.apply("div", graph.const(1.0), args[0])
-    if op == ca.OP_ASSIGN:
-        return args[0]
-    raise UnsupportedError(f"CasADi's operation number {op} has no C in kernels")
 
 
 def reachable(graph: Graph, roots: Sequence[Value]) -> list[Value]:

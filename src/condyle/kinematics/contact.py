@@ -15,7 +15,7 @@ from typing import Any
 
 import casadi as ca
 
-from ..mechanism.mechanism import COORDINATES
+from ..mechanism.mechanism import COORDINATES, Mechanism
 from .rotation import Bryant, rotation
 
 POSITIONS = COORDINATES[:3]
@@ -52,6 +52,10 @@ class ContactSymbols:
         """For ball centres near `position`: see `Smooth.started_at`."""
         return replace(self, surface=self.surface.started_at(position, self.constants))
 
+    def part_of_way(self, part: float) -> ContactSymbols:
+        """At a part of the way from home: surfaces stay, guides move."""
+        return self
+
     @property
     def square_lever(self) -> ca.SX:
         """|T|^2 [m^2]."""
@@ -61,6 +65,14 @@ class ContactSymbols:
         """Where the ball centre is when O_M is at `position`, (3,)."""
         lever = R @ self.point
         return position + lever if self.anchored else lever
+
+
+def contacts_of(mechanism: Mechanism) -> list[ContactSymbols]:
+    """A mechanism's contacts with their numbers in place."""
+    return [
+        ContactSymbols(c.locus, ca.SX(ca.DM(c.point)), ca.SX(ca.DM(c.locus.constants())))
+        for c in mechanism.contacts
+    ]
 
 
 def indices(names: Sequence[str]) -> list[int]:
@@ -146,6 +158,18 @@ def solve_small(A: ca.SX, b: ca.SX) -> ca.SX:
             x[j, :] = b[i, :] - A[i, columns] @ rest
             return x
     return ca.inv_minor(A) @ b
+
+
+def determinant(A: ca.SX) -> ca.SX:
+    """The determinant of a square A of a few rows; entries that are 1 by structure go first."""
+    size = A.shape[0]
+    for i, j in ((i, j) for j in range(size) for i in range(size)):
+        if size > 1 and A[i, j].is_one():
+            rows = [r for r in range(size) if r != i]
+            columns = [c for c in range(size) if c != j]
+            rest = determinant(A[rows, columns] - A[rows, j] @ A[i, columns])
+            return rest if (i + j) % 2 == 0 else -rest
+    return ca.det(A)
 
 
 def parasitic_jacobian(C: ca.SX, dependent: Sequence[str]) -> ca.SX:

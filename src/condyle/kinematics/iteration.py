@@ -10,7 +10,7 @@ others follow the sample from home in pieces, as `Closure` does.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 
@@ -19,6 +19,7 @@ from .contact import (
     Placement,
     contact_bias,
     contact_frame,
+    determinant,
     indices,
     solve_small,
 )
@@ -46,13 +47,15 @@ class _Plan:
     far: float
 
 
-# By the number of contacts: the more there are the nearer lie the folds, the fewer the ways.
+# By the number of dependent coordinates: the more there are the nearer lie the folds, the fewer
+# the ways. Six: a landmark follows its path.
 PLANS = (
     _Plan(4, 0.25, 0.05, 1.5),
     _Plan(4, 0.1, 0.1, 1.5),
     _Plan(6, 0.1, 0.2, 0.7),
     _Plan(4, 0.1, 0.2, 0.7),
     _Plan(2, 0.1, 0.2, 0.7),
+    _Plan(2, 0.2, 0.1, 1.0),
 )
 
 
@@ -67,7 +70,7 @@ def newton(contacts: Sequence[ContactSymbols], dependent: Sequence[str], q: ca.S
             return _height(contacts[0], q)
         if len(dep) == 2 and max(dep) >= 3:
             return one_angle(contacts, max(dep), q)
-    return _followed(contacts, dep, q)
+    return followed(contacts, dep, q)
 
 
 def _is_graph(contact: ContactSymbols) -> bool:
@@ -84,8 +87,10 @@ def _height(contact: ContactSymbols, q: ca.SX) -> Placement:
     return Placement(ca.vertcat(q[:2], Z), bryant, None)
 
 
-def _followed(contacts: Sequence[ContactSymbols], dep: list[int], q: ca.SX) -> Placement:
+def followed(contacts: Sequence[ContactSymbols], dep: list[int], q: ca.SX) -> Placement:
     """All dependent coordinates at once, along the straight way from home.
+
+    Guides move along with the way.
 
     Each piece is a step that follows the bend of the contacts, and one of Newton that shows how
     good it was. Branches meet at folds, where the determinant of C_dep changes its sign; steps
@@ -97,9 +102,9 @@ def _followed(contacts: Sequence[ContactSymbols], dep: list[int], q: ca.SX) -> P
     home = there.determinant
     sure = []
     plan = PLANS[len(dep) - 1]
-    for goal in _way(dep, q, plan.pieces):
+    for part, goal in _way(dep, q, plan.pieces):
         pose = pose.with_goal(goal, dep)
-        here = there.at_pose(pose)
+        here = there.guided(part).at_pose(pose)
         step, fold = here.bent_step(unit)
         pose = pose.moved(dep, step)
         there = here.at_pose(pose)
@@ -112,7 +117,7 @@ def _followed(contacts: Sequence[ContactSymbols], dep: list[int], q: ca.SX) -> P
     pose = pose.moved(dep, there.bent_step(unit)[0])
     last = there.at_pose(pose)
     pose = pose.moved(dep, last.step())
-    phi = _phi(contacts, pose)
+    phi = _phi([c.part_of_way(1.0) for c in contacts], pose)
     sure.append(unit.square(solve_small(last.C, phi), dep) < CLOSED**2)
     sure.append(pose.square(unit) < plan.far**2)
     reach = ca.SX(1)
@@ -174,14 +179,15 @@ class _Pose:
         return _Pose(position, turns)
 
 
-def _way(dep: Sequence[int], q: ca.SX, pieces: int) -> list[_Pose]:
+def _way(dep: Sequence[int], q: ca.SX, pieces: int) -> list[tuple[float, _Pose]]:
     """Poses with the independent coordinates of equal parts of the way from home to q."""
     given = iter(ca.vertsplit(q))
     values = [ca.SX(0) if i in dep else next(given) for i in range(6)]
     first = [ca.vertcat(ca.cos(v / pieces), ca.sin(v / pieces)) for v in values[3:]]
     goals, turns = [], first
     for part in range(1, pieces + 1):
-        goals.append(_Pose(ca.vertcat(*values[:3]) * (part / pieces), turns))
+        share = part / pieces
+        goals.append((share, _Pose(ca.vertcat(*values[:3]) * share, turns)))
         turns = [turned(turn, by) for turn, by in zip(turns, first, strict=True)]
     return goals
 
@@ -215,9 +221,13 @@ class _Contacts:
         here = [c.started_at(c.at(self.pose.position, R)) for c in self.contacts]
         return _Contacts.at(here, self.dep, pose)
 
+    def guided(self, part: float) -> _Contacts:
+        """The contacts with their guides at a part of the way."""
+        return replace(self, contacts=[c.part_of_way(part) for c in self.contacts])
+
     @property
     def determinant(self) -> ca.SX:
-        return ca.det(self.C)
+        return determinant(self.C)
 
     def step(self) -> ca.SX:
         """Newton's."""

@@ -11,8 +11,7 @@ import numpy as np
 from ..errors import InputError
 from ..mechanism.home import HOME_WARNING, characteristic_length, home_residuals
 from ..mechanism.mechanism import COORDINATES, Mechanism
-from .closure import contact_symbols
-from .contact import residuals
+from .contact import contacts_of, residuals
 
 ITERATIONS = 50
 ON_THE_SURFACE = 1e-12  # metres
@@ -76,7 +75,7 @@ def project_home(mechanism: Mechanism) -> Projection:
     Args:   mechanism: one whose contacts need not be on their surfaces yet.
     Raises: InputError: if no pose near home meets all contacts.
     """
-    contacts = contact_symbols(mechanism)
+    contacts = contacts_of(mechanism)
     x, d = ca.SX.sym("x", 6), ca.SX.sym("d", 3)
     length = characteristic_length(mechanism)
     scale = np.array([1.0, 1.0, 1.0, 1 / length, 1 / length, 1 / length])

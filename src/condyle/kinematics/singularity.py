@@ -27,29 +27,33 @@ class Singularity:
     J_A:             diagonal of eq. (26), (N, n) [m^2 per joint unit].
     transmission:    J_A made dimensionless, (N, n): 1 is best.
     J_W_sigma:       singular values of the dimensionless J_W, (N, m), falling.
+    inverse_ratio:   smallest over largest |transmission|, (N,).
+    direct_ratio:    smallest over largest singular value of J_W, (N,).
+    ratio:           the smaller of the two, (N,).
     length:          the characteristic length [m].
     """
 
     J_A: np.ndarray
     transmission: np.ndarray
     J_W_sigma: np.ndarray
+    inverse_ratio: np.ndarray
+    direct_ratio: np.ndarray
+    ratio: np.ndarray
     length: float
 
-    @property
-    def inverse_ratio(self) -> np.ndarray:
-        """Smallest over largest entry of J_A, (N,)."""
-        size = np.abs(self.transmission)
-        return _ratio(size.min(axis=1), size.max(axis=1))
-
-    @property
-    def direct_ratio(self) -> np.ndarray:
-        """Smallest over largest singular value of J_W, (N,)."""
-        return _ratio(self.J_W_sigma[:, -1], self.J_W_sigma[:, 0])
-
-    @property
-    def ratio(self) -> np.ndarray:
-        """The smaller of the two ratios, (N,)."""
-        return np.minimum(self.inverse_ratio, self.direct_ratio)
+    @staticmethod
+    def of(
+        J_A: np.ndarray,
+        transmission: np.ndarray,
+        J_W_sigma: np.ndarray,
+        J_A_extremes: np.ndarray,
+        length: float,
+    ) -> Singularity:
+        """Args: J_A_extremes: least and greatest |transmission|, (2, N)."""
+        inverse = ratio(J_A_extremes[0], J_A_extremes[1])
+        direct = ratio(J_W_sigma[:, -1], J_W_sigma[:, 0])
+        both = np.minimum(inverse, direct)
+        return Singularity(J_A, transmission, J_W_sigma, inverse, direct, both, length)
 
     @property
     def condition(self) -> np.ndarray:
@@ -67,26 +71,9 @@ class Singularity:
         return (self.inverse_ratio < threshold) + 2 * (self.direct_ratio < threshold)
 
 
-def measure(
-    J_A: np.ndarray,
-    J_A_scale: np.ndarray,
-    J_W: np.ndarray,
-    rod_length: np.ndarray,
-    angle_columns: np.ndarray,
-    length: float,
-) -> Singularity:
-    """Measures from the matrices of eq. (26).
-
-    Args: J_A, J_A_scale, rod_length: (N, n);  J_W: (N, n, m);
-          angle_columns: (m,), True where a coordinate is an angle;  length: [m].
-    """
-    scaled = J_W / (2 * rod_length[..., None]) / np.where(angle_columns, length, 1.0)
-    sigma = np.full((len(J_W), J_W.shape[2]), np.nan)
-    good = np.isfinite(scaled).all(axis=(1, 2))
-    sigma[good] = np.linalg.svd(scaled[good], compute_uv=False)
-    return Singularity(J_A, J_A / J_A_scale, sigma, length)
-
-
-def _ratio(small: np.ndarray, large: np.ndarray) -> np.ndarray:
+def ratio(small: np.ndarray, large: np.ndarray) -> np.ndarray:
+    """small / large; 0 where both vanish."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where(large > 0, small / large, np.where(np.isnan(large), np.nan, 0.0))
+        found = small / large
+    found[large == 0] = 0.0
+    return found

@@ -1,1 +1,87 @@
-"""What can be asked: each question once, as expressions over chains as lanes."""
+"""What can be asked: each question once, as expressions over chains as lanes.
+
+A question is a function of a mechanism's structure that returns the graph of its answer; a new one
+is a file that registers its name.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from ..graph.program import Program, Variants
+from .closure import Prescribed, closure, conditions
+from .configuration import configuration
+from .encoders import encoders
+from .inverse import inverse, motion, system
+from .matrices import jacobians, matrices
+from .reactions import reactions
+from .structure import Structure
+
+QUESTIONS: dict[str, Callable[..., Program | Variants]] = {
+    "inverse": inverse,
+    "motion": motion,
+    "system": system,
+    "closure": closure,
+    "conditions": conditions,
+    "configuration": configuration,
+    "encoders": encoders,
+    "matrices": matrices,
+    "jacobians": jacobians,
+    "reactions": reactions,
+}
+# What shapes a graph: the rooms that a question is written in.
+SOURCES = ("mechanism", "kinematics", "dynamics", "graph", "questions")
+# Questions that formulation and route make no difference to.
+GEOMETRY = ("motion", "closure", "conditions", "configuration", "encoders", "jacobians", "reactions")
+
+
+@dataclass(frozen=True)
+class Question:
+    """A question about a structure, not yet written out.
+
+    details: what it takes besides, such as the outputs that are wanted.
+    """
+
+    name: str
+    structure: Structure
+    details: tuple[Any, ...] = ()
+
+    @staticmethod
+    def about(structure: Structure, name: str, *details: Any) -> Question:
+        if name in GEOMETRY:
+            structure = replace(structure, formulation="virtual_power", route="core")
+        return Question(name, structure, details)
+
+    @property
+    def key(self) -> str:
+        """A text of everything that shapes the answer's graph."""
+        s = self.structure
+        told = replace(s, zeros=frozenset()), sorted(s.zeros)
+        return repr((self.name, told, self.details, version("casadi"), _sources()))
+
+    def variants(self) -> Variants:
+        """The graph."""
+        found = QUESTIONS[self.name](self.structure, *self.details)
+        return found if isinstance(found, Variants) else Variants(found)
+
+
+@lru_cache(maxsize=1)
+def _sources() -> str:
+    """A hash of the code that questions are written in."""
+    h = hashlib.sha256()
+    for room in SOURCES:
+        for path in sorted(Path(str(files("condyle") / room)).rglob("*.py")):
+            data = path.read_bytes()
+            h.update(f"{path.name} {len(data)} ".encode())
+            h.update(data)
+    return h.hexdigest()
+
+
+__all__ = ["QUESTIONS", "Prescribed", "Question"]

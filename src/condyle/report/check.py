@@ -12,7 +12,7 @@ from ..kinematics.chain import FAMILIES
 from ..kinematics.singularity import KINDS
 from ..mechanism.home import home_residuals
 from ..mechanism.mechanism import Mechanism
-from ..model import Model
+from ..model.evaluator import Evaluator
 
 
 @dataclass(frozen=True)
@@ -67,9 +67,8 @@ def _count(items: Sized, word: str) -> str:
 
 def describe(mechanism: Mechanism) -> Description:
     """Describe a mechanism at home."""
-    model = Model(mechanism)
-    posture = model.posture(np.zeros((1, 6)))
-    s = posture.singularity
+    model = Evaluator(mechanism, backend="numpy")  # one pose: building a kernel takes longer
+    s = model.configuration(np.zeros((1, 6))).singularity
     m = mechanism.degrees_of_freedom
     return Description(
         {

@@ -11,7 +11,7 @@ from ..errors import UnreachableError
 from ..kinematics.chain import FAMILIES
 from ..kinematics.forward import ForwardKinematics
 from ..mechanism.mechanism import COORDINATES, Mechanism
-from ..model import check_home
+from ..model.evaluator import check_home
 from ..motion import read_table, write_table
 from ..progress import step
 

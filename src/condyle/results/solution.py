@@ -18,12 +18,13 @@ from ..kinematics.singularity import KINDS, NEAR
 from ..mechanism.files import recall, record
 from ..mechanism.home import home_warnings
 from ..mechanism.mechanism import COORDINATES, Mechanism
-from ..model import STATUS_NAMES
+from ..model.data import Evaluation
+from ..model.evaluator import Evaluator
+from ..motion import Load, Motion, write_table
 from ..progress import step
+from ..status import STATUS_NAMES
 
 if TYPE_CHECKING:
-    from ..model import Evaluation, Model
-    from ..motion import Load, Motion
     from ..report.figures import SolutionPlots
 
 AXES = ("x", "y", "z")
@@ -64,15 +65,13 @@ class Solution(xr.Dataset):
 
     @property
     def plot(self) -> SolutionPlots:  # type: ignore[override]
-        """Figures: `solution.plot.torque()` and friends; xarray's own are there too."""
+        """Figures: `solution.ploe.effort()` and friends; xarray's own are there too."""
         from ..report.figures import SolutionPlots
 
         return SolutionPlots(self)
 
     def save(self, *paths: str | Path) -> None:
         """Write as NetCDF (.nc) or CSV (.csv): every file whole, or none of them."""
-        from ..motion import write_table
-
         with step("writing results"), ExitStack() as stack:
             for path in paths:
                 suffix = Path(path).suffix.lower()
@@ -141,7 +140,7 @@ def open_solution(path: str | Path) -> Solution:
 
 
 def assemble(
-    model: Model,
+    model: Evaluator,
     motion: Motion,
     load: Load,
     wrench: np.ndarray,
@@ -152,8 +151,7 @@ def assemble(
 ) -> Solution:
     """The labelled dataset of an evaluation along a motion."""
     mechanism = model.mechanism
-    e, t, p = evaluation.poses, evaluation.torques, evaluation.posture
-    assert t.contact_force is not None
+    e, p = evaluation, evaluation.configuration
     ok = evaluation.status == 0
     efforts = [FAMILIES[chain.kind].effort_unit for chain in mechanism.chains]
     joints = [FAMILIES[chain.kind].joint_unit for chain in mechanism.chains]
@@ -168,23 +166,23 @@ def assemble(
     by_chain, by_pose = ("time", "chain"), ("time", "coordinate")
     variables = {
         "pose": variable(by_pose, e.pose, POSE_UNITS, "pose of the platform X_EE"),
-        "pose_rate": variable(by_pose, e.rate, per_second(POSE_UNITS, 1), "rate of X_EE"),
+        "pose_rate": variable(by_pose, e.pose_rate, per_second(POSE_UNITS, 1), "rate of X_EE"),
         "pose_acceleration": variable(
-            by_pose, e.acceleration, per_second(POSE_UNITS, 2), "acceleration of X_EE"
+            by_pose, e.pose_acceleration, per_second(POSE_UNITS, 2), "acceleration of X_EE"
         ),
-        "torque": variable(by_chain, t.torque, effort, "actuator effort of least norm"),
+        "torque": variable(by_chain, e.effort, effort, "actuator effort of least norm"),
         "share": variable(
-            ("part", "time", "chain"), t.share, effort, "part of the effort each part needs"
+            ("part", "time", "chain"), e.share, effort, "part of the effort each part needs"
         ),
         "contact_force": variable(
             ("time", "contact"),
-            t.contact_force,
+            e.contact_force,
             "N",
             "contact force on the platform along the unit normal of the surface",
         ),
         "lift_off": (
             ("time", "contact"),
-            lift_off(mechanism, t.contact_force) & ok[:, None],
+            lift_off(mechanism, e.contact_force) & ok[:, None],
             LIFT_OFF,
         ),
         "contact_point": variable(
@@ -203,9 +201,9 @@ def assemble(
             "distance of the contact point to its nearest bound; negative outside",
         ),
         "joint": variable(by_chain, p.joint, joint, "joint coordinate, zero at home"),
-        "joint_rate": variable(by_chain, t.rate, per_second(joint, 1), "joint rate"),
+        "joint_rate": variable(by_chain, e.joint_rate, per_second(joint, 1), "joint rate"),
         "joint_acceleration": variable(
-            by_chain, t.acceleration, per_second(joint, 2), "joint acceleration"
+            by_chain, e.joint_acceleration, per_second(joint, 2), "joint acceleration"
         ),
         "rod_beta": variable(by_chain, p.beta, "rad", "rod angle beta_i"),
         "rod_gamma": variable(by_chain, p.gamma, "rad", "rod angle gamma_i"),

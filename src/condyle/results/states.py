@@ -8,8 +8,11 @@ import numpy as np
 
 from ..errors import BoundsError, InputError
 from ..mechanism.mechanism import COORDINATES
-from ..model import STATUS_NAMES, Model, with_point
+from ..model.evaluator import Evaluator, with_point
+from ..model.judge import require_ok
+from ..model.reactions import reactions as joint_reactions
 from ..motion import Table, TableWriter, iter_table
+from ..status import STATUS_NAMES
 from .solution import (
     AXES,
     BOUND_TOLERANCE,
@@ -24,7 +27,7 @@ CHUNK_ROWS = 65536
 
 
 def solve_file(
-    model: Model,
+    model: Evaluator,
     states: str | Path,
     out: str | Path,
     load_point: str | None = None,
@@ -82,7 +85,7 @@ def solve_file(
 
 
 def solve_table(
-    model: Model,
+    model: Evaluator,
     table: Table,
     load_point: str | None,
     flag: bool,
@@ -104,35 +107,31 @@ def solve_table(
     evaluation = model.evaluate(q, q1, q2, with_point(wrench, point), threads)
     ok = evaluation.status == 0
     if not flag and not ok.all():
-        model.require_ok(evaluation, row_offset=first_row)
+        require_ok(model.mechanism, evaluation, row_offset=first_row)
     mechanism = model.mechanism
     values = {
-        "tau_": (mechanism.chain_names, evaluation.torques.torque),
-        "contact_": (mechanism.contact_names, evaluation.torques.contact_force),
-        "": (COORDINATES, evaluation.poses.pose),
-        "joint_": (mechanism.chain_names, evaluation.posture.joint),
+        "tau_": (mechanism.chain_names, evaluation.effort),
+        "contact_": (mechanism.contact_names, evaluation.contact_force),
+        "": (COORDINATES, evaluation.pose),
+        "joint_": (mechanism.chain_names, evaluation.configuration.joint),
     }
     columns: dict[str, np.ndarray | list[str]] = {}
     for prefix, (labels, array) in values.items():
-        assert array is not None
         columns |= named_columns(prefix, labels, np.where(ok[:, None], array, np.nan))
     if reactions:
-        from ..dynamics.reactions import reactions as joint_reactions
-
         for name, reaction in joint_reactions(model, evaluation).items():
             array = np.where(ok[:, None], reaction.array, np.nan)
             columns |= {f"reaction_{name}_{axis}": array[:, i] for i, axis in enumerate(AXES)}
-    force = evaluation.torques.contact_force
-    assert force is not None
+    force = evaluation.contact_force
     lifted = lift_off(mechanism, force) & ok[:, None]
     columns |= lift_off_columns(mechanism, lifted)
     if flag:
         columns["status"] = [STATUS_NAMES[i] for i in evaluation.status]
-    margins = bound_margins(mechanism, evaluation.posture.contact_point)
+    margins = bound_margins(mechanism, evaluation.configuration.contact_point)
     return columns, np.where(ok[:, None], margins, np.inf), lifted
 
 
-def state_coordinates(model: Model, table: Table) -> list[str]:
+def state_coordinates(model: Evaluator, table: Table) -> list[str]:
     """The pose coordinates that a states file gives."""
     names = [name for name in COORDINATES if name in table.columns]
     m = model.mechanism.degrees_of_freedom

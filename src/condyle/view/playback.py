@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..kinematics.singularity import KINDS
-from ..model import STATUS_NAMES
 from ..report.scene import place
 from ..results.solution import Solution
+from ..status import STATUS_NAMES
 from .session import force_vectors, state_messages
 from .snapshot import Level, Snapshot
 

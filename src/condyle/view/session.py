@@ -13,9 +13,12 @@ from ..errors import InputError, did_you_mean
 from ..kinematics.contact import indices
 from ..kinematics.singularity import KINDS, NEAR
 from ..mechanism import COORDINATES, Mechanism
-from ..model import DEFAULT_LOAD_POINT, OK, UNREACHABLE, Evaluation, Model
+from ..model.data import Evaluation
+from ..model.evaluator import DEFAULT_LOAD_POINT, Evaluator
+from ..model.judge import unreachable_cause
 from ..report.scene import contact_normals, place
 from ..results.solution import BOUND_TOLERANCE, bound_margins, lift_off
+from ..status import Status
 from .snapshot import Level, Snapshot
 
 CENTRE = "mass centre"  # where the load acts besides the platform's points
@@ -48,7 +51,7 @@ class Session:
         """Raises: MechanismError: if the contacts do not hold the platform at home."""
         self.mechanism = mechanism
         # One pose at a time: a compiled kernel would take longer to build than it saves.
-        self.model = Model(mechanism, backend="interpreted")
+        self.model = Evaluator(mechanism, backend="numpy")
         self.q = np.zeros(len(self.model.independent))
         self.load = np.zeros(3)
         points = mechanism.platform.points
@@ -70,7 +73,7 @@ class Session:
             value = np.linspace(-span, span, SCAN)
             q = np.zeros((SCAN, len(self.q)))
             q[:, i] = value
-            reached = self._evaluate(q).status == OK
+            reached = self._evaluate(q).status == Status.OK
             low, high = _around_home(value, reached)
             unit, scale = ("°", 180 / np.pi) if angle else ("mm", 1e3)
             found.append(Coordinate(name, BEYOND * low, BEYOND * high, unit, scale))
@@ -108,7 +111,7 @@ class Session:
         q = self.q.copy()
         for _ in range(STEPS):
             around = np.vstack([q, q + NUDGE * np.eye(len(q))])
-            pose = self._evaluate(around).poses.pose
+            pose = self._evaluate(around).pose
             J = scale[:, None] * (pose[1:] - pose[0]).T / NUDGE
             away = scale * (wanted - pose[0])
             if not np.isfinite(J).all():
@@ -124,12 +127,12 @@ class Session:
         """The mechanism at `q` under `load`."""
         found = self._evaluate(self.q[None])
         status = int(found.status[0])
-        pose = found.poses.pose[0]
+        pose = found.pose[0]
         met = bool(np.isfinite(pose).all())
         wanted = None if met else self._wanted()
         if met:
             self._pose = pose
-        joint, reach = found.posture.joint[0], found.posture.reach[0]
+        joint, reach = found.configuration.joint[0], found.configuration.discriminant[0]
         in_reach = reach >= 0
         broken = [
             n for n, fine in zip(self.mechanism.chain_names, in_reach, strict=True) if not fine
@@ -137,11 +140,11 @@ class Session:
         if met:
             self._joint = np.where(in_reach, joint, self._joint)
         scene = place(self.mechanism, self._pose[None], self._joint[None])
-        force = _or_nan(found.torques.contact_force, len(self.mechanism.contacts), status == OK)
-        measures = found.posture.singularity
+        force = _or_nan(found.contact_force, len(self.mechanism.contacts), status == Status.OK)
+        measures = found.configuration.singularity
         ratio = float(measures.ratio[0])
         near = KINDS[int(measures.kind()[0])] if np.isfinite(ratio) else KINDS[0]
-        margin = bound_margins(self.mechanism, found.posture.contact_point)[0]
+        margin = bound_margins(self.mechanism, found.configuration.contact_point)[0]
         level, messages = self._messages(found, met, broken, margin, force, near)
         return Snapshot(
             mechanism=self.mechanism,
@@ -151,7 +154,7 @@ class Session:
             broken=tuple(broken) if met else (),
             joint=np.where(in_reach, joint, np.nan),
             rate=None,
-            torque=_or_nan(found.torques.torque, len(in_reach), status == OK),
+            torque=_or_nan(found.effort, len(in_reach), status == Status.OK),
             reach=reach,
             contact_force=force,
             force_vector=force_vectors(self.mechanism, scene.contacts, force),
@@ -189,18 +192,18 @@ class Session:
         near: str,
     ) -> tuple[Level, tuple[str, ...]]:
         status = int(found.status[0])
-        if status == UNREACHABLE:
-            cause = self.model.unreachable_cause(found, 0)
+        if status == Status.UNREACHABLE:
+            cause = unreachable_cause(self.mechanism, found, 0)
             messages = [f"Out of reach: {cause}"]
             others = [name for name in broken if f'"{name}"' not in cause]
             if met and others:
                 messages.append(f"Also out of reach: {', '.join(others)}")
             return "unreachable", (*messages, *bound_messages(self.mechanism, margin))
         messages = []
-        if status != OK:
+        if status != Status.OK:
             messages.append("Singular: the efforts are not determined here")
-        messages += state_messages(self.mechanism, margin, force, found.torques.torque[0], None)
-        if near != KINDS[0] and status == OK:
+        messages += state_messages(self.mechanism, margin, force, found.effort[0], None)
+        if near != KINDS[0] and status == Status.OK:
             messages.append(f"Near a singularity of the kind {near} (ratio below {NEAR:g})")
         return ("warning" if messages else "calm"), tuple(messages)
 

@@ -1,56 +1,97 @@
-/* What a kernel exports. The quick torques come from normal equations; a sample for which those
- * lose digits is done again, carefully. */
+/* What a kernel exports. A sample that the quick code cannot vouch for is done again, robustly. */
 
 void prepare(const double *par, const double *const *lane, double *table) {
-    prepare_quick(par, lane, table + QUICK_TABLE);
     prepare_step(par, lane, table + STEP_TABLE);
-#if CAREFUL
-    prepare_careful(par, lane, table + CAREFUL_TABLE);
+#if SINGLE
+    prepare_quick(par, lane, table + QUICK_TABLE);
+#endif
+#if ROBUST
+    prepare_robust(par, lane, table + ROBUST_TABLE);
 #endif
 }
 
-void one(const double *restrict table, const double *restrict in, double *restrict out) {
+/* The status that a sample's checks give: 0, that of the first that fails for sure, or AGAIN. */
+static int judged(const double *check) {
+    int status = 0;
+    for (int i = 0; i < CHECKS; i++) {
+        if (check[i] >= tolerance[i]) continue;
+        int own = check[i] < 0 ? below[i] : AGAIN;
+        if (status == 0 || (status == AGAIN && own != AGAIN)) status = own;
+    }
+    return status;
+}
+
+#if SINGLE
+/* One sample: INPUTS numbers, of which W more may be read; OUTPUTS + CHECKS numbers are written. */
+int one(const double *restrict table, const double *restrict in, double *restrict out) {
     quick(table + QUICK_TABLE, in, out);
-#if CAREFUL
-    if (__builtin_expect(!(out[QUALITY] >= 0), 0)) careful(table + CAREFUL_TABLE, in, out);
+    int status = judged(out + OUTPUTS);
+#if ROBUST
+    if (__builtin_expect(status == AGAIN, 0)) {
+        robust(table + ROBUST_TABLE, in, out);
+        status = judged(out + OUTPUTS);
+    }
 #endif
+    return status;
 }
+#endif
 
-/* Blocks of W samples, read from columns of any stride, written to columns.
+/* Blocks of W samples, read from columns of any strides, written to columns.
  *
- * in:     INPUTS columns with a common stride between samples.
+ * in:     INPUTS columns;  stride: between the samples of each, in doubles, 0 for a constant.
  * out:    OUTPUTS columns of doubles, `columns` apart.
- * status: 0 ok, 1 unreachable, 2 to be looked at again (near a singularity). */
-void batch(const double *restrict table, const double *const *in, ptrdiff_t stride, size_t count,
-           double *restrict out, size_t columns, uint8_t *restrict status) {
-    double packed[INPUTS][W];
-    const double *here[INPUTS];
-    vec result[OUTPUTS];
+ * status: of the checks, or AGAIN. */
+void batch(const double *restrict table, const double *const *in, const ptrdiff_t *stride,
+           size_t count, double *restrict out, size_t columns, uint8_t *restrict status) {
+    double packed[INPUTS + 1][W];
+    const double *here[INPUTS + 1];
+    vec result[OUTPUTS + CHECKS + 1];
+    int dense = 1;
+    for (int k = 0; k < INPUTS; k++) {
+        dense &= stride[k] == 1;
+        if (stride[k] == 0 && count > 0)
+            for (int i = 0; i < W; i++) packed[k][i] = in[k][0];
+    }
     for (size_t start = 0; start < count; start += W) {
         size_t some = count - start < W ? count - start : W;
         size_t at = start;
         const double *const *from = in;
-        if (stride != 1 || some < W) {
+        if (!dense || some < W) {
             for (int k = 0; k < INPUTS; k++) {
+                here[k] = packed[k];
+                if (stride[k] == 0) continue;
+                if (stride[k] == 1 && some == W) {
+                    here[k] = in[k] + start;
+                    continue;
+                }
                 for (size_t i = 0; i < W; i++) {
                     size_t sample = start + (i < some ? i : some - 1);
-                    packed[k][i] = in[k][(ptrdiff_t)sample * stride];
+                    packed[k][i] = in[k][(ptrdiff_t)sample * stride[k]];
                 }
-                here[k] = packed[k];
             }
             from = here, at = 0;
         }
         step(table + STEP_TABLE, from, at, result);
-#if CAREFUL
-        if (__builtin_expect(any(~(result[QUALITY] >= 0)), 0))
+        mask doubt = (mask){};
+        for (int i = 0; i < CHECKS; i++) doubt |= ~(result[OUTPUTS + i] >= tolerance[i]);
+        for (size_t i = 0; i < some; i++) status[start + i] = 0;
+        if (__builtin_expect(any(doubt), 0))
             for (size_t i = 0; i < some; i++) {
-                double sample[INPUTS], again[OUTPUTS];
-                if (result[QUALITY][i] >= 0) continue;
-                for (int k = 0; k < INPUTS; k++) sample[k] = from[k][at + i];
-                careful(table + CAREFUL_TABLE, sample, again);
-                for (int k = 0; k < OUTPUTS; k++) result[k][i] = again[k];
-            }
+                double check[CHECKS + 1];
+                if (!doubt[i]) continue;
+                for (int k = 0; k < CHECKS; k++) check[k] = result[OUTPUTS + k][i];
+                status[start + i] = judged(check);
+#if ROBUST
+                if (status[start + i] == AGAIN) {
+                    double sample[INPUTS + W], again[OUTPUTS + CHECKS];
+                    for (int k = 0; k < INPUTS; k++) sample[k] = from[k][at + i];
+                    for (int k = 0; k < W; k++) sample[INPUTS + k] = 0;
+                    robust(table + ROBUST_TABLE, sample, again);
+                    for (int k = 0; k < OUTPUTS; k++) result[k][i] = again[k];
+                    status[start + i] = judged(again + OUTPUTS);
+                }
 #endif
+            }
         if (some == W) {
             for (int k = 0; k < OUTPUTS; k++)
                 store(out + (size_t)k * columns + start, result[k]);
@@ -58,10 +99,6 @@ void batch(const double *restrict table, const double *const *in, ptrdiff_t stri
             for (int k = 0; k < OUTPUTS; k++)
                 for (size_t i = 0; i < some; i++)
                     out[(size_t)k * columns + start + i] = result[k][i];
-        }
-        for (size_t i = 0; i < some; i++) {
-            double margin = result[MARGIN][i], quality = result[QUALITY][i];
-            status[start + i] = margin < 0 ? 1 : margin >= NEAR && quality >= NEAR ? 0 : 2;
         }
     }
 }

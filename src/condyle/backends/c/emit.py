@@ -1,10 +1,10 @@
-"""A program as C: one evaluation with chains in the lanes, and a batch with samples in them.
+"""A program as C: one evaluation with lanes in the registers, and a batch with samples in them.
 
     prepare(numbers, table)          what does not change from sample to sample, once
     one(table, in, out)              least latency: shared values scalar, lane values vectors
-    batch(table, in, stride, ...)    most throughput: all values vectors over W samples
+    batch(table, in, strides, ...)   most throughput: all values vectors over W samples
 
-Both shapes are printed from the same graph: `straight` for one evaluation, `loops` for a batch.
+All shapes are printed from the same graph: `straight` for one evaluation, `loops` for a batch.
 """
 
 from __future__ import annotations
@@ -13,60 +13,65 @@ from dataclasses import dataclass
 from importlib.resources import files
 
 from ...graph.fuse import fuse
-from ...questions.program import Output, Program, build, folds
-from ...questions.spec import KernelSpec
+from ...graph.program import Interface, Program, Variants
+from ..kernel import AGAIN
 from .loops import Loops
 from .prepare import prepare
 from .straight import Straight
 
-CHAIN = 5
-NEAR = 1e-14  # margin or quality below which a sample is looked at again by the interpreter
+CHAIN = 5  # terms above which a sum becomes two that run side by side
 
 
 @dataclass(frozen=True)
 class Source:
     """Generated C and what a caller must know of it.
 
-    outputs:    names and sizes, in the order in which `one` and `batch` write them.
     table_size: numbers that `prepare` computes.
+    checks:     numbers that `one` writes after the results.
     operations: vector operations of one batch step; a fused multiply-add counts one.
     """
 
     text: str
-    outputs: list[tuple[str, int]]
+    interface: Interface
     table_size: int
+    checks: int
     operations: int
 
 
-def emit(spec: KernelSpec, width: int) -> Source:
+def emit(variants: Variants, width: int) -> Source:
     """The kernel's C for `width` lanes."""
-    program = fused(build(spec))
-    one = fused(build(spec, early=True)) if folds(spec) else program
-    quick, batch = Straight(one, width), Loops(program, width)
-    functions: dict[str, Straight | Loops] = {"quick": quick, "step": batch}
-    if spec.n > spec.m:
-        functions["careful"] = Straight(fused(build(spec, careful=True)), width)
-    outputs: dict[str, int] = {}
-    for o in program.outputs:
-        outputs[o.name] = outputs.get(o.name, 0) + (spec.n if o.lane else 1)
-    names = [name for name, count in outputs.items() for _ in range(count)]
+    main = fused(variants.main)
+    batch = Loops(main, width)
+    functions: dict[str, Straight | Loops] = {"step": batch}
+    if variants.single:
+        one = main if variants.latency is None else fused(variants.latency)
+        functions["quick"] = Straight(one, width)
+    if variants.robust is not None:
+        functions["robust"] = Straight(fused(variants.robust), width)
+    face, checks = main.interface, main.checks
     macros = {
         "W": width,
-        "INPUTS": len(program.layout.inputs),
-        "OUTPUTS": len(names),
-        "MARGIN": names.index("margin"),
-        "QUALITY": names.index("quality"),
-        "NEAR": NEAR,
-        "CAREFUL": int("careful" in functions),
+        "INPUTS": face.columns,
+        "OUTPUTS": sum(face.width(r) for r in face.results),
+        "CHECKS": len(checks),
+        "AGAIN": AGAIN,
+        "ROBUST": int("robust" in functions),
+        "SINGLE": int(variants.single),
     }
     size, code = 0, []
     for name, printer in functions.items():
         macros[f"{name.upper()}_TABLE"] = size
         size += -(-printer.table_size // width) * width
         code += [prepare(printer, f"prepare_{name}"), printer.function(name)]
+    below = ", ".join(str(AGAIN if c.below is None else int(c.below)) for c in checks)
+    tolerances = ", ".join(repr(c.tolerance) for c in checks)
+    judged = [
+        f"static const double tolerance[CHECKS + 1] = {{{tolerances}}};",
+        f"static const int below[CHECKS + 1] = {{{below}}};",
+    ]
     defines = [f"#define {name} {value}" for name, value in macros.items()]
-    text = "\n".join([*defines, _text("vector.h"), *code, _text("driver.h")])
-    return Source(text, list(outputs.items()), size, batch.operations())
+    text = "\n".join([*defines, _text("vector.h"), *judged, *code, _text("driver.h")])
+    return Source(text, face, size, len(checks), batch.operations())
 
 
 def _text(name: str) -> str:
@@ -75,8 +80,5 @@ def _text(name: str) -> str:
 
 def fused(program: Program) -> Program:
     """The program with its sums as fused multiply-adds."""
-    roots = [v for output in program.outputs for v in output.nodes]
-    graph, moved = fuse(program.graph, roots, CHAIN)
-    renamed = dict(zip(roots, moved, strict=True))
-    outputs = [Output(o.name, o.lane, tuple(renamed[v] for v in o.nodes)) for o in program.outputs]
-    return Program(program.spec, program.layout, graph, outputs)
+    graph, moved = fuse(program.graph, program.roots, CHAIN)
+    return program.moved(graph, dict(zip(program.roots, moved, strict=True)))

@@ -11,8 +11,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import groupby
 
-from ...graph.graph import REDUCTIONS, Value
-from ...questions.program import Program
+from ...graph.graph import Value
+from ...graph.operations import REDUCTIONS
+from ...graph.program import Program
 from .printer import Printer, fold
 
 ABREAST = 2  # chains whose statements alternate, to keep both arithmetic ports busy
@@ -28,13 +29,13 @@ class Loops(Printer):
     shared = "vec"
 
     def __init__(self, program: Program, width: int) -> None:
-        super().__init__(program, width, [count for _, count in program.spec.chains], 1)
+        super().__init__(program, width, list(program.counts), 1)
         self.uses: dict[Value, list[Value]] = {v: [] for v in self.varying}
         for v in self.varying:
             for a in self.g.nodes[v].args:
                 if a in self.uses:
                     self.uses[a].append(v)
-        self.wanted = {v for o in program.outputs for v in o.nodes}
+        self.wanted = set(program.roots)
         self.absorbed = self._absorbed()
         ordered = sorted(self.varying, key=lambda v: self._rank(self._part(v)))
         self.parts = [(part, list(values)) for part, values in groupby(ordered, self._part)]
@@ -179,11 +180,18 @@ class Loops(Printer):
     def _outputs(self) -> Iterator[str]:
         slot = 0
         for o in self.program.outputs:
-            for group, v in enumerate(o.nodes):
-                for c in range(self.counts[group] if o.lane else 1):
-                    name = self.name(v, c)
-                    yield f"  out[{slot}] = {f'spread({name})' if self.is_scalar(v) else name};"
-                    slot += 1
+            for entry in o.entries:
+                for group, v in enumerate(entry):
+                    for c in range(0 if v is None else self.counts[group] if o.lanes else 1):
+                        yield self._stored(slot, v, c)
+                        slot += 1
+        for i, check in enumerate(self.program.checks):
+            yield self._stored(slot + i, check.value, 0)
+
+    def _stored(self, slot: int, v: Value | None, copy: int) -> str:
+        assert v is not None
+        name = self.name(v, copy)
+        return f"  out[{slot}] = {f'spread({name})' if self.is_scalar(v) else name};"
 
     # -- names -----------------------------------------------------------------------------
 
@@ -197,6 +205,9 @@ class Loops(Printer):
 
     def sample(self, i: object) -> str:
         return f"load(in[{i}] + at)"
+
+    def lane_sample(self, first: object, copy: int) -> str:
+        return f"load(in[{first} + {self.lane(copy)}] + at)"
 
     def reduction(self, v: Value) -> str:
         shared = [self.repeated(v, t, count) for count, t in self.shared_terms(v)]

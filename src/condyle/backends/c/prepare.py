@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from ...graph.graph import REDUCTIONS, Value
+from ...graph.graph import Value
+from ...graph.operations import REDUCTIONS
 from .printer import INFIX, Printer, arithmetic, fold, number
 
 

@@ -7,10 +7,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from ...graph.graph import REDUCTIONS, Value, reachable
-from ...questions.program import Program
+from ...graph.graph import Value
+from ...graph.operations import OPERATIONS, REDUCTIONS
+from ...graph.program import Program
 
-INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
+INFIX = {name: op.infix for name, op in OPERATIONS.items() if op.infix}
 
 
 @dataclass
@@ -21,13 +22,13 @@ class Table:
     lanes: list[dict[Value, int]] = field(default_factory=list)
 
     @staticmethod
-    def of(program: Program, order: list[Value]) -> Table:
+    def of(program: Program) -> Table:
         """Fixed values that varying ones (or outputs) use."""
         g = program.graph
-        table = Table(lanes=[{} for _ in program.spec.chains])
-        used = {a for v in order if g.nodes[v].varies for a in g.nodes[v].args}
-        used |= {v for o in program.outputs for v in o.nodes}
-        for v in order:
+        table = Table(lanes=[{} for _ in program.counts])
+        used = {a for v in program.order if g.nodes[v].varies for a in g.nodes[v].args}
+        used |= set(program.roots)
+        for v in program.order:
             node = g.nodes[v]
             if node.varies or v not in used or node.op == "const":
                 continue
@@ -47,15 +48,13 @@ class Printer(ABC):
     shared: ClassVar[str]
 
     def __init__(self, program: Program, width: int, copies: list[int], stride: int) -> None:
-        roots = [v for output in program.outputs for v in output.nodes]
-        order = reachable(program.graph, roots)
         self.program, self.g = program, program.graph
         self.width, self.copies, self.stride = width, copies, stride
-        self.counts = [count for _, count in program.spec.chains]
+        self.counts = program.counts
         self.padded = padded_counts(program, width)
-        self.varying = [v for v in order if self.g.nodes[v].varies]
-        self.fixed = [v for v in order if not self.g.nodes[v].varies]
-        self.table = Table.of(program, order)
+        self.varying = [v for v in program.order if self.g.nodes[v].varies]
+        self.fixed = [v for v in program.order if not self.g.nodes[v].varies]
+        self.table = Table.of(program)
         self.starts = []
         start = len(self.table.shared)
         for lanes, padded in zip(self.table.lanes, self.padded, strict=True):
@@ -117,6 +116,8 @@ class Printer(ABC):
         node = self.g.nodes[v]
         if node.op == "input":
             return self.sample(node.data[0])
+        if node.op == "lane_input":
+            return self.lane_sample(node.data[1], copy)
         if node.op in REDUCTIONS:
             return self.reduction(v)
         if node.op == "div" and self._is_inverse_root(v):
@@ -139,6 +140,10 @@ class Printer(ABC):
     @abstractmethod
     def sample(self, i: object) -> str:
         """A sample's input."""
+
+    @abstractmethod
+    def lane_sample(self, first: object, copy: int) -> str:
+        """A sample's input of some lanes, which stand from column `first` on."""
 
     @abstractmethod
     def reduction(self, v: Value) -> str:
@@ -175,7 +180,7 @@ class Printer(ABC):
 
 def padded_counts(program: Program, width: int) -> list[int]:
     """Chains of each group, filled up to whole vectors."""
-    return [-(-count // width) * width for _, count in program.spec.chains]
+    return [-(-count // width) * width for count in program.counts]
 
 
 def fold(function: str, terms: list[str]) -> str:

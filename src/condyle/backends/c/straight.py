@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from ...graph.graph import Value
 from ...graph.schedule import ready_times, scheduled
-from ...questions.program import Program
+from ...graph.program import Program
 from .printer import Printer, fold, padded_counts
 
 NEAR = 12  # cycles between sums that are worth waiting for
@@ -80,17 +80,25 @@ class Straight(Printer):
             return " + ".join([f"lanes_sum({' + '.join(lanes)})", *shared])
         return fold("fmin_s", [f"lanes_least({fold('fmin_v', lanes)})", *shared])
 
+    def lane_sample(self, first: object, copy: int) -> str:
+        return f"load(in + {first} + {copy * self.width})"
+
     def outputs(self) -> Iterator[str]:
         slot = 0
         for o in self.program.outputs:
-            if not o.lane:
-                yield f"  out[{slot}] = {self.name(o.nodes[0], 0)};"
-                slot += 1
-                continue
-            for group, v in enumerate(o.nodes):
-                for c in range(self.copies[group]):
-                    yield from self._stored(slot + c * self.width, v, group, c)
-                slot += self.counts[group]
+            for entry in o.entries:
+                for group, v in enumerate(entry):
+                    if v is None:
+                        continue
+                    if not o.lanes:
+                        yield f"  out[{slot}] = {self.name(v, 0)};"
+                        slot += 1
+                        continue
+                    for c in range(self.copies[group]):
+                        yield from self._stored(slot + c * self.width, v, group, c)
+                    slot += self.counts[group]
+        for i, check in enumerate(self.program.checks):
+            yield f"  out[{slot + i}] = {self.name(check.value, 0)};"
 
     def _stored(self, at: int, v: Value, group: int, copy: int) -> Iterator[str]:
         used = min(self.width, self.counts[group] - copy * self.width)

@@ -1,0 +1,57 @@
+"""Which backend runs a question: compiled where there is a compiler, else numpy."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+
+from ..errors import InputError, did_you_mean
+from ..graph.program import Numbers, Variants
+from .c.kernel import CompiledKernel
+from .compiler import REMEDY, CompilerError, find_compiler
+from .kernel import Kernel
+from .notice import notice
+from .numpy import NumpyKernel
+
+BACKENDS = ("auto", "compiled", "numpy")
+ALIASES = {"interpreted": "numpy"}  # an older name
+
+
+class Backend:
+    """Makes kernels; `name` tells which it is: one that cannot build kernels turns to numpy."""
+
+    def __init__(self, name: str = "auto") -> None:
+        """`CONDYLE_BACKEND` decides what auto means, if it is set.
+
+        Raises: InputError:    for an unknown backend.
+                CompilerError: if compiled is asked for and there is no compiler.
+        """
+        chosen = os.environ.get("CONDYLE_BACKEND") or "auto" if name == "auto" else name
+        chosen = ALIASES.get(chosen, chosen)
+        if chosen not in BACKENDS:
+            raise InputError(f'no backend "{chosen}".{did_you_mean(chosen, BACKENDS)}')
+        self.required = chosen == "compiled"
+        self.name = "numpy" if chosen == "numpy" else "compiled"
+        if self.name == "compiled":
+            try:
+                find_compiler()
+            except CompilerError as error:
+                self._give_up(error)
+
+    def kernel(self, key: str, build: Callable[[], Variants], numbers: Numbers) -> Kernel:
+        """The question's kernel.
+
+        Raises: CompilerError: where it cannot be built and numpy was not to stand in.
+        """
+        if self.name == "compiled":
+            try:
+                return CompiledKernel(key, build, numbers)
+            except CompilerError as error:
+                self._give_up(error)
+        return NumpyKernel(build(), numbers)
+
+    def _give_up(self, error: CompilerError) -> None:
+        if self.required:
+            raise CompilerError(f"{error}. {REMEDY}") from None
+        self.name = "numpy"
+        notice(f"{error}; numpy gives the same numbers, slower", "compiler")

@@ -1,0 +1,85 @@
+"""What every backend makes of a program: a function of arrays of samples."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from ..errors import InputError
+from ..graph.program import Interface, Result
+
+OK, AGAIN = 0, 255  # statuses; others are those of the program's checks
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Results at N samples.
+
+    values: name -> (*shape, N), or (*shape, lanes, N), lanes in the callers' order.
+    status: (N,), 0, AGAIN or that of a check.
+    """
+
+    values: dict[str, np.ndarray]
+    status: np.ndarray
+
+
+class Kernel(Protocol):
+    """One mechanism's numbers in a program, ready to run."""
+
+    name: str
+    interface: Interface
+
+    def run(self, inputs: Mapping[str, np.ndarray], threads: int | None = None) -> Answer:
+        """Evaluate samples.
+
+        Args: inputs: port -> (N, size), (N, lanes) in the callers' order, or (N, size, lanes).
+              threads: at most so many; results do not depend on it.
+        """
+        ...
+
+
+def columns_of(
+    interface: Interface, inputs: Mapping[str, np.ndarray], order: tuple[int, ...]
+) -> tuple[int, list[np.ndarray]]:
+    """How many samples there are, and every input column, (N,) each, as views where possible.
+
+    Raises: InputError: for an array that does not fit its port.
+    """
+    count = None
+    columns: list[np.ndarray] = []
+    for port in interface.ports:
+        a = np.asarray(inputs[port.name], dtype=np.float64)
+        want = (port.size,)
+        if port.lanes:
+            want = (interface.lanes,) if port.size == 1 else (port.size, interface.lanes)
+        if a.shape[1:] != want:
+            shape = ", ".join(["N", *map(str, want)])
+            raise InputError(f"{port.name}: expected an array of shape ({shape}), got {a.shape}")
+        if count is not None and len(a) != count:
+            raise InputError(f"{port.name}: {len(a)} samples, where others have {count}")
+        count = len(a)
+        if not port.lanes:
+            columns += [a[:, i] for i in range(port.size)]
+            continue
+        for i in range(port.size):
+            rows = a if port.size == 1 else a[:, i]
+            columns += [rows[:, k] for k in order]
+    return count or 0, columns
+
+
+def arranged(
+    interface: Interface, result: Result, block: np.ndarray, order: tuple[int, ...]
+) -> np.ndarray:
+    """Columns of a result, (width, N), as its shape has it; lanes in the callers' order."""
+    count = block.shape[1]
+    if not result.lanes:
+        return block.reshape(*result.shape, count)
+    starts = np.cumsum([0, *interface.counts])
+    mine = [k for g in result.groups for k in order[starts[g] : starts[g + 1]]]
+    found = block.reshape(-1, len(mine), count)
+    if mine != sorted(mine):
+        found = found[:, np.argsort(mine)]
+    return found.reshape(*result.shape, len(mine), count)

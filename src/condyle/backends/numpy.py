@@ -1,0 +1,174 @@
+"""A program by numpy: node by node, lanes as a leading axis, samples in blocks.
+
+It needs no compiler, and is what the other backends are tested against.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from ..graph.graph import VARYING, Value
+from ..graph.operations import OPERATIONS, REDUCTIONS
+from ..graph.program import Numbers, Program, Variants
+from .kernel import AGAIN, OK, Answer, arranged, columns_of
+from .threads import workers
+
+BLOCK = 2048  # samples: few enough that what is alive stays in a cache
+
+
+class NumpyKernel:
+    """A program and its robust variant on one mechanism's numbers."""
+
+    name = "numpy"
+
+    def __init__(self, variants: Variants, numbers: Numbers) -> None:
+        self.interface = variants.main.interface
+        self._order = numbers.order
+        self._main = _Runner(variants.main, numbers)
+        self._robust = None if variants.robust is None else _Runner(variants.robust, numbers)
+
+    def run(self, inputs: Mapping[str, np.ndarray], threads: int | None = None) -> Answer:
+        workers(threads)
+        face = self.interface
+        count, columns = columns_of(face, inputs, self._order)
+        blocks = [np.empty((face.width(r), count)) for r in face.results]
+        status = np.empty(count, dtype=np.uint8)
+        with np.errstate(all="ignore"):
+            for start in range(0, count, BLOCK):
+                part = slice(start, min(start + BLOCK, count))
+                some = [column[part] for column in columns]
+                status[part] = self._main(some, [block[:, part] for block in blocks])
+                again = np.flatnonzero(status[part] == AGAIN) + start
+                if self._robust is not None and again.size:
+                    few = [np.empty((len(block), again.size)) for block in blocks]
+                    status[again] = self._robust([column[again] for column in columns], few)
+                    for block, better in zip(blocks, few, strict=True):
+                        block[:, again] = better
+        values = {
+            r.name: arranged(face, r, block, self._order)
+            for r, block in zip(face.results, blocks, strict=True)
+        }
+        return Answer(values, status)
+
+
+class _Runner:
+    """A program as a list of numpy calls into buffers; what does not vary is computed once."""
+
+    def __init__(self, program: Program, numbers: Numbers) -> None:
+        self._program = program
+        self._place: dict[Value, int] = {}
+        self._fixed: list[Any] = []  # the first places
+        varying = [v for v in program.order if program.graph.nodes[v].varies]
+        for v in program.order:
+            node = program.graph.nodes[v]
+            if not node.varies:
+                self._place[v] = len(self._fixed)
+                self._fixed.append(_number(node.op, node.data, numbers) if not node.args else None)
+                if node.args:
+                    given = [self._fixed[self._place[a]] for a in node.args]
+                    lanes = self._lanes(v)
+                    out = np.empty((lanes, 1) if lanes else ())
+                    with np.errstate(all="ignore"):
+                        self._call(v)(*given, out=out)
+                    self._fixed[-1] = out
+        self._buffers: list[int] = []  # lanes of the places after those
+        self._leaves: list[tuple[int, int]] = []  # place and column
+        self._steps: list[tuple[Callable[..., Any], tuple[int, ...], int]] = []
+        self._allocate(varying)
+
+    def _lanes(self, v: Value) -> int:
+        group = self._program.graph.nodes[v].group
+        return 0 if group is None else self._program.counts[group]
+
+    def _allocate(self, varying: list[Value]) -> None:
+        """A place for every value; what is not wanted any more leaves its own to others."""
+        nodes = self._program.graph.nodes
+        last = {a: v for v in varying for a in nodes[v].args}
+        wanted = set(self._program.roots)
+        free: dict[int, list[int]] = {}
+        for v in varying:
+            node, lanes = nodes[v], self._lanes(v)
+            places = free.setdefault(lanes, [])
+            if places and node.args:
+                place = places.pop()
+            else:
+                place = len(self._fixed) + len(self._buffers)
+                self._buffers.append(lanes)
+            self._place[v] = place
+            if node.op in VARYING:
+                self._leaves.append((place, int(node.data[-1])))  # type: ignore[call-overload]
+            else:
+                args = tuple(self._place[a] for a in node.args)
+                self._steps.append((self._call(v), args, place))
+            for a in set(node.args):
+                if nodes[a].varies and last[a] == v and a not in wanted:
+                    free.setdefault(self._lanes(a), []).append(self._place[a])
+
+    def _call(self, v: Value) -> Callable[..., Any]:
+        """What computes a value from those of its arguments, into `out`."""
+        node = self._program.graph.nodes[v]
+        if node.op not in REDUCTIONS:
+            return OPERATIONS[node.op].into
+        nodes, counts = self._program.graph.nodes, self._program.counts
+        lanes = [nodes[a].group is not None for a in node.args]
+        join = np.add if node.op == "sum" else np.minimum
+
+        def reduced(*terms: Any, out: np.ndarray) -> None:
+            for i, (term, own, count) in enumerate(zip(terms, lanes, counts, strict=True)):
+                if own:
+                    part = join.reduce(term, axis=0)
+                else:
+                    part = count * term if join is np.add else term
+                if i:
+                    join(out, part, out=out)
+                else:
+                    out[...] = part
+
+        return reduced
+
+    def __call__(self, columns: list[np.ndarray], blocks: list[np.ndarray]) -> np.ndarray:
+        """Fill blocks of results, (width, N) each; returns the statuses."""
+        count = len(columns[0]) if columns else 0
+        # Two samples at least: numpy adds the lanes of a single one in another order.
+        size = max(count, 2)
+        values = [*self._fixed, *(np.empty((n, size) if n else size) for n in self._buffers)]
+        for place, column in self._leaves:
+            for i, row in enumerate(np.atleast_2d(values[place])):
+                row[:count] = columns[column + i]
+                row[count:] = columns[column + i][:1] if count else 0.0
+        for call, args, out in self._steps:
+            call(*[values[a] for a in args], out=values[out])
+        for output, block in zip(self._program.outputs, blocks, strict=True):
+            row = 0
+            for entry in output.entries:
+                for g, v in enumerate(entry):
+                    if v is None:
+                        continue
+                    lanes = self._program.counts[g] if output.lanes else 1
+                    a = np.broadcast_to(values[self._place[v]], (lanes, size))
+                    block[row : row + lanes] = a[:, :count]
+                    row += lanes
+        return self._status(values, count, size)
+
+    def _status(self, values: list[Any], count: int, size: int) -> np.ndarray:
+        status = np.full(count, OK, dtype=np.uint8)
+        for check in self._program.checks:
+            value = np.broadcast_to(values[self._place[check.value]], size)[:count]
+            below = AGAIN if check.below is None else check.below
+            own = np.where(value >= check.tolerance, OK, np.where(value < 0, below, AGAIN))
+            # What is sure comes before what is in doubt.
+            better = (status == OK) | ((status == AGAIN) & (own != OK) & (own != AGAIN))
+            status = np.where(better, own, status).astype(np.uint8)
+        return status
+
+
+def _number(op: str, data: tuple[Any, ...], numbers: Numbers) -> Any:
+    if op == "const":
+        return np.float64(data[0])
+    if op == "parameter":
+        return np.float64(numbers.parameters[data[0]])
+    group, i = data
+    return numbers.lanes[group][i][:, None]

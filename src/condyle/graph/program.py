@@ -1,0 +1,211 @@
+"""A question's graph with its ports: what goes in, what comes out, and what has to hold."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from .graph import Graph, Value, reachable
+
+
+@dataclass(frozen=True)
+class Port:
+    """An input of every sample: `size` numbers, or so many for each lane.
+
+    start: its first column; lanes of a group stand side by side.
+    """
+
+    name: str
+    size: int
+    unit: str
+    lanes: bool
+    start: int
+
+
+@dataclass(frozen=True)
+class Output:
+    """A result of a shape; `lanes`: one of that shape for each lane.
+
+    entries: row by row, one value for a shared result, one a group for lanes: None where a group
+             has no such result.
+    """
+
+    name: str
+    shape: tuple[int, ...]
+    unit: str
+    lanes: bool
+    entries: tuple[tuple[Value | None, ...], ...]
+
+    def groups(self) -> tuple[int, ...]:
+        """Groups of lanes that have the result."""
+        some = self.entries[0] if self.entries else ()
+        return tuple(g for g, v in enumerate(some) if v is not None) if self.lanes else ()
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a caller must know of an output; `groups`: of lanes that have it."""
+
+    name: str
+    shape: tuple[int, ...]
+    unit: str
+    lanes: bool
+    groups: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Interface:
+    """What a caller must know of a program: enough to run it where it is compiled already.
+
+    counts: lanes of each group;  columns: inputs of a sample.
+    """
+
+    counts: tuple[int, ...]
+    columns: int
+    ports: tuple[Port, ...]
+    results: tuple[Result, ...]
+
+    @property
+    def lanes(self) -> int:
+        return sum(self.counts)
+
+    def width(self, result: Result) -> int:
+        """Columns of a result."""
+        lanes = sum(self.counts[g] for g in result.groups) if result.lanes else 1
+        return math.prod(result.shape) * lanes
+
+    def data(self) -> dict[str, Any]:
+        """As JSON takes it."""
+        return json.loads(json.dumps(asdict(self)))
+
+    @staticmethod
+    def of(data: Mapping[str, Any]) -> Interface:
+        """From what `data` returned."""
+        ports = tuple(Port(**port) for port in data["ports"])
+        results = tuple(
+            Result(**{**r, "shape": tuple(r["shape"]), "groups": tuple(r["groups"])})
+            for r in data["results"]
+        )
+        return Interface(tuple(data["counts"]), data["columns"], ports, results)
+
+
+@dataclass(frozen=True)
+class Check:
+    """What decides whether a sample counts.
+
+    Below zero its status is `below`, or to be looked at again if that is None; under the
+    tolerance, or where the value is no number, it is to be looked at again.
+    """
+
+    value: Value
+    tolerance: float
+    below: int | None
+
+
+@dataclass(frozen=True)
+class Program:
+    """A frozen question.
+
+    counts:  lanes of each group;  columns: inputs of a sample.
+    """
+
+    graph: Graph
+    counts: tuple[int, ...]
+    columns: int
+    ports: tuple[Port, ...]
+    outputs: tuple[Output, ...]
+    checks: tuple[Check, ...]
+
+    @cached_property
+    def interface(self) -> Interface:
+        results = (Result(o.name, o.shape, o.unit, o.lanes, o.groups()) for o in self.outputs)
+        return Interface(self.counts, self.columns, self.ports, tuple(results))
+
+    @cached_property
+    def roots(self) -> tuple[Value, ...]:
+        """Every value that is wanted."""
+        found = [v for o in self.outputs for entry in o.entries for v in entry if v is not None]
+        return tuple(dict.fromkeys([*found, *(c.value for c in self.checks)]))
+
+    @cached_property
+    def order(self) -> tuple[Value, ...]:
+        """What the roots need, arguments first."""
+        return tuple(reachable(self.graph, self.roots))
+
+    def pruned(self, wanted: Iterable[str]) -> Program:
+        """Only some of the outputs."""
+        names = set(wanted)
+        return replace(self, outputs=tuple(o for o in self.outputs if o.name in names))
+
+    def moved(self, graph: Graph, where: dict[Value, Value]) -> Program:
+        """The same with values of another graph."""
+        outputs = tuple(
+            replace(o, entries=tuple(tuple(v if v is None else where[v] for v in e) for e in o.entries))
+            for o in self.outputs
+        )
+        checks = tuple(replace(c, value=where[c.value]) for c in self.checks)
+        return replace(self, graph=graph, outputs=outputs, checks=checks)
+
+    @cached_property
+    def digest(self) -> str:
+        """A hash of all that the program computes."""
+        number = {v: i for i, v in enumerate(self.order)}
+        h = hashlib.sha256(repr((self.counts, self.columns)).encode())
+        for v in self.order:
+            n = self.graph.nodes[v]
+            h.update(repr((n.op, [number[a] for a in n.args], n.data, n.group)).encode())
+        for o in self.outputs:
+            entries = [[None if v is None else number[v] for v in e] for e in o.entries]
+            h.update(repr((o.name, o.shape, o.lanes, entries)).encode())
+        for c in self.checks:
+            h.update(repr((number[c.value], c.tolerance, c.below)).encode())
+        return h.hexdigest()
+
+
+@dataclass(frozen=True)
+class Variants:
+    """A question as it is run, with equal ports, outputs and checks.
+
+    main:    quick; a sample that it cannot vouch for goes to `robust`, if there is one.
+    latency: the same as main, with fewer operations after one another, for one evaluation.
+    single:  whether one evaluation is asked for at all, besides batches.
+    """
+
+    main: Program
+    robust: Program | None = None
+    latency: Program | None = None
+    single: bool = False
+
+    def __post_init__(self) -> None:
+        for other in (self.robust, self.latency):
+            assert other is None or _shape(other) == _shape(self.main)
+
+    @property
+    def digest(self) -> str:
+        programs = (self.main, self.robust, self.latency)
+        return " ".join("-" if p is None else p.digest for p in programs)
+
+
+def _shape(program: Program) -> tuple[object, ...]:
+    return program.interface, [(c.tolerance, c.below) for c in program.checks]
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """A mechanism's numbers: parameters (p,), and lane constants (size, lanes) of each group.
+
+    padding: (size,) of each group, for lanes that stand for none.
+    order:   where each lane, group by group, stands among the callers' lanes.
+    """
+
+    parameters: np.ndarray
+    lanes: tuple[np.ndarray, ...]
+    padding: tuple[np.ndarray, ...]
+    order: tuple[int, ...]

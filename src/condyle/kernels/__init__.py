@@ -1,1 +1,0 @@
-"""Expressions to fast code: interpreted, one evaluation, batches; cache."""

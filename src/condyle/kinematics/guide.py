@@ -1,0 +1,52 @@
+"""A landmark's path as contacts: its point stays on planes across the axes of {S} that move.
+
+Three guides hold a landmark where its path says, and are closed like contacts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+
+from .contact import ContactSymbols
+
+
+@dataclass(frozen=True)
+class AcrossAxis:
+    """Points whose coordinate along an axis of {S} is a number: phi = p_axis - number."""
+
+    axis: int
+
+    def phi(self, point: ca.SX, constants: ca.SX) -> ca.SX:
+        return point[self.axis] - constants[0]
+
+    def gradient(self, point: ca.SX, constants: ca.SX) -> ca.SX:
+        unit = ca.SX.zeros(3)
+        unit[self.axis] = 1
+        return unit
+
+    def bending(self, point: ca.SX, velocity: ca.SX, constants: ca.SX) -> ca.SX:
+        return ca.SX(0)
+
+    def started_at(self, point: ca.SX, constants: ca.SX) -> AcrossAxis:
+        return self
+
+
+@dataclass(frozen=True)
+class Guide(ContactSymbols):
+    """A platform point that is where its displacement from home says, along one axis.
+
+    displacement: at the end of the way [m].
+    """
+
+    displacement: Any = 0.0
+
+    @staticmethod
+    def along(axis: int, point: ca.SX, displacement: ca.SX) -> Guide:
+        """Args: point: (3,) in {M}; displacement: from home, in {S}."""
+        return Guide(AcrossAxis(axis), point, point[axis], displacement=displacement)
+
+    def part_of_way(self, part: float) -> Guide:
+        return replace(self, constants=self.point[self.surface.axis] + part * self.displacement)

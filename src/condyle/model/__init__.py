@@ -1,0 +1,1 @@
+"""Numbers in, numbers out: evaluate, judge samples, the robust path."""

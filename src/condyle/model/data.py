@@ -1,0 +1,72 @@
+"""What a model returns: plain arrays of samples, complete."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..kinematics.singularity import Singularity
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """The mechanism's configuration at N poses.
+
+    joint, beta, gamma: (N, n) [rad or m, rad, rad], principal values.
+    cos_gamma:      (N, n); near 0 beta_i and gamma_i lose their meaning.
+    discriminant:   (N, n), dimensionless; negative where a chain cannot reach its joint.
+    contact_point:  (N, k, 3) [m], ball centres in {S}.
+    contact_normal: (N, k, 3), unit normals of the surfaces there, in {S}.
+    """
+
+    joint: np.ndarray
+    beta: np.ndarray
+    gamma: np.ndarray
+    cos_gamma: np.ndarray
+    discriminant: np.ndarray
+    contact_point: np.ndarray
+    contact_normal: np.ndarray
+    singularity: Singularity
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Everything about N samples; what could not be computed is no number.
+
+    pose, pose_rate, pose_acceleration: X_EE and its derivatives, (N, 6).
+    effort:        (N, n) [N m or N].
+    share:         (parts, N, n): what each part needs of it.
+    contact_force: (N, k) [N], along the unit normals, on the platform.
+    joint_rate, joint_acceleration: (N, n).
+    status:        (N,), of `Status`.
+    """
+
+    pose: np.ndarray
+    pose_rate: np.ndarray
+    pose_acceleration: np.ndarray
+    effort: np.ndarray
+    share: np.ndarray
+    contact_force: np.ndarray
+    joint_rate: np.ndarray
+    joint_acceleration: np.ndarray
+    configuration: Configuration
+    status: np.ndarray
+
+
+@dataclass(frozen=True)
+class Efforts:
+    """Efforts at N samples, (N, n) [N m or N], and what was asked for besides.
+
+    others: by name: contact_force (N, k); share, gravity (parts, N, n); pose, pose_rate,
+            pose_acceleration (N, 6); joint_rate, joint_acceleration (N, n); condition (N,).
+    status: (N,), of `Status`; efforts of other samples than good ones are NaN.
+    """
+
+    effort: np.ndarray
+    others: Mapping[str, np.ndarray]
+    status: np.ndarray
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self.others[name]

@@ -1,0 +1,377 @@
+"""A mechanism, a formulation and a route, ready to compute: numbers in, numbers out.
+
+Every question is run by a kernel of the backend; samples that it cannot vouch for go the robust
+path. `condyle.derive` returns one that also labels what it finds, `condyle.results.model.Model`.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Collection, Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..backends.choose import Backend
+from ..backends.kernel import AGAIN, Kernel
+from ..dynamics import ROUTES
+from ..dynamics import formulation as formulation_named
+from ..errors import InputError, MechanismError, did_you_mean
+from ..kinematics.contact import indices
+from ..kinematics.singularity import Singularity
+from ..mechanism.home import (
+    characteristic_length,
+    dependent_coordinates,
+    holding_problems,
+    home_problem,
+    independent_coordinates,
+)
+from ..mechanism.mechanism import Mechanism
+from ..motion import Motion
+from ..progress import step
+from ..questions import Prescribed, Question
+from ..questions.equations import part_names
+from ..questions.inverse import OUTPUTS
+from ..questions.numbers import Layout, require_closed_form, specialised
+from ..questions.structure import structure_of
+from ..status import Status
+from .closing import closed_states
+from .data import Configuration, Efforts, Evaluation
+from .robust import Robust
+
+DEFAULT_LOAD_POINT = "right_molar"
+CONDITION = "condition"
+EVERYTHING = ("contact", "share", "motion", "joint", "configuration")
+# Names of results, by what is asked for.
+RESULTS = {
+    "contact": ("contact_force",),
+    "share": ("share",),
+    "gravity": ("gravity",),
+    "motion": ("pose", "pose_rate", "pose_acceleration"),
+    "joint": ("joint_rate", "joint_acceleration"),
+}
+
+States = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
+class Evaluator:
+    """Inverse dynamics of a mechanism by one formulation and route, and what belongs to it."""
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        formulation: str = "virtual_power",
+        route: str = "core",
+        backend: str = "auto",
+    ) -> None:
+        """Derive the equations of motion.
+
+        Args:   backend: compiled, numpy, or auto (compiled where there is a C compiler).
+        Raises: InputError:       for an unknown formulation, route or backend.
+                UnsupportedError: where route `direct` has no closed form.
+                MechanismError:   if the contacts do not hold the platform at home.
+                CompilerError:    if compiled is asked for and there is no compiler.
+        """
+        check_home(mechanism)
+        if route not in ROUTES:
+            raise InputError(f'no route "{route}".{did_you_mean(route, ROUTES)}')
+        if route == "direct":
+            require_closed_form(mechanism)
+        start = time.perf_counter()
+        self.mechanism = mechanism
+        self.formulation = formulation_named(formulation).name
+        self.route = route
+        self.backend = Backend(backend)
+        with step("deriving the equations"):
+            structure = structure_of(mechanism, self.formulation, route)
+            self._numbers = Layout.of(structure).numbers(mechanism)
+            self._structure = specialised(structure, self._numbers)
+        self._kernels: dict[Any, Kernel] = {}
+        self.derivation_seconds = time.perf_counter() - start
+
+    # -- what it is ------------------------------------------------------------------------
+
+    @property
+    def independent(self) -> tuple[str, ...]:
+        """Names of the independent coordinates q_EE, in order."""
+        return independent_coordinates(self.mechanism)
+
+    @property
+    def dependent(self) -> tuple[str, ...]:
+        """Names of the coordinates that the contacts determine."""
+        return dependent_coordinates(self.mechanism)
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Names of the parts that share the efforts."""
+        return part_names(self._structure.families)
+
+    @cached_property
+    def characteristic_length(self) -> float:
+        """What angles are multiplied by where they meet lengths [m]."""
+        return characteristic_length(self.mechanism)
+
+    def kernel(self, question: str, *details: Any) -> Kernel:
+        """The kernel of a question; see `condyle.questions`."""
+        asked = question, details
+        if asked not in self._kernels:
+            q = Question.about(self._structure, question, *details)
+            self._kernels[asked] = self.backend.kernel(q.key, q.variants, self._numbers)
+        return self._kernels[asked]
+
+    @cached_property
+    def _robust(self) -> Robust:
+        return Robust(self._structure, self._numbers, self.independent)
+
+    # -- inverse dynamics ------------------------------------------------------------------
+
+    def torques(
+        self,
+        q: np.ndarray,
+        q1: np.ndarray,
+        q2: np.ndarray,
+        load: np.ndarray,
+        outputs: Collection[str] = (),
+        threads: int | None = None,
+    ) -> Efforts:
+        """Efforts alone, as fast as the machine.
+
+        Args:    as for `evaluate`; outputs: what is wanted besides, of contact, share, gravity
+                 (what of each share gravity and load alone ask for), motion, joint and condition:
+                 ask for less, pay for less; threads: at most so many.
+        Raises:  InputError: for an output that is none of these.
+        """
+        known = (*RESULTS, CONDITION)
+        for name in outputs:
+            if name not in known:
+                raise InputError(f'no output "{name}".{did_you_mean(name, known)}')
+        wanted = {*outputs} - {CONDITION}
+        if CONDITION in outputs:
+            wanted.add("configuration")
+        values, status = self._solve(q, q1, q2, load, wanted, threads)
+        effort = values["effort"].T
+        if status.any():
+            effort[status != Status.OK] = np.nan
+        others = {
+            name: _sample_first(name, values[name])
+            for output in outputs
+            for name in RESULTS.get(output, ())
+        }
+        if CONDITION in outputs:
+            others[CONDITION] = self._singularity(values).condition
+        return Efforts(effort, others, status)
+
+    def evaluate(
+        self,
+        q: np.ndarray,
+        q1: np.ndarray,
+        q2: np.ndarray,
+        load: np.ndarray,
+        threads: int | None = None,
+    ) -> Evaluation:
+        """Inverse dynamics at samples of the independent coordinates, with all that follows.
+
+        Args: q, q1, q2: (N, m) each, in the order of `independent` [m, rad; per s; per s^2].
+              load: (N, 9): force [N] and moment [N m] in {S}, and the point they act at, in {M}.
+              threads: at most so many; default: the processors at hand. Results do not depend
+              on it.
+        """
+        values, status = self._solve(q, q1, q2, load, EVERYTHING, threads)
+        return Evaluation(
+            **{name: _sample_first(name, values[name]) for name in ("effort", *_names(EVERYTHING))},
+            configuration=self._configured(values),
+            status=status,
+        )
+
+    def _solve(
+        self,
+        q: np.ndarray,
+        q1: np.ndarray,
+        q2: np.ndarray,
+        load: np.ndarray,
+        wanted: Collection[str],
+        threads: int | None,
+    ) -> tuple[dict[str, np.ndarray], np.ndarray]:
+        """Results by name, samples last, and their statuses."""
+        kernel = self.kernel("inverse", tuple(o for o in OUTPUTS if o in wanted))
+        load = np.asarray(load)
+        if load.shape[1:] != (9,):
+            raise InputError(f"load: expected an array of shape (N, 9), got {load.shape}")
+        wrench = {"force": load[:, :3], "moment": load[:, 3:6], "point": load[:, 6:]}
+        inputs = {"q": q, "q1": q1, "q2": q2, **wrench}
+        answer = kernel.run(inputs, threads)
+        again = np.flatnonzero(answer.status == AGAIN)
+        if again.size:
+            few = {name: np.asarray(a, dtype=float)[again] for name, a in inputs.items()}
+            better, answer.status[again] = self._robust.evaluate(few)
+            for name, value in answer.values.items():
+                value[..., again] = better[name]
+        return answer.values, answer.status
+
+    # -- the configuration -----------------------------------------------------------------
+
+    def configuration(self, pose: np.ndarray, threads: int | None = None) -> Configuration:
+        """Joint coordinates, contact points and singularity measures at poses X_EE, (N, 6)."""
+        answer = self.kernel("configuration").run({"pose": pose}, threads)
+        again = np.flatnonzero(answer.status == AGAIN)
+        if again.size:
+            better = self._robust.configuration(np.asarray(pose, dtype=float)[again])[0]
+            for name, value in answer.values.items():
+                value[..., again] = better[name]
+        return self._configured(answer.values)
+
+    def _configured(self, values: Mapping[str, np.ndarray]) -> Configuration:
+        names = ("joint", "beta", "gamma", "cos_gamma", "discriminant")
+        points = (np.moveaxis(values[name], -1, 0) for name in ("contact_point", "contact_normal"))
+        return Configuration(*(values[name].T for name in names), *points, self._singularity(values))
+
+    def _singularity(self, values: Mapping[str, np.ndarray]) -> Singularity:
+        names = ("J_A", "transmission", "J_W_sigma")
+        arrays = (values[name].T for name in names)
+        return Singularity.of(*arrays, values["J_A_extremes"], self.characteristic_length)
+
+    # -- the matrices of the equations of motion ---------------------------------------------
+
+    def inertia_matrix(self, q: np.ndarray, space: str = "q") -> np.ndarray:
+        """M_r of [Cheng2023] eqs (57), (63): (N, m, m) in q_EE.
+
+        Args: q: (N, m), in the order of `independent`.
+              space: "X" for the mechanism without contacts, dual to X_EE, (N, 6, 6): eqs (61), (64).
+        Raises: InputError: for another space, or a pose that cannot be reached.
+        """
+        return self._matrices(q, np.zeros_like(q), "inertia_matrix", space)
+
+    def bias(self, q: np.ndarray, q1: np.ndarray, space: str = "q") -> np.ndarray:
+        """C_r q', (N, m) [N, N m]: Coriolis and centrifugal forces; `space` as above, then (N, 6)."""
+        return self._matrices(q, q1, "bias", space)
+
+    def gravity(self, q: np.ndarray, space: str = "q") -> np.ndarray:
+        """G_r, (N, m) [N, N m]: what holds the mechanism against gravity; then (N, 6)."""
+        return self._matrices(q, np.zeros_like(q), "gravity", space)
+
+    def _matrices(self, q: np.ndarray, q1: np.ndarray, name: str, space: str) -> np.ndarray:
+        if space not in ("q", "X"):
+            raise InputError(f'no space "{space}".{did_you_mean(space, ("q", "X"))}')
+        values = self._at("matrices", q, q1)
+        return np.moveaxis(values[name if space == "q" else f"{name}_X"], -1, 0)
+
+    def jacobians(self, q: np.ndarray) -> dict[str, np.ndarray]:
+        """Jacobians of [Cheng2023] eqs (9), (15)-(18) at samples (N, m).
+
+        Returns: J_theta (N, n, 6): theta' = J_theta X_EE'; M_J (N, 6, m); M_1 (N, n, 3, 3), M_2 and
+                 M_3 (N, n, 3, 6): M_1 q_r' = M_2 X_EE', q_r' = M_3 X_EE' of every chain.
+        """
+        values = self._at("jacobians", q, np.zeros_like(q))
+        found = {"J_theta": np.moveaxis(values["J_theta"], -1, 0).transpose(0, 2, 1)}
+        found["M_J"] = np.moveaxis(values["M_J"], -1, 0)
+        for name in ("M_1", "M_2", "M_3"):
+            found[name] = values[name].transpose(3, 2, 0, 1)
+        return found
+
+    def _at(self, question: str, q: np.ndarray, q1: np.ndarray) -> dict[str, np.ndarray]:
+        """Results of a question on the platform's motion, at whole poses the contacts meet."""
+        poses, reached = self._poses(q, q1, np.zeros_like(q))
+        if not reached.all():
+            sample = int(np.argmin(reached))
+            raise InputError(f"the contacts cannot be met at sample {sample}: q = {q[sample]}")
+        names = [port.name for port in self.kernel(question).interface.ports]
+        return self.kernel(question).run({name: poses[name] for name in names}).values
+
+    def _poses(
+        self, q: np.ndarray, q1: np.ndarray, q2: np.ndarray
+    ) -> tuple[dict[str, np.ndarray], np.ndarray]:
+        """X_EE and its rates, (N, 6) each, and where the contacts can be met."""
+        answer = self.kernel("motion").run({"q": q, "q1": q1, "q2": q2})
+        poses = {name: a.T for name, a in answer.values.items()}
+        reached = answer.status == Status.OK
+        again = np.flatnonzero(answer.status == AGAIN)
+        if again.size:
+            better, reached[again] = self._robust.motion(q[again], q1[again], q2[again])
+            for name, a in better.items():
+                poses[name][again] = a
+        return poses, reached
+
+    # -- motions and loads -------------------------------------------------------------------
+
+    def load_point(self, name: str | None) -> np.ndarray:
+        """Where a load acts, (3,) [m] in {M}: a named point, or right_molar if there is one.
+
+        Raises: InputError: if the mechanism has no such point.
+        """
+        points = self.mechanism.platform.points
+        if name is None and DEFAULT_LOAD_POINT not in points:
+            raise InputError(
+                f"the load needs a point: this mechanism has no {DEFAULT_LOAD_POINT}. "
+                f"Choose one with --load-point (load point).{did_you_mean('', points)}"
+            )
+        name = name or DEFAULT_LOAD_POINT
+        if name not in points:
+            raise InputError(f'the platform has no point "{name}".{did_you_mean(name, points)}')
+        return np.array(points[name])
+
+    def independent_motion(self, motion: Motion) -> tuple[States, float | None]:
+        """q_EE and its rates, (N, m) each, from a motion of any kind.
+
+        Also returns the largest distance of a given whole pose from the contacts [m], which the
+        projection removes; None for other kinds.
+        """
+        given = (motion.value, motion.rate, motion.acceleration)
+        if motion.kind == "pose":
+            columns = indices(self.independent)
+            q, q1, q2 = (a[:, columns] for a in given)
+            return (q, q1, q2), self.contact_residual(motion.value)
+        landmark = motion.landmark if motion.kind == "landmark" else None
+        return self.independent_states(motion.names, *given, landmark), None
+
+    def contact_residual(self, pose: np.ndarray) -> float:
+        """Largest |phi| of the contacts over poses, (N, 6) [m]."""
+        if not self.mechanism.contacts:
+            return 0.0
+        phi = self.kernel("encoders").run({"pose": pose}).values["phi"]
+        return float(np.nanmax(np.abs(phi)))
+
+    def independent_states(
+        self,
+        names: Sequence[str],
+        value: np.ndarray,
+        rate: np.ndarray,
+        acceleration: np.ndarray,
+        landmark: str | None = None,
+        threads: int | None = None,
+    ) -> States:
+        """q_EE and its rates from another set of coordinates or a landmark's displacement.
+
+        Samples that the contacts cannot meet come back as NaN.
+        """
+        given = (value, rate, acceleration)
+        return closed_states(self.mechanism, names, given, landmark, self.backend, threads)
+
+
+def _names(outputs: Collection[str]) -> list[str]:
+    return [name for output in outputs for name in RESULTS.get(output, ())]
+
+
+def _sample_first(name: str, value: np.ndarray) -> np.ndarray:
+    """Samples last to samples first; of shares, after the parts."""
+    return value.swapaxes(1, 2) if name in ("share", "gravity") else value.T
+
+
+def check_home(mechanism: Mechanism) -> None:
+    """Raises MechanismError where the contacts cannot hold the platform at home."""
+    problems = [
+        f'contact "{contact.name}": {problem}'
+        for contact in mechanism.contacts
+        if (problem := home_problem(contact)) is not None
+    ]
+    problems += [] if problems else list(holding_problems(mechanism))
+    if problems:
+        raise MechanismError(mechanism.name, problems)
+
+
+def with_point(wrench: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Wrenches (N, 6) and the point they act at, (3,), as loads (N, 9)."""
+    return np.hstack([wrench, np.broadcast_to(point, (len(wrench), 3))])
+
+
+__all__ = ["Evaluator", "Prescribed", "check_home", "with_point"]

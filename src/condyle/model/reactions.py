@@ -1,0 +1,57 @@
+"""Reactions at the samples of an evaluation: what every joint, guide and contact carries."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+
+from ..questions.reactions import POINT, Place, reaction_places
+from ..status import Status
+from .data import Evaluation
+from .evaluator import Evaluator
+
+
+@dataclass(frozen=True)
+class Reaction(Place):
+    """A reaction at N samples: components in {S}, (N, 3), and its place in {S}, (N, 3) [m]."""
+
+    frame: ClassVar[str] = "{S}"
+    array: np.ndarray = field(kw_only=True)
+    point: np.ndarray = field(kw_only=True)
+
+
+def reactions(
+    model: Evaluator, evaluation: Evaluation, effort: np.ndarray | None = None
+) -> dict[str, Reaction]:
+    """Reactions at the samples of an evaluation; NaN where a sample failed.
+
+    Args:    evaluation: of the model.
+             effort: (N, n), the efforts to balance if not those of the evaluation. The contact
+             forces are the evaluation's in any case.
+    Returns: by name: <joint>_<chain>, <joint>_force_<chain>, <joint>_moment_<chain>,
+             guide_moment_<chain>, contact_<contact>.
+    """
+    inputs = {
+        "pose": evaluation.pose,
+        "pose_rate": evaluation.pose_rate,
+        "pose_acceleration": evaluation.pose_acceleration,
+        "effort": evaluation.effort if effort is None else effort,
+        "contact_force": evaluation.contact_force,
+    }
+    values = model.kernel("reactions").run(inputs).values
+    failed = evaluation.status != Status.OK
+    found = {}
+    seen: dict[str, int] = {}
+    for place in reaction_places(model.mechanism):
+        at = seen.get(place.quantity, 0)  # chains that have it stand in the mechanism's order
+        seen[place.quantity] = at + 1
+        contact = place.quantity == "contact"
+        array, point = (
+            values[name][at].T.copy() if contact else values[name][:, at].T.copy()
+            for name in (place.quantity, POINT + place.quantity)
+        )
+        array[failed] = np.nan
+        found[place.name] = Reaction(**vars(place), array=array, point=point)
+    return found

@@ -1,0 +1,122 @@
+"""The robust path, for samples that a kernel cannot vouch for: by numpy, from the same graphs.
+
+Contacts are followed from home, efforts come from singular values of A itself, contact forces from
+the pseudo-inverse, and singular values from LAPACK.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+
+import numpy as np
+
+from ..backends.kernel import AGAIN
+from ..backends.numpy import NumpyKernel
+from ..dynamics.distribution import minimum_norm
+from ..graph.program import Numbers
+from ..kinematics.singularity import SINGULAR, ratio
+from ..questions import Prescribed, Question
+from ..questions.numbers import characteristic
+from ..questions.structure import Structure
+from ..status import Status
+from .follow import Follow
+
+Arrays = dict[str, np.ndarray]
+
+
+class Robust:
+    """Samples of one mechanism and formulation, one array operation after the other."""
+
+    def __init__(self, structure: Structure, numbers: Numbers, independent: tuple[str, ...]) -> None:
+        self._structure, self._numbers = structure, numbers
+        self._independent = independent
+        angles = [name not in ("X", "Y", "Z") for name in independent]
+        self._scale = np.where(angles, characteristic(structure, numbers), 1.0)
+
+    def _kernel(self, name: str) -> NumpyKernel:
+        return NumpyKernel(Question.about(self._structure, name).variants(), self._numbers)
+
+    @cached_property
+    def _motion(self) -> NumpyKernel:
+        return self._kernel("motion")
+
+    @cached_property
+    def _system(self) -> NumpyKernel:
+        return self._kernel("system")
+
+    @cached_property
+    def _configuration(self) -> NumpyKernel:
+        return self._kernel("configuration")
+
+    @cached_property
+    def _follow(self) -> Follow:
+        return Follow(self._structure, self._numbers, Prescribed(self._independent))
+
+    def evaluate(self, inputs: Mapping[str, np.ndarray]) -> tuple[Arrays, np.ndarray]:
+        """All results of inverse dynamics by name, samples last, and their statuses."""
+        poses, reached = self.motion(inputs["q"], inputs["q1"], inputs["q2"])
+        values = {name: a.T for name, a in poses.items()}
+        load = {name: inputs[name] for name in ("force", "moment", "point")}
+        with np.errstate(all="ignore"):
+            found, _, sure = self.configuration(poses["pose"])
+            values |= found
+            s = {n: np.moveaxis(a, -1, 0) for n, a in self._system.run(poses | load).values.items()}
+            values["joint_rate"], values["joint_acceleration"] = (
+                s[name].T for name in ("joint_rate", "joint_acceleration")
+            )
+            # A (N, m, n) by entry and lane; b (N, parts, m).
+            factors = minimum_norm(s["A"].transpose(0, 2, 1), self._scale)
+            share, gravity = (
+                factors.torques(s[name].transpose(0, 2, 1)) for name in ("b", "b_gravity")
+            )
+            effort = share.sum(axis=2)
+            values["share"], values["gravity"] = (a.transpose(2, 1, 0) for a in (share, gravity))
+            values["effort"] = effort.T
+            values["contact_force"] = self._contact_forces(s, effort).T
+            status = self._judged(reached, values, effort)
+        return values, status
+
+    def motion(
+        self, q: np.ndarray, q1: np.ndarray, q2: np.ndarray
+    ) -> tuple[Arrays, np.ndarray]:
+        """X_EE and its rates, (N, 6) each, and where the contacts can be met."""
+        answer = self._motion.run({"q": q, "q1": q1, "q2": q2})
+        poses = {name: a.T.copy() for name, a in answer.values.items()}
+        reached = answer.status == Status.OK
+        doubtful = np.flatnonzero(answer.status == AGAIN)
+        if doubtful.size:
+            found = self._follow.solve(q[doubtful], q1[doubtful], q2[doubtful])
+            reached[doubtful] = found.reached
+            for name, a in found.named().items():
+                poses[name][doubtful] = a
+        return poses, reached
+
+    def configuration(self, pose: np.ndarray) -> tuple[Arrays, np.ndarray, np.ndarray]:
+        """The configuration's results by name, samples last; always by LAPACK."""
+        values = self._configuration.run({"pose": pose}).values
+        rows = np.moveaxis(values["J_W"], -1, 0)
+        good = np.isfinite(rows).all(axis=(1, 2))
+        sigma = np.full((len(rows), self._structure.m), np.nan)
+        sigma[good] = np.linalg.svd(rows[good], compute_uv=False)
+        values["J_W_sigma"] = sigma.T
+        return values, sigma, good
+
+    def _contact_forces(self, s: Arrays, effort: np.ndarray) -> np.ndarray:
+        """lambda along the unit normals, (N, k), from what the efforts leave over."""
+        G = s["G"]
+        left = s["Q"] - (s["J"] @ effort[..., None])[..., 0]
+        mu = np.full(G.shape[:1] + G.shape[2:], np.nan)
+        good = np.isfinite(left).all(axis=1) & np.isfinite(G).all(axis=(1, 2))
+        mu[good] = (np.linalg.pinv(G[good]) @ left[good][..., None])[..., 0]
+        return mu * s["n_length"]
+
+    def _judged(self, reached: np.ndarray, values: Arrays, effort: np.ndarray) -> np.ndarray:
+        status = np.full(len(reached), Status.OK, dtype=np.uint8)
+        least, most = values["J_A_extremes"]
+        sigma = values["J_W_sigma"]
+        regular = np.minimum(ratio(least, most), ratio(sigma[-1], sigma[0])) >= SINGULAR
+        status[~np.isfinite(effort).all(axis=1)] = Status.OVERFLOW
+        status[~regular] = Status.SINGULAR
+        status[~(reached & (values["discriminant"] >= 0).all(axis=0))] = Status.UNREACHABLE
+        return status

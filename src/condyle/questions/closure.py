@@ -1,0 +1,111 @@
+"""Closing the contacts from what is prescribed: 6 - k pose coordinates, or a landmark's path.
+
+Six conditions fix a pose: the k contacts, phi = 0, and 6 - k prescribed functions g of the pose,
+g = s(t). Rates come by the chain rule through the Jacobian K of (phi, g):
+
+    K X' = (0, s'),     K X'' = (0, s'') - K' X'.
+
+With two contacts a landmark's path leaves one freedom; the fourth condition, which [Cheng2023]
+leaves open, is that the midpoint of the two contact points keeps its home Y.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from ..graph.program import Program
+from ..kinematics.contact import (
+    ContactSymbols,
+    contact_bias,
+    contact_frame,
+    indices,
+    residuals,
+    solve_small,
+)
+from ..kinematics.guide import Guide
+from ..kinematics.iteration import followed, newton
+from ..kinematics.parasitic import gyration, whole_motion
+from ..kinematics.rotation import Bryant
+from ..mechanism.mechanism import COORDINATES
+from ..status import Status
+from .builder import Builder
+from .numbers import contact_symbols, single_contacts
+from .platform import ANGLE_UNITS
+from .inverse import CERTAIN
+from .structure import Structure
+
+
+
+@dataclass(frozen=True)
+class Prescribed:
+    """What is given: 6 - k coordinates by name, or, without names, a landmark's displacement."""
+
+    names: tuple[str, ...] = ()
+
+
+def guides(b: Builder, s: ca.SX) -> list[ContactSymbols]:
+    """A landmark's path as contacts, for displacements (4,): x, y, z and the middle's y."""
+    landmark, middle = b.parameter("landmark"), b.parameter("middle")
+    return [*(Guide.along(i, landmark, s[i]) for i in range(3)), Guide.along(1, middle, s[3])]
+
+
+def closure(structure: Structure, prescribed: Prescribed) -> Program:
+    """Poses and rates where g = s, g' = s1, g'' = s2, ports (6 - k,) each."""
+    b = Builder(structure)
+    m = structure.m
+    s, s1, s2 = (b.sample(name, m) for name in ("s", "s1", "s2"))
+    if not prescribed.names:
+        contacts = [*single_contacts(structure, b.parameter), *guides(b, s)]
+        placement = followed(contacts, list(range(6)), ca.SX(0, 1))
+        here = [c.part_of_way(1.0) for c in contacts]
+        rate, acceleration = _rates(here, placement.position, placement.bryant, s1, s2)
+        pose = placement.pose()
+    else:
+        dependent = [name for name in COORDINATES if name not in prescribed.names]
+        contacts = contact_symbols(structure, b.parameter)
+        placement = newton(contacts, dependent, s)
+        motion = whole_motion(contacts, dependent, placement, s1, s2)
+        rate, acceleration = motion.rate, motion.acceleration
+        pose = placement.pose()
+        pose[indices(prescribed.names)] = s
+    b.output("pose", pose, ANGLE_UNITS)
+    b.output("pose_rate", rate, "per s")
+    b.output("pose_acceleration", acceleration, "per s^2")
+    if placement.reach is not None:
+        below = None if placement.iterated else Status.UNREACHABLE
+        b.check(placement.reach, CERTAIN if placement.iterated else 0.0, below)
+    return b.finish()
+
+
+def _rates(
+    contacts: list[ContactSymbols], position: ca.SX, bryant: Bryant, s1: ca.SX, s2: ca.SX
+) -> tuple[ca.SX, ca.SX]:
+    """X_EE' and X_EE'', (6,), where contacts and guides fix the whole pose."""
+    frame = contact_frame(contacts, position, bryant.rotation())
+    E = ca.diagcat(ca.SX.eye(3), bryant.angular_velocity())
+    K = frame.N.T @ E
+    still = ca.SX.zeros(6 - s1.numel())
+    rate = solve_small(K, ca.vertcat(still, s1))
+    bias = contact_bias(contacts, frame, position, E @ rate)
+    bias += frame.N[3:, :].T @ gyration(bryant, rate[3:])
+    return rate, solve_small(K, ca.vertcat(still, s2) - bias)
+
+
+def conditions(structure: Structure, prescribed: Prescribed) -> Program:
+    """phi and g, (6,), K, (6, 6), and K' X', (6,), at any pose: what Newton's method asks for."""
+    b = Builder(structure)
+    pose, rate = b.sample("pose", 6, ANGLE_UNITS), b.sample("pose_rate", 6)
+    contacts = single_contacts(structure, b.parameter)
+    given: ca.SX
+    if not prescribed.names:
+        given = residuals(guides(b, ca.SX.zeros(4)), pose)
+    else:
+        given = pose[indices(prescribed.names)]
+    values = ca.vertcat(residuals(contacts, pose), given)
+    K = ca.jacobian(values, pose)
+    b.output("values", values, "m, rad", 6)
+    b.output("K", K, "", 6, 6)
+    b.output("bias", ca.jtimes(K @ rate, pose, rate), "", 6)
+    return b.finish()

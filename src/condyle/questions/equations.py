@@ -1,0 +1,232 @@
+"""The equations of motion of a structure: the one place where they are put together.
+
+    Pi^T Q = (J Pi)^T tau,     Q - J^T tau = G mu,
+
+where Q (inertia less gravity less load) and the rows of J are dual to the coordinates of the
+state, Pi maps the rates that the contacts allow to the state's, and the contacts act along G. The
+route decides the state: `direct` works in q_EE itself (Model 1: Pi = E), `core` in the six
+coordinates of the mechanism without contacts (Model 2: Pi = M_J, or the same in twists).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import casadi as ca
+
+from ..dynamics import FORMULATIONS
+from ..dynamics.formulation import Body, Formulation
+from ..kinematics.chain import FAMILIES, Constants, Family, Law
+from ..kinematics.contact import indices, solve_small
+from ..kinematics.state import PointMotion, State, independent_state, pose_state, twist_state
+from .builder import Builder, Lanes
+from .platform import (
+    Basis,
+    Platform,
+    normal_forces,
+    rate_basis,
+    twist_basis,
+    whole_basis,
+)
+
+LOAD = "load"
+
+
+@dataclass(frozen=True)
+class Wrench:
+    """The load on the platform, ports force, moment and point: (3,) each, the point in {M}."""
+
+    force: ca.SX
+    moment: ca.SX
+    point: ca.SX
+
+    @staticmethod
+    def of(b: Builder) -> Wrench:
+        ports = (("force", "N"), ("moment", "N m"), ("point", "m"))
+        return Wrench(*(b.sample(name, 3, unit) for name, unit in ports))
+
+    def about_centre(self, R: ca.SX) -> ca.SX:
+        """[F; r x F + M] in {S}, (6,) ([Cheng2023] eq. 42)."""
+        return ca.vertcat(self.force, ca.cross(R @ self.point, self.force) + self.moment)
+
+
+@dataclass(frozen=True)
+class ChainTerms:
+    """What the chains of one group contribute, lane by lane, dual to the state's rates."""
+
+    law: Law
+    forces: dict[str, ca.SX]
+    row: ca.SX
+
+
+@dataclass(frozen=True)
+class Equations:
+    """The equations of one sample.
+
+    parts:  name -> generalized force of the bodies of that name, (s,); they sum up to Q.
+    chains: rows of J, and the joints' motion, one a group.
+    G:      (s, k), along which the contacts act; None on route direct, which has no equations
+            across them.
+    """
+
+    b: Builder
+    state: State
+    basis: Basis
+    parts: dict[str, ca.SX]
+    chains: list[ChainTerms]
+    G: ca.SX | None
+
+    @property
+    def Q(self) -> ca.SX:
+        return total(list(self.parts.values()))
+
+    @property
+    def A(self) -> Lanes:
+        """Rows of J Pi, one a group."""
+        return [self.basis.pull(c.row) for c in self.chains]
+
+    def contact_forces(self, platform: Platform, effort: Lanes) -> ca.SX:
+        """lambda along the unit normals, (k,), from the dependent rows of G mu = Q - J^T tau."""
+        assert self.G is not None
+        dep = indices(self.b.structure.dependent)
+        if not dep:
+            return ca.SX(0, 1)
+        rows = zip(self.chains, effort, strict=True)
+        carried = self.b.total([c.row[dep] * tau for c, tau in rows])
+        mu = solve_small(self.G[dep, :], self.Q[dep] - carried)
+        return normal_forces(self.b, platform.motion, mu)
+
+
+def equations(
+    b: Builder,
+    platform: Platform,
+    load: Wrench,
+    formulation: str | None = None,
+    route: str | None = None,
+    lump: bool = False,
+    low_latency: bool = False,
+    state: State | None = None,
+) -> Equations:
+    """The equations of motion.
+
+    Args: formulation, route: if not those of the structure.
+          lump: let each chain's bodies act as one, with end masses that are part of the platform.
+          low_latency: fewer operations after one another, for more of them in all.
+          state: in which they are written, if not that of route and formulation.
+    """
+    s = b.structure
+    method = FORMULATIONS[formulation or s.formulation]
+    motion, dependent = platform.motion, s.dependent
+    frame = motion.frame
+    G: ca.SX | None
+    if state is not None:
+        basis, G = rate_basis(motion, dependent), state.B.T @ frame.N
+    elif (route or s.route) == "direct":
+        state = independent_state(platform.q, platform.q1, platform.q2, platform.placement.pose())
+        basis, G = whole_basis(s.m), None
+    elif method.uses_twist:
+        position = platform.placement.position
+        state = twist_state(position, motion.R, motion.twist, motion.twist_rate)
+        basis, G = twist_basis(motion, dependent), frame.N
+    else:
+        pose = (platform.placement.pose(), motion.rate, motion.acceleration)
+        state = pose_state(*(b.cut(v) for v in pose))
+        basis, G = rate_basis(motion, dependent), motion.E.T @ frame.N
+    g = b.parameter("gravity")
+    chains = [
+        _chain_terms(b, group, method, state, g, lump, low_latency) for group in range(len(s.chains))
+    ]
+    parts = {"platform": method.platform(state, _body(b, lump), g)}
+    parts |= _summed(b, chains, lump)
+    parts[LOAD] = -(state.B.T @ load.about_centre(state.R))
+    return Equations(b, state, basis, parts, chains, G)
+
+
+def part_names(families: Sequence[str]) -> tuple[str, ...]:
+    """Parts that share the efforts: platform, the links of the chains, load."""
+    links: dict[str, None] = {}
+    for kind in families:
+        links.update(dict.fromkeys(reversed(FAMILIES[kind].bodies)))
+    return ("platform", *links, LOAD)
+
+
+def _chain_terms(
+    b: Builder,
+    group: int,
+    method: Formulation,
+    state: State,
+    g: ca.SX,
+    lump: bool,
+    low_latency: bool,
+) -> ChainTerms:
+    family = FAMILIES[b.structure.families[group]]
+    constants: Constants = family.named(b.lane(group, "constants"))
+    M = state.point(b.lane(group, "joint"))
+    if lump:
+        law, force = _lumped(family, constants, M, g, low_latency)
+        forces = {"chains": force}
+    else:
+        law = method.chain(family, constants, M, g)
+        forces = law.forces
+    if not (method.idles and family.idle):
+        # A lane without a chain has neither J nor force; elsewhere idle constants see to that.
+        active = b.lane(group, "active")
+        forces = {name: active * f for name, f in forces.items()}
+        law = replace(law, J=active * law.J)
+    pulled = {name: state.pull(f, M.lever) for name, f in forces.items()}
+    return ChainTerms(law, pulled, state.pull(law.J, M.lever))
+
+
+def _lumped(
+    family: Family, c: Constants, M: PointMotion, g: ca.SX, low_latency: bool
+) -> tuple[Law, ca.SX]:
+    """A chain's law, and all its force on M but that of its end masses, (3,).
+
+    With low latency the force is ready one step after the joint's acceleration, of which it is an
+    affine function; that takes a few operations more.
+    """
+    held: list[ca.SX] = []
+    acceleration = ca.SX.sym("acceleration")
+
+    def let(value: ca.SX) -> ca.SX:
+        held.append(value)
+        return acceleration
+
+    law = family.law(c, M.position, M.velocity, M.acceleration, g, let if low_latency else ca.SX)
+    force = total(list(law.forces.values())) + law.J * law.effort
+    if held:
+        slope = ca.jacobian(force, acceleration)
+        rest = ca.substitute(force, acceleration, 0)
+        law = replace(law, acceleration=held[0])
+        force = rest + slope * held[0]
+    return law, force
+
+
+def _body(b: Builder, lumped: bool) -> Body:
+    """The platform, alone or with the end masses of the chains as part of it."""
+    mass, first, i = (
+        b.parameter(f"{'lumped_' if lumped else ''}{name}")
+        for name in ("mass", "first_moment", "inertia")
+    )
+    inertia = ca.vertcat(*(ca.horzcat(*(i[k] for k in row)) for row in _SYMMETRIC))
+    return Body(mass, first, inertia)
+
+
+_SYMMETRIC = ((0, 3, 4), (3, 1, 5), (4, 5, 2))  # entries xx, yy, zz, xy, xz, yz
+
+
+def _summed(b: Builder, chains: Sequence[ChainTerms], lumped: bool) -> dict[str, ca.SX]:
+    """Forces of the chains' bodies, summed over the chains: by body, or all in one."""
+    size = chains[0].row.shape[0]
+    if lumped:
+        return {"chains": b.total([total(list(c.forces.values())) for c in chains])}
+    names = part_names(b.structure.families)[1:-1]
+    return {n: b.total([c.forces.get(n, ca.SX.zeros(size)) for c in chains]) for n in names}
+
+
+def total(terms: Sequence[ca.SX]) -> ca.SX:
+    found = terms[0]
+    for term in terms[1:]:
+        found = found + term
+    return found

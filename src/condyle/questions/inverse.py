@@ -1,0 +1,146 @@
+"""Inverse dynamics: the efforts of least norm that make a motion under a load, and what follows.
+
+From the independent coordinates q, q', q'' and the load; the contacts are closed on the way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import casadi as ca
+
+from ..dynamics import FORMULATIONS
+from ..dynamics.least_norm import gram_schmidt, normal_equations
+from ..graph.program import Program, Variants
+from ..status import Status
+from . import configuration
+from .builder import Builder
+from .equations import Equations, Wrench, equations, total
+from .platform import ANGLE_UNITS, Platform, closed, given
+from .structure import Structure
+
+# What can be asked for besides the efforts.
+OUTPUTS = ("contact", "share", "gravity", "motion", "joint", "configuration")
+NEAR = 1e-14  # feasibility or pivot ratio below which a sample is looked at again
+HUGE = 1e300
+CERTAIN = 0.5  # of a placement's discriminant, which is 0 or 1 where it was iterated
+
+
+def inverse(structure: Structure, wanted: Collection[str] = ()) -> Variants:
+    """Efforts alone, or with some of `OUTPUTS`.
+
+    Efforts alone come by normal equations, with a robust variant for samples where those lose
+    digits, and with one for least latency.
+    """
+    lean = not {"share", "gravity", "configuration"} & set(wanted)
+    robust = program(structure, wanted, robust=True)
+    if not lean:
+        return Variants(robust)
+    latency = None
+    if FORMULATIONS[structure.formulation].lumps:
+        quick = structure.n > structure.m
+        latency = program(structure, wanted, robust=not quick, low_latency=True)
+    if structure.n == structure.m:
+        return Variants(robust, None, latency, single=True)
+    return Variants(program(structure, wanted), robust, latency, single=True)
+
+
+def program(
+    structure: Structure,
+    wanted: Collection[str] = (),
+    robust: bool = False,
+    low_latency: bool = False,
+) -> Program:
+    """One variant.
+
+    Args: robust: solve for the efforts by `gram_schmidt` where `normal_equations` are quicker.
+          low_latency: as in `equations`.
+    """
+    b = Builder(structure)
+    platform, load = closed(b), Wrench.of(b)
+    apart = bool({"share", "gravity"} & set(wanted))
+    lump = FORMULATIONS[structure.formulation].lumps and not apart
+    eq = equations(b, platform, load, lump=lump, low_latency=low_latency)
+    parts = [eq.basis.pull(part) for part in eq.parts.values()]
+    right = ca.horzcat(*parts) if apart else total(parts)
+    if "gravity" in wanted:
+        # Forces of bodies at rest: what gravity alone asks for, and the load.
+        right = ca.horzcat(right, b.at_zero(right, platform.q1, platform.q2))
+    solve = gram_schmidt if robust else normal_equations
+    found, pivots = solve(b.total, eq.A, right)
+    own = [f[:, : len(parts)] if apart else f for f in found]
+    effort = [total(ca.horzsplit(f)) for f in own]
+    b.output("effort", effort, "N m or N")
+    if "share" in wanted:
+        b.output("share", own, "N m or N")
+    if "gravity" in wanted:
+        b.output("gravity", [f[:, len(parts) :] for f in found], "N m or N")
+    if "contact" in wanted:
+        core = eq if structure.route == "core" else _core(b, platform, load)
+        b.output("contact_force", core.contact_forces(platform, effort), "N", len(structure.contacts))
+    if "motion" in wanted:
+        _add_motion(b, platform)
+    if "joint" in wanted:
+        b.output("joint_rate", [c.law.rate for c in eq.chains], "rad/s or m/s")
+        b.output("joint_acceleration", [c.law.acceleration for c in eq.chains], "per s^2")
+    if "configuration" in wanted:
+        configuration.add(b, platform)
+    b.check(_feasibility(b, platform, eq), NEAR, Status.UNREACHABLE)
+    b.check(pivots * (ca.fabs(b.total(effort)) < HUGE), NEAR)
+    return b.finish()
+
+
+def motion(structure: Structure) -> Program:
+    """The contacts closed from the independent coordinates, and nothing else."""
+    b = Builder(structure)
+    platform = closed(b)
+    _add_motion(b, platform)
+    placement = platform.placement
+    if placement.reach is not None:
+        below = None if placement.iterated else Status.UNREACHABLE
+        b.check(placement.reach, CERTAIN if placement.iterated else 0.0, below)
+    return b.finish()
+
+
+def system(structure: Structure) -> Program:
+    """The equations themselves, at whole poses that meet the contacts, for the robust path."""
+    b = Builder(structure)
+    platform, load = given(b), Wrench.of(b)
+    eq = equations(b, platform, load, route="core")
+    still = [b.at_zero(part, *_rates(eq, platform)) for part in eq.parts.values()]
+    assert eq.G is not None
+    b.output("A", eq.A, "")
+    b.output("b", ca.horzcat(*(eq.basis.pull(p) for p in eq.parts.values())).T, "")
+    b.output("b_gravity", ca.horzcat(*(eq.basis.pull(p) for p in still)).T, "")
+    b.output("Q", eq.Q, "N, N m", 6)
+    b.output("J", [c.row for c in eq.chains], "")
+    b.output("G", eq.G, "", 6, len(structure.contacts))
+    b.output("n_length", platform.motion.frame.n_length, "", len(structure.contacts))
+    b.output("joint_rate", [c.law.rate for c in eq.chains], "rad/s or m/s")
+    b.output("joint_acceleration", [c.law.acceleration for c in eq.chains], "per s^2")
+    return b.finish()
+
+
+def _add_motion(b: Builder, platform: Platform) -> None:
+    b.output("pose", platform.pose, ANGLE_UNITS)
+    b.output("pose_rate", platform.motion.rate, "per s")
+    b.output("pose_acceleration", platform.motion.acceleration, "per s^2")
+
+
+def _rates(eq: Equations, platform: Platform) -> tuple[ca.SX, ca.SX]:
+    return platform.motion.rate, platform.motion.acceleration
+
+
+def _core(b: Builder, platform: Platform, load: Wrench) -> Equations:
+    """Route `direct` has no equations across the contacts: those of the core have."""
+    lump = FORMULATIONS[b.structure.formulation].lumps
+    return equations(b, platform, load, route="core", lump=lump)
+
+
+def _feasibility(b: Builder, platform: Platform, eq: Equations) -> ca.SX:
+    """Least of the dimensionless discriminants: not negative where the pose can be reached."""
+    least, placement = b.least([c.law.reach for c in eq.chains]), platform.placement
+    if placement.reach is None:
+        return least
+    # A pose that Newton did not find is not unreachable but unknown: 0, to be looked at again.
+    return least * placement.reach if placement.iterated else ca.fmin(least, placement.reach)

@@ -1,0 +1,72 @@
+"""The matrices of the equations of motion, apart ([Cheng2023] eqs 57, 61, 63, 64).
+
+    M_r q'' + C_r q' + G_r = (J_theta M_J)^T tau + load,
+
+in the independent coordinates q_EE, or, without M_J, dual to X_EE. The generalized force is that of
+inverse dynamics; M_r is its exact derivative in the accelerations, G_r what it is at rest.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..dynamics.joint_space import chain_jacobians
+from ..graph.program import Program
+from ..kinematics.chain import FAMILIES
+from ..kinematics.state import pose_state
+from .builder import Builder
+from .equations import Wrench, equations, total
+from .platform import given
+from .structure import Structure
+
+
+def matrices(structure: Structure) -> Program:
+    """Inertia matrix, Coriolis and centrifugal force, gravity: in q_EE, and dual to X_EE.
+
+    At whole poses and rates that the contacts allow; port pose_acceleration is what the rates
+    alone, q'' = 0, make of X_EE''.
+    """
+    b = Builder(structure)
+    platform = given(b)
+    X, X1, X2 = platform.pose, platform.motion.rate, platform.motion.acceleration
+    zero = ca.SX.zeros(3)
+    eq = equations(b, platform, Wrench(zero, zero, zero), route="core", state=pose_state(X, X1, X2))
+    Q = b.cut(total(list(eq.parts.values())))
+    M = b.jacobian(Q, X2)
+    moving = b.at_zero(Q, X2)
+    G = b.at_zero(moving, X1)
+    bias = moving - G
+    M_J = platform.motion.M_J
+    b.output("inertia_matrix", M_J.T @ M @ M_J, "kg, kg m, kg m^2", structure.m, structure.m)
+    b.output("bias", M_J.T @ (bias + M @ X2), "N, N m", structure.m)
+    b.output("gravity", M_J.T @ G, "N, N m", structure.m)
+    b.output("inertia_matrix_X", M, "kg, kg m, kg m^2", 6, 6)
+    b.output("bias_X", bias, "N, N m", 6)
+    b.output("gravity_X", G, "N, N m", 6)
+    return b.finish()
+
+
+def jacobians(structure: Structure) -> Program:
+    """J_theta on X_EE', M_J, and M_1i, M_2i, M_3i of every chain ([Cheng2023] eqs 9, 15-18)."""
+    b = Builder(structure)
+    platform = given(b, still=True)
+    motion = platform.motion
+    state = pose_state(platform.pose, motion.rate, motion.acceleration)
+    rows, M_1, M_2, M_3 = [], [], [], []
+    for group, kind in enumerate(structure.families):
+        family = FAMILIES[kind]
+        c = family.named(b.lane(group, "constants"))
+        M = state.point(b.lane(group, "joint"))
+        loop = family.loop(c, M.position)
+        rows.append(state.pull(loop.J, M.lever))
+        one, inverse = chain_jacobians(family, c, loop.q_r)
+        two = ca.horzcat(ca.SX.eye(3), -ca.skew(M.lever)) @ state.B
+        M_1.append(one)
+        M_2.append(two)
+        M_3.append(inverse @ two)
+    b.output("J_theta", rows, "rad or m per m or rad")
+    b.output("M_J", motion.M_J, "", 6, structure.m)
+    b.output("M_1", M_1, "m", 3, 3)
+    b.output("M_2", M_2, "", 3, 6)
+    b.output("M_3", M_3, "", 3, 6)
+    return b.finish()

@@ -1,0 +1,204 @@
+"""A mechanism's numbers, and where a question finds them: shared parameters, lanes of chains."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from ..dynamics import FORMULATIONS
+from ..errors import UnsupportedError
+from ..graph.program import Numbers
+from ..kinematics.chain import FAMILIES
+from ..kinematics.contact import (
+    ContactSymbols,
+    angle_equation,
+    closed_form_available,
+    contacts_of,
+    mean_and_difference,
+)
+from ..mechanism.home import characteristic_length, dependent_coordinates
+from ..mechanism.mechanism import Mechanism
+from ..mechanism.surface import of_form
+from .structure import Structure
+
+Slot = tuple[int, int]  # start, count
+Vector = tuple[float, ...]
+INERTIA = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # order of an inertia's entries
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Names to positions.
+
+    parameters: shared numbers of the mechanism.
+    lanes:      numbers of a chain, by group.
+    """
+
+    structure: Structure
+    parameters: dict[str, Slot]
+    lanes: list[dict[str, Slot]]
+
+    @staticmethod
+    def of(structure: Structure) -> Layout:
+        body = {"mass": 1, "first_moment": 3, "inertia": 6}
+        sizes = {"gravity": 3, **body, **{f"lumped_{name}": n for name, n in body.items()}}
+        sizes |= {"branch": 1, "length": 1, "landmark": 3, "middle": 3}
+        for i, (_, count) in enumerate(structure.contacts):
+            sizes |= {f"contact_point_{i}": 3, f"contact_surface_{i}": count}
+        if structure.parallel:
+            sizes |= {"slope": 2, "mean": 3, "mean_offset": 1, "difference": 3, "gap": 1}
+        lanes = [
+            _slots({"active": 1, "joint": 3, "constants": FAMILIES[kind].size()})
+            for kind in structure.families
+        ]
+        return Layout(structure, _slots(sizes), lanes)
+
+    def values(self, mechanism: Mechanism, landmark: str | None = None) -> dict[str, Any]:
+        """Shared numbers of a mechanism, by name.
+
+        Args: landmark: the platform point whose path is given, if one is.
+        """
+        points = [contact.point for contact in mechanism.contacts]
+        values: dict[str, Any] = {
+            "gravity": mechanism.gravity,
+            **_body(mechanism, {}),
+            **{f"lumped_{name}": v for name, v in _body(mechanism, end_masses(mechanism)).items()},
+            "branch": 1.0,
+            "length": characteristic_length(mechanism),
+            "landmark": mechanism.platform.points[landmark] if landmark else (0.0, 0.0, 0.0),
+            "middle": np.mean(points, axis=0) if points else (0.0, 0.0, 0.0),
+        }
+        for i, contact in enumerate(mechanism.contacts):
+            values[f"contact_point_{i}"] = contact.point
+            values[f"contact_surface_{i}"] = contact.locus.constants()
+        if self.structure.parallel:
+            first, second = (np.array(c.point) for c in mechanism.contacts)
+            a, b = (c.locus.constants() for c in mechanism.contacts)
+            values |= {"slope": a[:2], "mean": (first + second) / 2, "difference": first - second}
+            values |= {"mean_offset": (a[2] + b[2]) / 2, "gap": a[2] - b[2]}
+        if has_closed_form(mechanism):
+            values["branch"] = closed_branch(mechanism)
+        return values
+
+    def numbers(self, mechanism: Mechanism, landmark: str | None = None) -> Numbers:
+        """All of them, as backends take them."""
+        values = self.values(mechanism, landmark)
+        parameters = np.concatenate([np.ravel(values[name]) for name in self.parameters])
+        lanes, padding = [], []
+        for kind in self.structure.families:
+            family = FAMILIES[kind]
+            chains = [c for c in mechanism.chains if c.kind == kind]
+            rows = [[1.0, *c.platform, *family.vector(family.constants(c))] for c in chains]
+            idle = family.constants(chains[0])
+            idle |= {name: np.zeros_like(idle[name]) for name in self.idle(kind)}
+            lanes.append(np.array(rows, dtype=float).T.copy())
+            padding.append(np.array([0.0, *chains[0].platform, *family.vector(idle)]))
+        order = tuple(
+            i
+            for kind in self.structure.families
+            for i, chain in enumerate(mechanism.chains)
+            if chain.kind == kind
+        )
+        return Numbers(parameters.astype(float), tuple(lanes), tuple(padding), order)
+
+    def idle(self, kind: str) -> tuple[str, ...]:
+        """Constants of a family that, at 0, make a lane that stands for no chain do nothing."""
+        own = FORMULATIONS[self.structure.formulation].idles
+        return FAMILIES[kind].idle if own else ()
+
+
+def specialised(structure: Structure, numbers: Numbers) -> Structure:
+    """The structure that leaves out what is zero in this mechanism."""
+    zeros = [(-1, int(i)) for i in np.flatnonzero(numbers.parameters == 0)]
+    for group, (values, pad) in enumerate(zip(numbers.lanes, numbers.padding, strict=True)):
+        none = (values == 0).all(axis=1) & (pad == 0)
+        zeros += [(group, int(i)) for i in np.flatnonzero(none)]
+    return replace(structure, zeros=frozenset(zeros))
+
+
+def characteristic(structure: Structure, numbers: Numbers) -> float:
+    """The characteristic length [m], from a mechanism's numbers."""
+    return float(numbers.parameters[Layout.of(structure).parameters["length"][0]])
+
+
+def contact_symbols(structure: Structure, parameter: Callable[[str], ca.SX]) -> list[ContactSymbols]:
+    """The contacts, their numbers by name; parallel planes by their mean and difference."""
+    if structure.parallel:
+        names = ("slope", "mean", "mean_offset", "difference", "gap")
+        return mean_and_difference(of_form("plane"), *(parameter(name) for name in names))
+    return single_contacts(structure, parameter)
+
+
+def single_contacts(structure: Structure, parameter: Callable[[str], ca.SX]) -> list[ContactSymbols]:
+    """The contacts, one by one."""
+    return [
+        ContactSymbols(of_form(form), parameter(f"contact_point_{i}"), parameter(f"contact_surface_{i}"))
+        for i, (form, _) in enumerate(structure.contacts)
+    ]
+
+
+def has_closed_form(mechanism: Mechanism) -> bool:
+    """Whether the parasitic motion of the mechanism needs no iteration."""
+    forms = [contact.locus.form for contact in mechanism.contacts]
+    return closed_form_available(forms, dependent_coordinates(mechanism))
+
+
+def require_closed_form(mechanism: Mechanism) -> None:
+    """Raises UnsupportedError where route `direct` has no closed-form parasitic motion."""
+    if not has_closed_form(mechanism):
+        kinds = [contact.surface.kind for contact in mechanism.contacts]
+        dependent = dependent_coordinates(mechanism)
+        raise UnsupportedError(
+            "route direct needs parasitic motion in closed form: at most two contacts, on planes, "
+            f"with at most one dependent angle. This mechanism has {len(kinds)} "
+            f"({', '.join(kinds)}) with dependent {', '.join(dependent)}. Use route core, which "
+            "gives the same torques"
+        )
+
+
+def closed_branch(mechanism: Mechanism) -> float:
+    """-sign(B) of the angle equation at home, which keeps the dependent angle on its branch."""
+    dependent = dependent_coordinates(mechanism)
+    equation = angle_equation(contacts_of(mechanism), dependent, ca.SX.zeros(6))
+    return -float(np.sign(float(ca.evalf(equation.B))))
+
+
+def end_masses(mechanism: Mechanism) -> dict[Vector, float]:
+    """Masses [kg] of the chains that move with the platform's joints, by the joints' points."""
+    masses: dict[Vector, float] = {}
+    for chain in mechanism.chains:
+        family = FAMILIES[chain.kind]
+        constants = family.named(ca.SX(ca.DM(family.vector(family.constants(chain)))))
+        found = [float(ca.evalf(mass)) for mass in family.end_masses(constants).values()]
+        masses[tuple(chain.platform)] = masses.get(tuple(chain.platform), 0.0) + sum(found)
+    return masses
+
+
+def _body(mechanism: Mechanism, points: dict[Vector, float]) -> dict[str, Any]:
+    """Mass, first moment and inertia about O_M, in {M}, of the platform and point masses on it.
+
+    Sums are exact before they are rounded: what a symmetric mechanism makes zero is zero.
+    """
+    platform, xx = mechanism.platform, range(3)
+    own = platform.inertia.tensor()
+    second = [[math.fsum(m * p[i] * p[j] for p, m in points.items()) for j in xx] for i in xx]
+    trace = math.fsum(second[i][i] for i in xx)
+    inertia = [own[i, j] + (trace if i == j else 0.0) - second[i][j] for i, j in INERTIA]
+    return {
+        "mass": platform.mass + math.fsum(points.values()),
+        "first_moment": [math.fsum(m * p[i] for p, m in points.items()) for i in xx],
+        "inertia": inertia,
+    }
+
+
+def _slots(sizes: dict[str, int]) -> dict[str, Slot]:
+    slots, start = {}, 0
+    for name, count in sizes.items():
+        slots[name] = (start, count)
+        start += count
+    return slots

@@ -1,0 +1,150 @@
+"""Reactions: what every joint, guide and contact carries at given efforts.
+
+The free bodies of each chain (`free_body`) are solved for the efforts, so that Newton and Euler
+hold for every body. All vectors are in {S}; each acts on the body it names, and its opposite on the
+other. A crank's own weight is not in them: a mechanism file states no mass for a crank, which turns
+about its mass centre.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import casadi as ca
+
+from ..dynamics.free_body import FreeBodies, free_bodies
+from ..dynamics.joint_space import JointState, joint_motion
+from ..graph.program import Program
+from ..kinematics.chain import FAMILIES, Constants, Family, Joint
+from ..kinematics.contact import contact_frame, solve_small
+from ..kinematics.state import PointMotion, pose_state
+from ..mechanism.mechanism import Mechanism
+from .builder import Builder
+from .numbers import single_contacts
+from .platform import given
+from .structure import Structure
+
+POINT = "point of "  # what the name of a quantity's point begins with
+
+
+@dataclass(frozen=True)
+class Place:
+    """Which reaction it is.
+
+    quantity: "platform_joint", "crank_tip", "shaft_force", "shaft_moment", ..., "contact".
+    owner:    name of the chain or contact.
+    body, by: the body it acts on, and the one that exerts it.
+    place:    where the force acts, or the point that the moment is about.
+    effort:   whether the actuator's effort is part of it.
+    """
+
+    quantity: str
+    owner: str
+    body: str
+    by: str
+    place: str
+    unit: str = "N"
+    effort: bool = False
+
+    @property
+    def name(self) -> str:
+        """As in "crank_tip_masseter_left"."""
+        return f"{self.quantity}_{self.owner}"
+
+    @property
+    def long_name(self) -> str:
+        kind, at = ("force", "at") if self.unit == "N" else ("moment", "about")
+        text = f"{kind} on the {self.body} from the {self.by}, {at} the {self.place}"
+        return f"{text}, with the actuator's effort" if self.effort else text
+
+
+def reactions(structure: Structure) -> Program:
+    """Vectors, (3,) each, and where they act, by quantity: of all chains that have it."""
+    b = Builder(structure)
+    platform = given(b)
+    effort, force = b.lane_sample("effort"), b.sample("contact_force", len(structure.contacts), "N")
+    g = b.parameter("gravity")
+    motion = platform.motion
+    state = pose_state(platform.pose, motion.rate, motion.acceleration)
+    found: dict[str, list[tuple[ca.SX, ca.SX] | None]] = {}
+    units: dict[str, str] = {}
+    for group, kind in enumerate(structure.families):
+        family = FAMILIES[kind]
+        M = state.point(b.lane(group, "joint"))
+        constants = family.named(b.lane(group, "constants"))
+        pairs = chain_reactions(family, constants, M, effort[group], g)
+        for place, pair in zip(chain_places(family, ""), pairs, strict=True):
+            found.setdefault(place.quantity, [None] * len(structure.chains))[group] = pair
+            units[place.quantity] = place.unit
+    for name, own in found.items():
+        b.output(name, [None if pair is None else pair[0] for pair in own], units[name])
+        b.output(POINT + name, [None if pair is None else pair[1] for pair in own], "m")
+    contacts = single_contacts(structure, b.parameter)
+    frame = contact_frame(contacts, platform.pose[:3], platform.R)
+    vectors = [force[i] * n / ca.norm_2(n) for i, n in enumerate(frame.gradients)]
+    points = [platform.pose[:3] + r for r in frame.levers]
+    for name, rows, unit in (("contact", vectors, "N"), (POINT + "contact", points, "m")):
+        b.output(name, ca.horzcat(ca.SX(3, 0), *rows).T, unit, len(contacts), 3)
+    return b.finish()
+
+
+def reaction_places(mechanism: Mechanism) -> list[Place]:
+    """What `reactions` computes, in its order."""
+    return [
+        *(place for c in mechanism.chains for place in chain_places(FAMILIES[c.kind], c.name)),
+        *(
+            Place("contact", name, "platform", "surface", "centre of the ball")
+            for name in mechanism.contact_names
+        ),
+    ]
+
+
+def chain_reactions(
+    family: Family, c: Constants, M: PointMotion, tau: ca.SX, g: ca.SX
+) -> list[tuple[ca.SX, ca.SX]]:
+    """Reactions of one chain under the effort tau, and their points, (3,) each."""
+    s = JointState.symbols()
+    bodies = free_bodies(family, c, s, g)
+    values, points = zip(*_quantities(bodies), strict=True)
+    links = bodies.weight.numel()
+    all_weights = ca.SX.ones(links)
+    motion = joint_motion(family, c, M)
+    carried = ca.substitute(ca.horzcat(*values), bodies.weight, all_weights)
+    K, R, carried, where = motion.insert(s, [bodies.K, bodies.R, carried, ca.horzcat(*points)])
+    solved = solve_small(K, bodies.E * tau - R @ all_weights)
+    carried = ca.substitute(carried, bodies.unknown, solved)
+    return list(zip(ca.horzsplit(carried), ca.horzsplit(where), strict=True))
+
+
+def _quantities(bodies: FreeBodies) -> Iterator[tuple[ca.SX, ca.SX]]:
+    """Vector and point of each reaction of a chain, in the order of `chain_places`."""
+    yield bodies.unknown[:3], bodies.tip
+    for i, joint in enumerate(bodies.joints):
+        yield bodies.carried.forces[i], joint.point
+        if not is_ball(joint):
+            yield bodies.carried.moments[i], joint.point
+        if (guide := bodies.carried.guides[i]) is not None:
+            yield guide, joint.point
+
+
+def chain_places(family: Family, owner: str) -> Iterator[Place]:
+    """The reactions of one chain, in the order of `_quantities`."""
+    c = family.named(ca.SX.sym("c", family.size()))
+    names = [name.removesuffix("s") for name in family.bodies]
+    yield Place("platform_joint", owner, "platform", names[-1], "platform joint M")
+    for i, joint in enumerate(family.joints(c, ca.SX.sym("q_r", 3))):
+        ends = (owner, names[i], names[i - 1] if i else "base", joint.place)
+        turned = joint.driven and joint.turns.shape[1] > 0
+        if is_ball(joint):
+            yield Place(joint.name, *ends)
+        else:
+            yield Place(f"{joint.name}_force", *ends, effort=joint.driven and not turned)
+            yield Place(f"{joint.name}_moment", *ends, unit="N m", effort=turned)
+        if joint.guide is not None:
+            yield Place("guide_moment", owner, names[i], "base", joint.place, unit="N m")
+
+
+def is_ball(joint: Joint) -> bool:
+    """Whether the joint carries no moment."""
+    return joint.turns.shape[1] == 3

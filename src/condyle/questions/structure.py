@@ -1,0 +1,69 @@
+"""What shapes a question: the structure of a mechanism, without its numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..mechanism.home import dependent_coordinates
+from ..mechanism.mechanism import Mechanism
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Mechanisms of one structure share every kernel; their numbers are its constants.
+
+    chains:    (family, count) of each group, in the order in which families first occur.
+    contacts:  (form of the surface, number of its constants).
+    dependent: the coordinates that the contacts determine.
+    parallel:  two contacts on planes of one slope, written as their mean and difference.
+    zeros:     parameters that are zero, (-1, i), and constants that are zero in every chain of a
+               group, (group, i): what they multiply is left out.
+    """
+
+    formulation: str
+    route: str
+    chains: tuple[tuple[str, int], ...]
+    contacts: tuple[tuple[str, int], ...]
+    dependent: tuple[str, ...]
+    parallel: bool = False
+    zeros: frozenset[tuple[int, int]] = frozenset()
+
+    @property
+    def n(self) -> int:
+        """Chains."""
+        return sum(count for _, count in self.chains)
+
+    @property
+    def m(self) -> int:
+        """Degrees of freedom."""
+        return 6 - len(self.contacts)
+
+    @property
+    def counts(self) -> tuple[int, ...]:
+        """Chains of each group."""
+        return tuple(count for _, count in self.chains)
+
+    @property
+    def families(self) -> tuple[str, ...]:
+        """The family of each group."""
+        return tuple(kind for kind, _ in self.chains)
+
+
+def structure_of(
+    mechanism: Mechanism, formulation: str = "virtual_power", route: str = "core"
+) -> Structure:
+    """The structure of a mechanism; `numbers` says which of its constants are zero."""
+    counts: dict[str, int] = {}
+    for chain in mechanism.chains:
+        counts[chain.kind] = counts.get(chain.kind, 0) + 1
+    loci = [c.locus for c in mechanism.contacts]
+    contacts = tuple((locus.form, len(locus.constants())) for locus in loci)
+    planes = [locus for locus in loci if locus.form == "plane"]
+    return Structure(
+        formulation=formulation,
+        route=route,
+        chains=tuple(counts.items()),
+        contacts=contacts,
+        dependent=dependent_coordinates(mechanism),
+        parallel=len(contacts) == len(planes) == 2 and planes[0].slope == planes[1].slope,
+    )

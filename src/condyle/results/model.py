@@ -1,0 +1,74 @@
+"""A model: one mechanism, one formulation, one route, ready to compute and to say what it found.
+
+model = condyle.derive(mechanism, formulation="momentum", route="core")
+solution = model.solve(motion, load)
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from ..mechanism.mechanism import Mechanism
+from ..model.evaluator import DEFAULT_LOAD_POINT, Evaluator, with_point
+from ..model.judge import require_ok
+from ..model.reactions import reactions as joint_reactions
+from ..motion import Load, Motion
+from ..progress import step
+from .reactions import reaction_variables
+from .solution import Solution, assemble
+
+
+class Model(Evaluator):
+    """An evaluator whose results are labelled."""
+
+    def solve(
+        self,
+        motion: Motion,
+        load: Load | None = None,
+        load_point: str | None = None,
+        flag: bool = False,
+        reactions: bool = False,
+        threads: int | None = None,
+    ) -> Solution:
+        """Torques along a motion under a load.
+
+        Args:   motion: what the platform does; load: what acts on it (none by default).
+                load_point: platform point the load acts at; default: the load's own, else
+                right_molar.
+                flag: keep samples that cannot be computed, empty and with a status.
+                reactions: forces and moments in every joint too.
+                threads: at most so many; results do not depend on it.
+        Raises: UnreachableError, SingularError: for such samples, unless `flag`.
+                InputError: if motion or load do not fit the mechanism.
+        """
+        start = time.perf_counter()
+        load = load or Load.zero()
+        wrench = load.at(motion.t)
+        name = load_point or load.point
+        loaded = np.any(wrench) or name is not None
+        point = self.load_point(name) if loaded else np.zeros(3)
+        name = (name or DEFAULT_LOAD_POINT) if loaded else None
+        with step("solving"):
+            states, residual = self.independent_motion(motion)
+            evaluation = self.evaluate(*states, with_point(wrench, point), threads)
+        if not flag:
+            require_ok(self.mechanism, evaluation, motion.t)
+        seconds = time.perf_counter() - start
+        solution = assemble(self, motion, load, wrench, name, evaluation, residual, seconds)
+        if not reactions:
+            return solution
+        found = joint_reactions(self, evaluation)
+        variables, coordinates = reaction_variables(self.mechanism, found)
+        return solution.assign(variables).assign_coords(coordinates)
+
+
+def derive(
+    mechanism: Mechanism,
+    formulation: str = "virtual_power",
+    route: str = "core",
+    backend: str = "auto",
+) -> Model:
+    """Derive the equations of motion of a mechanism; see `Model`."""
+    return Model(mechanism, formulation, route, backend)
