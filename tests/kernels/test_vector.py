@@ -54,6 +54,15 @@ void arc_vector(size_t count, from a, from b, to x, to y) {
 void arc_scalar(size_t count, from a, from b, to x, to y) {
     for (size_t i = 0; i < count; i++) x[i] = atan2_s(a[i], b[i]), y[i] = fabs_s(b[i]);
 }
+void sign_vector(size_t count, from a, from b, to x, to y) {
+    EACH(i) {
+        store(x + i, copysign_v(load(a + i), load(b + i)));
+        store(y + i, load(a + i));
+    }
+}
+void sign_scalar(size_t count, from a, from b, to x, to y) {
+    for (size_t i = 0; i < count; i++) x[i] = copysign_s(a[i], b[i]), y[i] = a[i];
+}
 void lanes_vector(size_t count, from a, from b, to x, to y) {
     EACH(i) {
         store(x + i, spread(lanes_sum(load(a + i))));
@@ -207,6 +216,14 @@ def test_a_strange_point_leaves_its_neighbours_alone(vector: Functions) -> None:
         assert (arc[lane::8] == -np.pi).all()
         others = np.arange(64) % 8 != lane
         assert (arc[others] == plain[others]).all()
+
+
+def test_signs(vector: Functions) -> None:
+    values = np.array([0.0, -0.0, 1.5, -1.5, np.inf, -np.inf, 5e-324, -1e308])
+    a, b = (v.ravel() for v in np.meshgrid(values, values))
+    for got, _ in vector.both("sign", a, b):
+        np.testing.assert_array_equal(got, np.copysign(a, b))
+        np.testing.assert_array_equal(np.signbit(got), np.signbit(b))
 
 
 def test_sums_over_lanes(vector: Functions) -> None:

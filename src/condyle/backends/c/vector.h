@@ -52,6 +52,10 @@ INLINE double le_s(double a, double b) { return a <= b; }
 INLINE double lt_s(double a, double b) { return a < b; }
 INLINE vec fabs_v(vec a) { return (vec)((mask)a & INT64_MAX); }
 INLINE double fabs_s(double a) { return fabs(a); }
+INLINE vec copysign_v(vec a, vec b) {
+    return (vec)(((mask)a & INT64_MAX) | ((mask)b & ~INT64_MAX));
+}
+INLINE double copysign_s(double a, double b) { return __builtin_copysign(a, b); }
 INLINE double fmin_s(double a, double b) { return a < b ? a : b; }
 INLINE double fmax_s(double a, double b) { return a > b ? a : b; }
 #if W == 8 && defined(__AVX512F__)
@@ -220,7 +224,7 @@ INLINE vec atan2_v(vec y, vec x) {
     eighths = choose(back, 4.0 - eighths, eighths);
     arc = (vec)((mask)arc ^ ((steep ^ back) & sign));
     arc = eighths * EIGHTH_TURN + (arc + eighths * EIGHTH_TURN_REST);
-    arc = (vec)(((mask)arc & ~sign) | ((mask)y & sign));
+    arc = copysign_v(arc, y);
     mask strange = ~((sum > 0.0) & (sum < 1e308));
     if (__builtin_expect(any(strange), 0))
         for (int i = 0; i < W; i++)
@@ -244,7 +248,6 @@ INLINE vec atan2_v(vec y, vec x) {
 TWO_ARGUMENTS(pow, pow(a, b))
 TWO_ARGUMENTS(fmod, fmod(a, b))
 TWO_ARGUMENTS(remainder, remainder(a, b))
-TWO_ARGUMENTS(copysign, copysign(a, b))
 TWO_ARGUMENTS(hypot, hypot(a, b))
 TWO_ARGUMENTS(eq, a == b)
 TWO_ARGUMENTS(ne, a != b)
