@@ -52,9 +52,7 @@ def singular_values(total: Total, A: Lanes) -> tuple[ca.SX, ca.SX]:
         values = _inserted(values, value)
     if found:
         good = good * (values[-2] >= SPREAD)
-    values[-1] = q[0]
-    for x, y in zip(q[1:], values[:-1], strict=True):
-        values[-1] = values[-1] * (x / (y + TINY))
+    values[-1] = _product(q) / (_product(values[:-1]) + TINY)
     return ca.sqrt(ca.vertcat(*values) * trace), 2 * good - 1
 
 
@@ -111,12 +109,12 @@ def _step(d: list[ca.SX], s: list[ca.SX]) -> tuple[list[ca.SX], list[ca.SX]]:
         r = p + s[i]
         if i < len(s) - 1:
             s[i + 1] = sin2 * r
-        inverse = 1 / r
-        cos2, sin2 = p * inverse, s[i] * inverse
+        inverse = 1 / (r * p)  # one division for both
+        cos2, sin2 = p * p * inverse, s[i] * p * inverse
         before = pivot
         pivot = cos2 * (d[i] - shift) - sin2 * before
         d[i + 1] = before + (d[i] - pivot)
-        p = ca.fmax(pivot * pivot, FLOOR) * (r / p)
+        p = ca.fmax(pivot * pivot, FLOOR) * (r * r * inverse)
     s[0] = sin2 * p
     d[0] = shift + pivot
     return d, s
@@ -127,6 +125,13 @@ def _pair(a: ca.SX, b: ca.SX, s: ca.SX) -> list[ca.SX]:
     half = (a - b) / 2
     mean, root = (a + b) / 2, ca.sqrt(half * half + s)
     return [mean + root, mean - root]
+
+
+def _product(values: list[ca.SX]) -> ca.SX:
+    product = values[0]
+    for value in values[1:]:
+        product = product * value
+    return product
 
 
 def _inserted(values: list[ca.SX], value: ca.SX) -> list[ca.SX]:
