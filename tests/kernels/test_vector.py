@@ -54,6 +54,15 @@ void arc_vector(size_t count, from a, from b, to x, to y) {
 void arc_scalar(size_t count, from a, from b, to x, to y) {
     for (size_t i = 0; i < count; i++) x[i] = atan2_s(a[i], b[i]), y[i] = fabs_s(b[i]);
 }
+void sign_vector(size_t count, from a, from b, to x, to y) {
+    EACH(i) {
+        store(x + i, copysign_v(load(a + i), load(b + i)));
+        store(y + i, load(a + i));
+    }
+}
+void sign_scalar(size_t count, from a, from b, to x, to y) {
+    for (size_t i = 0; i < count; i++) x[i] = copysign_s(a[i], b[i]), y[i] = a[i];
+}
 void lanes_vector(size_t count, from a, from b, to x, to y) {
     EACH(i) {
         store(x + i, spread(lanes_sum(load(a + i))));
@@ -164,12 +173,57 @@ def test_comparisons_are_one_or_nothing(vector: Functions) -> None:
         assert less.tolist() == [1, 0, 0, 0, 0, 1, 0, 1]
 
 
-def test_arcs_and_sizes(vector: Functions) -> None:
+def check_arcs(got: np.ndarray, y: np.ndarray, x: np.ndarray, ulps: float) -> None:
+    wanted = np.array([math.atan2(*point) for point in zip(y, x, strict=True)])
+    np.testing.assert_array_equal(np.isnan(got), np.isnan(wanted))
+    real = ~np.isnan(wanted)
+    np.testing.assert_array_equal(np.signbit(got[real]), np.signbit(wanted[real]))
+    assert (np.abs(got - wanted)[real] <= ulps * np.spacing(np.abs(wanted[real]))).all()
+
+
+def test_arcs(vector: Functions) -> None:
+    """In every quadrant, next to every multiple of pi / 8 and at every ratio."""
     rng = np.random.default_rng(2)
-    a, b = rng.normal(size=(2, 64))
-    for arc, size in vector.both("arc", a, b):
-        assert np.allclose(arc, np.arctan2(a, b), rtol=1e-15, atol=0)
-        assert (size == np.abs(b)).all()
+    turns = np.arange(-64, 65) * (np.pi / 64)
+    near = [turns, np.nextafter(turns, 4), np.nextafter(turns, -4), turns + 1e-9, turns - 1e-9]
+    around = np.concatenate([*near, rng.uniform(-np.pi, np.pi, 20_000)])
+    size = 10.0 ** rng.uniform(-150, 150, len(around))
+    y, x = size * np.sin(around), size * np.cos(around)
+    sizes = 10.0 ** rng.uniform(-323, 307, (2, 5000)) * rng.choice([-1, 1], (2, 5000))
+    for b, a in ((y, x), sizes):
+        for arc, _ in vector.both("arc", b, a):
+            check_arcs(arc, b, a, 2)
+
+
+def test_arcs_of_special_points(vector: Functions) -> None:
+    """Zeros of either sign, halves, equals, infinities, the smallest, the largest and none."""
+    values = [0.0, 0.5, 1.0, 2.0, 5e-324, 1e-310, 2.3e-308, 9e307, 1.7e308, np.inf, np.nan]
+    signed = np.array([s * v for v in values for s in (1, -1)])
+    y, x = (v.ravel() for v in np.meshgrid(signed, signed))
+    for arc, size in vector.both("arc", y, x):
+        check_arcs(arc, y, x, 2)
+        np.testing.assert_array_equal(size, np.abs(x))
+
+
+def test_a_strange_point_leaves_its_neighbours_alone(vector: Functions) -> None:
+    rng = np.random.default_rng(4)
+    y, x = rng.normal(size=(2, 64))
+    plain, _ = vector("arc_vector", y, x)
+    for lane in range(8):
+        b, a = y.copy(), x.copy()
+        b[lane::8], a[lane::8] = -0.0, -0.0
+        arc, _ = vector("arc_vector", b, a)
+        assert (arc[lane::8] == -np.pi).all()
+        others = np.arange(64) % 8 != lane
+        assert (arc[others] == plain[others]).all()
+
+
+def test_signs(vector: Functions) -> None:
+    values = np.array([0.0, -0.0, 1.5, -1.5, np.inf, -np.inf, 5e-324, -1e308])
+    a, b = (v.ravel() for v in np.meshgrid(values, values))
+    for got, _ in vector.both("sign", a, b):
+        np.testing.assert_array_equal(got, np.copysign(a, b))
+        np.testing.assert_array_equal(np.signbit(got), np.signbit(b))
 
 
 def test_sums_over_lanes(vector: Functions) -> None:

@@ -6,24 +6,35 @@ from collections.abc import Callable, Sequence
 
 import casadi as ca
 
-# |q_k|^2 / |a_k|^2 below which the normal equations lose too many digits: they square the
-# condition number, and their error stays under about rounding / CONDITIONED.
+# Where the normal equations are left. |q_k|^2 / |a_k|^2 below which elimination loses too much,
 CONDITIONED = 1e-3
+# and how often longer than tau the terms that it is summed from may be, counted without signs.
+CANCELLATION = 50.0
 
 Lanes = list[ca.SX]  # one expression a family group
 Total = Callable[[Sequence[ca.SX]], ca.SX]
 
 
 def normal_equations(total: Total, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
-    """Least-norm solutions tau = A (A^T A)^-1 b.
+    """Least-norm solutions tau = A y with A^T A y = b.
 
-    Quick, since all its sums run at once, and good to rounding times the square of the condition
-    number; where the quality it returns is negative, `gram_schmidt` has to do the work.
+    Quick, since all its sums run at once. Elimination leaves A^T tau - b of rounding times
+    |a_i| sum_j |a_j| |y_j| in equation i, where a backward stable method leaves rounding times
+    |A| |tau|; their quotient can be as large as the condition number of A with columns of one
+    length, which is how normal equations come to square it. The quotient itself is known, from
+    |tau|^2 = y . b, and where
+
+        m sum_j |a_j|^2 y_j^2 <= CANCELLATION^2 y . b
+
+    the residual is a few times fifty roundings of |A| |tau|, so under 1e-12 times the condition
+    number of |b|. That is so wherever the condition number, with columns of one length, is under
+    `CANCELLATION` / sqrt(m), at least 20; above it b decides.
 
     Args:    total: sums entries over all chains.
              A: (m,) a group, lane values.  b: (m, r).
-    Returns: tau, (r,) a group as rows; 1, or -1 where columns of A are too nearly dependent: a
-             pivot is below `CONDITIONED` times its column's square.
+    Returns: tau, (r,) a group as rows; 1, or -1 where `gram_schmidt` has to do the work: a pivot
+             is below `CONDITIONED` times its column's square, or the bound above, summed over
+             the right-hand sides, does not hold.
     """
     m = b.shape[0]
     pairs = [(j, k) for j in range(m) for k in range(j, m)]
@@ -31,11 +42,15 @@ def normal_equations(total: Total, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
     G = ca.SX(m, m)
     for (j, k), product in zip(pairs, ca.vertsplit(products), strict=True):
         G[j, k] = G[k, j] = product
-    y, excess = _definite_solve(G, b, ca.diag(G))
+    lengths = ca.diag(G)
+    y, excess = _definite_solve(G, b, lengths)
+    terms = ca.dot(lengths, ca.sum2(y * y))
+    spare = CANCELLATION**2 / m * ca.sum2(ca.sum1(y * b)) - terms
     least = excess[0]
     for value in excess[1:]:
         least = ca.fmin(least, value)
-    return [a.T @ y for a in A], 2 * (least >= 0) - 1
+    # Compared apart, since minima do not agree on what is no number.
+    return [a.T @ y for a in A], 2 * (least >= 0) * (spare >= 0) - 1
 
 
 def _definite_solve(G: ca.SX, b: ca.SX, lengths: ca.SX) -> tuple[ca.SX, list[ca.SX]]:
@@ -70,8 +85,15 @@ def _definite_solve(G: ca.SX, b: ca.SX, lengths: ca.SX) -> tuple[ca.SX, list[ca.
 def gram_schmidt(total: Total, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
     """Least-norm solutions of A^T tau = b by modified Gram-Schmidt on the columns of A.
 
-    A = Q R with orthogonal, unnormalised columns, so that tau = Q (Q^T Q)^-1 R^-T b: no square
-    roots, and an error of rounding times the condition number, not its square.
+    A = Q R with unnormalised columns in Q and ones on the diagonal of R, so no square roots.
+    R^T w = b, forwards, gives w = Q^T tau; then tau = Q c with
+
+        c_k = (w_k - sum_{j > k} (q_k . q_j) c_j) / |q_k|^2,    k = m, ..., 1.
+
+    The sum would be 0 if Q were orthogonal. Modified Gram-Schmidt leaves rounding times the
+    condition number of it, and to project again in reverse order, as Bjoerck does for this
+    problem, makes the method backward stable: A^T tau - b is rounding times |A| |tau|, however
+    ill conditioned A is, and how long its columns are does not matter.
 
     Args:    total: sums entries over all chains.
              A: (m,) a group, lane values.  b: (m, r).
@@ -81,20 +103,26 @@ def gram_schmidt(total: Total, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
     m = b.shape[0]
     columns = [[a[k] for a in A] for k in range(m)]
     lengths = total([a * a for a in A])
-    z = [b[k, :] for k in range(m)]
-    result = [ca.SX(1, b.shape[1]) for _ in A]
+    w = [b[k, :] for k in range(m)]
+    overlaps, inverses = [], []
     quality = ca.SX(1.0)
     for k in range(m):
         q = columns[k]
+        # With the columns before it what is left of orthogonality, with those after it R.
         products = total(
-            [ca.vertcat(*(x * columns[j][g] for j in range(k, m))) for g, x in enumerate(q)]
+            [ca.vertcat(*(x * column[g] for column in columns)) for g, x in enumerate(q)]
         )
-        quality = ca.fmin(quality, products[0] / lengths[k])
-        inverse = 1 / products[0]
+        quality = ca.fmin(quality, products[k] / lengths[k])
+        overlaps.append(products[:k])
+        inverses.append(1 / products[k])
         for j in range(k + 1, m):
-            ratio = products[j - k] * inverse
+            ratio = products[j] * inverses[k]
             columns[j] = [y - ratio * x for x, y in zip(q, columns[j], strict=True)]
-            z[j] = z[j] - ratio * z[k]
-        weight = z[k] * inverse
-        result = [r + x * weight for r, x in zip(result, q, strict=True)]
+            w[j] = w[j] - ratio * w[k]
+    result = [ca.SX(1, b.shape[1]) for _ in A]
+    for k in reversed(range(m)):
+        c = w[k] * inverses[k]
+        for j in range(k):
+            w[j] = w[j] - overlaps[k][j] * c
+        result = [r + x * c for r, x in zip(result, columns[k], strict=True)]
     return result, quality
