@@ -46,8 +46,8 @@ if TYPE_CHECKING:
         UnsupportedError,
     )
     from .mechanism import Mechanism, bundled_mechanisms, dump, dumps, load
-    from .results.model import Model, derive
     from .motion import Load, Motion, reference_load, reference_motion, trial_motion
+    from .results.model import Model, derive
     from .results.solution import Solution, open_solution
 
 __all__ = [*_HOMES, "__version__"]

@@ -20,7 +20,7 @@ from ..mechanism.mechanism import Mechanism
 from ..model.evaluator import Evaluator, with_point
 from ..progress import step
 from .indices import Indices, indices
-from .runs import TimedModel, Run, Samples, run
+from .runs import Run, Samples, TimedModel, run
 
 if TYPE_CHECKING:
     from ..motion import Load, Motion

@@ -36,10 +36,7 @@ GCC = (
 NATIVE = (("-march=native", *GCC), ("-march=native",), ("-mcpu=native",), ())
 SECONDS = 300  # a build that takes longer has gone wrong
 ASKING = 30  # seconds in which a compiler says what it is
-REMEDY = (
-    "Install gcc or clang, name another compiler in CC, or take numpy "
-    "(--backend numpy)"
-)
+REMEDY = "Install gcc or clang, name another compiler in CC, or take numpy (--backend numpy)"
 
 
 class CompilerError(CondyleError):

@@ -52,7 +52,7 @@ def columns_of(
     columns: list[np.ndarray] = []
     for port in interface.ports:
         a = np.asarray(inputs[port.name], dtype=np.float64)
-        want = (port.size,)
+        want: tuple[int, ...] = (port.size,)
         if port.lanes:
             want = (interface.lanes,) if port.size == 1 else (port.size, interface.lanes)
         if a.shape[1:] != want:

@@ -1,4 +1,4 @@
-"""Our own rows: kernels of every formulation, the interpreter, and CasADi's straight-line C."""
+"""Our own rows: kernels of every formulation, numpy, and CasADi's straight-line C."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
@@ -16,16 +17,21 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
+from ..backends.c.kernel import CompiledKernel
 from ..backends.compiler import find_compiler
-from ..dynamics.equations import has_closed_form
-from ..kernels.compiled import Kernel
 from ..mechanism.mechanism import Mechanism
-from ..model import Model
+from ..model.evaluator import Evaluator
+from ..motion import Motion, reference_load, reference_motion
+from ..questions.inverse import inverse
+from ..questions.numbers import Layout, has_closed_form, specialised
+from ..questions.structure import structure_of
+from ..results.model import Model
 from .rows import Probe, Row, spread
 from .straight_line import torque_function
 
 SAMPLES = 1000  # in a cache, and no power of two, which columns would have to share places for
-INTERPRETED = 256  # samples a call of the interpreter
+MANY = 100_000  # samples of what people call
+SOLVE = "solve along a landmark's path"
 
 
 class Timer:
@@ -48,7 +54,7 @@ class Timer:
         return min(self.library.vector_operation(ctypes.c_long(1_200_000)) for _ in range(3))
 
 
-def reachable_samples(model: Model, count: int, seed: int = 0) -> np.ndarray:
+def reachable_samples(model: Evaluator, count: int, seed: int = 0) -> np.ndarray:
     """Random states (q, q', q'', F) that the mechanism reaches, (count, 3 m + 3)."""
     rng = np.random.default_rng(seed)
     m = model.mechanism.degrees_of_freedom
@@ -57,23 +63,55 @@ def reachable_samples(model: Model, count: int, seed: int = 0) -> np.ndarray:
     while sum(map(len, found)) < count:
         q, q1, q2 = (rng.uniform(-s, s, (count, m)) * scale for s in (0.05, 0.5, 5.0))
         force = rng.normal(0, 5, (count, 3))
-        load = np.hstack([force, np.zeros((count, 3)), np.zeros((count, 3))])
-        ok = model.torques(q, q1, q2, load)[1] == 0
+        load = np.hstack([force, np.zeros((count, 6))])
+        ok = model.torques(q, q1, q2, load).status == 0
         found.append(np.hstack([q, q1, q2, force])[ok])
     return np.concatenate(found)[:count]
 
 
+@dataclass(frozen=True)
+class Case:
+    """States and loads of a mechanism, and their efforts by numpy."""
+
+    mechanism: Mechanism
+    samples: np.ndarray
+    load: np.ndarray
+    point: np.ndarray
+    right: np.ndarray
+
+    @staticmethod
+    def of(mechanism: Mechanism) -> Case:
+        point = np.array(mechanism.platform.points.get("right_molar", (0.01, 0.02, 0.005)))
+        reference = Evaluator(mechanism, backend="numpy")
+        m = mechanism.degrees_of_freedom
+        samples = reachable_samples(reference, SAMPLES)
+        load = np.hstack(
+            [samples[:, 3 * m :], np.zeros((SAMPLES, 3)), np.tile(point, (SAMPLES, 1))]
+        )
+        case = Case(mechanism, samples, load, point, np.empty(0))
+        return replace(case, right=reference.torques(*case.states, load).effort)
+
+    @property
+    def states(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        m = self.mechanism.degrees_of_freedom
+        q, q1, q2 = (self.samples[:, i * m : (i + 1) * m] for i in range(3))
+        return q, q1, q2
+
+    @property
+    def columns(self) -> np.ndarray:
+        """What a kernel of inverse dynamics reads, (SAMPLES, 3 m + 9)."""
+        return np.hstack([*self.states, self.load])
+
+    def many(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """q, q', q'' and the load of so many samples, as columns."""
+        rows = np.arange(count) % SAMPLES
+        q, q1, q2, load = (np.asfortranarray(a[rows]) for a in (*self.states, self.load))
+        return q, q1, q2, load
+
+
 def own_probes(mechanism: Mechanism, formulations: list[str]) -> Iterator[Probe]:
     """What is timed of one mechanism."""
-    timer = Timer()
-    point = np.array(mechanism.platform.points.get("right_molar", (0.01, 0.02, 0.005)))
-    reference = Model(mechanism, backend="interpreted")
-    m = mechanism.degrees_of_freedom
-    samples = reachable_samples(reference, SAMPLES)
-    load = np.hstack([samples[:, 3 * m :], np.zeros((SAMPLES, 3)), np.tile(point, (SAMPLES, 1))])
-    states = [samples[:, i * m : (i + 1) * m] for i in range(3)]
-    right = reference.torques(states[0], states[1], states[2], load)[0].torque
-    name = mechanism.name
+    timer, case, name = Timer(), Case.of(mechanism), mechanism.name
     for formulation in formulations:
         label = f"{name} {formulation}"
         variants: list[tuple[str, str, tuple[str, ...]]] = [("", "core", ())]
@@ -82,64 +120,78 @@ def own_probes(mechanism: Mechanism, formulations: list[str]) -> Iterator[Probe]
         elif has_closed_form(mechanism):
             variants.append((", direct", "direct", ()))
         for what, route, outputs in variants:
-            kernel = Kernel(mechanism, formulation, route, point, outputs)
-            yield from _kernel_probes(label + what, kernel, timer, samples, right)
-    q, q1, q2, wrench = (a[:INTERPRETED] for a in (*states, load))
+            model = Evaluator(mechanism, formulation, route, "compiled")
+            yield from _kernel_probes(label + what, model, outputs, timer, case)
+    numpy = Evaluator(mechanism, backend="numpy")
     yield _python_probe(
-        f"{name} interpreter: batch", lambda: reference.torques(q, q1, q2, wrench), INTERPRETED
+        f"{name} numpy: batch", lambda: numpy.torques(*case.states, case.load), SAMPLES
     )
     if all(c.locus.form == "plane" for c in mechanism.contacts):
-        label = f"{name} CasADi straight-line C, gcc"
-        yield from _straight_probes(label, mechanism, point, timer, samples, right)
+        yield from _straight_probes(f"{name} CasADi straight-line C, gcc", timer, case)
 
 
 def _kernel_probes(
-    label: str, kernel: Kernel, timer: Timer, samples: np.ndarray, right: np.ndarray
+    label: str, model: Evaluator, outputs: tuple[str, ...], timer: Timer, case: Case
 ) -> Iterator[Probe]:
-    packed, columns = np.ascontiguousarray(samples), np.asfortranarray(samples)
-    out, status = np.empty(64 * len(samples)), np.empty(len(samples), dtype=np.uint8)
-    got = np.array([kernel.one(s) for s in samples[:256]])[:, : right.shape[1]]
+    kernel = model.kernel("inverse", outputs)
+    assert isinstance(kernel, CompiledKernel)
+    packed, columns = np.ascontiguousarray(case.columns), np.asfortranarray(case.columns)
+    out, status = np.empty(96 * SAMPLES), np.empty(SAMPLES, dtype=np.uint8)
+    n = case.right.shape[1]
+    got = np.array([kernel.one(s)[0] for s in packed[:256]])[:, :n]
     # Lanes stand family by family in what C returns.
-    wrong = _error(kernel.in_order(got), right[:256])
+    wrong = _error(got[:, np.argsort(kernel.order)], case.right[:256])
     operations = kernel.facts["operations"]
     for dependent, what in ((0, "one"), (1, "one, dependent")):
 
         def run(dependent: int = dependent) -> float:
             one, _, table = _addresses(kernel)
             return timer.library.time_one(
-                one, table, _at(packed), len(packed), packed.shape[1], _at(out), dependent
+                one, table, _at(packed), len(packed) - 1, packed.shape[1], _at(out), dependent
             )
 
         yield Probe(f"{label}: {what}", run, wrong, operations)
-    pointers = (ctypes.c_void_p * columns.shape[1])(
-        *(columns[:, j].ctypes.data for j in range(columns.shape[1]))
-    )
+    count = columns.shape[1]
+    pointers = (ctypes.c_void_p * count)(*(columns[:, j].ctypes.data for j in range(count)))
+    strides = (ctypes.c_ssize_t * count)(*[1] * count)
 
     def blocks() -> float:
         _, batch, table = _addresses(kernel)
         return timer.library.time_batch(
-            batch, table, pointers, ctypes.c_size_t(len(columns)), _at(out), _at(status)
+            batch, table, pointers, strides, ctypes.c_size_t(SAMPLES), _at(out), _at(status)
         )
 
-    wrong = _error(kernel.in_order(kernel.run(columns)[0]["torque"]), right)
+    wrong = _error(model.torques(*case.states, case.load, outputs).effort, case.right)
     yield Probe(f"{label}: batch", blocks, wrong, operations)
 
 
-def _addresses(kernel: Kernel) -> list[ctypes.c_void_p]:
+def _addresses(kernel: CompiledKernel) -> list[ctypes.c_void_p]:
     """Of `one`, `batch` and the table, while the kernel that owns them is there."""
     return [ctypes.c_void_p(address) for address in kernel.address]
 
 
 def thread_probes(mechanism: Mechanism) -> Iterator[Probe]:
-    """One thread and two, by the same call from Python on many samples."""
-    kernel = Kernel(mechanism, "virtual_power", "core", np.array([0.01, 0.02, 0.005]))
-    samples = reachable_samples(Model(mechanism, backend="interpreted"), SAMPLES)
-    many = np.asfortranarray(np.tile(samples, (200, 1)))
+    """One thread and two, by the same call from Python on few and on many samples."""
+    model, case = Evaluator(mechanism, backend="compiled"), Case.of(mechanism)
     label = f"{mechanism.name} virtual_power: batch"
-    for threads, what in ((1, "one thread"), (2, "two threads")):
-        yield _python_probe(
-            f"{label}, {what}", partial(kernel.run, many, threads=threads), len(many)
-        )
+    for count in (100, 5000, 200_000):
+        given = case.many(count)
+        size = "" if count == 200_000 else f" of {count}"
+        for threads, what in ((1, "one thread"), (2, "two threads")):
+            call = partial(model.torques, *given, threads=threads)
+            yield _python_probe(f"{label}{size}, {what}", call, count)
+
+
+def asked_probes(mechanism: Mechanism) -> Iterator[Probe]:
+    """What people call, from Python, on as many samples: efforts, everything, and `solve`."""
+    model, case = Model(mechanism, backend="compiled"), Case.of(mechanism)
+    label, given = mechanism.name, case.many(MANY)
+    yield _python_probe(f"{label}: torques", lambda: model.torques(*given), MANY)
+    yield _python_probe(f"{label}: evaluate", lambda: model.evaluate(*given), MANY)
+    t = np.linspace(0, 5, MANY)
+    chew, bite = reference_motion(), reference_load()
+    path = Motion.from_arrays(chew.t, chew.value, chew.names, landmark="incisor", times=t)
+    yield _python_probe(f"{label}: {SOLVE}", lambda: model.solve(path, bite), MANY)
 
 
 def _python_probe(name: str, call: Callable[[], object], count: int) -> Probe:
@@ -155,23 +207,19 @@ def _python_probe(name: str, call: Callable[[], object], count: int) -> Probe:
     return Probe(name, run, 0.0)
 
 
-def _straight_probes(
-    label: str,
-    mechanism: Mechanism,
-    point: np.ndarray,
-    timer: Timer,
-    samples: np.ndarray,
-    right: np.ndarray,
-) -> Iterator[Probe]:
-    function = torque_function(mechanism, "virtual_power", point)
+def _straight_probes(label: str, timer: Timer, case: Case) -> Iterator[Probe]:
+    structure = structure_of(case.mechanism)
+    numbers = Layout.of(structure).numbers(case.mechanism)
+    program = inverse(specialised(structure, numbers)).main
+    function = torque_function(program, numbers, case.point)
     folder = Path(tempfile.mkdtemp(prefix="condyle-bench-"))
     (folder / "straight.c").write_text(_generated(function), encoding="utf-8")
     library = folder / "straight.so"
     find_compiler().build(folder / "straight.c", library)
     call = ctypes.CDLL(str(library)).straight_line
     w, iw = np.empty(function.sz_w() + 1), np.empty(function.sz_iw() + 1, dtype=np.int64)
-    packed, out = np.ascontiguousarray(samples), np.empty(16)
-    got = np.asarray(function(samples[:256].T).full()).T
+    packed, out = np.ascontiguousarray(case.samples), np.empty(16)
+    got = np.asarray(function(packed[:256].T).full()).T[:, np.argsort(numbers.order)]
     for dependent, what in ((0, "one"), (1, "one, dependent")):
 
         def run(dependent: int = dependent) -> float:
@@ -186,7 +234,7 @@ def _straight_probes(
                 dependent,
             )
 
-        yield Probe(f"{label}: {what}", run, _error(got, right[:256]))
+        yield Probe(f"{label}: {what}", run, _error(got, case.right[:256]))
 
 
 def _generated(function: ca.Function) -> str:
@@ -200,10 +248,9 @@ def ready_rows(mechanism: str) -> Iterator[Row]:
     program = (
         "import time; t = time.perf_counter()\n"
         "import numpy as np, condyle\n"
-        "from condyle.kernels.compiled import Kernel\n"
-        f"m = condyle.load({mechanism!r})\n"
-        "k = Kernel(m, 'virtual_power', 'core', np.array([0.01, 0.02, 0.005]))\n"
-        "k.one(np.zeros(k.inputs))\n"
+        "from condyle.model.evaluator import Evaluator\n"
+        f"k = Evaluator(condyle.load({mechanism!r})).kernel('inverse', ())\n"
+        "k.one(np.zeros(k.interface.columns))\n"
         "print(time.perf_counter() - t)\n"
     )
     with tempfile.TemporaryDirectory(prefix="condyle-bench-") as cache:

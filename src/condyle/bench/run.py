@@ -21,9 +21,17 @@ from .. import __version__
 from ..backends.compiler import find_compiler
 from ..dynamics import FORMULATIONS
 from ..mechanism import bundled_text, load
-from ..model import Model
+from ..model.evaluator import Evaluator
 from ..progress import step
-from .own import Timer, own_probes, reachable_samples, ready_rows, thread_probes
+from .own import (
+    SOLVE,
+    Timer,
+    asked_probes,
+    own_probes,
+    reachable_samples,
+    ready_rows,
+    thread_probes,
+)
 from .rows import Probe, Row, timed
 
 REFERENCE = "masticatory"
@@ -91,6 +99,7 @@ def run_benchmark(seconds: float = 1.0) -> Benchmark:
                 probes += own_probes(load(name), ["virtual_power"])
         with step("building other engines"):
             probes += _peer_probes(unavailable)
+        probes += asked_probes(load(REFERENCE))
         probes.append(Probe(OPERATION, timer.vector_operation, 0.0))
         rows = _timed(probes, rounds)
         with step("starting afresh"):
@@ -138,7 +147,7 @@ def _heat(probe: Probe) -> int:
     """Processors slow down for a while after wide vectors were busy: what keeps them so is last."""
     if probe.name == OPERATION:
         return 3
-    if "batch" in probe.name and "interpreter" not in probe.name:
+    if "batch" in probe.name and "numpy" not in probe.name:
         return 2
     return 0 if probe.name == CYCLE or probe.name.startswith("peer") else 1
 
@@ -155,14 +164,14 @@ def _peer_probes(unavailable: dict[str, str]) -> Iterator[Probe]:
         sys.path.pop(0)
     raw = tomllib.loads(bundled_text(REFERENCE))
     mechanism = load(REFERENCE)
-    model = Model(mechanism, backend="interpreted")
+    model = Evaluator(mechanism, backend="numpy")
     m = mechanism.degrees_of_freedom
     samples = reachable_samples(model, 64)
     q, q1, q2 = (np.ascontiguousarray(samples[:, i * m : (i + 1) * m]) for i in range(3))
     force = np.ascontiguousarray(samples[:, 3 * m :])
     point = np.tile(mechanism.platform.points["right_molar"], (64, 1))
     load_ = np.hstack([force, np.zeros((64, 3)), point])
-    right = model.torques(q, q1, q2, load_)[0].torque
+    right = model.torques(q, q1, q2, load_).effort
     for name, make in peers.PEERS.items():
         peer = make()
         able, why = peer.available()
@@ -216,6 +225,13 @@ def _ratios(rows: list[Row], lanes: int) -> dict[str, float]:
     for formulation in ("momentum", "lagrange"):
         routes = (by_name[f"{REFERENCE} {formulation}{r}: one"] for r in (", direct", ""))
         ratios[f"one evaluation, {formulation}, direct over core"] = next(routes).over(next(routes))
+    asked = by_name[f"{REFERENCE}: torques"]
+    for what in ("evaluate", SOLVE):
+        ratios[f"{what} over efforts alone"] = by_name[f"{REFERENCE}: {what}"].over(asked)
+    for size in ("100", "5000"):
+        few = [by_name.get(f"{own}: batch of {size}, {t}") for t in ("one thread", "two threads")]
+        if few[0] and few[1]:
+            ratios[f"two threads over one, {size} samples"] = few[1].over(few[0])
     threads = [by_name.get(f"{own}: batch, {what}") for what in ("one thread", "two threads")]
     if threads[0] and threads[1]:
         ratios["two threads, times faster than one"] = threads[0].over(threads[1])

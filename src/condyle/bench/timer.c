@@ -2,9 +2,9 @@
 #include "../backends/c/vector.h"
 #include <time.h>
 
-typedef void (*One)(const double *, const double *, double *);
-typedef void (*Batch)(const double *, const double *const *, ptrdiff_t, size_t, double *, size_t,
-                      uint8_t *);
+typedef int (*One)(const double *, const double *, double *);
+typedef void (*Batch)(const double *, const double *const *, const ptrdiff_t *, size_t, double *,
+                      size_t, uint8_t *);
 typedef int (*Casadi)(const double **, double **, long long *, double *, int);
 
 static double now(void) {
@@ -27,10 +27,10 @@ double time_one(One f, const double *table, double *samples, size_t count, size_
     return (now() - start) / (double)count;
 }
 
-double time_batch(Batch f, const double *table, const double *const *in, size_t count, double *out,
-                  uint8_t *status) {
+double time_batch(Batch f, const double *table, const double *const *in, const ptrdiff_t *stride,
+                  size_t count, double *out, uint8_t *status) {
     double start = now();
-    f(table, in, 1, count, out, count, status);
+    f(table, in, stride, count, out, count, status);
     return (now() - start) / (double)count;
 }
 

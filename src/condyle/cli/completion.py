@@ -15,7 +15,7 @@ import typer
 
 FORMULATIONS = ("virtual_power", "momentum", "lagrange", "hessian", "newton_euler")
 ROUTES = ("core", "direct")
-BACKENDS = ("auto", "compiled", "interpreted")
+BACKENDS = ("auto", "compiled", "numpy")
 UNITS = ("m,rad", "m,deg", "mm,rad", "mm,deg", "cm,rad", "cm,deg")
 FIGURES = (
     "motion",

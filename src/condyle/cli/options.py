@@ -87,7 +87,7 @@ Reactions = Annotated[
 Backend = Annotated[
     str,
     typer.Option(
-        help="compiled, interpreted (the same numbers, slower), or auto: compiled where there is "
+        help="compiled, numpy (the same numbers, slower), or auto: compiled where there is "
         "a C compiler.",
         autocompletion=completion.one_of(*completion.BACKENDS),
     ),

@@ -14,10 +14,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from .operations import REDUCTIONS
+from .operations import REDUCTIONS, Value
 
-Value = int  # a node's number
 VARYING = ("input", "lane_input")  # leaves that change from sample to sample
+
 
 @dataclass(frozen=True)
 class Node:
@@ -183,3 +183,6 @@ def reachable(graph: Graph, roots: Sequence[Value]) -> list[Value]:
                 stack.append((value, True))
                 stack.extend((a, False) for a in reversed(graph.nodes[value].args))
     return order
+
+
+__all__ = ["VARYING", "Graph", "Node", "Value", "reachable"]

@@ -8,17 +8,25 @@ A new way to run graphs reads this table; a new operation is a row of it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import casadi as ca
 import numpy as np
 
-if TYPE_CHECKING:
-    from .graph import Graph, Value
+Value = int  # a node's number
 
-Partials = Callable[["Graph", "Value", "Sequence[Value]"], "list[Value | None]"]
+
+class Algebra(Protocol):
+    """What derivatives are written with: a graph."""
+
+    def apply(self, op: str, *args: Value) -> Value: ...
+
+    def const(self, value: float) -> Value: ...
+
+
+Partials = Callable[[Algebra, Value, Sequence[Value]], Sequence[Value | None]]
 
 
 @dataclass(frozen=True)
@@ -36,7 +44,7 @@ class Operation:
     name: str
     casadi: int | None
     numpy: Callable[..., Any]
-    partials: Callable[[Graph, Value, tuple[Value, ...]], list[Value | None]]
+    partials: Partials
     infix: str | None = None
     latency: int = 4
 
@@ -49,27 +57,27 @@ class Operation:
         return lambda *args, out: np.copyto(out, function(*args))
 
 
-def _flat(count: int) -> Callable[..., list[None]]:
+def _flat(count: int) -> Partials:
     return lambda g, v, x: [None] * count
 
 
-def _square_below(g: Graph, a: Value, sign: str) -> Value:
+def _square_below(g: Algebra, a: Value, sign: str) -> Value:
     """1 - a^2 or 1 + a^2."""
     return g.apply(sign, g.const(1.0), g.apply("mul", a, a))
 
 
-def _inverse(g: Graph, a: Value) -> Value:
+def _inverse(g: Algebra, a: Value) -> Value:
     return g.apply("div", g.const(1.0), a)
 
 
-def _scaled(g: Graph, a: Value, factor: float) -> Value:
+def _scaled(g: Algebra, a: Value, factor: float) -> Value:
     return g.apply("mul", g.const(factor), a)
 
 
-def _product(*names: str) -> Callable[[Graph, Value, tuple[Value, ...]], list[Value | None]]:
+def _product(*names: str) -> Partials:
     """Derivative of a function of one argument, as a product of functions of that argument."""
 
-    def partials(g: Graph, v: Value, x: tuple[Value, ...]) -> list[Value | None]:
+    def partials(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
         total = g.const(1.0)
         for name in names:
             total = g.apply("mul", total, g.apply(name, x[0]))
@@ -78,90 +86,90 @@ def _product(*names: str) -> Callable[[Graph, Value, tuple[Value, ...]], list[Va
     return partials
 
 
-def _root(g: Graph, v: Value, x: tuple[Value, ...]) -> list[Value | None]:
+def _root(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
     return [_scaled(g, _inverse(g, v), 0.5)]
 
 
-def _arc(sign: str, negative: bool = False) -> Callable[..., list[Value | None]]:
+def _arc(sign: str, negative: bool = False) -> Partials:
     """+-1 / sqrt(1 -+ a^2)."""
 
-    def partials(g: Graph, v: Value, x: tuple[Value, ...]) -> list[Value | None]:
+    def partials(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
         slope = _inverse(g, g.apply("sqrt", _square_below(g, x[0], sign)))
         return [g.apply("neg", slope) if negative else slope]
 
     return partials
 
 
-def _acosh(g: Graph, v: Value, x: tuple[Value, ...]) -> list[Value | None]:
+def _acosh(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
     below = g.apply("sub", g.apply("mul", x[0], x[0]), g.const(1.0))
     return [_inverse(g, g.apply("sqrt", below))]
 
 
-def _rational(sign: str) -> Callable[..., list[Value | None]]:
+def _rational(sign: str) -> Partials:
     return lambda g, v, x: [_inverse(g, _square_below(g, x[0], sign))]
 
 
-def _erf(g: Graph, v: Value, x: tuple[Value, ...]) -> list[Value | None]:
+def _erf(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
     bell = g.apply("exp", g.apply("neg", g.apply("mul", x[0], x[0])))
     return [_scaled(g, bell, 2 / math.sqrt(math.pi))]
 
 
-def _power(g: Graph, v: Value, x: tuple[Value, ...]) -> list[Value | None]:
+def _power(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
     a, b = x
     lower = g.apply("pow", a, g.apply("sub", b, g.const(1.0)))
     return [g.apply("mul", b, lower), g.apply("mul", v, g.apply("log", a))]
 
 
-def _quotient(g: Graph, v: Value, x: tuple[Value, ...]) -> list[Value | None]:
+def _quotient(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
     inverse = _inverse(g, x[1])
     return [inverse, g.apply("neg", g.apply("mul", v, inverse))]
 
 
-def _angle(g: Graph, v: Value, x: tuple[Value, ...]) -> list[Value | None]:
+def _angle(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
     square = g.apply("add", g.apply("mul", x[0], x[0]), g.apply("mul", x[1], x[1]))
     inverse = _inverse(g, square)
     return [g.apply("mul", x[1], inverse), g.apply("neg", g.apply("mul", x[0], inverse))]
 
 
-def _either(first: str) -> Callable[..., list[Value | None]]:
+def _either(first: str) -> Partials:
     """Of a minimum or maximum: one where the argument is taken, else nothing."""
 
-    def partials(g: Graph, v: Value, x: tuple[Value, ...]) -> list[Value | None]:
+    def partials(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
         taken = g.apply("le", *(x if first == "a" else x[::-1]))
         return [taken, g.apply("sub", g.const(1.0), taken)]
 
     return partials
 
 
-def _size(g: Graph, v: Value, x: tuple[Value, ...]) -> list[Value | None]:
+def _size(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
     return [g.apply("sign", x[0])]
 
 
-def _hypotenuse(g: Graph, v: Value, x: tuple[Value, ...]) -> list[Value | None]:
+def _hypotenuse(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
     inverse = _inverse(g, v)
     return [g.apply("mul", a, inverse) for a in x]
 
 
-def _copied_sign(g: Graph, v: Value, x: tuple[Value, ...]) -> list[Value | None]:
+def _copied_sign(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
     same = g.apply("mul", g.apply("sign", x[0]), g.apply("copysign", g.const(1.0), x[1]))
     return [same, None]
 
 
-def _remaining(name: str) -> Callable[..., list[Value | None]]:
+def _remaining(name: str) -> Partials:
     """a - k b with a whole k: (a - value) / b."""
 
-    def partials(g: Graph, v: Value, x: tuple[Value, ...]) -> list[Value | None]:
+    def partials(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
         k = g.apply("div", g.apply("sub", x[0], v), x[1])
         return [g.const(1.0), g.apply("neg", k)]
 
     return partials
 
 
-def _where(g: Graph, v: Value, x: tuple[Value, ...]) -> list[Value | None]:
+def _where(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
     return [None, g.apply("where", x[0], g.const(1.0))]
 
 
-def _fused(sign: float) -> Callable[..., list[Value | None]]:
+def _fused(sign: float) -> Partials:
     return lambda g, v, x: [
         x[1] if sign > 0 else g.apply("neg", x[1]),
         x[0] if sign > 0 else g.apply("neg", x[0]),
@@ -180,12 +188,8 @@ def _erf_of(a: Any) -> Any:
 
 
 _ROWS = (
-    Operation(
-        "add", ca.OP_ADD, np.add, lambda g, v, x: [g.const(1.0), g.const(1.0)], "+"
-    ),
-    Operation(
-        "sub", ca.OP_SUB, np.subtract, lambda g, v, x: [g.const(1.0), g.const(-1.0)], "-"
-    ),
+    Operation("add", ca.OP_ADD, np.add, lambda g, v, x: [g.const(1.0), g.const(1.0)], "+"),
+    Operation("sub", ca.OP_SUB, np.subtract, lambda g, v, x: [g.const(1.0), g.const(-1.0)], "-"),
     Operation("mul", ca.OP_MUL, np.multiply, lambda g, v, x: [x[1], x[0]], "*"),
     Operation("div", ca.OP_DIV, np.divide, _quotient, "/", latency=14),
     Operation("neg", ca.OP_NEG, np.negative, lambda g, v, x: [g.const(-1.0)]),
@@ -236,24 +240,20 @@ _ROWS = (
         np.log1p,
         lambda g, v, x: [_inverse(g, g.apply("add", g.const(1.0), x[0]))],
     ),
-    Operation(
-        "tan", ca.OP_TAN, np.tan, lambda g, v, x: [_square_below(g, v, "add")]
-    ),
+    Operation("tan", ca.OP_TAN, np.tan, lambda g, v, x: [_square_below(g, v, "add")]),
     Operation("asin", ca.OP_ASIN, np.arcsin, _arc("sub")),
     Operation("acos", ca.OP_ACOS, np.arccos, _arc("sub", negative=True)),
     Operation("atan", ca.OP_ATAN, np.arctan, _rational("add")),
     Operation("sinh", ca.OP_SINH, np.sinh, _product("cosh")),
     Operation("cosh", ca.OP_COSH, np.cosh, _product("sinh")),
-    Operation(
-        "tanh", ca.OP_TANH, np.tanh, lambda g, v, x: [_square_below(g, v, "sub")]
-    ),
+    Operation("tanh", ca.OP_TANH, np.tanh, lambda g, v, x: [_square_below(g, v, "sub")]),
     Operation("asinh", ca.OP_ASINH, np.arcsinh, _arc("add")),
     Operation("acosh", ca.OP_ACOSH, np.arccosh, _acosh),
     Operation("atanh", ca.OP_ATANH, np.arctanh, _rational("sub")),
     Operation("erf", ca.OP_ERF, _erf_of, _erf),
 )
 OPERATIONS = {row.name: row for row in _ROWS}
-BY_CASADI = {row.casadi: row.name for row in _ROWS if row.casadi is not None}
+BY_CASADI: dict[int, str] = {r.casadi: r.name for r in _ROWS if r.casadi is not None}
 BY_CASADI[ca.OP_CONSTPOW] = "pow"
 REDUCTIONS = ("sum", "least")
 REDUCTION_LATENCY = 22

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -139,15 +139,12 @@ class Program:
         """What the roots need, arguments first."""
         return tuple(reachable(self.graph, self.roots))
 
-    def pruned(self, wanted: Iterable[str]) -> Program:
-        """Only some of the outputs."""
-        names = set(wanted)
-        return replace(self, outputs=tuple(o for o in self.outputs if o.name in names))
-
-    def moved(self, graph: Graph, where: dict[Value, Value]) -> Program:
+    def moved(self, graph: Graph, where: dict[Value | None, Value]) -> Program:
         """The same with values of another graph."""
         outputs = tuple(
-            replace(o, entries=tuple(tuple(v if v is None else where[v] for v in e) for e in o.entries))
+            replace(
+                o, entries=tuple(tuple(v if v is None else where[v] for v in e) for e in o.entries)
+            )
             for o in self.outputs
         )
         checks = tuple(replace(c, value=where[c.value]) for c in self.checks)

@@ -56,5 +56,3 @@ def _operation(graph: Graph, op: int, args: list[Value]) -> Value:
     if op == ca.OP_ASSIGN:
         return args[0]
     raise UnsupportedError(f"CasADi's operation number {op} is not in the table of operations")
-
-

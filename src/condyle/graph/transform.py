@@ -47,7 +47,9 @@ def tangents(graph: Graph, roots: Sequence[Value], seeds: Mapping[Value, Value])
             found[v] = graph.reduce("sum", own)
         else:
             total = zero
-            for partial, x in zip(OPERATIONS[node.op].partials(graph, v, node.args), own, strict=True):
+            for partial, x in zip(
+                OPERATIONS[node.op].partials(graph, v, node.args), own, strict=True
+            ):
                 if partial is not None:
                     total = graph.apply("add", total, graph.apply("mul", partial, x))
             found[v] = total

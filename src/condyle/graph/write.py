@@ -22,7 +22,7 @@ def casadi_function(program: Program, numbers: Numbers) -> ca.Function:
     values: dict[Value, list[Any]] = {}  # one a lane, or one for all
     for v in program.order:
         node = program.graph.nodes[v]
-        lanes = 1 if node.group is None else program.counts[node.group]
+        lanes = program.counts[node.group] if node.group is not None else 1
         if not node.args:
             values[v] = [_leaf(node.op, node.data, numbers, x, lane) for lane in range(lanes)]
         elif node.op in REDUCTIONS:
@@ -42,12 +42,11 @@ def casadi_function(program: Program, numbers: Numbers) -> ca.Function:
             ]
     outputs = []
     for output in program.outputs:
-        entries = []
+        entries: list[Any] = []
         for entry in output.entries:
-            for group, v in enumerate(entry):
-                if v is not None:
-                    count = program.counts[group] if output.lanes else 1
-                    own = values[v]
+            for group, wanted in enumerate(entry):
+                if wanted is not None:
+                    own, count = values[wanted], program.counts[group] if output.lanes else 1
                     entries += own if len(own) == count else own * count
         outputs.append(ca.vertcat(ca.SX(0, 1), *entries))
     checks = ca.vertcat(ca.SX(0, 1), *(values[c.value][0] for c in program.checks))

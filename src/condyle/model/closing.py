@@ -63,8 +63,10 @@ class Closure:
     ) -> PlatformMotion:
         """X_EE and its rates where g = s, g' = s1, g'' = s2, (N, 6 - k) each."""
         answer = self._kernel.run({"s": s, "s1": s1, "s2": s2}, threads)
-        names = ("pose", "pose_rate", "pose_acceleration")
-        found = [answer.values[name].T for name in names]
+        pose, rate, acceleration = (
+            answer.values[name].T for name in ("pose", "pose_rate", "pose_acceleration")
+        )
+        found = (pose, rate, acceleration)
         reached = answer.status == Status.OK
         again = np.flatnonzero(answer.status == AGAIN)
         if again.size:
@@ -76,7 +78,7 @@ class Closure:
         if not reached.all():
             for target in found:
                 target[~reached] = np.nan
-        return PlatformMotion(*found, reached)
+        return PlatformMotion(pose, rate, acceleration, reached)
 
 
 def closed_states(

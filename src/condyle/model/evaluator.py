@@ -216,20 +216,33 @@ class Evaluator:
         answer = self.kernel("configuration").run({"pose": pose}, threads)
         again = np.flatnonzero(answer.status == AGAIN)
         if again.size:
-            better = self._robust.configuration(np.asarray(pose, dtype=float)[again])[0]
+            better = self._robust.configuration(np.asarray(pose, dtype=float)[again])
             for name, value in answer.values.items():
                 value[..., again] = better[name]
         return self._configured(answer.values)
 
     def _configured(self, values: Mapping[str, np.ndarray]) -> Configuration:
-        names = ("joint", "beta", "gamma", "cos_gamma", "discriminant")
-        points = (np.moveaxis(values[name], -1, 0) for name in ("contact_point", "contact_normal"))
-        return Configuration(*(values[name].T for name in names), *points, self._singularity(values))
+        joint, beta, gamma, cos_gamma, discriminant = (
+            values[name].T for name in ("joint", "beta", "gamma", "cos_gamma", "discriminant")
+        )
+        points, normals = (
+            np.moveaxis(values[name], -1, 0) for name in ("contact_point", "contact_normal")
+        )
+        return Configuration(
+            joint,
+            beta,
+            gamma,
+            cos_gamma,
+            discriminant,
+            points,
+            normals,
+            self._singularity(values),
+        )
 
     def _singularity(self, values: Mapping[str, np.ndarray]) -> Singularity:
-        names = ("J_A", "transmission", "J_W_sigma")
-        arrays = (values[name].T for name in names)
-        return Singularity.of(*arrays, values["J_A_extremes"], self.characteristic_length)
+        J_A, transmission, sigma = (values[name].T for name in ("J_A", "transmission", "J_W_sigma"))
+        extremes = values["J_A_extremes"]
+        return Singularity.of(J_A, transmission, sigma, extremes, self.characteristic_length)
 
     # -- the matrices of the equations of motion ---------------------------------------------
 
@@ -237,17 +250,18 @@ class Evaluator:
         """M_r of [Cheng2023] eqs (57), (63): (N, m, m) in q_EE.
 
         Args: q: (N, m), in the order of `independent`.
-              space: "X" for the mechanism without contacts, dual to X_EE, (N, 6, 6): eqs (61), (64).
+              space: "X" for the mechanism without contacts, dual to X_EE, (N, 6, 6): eqs (61),
+              (64).
         Raises: InputError: for another space, or a pose that cannot be reached.
         """
         return self._matrices(q, np.zeros_like(q), "inertia_matrix", space)
 
     def bias(self, q: np.ndarray, q1: np.ndarray, space: str = "q") -> np.ndarray:
-        """C_r q', (N, m) [N, N m]: Coriolis and centrifugal forces; `space` as above, then (N, 6)."""
+        """C_r q', (N, m) [N, N m]: Coriolis and centrifugal forces; in `space` "X", (N, 6)."""
         return self._matrices(q, q1, "bias", space)
 
     def gravity(self, q: np.ndarray, space: str = "q") -> np.ndarray:
-        """G_r, (N, m) [N, N m]: what holds the mechanism against gravity; then (N, 6)."""
+        """G_r, (N, m) [N, N m]: what holds it against gravity; in `space` "X", (N, 6)."""
         return self._matrices(q, np.zeros_like(q), "gravity", space)
 
     def _matrices(self, q: np.ndarray, q1: np.ndarray, name: str, space: str) -> np.ndarray:

@@ -44,10 +44,10 @@ def require_ok(
             f"pose, or keep such samples with --flag (flag=True).{more}",
             bad.tolist(),
         )
+    cause = unreachable_cause(mechanism, evaluation, first)
     raise UnreachableError(
-        f"{unreachable_cause(mechanism, evaluation, first)} at {where}. The motion goes too far for "
-        "this mechanism; scale it down, or keep such samples with --flag (flag=True)."
-        f"{more}",
+        f"{cause} at {where}. The motion goes too far for this mechanism; scale it down, or keep "
+        f"such samples with --flag (flag=True).{more}",
         bad.tolist(),
     )
 

@@ -28,7 +28,9 @@ Arrays = dict[str, np.ndarray]
 class Robust:
     """Samples of one mechanism and formulation, one array operation after the other."""
 
-    def __init__(self, structure: Structure, numbers: Numbers, independent: tuple[str, ...]) -> None:
+    def __init__(
+        self, structure: Structure, numbers: Numbers, independent: tuple[str, ...]
+    ) -> None:
         self._structure, self._numbers = structure, numbers
         self._independent = independent
         angles = [name not in ("X", "Y", "Z") for name in independent]
@@ -59,9 +61,9 @@ class Robust:
         values = {name: a.T for name, a in poses.items()}
         load = {name: inputs[name] for name in ("force", "moment", "point")}
         with np.errstate(all="ignore"):
-            found, _, sure = self.configuration(poses["pose"])
-            values |= found
-            s = {n: np.moveaxis(a, -1, 0) for n, a in self._system.run(poses | load).values.items()}
+            values |= self.configuration(poses["pose"])
+            system = self._system.run(poses | load).values
+            s = {name: np.moveaxis(a, -1, 0) for name, a in system.items()}
             values["joint_rate"], values["joint_acceleration"] = (
                 s[name].T for name in ("joint_rate", "joint_acceleration")
             )
@@ -77,9 +79,7 @@ class Robust:
             status = self._judged(reached, values, effort)
         return values, status
 
-    def motion(
-        self, q: np.ndarray, q1: np.ndarray, q2: np.ndarray
-    ) -> tuple[Arrays, np.ndarray]:
+    def motion(self, q: np.ndarray, q1: np.ndarray, q2: np.ndarray) -> tuple[Arrays, np.ndarray]:
         """X_EE and its rates, (N, 6) each, and where the contacts can be met."""
         answer = self._motion.run({"q": q, "q1": q1, "q2": q2})
         poses = {name: a.T.copy() for name, a in answer.values.items()}
@@ -92,7 +92,7 @@ class Robust:
                 poses[name][doubtful] = a
         return poses, reached
 
-    def configuration(self, pose: np.ndarray) -> tuple[Arrays, np.ndarray, np.ndarray]:
+    def configuration(self, pose: np.ndarray) -> Arrays:
         """The configuration's results by name, samples last; always by LAPACK."""
         values = self._configuration.run({"pose": pose}).values
         rows = np.moveaxis(values["J_W"], -1, 0)
@@ -100,7 +100,7 @@ class Robust:
         sigma = np.full((len(rows), self._structure.m), np.nan)
         sigma[good] = np.linalg.svd(rows[good], compute_uv=False)
         values["J_W_sigma"] = sigma.T
-        return values, sigma, good
+        return values
 
     def _contact_forces(self, s: Arrays, effort: np.ndarray) -> np.ndarray:
         """lambda along the unit normals, (N, k), from what the efforts leave over."""

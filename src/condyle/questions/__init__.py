@@ -39,7 +39,15 @@ QUESTIONS: dict[str, Callable[..., Program | Variants]] = {
 # What shapes a graph: the rooms that a question is written in.
 SOURCES = ("mechanism", "kinematics", "dynamics", "graph", "questions")
 # Questions that formulation and route make no difference to.
-GEOMETRY = ("motion", "closure", "conditions", "configuration", "encoders", "jacobians", "reactions")
+GEOMETRY = (
+    "motion",
+    "closure",
+    "conditions",
+    "configuration",
+    "encoders",
+    "jacobians",
+    "reactions",
+)
 
 
 @dataclass(frozen=True)

@@ -31,11 +31,10 @@ from ..kinematics.rotation import Bryant
 from ..mechanism.mechanism import COORDINATES
 from ..status import Status
 from .builder import Builder
+from .inverse import CERTAIN
 from .numbers import contact_symbols, single_contacts
 from .platform import ANGLE_UNITS
-from .inverse import CERTAIN
 from .structure import Structure
-
 
 
 @dataclass(frozen=True)

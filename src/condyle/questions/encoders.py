@@ -1,4 +1,4 @@
-"""What forward kinematics asks of a pose: joints, their Jacobian, how far off the contacts it is."""
+"""What forward kinematics asks of a pose: joints, their Jacobian, how far off contacts it is."""
 
 from __future__ import annotations
 

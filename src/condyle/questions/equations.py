@@ -135,7 +135,8 @@ def equations(
         basis, G = rate_basis(motion, dependent), motion.E.T @ frame.N
     g = b.parameter("gravity")
     chains = [
-        _chain_terms(b, group, method, state, g, lump, low_latency) for group in range(len(s.chains))
+        _chain_terms(b, group, method, state, g, lump, low_latency)
+        for group in range(len(s.chains))
     ]
     parts = {"platform": method.platform(state, _body(b, lump), g)}
     parts |= _summed(b, chains, lump)

@@ -77,7 +77,9 @@ def program(
         b.output("gravity", [f[:, len(parts) :] for f in found], "N m or N")
     if "contact" in wanted:
         core = eq if structure.route == "core" else _core(b, platform, load)
-        b.output("contact_force", core.contact_forces(platform, effort), "N", len(structure.contacts))
+        b.output(
+            "contact_force", core.contact_forces(platform, effort), "N", len(structure.contacts)
+        )
     if "motion" in wanted:
         _add_motion(b, platform)
     if "joint" in wanted:

@@ -26,6 +26,7 @@ from ..mechanism.mechanism import Mechanism
 from ..mechanism.surface import of_form
 from .structure import Structure
 
+Parameter = Callable[[str], ca.SX]  # a mechanism's number by name
 Slot = tuple[int, int]  # start, count
 Vector = tuple[float, ...]
 INERTIA = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # order of an inertia's entries
@@ -126,7 +127,9 @@ def characteristic(structure: Structure, numbers: Numbers) -> float:
     return float(numbers.parameters[Layout.of(structure).parameters["length"][0]])
 
 
-def contact_symbols(structure: Structure, parameter: Callable[[str], ca.SX]) -> list[ContactSymbols]:
+def contact_symbols(
+    structure: Structure, parameter: Callable[[str], ca.SX]
+) -> list[ContactSymbols]:
     """The contacts, their numbers by name; parallel planes by their mean and difference."""
     if structure.parallel:
         names = ("slope", "mean", "mean_offset", "difference", "gap")
@@ -134,10 +137,14 @@ def contact_symbols(structure: Structure, parameter: Callable[[str], ca.SX]) -> 
     return single_contacts(structure, parameter)
 
 
-def single_contacts(structure: Structure, parameter: Callable[[str], ca.SX]) -> list[ContactSymbols]:
+def single_contacts(
+    structure: Structure, parameter: Callable[[str], ca.SX]
+) -> list[ContactSymbols]:
     """The contacts, one by one."""
     return [
-        ContactSymbols(of_form(form), parameter(f"contact_point_{i}"), parameter(f"contact_surface_{i}"))
+        ContactSymbols(
+            of_form(form), parameter(f"contact_point_{i}"), parameter(f"contact_surface_{i}")
+        )
         for i, (form, _) in enumerate(structure.contacts)
     ]
 

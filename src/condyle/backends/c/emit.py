@@ -81,4 +81,4 @@ def _text(name: str) -> str:
 def fused(program: Program) -> Program:
     """The program with its sums as fused multiply-adds."""
     graph, moved = fuse(program.graph, program.roots, CHAIN)
-    return program.moved(graph, dict(zip(program.roots, moved, strict=True)))
+    return program.moved(graph, {old: new for old, new in zip(program.roots, moved, strict=True)})

@@ -35,7 +35,8 @@ _doubles = ctypes.POINTER(ctypes.c_double)
 class CompiledKernel:
     """One mechanism's numbers in a compiled question.
 
-    Attributes: facts: flags, compiler, operation count, where the library is.
+    Attributes: order: where each lane stands among the callers'.
+                facts: flags, compiler, operation count, where the library is.
                 cached: whether it was there already.
     """
 
@@ -50,7 +51,7 @@ class CompiledKernel:
         self.facts, self.cached = entry.facts, entry.cached
         self.interface = Interface.of(self.facts["interface"])
         self.columns = sum(self.interface.width(r) for r in self.interface.results)
-        self._order = numbers.order
+        self.order = numbers.order
         self._table = _aligned(self.facts["table_size"])
         blocks = [
             np.ascontiguousarray(_padded(own, pad, self.facts["lanes"]))
@@ -61,7 +62,7 @@ class CompiledKernel:
 
     def run(self, inputs: Mapping[str, np.ndarray], threads: int | None = None) -> Answer:
         """Evaluate samples; columns that are contiguous or constant are fastest."""
-        count, columns = columns_of(self.interface, inputs, self._order)
+        count, columns = columns_of(self.interface, inputs, self.order)
         columns = [_readable(column) for column in columns]
         status = np.empty(count, dtype=np.uint8)
         results = np.empty((self.columns, count))
@@ -90,7 +91,7 @@ class CompiledKernel:
         for r in self.interface.results:
             width = self.interface.width(r)
             block = results[row : row + width]
-            values[r.name] = arranged(self.interface, r, block, self._order)
+            values[r.name] = arranged(self.interface, r, block, self.order)
             row += width
         return Answer(values, status)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ...graph.graph import Value
-from ...graph.schedule import ready_times, scheduled
 from ...graph.program import Program
+from ...graph.schedule import ready_times, scheduled
 from .printer import Printer, fold, padded_counts
 
 NEAR = 12  # cycles between sums that are worth waiting for
