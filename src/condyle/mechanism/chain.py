@@ -14,13 +14,15 @@ from pydantic import Field, ValidationInfo, field_validator
 from .quantities import (
     Direction,
     Fraction,
+    Limit,
+    MassOrNone,
+    Moment,
+    MomentOrNone,
     Name,
-    NonNegative,
     NonNegativeLength,
     Point,
-    Positive,
-    Table,
 )
+from .table import Table
 
 AXIS_TOLERANCE = math.radians(0.5)  # how far an axis may be off the perpendicular
 NO_BRANCH = 1e-9  # sine of the transmission angle below which home has no branch
@@ -29,10 +31,10 @@ NO_BRANCH = 1e-9  # sine of the transmission angle below which home has no branc
 class Rod(Table):
     """A rod with two ball ends, symmetric about its line."""
 
-    mass: NonNegative
+    mass: MassOrNone
     com: Fraction = Field(description="mass centre: fraction of the way to the platform joint")
-    transverse: NonNegative = Field(description="central moment of inertia across the rod")
-    axial: NonNegative = Field(description="moment of inertia along the rod")
+    transverse: MomentOrNone = Field(description="central moment of inertia across the rod")
+    axial: MomentOrNone = Field(description="moment of inertia along the rod")
 
     @field_validator("axial")
     @classmethod
@@ -51,20 +53,20 @@ def check_rod_inertia(axial: float, transverse: float | None) -> float:
 
 
 class Crank(Table):
-    inertia: Positive = Field(description="about the shaft; its mass centre is on the shaft")
+    inertia: Moment = Field(description="about the shaft; its mass centre is on the shaft")
 
 
 class Slider(Table):
-    mass: NonNegative = Field(description="its mass centre is at its joint")
+    mass: MassOrNone = Field(description="its mass centre is at its joint")
 
 
 class LegBody(Table):
     """One of the two bodies of a telescopic leg, symmetric about the leg's line."""
 
-    mass: NonNegative
+    mass: MassOrNone
     com: NonNegativeLength = Field(description="mass centre: distance from the body's own joint")
-    transverse: NonNegative = Field(description="central moment of inertia across the leg")
-    axial: NonNegative = Field(description="moment of inertia along the leg")
+    transverse: MomentOrNone = Field(description="central moment of inertia across the leg")
+    axial: MomentOrNone = Field(description="moment of inertia along the leg")
 
     @field_validator("axial")
     @classmethod
@@ -73,19 +75,39 @@ class LegBody(Table):
 
 
 class RotaryActuator(Table):
-    torque_limit: Positive | None = None
-    speed_limit: Positive | None = None
+    torque_limit: Limit | None = None
+    speed_limit: Limit | None = None
 
 
 class LinearActuator(Table):
-    force_limit: Positive | None = None
-    speed_limit: Positive | None = None
+    force_limit: Limit | None = None
+    speed_limit: Limit | None = None
 
 
 class ChainTable(Table):
     """What every family has: a name and a joint on the platform."""
 
     name: Name
+
+    @property
+    def lengths(self) -> dict[str, float]:
+        """Of its links at home [m]."""
+        return {}
+
+    @property
+    def masses(self) -> dict[str, float]:
+        """Of its moving bodies [kg], those that have one."""
+        return {}
+
+    @property
+    def gyration(self) -> dict[str, float]:
+        """Radii of gyration of its bodies across themselves [m], by the link they belong to."""
+        return {}
+
+    @property
+    def fixed_points(self) -> tuple[tuple[float, ...], ...]:
+        """Where it is at home, in {S} [m]; its joint on the platform apart."""
+        return ()
 
 
 class RSS(ChainTable):
@@ -99,6 +121,23 @@ class RSS(ChainTable):
     crank: Crank
     coupler: Rod
     actuator: RotaryActuator = RotaryActuator()
+
+    @property
+    def lengths(self) -> dict[str, float]:
+        crank, coupler = (self.base, self.crank_tip), (self.crank_tip, self.platform)
+        return {"crank": distance(*crank), "coupler": distance(*coupler)}
+
+    @property
+    def masses(self) -> dict[str, float]:
+        return {"coupler": self.coupler.mass}
+
+    @property
+    def gyration(self) -> dict[str, float]:
+        return {"coupler": across(self.coupler)}
+
+    @property
+    def fixed_points(self) -> tuple[tuple[float, ...], ...]:
+        return self.base, self.crank_tip
 
     @field_validator("crank_tip")
     @classmethod
@@ -150,6 +189,22 @@ class PSS(ChainTable):
     rod: Rod
     actuator: LinearActuator = LinearActuator()
 
+    @property
+    def lengths(self) -> dict[str, float]:
+        return {"rod": distance(self.base, self.platform)}
+
+    @property
+    def masses(self) -> dict[str, float]:
+        return {"slider": self.slider.mass, "rod": self.rod.mass}
+
+    @property
+    def gyration(self) -> dict[str, float]:
+        return {"rod": across(self.rod)}
+
+    @property
+    def fixed_points(self) -> tuple[tuple[float, ...], ...]:
+        return (self.base,)
+
     @field_validator("platform")
     @classmethod
     def _rod(cls, joint: Any, info: ValidationInfo) -> Any:
@@ -178,12 +233,37 @@ class SPS(ChainTable):
     piston: LegBody = Field(description="the body at M")
     actuator: LinearActuator = LinearActuator()
 
+    @property
+    def lengths(self) -> dict[str, float]:
+        return {"leg": distance(self.base, self.platform)}
+
+    @property
+    def masses(self) -> dict[str, float]:
+        return {"cylinder": self.cylinder.mass, "piston": self.piston.mass}
+
+    @property
+    def gyration(self) -> dict[str, float]:
+        return {"leg": max(across(self.cylinder), across(self.piston))}
+
+    @property
+    def fixed_points(self) -> tuple[tuple[float, ...], ...]:
+        return (self.base,)
+
     @field_validator("platform")
     @classmethod
     def _leg(cls, joint: Any, info: ValidationInfo) -> Any:
         if (base := info.data.get("base")) is not None:
             check_rod_length(np.subtract(joint, base), "leg", "base")
         return joint
+
+
+def distance(start: tuple[float, ...], end: tuple[float, ...]) -> float:
+    return float(np.linalg.norm(np.subtract(end, start)))
+
+
+def across(body: Rod | LegBody) -> float:
+    """Radius of gyration across a body [m]; 0 without mass."""
+    return math.sqrt(body.transverse / body.mass) if body.mass else 0.0
 
 
 def check_rod_length(rod: np.ndarray, name: str, start: str) -> None:
