@@ -22,7 +22,11 @@ def test_check_describes_a_mechanism(condyle_command: Callable[..., Any]) -> Non
         "dependent coordinates:   Z, gamma",
         "X, Y, alpha, beta",
         "left_condyle",
-        "off its surface at home",
+        "on its surface at home",
+        "9.81 m/s^2 along -Z",
+        "platform:                0.2 kg, radii of gyration",
+        "crank 20 mm",
+        "limits 3 N m, 6 rad/s",
         "singularity at home",
         "rank 4 of 4",
     ):

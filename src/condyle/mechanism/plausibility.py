@@ -17,7 +17,7 @@ from .mechanism import Mechanism
 
 LARGE, SMALL = 10.0, 1e-4  # metres
 EARTH, EARTH_SPREAD = 9.81, 0.06  # m/s^2: 9.76 at the equator's mountains, 9.83 at the poles
-DENSEST = 2e4  # kg/m^3; nearly osmium
+DENSEST = 2e4  # kg/m^3 of a cube as large as the mechanism; nearly osmium
 SOUND = 340.0  # m/s
 POINTLIKE = 1e-3  # radius of gyration over the platform's own size
 ROUNDING = 1e-12  # metres outside a bound
@@ -116,7 +116,7 @@ def _platform(mechanism: Mechanism) -> Iterator[Implausible]:
             f"to {length_text(size)} from its mass centre; inertia is in kg m^2",
             data,
         )
-    most = DENSEST * (2 * whole) ** 3
+    most = DENSEST * whole**3
     if mass > most:
         yield Implausible(
             "mass_large",
