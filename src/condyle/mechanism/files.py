@@ -16,7 +16,7 @@ from .coordinates import COORDINATES
 from .home import holding_problems, off_surface
 from .library import bundled_mechanisms, bundled_text
 from .mechanism import Mechanism
-from .messages import describe, shown
+from .messages import describe, shown, unknown_key
 from .quantities import PER_METRE
 from .schema import schema_of
 from .structure import structural_problems
@@ -86,8 +86,10 @@ def from_data(
         unit = "m"
     context = {"per_metre": PER_METRE[unit], "notes": notes, "at_home": False}
     # Names that Python has for a key of the file are no keys of the file.
-    aliased = {name for name, field in Mechanism.model_fields.items() if field.alias}
-    unknown = {key: data.pop(key) for key in sorted(aliased & data.keys())}
+    fields = Mechanism.model_fields.items()
+    aliased = [name for name, field in fields if field.alias and name in data]
+    for name in aliased:
+        del data[name]
     mechanism = None
     try:
         mechanism = Mechanism.model_validate(data, context=context)
@@ -96,10 +98,7 @@ def from_data(
         found = describe(error, data, Mechanism)
         problems += structural
         problems += [p for p in found if not any(s in p for s in structural)]
-    problems += [
-        f"{key}: is not a key of the file format; a file has [[{key.removesuffix('s')}]]"
-        for key in unknown
-    ]
+    problems += [f"{name}: {unknown_key(name, (), Mechanism)}" for name in aliased]
     problems += _contact_problems(data, context) if at_home else ()
     if problems:
         raise MechanismError(source, problems)

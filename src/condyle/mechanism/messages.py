@@ -67,10 +67,12 @@ def entry(table: Any, key: str) -> Any:
 def _message(problem: Any, root: type[BaseModel]) -> str:
     kind, got, context = problem["type"], problem.get("input"), problem.get("ctx", {})
     location = problem["loc"]
-    tables = kind == "tuple_type" and location in (("contact",), ("chain",))
+    if kind == "extra_forbidden":
+        return unknown_key(str(location[-1]), location[:-1], root)
+    if kind == "tuple_type" and location in (("contact",), ("chain",)):
+        return f"expected tables, each under [[{location[0]}]], got {shown(got)}"
     expected = {
         "missing": "is missing",
-        "extra_forbidden": "is not a key of the file format; remove it or mend its spelling.",
         "float_type": f"expected a number, got {shown(got)}",
         "finite_number": f"expected a finite number, got {shown(got)}",
         "greater_than": f"expected a value above {context.get('gt')}, got {shown(got)}",
@@ -92,13 +94,15 @@ def _message(problem: Any, root: type[BaseModel]) -> str:
         + did_you_mean(str(context.get("tag")), _quoted(context.get("expected_tags"))),
         "union_tag_not_found": "the key `kind` is missing",
     }.get(kind)
-    if tables:
-        expected = f"expected tables, each under [[{location[0]}]], got {shown(got)}"
     if expected is None:
         expected = re.sub(r"^Value error, ", "", problem["msg"]) + f", got {shown(got)}"
-    if kind == "extra_forbidden":
-        expected += did_you_mean(str(location[-1]), keys_at(root, location[:-1]))
     return expected
+
+
+def unknown_key(key: str, location: Iterable[Any], root: type[BaseModel]) -> str:
+    """What to do about a key that a table at this place does not have."""
+    hint = did_you_mean(key, keys_at(root, location))
+    return f"is not a key of the file format; remove it or mend its spelling.{hint}"
 
 
 def _quoted(text: Any) -> list[str]:

@@ -19,7 +19,7 @@ LARGE, SMALL = 10.0, 1e-4  # metres
 EARTH, EARTH_SPREAD = 9.81, 0.06  # m/s^2: 9.76 at the equator's mountains, 9.83 at the poles
 DENSEST = 2e4  # kg/m^3 of a cube as large as the mechanism; nearly osmium
 SOUND = 340.0  # m/s
-POINTLIKE = 1e-3  # radius of gyration over the platform's own size
+POINTLIKE = 3e-3  # radius of gyration over the platform's own size
 ROUNDING = 1e-12  # metres outside a bound
 
 
