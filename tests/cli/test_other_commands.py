@@ -58,6 +58,24 @@ def test_check_warns_of_a_home_a_little_off(
     )
 
 
+def test_check_warns_of_numbers_that_do_not_go_together(
+    condyle_command: Callable[..., Any], tmp_path: Path
+) -> None:
+    text = bundled_text("masticatory").replace("x = [-27.65,", "x = [-20,", 1)
+    text = text.replace("mass = 0.2 ", "mass = 200 ").replace("-9.81", "9.81")
+    (tmp_path / "jaw.toml").write_text(text)
+    outcome = condyle_command("check", "jaw.toml")
+    assert outcome.status == 0 and "9.81 m/s^2 along +Z" in outcome.out
+    assert [line.split(": ")[2] for line in outcome.err.splitlines()] == [
+        "platform",
+        "gravity",
+        'contact "left_condyle"',
+    ]
+    data = json.loads(condyle_command("check", "jaw.toml", "--json").out)
+    kinds = [warning["kind"] for warning in data["warnings"]]
+    assert kinds == ["mass_large", "gravity_upwards", "home_outside_bounds"]
+
+
 def test_schema_is_json(condyle_command: Callable[..., Any]) -> None:
     assert json.loads(condyle_command("schema").out) == json_schema()
 

@@ -11,77 +11,22 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
 
-from .quantities import (
-    Direction,
-    Fraction,
-    Limit,
-    MassOrNone,
-    Moment,
-    MomentOrNone,
-    Name,
-    NonNegativeLength,
-    Point,
+from .bodies import (
+    Crank,
+    LegBody,
+    LinearActuator,
+    Rod,
+    RotaryActuator,
+    Slider,
+    across,
+    check_rod_length,
+    distance,
 )
+from .quantities import Direction, Name, Point
 from .table import Table
 
 AXIS_TOLERANCE = math.radians(0.5)  # how far an axis may be off the perpendicular
 NO_BRANCH = 1e-9  # sine of the transmission angle below which home has no branch
-
-
-class Rod(Table):
-    """A rod with two ball ends, symmetric about its line."""
-
-    mass: MassOrNone
-    com: Fraction = Field(description="mass centre: fraction of the way to the platform joint")
-    transverse: MomentOrNone = Field(description="central moment of inertia across the rod")
-    axial: MomentOrNone = Field(description="moment of inertia along the rod")
-
-    @field_validator("axial")
-    @classmethod
-    def _triangle(cls, axial: float, info: ValidationInfo) -> float:
-        return check_rod_inertia(axial, info.data.get("transverse"))
-
-
-def check_rod_inertia(axial: float, transverse: float | None) -> float:
-    """The triangle inequality on the principal moments (transverse, transverse, axial)."""
-    if transverse is not None and axial > 2 * transverse * (1 + 1e-12):
-        raise ValueError(
-            f"inertia breaks the triangle inequality: axial {axial:g} kg m^2 is more than "
-            f"twice transverse {transverse:g} kg m^2; no rigid body has such moments"
-        )
-    return axial
-
-
-class Crank(Table):
-    inertia: Moment = Field(description="about the shaft; its mass centre is on the shaft")
-
-
-class Slider(Table):
-    mass: MassOrNone = Field(description="its mass centre is at its joint")
-
-
-class LegBody(Table):
-    """One of the two bodies of a telescopic leg, symmetric about the leg's line."""
-
-    mass: MassOrNone
-    com: NonNegativeLength = Field(description="mass centre: distance from the body's own joint")
-    transverse: MomentOrNone = Field(description="central moment of inertia across the leg")
-    axial: MomentOrNone = Field(description="moment of inertia along the leg")
-
-    @field_validator("axial")
-    @classmethod
-    def _triangle(cls, axial: float, info: ValidationInfo) -> float:
-        return check_rod_inertia(axial, info.data.get("transverse"))
-
-
-class RotaryActuator(Table):
-    torque_limit: Limit | None = None
-    speed_limit: Limit | None = None
-
-
-class LinearActuator(Table):
-    force_limit: Limit | None = None
-    speed_limit: Limit | None = None
 
 
 class ChainTable(Table):
@@ -100,7 +45,7 @@ class ChainTable(Table):
         return {}
 
     @property
-    def gyration(self) -> dict[str, float]:
+    def radii_of_gyration(self) -> dict[str, float]:
         """Radii of gyration of its bodies across themselves [m], by the link they belong to."""
         return {}
 
@@ -132,7 +77,7 @@ class RSS(ChainTable):
         return {"coupler": self.coupler.mass}
 
     @property
-    def gyration(self) -> dict[str, float]:
+    def radii_of_gyration(self) -> dict[str, float]:
         return {"coupler": across(self.coupler)}
 
     @property
@@ -198,7 +143,7 @@ class PSS(ChainTable):
         return {"slider": self.slider.mass, "rod": self.rod.mass}
 
     @property
-    def gyration(self) -> dict[str, float]:
+    def radii_of_gyration(self) -> dict[str, float]:
         return {"rod": across(self.rod)}
 
     @property
@@ -242,7 +187,7 @@ class SPS(ChainTable):
         return {"cylinder": self.cylinder.mass, "piston": self.piston.mass}
 
     @property
-    def gyration(self) -> dict[str, float]:
+    def radii_of_gyration(self) -> dict[str, float]:
         return {"leg": max(across(self.cylinder), across(self.piston))}
 
     @property
@@ -255,20 +200,6 @@ class SPS(ChainTable):
         if (base := info.data.get("base")) is not None:
             check_rod_length(np.subtract(joint, base), "leg", "base")
         return joint
-
-
-def distance(start: tuple[float, ...], end: tuple[float, ...]) -> float:
-    return float(np.linalg.norm(np.subtract(end, start)))
-
-
-def across(body: Rod | LegBody) -> float:
-    """Radius of gyration across a body [m]; 0 without mass."""
-    return math.sqrt(body.transverse / body.mass) if body.mass else 0.0
-
-
-def check_rod_length(rod: np.ndarray, name: str, start: str) -> None:
-    if not np.linalg.norm(rod):
-        raise ValueError(f"the {name} has zero length: {start} and platform are the same point")
 
 
 Chain = Annotated[RSS | PSS | SPS, Field(discriminator="kind")]

@@ -130,7 +130,7 @@ def _rods(mechanism: Mechanism) -> Iterator[Implausible]:
     beyond = {
         f'{name} of chain "{chain.name}"': (radius, chain.lengths[name])
         for chain in mechanism.chains
-        for name, radius in chain.gyration.items()
+        for name, radius in chain.radii_of_gyration.items()
         if radius > chain.lengths[name]
     }
     if beyond:

@@ -61,7 +61,7 @@ def read_tables(text: str, source: str) -> dict[str, Any]:
     if len(text) > LARGEST_FILE:
         raise InputError(f"{source} is no mechanism file: it has more than a megabyte")
     try:
-        tables = tomllib.loads(text.replace("\r\n", "\n"))
+        tables = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{source} is not TOML: {shortened(str(error), 300)}") from None
     except ValueError:  # Python reads no integers of so many digits

@@ -45,7 +45,7 @@ def _whole(d: Mapping[str, Any]) -> Iterator[str]:
     yield f"independent coordinates: {', '.join(d['independent'])}"
     yield f"dependent coordinates:   {', '.join(d['dependent']) or 'none'}"
     yield f"gravity:                 {_gravity(d['gravity'])}"
-    radii = ", ".join(length_text(radius) for radius in d["platform"]["gyration"])
+    radii = ", ".join(length_text(radius) for radius in d["platform"]["radii_of_gyration"])
     yield f"platform:                {d['platform']['mass']:g} kg, radii of gyration {radii}"
     yield f"moving mass:             {d['moving_mass']:g} kg with the chains"
     sides = " x ".join(length_text(side) for side in d["size"])
@@ -139,7 +139,7 @@ def describe(mechanism: Mechanism) -> Description:
             "gravity": list(mechanism.gravity),
             "platform": {
                 "mass": platform.mass,
-                "gyration": np.sqrt(platform.inertia.principal() / platform.mass).tolist(),
+                "radii_of_gyration": np.sqrt(platform.inertia.principal() / platform.mass).tolist(),
             },
             "moving_mass": platform.mass + rods,
             "chains": chains,
