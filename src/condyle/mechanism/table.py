@@ -34,10 +34,7 @@ class Table(BaseModel):
         """
         if not update:
             return super().model_copy(deep=deep)
-        fields = type(self).model_fields
-        names = {name: field.alias or name for name, field in fields.items()}
-        changes = {names.get(name, name): value for name, value in update.items()}
-        return self.checked(self.entries() | changes, self.title())
+        return self.checked(self._changed(update), self.title())
 
     def copy(self, *, update: Mapping[str, Any] | None = None, **options: Any) -> Self:  # type: ignore[override]
         """As `model_copy`."""
@@ -61,7 +58,13 @@ class Table(BaseModel):
     def derived(self, **changes: Any) -> Self:
         """A copy with entries that follow from checked ones, unchecked: such as a surface that is
         parallel to one of the file."""
-        return super().model_copy(update=changes)
+        return self.model_construct(**self._changed(changes))
+
+    def _changed(self, changes: Mapping[str, Any]) -> dict[str, Any]:
+        """The entries with some changed; names that Python has for keys are keys too."""
+        fields = type(self).model_fields
+        names = {name: field.alias or name for name, field in fields.items()}
+        return self.entries() | {names.get(name, name): v for name, v in changes.items()}
 
 
 class FrozenTable(dict[str, Any]):
