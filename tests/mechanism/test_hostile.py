@@ -39,6 +39,13 @@ def test_texts_that_mean_harm(case: str, tmp_path: Path) -> None:
         assert message in str(caught.value) and len(str(caught.value)) < 1000
 
 
+def test_a_megabyte_is_counted_in_bytes(tmp_path: Path) -> None:
+    """A file is never cut and then read as if it were whole."""
+    (tmp_path / "jaw.toml").write_text(TEXT + "\n# " + "é" * 600_000, encoding="utf-8")
+    with pytest.raises(InputError, match="more than a megabyte"):
+        load(tmp_path / "jaw.toml")
+
+
 @pytest.mark.parametrize("source", [3, None, b"masticatory", "a\0b", "x" * 5000, {}])
 def test_what_is_no_path(source: Any) -> None:
     with pytest.raises(InputError) as caught:
@@ -104,8 +111,9 @@ def test_messages_are_short(raw: dict[str, Any]) -> None:
     assert len(str(caught.value)) < 4000 and "more" in str(caught.value)
     assert len(caught.value.problems) == 2001 and max(map(len, caught.value.problems)) < 400
     many = from_data({**raw_of(TEXT), "platform": {**raw_of(TEXT)["platform"], "points": POINTS}})
-    with pytest.raises(InputError, match="and 490 more"):
+    with pytest.raises(InputError, match="and 490 more") as caught:
         many.get("platform.points.none")
+    assert len(str(caught.value)) < 300
 
 
 POINTS = {f"p{k}": [0, 0, 0] for k in range(500)}

@@ -37,6 +37,11 @@ CASES: dict[str, tuple[Callable[[Mechanism], Mechanism], set[str], str]] = {
     ),
     "200 kg": (lambda m: m.set("platform.mass", 200.0), {"mass_large"}, "denser than any metal"),
     "grams": (lambda m: m.set("platform.mass", 2e-4), {"gyration_large"}, "954.5 mm"),
+    "a tenth of a millimetre": (
+        lambda m: m.set("platform.inertia", {k: 2e-9 for k in AXES}),
+        {"gyration_small"},
+        "its radius of gyration is 0.1 mm, and its joints are up to",
+    ),
     "upwards": (lambda m: m.set("gravity[2]", 9.81), {"gravity_upwards"}, "points up"),
     "millimetres": (lambda m: m.set("gravity[2]", -9810.0), {"gravity_size"}, "9810 m/s^2"),
     "moon": (lambda m: m.set("gravity[2]", -1.62), {"gravity_size"}, "neither the Earth's"),

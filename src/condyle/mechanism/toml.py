@@ -54,23 +54,20 @@ def read_text(source: str | Path) -> str:
 def read_tables(text: str, source: str) -> dict[str, Any]:
     """The tables of a file as TOML gives them; `source` names it in messages.
 
-    Raises: InputError: if the text is not TOML, or nests deeper than any mechanism.
+    Raises: InputError: if the text is not TOML, or nests deeper than Python can follow.
     """
     if not isinstance(text, str):
         raise InputError(f"{source}: expected the text of a mechanism file, got {shown(text)}")
     if len(text) > LARGEST_FILE:
         raise InputError(f"{source} is no mechanism file: it has more than a megabyte")
     try:
-        tables = tomllib.loads(text)
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{source} is not TOML: {shortened(str(error), 300)}") from None
     except ValueError:  # Python reads no integers of so many digits
         raise InputError(f"{source}: an integer has thousands of digits") from None
     except RecursionError:
         raise too_deep(source) from None
-    if nests_too_deep(tables):
-        raise too_deep(source)
-    return tables
 
 
 def too_deep(source: str) -> InputError:
