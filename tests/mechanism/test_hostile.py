@@ -127,11 +127,13 @@ def raw_of(text: str) -> dict[str, Any]:
 
 LARGE: dict[str, tuple[tuple[Any, ...], Any, str]] = {
     "mass": (("platform", "mass"), 1e200, "expected at most 1e+06 kg, got 1e+200"),
-    "small mass": (("platform", "mass"), 1e-200, "expected at least 1e-15 kg"),
+    "small mass": (("platform", "mass"), 1e-200, "expected at least 1e-18 kg"),
     "inertia": (("platform", "inertia", "xx"), 1e200, "at most 1e+06 kg m^2"),
     "product": (("platform", "inertia", "xy"), -1e200, "at most 1e+06 kg m^2"),
     "crank": (("chain", 0, "crank", "inertia"), 1e7, "at most 1e+06 kg m^2"),
     "rod": (("chain", 0, "coupler", "mass"), 1e7, "at most 1e+06 kg"),
+    "nearly no rod": (("chain", 0, "coupler", "mass"), 1e-300, "at least 1e-18 kg"),
+    "nearly no moment": (("chain", 0, "coupler", "axial"), 1e-300, "at least 1e-18 kg m^2"),
     "point": (("chain", 0, "base", 1), -1e200, "at most 1e+08 mm, got -1e+200"),
     "landmark": (("platform", "points", "incisor", 0), 1e9, "at most 1e+08 mm"),
     "offset": (("contact", 0, "surface", "offset"), 1e200, "at most 1e+08 mm"),

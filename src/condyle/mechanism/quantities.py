@@ -16,7 +16,7 @@ from pydantic import AfterValidator, Field, ValidationInfo
 
 PER_METRE = {"m": 1.0, "mm": 1000.0}
 LONGEST, SHORTEST = 1e5, 1e-9  # metres; the shortest of those that must be positive
-LARGEST, SMALLEST = 1e6, 1e-15  # of all else, in SI; the smallest of what must be positive
+LARGEST, SMALLEST = 1e6, 1e-18  # of all else, in SI; the smallest of what is not zero
 LARGEST_LIMIT = 1e12  # N m, N, rad/s or m/s: some write a limit that is none
 NAME_CHARACTERS, NAME_BYTES = 80, 160  # with an ending it names a file and a column
 
@@ -106,9 +106,9 @@ Number = Annotated[_Any, _bounded("")]
 Acceleration = Annotated[_Any, _bounded("m/s^2")]
 Fraction = Annotated[_Any, Field(ge=0, le=1)]
 Mass = Annotated[_Above, _bounded("kg", SMALLEST)]
-MassOrNone = Annotated[_NotBelow, _bounded("kg")]
+MassOrNone = Annotated[_NotBelow, _bounded("kg", SMALLEST)]
 Moment = Annotated[_Above, _bounded("kg m^2", SMALLEST)]
-MomentOrNone = Annotated[_NotBelow, _bounded("kg m^2")]
+MomentOrNone = Annotated[_NotBelow, _bounded("kg m^2", SMALLEST)]
 Product = Annotated[_Any, _bounded("kg m^2")]
 Limit = Annotated[_Above, _bounded("", SMALLEST, LARGEST_LIMIT)]
 Length = Annotated[_Any, _in_metres()]
