@@ -17,7 +17,8 @@ from .gauss_newton import GaussNewton
 from .orientation import bryant_angles, principal, rotations
 from .pose_status import PoseStatus, judge
 
-STARTS = 2000
+STARTS = 2000  # that chains can reach, at most, of so many
+DRAWN = 20000
 WIDTHS = 4  # of boxes, each half as wide as the one before
 ITERATIONS = 60
 LONGEST = 0.5  # step, in characteristic lengths and radians
@@ -47,6 +48,7 @@ def search(
 ) -> AssemblyModes:
     """Poses of joint coordinates, (n,), that fit within `tolerance` [rad or m]."""
     starts = _starts(mechanism, np.random.default_rng(seed))
+    starts = starts[np.isfinite(newton.joints(starts)).all(axis=1)][:STARTS]
     given = np.tile(joints, (len(starts), 1))
     pose, converged = _descend(newton, starts, given)
     pose, given = principal(pose[converged]), given[converged]
@@ -68,14 +70,14 @@ def search(
 def _starts(mechanism: Mechanism, rng: np.random.Generator) -> np.ndarray:
     """Poses about home, (N, 6): home itself, then boxes up to twice as far as the base reaches."""
     points = [chain.base for chain in mechanism.chains]
-    width = 2 * np.linalg.norm(points, axis=1).max() * 0.5 ** (np.arange(STARTS) % WIDTHS)
-    place = rng.uniform(-1, 1, (STARTS, 3)) * width[:, None]
-    axis = rng.normal(size=(STARTS, 3))
+    width = 2 * np.linalg.norm(points, axis=1).max() * 0.5 ** (np.arange(DRAWN) % WIDTHS)
+    place = rng.uniform(-1, 1, (DRAWN, 3)) * width[:, None]
+    axis = rng.normal(size=(DRAWN, 3))
     axis /= np.linalg.norm(axis, axis=1)[:, None]
-    half = rng.uniform(0, np.pi / 2, STARTS)
+    half = rng.uniform(0, np.pi / 2, DRAWN)
     w, v = np.cos(half)[:, None, None], axis * np.sin(half)[:, None]
     x, y, z = v.T
-    zero = np.zeros(STARTS)
+    zero = np.zeros(DRAWN)
     skew = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
     R = np.eye(3) + 2 * w * skew + 2 * skew @ skew  # Rodrigues, of a unit quaternion (w, v)
     starts = np.hstack([place, bryant_angles(R)])
@@ -94,6 +96,7 @@ def _descend(
         finite = np.isfinite(step.size) & np.isfinite(step.error)
         small = finite & ((step.size <= CONVERGED) | step.settled)
         converged[active[small]] = True
+        x[active[small]] += step.move[small]
         going = finite & ~small
         active, step = active[going], step.of(going)
         if not active.size:

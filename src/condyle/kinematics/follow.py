@@ -50,9 +50,13 @@ def follow(
 
 
 def converge(
-    newton: GaussNewton, x: np.ndarray, joints: np.ndarray
+    newton: GaussNewton, x: np.ndarray, joints: np.ndarray, bold: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Gauss-Newton from poses x, (N, 6), in steps that contract; where that went well, (N,)."""
+    """Gauss-Newton from poses x, (N, 6), in steps that contract; where that went well, (N,).
+
+    Args: bold: any pose will do, however far.
+    """
+    shrink = 1.0 if bold else SHRINK
     x, last = x.copy(), np.full(len(x), np.inf)
     converged = np.zeros(len(x), dtype=bool)
     active = np.arange(len(x))
@@ -64,14 +68,15 @@ def converge(
         finite = np.isfinite(step.size)
         x[active[finite]] += step.move[finite]
         # Near a singularity rounding of the joints makes steps that do not shrink.
-        stalled = step.size > SHRINK * last[active]
+        stalled = step.size > shrink * last[active]
         converged[active] = (step.size <= CONVERGED) | (stalled & step.settled)
         last[active] = step.size
         going = finite & ~converged[active] & ~stalled & (step.size <= LONGEST)
         active = active[going]
         if not active.size:
             break
-    converged &= unlikeness(first, final) <= ALIKE
+    if not bold:
+        converged &= unlikeness(first, final) <= ALIKE
     return x, converged
 
 

@@ -24,6 +24,7 @@ from .pose_status import PoseStatus, judge
 
 FEW = 32  # rows followed at once behind a broken link; four times as many after each success
 SAME = 1e-6  # poses closer than this are one, in characteristic lengths and radians
+FALLEN = 0.3  # smallest singular value of A, over that of the row before
 BETTER = 0.5  # distance from what is expected, over that of the pose followed
 
 
@@ -55,7 +56,8 @@ def track(
         unsure = _unsure(newton, pose[new], joints[new], time[new], tolerance)
         unsure[: len(new) - len(taken[first:])] = False
         if unsure.any():
-            status[new[np.argmax(unsure)] :] = PoseStatus.LOST
+            # The row before is the one that may have been next to the singularity.
+            status[new[np.argmax(unsure) - 1] :] = PoseStatus.LOST
             break
         found = new
         row += linked
@@ -95,11 +97,19 @@ def _unsure(
     here, given = pose[2:], joints[2:]
     expected = pose[1:-1] + newton.between(pose[:-2], pose[1:-1]) * ratio[:, None]
     off = newton.size(newton.between(expected, here))
-    other, fits = converge(newton, expected, given)
+    other, fits = converge(newton, expected, given, bold=True)
     residual = newton.step(other, given).residual
     fits &= judge(fits, residual, tolerance) == PoseStatus.OK
     fits &= newton.size(newton.between(here, other)) > SAME
-    unsure[2:] = fits & (newton.size(newton.between(expected, other)) < BETTER * off)
+    another = fits & (newton.size(newton.between(expected, other)) < BETTER * off)
+    # Next to a singularity, A changes altogether within less than what is expected is off by.
+    A = newton.step(pose[1:], joints[1:]).A
+    step = newton.size(newton.between(pose[1:-1], here))
+    at_border = unlikeness(A[:-1], A[1:]) * off > step
+    sigma = np.linalg.svd(A[:-1][at_border], compute_uv=False)[:, -1]
+    fallen = np.linalg.svd(A[1:][at_border], compute_uv=False)[:, -1]
+    at_border[at_border] = fallen < FALLEN * sigma
+    unsure[2:] = another | at_border
     return unsure
 
 
