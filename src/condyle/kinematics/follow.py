@@ -1,17 +1,19 @@
-"""From a pose whose joints are known to the pose of other joint coordinates, without a leap.
+"""From a pose to the pose of other joint coordinates, without a leap.
 
 Joint coordinates of most mechanisms belong to several poses, its assembly modes; which one a
-mechanism takes is a matter of how it got there. So a pose is followed: joint coordinates go to the
-given ones on a straight line, in pieces, and a piece is taken only if
+mechanism takes is a matter of how it got there. So a pose is followed along the flow of
+Gauss-Newton, X' = A^+ (theta - theta(X)), in pieces: parts of a Gauss-Newton step. With as many
+joints as freedoms, joint coordinates then go to the given ones on a straight line. A piece is taken
+if
 
-- Gauss-Newton contracts: each step is at most a quarter of the last, and none longer than a
-  radian or a characteristic length;
-- the two ends invert each other, |1 - A_end^+ A_start| <= 1/2. Then every A between the two has
-  full rank, so no singularity, where modes meet, lies between; with as many joints as freedoms,
-  the sign of det A stays.
+- it is a whole step, of at most a radian and a characteristic length, and the next one is at most
+  a quarter as long; or it is short and comes nearer to the joint coordinates;
+- and its two ends invert each other, |1 - A_end^+ A_start| <= 1/2. Then every A between the two
+  matrices has full rank, and with as many joints as freedoms the sign of det A stays: no
+  singularity, where modes meet, is leapt over.
 
-Pieces that fail are halved. Both conditions are computed at points, not over intervals: they are
-tests, with a factor in hand, and no proof.
+Other pieces are halved. Both are tests at the ends of a piece, with a factor in hand; neither is
+computed over an interval, so they are no proof.
 """
 
 from __future__ import annotations
@@ -20,64 +22,65 @@ import numpy as np
 
 from .gauss_newton import GaussNewton, least_squares
 
-SMALLEST_PIECE = 2.0**-10  # of the way
+SMALLEST_PIECE = 2.0**-10  # of a step
+PIECES = 200
 ITERATIONS = 40
 SHRINK = 0.25  # a step over the step before
-LONGEST = 1.0  # step, in characteristic lengths and radians
-CONVERGED = 1e-12  # likewise
+LONGEST = 1.0  # piece, in characteristic lengths and radians,
+SHORT = 0.25  # and one that need not shrink the step to a quarter
+CONVERGED = 1e-12  # step, likewise
 ALIKE = 0.5  # of |1 - A_end^+ A_start|
 
 
 def follow(
     newton: GaussNewton, start: np.ndarray, joints: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Poses (N, 6) followed from `start`, (N, 6), to joint coordinates (N, n); where reached, (N,).
+    """Poses (N, 6) followed from `start`, (N, 6), towards joint coordinates (N, n), as far as
+    that goes, and whether to the end, (N,): there the joints are nearest to the given ones.
 
     Samples never influence each other.
     """
-    pose, done, piece = start.copy(), np.zeros(len(start)), np.ones(len(start))
-    origin = newton.joints(start)
-    way = newton.turn(joints - origin)
-    active = np.flatnonzero(np.isfinite(way).all(axis=1))
-    while active.size:
-        goal = np.minimum(done[active] + piece[active], 1.0)
-        target = origin[active] + way[active] * goal[:, None]
-        x, ok = converge(newton, pose[active], target)
-        pose[active[ok]], done[active[ok]] = x[ok], goal[ok]
-        piece[active] *= np.where(ok, 2.0, 0.5)
-        active = active[(done[active] < 1) & (piece[active] >= SMALLEST_PIECE)]
-    return pose, done == 1
-
-
-def converge(
-    newton: GaussNewton, x: np.ndarray, joints: np.ndarray, bold: bool = False
-) -> tuple[np.ndarray, np.ndarray]:
-    """Gauss-Newton from poses x, (N, 6), in steps that contract; where that went well, (N,).
-
-    Args: bold: any pose will do, however far.
-    """
-    shrink = 1.0 if bold else SHRINK
-    x, last = x.copy(), np.full(len(x), np.inf)
-    converged = np.zeros(len(x), dtype=bool)
-    active = np.arange(len(x))
-    for iteration in range(ITERATIONS):
-        step = newton.step(x[active], joints[active])
-        if iteration == 0:
-            first, final = step.A, step.A.copy()
-        final[active] = step.A
-        finite = np.isfinite(step.size)
-        x[active[finite]] += step.move[finite]
-        # Near a singularity rounding of the joints makes steps that do not shrink.
-        stalled = step.size > shrink * last[active]
-        converged[active] = (step.size <= CONVERGED) | (stalled & step.settled)
-        last[active] = step.size
-        going = finite & ~converged[active] & ~stalled & (step.size <= LONGEST)
-        active = active[going]
+    pose, piece, reached = start.copy(), np.ones(len(start)), np.zeros(len(start), dtype=bool)
+    step = newton.step(pose, joints)
+    active = np.flatnonzero(np.isfinite(step.size))
+    step = step.of(active)
+    for _ in range(PIECES):
         if not active.size:
             break
-    if not bold:
-        converged &= unlikeness(first, final) <= ALIKE
-    return x, converged
+        part = np.minimum(piece[active], LONGEST / np.maximum(step.size, LONGEST))
+        x = pose[active] + step.move * part[:, None]
+        new = newton.step(x, joints[active])
+        nearer = (part * step.size <= SHORT) & (new.error < step.error)
+        ok = (new.size <= SHRINK * step.size) | ((part < 1) & nearer)
+        ok &= unlikeness(step.A, new.A) <= ALIKE
+        # Near a singularity rounding of the joints makes steps that do not shrink.
+        still = (step.size <= CONVERGED) | (step.settled & ~ok)
+        reached[active[still]] = True
+        pose[active[ok]] = x[ok]
+        step.put(ok, new.of(ok))
+        piece[active] = np.where(ok, 2 * part, part / 2)
+        going = ~still & (piece[active] >= SMALLEST_PIECE)
+        active, step = active[going], step.of(going)
+    return pose, reached
+
+
+def nearest(
+    newton: GaussNewton, start: np.ndarray, joints: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where plain Gauss-Newton gets, (N, 6), and whether it converges, (N,): a leap, if need be."""
+    pose, converged = start.copy(), np.zeros(len(start), dtype=bool)
+    last, active = np.full(len(start), np.inf), np.arange(len(start))
+    for _ in range(ITERATIONS):
+        if not active.size:
+            break
+        step = newton.step(pose[active], joints[active])
+        shrinks = step.size < last[active]
+        pose[active[shrinks]] += step.move[shrinks]
+        last[active] = step.size
+        small = (step.size <= CONVERGED) | step.settled
+        converged[active] = small
+        active = active[shrinks & ~small]
+    return pose, converged
 
 
 def unlikeness(start: np.ndarray, end: np.ndarray) -> np.ndarray:

@@ -64,9 +64,10 @@ class ForwardKinematics:
                 time:      (N,) [s], rising: each sample follows the one before. Without, samples
                            follow from home and never influence each other.
                 tolerance: largest residual of a joint [rad or m].
-        Raises: InputError: for times that do not rise.
+        Raises: InputError: for times that do not rise, or a tolerance that is none.
         """
         joints = np.asarray(joints, dtype=float)
+        _check(tolerance)
         if time is None:
             pose, reached = follow(self._newton, np.zeros((len(joints), 6)), joints)
             status = judge(reached, self._newton.step(pose, joints).residual, tolerance)
@@ -92,4 +93,10 @@ class ForwardKinematics:
         self, joints: np.ndarray, seed: int = 0, tolerance: float = TOLERANCE
     ) -> AssemblyModes:
         """Assembly modes of one sample, (n,), that a seeded search finds; it may miss some."""
+        _check(tolerance)
         return search(self._mechanism, self._newton, np.asarray(joints, float), seed, tolerance)
+
+
+def _check(tolerance: float) -> None:
+    if not 0 <= tolerance < np.inf:
+        raise InputError(f"tolerance: expected a finite number from 0 on, got {tolerance:g}")

@@ -26,4 +26,4 @@ def judge(reached: np.ndarray, residual: np.ndarray, tolerance: float) -> np.nda
     with np.errstate(invalid="ignore"):
         fits = (np.abs(residual) <= tolerance).all(axis=1)
     missed = np.where(reached, PoseStatus.INCONSISTENT, PoseStatus.UNREACHABLE)
-    return np.where(reached & fits, PoseStatus.OK, missed)
+    return np.where(reached & fits, PoseStatus.OK, missed).astype(int)

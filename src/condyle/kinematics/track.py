@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .follow import ALIKE, CONVERGED, LONGEST, SHRINK, converge, follow, unlikeness
+from .follow import ALIKE, CONVERGED, LONGEST, SHRINK, follow, nearest, unlikeness
 from .gauss_newton import GaussNewton, Step
 from .pose_status import PoseStatus, judge
 
@@ -65,9 +65,7 @@ def track(
     return pose, status
 
 
-def _linked(
-    newton: GaussNewton, pose: np.ndarray, at: Step, joints: np.ndarray, first: int
-) -> int:
+def _linked(newton: GaussNewton, pose: np.ndarray, at: Step, joints: np.ndarray, first: int) -> int:
     """How many poses from the first on are each followed from the one before.
 
     Args: at, joints: of more rows, of which `pose` are those from `first` on.
@@ -97,7 +95,7 @@ def _unsure(
     here, given = pose[2:], joints[2:]
     expected = pose[1:-1] + newton.between(pose[:-2], pose[1:-1]) * ratio[:, None]
     off = newton.size(newton.between(expected, here))
-    other, fits = converge(newton, expected, given, bold=True)
+    other, fits = nearest(newton, expected, given)
     residual = newton.step(other, given).residual
     fits &= judge(fits, residual, tolerance) == PoseStatus.OK
     fits &= newton.size(newton.between(here, other)) > SAME
