@@ -199,8 +199,8 @@ CASES: dict[str, Case] = {
     "all poses and flags": ((*POSE, "--all", "--flag"), table(JOINTS, [[0] * 6]), "leave out --fl"),
     "seed of no search": ((*POSE, "--seed", "1"), table(JOINTS, [[0] * 6]), "--seed is of the se"),
     "tolerance below zero": ((*POSE, "--tolerance", "-1"), table(JOINTS, [[0] * 6]), "tolerance"),
-    "tolerance of nothing": (
-        (*POSE, "--tolerance", "nan"),
+    "tolerance without end": (
+        (*POSE, "--tolerance", "inf"),
         table(JOINTS, [[0] * 6]),
         "tolerance: expected a finite number",
     ),
