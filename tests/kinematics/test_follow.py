@@ -14,6 +14,7 @@ from oracles.rotations import platform_motion
 
 import condyle
 from condyle.errors import LostError
+from condyle.kinematics.follow import follow
 from condyle.kinematics.forward import ForwardKinematics
 from condyle.kinematics.gauss_newton import GaussNewton
 from condyle.kinematics.pose_status import PoseStatus
@@ -22,6 +23,7 @@ from condyle.mechanism.files import from_data
 from condyle.motion import write_table
 from condyle.results.poses import pose_file
 
+Reached = tuple[np.ndarray, np.ndarray]
 OK, UNREACHABLE, LOST, INCONSISTENT = PoseStatus
 
 
@@ -182,3 +184,36 @@ def test_a_lost_track_in_a_file(tmp_path: Path) -> None:
     assert error.value.samples[-1] == 100 and not (tmp_path / "out.csv").exists()
     report = pose_file(mechanism, tmp_path / "in.csv", tmp_path / "out.csv", flag=True)
     assert report.failed == {"lost": report.missing} and report.missing >= 22
+
+
+def test_candidates_of_another_mode_are_followed_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rows 20 and on begin as the mirror image below the base (Z = -2 m), whose legs are as long."""
+    forward, d = stewart()
+    poses = line((-0.1, 0.2, 0.1, 0.3, -0.2, 0.4), 60)
+    calls: list[int] = []
+
+    def leaping(newton: GaussNewton, start: np.ndarray, joints: np.ndarray) -> Reached:
+        calls.append(len(start))
+        found, reached = follow(newton, start, joints)
+        if len(calls) == 1:
+            found[20:, 2] = -4.0 - found[20:, 2]
+            found[20:, 3:5] *= -1
+        return found, reached
+
+    monkeypatch.setattr("condyle.kinematics.track.follow", leaping)
+    found = forward.solve(encoders(d, poses), np.arange(60.0))
+    assert found.found.all() and len(calls) > 2
+    np.testing.assert_allclose(found.pose, poses, rtol=0, atol=1e-12)
+
+
+def test_solutions_have_principal_angles(monkeypatch: pytest.MonkeyPatch) -> None:
+    forward, d = stewart()
+    poses = line((-0.1, 0.2, 0.1, 0.3, -0.2, 0.4), 3)
+
+    def turning(newton: GaussNewton, start: np.ndarray, joints: np.ndarray) -> Reached:
+        found, reached = follow(newton, start, joints)
+        return found + 2 * np.pi * np.array([0, 0, 0, 1, 0, -2]), reached
+
+    monkeypatch.setattr("condyle.kinematics.forward.follow", turning)
+    found = forward.solve(encoders(d, poses))
+    np.testing.assert_allclose(found.pose, poses, rtol=0, atol=1e-12)
