@@ -187,7 +187,7 @@ def test_a_lost_track_in_a_file(tmp_path: Path) -> None:
 
 
 def test_candidates_of_another_mode_are_followed_anew(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Rows 20 and on begin as the mirror image below the base (Z = -2 m), whose legs are as long."""
+    """Rows 20 and on begin as the mirror image below the base (Z = -2 m), with the same legs."""
     forward, d = stewart()
     poses = line((-0.1, 0.2, 0.1, 0.3, -0.2, 0.4), 60)
     calls: list[int] = []
