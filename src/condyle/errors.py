@@ -77,6 +77,14 @@ class UnreachableError(SampleError):
     """A pose that a chain or the contacts cannot reach."""
 
 
+class LostError(SampleError):
+    """Joint coordinates of which it is no longer certain to which assembly mode they belong."""
+
+
+class InconsistentError(SampleError):
+    """Joint coordinates that no pose near the one found has."""
+
+
 class SingularError(SampleError):
     """A pose at which the torques are not determined."""
 

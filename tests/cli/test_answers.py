@@ -34,6 +34,7 @@ CALLS: dict[str, tuple[str, ...]] = {
     "solve": ("solve", "my jaw.toml", "--states", "states.csv", "--out", "torques.csv"),
     "pose": ("pose", "masticatory", "--joints", "joints.csv", "--out", "poses.csv"),
     "pose --flag": ("pose", "masticatory", "--joints", "far.csv", "--out", "poses.csv", "--flag"),
+    "pose --all": ("pose", "masticatory", "--joints", "joints.csv", "--out", "modes.csv", "--all"),
     "compare": ("compare", *QUICK, "--motion", "my path.csv", "--no-figures", "--out", "x y"),
     "plot": ("plot",),
     "plot SOLUTION": ("plot", "a run.nc", "--figure", "load", "--out", "my figures"),

@@ -190,6 +190,20 @@ CASES: dict[str, Case] = {
     "joints of others": (POSE, "joint_left\n0\n", "joint_left"),
     "joints nan": (POSE, table(JOINTS, [["nan"] * 6]), 'got "nan"'),
     "joints unreachable": (POSE, table(JOINTS, [[3] * 6]), "no pose has the joint coordinates"),
+    "joints whose times fall": (
+        POSE,
+        table(["t", *JOINTS], [[1, *[0] * 6]] * 2),
+        "times must rise",
+    ),
+    "joints that disagree": (POSE, table(JOINTS, [[1e-3] + [0] * 5]), "raise --tolerance"),
+    "all poses and flags": ((*POSE, "--all", "--flag"), table(JOINTS, [[0] * 6]), "leave out --fl"),
+    "seed of no search": ((*POSE, "--seed", "1"), table(JOINTS, [[0] * 6]), "--seed is of the se"),
+    "tolerance below zero": ((*POSE, "--tolerance", "-1"), table(JOINTS, [[0] * 6]), "tolerance"),
+    "tolerance without end": (
+        (*POSE, "--tolerance", "inf"),
+        table(JOINTS, [[0] * 6]),
+        "tolerance: expected a finite number",
+    ),
     "poses in a folder": ((*POSE[:5], "."), table(JOINTS, [[0] * 6]), "is a folder"),
     # solutions
     "solution missing": (("plot", "a.nc"), None, "a.nc: no such file"),
