@@ -96,8 +96,8 @@ def test_far_from_home_rows_follow_the_row_before() -> None:
         assert result.poses is not None
         if not result.reached.all():
             continue
-        poses = result.poses.pose
-        joints = model.posture(poses).joint
+        poses = result.pose
+        joints = model.configuration(poses).joint
         alone, timed = forward.solve(joints[-1:]), forward.solve(joints, np.arange(101.0))
         assert timed.found.all()
         np.testing.assert_allclose(timed.pose, poses, rtol=0, atol=1e-9)
@@ -156,7 +156,7 @@ def test_one_wrong_encoder_row_is_inconsistent_alone() -> None:
     q = line((0.004, 0.002, 0.1, 0.05), 30)
     result = model.kernel.solve(q, 0 * q, 0 * q, np.zeros((30, 9)))
     assert result.poses is not None
-    joints = model.posture(result.poses.pose).joint
+    joints = model.configuration(result.pose).joint
     joints[11, 2] += 0.01
     found = ForwardKinematics(condyle.load("masticatory")).solve(joints, np.arange(30.0))
     np.testing.assert_array_equal(np.flatnonzero(found.status), [11])

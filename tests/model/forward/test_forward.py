@@ -27,8 +27,8 @@ def poses_and_joints(name: str, count: int, size: float) -> tuple[np.ndarray, np
     q = np.random.default_rng(7).uniform(-size, size, (count, m)) * unit
     result = model.kernel.solve(q, 0 * q, 0 * q, np.zeros((count, 9)))
     assert result.poses is not None
-    pose = result.poses.pose[result.reached]
-    return pose, model.posture(pose).joint
+    pose = result.pose[result.reached]
+    return pose, model.configuration(pose).joint
 
 
 @pytest.mark.parametrize("name", bundled_mechanisms())
@@ -72,7 +72,7 @@ def test_noise_is_spread_in_the_least_squares_sense() -> None:
             zero = np.zeros_like(q)
             result = model.kernel.solve(q, zero, zero, np.zeros((len(q), 9)))
             assert result.poses is not None
-            moved.append(model.posture(result.poses.pose).joint)
+            moved.append(model.configuration(result.pose).joint)
         slope = (moved[0] - moved[1]) / (2 * step)
         cosine = (slope * found.residual).sum(axis=1) / np.linalg.norm(slope, axis=1) / left
         assert np.abs(cosine).max() < 1e-5
