@@ -13,6 +13,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 @pytest.fixture
+def fuzz_runs(request: pytest.FixtureRequest) -> int:
+    """Files to try."""
+    return int(request.config.getoption("--fuzz-runs", default=SHORT))
+
+
+@pytest.fixture
 def fuzz_seeds(request: pytest.FixtureRequest) -> range:
     """Seeds, one a run; a run that fails can be repeated with its seed alone."""
     first = request.config.getoption("--fuzz-seed", default=0)

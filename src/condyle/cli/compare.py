@@ -23,10 +23,11 @@ def compare(
     load: options.Load = None,
     load_point: options.LoadPoint = None,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("results"),
-    units: options.Units = "m,rad",
+    units: options.Units = None,
     landmark: options.Landmark = None,
     smooth: options.Smooth = None,
     rate: options.Rate = None,
+    trim: options.Trim = 0.0,
     figures: Annotated[bool, typer.Option(help="Draw Figures 5 to 9 of the paper.")] = True,
     report: Annotated[
         bool, typer.Option("--report", help="Write the page of condyle report, with the tables.")
@@ -43,7 +44,7 @@ def compare(
     from ..report.tables import save_tables, tables, with_tables
 
     machine = condyle.load(mechanism)
-    path, acting = motion_and_load(machine, motion, load, units, landmark, smooth, rate)
+    path, acting = motion_and_load(machine, motion, load, units, landmark, smooth, rate, trim)
     comparison = compare_models(machine, path, acting, load_point)
     output_folder(out)
     files = save_tables(comparison, out)
@@ -60,7 +61,7 @@ def compare(
         inputs = [file for file in (motion, load) if file is not None]
         page = out / f"{file_stem(machine.name)}.html"
         files.append(write_report(solution, page, files=inputs))
-    warn(solution.warnings)
+    warn([*path.warnings, *acting.warnings, *solution.warnings])
     then = command_line(
         "run",
         mechanism,
@@ -68,10 +69,11 @@ def compare(
         load=load,
         load_point=load_point,
         out=out if out != Path("results") else None,
-        units=units if units != "m,rad" else None,
+        units=units,
         landmark=landmark,
         smooth=smooth,
         rate=rate,
+        trim=trim or None,
         report=True,
     )
     return Answer(f"{comparison}\n{files_line(files)}", _data(comparison) | {"files": files}, then)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,16 +19,17 @@ def motion_and_load(
     machine: Mechanism,
     motion: Path | None,
     load: Path | None,
-    units: str = "m,rad",
+    units: str | None = None,
     landmark: str | None = None,
     smooth: str | None = None,
     rate: float | None = None,
+    trim: float = 0.0,
 ) -> tuple[Motion, Load]:
     """The files named; without a motion the reference case, or a trial motion if it is no jaw."""
     from ..mechanism.home import independent_coordinates
-    from ..motion import Load, Motion, bundled_reference, trial_motion
+    from ..motion import Load, Motion, bundled_reference, resolve_landmark, trial_motion
 
-    if motion is None and units != "m,rad":
+    if motion is None and units is not None:
         raise InputError("--units is for a motion of your own; name it with --motion")
     reference_path, reference_load = bundled_reference()
     reference = motion is None and chews(machine, landmark)
@@ -47,10 +49,17 @@ def motion_and_load(
                 f"{', '.join(independent_coordinates(machine))} about home"
             ]
         )
-        return trial_motion(machine, cutoff=smooth, rate=rate), acting
+        return trial_motion(machine, cutoff=smooth, rate=rate, trim=trim), acting
     path = Motion.from_csv(
-        motion or reference_path, units=units, landmark=landmark, cutoff=smooth, rate=rate
+        motion or reference_path,
+        units=units,
+        landmark=landmark,
+        cutoff=smooth,
+        rate=rate,
+        trim=trim,
     )
+    if path.kind == "landmark":
+        path = replace(path, landmark=resolve_landmark(landmark, machine.platform.points))
     return path, acting
 
 
@@ -81,7 +90,7 @@ def file_stem(name: str) -> str:
 
 def warn(warnings: list[str]) -> None:
     """Warnings on stderr, so that they never mix with results."""
-    for warning in warnings:
+    for warning in dict.fromkeys(warnings):
         print(f"condyle: warning: {warning}", file=sys.stderr)
 
 

@@ -19,12 +19,12 @@ def pose(
     joints: Annotated[
         Path,
         typer.Option(
-            help="Joint coordinates (CSV): joint_CHAIN for each chain (rad, or m for a slider), "
-            "zero at home. With a column t (s) each row follows the one before, else each stands "
+            help="Joint coordinates (CSV or Parquet): joint_CHAIN for each chain (rad, or m for a "
+            "slider), zero at home. With a column t (s) each row follows the one before, else each stands "
             "alone and follows from home."
         ),
     ],
-    out: Annotated[Path, typer.Option(help="File for the poses (CSV).")],
+    out: Annotated[Path, typer.Option(help="File for the poses (.csv or .parquet).")],
     flag: options.Flag = False,
     tolerance: Annotated[
         float,

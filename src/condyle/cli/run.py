@@ -25,10 +25,11 @@ def run(
     formulation: options.Formulation = "virtual_power",
     route: options.Route = "core",
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("results"),
-    units: options.Units = "m,rad",
+    units: options.Units = None,
     landmark: options.Landmark = None,
     smooth: options.Smooth = None,
     rate: options.Rate = None,
+    trim: options.Trim = 0.0,
     figures: Annotated[bool, typer.Option("--figures", help="Draw figures too.")] = False,
     reactions: options.Reactions = False,
     report: Annotated[
@@ -48,7 +49,7 @@ def run(
     from ..results.summary import summarize
 
     machine = condyle.load(mechanism)
-    path, acting = motion_and_load(machine, motion, load, units, landmark, smooth, rate)
+    path, acting = motion_and_load(machine, motion, load, units, landmark, smooth, rate, trim)
     model = condyle.derive(machine, formulation, route, backend)
     solution = model.solve(path, acting, load_point, flag, reactions, threads)
     if strict:
@@ -66,7 +67,7 @@ def run(
         inputs = [file for file in (motion, load) if file is not None]
         inputs += [Path(mechanism)] if Path(mechanism).is_file() else []
         files.append(write_report(solution, folder / f"{stem}.html", files=inputs))
-    warn(solution.warnings)
+    warn([*path.warnings, *acting.warnings, *solution.warnings])
     summary = summarize(solution)
     return Answer(
         f"{summary}\n\n{files_line(files)}",

@@ -28,7 +28,7 @@ from ..mechanism.home import (
     independent_coordinates,
 )
 from ..mechanism.mechanism import Mechanism
-from ..motion import Motion
+from ..motion import Motion, resolve_landmark, resolve_load_point
 from ..progress import step
 from ..questions import Prescribed, Question
 from ..questions.equations import part_names
@@ -40,7 +40,6 @@ from .closing import closed_states
 from .data import Configuration, Efforts, Evaluation
 from .robust import Robust
 
-DEFAULT_LOAD_POINT = "right_molar"
 CONDITION = "condition"
 EVERYTHING = ("contact", "share", "motion", "joint", "configuration")
 # Names of results, by what is asked for.
@@ -309,20 +308,12 @@ class Evaluator:
     # -- motions and loads -------------------------------------------------------------------
 
     def load_point(self, name: str | None) -> np.ndarray:
-        """Where a load acts, (3,) [m] in {M}: a named point, or right_molar if there is one.
+        """Where a load acts, (3,) [m] in {M}: a named point; else right_molar, or the only one.
 
         Raises: InputError: if the mechanism has no such point.
         """
         points = self.mechanism.platform.points
-        if name is None and DEFAULT_LOAD_POINT not in points:
-            raise InputError(
-                f"the load needs a point: this mechanism has no {DEFAULT_LOAD_POINT}. "
-                f"Choose one with --load-point (load point).{did_you_mean('', points)}"
-            )
-        name = name or DEFAULT_LOAD_POINT
-        if name not in points:
-            raise InputError(f'the platform has no point "{name}".{did_you_mean(name, points)}')
-        return np.array(points[name])
+        return np.array(points[resolve_load_point(name, points)])
 
     def independent_motion(self, motion: Motion) -> tuple[States, float | None]:
         """q_EE and its rates, (N, m) each, from a motion of any kind.
@@ -335,7 +326,9 @@ class Evaluator:
             columns = indices(self.independent)
             q, q1, q2 = (a[:, columns] for a in given)
             return (q, q1, q2), self.contact_residual(motion.value)
-        landmark = motion.landmark if motion.kind == "landmark" else None
+        landmark = None
+        if motion.kind == "landmark":
+            landmark = resolve_landmark(motion.landmark, self.mechanism.platform.points)
         return self.independent_states(motion.names, *given, landmark), None
 
     def contact_residual(self, pose: np.ndarray) -> float:

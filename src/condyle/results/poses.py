@@ -182,7 +182,9 @@ def modes_file(
 def _read(mechanism: Mechanism, joints: str | Path) -> tuple[Table, np.ndarray]:
     check_home(mechanism)
     names = [f"joint_{name}" for name in mechanism.chain_names]
-    table = read_table(joints, known=("t", *names))
+    turns = {"rad": "angle", "m": "length"}
+    kinds = {n: (turns[unit], 0) for n, unit in zip(names, _units(mechanism), strict=True)}
+    table = read_table(joints, known={"t": ("time", 0), **kinds})
     return table, table.require(names)
 
 

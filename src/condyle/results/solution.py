@@ -71,19 +71,20 @@ class Solution(xr.Dataset):
         return SolutionPlots(self)
 
     def save(self, *paths: str | Path) -> None:
-        """Write as NetCDF (.nc) or CSV (.csv): every file whole, or none of them."""
+        """Write as NetCDF (.nc), CSV (.csv) or Parquet (.parquet): every file whole, or none."""
         with step("writing results"), ExitStack() as stack:
             for path in paths:
                 suffix = Path(path).suffix.lower()
-                if suffix not in (".nc", ".csv"):
+                if suffix not in (".nc", ".csv", ".parquet"):
                     raise InputError(
-                        f'{path}: expected a name that ends in .nc or .csv, got "{suffix}"'
+                        f"{path}: expected a name that ends in .nc, .csv or .parquet, "
+                        f'got "{suffix}"'
                     )
                 temporary = stack.enter_context(replacing(path))
                 if suffix == ".nc":
                     self.to_netcdf(temporary, engine="h5netcdf")
                 else:
-                    write_table(temporary, self.columns())
+                    write_table(temporary, self.columns(), parquet=suffix == ".parquet")
 
     def columns(self) -> dict[str, np.ndarray | list[str]]:
         """Columns of the CSV: t, tau_<chain>, contact_<contact>, pose, joint_<chain>.

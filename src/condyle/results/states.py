@@ -23,7 +23,7 @@ from .solution import (
     named_columns,
 )
 
-CHUNK_ROWS = 65536
+CHUNK_ROWS = 16384
 
 
 def solve_file(
@@ -40,8 +40,10 @@ def solve_file(
 
     Rows never influence each other.
 
-    Args:    states: CSV with 6 - k pose coordinates, their rates dX... and accelerations
-             ddX..., and optionally Fx, Fy, Fz, Mx, My, Mz.
+    Args:    states: CSV, or Parquet if its name ends in .parquet, with 6 - k pose coordinates,
+             their rates dX... and accelerations ddX..., and optionally some of Fx, Fy, Fz, Mx,
+             My, Mz. Other columns are named in a warning, or refused if they look misspelt.
+             out: likewise CSV or Parquet.
              reactions: columns reaction_<joint>_<chain>_x, _y, _z ... too.
              threads: at most so many; the file does not depend on it.
     Returns: number of rows, and warnings.
@@ -50,7 +52,7 @@ def solve_file(
     known = [p + name for p in ("", "d", "dd") for name in COORDINATES] + list(WRENCH)
     worst: dict[str, tuple[float, int, int]] = {}
     lifts: dict[str, tuple[int, int]] = {}
-    rows = 0
+    rows, unused = 0, list[str]()
     with TableWriter(out) as writer:
         for table in iter_table(states, CHUNK_ROWS, known=known, doing="solving"):
             columns, margins, lifted = solve_table(
@@ -69,6 +71,7 @@ def solve_file(
                     lifts[name] = (first, count + pulls.size)
             writer.write(columns)
             rows += table.rows
+            unused = list(table.warnings)
         warnings = [
             f'contact "{name}" is outside its bounds in {count} rows, by up to '
             f"{depth * 1e3:.3g} mm in row {at}"
@@ -81,7 +84,7 @@ def solve_file(
         "would have to pull the ball"
         for name, (first, count) in lifts.items()
     ]
-    return rows, warnings
+    return rows, unused + warnings
 
 
 def solve_table(
@@ -99,10 +102,10 @@ def solve_table(
     q, q1, q2 = model.independent_states(names, q, q1, q2)
     wrench = np.zeros((table.rows, 6))
     point = np.zeros(3)
-    for part, group in ((slice(0, 3), WRENCH[:3]), (slice(3, 6), WRENCH[3:])):
-        if any(name in table.columns for name in group):
-            wrench[:, part] = table.require(group)
-    if load_point is not None or "Fx" in table.columns:
+    given = [name for name in WRENCH if name in table.columns]
+    for name in given:
+        wrench[:, WRENCH.index(name)] = table.columns[name]
+    if load_point is not None or set(given) & set(WRENCH[:3]):
         point = model.load_point(load_point)
     evaluation = model.evaluate(q, q1, q2, with_point(wrench, point), threads)
     ok = evaluation.status == 0
@@ -126,7 +129,7 @@ def solve_table(
     lifted = lift_off(mechanism, force) & ok[:, None]
     columns |= lift_off_columns(mechanism, lifted)
     if flag:
-        columns["status"] = [STATUS_NAMES[i] for i in evaluation.status]
+        columns["status"] = np.array(STATUS_NAMES)[evaluation.status]
     margins = bound_margins(mechanism, evaluation.configuration.contact_point)
     return columns, np.where(ok[:, None], margins, np.inf), lifted
 

@@ -14,8 +14,9 @@ from ..kinematics.contact import indices
 from ..kinematics.singularity import KINDS, NEAR
 from ..mechanism import COORDINATES, Mechanism
 from ..model.data import Evaluation
-from ..model.evaluator import DEFAULT_LOAD_POINT, Evaluator
+from ..model.evaluator import Evaluator
 from ..model.judge import unreachable_cause
+from ..motion.points import DEFAULT_LOAD_POINT
 from ..report.scene import contact_normals, place
 from ..results.solution import BOUND_TOLERANCE, bound_margins, lift_off
 from ..status import Status
