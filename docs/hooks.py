@@ -132,7 +132,6 @@ def count(function: Any) -> tuple[int, int]:
 
 def command_help() -> str:
     """Arguments and options of every command, from the functions that the terminal calls."""
-    from condyle.cli import commands  # noqa: F401 - registers them
     from condyle.cli.app import app
 
     return "\n\n".join(_section(c.callback, c.name, c.epilog) for c in app.registered_commands)

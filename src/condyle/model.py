@@ -18,9 +18,9 @@ import numpy as np
 from .dynamics import ROUTES
 from .dynamics import formulation as formulation_named
 from .dynamics.equations import part_names, posture_function, require_closed_form
-from .errors import InputError, MechanismError, SingularError, UnreachableError, did_you_mean
+from .errors import InputError, MechanismError, did_you_mean
 from .kinematics.batch import evaluate
-from .kinematics.chain import FAMILIES
+from .kinematics.causes import causes, owners, sample_error, unreachable_text
 from .kinematics.closure import Closure, coordinate_closure, landmark_closure
 from .kinematics.contact import indices
 from .kinematics.singularity import SINGULAR, Singularity, measure
@@ -34,6 +34,8 @@ from .mechanism.home import (
 from .mechanism.mechanism import COORDINATES, Mechanism
 from .progress import step
 from .questions.spec import OUTPUTS
+from .status import STATUS_NAMES as STATUS_NAMES
+from .status import Status, judge
 
 if TYPE_CHECKING:
     from .kernels.compiled import Compiled
@@ -45,8 +47,7 @@ if TYPE_CHECKING:
 DEFAULT_LOAD_POINT = "right_molar"
 CONDITION = "condition"
 BACKENDS = ("auto", "compiled", "interpreted")
-OK, UNREACHABLE, SINGULAR_STATUS = 0, 1, 2
-STATUS_NAMES = ("ok", "unreachable", "singular")
+OK, UNREACHABLE, SINGULAR_STATUS = Status.ok, Status.unreachable, Status.singular
 
 
 @dataclass(frozen=True)
@@ -133,18 +134,25 @@ class Model:
     def _posture_function(self):
         return posture_function(self.mechanism)
 
+    @property
+    def default_load_point(self) -> str | None:
+        """Point for a load that names none: right_molar, or the only one there is."""
+        points = self.mechanism.platform.points
+        only = next(iter(points)) if len(points) == 1 else None
+        return DEFAULT_LOAD_POINT if DEFAULT_LOAD_POINT in points else only
+
     def load_point(self, name: str | None) -> np.ndarray:
-        """Where a load acts, (3,) [m] in {M}: a named point, or right_molar if there is one.
+        """Where a load acts, (3,) [m] in {M}: a named point; else right_molar, or the only one.
 
         Raises: InputError: if the mechanism has no such point.
         """
         points = self.mechanism.platform.points
-        if name is None and DEFAULT_LOAD_POINT not in points:
+        name = name or self.default_load_point
+        if name is None:
             raise InputError(
-                f"the load needs a point: this mechanism has no {DEFAULT_LOAD_POINT}. "
-                f"Choose one with --load-point (load point).{did_you_mean('', points)}"
+                "the load needs a point of the platform: choose one with --load-point (load_point)."
+                + did_you_mean("", points)
             )
-        name = name or DEFAULT_LOAD_POINT
         if name not in points:
             raise InputError(f'the platform has no point "{name}".{did_you_mean(name, points)}')
         return np.array(points[name])
@@ -172,7 +180,7 @@ class Model:
         if conditioned:
             outputs = {*outputs, "motion"} - {CONDITION}
         result = self.kernel.solve(q, q1, q2, load, outputs, threads)
-        status = np.where(result.reached, OK, UNREACHABLE)
+        status = np.where(result.reached, OK, UNREACHABLE).astype(np.int8)
         doubtful = np.flatnonzero(result.uncertain & result.reached)
         if doubtful.size:
             poses = result.poses.pose[doubtful] if result.poses is not None else None
@@ -183,8 +191,8 @@ class Model:
                 poses = again.pose
             with np.errstate(invalid="ignore", divide="ignore"):
                 ratio = self.posture(poses).singularity.ratio
-                regular = (ratio >= SINGULAR) & np.isfinite(result.torque[doubtful]).all(axis=1)
-            status[doubtful[~regular]] = SINGULAR_STATUS
+                finite = np.isfinite(result.torque[doubtful]).all(axis=1)
+            status[doubtful] = judge(result.reached[doubtful], ratio >= SINGULAR, finite)
         result.torque[status != OK] = np.nan
         if conditioned:
             assert result.poses is not None
@@ -213,9 +221,11 @@ class Model:
             poses = torques.poses
             assert poses is not None
             posture = self.posture(poses.pose)
-            status = np.where(torques.reached, OK, UNREACHABLE)
-            regular = (posture.singularity.ratio >= SINGULAR) & np.isfinite(torques.torque).all(1)
-            status[torques.reached & ~regular] = SINGULAR_STATUS
+            status = judge(
+                torques.reached,
+                posture.singularity.ratio >= SINGULAR,
+                np.isfinite(torques.torque).all(axis=1),
+            )
         return Evaluation(poses, torques, posture, status)
 
     def posture(self, pose: np.ndarray) -> Posture:
@@ -255,7 +265,7 @@ class Model:
                 InputError: if motion or load do not fit the mechanism.
         """
         from .motion import Load
-        from .results.solution import assemble
+        from .results.assemble import assemble
 
         start = time.perf_counter()
         load = load or Load.zero()
@@ -263,7 +273,7 @@ class Model:
         name = load_point or load.point
         loaded = np.any(wrench) or name is not None
         point = self.load_point(name) if loaded else np.zeros(3)
-        name = (name or DEFAULT_LOAD_POINT) if loaded else None
+        name = (name or self.default_load_point) if loaded else None
         with step("solving"):
             q, q1, q2, residual = self.independent_motion(motion)
             evaluation = self.evaluate(q, q1, q2, with_point(wrench, point), threads)
@@ -356,45 +366,25 @@ class Model:
 
         Args: t: their times; without, they are rows of a file that start at `row_offset`.
         """
-        bad = np.flatnonzero(evaluation.status != OK)
-        if not bad.size:
-            return
-        first = int(bad[0])
-        row = f"row {row_offset + first + 1}"
-        where = row if t is None else f"t = {t[first]:g} s (sample {first})"
-        more = f" {bad.size - 1} more samples fail too." if bad.size > 1 else ""
-        if evaluation.status[first] == SINGULAR_STATUS:
-            s = evaluation.posture.singularity
-            if s.ratio[first] >= SINGULAR:
-                raise SingularError(
-                    f"the torques at {where} are not finite: its rates, accelerations or load are "
-                    f"too large for numbers.{more}",
-                    bad.tolist(),
-                )
-            raise SingularError(
-                f"the mechanism is singular at {where}: dimensionless ratio {s.ratio[first]:.2g}, "
-                f"must be above {SINGULAR:g}. The torques are not determined there; avoid the "
-                f"pose, or keep such samples with --flag (flag=True).{more}",
-                bad.tolist(),
-            )
-        raise UnreachableError(
-            f"{self.unreachable_cause(evaluation, first)} at {where}. The motion goes too far for "
-            "this mechanism; scale it down, or keep such samples with --flag (flag=True)."
-            f"{more}",
-            bad.tolist(),
+        poses, posture = evaluation.poses, evaluation.posture
+        error = sample_error(
+            self.mechanism,
+            evaluation.status,
+            np.where(poses.reached[:, None], poses.pose, np.nan),
+            posture.reach,
+            posture.singularity,
+            t,
+            row_offset,
         )
+        if error is not None:
+            raise error
 
     def unreachable_cause(self, evaluation: Evaluation, sample: int) -> str:
         """Which chain or contact cannot be where the sample wants it."""
-        pose = evaluation.poses.pose[sample]
-        if not evaluation.poses.reached[sample] or not np.isfinite(pose).all():
-            names = ", ".join(f'"{name}"' for name in self.mechanism.contact_names)
-            return f"no pose with the given coordinates has the contacts {names} on their surfaces"
-        for i, chain in enumerate(self.mechanism.chains):
-            if not evaluation.posture.reach[sample, i] >= 0:
-                with np.errstate(all="ignore"):
-                    return FAMILIES[chain.kind].explain(chain, pose)
-        return "the pose cannot be reached"
+        poses, posture = evaluation.poses, evaluation.posture
+        pose = np.where(poses.reached[:, None], poses.pose, np.nan)
+        cause = causes(evaluation.status, pose, posture.reach, posture.singularity)[sample]
+        return unreachable_text(self.mechanism, owners(self.mechanism)[cause], pose[sample])
 
 
 def derive(

@@ -9,7 +9,7 @@ import typer
 
 from . import options
 from .answer import Answer, command_line, files_line
-from .app import COMPUTE, command
+from .command import COMPUTE, command
 from .inputs import file_stem, motion_and_load, output_folder, warn
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import BoundsError, InputError
+from ..errors import InputError
 
 if TYPE_CHECKING:
     from ..mechanism import Mechanism
@@ -83,10 +83,3 @@ def warn(warnings: list[str]) -> None:
     """Warnings on stderr, so that they never mix with results."""
     for warning in warnings:
         print(f"condyle: warning: {warning}", file=sys.stderr)
-
-
-def require_inside(warnings: list[str]) -> None:
-    """Raises BoundsError if a contact left its bounds (`--strict`)."""
-    outside = [w for w in warnings if "leaves its bounds" in w]
-    if outside:
-        raise BoundsError("; ".join(outside) + ". Without --strict this is a warning", [])

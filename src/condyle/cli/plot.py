@@ -10,7 +10,7 @@ import typer
 from ..errors import InputError, did_you_mean
 from . import completion
 from .answer import Answer, command_line
-from .app import LOOK, command
+from .command import LOOK, command
 from .inputs import output_folder
 
 RESULT = Path("results/masticatory.nc")  # of `condyle run` as it stands

@@ -10,7 +10,7 @@ import typer
 
 from . import options
 from .answer import Answer, command_line, files_line
-from .app import COMPUTE, command
+from .command import COMPUTE, command
 
 
 @command(COMPUTE, example="condyle pose jaw.toml --joints encoders.csv --out poses.csv")

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .answer import Answer, command_line
-from .app import LOOK, command
+from .command import LOOK, command
 
 
 @command(LOOK, example="condyle report results/masticatory.nc")

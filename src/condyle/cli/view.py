@@ -9,7 +9,7 @@ import typer
 
 from . import options
 from .answer import command_line
-from .app import LOOK, app
+from .command import LOOK, app
 
 
 @app.command(rich_help_panel=LOOK, epilog="Example: condyle view jaw.toml")

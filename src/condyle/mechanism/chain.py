@@ -6,7 +6,7 @@ A family's mathematics is in `condyle.kinematics.chain`.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
@@ -80,6 +80,16 @@ class RotaryActuator(Table):
 class LinearActuator(Table):
     force_limit: Positive | None = None
     speed_limit: Positive | None = None
+
+
+class Limits(NamedTuple):
+    """What an actuator can do at most, None where nothing is said.
+
+    effort: [N m or N];  speed: [rad/s or m/s].
+    """
+
+    effort: float | None
+    speed: float | None
 
 
 class ChainTable(Table):
@@ -192,3 +202,11 @@ def check_rod_length(rod: np.ndarray, name: str, start: str) -> None:
 
 
 Chain = Annotated[RSS | PSS | SPS, Field(discriminator="kind")]
+
+
+def limits(chain: RSS | PSS | SPS) -> Limits:
+    """Limits of a chain's actuator, whatever its effort is called in the file."""
+    actuator = chain.actuator
+    if isinstance(actuator, RotaryActuator):
+        return Limits(actuator.torque_limit, actuator.speed_limit)
+    return Limits(actuator.force_limit, actuator.speed_limit)

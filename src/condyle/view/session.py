@@ -13,6 +13,7 @@ from ..errors import InputError, did_you_mean
 from ..kinematics.contact import indices
 from ..kinematics.singularity import KINDS, NEAR
 from ..mechanism import COORDINATES, Mechanism
+from ..mechanism.chain import limits
 from ..model import DEFAULT_LOAD_POINT, OK, UNREACHABLE, Evaluation, Model
 from ..report.scene import contact_normals, place
 from ..results.solution import BOUND_TOLERANCE, bound_margins, lift_off
@@ -221,8 +222,7 @@ def state_messages(
         if up
     ]
     for i, chain in enumerate(mechanism.chains):
-        effort = effort_limit(chain)
-        speed = chain.actuator.speed_limit
+        effort, speed = limits(chain)
         if effort is not None and abs(torque[i]) > effort:
             messages.append(f"{chain.name} is above its effort limit of {effort:g}")
         if rate is not None and speed is not None and abs(rate[i]) > speed:
@@ -237,12 +237,6 @@ def bound_messages(mechanism: Mechanism, margin: np.ndarray) -> list[str]:
         for name, m in zip(mechanism.contact_names, margin, strict=True)
         if m < -BOUND_TOLERANCE
     ]
-
-
-def effort_limit(chain: object) -> float | None:
-    """Torque or force limit of a chain [N m or N]."""
-    actuator = chain.actuator  # type: ignore[attr-defined]
-    return getattr(actuator, "torque_limit", None) or getattr(actuator, "force_limit", None)
 
 
 def force_vectors(
