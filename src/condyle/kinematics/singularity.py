@@ -12,6 +12,7 @@ angles multiplied by the characteristic length, J_W becomes dimensionless as wel
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
@@ -38,8 +39,8 @@ class Singularity:
     @property
     def inverse_ratio(self) -> np.ndarray:
         """Smallest over largest entry of J_A, (N,)."""
-        size = np.abs(self.transmission)
-        return _ratio(size.min(axis=1), size.max(axis=1))
+        size = np.abs(self.transmission).T  # by columns: far quicker than along short rows
+        return _ratio(reduce(np.minimum, size), reduce(np.maximum, size))
 
     @property
     def direct_ratio(self) -> np.ndarray:
@@ -60,7 +61,8 @@ class Singularity:
     @property
     def rank(self) -> np.ndarray:
         """Rank of J_W, (N,): singular values above `SINGULAR` times the largest."""
-        return (self.J_W_sigma > SINGULAR * self.J_W_sigma[:, :1]).sum(axis=1)
+        least = SINGULAR * self.J_W_sigma[:, 0]
+        return np.add.reduce([sigma > least for sigma in self.J_W_sigma.T], dtype=np.int8)
 
     def kind(self, threshold: float = NEAR) -> np.ndarray:
         """Index into `KINDS` of what each sample is near to, (N,)."""

@@ -154,7 +154,7 @@ VARIABLES = (
     Variable("condition", ("time",), "1", "condition number of J_W", lambda d: d.condition),
     Variable(
         "rank", ("time",), "1", "rank of J_W; 0 where the pose cannot be reached",
-        lambda d: d.evaluation.configuration.singularity.rank.astype(np.int8),
+        lambda d: d.evaluation.configuration.singularity.rank,
     ),
     Variable(
         "singularity_ratio", ("time",), "1",
