@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
+from ..extras import require
 
 if TYPE_CHECKING:
     from ..mechanism import Mechanism
@@ -23,7 +24,7 @@ def motion_and_load(
     smooth: str | None = None,
     rate: float | None = None,
 ) -> tuple[Motion, Load]:
-    """The files named; without a motion the reference case, or a trial motion if it is no jaw."""
+    """The files named; without a motion the reference case, or a trial motion where it does not fit."""
     from ..mechanism.home import independent_coordinates
     from ..motion import Load, Motion, bundled_reference, trial_motion
 
@@ -33,8 +34,9 @@ def motion_and_load(
     reference = motion is None and chews(machine, landmark)
     if motion is None and landmark is not None and not reference:
         raise InputError(
-            f'--landmark {landmark}: "{machine.name}" has no jaw\'s two contacts for the bundled '
-            "path. Name a motion of t, x, y, z with --motion"
+            f"--landmark {landmark}: the bundled path is for two contacts; "
+            f'"{machine.name}" has {len(machine.contacts)}. Name a motion of t, x, y, z with '
+            "--motion"
         )
     if load is not None:
         acting = Load.from_csv(load)
@@ -77,6 +79,14 @@ def output_folder(path: Path) -> Path:
 def file_stem(name: str) -> str:
     """The name of a mechanism as the beginning of a file name: no way out of the folder."""
     return re.sub(r"[^\w.+-]+", "_", name)
+
+
+def require_drawing(figures: bool, report: bool) -> None:
+    """Raises MissingExtraError before minutes pass, if what draws them is not installed."""
+    if figures:
+        require("matplotlib", "figures")
+    if report:
+        require("plotly", "report")
 
 
 def warn(warnings: list[str]) -> None:

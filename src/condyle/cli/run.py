@@ -10,7 +10,7 @@ import typer
 from . import options
 from .answer import Answer, command_line, files_line
 from .command import COMPUTE, command
-from .inputs import file_stem, motion_and_load, output_folder, warn
+from .inputs import file_stem, motion_and_load, output_folder, require_drawing, warn
 
 
 @command(
@@ -43,6 +43,7 @@ def run(
 
     Without arguments: the bundled chewing robot, a synthetic chewing path and bite force.
     """
+    require_drawing(figures, report)
     import condyle
 
     from ..results.summary import summarize
