@@ -24,7 +24,7 @@ def motion_and_load(
     smooth: str | None = None,
     rate: float | None = None,
 ) -> tuple[Motion, Load]:
-    """The files named; without a motion the reference case, or a trial motion where it does not fit."""
+    """The files named; without a motion the reference case, or a trial motion."""
     from ..mechanism.home import independent_coordinates
     from ..motion import Load, Motion, bundled_reference, trial_motion
 

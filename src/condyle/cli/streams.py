@@ -15,7 +15,10 @@ class Forgiving(io.TextIOBase):
         self._stream = stream
 
     def write(self, text: str) -> int:
-        self._try("write", text)
+        try:
+            self._try("write", text)
+        except UnicodeError:  # a file name that is no text
+            self._try("write", text.encode("ascii", "backslashreplace").decode())
         return len(text)
 
     def flush(self) -> None:
@@ -41,6 +44,8 @@ class Forgiving(io.TextIOBase):
             return
         try:
             getattr(self._stream, method)(*text)
+        except UnicodeError:
+            raise
         except (OSError, ValueError):
             drop(self._stream)
             self._stream = None

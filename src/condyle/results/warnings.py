@@ -189,8 +189,7 @@ class Watch:
                 )
             )
         order = list(KINDS)
-        for kind, i, status in self._tallies:
-            found.append(self._notice(kind, i, status, self._tallies[kind, i, status]))
+        found += [self._notice(*key, self._tallies[key]) for key in sorted(self._tallies)]
         return sorted(found, key=lambda notice: order.index(notice.kind))
 
     def _notice(self, kind: str, i: int, status: int, tally: _Tally) -> Notice:
