@@ -20,7 +20,8 @@ GENERATED = Path(__file__).parent / "generated"
 EXAMPLES = Path(__file__).parents[1] / "examples"
 FIGURES = ("motion", "path", "torque", "share", "contact_force", "contact_track", "singularity")
 PICTURES = ("mechanism", *FIGURES)
-PAGES = ("cli.md", "operations.md", "variables.md")  # pieces that pages take in
+# Pieces that pages take in.
+PAGES = ("cli.md", "operations.md", "variables.md", "dimensions.md", "statuses.md", "warnings.md")
 REPORT = "report.html"
 FILES = (*(f"{name}.png" for name in PICTURES), *PAGES, REPORT)
 
@@ -59,7 +60,8 @@ def generate(folder: Path) -> None:
 def text_pages(folder: Path) -> None:
     """Write `PAGES`."""
     pages = {"cli.md": command_help(), "operations.md": operation_counts()}
-    pages["variables.md"] = variable_table(reference_solution(100.0))
+    pages |= {"variables.md": variable_table(), "dimensions.md": dimension_table()}
+    pages |= {"statuses.md": status_table(), "warnings.md": warning_table()}
     for name, text in pages.items():
         (folder / name).write_text(text, encoding="utf-8")
 
@@ -74,16 +76,46 @@ def reference_solution(rate: float, reactions: bool = False) -> Any:
     return model.solve(motion, condyle.reference_load(), reactions=reactions)
 
 
-def variable_table(solution: Any) -> str:
+def variable_table() -> str:
     """Every variable of a solution: dimensions, unit and meaning."""
+    import condyle
+    from condyle.results.variables import VARIABLES
+
+    mechanism = condyle.load("masticatory")
     lines = ["| variable | dimensions | unit | what it is |", "|---|---|---|---|"]
-    for name, variable in solution.data_vars.items():
-        dims, units = ", ".join(variable.dims), variable.attrs.get("units", "1")
-        meaning = variable.attrs.get("long_name", "")
-        if flags := variable.attrs.get("flag_meanings"):
-            meaning += ": " + ", ".join(f"{i} {f}" for i, f in enumerate(str(flags).split()))
-        lines.append(f"| `{name}` | {dims} | {units} | {meaning} |")
+    for variable in VARIABLES:
+        about = variable.attributes(mechanism)
+        meaning = about["long_name"]
+        if flags := about.get("flag_meanings"):
+            meaning += ": " + ", ".join(f"{i} {f}" for i, f in enumerate(flags.split()))
+        dims = ", ".join(variable.dims)
+        lines.append(f"| `{variable.name}` | {dims} | {about['units']} | {meaning} |")
     return "\n".join(lines) + "\n"
+
+
+def dimension_table() -> str:
+    """What stands along each dimension of a solution."""
+    from condyle.results.variables import DIMENSIONS
+
+    rows = [f"| `{name}` | {entries} |" for name, entries in DIMENSIONS.items()]
+    return "\n".join(["| dimension | entries |", "|---|---|", *rows]) + "\n"
+
+
+def status_table() -> str:
+    """Every status of a sample."""
+    from condyle.status import Status
+
+    rows = [f"| {s.value} | {s.name} | {s.meaning} | {s.owner} |" for s in Status]
+    head = ["| status | name | meaning | the cause names |", "|---|---|---|---|"]
+    return "\n".join([*head, *rows]) + "\n"
+
+
+def warning_table() -> str:
+    """Every kind of warning, and what to do."""
+    from condyle.results.warnings import KINDS
+
+    rows = [f"| `{name}` | {kind.meaning} | {kind.advice} |" for name, kind in KINDS.items()]
+    return "\n".join(["| kind | warning | what to do |", "|---|---|---|", *rows]) + "\n"
 
 
 def operation_counts() -> str:
@@ -132,7 +164,6 @@ def count(function: Any) -> tuple[int, int]:
 
 def command_help() -> str:
     """Arguments and options of every command, from the functions that the terminal calls."""
-    from condyle.cli import commands  # noqa: F401 - registers them
     from condyle.cli.app import app
 
     return "\n\n".join(_section(c.callback, c.name, c.epilog) for c in app.registered_commands)

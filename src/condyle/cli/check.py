@@ -8,7 +8,7 @@ import typer
 
 from . import options
 from .answer import Answer, command_line
-from .app import BEGIN, command
+from .command import BEGIN, command
 from .inputs import warn
 
 Project = Annotated[

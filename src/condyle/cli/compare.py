@@ -9,8 +9,8 @@ import typer
 
 from . import options
 from .answer import Answer, command_line, files_line
-from .app import COMPUTE, command
-from .inputs import file_stem, motion_and_load, output_folder, warn
+from .command import COMPUTE, command
+from .inputs import file_stem, motion_and_load, output_folder, require_drawing, warn
 
 if TYPE_CHECKING:
     from ..analysis.compare import Comparison
@@ -38,6 +38,7 @@ def compare(
     How far their numbers differ and what they cost, with and without the contacts: Tables 1 and 2
     and Figures 5 to 9 of the paper.
     """
+    require_drawing(figures, report)
     import condyle
 
     from ..analysis.compare import compare as compare_models

@@ -8,7 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import BoundsError, InputError
+from ..errors import InputError
+from ..extras import require
 
 if TYPE_CHECKING:
     from ..mechanism import Mechanism
@@ -25,7 +26,7 @@ def motion_and_load(
     rate: float | None = None,
     trim: float = 0.0,
 ) -> tuple[Motion, Load]:
-    """The files named; without a motion the reference case, or a trial motion if it is no jaw."""
+    """The files named; without a motion the reference case, or a trial motion."""
     from ..mechanism.home import independent_coordinates
     from ..motion import Load, Motion, bundled_reference, resolve_landmark, trial_motion
 
@@ -35,8 +36,9 @@ def motion_and_load(
     reference = motion is None and chews(machine, landmark)
     if motion is None and landmark is not None and not reference:
         raise InputError(
-            f'--landmark {landmark}: "{machine.name}" has no jaw\'s two contacts for the bundled '
-            "path. Name a motion of t, x, y, z with --motion"
+            f"--landmark {landmark}: the bundled path is for two contacts; "
+            f'"{machine.name}" has {len(machine.contacts)}. Name a motion of t, x, y, z with '
+            "--motion"
         )
     if load is not None:
         acting = Load.from_csv(load)
@@ -88,14 +90,15 @@ def file_stem(name: str) -> str:
     return re.sub(r"[^\w.+-]+", "_", name)
 
 
+def require_drawing(figures: bool, report: bool) -> None:
+    """Raises MissingExtraError before minutes pass, if what draws them is not installed."""
+    if figures:
+        require("matplotlib", "figures")
+    if report:
+        require("plotly", "report")
+
+
 def warn(warnings: list[str]) -> None:
     """Warnings on stderr, so that they never mix with results."""
     for warning in dict.fromkeys(warnings):
         print(f"condyle: warning: {warning}", file=sys.stderr)
-
-
-def require_inside(warnings: list[str]) -> None:
-    """Raises BoundsError if a contact left its bounds (`--strict`)."""
-    outside = [w for w in warnings if "leaves its bounds" in w]
-    if outside:
-        raise BoundsError("; ".join(outside) + ". Without --strict this is a warning", [])

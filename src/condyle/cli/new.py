@@ -9,7 +9,7 @@ import typer
 
 from ..errors import InputError, shortened
 from .answer import Answer, command_line
-from .app import BEGIN, command
+from .command import BEGIN, command
 
 
 @command(BEGIN, example="condyle new my-robot")

@@ -37,8 +37,8 @@ Route = Annotated[
 LoadPoint = Annotated[
     str | None,
     typer.Option(
-        help="Platform point the load acts at. Default: right_molar if there is one, else the "
-        "only point.",
+        help="Platform point the load acts at. Default: that of the load, right_molar, or the only "
+        "point.",
         autocompletion=completion.points,
     ),
 ]
@@ -47,14 +47,14 @@ Motion = Annotated[
     typer.Option(
         help="Motion to follow (CSV or Parquet): t (s) and pose coordinates such as X, Y (m), "
         "alpha, beta (rad), or the path x, y, z (m) of a landmark. Default: the bundled chewing "
-        "path, for mechanisms that are no jaw a trial motion about home (both synthetic)."
+        "path, or a trial motion about home for mechanisms that it does not fit (both synthetic)."
     ),
 ]
 Load = Annotated[
     Path | None,
     typer.Option(
         help="Load on the platform (CSV or Parquet): t (s), some of Fx, Fy, Fz (N), Mx, My, Mz "
-        "(N m). Default: the bundled bite force (synthetic) with the bundled motion, else none."
+        "(N m). Default: the bundled load (synthetic) with the bundled motion, else none."
     ),
 ]
 Units = Annotated[

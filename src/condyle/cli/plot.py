@@ -8,9 +8,10 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError, did_you_mean
+from ..extras import require
 from . import completion
 from .answer import Answer, command_line
-from .app import LOOK, command
+from .command import LOOK, command
 from .inputs import output_folder
 
 RESULT = Path("results/masticatory.nc")  # of `condyle run` as it stands
@@ -31,6 +32,7 @@ def plot(
     out: Annotated[Path, typer.Option(help="Folder for PNG and SVG files.")] = Path("figures"),
 ) -> Answer:
     """Figures of a run, to look at or to print."""
+    require("matplotlib", "figures")
     import condyle
 
     from ..report.figures import PLOTS, save_each

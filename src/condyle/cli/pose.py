@@ -10,7 +10,7 @@ import typer
 
 from . import options
 from .answer import Answer, command_line, files_line
-from .app import COMPUTE, command
+from .command import COMPUTE, command
 
 
 @command(COMPUTE, example="condyle pose jaw.toml --joints encoders.csv --out poses.csv")
@@ -20,8 +20,8 @@ def pose(
         Path,
         typer.Option(
             help="Joint coordinates (CSV or Parquet): joint_CHAIN for each chain (rad, or m for a "
-            "slider), zero at home. With a column t (s) each row follows the one before, else each stands "
-            "alone and follows from home."
+            "slider), zero at home. With a column t (s) each row follows the one before, else each "
+            "stands alone and follows from home."
         ),
     ],
     out: Annotated[Path, typer.Option(help="File for the poses (.csv or .parquet).")],

@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
+from ..extras import require
 from .answer import Answer, command_line
-from .app import LOOK, command
+from .command import LOOK, command
 
 
 @command(LOOK, example="condyle report results/masticatory.nc")
@@ -27,6 +28,7 @@ def report(
     One HTML file that opens without a network: the moving mechanism, linked plots, tables and
     every warning.
     """
+    require("plotly", "report")
     import condyle
 
     from ..report.page import write_report

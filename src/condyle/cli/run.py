@@ -9,8 +9,8 @@ import typer
 
 from . import options
 from .answer import Answer, command_line, files_line
-from .app import COMPUTE, command
-from .inputs import file_stem, motion_and_load, output_folder, require_inside, warn
+from .command import COMPUTE, command
+from .inputs import file_stem, motion_and_load, output_folder, require_drawing, warn
 
 
 @command(
@@ -44,16 +44,18 @@ def run(
 
     Without arguments: the bundled chewing robot, a synthetic chewing path and bite force.
     """
+    require_drawing(figures, report)
     import condyle
 
     from ..results.summary import summarize
+    from ..results.warnings import refuse
 
     machine = condyle.load(mechanism)
     path, acting = motion_and_load(machine, motion, load, units, landmark, smooth, rate, trim)
     model = condyle.derive(machine, formulation, route, backend)
     solution = model.solve(path, acting, load_point, flag, reactions, threads)
     if strict:
-        require_inside(solution.warnings)
+        refuse(solution.notices)
     folder, stem = output_folder(out), file_stem(machine.name)
     files = [folder / f"{stem}.nc", folder / f"{stem}.csv"]
     solution.save(*files)

@@ -9,7 +9,7 @@ import typer
 
 from . import options
 from .answer import Answer, command_line
-from .app import COMPUTE, command
+from .command import COMPUTE, command
 from .inputs import warn
 
 

@@ -6,7 +6,7 @@ A family's mathematics is in `condyle.kinematics.chain`.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
@@ -27,6 +27,16 @@ from .table import Table
 
 AXIS_TOLERANCE = math.radians(0.5)  # how far an axis may be off the perpendicular
 NO_BRANCH = 1e-9  # sine of the transmission angle below which home has no branch
+
+
+class Limits(NamedTuple):
+    """What an actuator can do at most, None where nothing is said.
+
+    effort: [N m or N];  speed: [rad/s or m/s].
+    """
+
+    effort: float | None
+    speed: float | None
 
 
 class ChainTable(Table):
@@ -203,3 +213,11 @@ class SPS(ChainTable):
 
 
 Chain = Annotated[RSS | PSS | SPS, Field(discriminator="kind")]
+
+
+def limits(chain: RSS | PSS | SPS) -> Limits:
+    """Limits of a chain's actuator, whatever its effort is called in the file."""
+    actuator = chain.actuator
+    if isinstance(actuator, RotaryActuator):
+        return Limits(actuator.torque_limit, actuator.speed_limit)
+    return Limits(actuator.force_limit, actuator.speed_limit)

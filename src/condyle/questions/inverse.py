@@ -87,7 +87,7 @@ def program(
         b.output("joint_acceleration", [c.law.acceleration for c in eq.chains], "per s^2")
     if "configuration" in wanted:
         configuration.add(b, platform)
-    b.check(_feasibility(b, platform, eq), NEAR, Status.UNREACHABLE)
+    b.check(_feasibility(b, platform, eq), NEAR, Status.unreachable)
     b.check(pivots * (ca.fabs(b.total(effort)) < HUGE), NEAR)
     return b.finish()
 
@@ -99,7 +99,7 @@ def motion(structure: Structure) -> Program:
     _add_motion(b, platform)
     placement = platform.placement
     if placement.reach is not None:
-        below = None if placement.iterated else Status.UNREACHABLE
+        below = None if placement.iterated else Status.unreachable
         b.check(placement.reach, CERTAIN if placement.iterated else 0.0, below)
     return b.finish()
 

@@ -16,8 +16,9 @@ from ..model.judge import require_ok
 from ..model.reactions import reactions as joint_reactions
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
 from ..progress import step
+from .assemble import assemble
 from .reactions import reaction_variables
-from .solution import Solution, assemble
+from .solution import Solution
 
 
 class Model(Evaluator):

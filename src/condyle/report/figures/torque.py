@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
+from ...mechanism.chain import limits as actuator_limits
 from .chains import by_unit, groups, heading, readable
 from .labels import caption
 from .panels import finish, legend, legend_beside, limits, lines, same_scale
@@ -96,8 +97,7 @@ def effort_limits(solution: Solution) -> dict[str, float]:
     """Chain -> its actuator's largest effort, where it has one."""
     found = {}
     for chain in solution.mechanism.chains:
-        actuator = chain.actuator.model_dump()
-        limit = actuator.get("torque_limit") or actuator.get("force_limit")
+        limit = actuator_limits(chain).effort
         if limit is not None:
             found[chain.name] = limit
     return found

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...mechanism.chain import limits as actuator_limits
 from ..scene import Style, styles
 from .columns import Columns
 from .units import Shown, shown
@@ -145,14 +146,12 @@ def _chains(solution: Solution, columns: Columns) -> Iterator[Panel]:
 
 def effort_limits(solution: Solution) -> list[float | None]:
     """Torque or force limit of each chain [N m or N]."""
-    actuators = [chain.actuator for chain in solution.mechanism.chains]
-    names = ("torque_limit", "force_limit")
-    return [next((v for n in names if (v := getattr(a, n, None))), None) for a in actuators]
+    return [actuator_limits(chain).effort for chain in solution.mechanism.chains]
 
 
 def speed_limits(solution: Solution) -> list[float | None]:
     """Speed limit of each chain [rad/s or m/s]."""
-    return [getattr(chain.actuator, "speed_limit", None) for chain in solution.mechanism.chains]
+    return [actuator_limits(chain).speed for chain in solution.mechanism.chains]
 
 
 def _distinct(
