@@ -224,7 +224,15 @@ def generator_digest() -> str:
     """A hash of all code that decides what a kernel's C looks like."""
     package = files("condyle")
     parts: list[bytes] = []
-    for room in ("mechanism", "kinematics", "dynamics", "graph", "questions", "backends", "kernels"):
+    for room in (
+        "mechanism",
+        "kinematics",
+        "dynamics",
+        "graph",
+        "questions",
+        "backends",
+        "kernels",
+    ):
         for path in sorted(Path(str(package / room)).rglob("*")):
             if path.suffix in (".py", ".h"):
                 parts += [str(path.name).encode(), path.read_bytes()]

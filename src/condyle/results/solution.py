@@ -20,11 +20,11 @@ from ..mechanism.home import home_warnings
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..model import STATUS_NAMES
 from ..progress import step
+from .accessors import extend
 
 if TYPE_CHECKING:
     from ..model import Evaluation, Model
     from ..motion import Load, Motion
-    from ..report.figures import SolutionPlots
 
 AXES = ("x", "y", "z")
 WRENCH = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
@@ -63,11 +63,9 @@ class Solution(xr.Dataset):
         return json.loads(self.attrs["options"])
 
     @property
-    def plot(self) -> SolutionPlots:  # type: ignore[override]
+    def plot(self) -> Any:  # type: ignore[override]
         """Figures: `solution.plot.torque()` and friends; xarray's own are there too."""
-        from ..report.figures import SolutionPlots
-
-        return SolutionPlots(self)
+        return extend("solution.plot", self)
 
     def save(self, *paths: str | Path) -> None:
         """Write as NetCDF (.nc) or CSV (.csv): every file whole, or none of them."""
