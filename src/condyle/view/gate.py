@@ -165,10 +165,10 @@ def _task(loop: asyncio.AbstractEventLoop, coroutine: Any, **options: Any) -> as
     if (connection := _connection.get()) is not None:
 
         def ended(task: asyncio.Task[Any]) -> None:
-            if not task.cancelled() and (error := task.exception()) is not None:
-                if not isinstance(error, ConnectionClosed):
-                    _connection.set(None)
-                    loop.create_task(_end(connection, error))
+            error = None if task.cancelled() else task.exception()
+            if error is not None and not isinstance(error, ConnectionClosed):
+                _connection.set(None)
+                loop.create_task(_end(connection, error))
 
         task.add_done_callback(ended)
     return task
