@@ -18,16 +18,16 @@ ROUTES = ("core", "direct")
 BACKENDS = ("auto", "compiled", "interpreted")
 UNITS = ("m,rad", "m,deg", "mm,rad", "mm,deg", "cm,rad", "cm,deg")
 FIGURES = (
-    "motion",
-    "path",
-    "joint",
-    "load",
-    "torque",
-    "share",
     "contact_force",
     "contact_track",
+    "joint",
+    "load",
+    "motion",
+    "path",
+    "share",
     "jacobian",
     "singularity",
+    "torque",
 )
 
 

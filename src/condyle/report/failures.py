@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -46,7 +47,7 @@ def failures(
     known = [_fields(record) for record in getattr(solution, "failures", ())]
     edges = np.flatnonzero(np.diff(status, prepend=0, append=0))
     found = []
-    for first, after in zip(edges[:-1], edges[1:], strict=True):
+    for first, after in pairwise(edges):
         if status[first] == 0:
             continue
         start, end = float(time[first]), float(time[after - 1])

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from .chains import by_unit, groups, heading, readable
 from .labels import caption
 from .panels import finish, legend, legend_beside, limits, lines, same_scale
+from .registry import plot
 from .style import house, new_figure
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from ...results.solution import Solution
 
 
-@house
+@plot()
 def torque(solution: Solution) -> Figure:
     """Effort of each chain over time, with its actuator's limit."""
     names, units = chains_of(solution)
@@ -33,8 +34,7 @@ def torque(solution: Solution) -> Figure:
         legend(axes, 2)
         axes.set_title(heading(own))
         unit = units[members[0]]
-        for limit in {bounds[name] for name in own if name in bounds}:
-            limits(axes, values[:, by_unit(units)[unit]], limit, unit)
+        limits(axes, values[:, by_unit(units)[unit]], bounds, own, unit)
     scale_by_unit(grid, panels, units)
     finish(grid, [[effort_label(units[members[0]])] for members in panels])
     return figure

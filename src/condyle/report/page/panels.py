@@ -16,6 +16,8 @@ from .units import Shown, shown
 if TYPE_CHECKING:
     from ...results.solution import Solution
 
+# The third with gaps, through which one that it lies on can be seen, as gamma on alpha in chewing.
+COMPONENTS = [Style(0, "solid"), Style(1, "dot"), Style(2, "dash")]
 LIMITS_IN_VIEW = 0.25  # of a limit: peaks above this bring the limit into view
 MAX_BOUND = 1e9  # metres; a margin without a bound is infinite
 
@@ -116,7 +118,7 @@ def _motion(solution: Solution, columns: Columns) -> Iterator[Panel]:
         lines = variable_lines(solution, variable, "coordinate")
         lines = [
             Line(line.label + "′" * bool(suffix), line.column, line.values, style)
-            for line, style in zip(lines, styles(list("abc")) * 2, strict=True)
+            for line, style in zip(lines, COMPONENTS * 2, strict=True)
         ]
         for part, what, unit in ((lines[:3], "position", "m"), (lines[3:], "angles", "rad")):
             people = shown(unit)
@@ -214,7 +216,7 @@ def _contacts(solution: Solution, columns: Columns, every: bool) -> Iterator[Pan
     load = [
         Line(line.label, line.column, line.values, style)
         for line, style in zip(
-            variable_lines(solution, "load", "component"), styles(list("abc")) * 2, strict=True
+            variable_lines(solution, "load", "component"), COMPONENTS * 2, strict=True
         )
     ]
     if solution.sizes["contact"]:

@@ -136,13 +136,30 @@ function pathTraces() {
   });
 }
 
+// Names at one place of the picture stand beside each other, where the first is.
+function labelTexts(named, places) {
+  const texts = named.map((item) => plain(item.name));
+  if (!view) return texts;
+  const { from, up } = CAMERAS[view], right = unit(cross(up, from)), above = cross(unit(from), right);
+  const seen = places.map((p) => [dot(p, right) / 1e3 / longest, dot(p, above) / 1e3 / longest]);
+  seen.forEach(([x, y], n) => {
+    const first = seen.findIndex(([a, b]) => Math.abs(a - x) < LABEL_WIDE && Math.abs(b - y) < LABEL_HIGH);
+    if (first === n) return;
+    texts[first] = `${texts[first].trimEnd()}, ${texts[n]}`;
+    texts[n] = "";
+  });
+  return texts;
+}
+
+const LABEL_WIDE = 0.12, LABEL_HIGH = 0.03;  // of the longest side, about a name's size
+
 function labelTrace(index) {
   const named = [...drawn.landmarks, ...drawn.balls];
   const places = named.map((item) => position(item.at, index).map((v) => 1e3 * v));
   return {
     type: "scatter3d", mode: "markers+text", name: "landmarks",
     x: places.map((p) => p[0]), y: places.map((p) => p[1]), z: places.map((p) => p[2]),
-    text: named.map((item) => plain(item.name)),
+    text: labelTexts(named, places),
     textposition: named.map((_, n) => n < drawn.landmarks.length ? "top right" : "bottom center"),
     textfont: { size: 11, color: css("--ink") }, hoverinfo: "skip",
     marker: { size: named.map((_, n) => n < drawn.landmarks.length ? 4 : 0.1), color: css("--ink") },
@@ -229,6 +246,16 @@ function shown3d(wanted) {
 }
 
 const MOVING = 6;  // platform, chains, joints, balls, forces, labels
+const LABELS = 5;
+
+// Names after the picture was turned; they may lie on each other now.
+function relabel() {
+  if (!stageReady) return;
+  const wanted = wantedAt(clock.index);
+  setPose(wanted.drawn);
+  const { text } = labelTrace(wanted.drawn);
+  if (String(text) !== String(stageNode.data[LABELS].text)) Plotly.restyle(stageNode, { text: [text] }, [LABELS]);
+}
 
 // At most one update is under way; the newest time wins.
 async function moveStage(index) {
@@ -248,6 +275,7 @@ async function moveStage(index) {
       [...Array(MOVING).keys()]);
     shown3d(wanted);
   }
+  relabel();
   stageBusy = false;
 }
 
@@ -274,7 +302,7 @@ function setCamera(name) {
   flat = CAMERAS[name].flat;
   if (!stageReady) return;
   const solids = stageNode.data.flatMap((trace, n) => (trace.type === "mesh3d" ? [n] : []));
-  Plotly.update(stageNode, { lightposition: LIGHT[flat] }, change(name), solids);
+  Plotly.update(stageNode, { lightposition: LIGHT[flat] }, change(name), solids).then(relabel);
 }
 
 function change(name) {
@@ -294,6 +322,7 @@ function resizeStage() {
 function turnedByHand(event) {
   if (!event["scene.camera"]) return;
   view = null;
+  relabel();
   for (const button of document.querySelectorAll("#cameras button")) button.setAttribute("aria-pressed", "false");
 }
 
