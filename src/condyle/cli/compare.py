@@ -61,19 +61,22 @@ def compare(
         page = out / f"{file_stem(machine.name)}.html"
         files.append(write_report(solution, page, files=inputs))
     warn(solution.warnings)
-    then = command_line(
-        "run",
-        mechanism,
-        motion=motion,
-        load=load,
-        load_point=load_point,
-        out=out if out != Path("results") else None,
-        units=units if units != "m,rad" else None,
-        landmark=landmark,
-        smooth=smooth,
-        rate=rate,
-        report=True,
-    )
+    if report:  # the page is there already
+        then = command_line("view", solution=out / f"{file_stem(machine.name)}-compare.nc")
+    else:
+        then = command_line(
+            "run",
+            mechanism,
+            motion=motion,
+            load=load,
+            load_point=load_point,
+            out=out if out != Path("results") else None,
+            units=units if units != "m,rad" else None,
+            landmark=landmark,
+            smooth=smooth,
+            rate=rate,
+            report=True,
+        )
     return Answer(f"{comparison}\n{files_line(files)}", _data(comparison) | {"files": files}, then)
 
 

@@ -16,16 +16,17 @@ import typer
 FORMULATIONS = ("virtual_power", "momentum", "lagrange", "hessian", "newton_euler")
 ROUTES = ("core", "direct")
 BACKENDS = ("auto", "compiled", "interpreted")
+STYLES = ("screen", "journal", "journal-wide")
 UNITS = ("m,rad", "m,deg", "mm,rad", "mm,deg", "cm,rad", "cm,deg")
 FIGURES = (
     "contact_force",
     "contact_track",
+    "jacobian",
     "joint",
     "load",
     "motion",
     "path",
     "share",
-    "jacobian",
     "singularity",
     "torque",
 )

@@ -16,7 +16,7 @@ from .chains import readable, styles
 from .labels import caption
 from .panels import finish, legend, legend_above, lines
 from .registry import plot
-from .style import ALERT, GREY, PALETTE, figsize_is_free, new_figure, nothing_to_draw
+from .style import ALERT, GREY, PALETTE, figsize_is_free, narrow, new_figure, nothing_to_draw
 
 if TYPE_CHECKING:
     from ...results.solution import Solution
@@ -56,8 +56,8 @@ def contact_track(solution: Solution) -> Figure:
         return nothing_to_draw(title, caption(solution), NO_CONTACTS)
     figure = new_figure(title, caption(solution), 0.3 + 3.7 * len(names), 6.0)
     if figsize_is_free():  # the views have a shape of their own
-        view = figure.get_figwidth() / len(names) - BESIDE
-        figure.set_figheight(2 * (VIEW_RATIO * view + BELOW) + ABOVE)
+        wide = figure.get_figwidth() / len(names) - BESIDE
+        figure.set_figheight(2 * (VIEW_RATIO * wide + BELOW) + (2 if narrow() else 1) * ABOVE)
     grid = figure.subplots(2, len(names), squeeze=False)
     points = solution["contact_point"].values * 1e3
     margins = solution["bound_margin"].values

@@ -41,9 +41,8 @@ def motion(solution: Solution) -> Figure:
 @plot()
 def path(solution: Solution) -> Figure:
     """Path of a platform point from the side, the front, above and in space."""
-    figure = new_figure(
-        f"Path of {landmark(solution)[0]}", caption(solution), 10, 4.4 if narrow() else 2.9
-    )
+    height = 4.4 if narrow() else 2.9
+    figure = new_figure(f"Path of {landmark(solution)[0]}", caption(solution), 10, height)
     draw_path(figure, solution)
     return figure
 
@@ -95,7 +94,7 @@ def draw_path(figure: FigureBase, solution: Solution) -> None:
         axes.set(title=view, xlabel=f"{across} [mm]", ylabel=f"{up} [mm]")
         axes.set_aspect("equal", adjustable="datalim")
         axes.margins(0.1)
-    row[0].annotate("home", home[[0, 2]], (6, -3), textcoords="offset points", fontsize=8)
+    row[0].annotate("home", (home[0], home[2]), (6, -3), textcoords="offset points", fontsize=8)
     axes = axes_in_space
     axes.plot(*place.T, color=PALETTE[0], lw=0.9)
     axes.plot(*home[:, None], "o", color=PALETTE[1], ms=4)

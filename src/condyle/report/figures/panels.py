@@ -124,9 +124,8 @@ def legend_above(figure: Figure, panels: Iterable[Axes], columns: int = 3) -> No
     # The heading keeps the room: blank lines below it.
     heading, small = mpl.rcParams["figure.titlesize"], mpl.rcParams["legend.fontsize"]
     title = figure.get_suptitle()
-    figure.suptitle(
-        title + "\n" * (-(-int(rows * 1.6 * small) // int(1.2 * heading))), x=0.01, ha="left"
-    )
+    blank = -(-int(rows * 2.0 * small) // int(1.2 * heading))
+    figure.suptitle(title + "\n" * blank, x=0.01, ha="left")
     below = 1.9 * heading if title else 0.0
     figure.legend(
         list(entries.values()),

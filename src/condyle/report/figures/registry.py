@@ -54,3 +54,6 @@ def find_figures() -> None:
         import_module(f"{folder}.{module.name}")
     for point in entry_points(group=GROUP):
         point.load()
+    found = sorted(PLOTS.items())  # in whatever order the files were imported
+    PLOTS.clear()
+    PLOTS.update(found)

@@ -36,6 +36,7 @@ def share(solution: Solution, parts: Sequence[str] | None = None) -> Figure:
         caption(solution),
         max(6.0, 1.8 + 2.7 * len(parts)),
         1.1 + 1.7 * len(panels),
+        len(parts),
     )
     grid = figure.subplots(len(panels), len(parts), sharex=True, squeeze=False)
     for row, members in zip(grid, panels, strict=True):

@@ -135,7 +135,7 @@ def house(draw: Callable[..., Figure]) -> Callable[..., Figure]:
                 without them both belong into the caption of whoever prints the figure.
             letters: whether panels are marked (a), (b), ...
             style: of `STYLES`: "screen"; "journal", 85 mm wide with letters of 8 pt, or
-                "journal-wide", 175 mm.
+                "journal-wide", 175 mm, which figures of many columns take anyway.
     Raises: InputError: if there is no such style.
     """
 
@@ -199,13 +199,15 @@ def mark_panels(figure: Figure) -> None:
         axes.set_title(f"({letter}) {axes.get_title(loc='left')}".rstrip(), loc="left")
 
 
-def new_figure(title: str, caption: str, width: float, height: float) -> Figure:
+def new_figure(title: str, caption: str, width: float, height: float, columns: int = 1) -> Figure:
     """An empty figure [inch] with a title, and a caption that says where its data come from.
 
     The caller's wishes go before.
+
+    Args: columns: of panels; more than two do not fit into one column of a journal.
     """
     wishes = _wishes.get()
-    paper = wishes.paper
+    paper = STYLES["journal-wide"] if narrow() and columns > 2 else wishes.paper
     size = (width if paper.width is None else paper.width / INCH, height * paper.height)
     figure = Figure(figsize=wishes.figsize or size, layout="constrained")
     if wishes.title:

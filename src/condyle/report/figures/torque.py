@@ -54,6 +54,7 @@ def figure_8(comparison: Comparison) -> Figure:
         caption(solution),
         1.2 + 3.4 * len(columns),
         1.1 + 1.7 * len(panels),
+        len(columns),
     )
     grid = figure.subplots(len(panels), len(columns), sharex=True, squeeze=False)
     for row, members in zip(grid, panels, strict=True):
