@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import base64
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from .reduce import Envelope
+from .encode import packed
+from .envelope import Envelope
 
 
 class Columns:
@@ -53,8 +52,3 @@ class Columns:
             "values": packed(values, "<f4"),
             "envelope": None if envelope is None else envelope.packed(self.lines),
         }
-
-
-def packed(values: np.ndarray, kind: str) -> str:
-    """An array in base64."""
-    return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")

@@ -7,13 +7,14 @@ time. So no peak is lost, in the plots or in the tables.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .columns import Columns, packed
+from .columns import Columns
+from .envelope import Envelope
 from .panels import time_panels
 from .tracks import track_panels
 
@@ -24,36 +25,6 @@ BUDGET = 3_400_000  # bytes of samples, so that a page of 5001 samples stays und
 BUCKETS = 1200  # of an envelope: two of them a pixel of a wide plot
 DRAWN = (4, 20)  # columns a chain, and besides, that the picture in space needs
 PIECE = 32_768  # samples that are looked at together
-
-
-@dataclass
-class Envelope:
-    """Smallest and largest value of curves in spans of time, and when.
-
-    edges: of the spans, (B + 1,) [s].   low, high: (B,) by name.
-    low_at, high_at: where in its span, (B,) from 0 to 1 by name.
-    """
-
-    edges: np.ndarray
-    low: dict[str, np.ndarray] = field(default_factory=dict)
-    high: dict[str, np.ndarray] = field(default_factory=dict)
-    low_at: dict[str, np.ndarray] = field(default_factory=dict)
-    high_at: dict[str, np.ndarray] = field(default_factory=dict)
-
-    def packed(self, lines: Mapping[str, int]) -> dict[str, Any]:
-        """The curves `lines`, name -> number of its column."""
-
-        def rows(of: dict[str, np.ndarray]) -> np.ndarray:
-            return np.array([of[name] for name in lines])
-
-        return {
-            "columns": list(lines.values()),
-            "edges": packed(self.edges, "<f8"),
-            "low": packed(rows(self.low), "<f4"),
-            "high": packed(rows(self.high), "<f4"),
-            "lowAt": packed(np.round(65535 * rows(self.low_at)), "<u2"),
-            "highAt": packed(np.round(65535 * rows(self.high_at)), "<u2"),
-        }
 
 
 @dataclass(frozen=True)
