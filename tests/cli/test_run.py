@@ -232,6 +232,27 @@ def test_names_never_leave_the_folder(
     assert len(list(Path("results").iterdir())) == 2
 
 
+def test_compare_with_its_page_does_not_propose_to_make_it(
+    condyle_command: Callable[..., Any],
+) -> None:
+    outcome = condyle_command("compare", "--no-figures", "--rate", 10, "--report", "--out", "o")
+    assert outcome.status == 0, outcome.err
+    assert "Next: condyle view --solution o/masticatory-compare.nc" in outcome.out
+    assert Path("o/masticatory.html").is_file()
+
+
+def test_figures_for_a_journal_from_the_command(condyle_command: Callable[..., Any]) -> None:
+    assert condyle_command("run", "--rate", 20, "--out", "o", "--quiet").status == 0
+    what = ("plot", "o/masticatory.nc", "--figure", "load")
+    outcome = condyle_command(*what, "--style", "journal", "--no-title", "--letters")
+    assert outcome.status == 0, outcome.err
+    svg = Path("figures/load.svg").read_text("utf-8")
+    assert 'width="240.9' in svg, "85 mm"
+    assert "stand-in" not in svg
+    wrong = condyle_command(*what, "--style", "jurnal")
+    assert wrong.status == 2 and "journal" in wrong.err
+
+
 def test_compare_in_short(condyle_command: Callable[..., Any]) -> None:
     outcome = condyle_command("compare", "--no-figures", "--rate", 20, "--out", "compared")
     assert outcome.status == 0 and outcome.err == ""

@@ -63,20 +63,23 @@ def compare(
         page = out / f"{file_stem(machine.name)}.html"
         files.append(write_report(solution, page, files=inputs))
     warn([*path.warnings, *acting.warnings, *solution.warnings])
-    then = command_line(
-        "run",
-        mechanism,
-        motion=motion,
-        load=load,
-        load_point=load_point,
-        out=out if out != Path("results") else None,
-        units=units,
-        landmark=landmark,
-        smooth=smooth,
-        rate=rate,
-        trim=trim or None,
-        report=True,
-    )
+    if report:  # the page is there already
+        then = command_line("view", solution=out / f"{file_stem(machine.name)}-compare.nc")
+    else:
+        then = command_line(
+            "run",
+            mechanism,
+            motion=motion,
+            load=load,
+            load_point=load_point,
+            out=out if out != Path("results") else None,
+            units=units,
+            landmark=landmark,
+            smooth=smooth,
+            rate=rate,
+            trim=trim or None,
+            report=True,
+        )
     return Answer(f"{comparison}\n{files_line(files)}", _data(comparison) | {"files": files}, then)
 
 

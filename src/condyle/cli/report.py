@@ -29,12 +29,11 @@ def report(
     every warning.
     """
     require("plotly", "report")
-    import condyle
-
     from ..report.page import write_report
 
-    data = condyle.open_solution(solution)
-    path = write_report(data, out or solution.with_suffix(".html"), files=[solution, *(file or ())])
+    path = write_report(
+        solution, out or solution.with_suffix(".html"), files=[solution, *(file or ())]
+    )
     size = path.stat().st_size
     return Answer(
         f"Wrote {path} ({size / 1e6:.1f} MB); open it in a browser",

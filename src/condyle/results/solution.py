@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -18,14 +18,12 @@ from ..mechanism.files import recall
 from ..mechanism.mechanism import Mechanism
 from ..motion import write_table
 from ..progress import step
+from .accessors import extend
 from .contacts import AXES, BOUND_TOLERANCE, bound_margins, lift_off, lift_off_columns
 from .failures import Failure, failures, status_columns
 from .netcdf import write_netcdf
 from .variables import VARIABLES, WRENCH
 from .warnings import Notice
-
-if TYPE_CHECKING:
-    from ..report.figures import SolutionPlots
 
 __all__ = [
     "AXES",
@@ -80,12 +78,10 @@ class Solution(xr.Dataset):
         return json.loads(self.attrs["options"])
 
     @property
-    def plot(self) -> SolutionPlots:  # type: ignore[override]
+    def plot(self) -> Any:  # type: ignore[override]
         """Figures: `solution.plot.torque()` and friends; xarray's own are there too."""
         require("matplotlib", "figures")
-        from ..report.figures import SolutionPlots
-
-        return SolutionPlots(self)
+        return extend("solution.plot", self)
 
     def save(self, *paths: str | Path) -> None:
         """Write as NetCDF (.nc), CSV (.csv) or Parquet (.parquet): every file whole, or none."""
