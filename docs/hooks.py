@@ -15,12 +15,15 @@ from pathlib import Path
 from types import UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
+from formulas import with_formulas
+from structure import structure
+
 os.environ.setdefault("MPLBACKEND", "agg")
 GENERATED = Path(__file__).parent / "generated"
 EXAMPLES = Path(__file__).parents[1] / "examples"
 FIGURES = ("motion", "path", "torque", "share", "contact_force", "contact_track", "singularity")
 PICTURES = ("mechanism", *FIGURES)
-PAGES = ("cli.md", "operations.md", "variables.md")  # pieces that pages take in
+PAGES = ("cli.md", "operations.md", "structure.md", "variables.md")  # pieces that pages take in
 REPORT = "report.html"
 FILES = (*(f"{name}.png" for name in PICTURES), *PAGES, REPORT)
 
@@ -29,6 +32,11 @@ def on_pre_build(config: Any) -> None:
     """MkDocs calls this before it collects files; an example that fails ends the build."""
     run_examples()
     generate(GENERATED)
+
+
+def on_page_content(html: str, **_: Any) -> str:
+    """MkDocs calls this with each page; a formula that cannot be set ends the build."""
+    return with_formulas(html)
 
 
 def run_examples(folder: Path = EXAMPLES) -> None:
@@ -59,6 +67,7 @@ def generate(folder: Path) -> None:
 def text_pages(folder: Path) -> None:
     """Write `PAGES`."""
     pages = {"cli.md": command_help(), "operations.md": operation_counts()}
+    pages["structure.md"] = structure()
     pages["variables.md"] = variable_table(reference_solution(100.0))
     for name, text in pages.items():
         (folder / name).write_text(text, encoding="utf-8")
