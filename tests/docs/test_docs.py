@@ -72,6 +72,21 @@ def quick(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFact
     monkeypatch.setenv("CONDYLE_CACHE", str(tmp_path_factory.getbasetemp() / "docs-kernels"))
 
 
+@pytest.fixture(autouse=True)
+def registers() -> Iterator[None]:
+    """What a page registers is gone after it."""
+    from condyle.dynamics import FORMULATIONS
+    from condyle.report.figures import PLOTS
+
+    kept: list[tuple[dict[str, Any], dict[str, Any]]] = [
+        (register, dict(register)) for register in (FORMULATIONS, PLOTS)
+    ]
+    yield
+    for register, before in kept:
+        register.clear()
+        register.update(before)
+
+
 def put_files_of_a_reader(folder: Path) -> None:
     """Files that commands in the text name without making them."""
     (folder / "my.toml").write_text(bundled_text("masticatory"), encoding="utf-8")

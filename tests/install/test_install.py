@@ -53,7 +53,8 @@ def installed(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_wheel_has_what_the_program_reads(built: Path) -> None:
-    names = zipfile.ZipFile(next(built.glob("*.whl"))).namelist()
+    with zipfile.ZipFile(next(built.glob("*.whl"))) as wheel:
+        names = wheel.namelist()
     source = ROOT / "src" / "condyle"
     files = {
         f"condyle/{path.relative_to(source)}"
@@ -65,8 +66,8 @@ def test_wheel_has_what_the_program_reads(built: Path) -> None:
 
 
 def test_sdist_has_what_the_tests_read(built: Path) -> None:
-    names = tarfile.open(next(built.glob("*.tar.gz"))).getnames()
-    inside = {name.partition("/")[2] for name in names}
+    with tarfile.open(next(built.glob("*.tar.gz"))) as sdist:
+        inside = {name.partition("/")[2] for name in sdist.getnames()}
     wanted = {"README.md", "LICENSE", "CITATION.cff", "mkdocs.yml", "docs/hooks.py", "Makefile"}
     assert wanted | {"tests/conftest.py", "examples/reference.py"} <= inside
 
@@ -75,7 +76,9 @@ def test_command_runs(installed: Path, tmp_path: Path) -> None:
     said = run(installed / "condyle", "run", "--quiet", "--out", "results", cwd=tmp_path)
     assert said == ""
     assert {path.suffix for path in (tmp_path / "results").iterdir()} == {".nc", ".csv"}
-    version = re.search(r'__version__ = "(.+)"', (ROOT / "src/condyle/__init__.py").read_text())
+    version = re.search(
+        r'__version__ = "(.+)"', (ROOT / "src/condyle/__init__.py").read_text(encoding="utf-8")
+    )
     assert version is not None and version[1] in run(
         installed / "condyle", "--version", cwd=tmp_path
     )
