@@ -84,7 +84,7 @@ def test_command_runs(installed: Path, tmp_path: Path) -> None:
     )
 
 
-def test_library_is_typed_and_counts(installed: Path, tmp_path: Path) -> None:
+def test_library_counts(installed: Path, tmp_path: Path) -> None:
     script = (
         "import condyle, importlib.resources as r\n"
         "s = condyle.derive(condyle.load('masticatory')).solve(\n"
