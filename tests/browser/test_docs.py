@@ -52,9 +52,17 @@ def test_formulas_are_set(site: Path, open_tab: Callable) -> None:
 
 def test_search_answers_from_a_folder(site: Path, open_tab: Callable) -> None:
     tab = open_tab((site / "theory" / "kernels.html").as_uri())
-    tab.page.fill("input[name=query]", "transmission")
-    tab.wait("() => document.querySelector('.md-search-result__item a')")
-    links = tab.page.locator(".md-search-result__item a").evaluate_all("e => e.map(a => a.href)")
+    found = tab.page.locator(".md-search-result__item a")
+
+    def answered() -> bool:
+        # The page may not listen yet: ask again until it does.
+        for text in ("", "transmission"):
+            tab.page.fill("input[name=query]", text)
+        tab.page.wait_for_timeout(500)
+        return found.count() > 0
+
+    tab.until(answered, "the search answers")
+    links = found.evaluate_all("e => e.map(a => a.href)")
     assert any("symbols.html" in link for link in links)
     assert all(link.startswith("file:") for link in links)
 
