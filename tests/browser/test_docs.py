@@ -55,10 +55,10 @@ def test_search_answers_from_a_folder(site: Path, open_tab: Callable) -> None:
     found = tab.page.locator(".md-search-result__item a")
 
     def answered() -> bool:
-        # The page may not listen yet: ask again until it does.
+        # The page may not listen yet. Each question begins the search anew, so leave it time.
         for text in ("", "transmission"):
             tab.page.fill("input[name=query]", text)
-        tab.page.wait_for_timeout(500)
+        tab.page.wait_for_timeout(5000)
         return found.count() > 0
 
     tab.until(answered, "the search answers")
