@@ -15,13 +15,17 @@ from pathlib import Path
 from types import UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
+from formulas import with_formulas
+from structure import structure
+
 os.environ.setdefault("MPLBACKEND", "agg")
 GENERATED = Path(__file__).parent / "generated"
 EXAMPLES = Path(__file__).parents[1] / "examples"
 FIGURES = ("motion", "path", "torque", "share", "contact_force", "contact_track", "singularity")
 PICTURES = ("mechanism", *FIGURES)
 # Pieces that pages take in.
-PAGES = ("cli.md", "operations.md", "variables.md", "dimensions.md", "statuses.md", "warnings.md")
+PAGES = ("cli.md", "operations.md", "structure.md", "variables.md")
+PAGES += ("dimensions.md", "statuses.md", "warnings.md")
 REPORT = "report.html"
 FILES = (*(f"{name}.png" for name in PICTURES), *PAGES, REPORT)
 
@@ -30,6 +34,11 @@ def on_pre_build(config: Any) -> None:
     """MkDocs calls this before it collects files; an example that fails ends the build."""
     run_examples()
     generate(GENERATED)
+
+
+def on_page_content(html: str, **_: Any) -> str:
+    """MkDocs calls this with each page; a formula that cannot be set ends the build."""
+    return with_formulas(html)
 
 
 def run_examples(folder: Path = EXAMPLES) -> None:
@@ -60,6 +69,7 @@ def generate(folder: Path) -> None:
 def text_pages(folder: Path) -> None:
     """Write `PAGES`."""
     pages = {"cli.md": command_help(), "operations.md": operation_counts()}
+    pages["structure.md"] = structure()
     pages |= {"variables.md": variable_table(), "dimensions.md": dimension_table()}
     pages |= {"statuses.md": status_table(), "warnings.md": warning_table()}
     for name, text in pages.items():
@@ -120,9 +130,10 @@ def warning_table() -> str:
 
 def operation_counts() -> str:
     """Operations a sample of Models 1 and 2: every subexpression once, and written out."""
+    from condyle.dynamics.equations import closure_function, core_function, direct_function
+
     import condyle
     from condyle.dynamics import FORMULATIONS
-    from condyle.dynamics.equations import closure_function, core_function, direct_function
 
     mechanism = condyle.load("masticatory")
     closure = count(closure_function(mechanism))

@@ -225,7 +225,7 @@ def test_names_never_leave_the_folder(
     condyle_command: Callable[..., Any], write_csv: Callable[..., Path], tmp_path: Path
 ) -> None:
     text = bundled_text("masticatory").replace('"masticatory"', '"../a b/é"')
-    Path("jaw.toml").write_text(text)
+    Path("jaw.toml").write_text(text, encoding="utf-8")
     write_csv(*motion("plain"), "motion.csv")
     assert condyle_command("run", "jaw.toml", "--motion", "motion.csv").status == 0
     assert all(".." not in path.parts for path in Path("results").iterdir())

@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import condyle
 from condyle.dynamics.reactions import reaction_places
+
+import condyle
 from condyle.kinematics.chain import FAMILIES
 from families.cases import case
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from condyle.dynamics.equations import has_closed_form
 from oracles import description
 
 import condyle
 from condyle.dynamics import FORMULATIONS
-from condyle.dynamics.equations import has_closed_form
 from condyle.mechanism import load
 from condyle.model import Evaluation
 from families.cases import MECHANISMS, Case, case, close, of_raw

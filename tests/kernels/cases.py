@@ -7,11 +7,11 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from condyle.kernels.compiled import Kernel
+from condyle.kernels.result import Torques
 from oracles import description
 from oracles.random_mechanism import random_mechanism, random_state, toml_text
 
-from condyle.kernels.compiled import Kernel
-from condyle.kernels.result import Torques
 from condyle.mechanism import Mechanism, load, parse
 
 Array = np.ndarray

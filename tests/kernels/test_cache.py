@@ -15,13 +15,13 @@ from typing import Any
 
 import platformdirs
 import pytest
+from condyle.kernels import compiled
+from condyle.kernels.compiled import _recipe
+from condyle.questions.spec import KernelSpec, kernel_spec
 
 from condyle.backends import cache, compiler
 from condyle.backends.compiler import Compiler, find_compiler
 from condyle.errors import CondyleError
-from condyle.kernels import compiled
-from condyle.kernels.compiled import _recipe
-from condyle.questions.spec import KernelSpec, kernel_spec
 from kernels.cases import case
 
 RECIPE, OTHER = cache.digest("one"), cache.digest("other")

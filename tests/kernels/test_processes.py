@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from condyle.kernels import compiled
+from condyle.kernels.compiled import Kernel
 
 from condyle.backends import cache
 from condyle.backends.compiler import find_compiler
-from condyle.kernels import compiled
-from condyle.kernels.compiled import Kernel
 from condyle.model import Model
 from kernels.cases import case, error
 from kernels.children import PATIENCE, end, start, wait_for

@@ -6,10 +6,10 @@ from functools import cache
 
 import numpy as np
 import pytest
+from condyle.kernels.compiled import LOOK_AGAIN
 from scipy.optimize import minimize
 
 from condyle.errors import InputError, UnreachableError
-from condyle.kernels.compiled import LOOK_AGAIN
 from condyle.model import OK, SINGULAR_STATUS, UNREACHABLE, Evaluation, Model, with_point
 from condyle.status import Status
 from kernels.cases import Case, case, error

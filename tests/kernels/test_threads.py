@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from condyle.errors import InputError
 from condyle.kernels import compiled
 from condyle.kernels.compiled import Kernel
+
+from condyle.errors import InputError
 from condyle.model import Model
 from condyle.results import states
 from condyle.results.states import solve_file

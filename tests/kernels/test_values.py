@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from condyle.kernels.compiled import Compiled
+from condyle.questions.spec import OUTPUTS
 
 from condyle.dynamics import FORMULATIONS
-from condyle.kernels.compiled import Compiled
 from condyle.model import Model
-from condyle.questions.spec import OUTPUTS
 from kernels.cases import Case, case, error, errors, ones
 
 BATCH, ONE = 1e-11, 1e-12

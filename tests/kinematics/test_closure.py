@@ -8,18 +8,18 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from oracles.closure import complete_state, contact_rows
-from oracles.description import read
-from oracles.random_mechanism import random_mechanism, random_state, toml_text
-from oracles.rotations import platform_motion
-
-from condyle import InputError
 from condyle.kinematics.closure import (
     contact_symbols,
     coordinate_closure,
     landmark_closure,
     solve_samples,
 )
+from oracles.closure import complete_state, contact_rows
+from oracles.description import read
+from oracles.random_mechanism import random_mechanism, random_state, toml_text
+from oracles.rotations import platform_motion
+
+from condyle import InputError
 from condyle.kinematics.contact import contact_frame, indices, parasitic_jacobian, residuals
 from condyle.kinematics.rotation import angular_velocity_matrix, rotation
 from condyle.mechanism import COORDINATES, Mechanism, parse

@@ -8,11 +8,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from condyle.kinematics.closure import contact_symbols, coordinate_closure
 from oracles.random_mechanism import random_mechanism, toml_text
 
 import condyle
 from condyle.kinematics.batch import evaluate
-from condyle.kinematics.closure import contact_symbols, coordinate_closure
 from condyle.kinematics.iteration import newton
 from condyle.mechanism import Mechanism, parse
 from condyle.mechanism.home import dependent_coordinates, independent_coordinates

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from condyle.dynamics.equations import closure_function, require_closed_form
+from condyle.kinematics.closure import coordinate_closure
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from oracles.random_mechanism import random_mechanism, toml_text
 
 import condyle
-from condyle.dynamics.equations import closure_function, require_closed_form
 from condyle.kinematics.batch import evaluate
-from condyle.kinematics.closure import coordinate_closure
 from condyle.mechanism import Mechanism, parse
 from condyle.mechanism.home import (
     condition_of,

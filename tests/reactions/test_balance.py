@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from condyle.dynamics.reactions import Reaction, reactions
 from families.bodies import Body, bodies
 from families.cases import MECHANISMS, Case, case, of_raw
 from families.jets import Jet
 from oracles.random_mechanism import random_mechanism
 
-from condyle.dynamics.reactions import Reaction, reactions
 from condyle.model import Model
 
 SURFACES = {

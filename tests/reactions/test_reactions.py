@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from condyle.dynamics.reactions import reaction_places, reaction_variables, reactions
 from families.cases import MECHANISMS, Case, case, close
 from oracles import newton_euler
 from oracles.closure import contact_normals
@@ -14,7 +15,6 @@ from oracles.description import read, rod_angles
 from oracles.rotations import platform_motion
 
 import condyle
-from condyle.dynamics.reactions import reaction_places, reaction_variables, reactions
 from condyle.mechanism import Mechanism
 from condyle.model import Evaluation, Model
 from condyle.motion import read_table, write_table

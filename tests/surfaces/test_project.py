@@ -10,11 +10,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from condyle.kinematics.closure import contact_symbols
 from oracles.random_mechanism import random_mechanism, toml_text
 
 import condyle
 from condyle.errors import InputError
-from condyle.kinematics.closure import contact_symbols
 from condyle.kinematics.contact import residuals
 from condyle.kinematics.project import project_home
 from condyle.mechanism.files import from_data
