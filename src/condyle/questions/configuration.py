@@ -35,7 +35,7 @@ def add(b: Builder, platform: Platform) -> None:
     b.output("beta", [loop.q_r[1] for loop in loops], "rad")
     b.output("gamma", [loop.q_r[2] for loop in loops], "rad")
     b.output("cos_gamma", [loop.cos_gamma for loop in loops], "1")
-    b.output("discriminant", [loop.reach for loop in loops], "1")
+    b.output("discriminant", [loop.discriminant for loop in loops], "1")
     b.output("J_A", [loop.J_A for loop in loops], "m^2 per rad or m")
     transmission = [loop.J_A / loop.J_A_scale for loop in loops]
     b.output("transmission", transmission, "1")
@@ -70,7 +70,7 @@ def _loops(b: Builder, platform: Platform) -> tuple[list[Loop], Lanes]:
         position = platform.placement.position + r
         loop = family.loop(family.named(b.lane(group, "constants")), position)
         e = loop.rod / loop.rod_length
-        active = b.lane(group, "active")
-        rows.append(active * scale * (B.T @ ca.vertcat(e, ca.cross(r, e))))
+        mask = b.lane(group, "mask")
+        rows.append(mask * scale * (B.T @ ca.vertcat(e, ca.cross(r, e))))
         loops.append(loop)
     return loops, rows
