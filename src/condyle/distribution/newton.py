@@ -22,6 +22,8 @@ from .small import gram, solve, total
 
 ENOUGH = 1e-4  # part of the promised rise that a step must give
 SHORTER = 0.3  # what a step that does not is multiplied by
+DOUBT = 2  # steps after which to look whether there is a solution at all
+FARKAS = 1e-9  # of its terms, by which that proof must hold
 ROUNDING = 1e-13  # of the terms of a sum
 
 
@@ -95,9 +97,9 @@ def point(r: Reduced, law: Law, u: np.ndarray) -> Point:
         u = np.concatenate([u[:m], s])
     g = total(r.G * u[:, None], 0)
     x = law.answer(g, r.low, r.high)
-    products = r.G * x
-    gradient = r.right - total(products, 1)
-    size = np.abs(r.right) + total(np.abs(products), 1)
+    gradient = r.right - total(r.G * x, 1)
+    steepest, known = r.size
+    size = known + steepest * total(np.abs(x), 0)
     d = total(u * r.right, 0) - total(g * x - law.value(x), 0)
     if not k:
         empty = np.zeros((0, r.count))
@@ -144,12 +146,12 @@ def step(r: Reduced, law: Law, p: Point) -> tuple[np.ndarray, np.ndarray]:
 
 
 def maximise(
-    r: Reduced, law: Law, u: np.ndarray, cutoff: np.ndarray, steps: int = 25
+    r: Reduced, law: Law, u: np.ndarray, cutoff: np.ndarray, steps: int = 12
 ) -> Answer:
     """Greatest d from a start u, (6, R); `found` where its gradient vanishes.
 
     Args: cutoff: d beyond which a sample is given up as `beaten`, (R,): d is never above the
-          least value, so no solution is below the cutoff.
+          least value, so no solution is below the cutoff; none is where there is none at all.
     """
     answer = Answer.empty(r)
     rows = np.arange(r.count)
@@ -166,6 +168,8 @@ def maximise(
             here = trial if good.all() else trial.where(good, here)
         done = (np.abs(here.gradient) <= ROUNDING * here.size).all(axis=0)
         beaten = ~done & (here.d > cutoff)
+        if turn >= DOUBT:
+            beaten |= ~done & (empty(r, here.u) | empty(r, change))
         ended = done | beaten | (turn == steps)
         if ended.any():
             error = np.full(len(rows), np.nan)
@@ -179,6 +183,22 @@ def maximise(
         newton, _ = step(r, law, here)
         change = newton if good.all() else np.where(good, newton, change)
     return answer
+
+
+def empty(r: Reduced, u: np.ndarray) -> np.ndarray:
+    """Whether multipliers prove that no x and lambda within bounds meet the equations, (R,).
+
+    The equations weighed by u read right . u = g . x + s . lambda, and the right side cannot be as
+    great as the left (Farkas).
+    """
+    price = np.concatenate([total(r.G * u[:, None], 0), u[r.m :]])
+    bound = np.where(
+        price > 0, np.concatenate([r.high, r.contact_high]), np.concatenate([r.low, r.contact_low])
+    )
+    most = total(price * np.where(price == 0, 0.0, bound), 0)
+    products = u * r.right
+    with np.errstate(invalid="ignore"):
+        return total(products, 0) - most > FARKAS * total(np.abs(products), 0)
 
 
 def greatest(r: Reduced, law: Law) -> np.ndarray:

@@ -22,13 +22,13 @@ def least_squares(r: Reduced, start: np.ndarray, cutoff: np.ndarray) -> Answer:
     answer = settle(r, SQUARE, maximise(r, SQUARE, start, cutoff))
     left = np.flatnonzero(~answer.found & ~answer.beaten)
     if len(left):
+        found = active_set(r.take(left))
+        left, found = left[found.found], found.take(found.found)
         part = r.take(left)
-        found = active_set(part)
         # Newton from DAQP's multipliers ends at once, and its answer is exact to rounding.
-        exact = settle(part, SQUARE, maximise(part, SQUARE, np.nan_to_num(found.u), cutoff[left]))
+        exact = settle(part, SQUARE, maximise(part, SQUARE, found.u, np.full(len(left), np.inf)))
         found = settle(part, SQUARE, found)
-        better = np.flatnonzero(exact.found)
-        found.put(better, exact.take(better))
+        found.put(np.flatnonzero(exact.found), exact.take(exact.found))
         answer.put(left, found)
     return answer
 

@@ -12,6 +12,7 @@ sample can influence another.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -44,6 +45,11 @@ class Reduced:
     scale: np.ndarray
     regular: np.ndarray
 
+    @cached_property
+    def size(self) -> tuple[np.ndarray, np.ndarray]:
+        """Greatest |G| of every row, and |right|, (6, R) each: what rounding is relative to."""
+        return np.abs(self.G).max(axis=1, initial=0.0), np.abs(self.right)
+
     @property
     def k(self) -> int:
         return len(self.contact_low)
@@ -62,7 +68,7 @@ class Reduced:
 
     def take(self, rows: np.ndarray) -> Reduced:
         """Some of the samples."""
-        return replace(
+        part = replace(
             self,
             G=self.G[:, :, rows],
             right=self.right[:, rows],
@@ -72,6 +78,9 @@ class Reduced:
             contact_high=self.contact_high[:, rows],
             regular=self.regular[rows],
         )
+        if "size" in self.__dict__:
+            part.__dict__["size"] = tuple(a[:, rows] for a in self.size)
+        return part
 
     def forces(self, x: np.ndarray) -> np.ndarray:
         """lambda = c - B x, (k, R)."""

@@ -16,7 +16,7 @@ from .problem import Problem
 from .reduced import Reduced, reduce
 from .result import Result, Status
 
-ENTRIES = 24_000  # efforts worked on at once: what fits into a processor's cache
+ENTRIES = 48_000  # efforts worked on at once: many enough for calls to cost little
 SINGULAR = 1e-12  # ratio of singular values of A below which efforts are not determined
 DOUBTFUL = 1e-6  # pivot of A A^T below which that ratio is looked at
 TIE = 1e-12  # of a value: patterns of friction nearer than this are equal, and the first counts
@@ -38,7 +38,7 @@ def distribute(problem: Problem, distribution: str = "bounded") -> Result:
     finite = problem.finite
     result.status[~finite] = Status.unreachable
     rows = np.flatnonzero(finite)
-    size = max(64, ENTRIES // max(problem.n, 1))
+    size = max(64, ENTRIES // (max(problem.n, 1) * len(signs)))
     for start in range(0, len(rows), size):
         block = rows[start : start + size]
         _block(problem.take(block), objective, signs, result, block)
@@ -49,7 +49,8 @@ def patterns(problem: Problem) -> np.ndarray:
     """All signs of the contacts that have friction in any sample, 0 for others, (P, k)."""
     rubs = (problem.frictions != 0).any(axis=(0, 2))
     choices = [(1, -1) if rubbing else (0,) for rubbing in rubs]
-    return np.array(list(product(*choices)), dtype=int).reshape(-1, problem.k)
+    found = list(product(*choices))
+    return np.array(found, dtype=int).reshape(len(found), problem.k)
 
 
 def _block(
@@ -59,48 +60,56 @@ def _block(
 
     Friction turns with the sign sigma of the contact force, so the equations are linear only
     once the signs are given. A pattern of signs is consistent where sigma_k lambda_k >= 0, a
-    constraint of its program; the answer is the least of all patterns.
+    constraint of its program; the answer is the least of all patterns. Here a sample stands once
+    under every pattern, pattern after pattern.
     """
-    count = problem.count
-    scale, weight = objective.scale(problem), objective.weight(problem)
-    programs, starts = [], []
-    bounds = np.empty((len(signs), count))
-    singular = np.zeros(count, dtype=bool)
-    for p, sign in enumerate(signs):
-        pattern = np.broadcast_to(sign, (count, problem.k))
-        r = reduce(problem, pattern, scale, weight, objective.limits)
-        u, bad = _unlimited(r)
-        singular |= bad
-        programs.append(r)
-        starts.append(u)
-        bounds[p] = objective.lower_bound(r, u)
-    best = Answer.empty(programs[0])
+    count, choices = problem.count, len(signs)
+    programs = reduce(
+        problem.take(np.tile(np.arange(count), choices)),
+        np.repeat(signs, count, axis=0),
+        objective.scale(problem),
+        objective.weight(problem),
+        objective.limits,
+    )
+    start, singular = _unlimited(programs)
+    singular = singular.reshape(choices, count).any(axis=0)
+    bounds = objective.lower_bound(programs, start).reshape(choices, count)
+    bounds = bounds - TIE * np.abs(np.where(np.isfinite(bounds), bounds, 0.0))
+    order = np.argsort(bounds, axis=0, kind="stable")
+
+    best = Answer.empty(programs.take(np.arange(count)))
     chosen = np.full(count, -1)
     values = np.full((2, count), np.inf)
-    unknown = np.zeros((len(signs), count), dtype=bool)  # neither an answer nor a proof of none
-    order = np.argsort(bounds, axis=0, kind="stable")
-    for rank, p in product(range(len(signs)), range(len(signs))):
-        bound = bounds[p] - TIE * np.abs(bounds[p])
-        todo = np.flatnonzero((order[rank] == p) & (bound < values[0]) & ~singular)
+    unknown = np.zeros((choices, count), dtype=bool)  # neither an answer nor a proof of none
+    for p in order:  # the most promising pattern of every sample, then the next
+        todo = np.flatnonzero((bounds[p, np.arange(count)] < values[0]) & ~singular)
         if not len(todo):
             continue
-        r = programs[p].take(todo)
-        answer = objective.solve(r, starts[p][:, todo], values[0, todo])
-        value = np.full((2, len(todo)), np.inf)
-        found = objective.values(r, answer)
-        value[: len(found)] = np.where(answer.found, found, np.inf)
-        value[len(found) :] = np.where(answer.found, 0.0, np.inf)
+        at = p[todo] * count + todo
+        part = programs.take(at)
+        answer = objective.solve(part, start[:, at], values[0, todo])
+        value = np.zeros((2, len(todo)))
+        found = objective.values(part, answer)
+        value[: len(found)] = found
+        value[:, ~answer.found] = np.inf
         less = _less(value, values[:, todo])
         best.put(todo[less], answer.take(less))
-        chosen[todo[less]] = p
+        chosen[todo[less]] = p[todo[less]]
         values[:, todo[less]] = value[:, less]
-        unknown[p, todo] = ~answer.found & ~answer.beaten
-    _write(programs, best, chosen, signs, result, rows)
+        unknown[p[todo], todo] = ~answer.found & ~answer.beaten
+    answered = np.flatnonzero(chosen >= 0)
+    _write(
+        programs.take(chosen[answered] * count + answered),
+        best.take(answered),
+        signs[chosen[answered]],
+        result,
+        rows[answered],
+    )
     for row in rows[singular]:
         result.refuse(int(row), Status.singular, np.nan)
     # What has no answer has none for a reason, which is found one sample at a time.
     for i in np.flatnonzero(~singular & (unknown.any(axis=0) | (chosen < 0))):
-        single = [r.take(np.array([i])) for r in programs]
+        single = [programs.take(np.array([p * count + i])) for p in range(choices)]
         status, shortfall = explain(single, signs, unknown[:, i], bool(chosen[i] >= 0))
         if status != Status.ok:
             result.refuse(int(rows[i]), status, shortfall)
@@ -141,24 +150,14 @@ def _unlimited(r: Reduced) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _write(
-    programs: list[Reduced],
-    best: Answer,
-    chosen: np.ndarray,
-    signs: np.ndarray,
-    result: Result,
-    rows: np.ndarray,
+    r: Reduced, answer: Answer, pattern: np.ndarray, result: Result, rows: np.ndarray
 ) -> None:
     """Answers of some samples, with their certificates, into the result."""
-    for p, r in enumerate(programs):
-        here = np.flatnonzero(chosen == p)
-        if not len(here):
-            continue
-        part, answer, to = r.take(here), best.take(here), rows[here]
-        result.effort[to] = answer.x.T * r.scale
-        result.contact_force[to] = answer.force.T
-        result.pattern[to] = signs[p]
-        result.residual[to] = residual(part, answer)
-        result.primal[to] = excess(part, answer)
-        result.dual[to] = answer.error
-        result.status[to] = Status.ok
-        result.shortfall[to] = 1.0
+    result.effort[rows] = answer.x.T * r.scale
+    result.contact_force[rows] = answer.force.T
+    result.pattern[rows] = pattern
+    result.residual[rows] = residual(r, answer)
+    result.primal[rows] = excess(r, answer)
+    result.dual[rows] = answer.error
+    result.status[rows] = Status.ok
+    result.shortfall[rows] = 1.0

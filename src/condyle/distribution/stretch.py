@@ -18,7 +18,7 @@ import numpy as np
 
 from .reduced import Reduced
 
-SMALL = (1e-2, 1e-4, 1e-6)  # multiples that are tried
+SMALL = (1e-3, 1e-5, 1e-7)  # multiples that are tried
 GAP = 1e-10  # of t, between what was found and the bound of duality
 ACTIVE = 5  # DAQP's code of an equation
 TOLERANCES = {"primal_tol": 1e-12, "dual_tol": 1e-12, "iter_limit": 2000}
@@ -80,22 +80,24 @@ def least_stretch(s: Sample, lower: np.ndarray, upper: np.ndarray) -> Stretch:
     lower, upper, t are in the unit of x before `Sample` divided it, so t is t of the caller.
     """
     lower, upper = lower / s.unit, upper / s.unit
+    program = Program.of(s, lower, upper)
     best: Stretch | None = None
     for small in SMALL:
-        first, second = (_regularised(s, lower, upper, size) for size in (small, 0.5 * small))
+        first, second = program.regularised(small), program.regularised(0.5 * small)
         if first is None or second is None:
             continue
-        x, t = second[0], float(second[1])
+        x, t = second.x, second.t
         # Multipliers are linear in the multiple: its limit at 0, and its rate.
-        u, alpha = (2 * b - a for a, b in zip(first[2:], second[2:], strict=True))
-        rate = (first[2] - second[2]) / (0.5 * small)
+        u, alpha = 2 * second.u - first.u, 2 * second.alpha - first.alpha
+        rate = (first.u - second.u) / (0.5 * small)
         gap = abs(t - _bound(s, lower, upper, u, alpha)) / max(t, 1e-12)
-        found = Stretch(t, x * s.unit, u, gap, _spread(s, lower * t, upper * t, x, u, rate))
+        spread = _spread(s, times(t, lower), times(t, upper), x, u, rate)
+        found = Stretch(t, x * s.unit, u, gap, spread)
         if best is None or found.error < best.error:
             best = found
         if best.error <= GAP:
             return best
-    exact = _linear_program(s, lower, upper)
+    exact = program.exact()
     if exact is None:
         return Stretch(np.inf, np.full(len(lower), np.nan), np.full(6, np.nan), np.inf, np.inf)
     if best is not None and abs(best.t - exact[1]) <= 1e-9 * exact[1]:
@@ -103,50 +105,95 @@ def least_stretch(s: Sample, lower: np.ndarray, upper: np.ndarray) -> Stretch:
     return Stretch(exact[1], exact[0] * s.unit, np.full(6, np.nan), 0.0, np.inf)
 
 
-def _rows(
-    s: Sample, lower: np.ndarray, upper: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Constraints on (x, t): matrix, least and greatest values; which efforts stand in which row."""
-    n, m = s.G.shape[1], s.m
-    up, down = (np.flatnonzero(np.isfinite(b)) for b in (upper, lower))
-    eye = np.eye(n)
-    stretched = np.vstack([
-        np.column_stack([eye[up], -upper[up]]), np.column_stack([eye[down], -lower[down]])
-    ])  # fmt: skip
-    equations = np.column_stack([s.G, np.zeros(6)])
-    c = s.right[m:]
-    least = np.concatenate([np.full(len(up), -np.inf), np.zeros(len(down))])
-    most = np.concatenate([np.zeros(len(up)), np.full(len(down), np.inf)])
-    least = np.concatenate([least, s.right[:m], c - s.contact_high])
-    most = np.concatenate([most, s.right[:m], c - s.contact_low])
-    return np.vstack([stretched, equations]), least, most, np.concatenate([up, down])
+def times(t: float, limit: np.ndarray) -> np.ndarray:
+    """t times limits; what is infinite stays so."""
+    return np.where(np.isfinite(limit), t * np.where(np.isfinite(limit), limit, 0.0), limit)
 
 
-def _regularised(
-    s: Sample, lower: np.ndarray, upper: np.ndarray, small: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
-    """x, t, u and the prices alpha of stretched limits, (n,), of the regularised program."""
-    n, m = s.G.shape[1], s.m
-    matrix, least, most, who = _rows(s, lower, upper)
-    sense = np.zeros(n + 1 + len(least), dtype=np.int32)
-    sense[n + 1 + len(who) : n + 1 + len(who) + m] = ACTIVE
-    cost = np.zeros(n + 1)
-    cost[n] = 1.0 / small
-    z, _, flag, info = daqp.solve(
-        np.eye(n + 1),
-        cost,
-        np.ascontiguousarray(matrix),
-        np.concatenate([s.high, [np.inf], most]),
-        np.concatenate([s.low, [0.0], least]),
-        sense,
-        **TOLERANCES,
-    )
-    if flag != 1:
-        return None
-    price = -np.asarray(info["lam"])[n + 1 :] * small
-    alpha = np.zeros(n)
-    np.add.at(alpha, who, -price[: len(who)])
-    return z[:n], np.array(z[n]), price[len(who) :], alpha
+@dataclass(frozen=True)
+class Priced:
+    """x (n,), t, multipliers u (6,) and the prices alpha of stretched limits, (n,)."""
+
+    x: np.ndarray
+    t: float
+    u: np.ndarray
+    alpha: np.ndarray
+
+
+@dataclass(frozen=True)
+class Program:
+    """Constraints on z = (x, t): low <= z <= high, least <= matrix z <= most.
+
+    who:   the effort of each stretched limit, in the first rows of the matrix; then come the
+           m equations, then the contacts.
+    """
+
+    matrix: np.ndarray
+    least: np.ndarray
+    most: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    who: np.ndarray
+    m: int
+
+    @classmethod
+    def of(cls, s: Sample, lower: np.ndarray, upper: np.ndarray) -> Program:
+        n, m = s.G.shape[1], s.m
+        up, down = np.isfinite(upper).nonzero()[0], np.isfinite(lower).nonzero()[0]
+        who = np.concatenate([up, down])
+        q = len(who)
+        matrix = np.zeros((q + 6, n + 1))
+        matrix[np.arange(q), who] = 1.0
+        matrix[:q, n] = -np.concatenate([upper[up], lower[down]])
+        matrix[q:, :n] = s.G
+        least, most = np.zeros(q + 6), np.zeros(q + 6)
+        least[: len(up)], most[len(up) : q] = -np.inf, np.inf
+        least[q:] = most[q:] = s.right
+        least[q + m :] -= s.contact_high
+        most[q + m :] -= s.contact_low
+        low, high = np.append(s.low, 0.0), np.append(s.high, np.inf)
+        return cls(matrix, least, most, low, high, who, m)
+
+    def regularised(self, small: float) -> Priced | None:
+        """The least of t + small |z|^2 / 2; None where DAQP finds none."""
+        n, q = len(self.low) - 1, len(self.who)
+        sense = np.zeros(n + 1 + len(self.least), dtype=np.int32)
+        sense[n + 1 + q : n + 1 + q + self.m] = ACTIVE
+        cost = np.zeros(n + 1)
+        cost[n] = 1.0 / small
+        high, low = np.concatenate([self.high, self.most]), np.concatenate([self.low, self.least])
+        z, _, flag, info = daqp.solve(
+            np.eye(n + 1), cost, self.matrix, high, low, sense, **TOLERANCES
+        )
+        if flag != 1:
+            return None
+        price = -small * np.asarray(info["lam"])[n + 1 :]
+        alpha = np.bincount(self.who, weights=-price[:q], minlength=n)
+        return Priced(z[:n], float(z[n]), price[q:], alpha)
+
+    def exact(self) -> tuple[np.ndarray, float] | None:
+        """x and t by HiGHS; None where nothing fits."""
+        from scipy.optimize import linprog
+
+        n, q = len(self.low) - 1, len(self.who)
+        equal = slice(q, q + self.m)
+        rest = np.r_[0:q, q + self.m : len(self.least)]
+        A = np.vstack([self.matrix[rest], -self.matrix[rest]])
+        b = np.concatenate([self.most[rest], -self.least[rest]])
+        keep = np.isfinite(b)
+        cost = np.zeros(n + 1)
+        cost[n] = 1.0
+        found = linprog(
+            cost,
+            A[keep],
+            b[keep],
+            self.matrix[equal],
+            self.least[equal],
+            list(zip(self.low, self.high, strict=True)),
+            method="highs",
+            options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
+        )
+        return (found.x[:n], float(found.x[n])) if found.status == 0 else None
 
 
 def _bound(
@@ -185,31 +232,3 @@ def _spread(
     )
     wrong = np.where(np.abs(g) > 1e-9 * np.abs(g).max(initial=0.0), 0.0, wrong)
     return float(wrong.max(initial=0.0) / largest) if largest else 0.0
-
-
-def _linear_program(
-    s: Sample, lower: np.ndarray, upper: np.ndarray
-) -> tuple[np.ndarray, float] | None:
-    """x and t by HiGHS; None where nothing fits."""
-    from scipy.optimize import linprog
-
-    n, m = s.G.shape[1], s.m
-    matrix, least, most, who = _rows(s, lower, upper)
-    equations = slice(len(who), len(who) + m)
-    rest = np.r_[0 : len(who), len(who) + m : len(least)]
-    A = np.vstack([matrix[rest], -matrix[rest]])
-    b = np.concatenate([most[rest], -least[rest]])
-    keep = np.isfinite(b)
-    cost = np.zeros(n + 1)
-    cost[n] = 1.0
-    found = linprog(
-        cost,
-        A[keep] if keep.any() else None,
-        b[keep] if keep.any() else None,
-        matrix[equations] if m else None,
-        least[equations] if m else None,
-        [*zip(s.low, s.high, strict=True), (0.0, np.inf)],
-        method="highs",
-        options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
-    )
-    return (found.x[:n], float(found.x[n])) if found.status == 0 else None
