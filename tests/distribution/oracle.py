@@ -67,9 +67,7 @@ def best_active_set(f: Full, tolerance: float = 1e-9) -> tuple[float, np.ndarray
     rows = np.abs(f.C).max(axis=1)
     C, q = f.C / rows[:, None], f.q / rows
     best = None
-    bounds = [
-        [(j, v) for v in {f.low[j], f.high[j]} if np.isfinite(v)] for j in range(size)
-    ]
+    bounds = [[(j, v) for v in {f.low[j], f.high[j]} if np.isfinite(v)] for j in range(size)]
     able = [j for j in range(size) if bounds[j]]
     for active in range(0, size - 6 + 1):
         for chosen in combinations(able, active):
@@ -138,9 +136,7 @@ def least_maximum(f: Full, scale: np.ndarray) -> float:
     return float(found.x[-1]) if found.status == 0 else np.inf
 
 
-def by_slsqp(
-    f: Full, value, slope, start: np.ndarray
-) -> np.ndarray:
+def by_slsqp(f: Full, value, slope, start: np.ndarray) -> np.ndarray:
     """Least of a convex function of the efforts, from a start z near it."""
     rows = np.abs(f.C).max(axis=1)
     n, size = f.n, len(f.low)

@@ -68,10 +68,15 @@ def _wrong(
 
 
 def settle(r: Reduced, law: Law, answer: Answer) -> Answer:
-    """The answer with bounds met exactly, `found` only where it is proved."""
+    """The answer with bounds met exactly, `found` only where it is proved to be least."""
     answer.x = np.minimum(np.maximum(answer.x, r.low), r.high)
+    answer.error = slack(r, law, answer)
+    return accept(r, answer)
+
+
+def accept(r: Reduced, answer: Answer) -> Answer:
+    """`found` only where equations, constraints and the conditions of optimality are met."""
     with np.errstate(invalid="ignore"):
-        answer.error = slack(r, law, answer)
         parts = (residual(r, answer), excess(r, answer), answer.error)
         answer.found &= np.all([part <= CERTIFIED for part in parts], axis=0)
     return answer

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..errors import InputError
@@ -11,13 +13,15 @@ from .newton import Answer, greatest, maximise
 from .objective import Objective, register
 from .problem import Problem
 from .quadratic import least_squares
-from .reduced import Reduced
+from .reduced import Reduced, typical
 from .small import total
 
 # f = x^3 / 3 has no curvature at 0, where the answer to a price is steepest; a very small
 # square added to it keeps Newton's steps finite and changes less than the certificate shows.
 SOFT = 1e-12
-SOFTER = (1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, SOFT)  # where that is too sudden
+STEPS = 20
+PRIMAL_SOFT, PRIMAL_STEPS = 1e-5, 40  # of the quadratic programs where that does not end
+ENDED = 1e-13  # of the greatest effort: a step that ends them
 
 
 class Cubic(Objective):
@@ -35,28 +39,67 @@ class Cubic(Objective):
             )
 
     def solve(self, r: Reduced, start: np.ndarray, cutoff: np.ndarray) -> Answer:
-        rows = total(np.abs(r.G[: r.m]), 1)
-        typical = (np.abs(r.right[: r.m]) / np.where(rows > 0, rows, np.inf)).max(axis=0, initial=0)
-        typical = np.where(typical > 0, typical, 1.0)
-        law = Cube(SOFT * typical)
+        size = typical(r)
+        law = Cube(SOFT * size)
         cutoff = np.minimum(cutoff, greatest(r, law))
-        answer = settle(r, Cube(), maximise(r, law, start * typical, cutoff))
+        answer = settle(r, Cube(), maximise(r, law, start * size, cutoff, STEPS))
         left = np.flatnonzero(~answer.found & ~answer.beaten)
         if len(left):
-            part = r.take(left)
-            # Where there is a solution at all, the sum of squares has one, and is a start.
-            never = np.full(len(left), np.inf)
-            square = least_squares(part, start[:, left], never)
-            left, part, never = left[square.found], part.take(square.found), never[square.found]
-            u = square.u[:, square.found] * typical[left]
-            for soft in SOFTER:
-                found = maximise(part, Cube(soft * typical[left]), u, never, steps=60)
-                u = found.u
-            answer.put(left, settle(part, Cube(), found))
+            found = _by_squares(r.take(left), start[:, left])
+            part, law = r.take(left), law.take(left)
+            exact = maximise(part, law, np.nan_to_num(found.u), cutoff[left], STEPS)
+            exact = settle(part, Cube(), exact)
+            found = settle(part, Cube(), found)
+            found.put(np.flatnonzero(exact.found), exact.take(exact.found))
+            found.beaten |= exact.beaten & ~found.found
+            answer.put(left, found)
         return answer
 
     def values(self, r: Reduced, answer: Answer) -> np.ndarray:
         return total(answer.x**3, 0)[None] / 3.0
+
+
+def _by_squares(r: Reduced, start: np.ndarray) -> Answer:
+    """Newton's method on the efforts themselves: a quadratic program a step, within all bounds.
+
+    f near x is (2 x + soft) (z - target)^2 / 2 with target = x - x^2 / (2 x + soft).
+    """
+    never = np.full(r.count, np.inf)
+    now = least_squares(r, start, never)
+    answer = Answer.empty(r)
+    rows = np.flatnonzero(now.found)
+    r, x, u = r.take(rows), now.x[:, rows], now.u[:, rows]
+    never = never[rows]
+    for _ in range(PRIMAL_STEPS):
+        curvature = 2 * x + PRIMAL_SOFT * x.max(axis=0, initial=0.0) + np.finfo(float).tiny
+        target, root = x - x * x / curvature, np.sqrt(curvature)
+        G = r.G / root
+        model = replace(
+            r,
+            G=G,
+            right=r.right - total(r.G * target, 1),
+            low=root * (r.low - target),
+            high=root * (r.high - target),
+        )
+        found = least_squares(model, u, never)
+        step = np.where(found.found, target + found.x / root - x, 0.0)
+        # f' is rising along the step: bisect where it vanishes, if that is before its end.
+        low, high = np.zeros(r.count), np.ones(r.count)
+        rises = total((x + step) ** 2 * step, 0) > 0
+        for _ in range(30):
+            middle = 0.5 * (low + high)
+            above = total((x + middle * step) ** 2 * step, 0) > 0
+            low, high = np.where(above, low, middle), np.where(above, middle, high)
+        moves = found.found & (np.abs(step).max(axis=0) > ENDED * x.max(axis=0))
+        if not moves.any():
+            break
+        x = np.where(moves, np.maximum(x + np.where(rises, low, 1.0) * step, r.low), x)
+        u = np.where(moves, found.u, u)
+    part = Answer.empty(r)
+    part.x, part.u, part.force = x, u, r.forces(x)
+    part.found[:] = True
+    answer.put(rows, part)
+    return answer
 
 
 register(Cubic())

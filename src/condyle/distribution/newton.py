@@ -22,6 +22,7 @@ from .small import gram, solve, total
 
 ENOUGH = 1e-4  # part of the promised rise that a step must give
 SHORTER = 0.3  # what a step that does not is multiplied by
+STRAIGHT, LONGER = 0.9, 4.0  # part of the rise above which the next step is longer; by how much
 DOUBT = 2  # steps after which to look whether there is a solution at all
 FARKAS = 1e-9  # of its terms, by which that proof must hold
 ROUNDING = 1e-13  # of the terms of a sum
@@ -130,7 +131,7 @@ def step(r: Reduced, law: Law, p: Point) -> tuple[np.ndarray, np.ndarray]:
     everything = bool(r.k) and (r.weight > 0.0 or not p.held.all())
     size = 6 if everything else m
     M = gram(r.G, compliance, size)
-    typical = np.where(compliance > 0, compliance, 0.0).max(axis=0)
+    typical = compliance.max(axis=0)
     full = total(r.G[:size] ** 2, 1) * np.where(typical > 0, typical, 1.0)
     if everything:
         free = np.where(p.held, 0.0, 1.0)
@@ -145,9 +146,7 @@ def step(r: Reduced, law: Law, p: Point) -> tuple[np.ndarray, np.ndarray]:
     return change, quality
 
 
-def maximise(
-    r: Reduced, law: Law, u: np.ndarray, cutoff: np.ndarray, steps: int = 12
-) -> Answer:
+def maximise(r: Reduced, law: Law, u: np.ndarray, cutoff: np.ndarray, steps: int = 12) -> Answer:
     """Greatest d from a start u, (6, R); `found` where its gradient vanishes.
 
     Args: cutoff: d beyond which a sample is given up as `beaten`, (R,): d is never above the
@@ -156,15 +155,18 @@ def maximise(
     answer = Answer.empty(r)
     rows = np.arange(r.count)
     here = point(r, law, u)
-    change, length = np.zeros_like(u), np.ones(r.count)
+    change, length, first = np.zeros_like(u), np.ones(r.count), np.ones(r.count)
     good = np.ones(r.count, dtype=bool)
     for turn in range(steps + 1):
         if turn:
             trial = point(r, law, here.u + length * change)
             rise = total(here.gradient * (trial.u - here.u), 0)
             noise = ROUNDING * (np.abs(here.d) + total(np.abs(trial.u) * trial.size, 0))
-            good = trial.d - here.d >= ENOUGH * rise - noise
-            length = np.where(good, 1.0, SHORTER * length)
+            gain = trial.d - here.d
+            good = gain >= ENOUGH * rise - noise
+            # Half of the rise is what curvature leaves; all of it means that d is straight here.
+            first = np.where(good, np.where(gain > STRAIGHT * rise, LONGER * length, 1.0), first)
+            length = np.where(good, first, SHORTER * length)
             here = trial if good.all() else trial.where(good, here)
         done = (np.abs(here.gradient) <= ROUNDING * here.size).all(axis=0)
         beaten = ~done & (here.d > cutoff)
@@ -179,7 +181,8 @@ def maximise(
             if not left.any():
                 break
             rows, r, here, law = rows[left], r.take(left), here.take(left), law.take(left)
-            good, length, change, cutoff = good[left], length[left], change[:, left], cutoff[left]
+            good, length, first = good[left], length[left], first[left]
+            change, cutoff = change[:, left], cutoff[left]
         newton, _ = step(r, law, here)
         change = newton if good.all() else np.where(good, newton, change)
     return answer

@@ -134,7 +134,7 @@ class Problem:
     def finite(self) -> np.ndarray:
         """Samples whose numbers are all finite, (N,)."""
         parts = (self.Q, self.J, self.normal, self.frictions, self.offsets)
-        return np.all([np.isfinite(a).reshape(len(a), -1).all(axis=1) for a in parts], axis=0)
+        return np.all([np.isfinite(a).all(axis=tuple(range(1, a.ndim))) for a in parts], axis=0)
 
     def take(self, rows: np.ndarray) -> Problem:
         """The same machine at some of the samples."""

@@ -19,6 +19,7 @@ import numpy as np
 from .problem import Problem
 from .small import total
 
+ROOM = 1e-10  # what bounds are widened by, relative: less than a certificate allows
 DEPENDENT = 1e-11  # sine of an angle to other columns below which a contact adds nothing new
 
 
@@ -156,3 +157,24 @@ def _triangular(M: np.ndarray, k: int) -> np.ndarray:
         w = total(v[:, None] * M[j:, j:], 0) * factor
         M[j:, j:] -= v[:, None] * w
     return regular
+
+
+def widened(r: Reduced) -> Reduced:
+    """With bounds moved outwards by `ROOM` of what efforts and contact forces are like."""
+    x = typical(r)
+    force = np.abs(r.right[r.m :]) + np.abs(r.G[r.m :]).max(axis=1, initial=0.0) * x
+    return replace(
+        r,
+        low=r.low - ROOM * x,
+        high=r.high + ROOM * x,
+        contact_low=r.contact_low - ROOM * force,
+        contact_high=r.contact_high + ROOM * force,
+    )
+
+
+def typical(r: Reduced) -> np.ndarray:
+    """What the greatest |x| is not below, (R,); 1 where nothing has to be balanced."""
+    rows = total(np.abs(r.G[: r.m]), 1)
+    x = np.abs(r.right[: r.m]) / np.where(rows > 0, rows, np.inf)
+    x = x.max(axis=0, initial=0.0)
+    return np.where(x > 0, x, 1.0)

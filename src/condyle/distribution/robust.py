@@ -7,7 +7,7 @@ import numpy as np
 
 from .newton import Answer
 from .reduced import Reduced
-from .stretch import ACTIVE, TOLERANCES, Sample
+from .program import ACTIVE, TOLERANCES, Sample
 
 
 def active_set(r: Reduced) -> Answer:

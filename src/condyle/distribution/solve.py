@@ -7,13 +7,13 @@ from itertools import product
 
 import numpy as np
 
-from .certificate import excess, residual
+from .certificate import accept, excess, residual
 from .explain import explain
 from .law import Square
 from .newton import Answer, point, step
 from .objective import Objective, named
 from .problem import Problem
-from .reduced import Reduced, reduce
+from .reduced import Reduced, reduce, widened
 from .result import Result, Status
 
 ENTRIES = 48_000  # efforts worked on at once: many enough for calls to cost little
@@ -37,6 +37,9 @@ def distribute(problem: Problem, distribution: str = "bounded") -> Result:
     signs = patterns(problem)
     finite = problem.finite
     result.status[~finite] = Status.unreachable
+    if problem.n < 6 - problem.k:  # fewer efforts than equations
+        result.status[finite] = Status.singular
+        return result
     rows = np.flatnonzero(finite)
     size = max(64, ENTRIES // (max(problem.n, 1) * len(signs)))
     for start in range(0, len(rows), size):
@@ -87,7 +90,7 @@ def _block(
             continue
         at = p[todo] * count + todo
         part = programs.take(at)
-        answer = objective.solve(part, start[:, at], values[0, todo])
+        answer = _solve(objective, part, start[:, at], values[0, todo])
         value = np.zeros((2, len(todo)))
         found = objective.values(part, answer)
         value[: len(found)] = found
@@ -115,6 +118,22 @@ def _block(
             result.refuse(int(rows[i]), status, shortfall)
 
 
+def _solve(objective: Objective, r: Reduced, start: np.ndarray, cutoff: np.ndarray) -> Answer:
+    """The objective's answers, also where all that fits within the bounds is a point or nearly.
+
+    Bounds a little wider, by less than the certificate shows, leave solvers room there.
+    """
+    answer = objective.solve(r, start, cutoff)
+    left = np.flatnonzero(~answer.found & ~answer.beaten)
+    if len(left):
+        part = r.take(left)
+        again = objective.solve(widened(part), start[:, left], cutoff[left])
+        again.x = np.minimum(np.maximum(again.x, part.low), part.high)
+        again.force = part.forces(again.x)
+        answer.put(left, accept(part, again))
+    return answer
+
+
 def _less(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Whether values a, (levels, R), come before b: level by level, equal within `TIE`."""
     with np.errstate(invalid="ignore"):
@@ -127,7 +146,7 @@ def _less(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def _unlimited(r: Reduced) -> tuple[np.ndarray, np.ndarray]:
     """Multipliers of the least squares without limits, (6, R); which samples are singular."""
-    n, k = r.low.shape[0], r.k
+    k = r.k
     free = replace(
         r,
         low=np.full_like(r.low, -np.inf),
@@ -139,9 +158,7 @@ def _unlimited(r: Reduced) -> tuple[np.ndarray, np.ndarray]:
     change, quality = step(free, Square(), point(free, Square(), zero))
     singular = ~r.regular
     doubtful = np.flatnonzero(r.regular & ~(quality > DOUBTFUL))
-    if n < r.m:
-        singular |= True
-    elif len(doubtful) and r.m:
+    if len(doubtful):
         A = r.G[: r.m, :, doubtful].transpose(2, 0, 1)
         sizes = np.linalg.norm(A, axis=2, keepdims=True)
         sigma = np.linalg.svd(A / np.where(sizes > 0, sizes, 1.0), compute_uv=False)
