@@ -69,7 +69,7 @@ def best_active_set(f: Full, tolerance: float = 1e-9) -> tuple[float, np.ndarray
     best = None
     bounds = [[(j, v) for v in {f.low[j], f.high[j]} if np.isfinite(v)] for j in range(size)]
     able = [j for j in range(size) if bounds[j]]
-    for active in range(0, size - 6 + 1):
+    for active in range(size - 6 + 1):
         for chosen in combinations(able, active):
             for values in product(*(bounds[j] for j in chosen)):
                 fixed = np.zeros((active, size))

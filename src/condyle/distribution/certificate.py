@@ -30,7 +30,7 @@ def residual(r: Reduced, answer: Answer) -> np.ndarray:
 
 
 def excess(r: Reduced, answer: Answer) -> np.ndarray:
-    """How far efforts and contact forces are outside their bounds, (R,), relative to the largest."""
+    """How far efforts and contact forces exceed their bounds, (R,), relative to the largest."""
     x, force = answer.x, answer.force
     largest = np.abs(x).max(axis=0, initial=0.0)
     over = np.maximum(r.low - x, x - r.high).max(axis=0, initial=0.0)

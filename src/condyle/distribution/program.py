@@ -37,7 +37,8 @@ class Sample:
         if not unit:
             sizes = np.abs(np.concatenate([*bounds, right]))
             unit = float(np.max(sizes, where=np.isfinite(sizes), initial=0.0)) or 1.0
-        return cls(G, right / unit, *(b / unit for b in bounds), unit)
+        low, high, contact_low, contact_high = (b / unit for b in bounds)
+        return cls(G, right / unit, low, high, contact_low, contact_high, unit)
 
     @property
     def m(self) -> int:
@@ -127,4 +128,6 @@ class Program:
             method="highs",
             options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
         )
-        return (found.x[:n], float(found.x[n])) if found.status == 0 else None
+        if found.status != 0 or found.x is None:
+            return None
+        return found.x[:n], float(found.x[n])

@@ -117,9 +117,8 @@ def reduce(
     low, high = problem.limits if limits else (np.full(n, -np.inf), np.full(n, np.inf))
     low, high = low / scale, high / scale
     push = problem.pushes if limits else np.zeros(k)
-    load = problem.preload
-    contact_low = np.where(push > 0, load, np.where(push < 0, -np.inf, -np.inf)) * np.ones(k)
-    contact_high = np.where(push < 0, -load, np.inf) * np.ones(k)
+    contact_low = np.where(push > 0, problem.preload, -np.inf)
+    contact_high = np.where(push < 0, -problem.preload, np.inf)
     shape = (n, count)
     return Reduced(
         G=np.ascontiguousarray(M[:, :n]),

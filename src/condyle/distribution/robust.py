@@ -6,8 +6,8 @@ import daqp
 import numpy as np
 
 from .newton import Answer
-from .reduced import Reduced
 from .program import ACTIVE, TOLERANCES, Sample
+from .reduced import Reduced
 
 
 def active_set(r: Reduced) -> Answer:

@@ -75,7 +75,7 @@ def _block(
         objective.limits,
     )
     start, singular = _unlimited(programs)
-    singular = singular.reshape(choices, count).any(axis=0)
+    singular = np.any(singular.reshape(choices, count), axis=0)
     bounds = objective.lower_bound(programs, start).reshape(choices, count)
     bounds = bounds - TIE * np.abs(np.where(np.isfinite(bounds), bounds, 0.0))
     order = np.argsort(bounds, axis=0, kind="stable")
