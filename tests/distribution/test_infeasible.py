@@ -20,7 +20,7 @@ def limits_times(problem, factor):
 @pytest.mark.parametrize("friction", [0, 1, 2])
 def test_shortfall_is_where_it_turns(name, friction):
     rng = np.random.default_rng(friction)
-    problem = random_problem(rng, 7, 2, 30, friction=friction, one_sided=True, tight=0.4, pull=True)
+    problem = random_problem(rng, 7, 2, 60, friction=friction, one_sided=True, tight=0.4, pull=True)
     result = distribute(problem, name)
     short = np.flatnonzero((result.status == Status.infeasible) & np.isfinite(result.shortfall))
     assert len(short) >= 5

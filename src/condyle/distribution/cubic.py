@@ -39,6 +39,7 @@ class Cubic(Objective):
             )
 
     def solve(self, r: Reduced, start: np.ndarray, cutoff: np.ndarray) -> Answer:
+        r = replace(r, low=np.maximum(r.low, 0.0))  # also where bounds are widened
         size = typical(r)
         law = Cube(SOFT * size)
         cutoff = np.minimum(cutoff, greatest(r, law))
@@ -69,7 +70,7 @@ def _by_squares(r: Reduced, start: np.ndarray) -> Answer:
     answer = Answer.empty(r)
     rows = np.flatnonzero(now.found)
     r, x, u = r.take(rows), now.x[:, rows], now.u[:, rows]
-    never = never[rows]
+    never, moving = never[rows], np.ones(len(rows), dtype=bool)
     for _ in range(PRIMAL_STEPS):
         curvature = 2 * x + PRIMAL_SOFT * x.max(axis=0, initial=0.0) + np.finfo(float).tiny
         target, root = x - x * x / curvature, np.sqrt(curvature)
@@ -90,11 +91,11 @@ def _by_squares(r: Reduced, start: np.ndarray) -> Answer:
             middle = 0.5 * (low + high)
             above = total((x + middle * step) ** 2 * step, 0) > 0
             low, high = np.where(above, low, middle), np.where(above, middle, high)
-        moves = found.found & (np.abs(step).max(axis=0) > ENDED * x.max(axis=0))
-        if not moves.any():
+        x = np.where(moving, np.maximum(x + np.where(rises, low, 1.0) * step, r.low), x)
+        u = np.where(moving & found.found, found.u, u)
+        moving &= found.found & (np.abs(step).max(axis=0) > ENDED * x.max(axis=0))
+        if not moving.any():
             break
-        x = np.where(moves, np.maximum(x + np.where(rises, low, 1.0) * step, r.low), x)
-        u = np.where(moves, found.u, u)
     part = Answer.empty(r)
     part.x, part.u, part.force = x, u, r.forces(x)
     part.found[:] = True

@@ -83,6 +83,12 @@ class Reduced:
             part.__dict__["size"] = tuple(a[:, rows] for a in self.size)
         return part
 
+    def equations(self, rows: np.ndarray) -> np.ndarray:
+        """A of some samples, its rows of length 1, (R, m, n)."""
+        A = self.G[: self.m, :, rows].transpose(2, 0, 1)
+        sizes = np.linalg.norm(A, axis=2, keepdims=True)
+        return A / np.where(sizes > 0, sizes, 1.0)
+
     def forces(self, x: np.ndarray) -> np.ndarray:
         """lambda = c - B x, (k, R)."""
         return self.right[self.m :] - total(self.G[self.m :] * x, 1)
@@ -156,6 +162,19 @@ def _triangular(M: np.ndarray, k: int) -> np.ndarray:
         w = total(v[:, None] * M[j:, j:], 0) * factor
         M[j:, j:] -= v[:, None] * w
     return regular
+
+
+def orthonormal(r: Reduced, rows: np.ndarray) -> Reduced:
+    """The same equations with orthonormal rows of A in some samples: A^T = Z R, Z^T x = R^-T b.
+
+    Efforts lose no digits by it, and multipliers then lose none either.
+    """
+    Z, R = np.linalg.qr(r.G[: r.m, :, rows].transpose(2, 1, 0))
+    G, right = r.G.copy(), r.right.copy()
+    G[: r.m, :, rows] = Z.transpose(2, 1, 0)
+    b = right[: r.m, rows].T[..., None]
+    right[: r.m, rows] = np.linalg.solve(R.transpose(0, 2, 1), b)[..., 0].T
+    return replace(r, G=G, right=right)
 
 
 def widened(r: Reduced) -> Reduced:

@@ -27,25 +27,19 @@ def active_set(r: Reduced) -> Answer:
 def _solve(s: Sample, weight: float) -> tuple[np.ndarray, np.ndarray] | None:
     """x and multipliers u of one sample; None where DAQP finds no solution."""
     m, n = s.m, s.G.shape[1]
-    A, B, b, c = s.G[:m], s.G[m:], s.right[:m], s.right[m:]
-    # Orthonormal equations Z^T x = R^-T b: what DAQP works with is then well conditioned.
-    Z, R = np.linalg.qr(A.T)
-    if Z.shape[1] < m or np.abs(np.diag(R)).min(initial=1.0) == 0.0:
-        return None
-    equal = np.linalg.solve(R.T, b) if m else b
+    B, b, c = s.G[m:], s.right[:m], s.right[m:]
     sense = np.zeros(n + 6, dtype=np.int32)
     sense[n : n + m] = ACTIVE
     x, _, flag, info = daqp.solve(
         np.eye(n) + weight * B.T @ B,
         -weight * B.T @ c,
-        np.ascontiguousarray(np.vstack([Z.T, B])),
-        np.concatenate([s.high, equal, c - s.contact_low]),
-        np.concatenate([s.low, equal, c - s.contact_high]),
+        np.ascontiguousarray(s.G),
+        np.concatenate([s.high, b, c - s.contact_low]),
+        np.concatenate([s.low, b, c - s.contact_high]),
         sense,
         **TOLERANCES,
     )
     if flag != 1:
         return None
-    price = -np.asarray(info["lam"])
-    v = np.linalg.solve(R, price[n : n + m]) if m else price[n:n]
-    return x, np.concatenate([v, price[n + m :] + weight * (c - B @ x)])
+    price = -np.asarray(info["lam"])[n:]
+    return x, np.concatenate([price[:m], price[m:] + weight * (c - B @ x)])

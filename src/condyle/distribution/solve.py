@@ -13,7 +13,7 @@ from .law import Square
 from .newton import Answer, point, step
 from .objective import Objective, named
 from .problem import Problem
-from .reduced import Reduced, reduce, widened
+from .reduced import Reduced, orthonormal, reduce, widened
 from .result import Result, Status
 
 ENTRIES = 48_000  # efforts worked on at once: many enough for calls to cost little
@@ -74,7 +74,7 @@ def _block(
         objective.weight(problem),
         objective.limits,
     )
-    start, singular = _unlimited(programs)
+    programs, start, singular = _prepare(programs)
     singular = np.any(singular.reshape(choices, count), axis=0)
     bounds = objective.lower_bound(programs, start).reshape(choices, count)
     bounds = bounds - TIE * np.abs(np.where(np.isfinite(bounds), bounds, 0.0))
@@ -144,26 +144,32 @@ def _less(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return first | (equal & second)
 
 
+def _prepare(r: Reduced) -> tuple[Reduced, np.ndarray, np.ndarray]:
+    """Well-conditioned equations, multipliers of the least squares without limits, (6, R), and
+    which samples are singular, (R,)."""
+    start, quality = _unlimited(r)
+    singular = ~r.regular
+    doubtful = np.flatnonzero(r.regular & ~(quality > DOUBTFUL))
+    if len(doubtful):
+        sigma = np.linalg.svd(r.equations(doubtful), compute_uv=False)
+        none = ~(sigma[:, -1] > SINGULAR * sigma[:, 0])
+        singular[doubtful] = none
+        hard = doubtful[~none]
+        r = orthonormal(r, hard)
+        start[:, hard] = _unlimited(r.take(hard))[0]
+    return r, start, singular
+
+
 def _unlimited(r: Reduced) -> tuple[np.ndarray, np.ndarray]:
-    """Multipliers of the least squares without limits, (6, R); which samples are singular."""
-    k = r.k
+    """Multipliers of the least squares without limits, (6, R), and their least pivots, (R,)."""
     free = replace(
         r,
         low=np.full_like(r.low, -np.inf),
         high=np.full_like(r.high, np.inf),
-        contact_low=np.full((k, r.count), -np.inf),
-        contact_high=np.full((k, r.count), np.inf),
+        contact_low=np.full((r.k, r.count), -np.inf),
+        contact_high=np.full((r.k, r.count), np.inf),
     )
-    zero = np.zeros((6, r.count))
-    change, quality = step(free, Square(), point(free, Square(), zero))
-    singular = ~r.regular
-    doubtful = np.flatnonzero(r.regular & ~(quality > DOUBTFUL))
-    if len(doubtful):
-        A = r.G[: r.m, :, doubtful].transpose(2, 0, 1)
-        sizes = np.linalg.norm(A, axis=2, keepdims=True)
-        sigma = np.linalg.svd(A / np.where(sizes > 0, sizes, 1.0), compute_uv=False)
-        singular[doubtful] = ~(sigma[:, -1] > SINGULAR * sigma[:, 0])
-    return change, singular
+    return step(free, Square(), point(free, Square(), np.zeros((6, r.count))))
 
 
 def _write(
