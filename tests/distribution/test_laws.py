@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from condyle.distribution import OBJECTIVES, Status, distribute
+from condyle.distribution import OBJECTIVES, Status, distribute, within
 
 from .cases import INCISOR, MOLAR_RIGHT, human_jaw, random_problem
 
@@ -109,3 +109,14 @@ def test_limits_that_do_not_bind_leave_the_least_norm():
     rng = np.random.default_rng(0)
     problem = random_problem(rng, 7, 1, 50, tight=100.0)
     same(distribute(problem, "bounded"), distribute(problem, "minimum_norm"))
+
+
+def test_where_least_norm_is_within_limits_it_is_the_answer():
+    rng = np.random.default_rng(0)
+    problem = random_problem(rng, 7, 1, 80, tight=1.0, one_sided=True)
+    problem = replace(problem, preload=1.0)
+    least, bounded = distribute(problem, "minimum_norm"), distribute(problem, "bounded")
+    kept = within(problem, least.effort, least.contact_force)
+    assert 5 < kept.sum() < 75
+    same_effort = np.abs(bounded.effort - least.effort).max(axis=1) < 1e-9
+    np.testing.assert_array_equal(same_effort, kept)

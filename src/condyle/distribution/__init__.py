@@ -5,6 +5,7 @@ friction are is not known here; `Problem` says what of them counts.
 """
 
 from . import bounded, cubic, minimax, minimum_norm, weighted  # each registers its objective
+from .limits import within
 from .objective import OBJECTIVES, Objective, register
 from .problem import Problem
 from .result import CERTIFIED, Result, Status
@@ -24,4 +25,5 @@ __all__ = [
     "minimum_norm",
     "register",
     "weighted",
+    "within",
 ]

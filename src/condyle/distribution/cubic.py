@@ -21,6 +21,7 @@ from .small import total
 SOFT = 1e-12
 STEPS = 20
 PRIMAL_SOFT, PRIMAL_STEPS = 1e-5, 40  # of the quadratic programs where that does not end
+NEAR = 1e-9  # of a limit: an effort this near a bound is at it
 ENDED = 1e-13  # of the greatest effort: a step that ends them
 
 
@@ -97,10 +98,38 @@ def _by_squares(r: Reduced, start: np.ndarray) -> Answer:
         if not moving.any():
             break
     part = Answer.empty(r)
+    for i in range(r.count):
+        x[:, i], u[:, i] = _polished(r, i, x[:, i], u[:, i])
     part.x, part.u, part.force = x, u, r.forces(x)
     part.found[:] = True
     answer.put(rows, part)
     return answer
+
+
+def _polished(r: Reduced, i: int, x: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """x and multipliers u of one sample to all digits, from those that are nearly right.
+
+    Newton's method on both at once, with the bounds that are met held as equations: near the
+    limit of what is possible multipliers grow, and x does not follow from them alone.
+    """
+    G, right, m = r.G[:, :, i], r.right[:, i].copy(), r.m
+    x, u = x.copy(), u.copy()
+    free = (x > r.low[:, i] + NEAR) & (x < r.high[:, i] - NEAR)
+    bound = np.where(u[m:] < 0, r.contact_low[:, i], r.contact_high[:, i])
+    acts = (u[m:] != 0) & np.isfinite(bound)
+    right[m:] -= np.where(acts, bound, 0.0)
+    rows = np.concatenate([np.ones(m, dtype=bool), acts])
+    part, count = G[np.ix_(rows, free)], int(free.sum())
+    for _ in range(4):
+        K = np.block([
+            [np.diag(2 * x[free]), -part.T],
+            [part, np.zeros((len(part), len(part)))],
+        ])  # fmt: skip
+        wrong = np.concatenate([part.T @ u[rows] - x[free] ** 2, right[rows] - G[rows] @ x])
+        change = np.linalg.lstsq(K, wrong)[0]
+        x[free] += change[:count]
+        u[rows] += change[count:]
+    return x, u
 
 
 register(Cubic())
