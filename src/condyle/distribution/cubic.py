@@ -40,7 +40,6 @@ class Cubic(Objective):
             )
 
     def solve(self, r: Reduced, start: np.ndarray, cutoff: np.ndarray) -> Answer:
-        r = replace(r, low=np.maximum(r.low, 0.0))  # also where bounds are widened
         size = typical(r)
         law = Cube(SOFT * size)
         cutoff = np.minimum(cutoff, greatest(r, law))

@@ -11,9 +11,11 @@ from .newton import Answer
 from .objective import Objective, register
 from .program import Sample
 from .quadratic import least_squares
-from .reduced import ROOM, Reduced
+from .reduced import Reduced
 from .small import total
 from .stretch import least_stretch
+
+ROOM = 1e-10  # above t, within which other efforts may be
 
 
 class Minimax(Objective):

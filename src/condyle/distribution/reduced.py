@@ -19,7 +19,6 @@ import numpy as np
 from .problem import Problem
 from .small import total
 
-ROOM = 1e-10  # what bounds are widened by, relative: less than a certificate allows
 DEPENDENT = 1e-11  # sine of an angle to other columns below which a contact adds nothing new
 
 
@@ -175,19 +174,6 @@ def orthonormal(r: Reduced, rows: np.ndarray) -> Reduced:
     b = right[: r.m, rows].T[..., None]
     right[: r.m, rows] = np.linalg.solve(R.transpose(0, 2, 1), b)[..., 0].T
     return replace(r, G=G, right=right)
-
-
-def widened(r: Reduced) -> Reduced:
-    """With bounds moved outwards by `ROOM` of what efforts and contact forces are like."""
-    x = typical(r)
-    force = np.abs(r.right[r.m :]) + np.abs(r.G[r.m :]).max(axis=1, initial=0.0) * x
-    return replace(
-        r,
-        low=r.low - ROOM * x,
-        high=r.high + ROOM * x,
-        contact_low=r.contact_low - ROOM * force,
-        contact_high=r.contact_high + ROOM * force,
-    )
 
 
 def typical(r: Reduced) -> np.ndarray:

@@ -7,13 +7,13 @@ from itertools import product
 
 import numpy as np
 
-from .certificate import accept, excess, residual
+from .certificate import excess, residual
 from .explain import explain
 from .law import Square
 from .newton import Answer, point, step
 from .objective import Objective, named
 from .problem import Problem
-from .reduced import Reduced, orthonormal, reduce, widened
+from .reduced import Reduced, orthonormal, reduce
 from .result import Result, Status
 
 ENTRIES = 48_000  # efforts worked on at once: many enough for calls to cost little
@@ -90,7 +90,7 @@ def _block(
             continue
         at = p[todo] * count + todo
         part = programs.take(at)
-        answer = _solve(objective, part, start[:, at], values[0, todo])
+        answer = objective.solve(part, start[:, at], values[0, todo])
         value = np.zeros((2, len(todo)))
         found = objective.values(part, answer)
         value[: len(found)] = found
@@ -116,22 +116,6 @@ def _block(
         status, shortfall = explain(single, signs, unknown[:, i], bool(chosen[i] >= 0))
         if status != Status.ok:
             result.refuse(int(rows[i]), status, shortfall)
-
-
-def _solve(objective: Objective, r: Reduced, start: np.ndarray, cutoff: np.ndarray) -> Answer:
-    """The objective's answers, also where all that fits within the bounds is a point or nearly.
-
-    Bounds a little wider, by less than the certificate shows, leave solvers room there.
-    """
-    answer = objective.solve(r, start, cutoff)
-    left = np.flatnonzero(~answer.found & ~answer.beaten)
-    if len(left):
-        part = r.take(left)
-        again = objective.solve(widened(part), start[:, left], cutoff[left])
-        again.x = np.minimum(np.maximum(again.x, part.low), part.high)
-        again.force = part.forces(again.x)
-        answer.put(left, accept(part, again))
-    return answer
 
 
 def _less(a: np.ndarray, b: np.ndarray) -> np.ndarray:
