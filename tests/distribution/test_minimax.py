@@ -11,7 +11,8 @@ from .cases import random_problem
 from .oracle import best_active_set, full, least_maximum, signs
 
 
-@pytest.mark.parametrize("seed", range(40))
+# The last three leave next to nothing that fits: the choice among ties takes a second program.
+@pytest.mark.parametrize("seed", [*range(40), 80, 341, 461])
 def test_linear_program(seed):
     rng = np.random.default_rng(seed)
     k = seed % 4

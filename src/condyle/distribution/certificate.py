@@ -24,8 +24,9 @@ def residual(r: Reduced, answer: Answer) -> np.ndarray:
     products = r.G * answer.x
     error = np.abs(r.right - products.sum(axis=1) - force)
     x = np.abs(answer.x).max(axis=0, initial=0.0)
-    size = np.abs(r.G).max(axis=1, initial=0.0) * x
-    size = np.where(size > 0, size, np.abs(r.right) + np.abs(force))
+    steepest, known = r.size
+    size = steepest * x
+    size = np.where(size > 0, size, known + np.abs(force))
     return ratio(error, size).max(axis=0)
 
 
@@ -53,7 +54,7 @@ def slack(r: Reduced, law: Law, answer: Answer) -> np.ndarray:
         # A multiplier of a contact counts by what it adds to the price of efforts.
         size = np.abs(force).max(axis=0) + np.abs(x).max(axis=0, initial=0.0)
         wrong = _wrong(r.weight * force - s, force, r.contact_low, r.contact_high, size)
-        effect = np.abs(r.G[r.m :]).max(axis=1, initial=0.0)
+        effect = r.size[0][r.m :]
         worst = np.maximum(worst, ratio((wrong * effect).max(axis=0), largest))
     return worst
 
@@ -77,6 +78,7 @@ def settle(r: Reduced, law: Law, answer: Answer) -> Answer:
 def accept(r: Reduced, answer: Answer) -> Answer:
     """`found` only where equations, constraints and the conditions of optimality are met."""
     with np.errstate(invalid="ignore"):
-        parts = (residual(r, answer), excess(r, answer), answer.error)
+        answer.residual, answer.excess = residual(r, answer), excess(r, answer)
+        parts = (answer.residual, answer.excess, answer.error)
         answer.found &= np.all([part <= CERTIFIED for part in parts], axis=0)
     return answer

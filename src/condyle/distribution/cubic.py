@@ -67,7 +67,7 @@ def _by_squares(r: Reduced, start: np.ndarray) -> Answer:
     """
     never = np.full(r.count, np.inf)
     now = least_squares(r, start, never)
-    answer = Answer.empty(r)
+    answer = Answer.empty(r.n, r.k, r.count)
     rows = np.flatnonzero(now.found)
     r, x, u = r.take(rows), now.x[:, rows], now.u[:, rows]
     never, moving = never[rows], np.ones(len(rows), dtype=bool)
@@ -96,12 +96,9 @@ def _by_squares(r: Reduced, start: np.ndarray) -> Answer:
         moving &= found.found & (np.abs(step).max(axis=0) > ENDED * x.max(axis=0))
         if not moving.any():
             break
-    part = Answer.empty(r)
     for i in range(r.count):
         x[:, i], u[:, i] = _polished(r, i, x[:, i], u[:, i])
-    part.x, part.u, part.force = x, u, r.forces(x)
-    part.found[:] = True
-    answer.put(rows, part)
+    answer.put(rows, Answer.of(x, r.forces(x), u, found=True))
     return answer
 
 

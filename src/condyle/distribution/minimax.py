@@ -24,7 +24,7 @@ class Minimax(Objective):
     mixes_units = True
 
     def solve(self, r: Reduced, start: np.ndarray, cutoff: np.ndarray) -> Answer:
-        answer, t = Answer.empty(r), np.empty(r.count)
+        answer, t = Answer.empty(r.n, r.k, r.count), np.empty(r.count)
         ones = np.ones(r.n)
         for i in range(r.count):
             s = least_stretch(Sample.of(r, i), -ones, ones)

@@ -34,7 +34,8 @@ class Answer:
 
     found: whether it is one, (R,).
     beaten: whether it is proved that no solution has a value below a cutoff, (R,).
-    error: violation of the conditions of optimality, (R,), once it is known.
+    residual, excess, error: the certificate, (R,) each, once it is known: equations, constraints
+            and conditions of optimality.
     """
 
     x: np.ndarray
@@ -42,19 +43,29 @@ class Answer:
     u: np.ndarray
     found: np.ndarray
     beaten: np.ndarray
+    residual: np.ndarray
+    excess: np.ndarray
     error: np.ndarray
 
     @classmethod
-    def empty(cls, r: Reduced) -> Answer:
-        nan = np.nan
-        return cls(
-            np.full((r.n, r.count), nan),
-            np.full((r.k, r.count), nan),
-            np.full((6, r.count), nan),
-            np.zeros(r.count, dtype=bool),
-            np.zeros(r.count, dtype=bool),
-            np.full(r.count, nan),
-        )
+    def of(
+        cls,
+        x: np.ndarray,
+        force: np.ndarray,
+        u: np.ndarray,
+        found: np.ndarray | bool,
+        beaten: np.ndarray | bool = False,
+    ) -> Answer:
+        """A solution without a certificate."""
+        count = x.shape[1]
+        flags = [np.broadcast_to(flag, count).copy() for flag in (found, beaten)]
+        return cls(x, force, u, *flags, *(np.full(count, np.nan) for _ in range(3)))
+
+    @classmethod
+    def empty(cls, n: int, k: int, count: int) -> Answer:
+        """No solution."""
+        shapes = ((n, count), (k, count), (6, count))
+        return cls.of(*(np.full(shape, np.nan) for shape in shapes), found=False)
 
     def put(self, rows: np.ndarray, part: Answer) -> None:
         """Write the answers of some samples."""
@@ -152,7 +163,7 @@ def maximise(r: Reduced, law: Law, u: np.ndarray, cutoff: np.ndarray, steps: int
     Args: cutoff: d beyond which a sample is given up as `beaten`, (R,): d is never above the
           least value, so no solution is below the cutoff; none is where there is none at all.
     """
-    answer = Answer.empty(r)
+    answer = Answer.empty(r.n, r.k, r.count)
     rows = np.arange(r.count)
     here = point(r, law, u)
     change, length, first = np.zeros_like(u), np.ones(r.count), np.ones(r.count)
@@ -174,8 +185,9 @@ def maximise(r: Reduced, law: Law, u: np.ndarray, cutoff: np.ndarray, steps: int
             beaten |= ~done & (empty(r, here.u) | empty(r, change))
         ended = done | beaten | (turn == steps)
         if ended.any():
-            error = np.full(len(rows), np.nan)
-            part = Answer(here.x, here.force, here.u, done, beaten, error)
+            part = Answer.of(here.x, here.force, here.u, done, beaten)
+            if ended.all() and len(rows) == answer.found.size:
+                return part
             answer.put(rows[ended], part.take(ended))
             left = ~ended
             if not left.any():

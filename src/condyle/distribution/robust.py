@@ -12,7 +12,7 @@ from .reduced import Reduced
 
 def active_set(r: Reduced) -> Answer:
     """The least of |x|^2 / 2 + W |lambda|^2 / 2, each sample by itself from a cold start."""
-    answer = Answer.empty(r)
+    answer = Answer.empty(r.n, r.k, r.count)
     for i in range(r.count):
         s = Sample.of(r, i)
         found = _solve(s, r.weight)

@@ -7,7 +7,6 @@ from itertools import product
 
 import numpy as np
 
-from .certificate import excess, residual
 from .explain import explain
 from .law import Square
 from .newton import Answer, point, step
@@ -44,7 +43,8 @@ def distribute(problem: Problem, distribution: str = "bounded") -> Result:
     size = max(64, ENTRIES // (max(problem.n, 1) * len(signs)))
     for start in range(0, len(rows), size):
         block = rows[start : start + size]
-        _block(problem.take(block), objective, signs, result, block)
+        part = problem if len(block) == problem.count else problem.take(block)
+        _block(part, objective, signs, result, block)
     return result
 
 
@@ -68,7 +68,7 @@ def _block(
     """
     count, choices = problem.count, len(signs)
     programs = reduce(
-        problem.take(np.tile(np.arange(count), choices)),
+        problem.take(np.tile(np.arange(count), choices)) if choices > 1 else problem,
         np.repeat(signs, count, axis=0),
         objective.scale(problem),
         objective.weight(problem),
@@ -80,7 +80,7 @@ def _block(
     bounds = bounds - TIE * np.abs(np.where(np.isfinite(bounds), bounds, 0.0))
     order = np.argsort(bounds, axis=0, kind="stable")
 
-    best = Answer.empty(programs.take(np.arange(count)))
+    best = Answer.empty(problem.n, problem.k, count)
     chosen = np.full(count, -1)
     values = np.full((2, count), np.inf)
     unknown = np.zeros((choices, count), dtype=bool)  # neither an answer nor a proof of none
@@ -89,7 +89,7 @@ def _block(
         if not len(todo):
             continue
         at = p[todo] * count + todo
-        part = programs.take(at)
+        part = programs if len(at) == programs.count else programs.take(at)
         answer = objective.solve(part, start[:, at], values[0, todo])
         value = np.zeros((2, len(todo)))
         found = objective.values(part, answer)
@@ -101,13 +101,13 @@ def _block(
         values[:, todo[less]] = value[:, less]
         unknown[p[todo], todo] = ~answer.found & ~answer.beaten
     answered = np.flatnonzero(chosen >= 0)
-    _write(
-        programs.take(chosen[answered] * count + answered),
-        best.take(answered),
-        signs[chosen[answered]],
-        result,
-        rows[answered],
-    )
+    to, answer = rows[answered], best.take(answered)
+    result.effort[to] = answer.x.T * programs.scale
+    result.contact_force[to] = answer.force.T
+    result.pattern[to] = signs[chosen[answered]]
+    result.residual[to], result.primal[to] = answer.residual, answer.excess
+    result.dual[to] = answer.error
+    result.status[to], result.shortfall[to] = Status.ok, 1.0
     for row in rows[singular]:
         result.refuse(int(row), Status.singular, np.nan)
     # What has no answer has none for a reason, which is found one sample at a time.
@@ -154,17 +154,3 @@ def _unlimited(r: Reduced) -> tuple[np.ndarray, np.ndarray]:
         contact_high=np.full((r.k, r.count), np.inf),
     )
     return step(free, Square(), point(free, Square(), np.zeros((6, r.count))))
-
-
-def _write(
-    r: Reduced, answer: Answer, pattern: np.ndarray, result: Result, rows: np.ndarray
-) -> None:
-    """Answers of some samples, with their certificates, into the result."""
-    result.effort[rows] = answer.x.T * r.scale
-    result.contact_force[rows] = answer.force.T
-    result.pattern[rows] = pattern
-    result.residual[rows] = residual(r, answer)
-    result.primal[rows] = excess(r, answer)
-    result.dual[rows] = answer.error
-    result.status[rows] = Status.ok
-    result.shortfall[rows] = 1.0
