@@ -14,7 +14,7 @@ from .objective import Objective, register
 from .problem import Problem
 from .quadratic import least_squares
 from .reduced import Reduced, typical
-from .small import total
+from .small import pick, total
 
 # f = x^3 / 3 has no curvature at 0, where the answer to a price is steepest; a very small
 # square added to it keeps Newton's steps finite and changes less than the certificate shows.
@@ -46,7 +46,7 @@ class Cubic(Objective):
         answer = settle(r, Cube(), maximise(r, law, start * size, cutoff, STEPS))
         left = np.flatnonzero(~answer.found & ~answer.beaten)
         if len(left):
-            found = _by_squares(r.take(left), start[:, left])
+            found = _by_squares(r.take(left), pick(start, left))
             part, law = r.take(left), law.take(left)
             exact = maximise(part, law, np.nan_to_num(found.u), cutoff[left], STEPS)
             exact = settle(part, Cube(), exact)
@@ -69,7 +69,7 @@ def _by_squares(r: Reduced, start: np.ndarray) -> Answer:
     now = least_squares(r, start, never)
     answer = Answer.empty(r.n, r.k, r.count)
     rows = np.flatnonzero(now.found)
-    r, x, u = r.take(rows), now.x[:, rows], now.u[:, rows]
+    r, x, u = r.take(rows), pick(now.x, rows), pick(now.u, rows)
     never, moving = never[rows], np.ones(len(rows), dtype=bool)
     for _ in range(PRIMAL_STEPS):
         curvature = 2 * x + PRIMAL_SOFT * x.max(axis=0, initial=0.0) + np.finfo(float).tiny

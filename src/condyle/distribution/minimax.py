@@ -12,7 +12,7 @@ from .objective import Objective, register
 from .program import Sample
 from .quadratic import least_squares
 from .reduced import Reduced
-from .small import total
+from .small import pick, total
 from .stretch import least_stretch
 
 ROOM = 1e-10  # above t, within which other efforts may be
@@ -36,7 +36,7 @@ class Minimax(Objective):
         answer = accept(r, answer)
         left = np.flatnonzero(~answer.found & ~answer.beaten)
         if len(left):
-            answer.put(left, _within(r.take(left), t[left], start[:, left]))
+            answer.put(left, _within(r.take(left), t[left], pick(start, left)))
         return answer
 
     def values(self, r: Reduced, answer: Answer) -> np.ndarray:

@@ -18,7 +18,7 @@ import numpy as np
 
 from .law import Law
 from .reduced import Reduced
-from .small import gram, solve, total
+from .small import gram, pick, solve, total
 
 ENOUGH = 1e-4  # part of the promised rise that a step must give
 SHORTER = 0.3  # what a step that does not is multiplied by
@@ -65,7 +65,8 @@ class Answer:
     def empty(cls, n: int, k: int, count: int) -> Answer:
         """No solution."""
         shapes = ((n, count), (k, count), (6, count))
-        return cls.of(*(np.full(shape, np.nan) for shape in shapes), found=False)
+        x, force, u = (np.full(shape, np.nan) for shape in shapes)
+        return cls.of(x, force, u, found=False)
 
     def put(self, rows: np.ndarray, part: Answer) -> None:
         """Write the answers of some samples."""
@@ -74,7 +75,7 @@ class Answer:
 
     def take(self, rows: np.ndarray) -> Answer:
         """Some of the samples."""
-        return Answer(*(a[..., rows] for a in vars(self).values()))
+        return Answer(*(pick(a, rows) for a in vars(self).values()))
 
 
 @dataclass
@@ -91,7 +92,7 @@ class Point:
     d: np.ndarray
 
     def take(self, rows: np.ndarray) -> Point:
-        return Point(*(a[..., rows] for a in vars(self).values()))
+        return Point(*(pick(a, rows) for a in vars(self).values()))
 
     def where(self, good: np.ndarray, other: Point) -> Point:
         """This point, and another where it is not `good`, (R,)."""
@@ -194,7 +195,7 @@ def maximise(r: Reduced, law: Law, u: np.ndarray, cutoff: np.ndarray, steps: int
                 break
             rows, r, here, law = rows[left], r.take(left), here.take(left), law.take(left)
             good, length, first = good[left], length[left], first[left]
-            change, cutoff = change[:, left], cutoff[left]
+            change, cutoff = pick(change, left), cutoff[left]
         newton, _ = step(r, law, here)
         change = newton if good.all() else np.where(good, newton, change)
     return answer

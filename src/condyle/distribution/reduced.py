@@ -13,11 +13,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from .problem import Problem
-from .small import total
+from .small import pick, total
 
 DEPENDENT = 1e-11  # sine of an angle to other columns below which a contact adds nothing new
 
@@ -68,18 +69,11 @@ class Reduced:
 
     def take(self, rows: np.ndarray) -> Reduced:
         """Some of the samples."""
-        part = replace(
-            self,
-            G=self.G[:, :, rows],
-            right=self.right[:, rows],
-            low=self.low[:, rows],
-            high=self.high[:, rows],
-            contact_low=self.contact_low[:, rows],
-            contact_high=self.contact_high[:, rows],
-            regular=self.regular[rows],
-        )
+        names = ("G", "right", "low", "high", "contact_low", "contact_high", "regular")
+        picked: dict[str, Any] = {name: pick(getattr(self, name), rows) for name in names}
+        part = replace(self, **picked)
         if "size" in self.__dict__:
-            part.__dict__["size"] = tuple(a[:, rows] for a in self.size)
+            part.__dict__["size"] = tuple(pick(a, rows) for a in self.size)
         return part
 
     def equations(self, rows: np.ndarray) -> np.ndarray:

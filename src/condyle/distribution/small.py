@@ -7,6 +7,11 @@ import numpy as np
 FLAT = 1e-13  # a pivot below this part of its full size stands for a direction without curvature
 
 
+def pick(a: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Some samples, by number or mask, side by side as before: an index would turn them around."""
+    return np.take(a, rows.nonzero()[0] if rows.dtype == bool else rows, axis=-1)
+
+
 def total(terms: np.ndarray, axis: int) -> np.ndarray:
     """Sum over an axis that is not the last, in the same order however many samples there are."""
     if terms.shape[-1] != 1:

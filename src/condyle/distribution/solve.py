@@ -14,6 +14,7 @@ from .objective import Objective, named
 from .problem import Problem
 from .reduced import Reduced, orthonormal, reduce
 from .result import Result, Status
+from .small import pick
 
 ENTRIES = 48_000  # efforts worked on at once: many enough for calls to cost little
 SINGULAR = 1e-12  # ratio of singular values of A below which efforts are not determined
@@ -90,7 +91,7 @@ def _block(
             continue
         at = p[todo] * count + todo
         part = programs if len(at) == programs.count else programs.take(at)
-        answer = objective.solve(part, start[:, at], values[0, todo])
+        answer = objective.solve(part, pick(start, at), values[0, todo])
         value = np.zeros((2, len(todo)))
         found = objective.values(part, answer)
         value[: len(found)] = found
