@@ -134,8 +134,7 @@ def reduce(
 
 def _lever(M: np.ndarray) -> np.ndarray:
     """A length that makes moments of the order of forces, (R,): a power of 2, so nothing rounds."""
-    squares = total(total(M * M, 1)[None].reshape(2, 3, -1), 1)
-    force, moment = squares
+    force, moment = total(total(M * M, 1).reshape(2, 3, -1), 1)
     usable = (force > 0) & (moment > 0)
     ratio = np.sqrt(np.where(usable, moment, 1.0) / np.where(usable, force, 1.0))
     return np.exp2(np.round(np.log2(ratio)))

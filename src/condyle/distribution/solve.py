@@ -19,6 +19,7 @@ from .small import pick
 ENTRIES = 48_000  # efforts worked on at once: many enough for calls to cost little
 SINGULAR = 1e-12  # ratio of singular values of A below which efforts are not determined
 DOUBTFUL = 1e-6  # pivot of A A^T below which that ratio is looked at
+BOUND = 1e-9  # of a lower bound, by which rounding may have put it too high
 TIE = 1e-12  # of a value: patterns of friction nearer than this are equal, and the first counts
 
 
@@ -78,7 +79,7 @@ def _block(
     programs, start, singular = _prepare(programs)
     singular = np.any(singular.reshape(choices, count), axis=0)
     bounds = objective.lower_bound(programs, start).reshape(choices, count)
-    bounds = bounds - TIE * np.abs(np.where(np.isfinite(bounds), bounds, 0.0))
+    bounds = bounds - BOUND * np.abs(np.where(np.isfinite(bounds), bounds, 0.0))
     order = np.argsort(bounds, axis=0, kind="stable")
 
     best = Answer.empty(problem.n, problem.k, count)
