@@ -159,7 +159,7 @@ class Family(ABC):
     joint_unit: ClassVar[str]
     effort_unit: ClassVar[str]
     shapes: ClassVar[dict[str, int]]  # constant -> number of entries (1, 3 or 9)
-    # Constants that, at 0, leave `dynamics` without J and forces: for padding lanes, without a chain.
+    # Constants that, at 0, leave `dynamics` without J and forces: of lanes without a chain.
     # A family that has none pays for such lanes with a few multiplications.
     padding: ClassVar[tuple[str, ...]] = ()
 

@@ -40,7 +40,7 @@ class RSSFamily(Family):
     bodies = ("cranks", "couplers")
     joint_unit = "rad"
     effort_unit = "N m"
-    # `plane_1` and `plane_2` span the crank plane, plane_1[2] = 0: one constant fewer where it counts.
+    # `plane_1` and `plane_2` span the crank plane; plane_1[2] = 0 saves a constant.
     # C and N are C_i0 and N_i0; Y is the second axis of N.
     padding = ("branch", "mass", "transverse", "axial", "crank")
     shapes = {
