@@ -21,7 +21,8 @@ from .structure import Structure
 
 # What can be asked for besides the efforts.
 OUTPUTS = ("contact", "share", "gravity", "motion", "joint", "configuration")
-DOUBTFUL = 1e-14  # feasibility or pivot ratio below which a sample is looked at again
+DOUBTFUL = 1e-14  # discriminant below which a sample is looked at again,
+WEAK = 1e-20  # and ratio of a pivot to its column, squared
 HUGE = 1e300
 CERTAIN = 0.5  # of a placement's discriminant, which is 0 or 1 where it was iterated
 
@@ -88,7 +89,7 @@ def program(
     if "configuration" in wanted:
         configuration.add(b, platform)
     b.check(_feasibility(b, platform, eq), DOUBTFUL, Status.unreachable)
-    b.check(pivots * (ca.fabs(b.total(effort)) < HUGE), DOUBTFUL)
+    b.check(pivots * (ca.fabs(b.total(effort)) < HUGE), WEAK)
     return b.finish()
 
 
@@ -112,8 +113,9 @@ def system(structure: Structure) -> Program:
     still = [b.at_zero(part, *_rates(eq, platform)) for part in eq.parts.values()]
     assert eq.G is not None
     b.output("A", eq.A, "")
-    b.output("b", ca.horzcat(*(eq.basis.generalized_force(p) for p in eq.parts.values())).T, "")
-    b.output("b_gravity", ca.horzcat(*(eq.basis.generalized_force(p) for p in still)).T, "")
+    for name, parts in (("b", list(eq.parts.values())), ("b_gravity", still)):
+        rows = ca.horzcat(*(eq.basis.generalized_force(p) for p in parts)).T
+        b.output(name, rows, "", len(parts), structure.m)
     b.output("Q", eq.Q, "N, N m", 6)
     b.output("J", [c.row for c in eq.chains], "")
     b.output("G", eq.G, "", 6, len(structure.contacts))
