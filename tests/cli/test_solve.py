@@ -57,7 +57,7 @@ def test_columns_and_digits(
     ]
     found = model.evaluate(q, q1, q2, with_point(wrench, model.load_point("right_molar")))
     t = found.torques
-    wanted = np.hstack([t.torque, t.contact_force, found.poses.pose, found.posture.joint])
+    wanted = np.hstack([t.torque, t.contact_force, found.pose, found.configuration.joint])
     np.testing.assert_array_equal(np.array(rows, dtype=float), wanted)
     assert all(cell == f"{float(cell):.17g}" for row in rows for cell in row)
 
@@ -102,16 +102,16 @@ def test_any_valid_set_of_coordinates(
     q, q1, q2 = draw(12)
     found = model.evaluate(q, q1, q2, np.zeros((12, 9)))
     columns = [COORDINATES.index(name) for name in names]
-    poses = (found.poses.pose, found.poses.rate, found.poses.acceleration)
+    poses = (found.pose, found.pose_rate, found.pose_acceleration)
     cells = np.hstack([a[:, columns] for a in poses])
     mix = np.random.default_rng(2).permutation(12)
     write_csv([header(names)[i] for i in mix], cells[:, mix], "states.csv")
     outcome = condyle_command("solve", "masticatory", "--states", "states.csv", "--out", "out.csv")
     assert outcome.status == 0, outcome.err
     table = np.array(read_csv("out.csv")[1], dtype=float)
-    torque = found.torques.torque
+    torque = found.effort
     np.testing.assert_allclose(table[:, :6], torque, atol=1e-11 * np.abs(torque).max())
-    np.testing.assert_allclose(table[:, 8:14], found.poses.pose, atol=1e-13)
+    np.testing.assert_allclose(table[:, 8:14], found.pose, atol=1e-13)
 
 
 def test_flagged_rows_are_kept_and_empty(

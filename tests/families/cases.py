@@ -49,7 +49,7 @@ class Case:
         self,
         formulation: str = "virtual_power",
         route: str = "core",
-        backend: str = "interpreted",
+        backend: str = "numpy",
     ) -> Evaluation:
         model = Model(self.mechanism, formulation, route, backend)
         assert model.independent == tuple(self.states["names"])

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import condyle
-from condyle.dynamics.reactions import reaction_places
+from condyle.model.reactions import reaction_places
 from condyle.kinematics.chain import FAMILIES
 from families.cases import case
 

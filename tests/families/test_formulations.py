@@ -9,7 +9,7 @@ from oracles import description
 
 import condyle
 from condyle.dynamics import FORMULATIONS
-from condyle.dynamics.equations import has_closed_form
+from condyle.questions.numbers import has_closed_form
 from condyle.mechanism import load
 from condyle.model import Evaluation
 from families.cases import MECHANISMS, Case, case, close, of_raw

@@ -12,7 +12,7 @@ from oracles.random_mechanism import random_mechanism, toml_text
 
 import condyle
 from condyle.kinematics.batch import evaluate
-from condyle.kinematics.closure import contact_symbols, coordinate_closure
+from condyle.kinematics.contact import contacts_of, coordinate_closure
 from condyle.kinematics.iteration import newton
 from condyle.mechanism import Mechanism, parse
 from condyle.mechanism.home import dependent_coordinates, independent_coordinates

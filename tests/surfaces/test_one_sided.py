@@ -31,7 +31,7 @@ def chewing() -> Motion:
 
 
 def solve(mechanism: Mechanism, motion: Motion) -> Solution:
-    model = Model(mechanism, backend="interpreted")
+    model = Model(mechanism, backend="numpy")
     return model.solve(motion, condyle.reference_load())
 
 

@@ -14,7 +14,7 @@ from oracles.random_mechanism import random_mechanism, toml_text
 
 import condyle
 from condyle.errors import InputError
-from condyle.kinematics.closure import contact_symbols
+from condyle.kinematics.contact import contacts_of
 from condyle.kinematics.contact import residuals
 from condyle.kinematics.project import project_home
 from condyle.mechanism.files import from_data
@@ -72,7 +72,7 @@ def test_nearest(options: dict[str, Any]) -> None:
 def test_check_gives_points_for_the_file(
     condyle_command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, kind: str, ball: float
 ) -> None:
-    monkeypatch.setenv("CONDYLE_BACKEND", "interpreted")
+    monkeypatch.setenv("CONDYLE_BACKEND", "numpy")
     raw = shaken(5, surface=kind)
     if ball:
         for contact in raw["contact"]:

@@ -7,11 +7,11 @@ import pytest
 
 from condyle.errors import InputError
 from condyle.model import Model
-from kernels.cases import case
+from support.cases import case
 
 
 @pytest.mark.usefixtures("quick")
-@pytest.mark.parametrize("backend", ["compiled", "interpreted"])
+@pytest.mark.parametrize("backend", ["compiled", "numpy"])
 def test_condition_is_that_of_the_jacobian(backend: str) -> None:
     """Against singular values of the Jacobian that forward differences of the joints give."""
     c = case("masticatory")
@@ -25,9 +25,9 @@ def test_condition_is_that_of_the_jacobian(backend: str) -> None:
         still = np.zeros_like(steps)
         loads = np.tile(load[i], (len(steps), 1))
         evaluation = model.evaluate(steps, still, still, loads)
-        forth, back = np.split(evaluation.posture.joint, 2)
+        forth, back = np.split(evaluation.configuration.joint, 2)
         J = (forth - back) / 2e-6
-        weights = np.abs(evaluation.posture.singularity.transmission).mean(axis=0)
+        weights = np.abs(evaluation.configuration.singularity.transmission).mean(axis=0)
         expected = np.linalg.cond(J.T * _arm(model) * weights[:, None])
         assert result.condition[i] == pytest.approx(expected, rel=1e-4)
 
@@ -42,4 +42,4 @@ def _arm(model: Model) -> np.ndarray:
 def test_an_unknown_output_is_named() -> None:
     c = case("masticatory")
     with pytest.raises(InputError, match='no output "contacts"'):
-        Model(c.mechanism, backend="interpreted").torques(*c.arguments, outputs=("contacts",))
+        Model(c.mechanism, backend="numpy").torques(*c.arguments, outputs=("contacts",))

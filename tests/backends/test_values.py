@@ -9,7 +9,7 @@ from condyle.dynamics import FORMULATIONS
 from condyle.kernels.compiled import Compiled
 from condyle.model import Model
 from condyle.questions.spec import OUTPUTS
-from kernels.cases import Case, case, error, errors, ones
+from support.cases import Case, case, error, errors, ones
 
 BATCH, ONE = 1e-11, 1e-12
 WITHOUT_SHARE = ("contact", "motion", "joint")  # virtual_power then folds masses together
@@ -42,7 +42,7 @@ RANDOM = [
 def check(c: Case, formulation: str, route: str, outputs: tuple[str, ...] = OUTPUTS) -> Compiled:
     """All results of a batch, and of one evaluation after the other."""
     compiled = Model(c.mechanism, formulation, route, "compiled").kernel
-    interpreted = Model(c.mechanism, formulation, route, "interpreted").kernel
+    interpreted = Model(c.mechanism, formulation, route, "numpy").kernel
     wanted = interpreted.solve(*c.arguments)
     got = compiled.solve(*c.arguments, outputs=outputs)
     assert compiled.name == "compiled"
@@ -92,7 +92,7 @@ def test_asking_for_less_changes_nothing() -> None:
 def test_without_moments() -> None:
     c = case("masticatory")
     pushed = c.load * np.repeat([1, 0, 1], 3)
-    wanted = Model(c.mechanism, backend="interpreted").kernel.solve(c.q, c.q1, c.q2, pushed)
+    wanted = Model(c.mechanism, backend="numpy").kernel.solve(c.q, c.q1, c.q2, pushed)
     compiled = Model(c.mechanism, backend="compiled").kernel
     with_zeros = compiled.solve(c.q, c.q1, c.q2, pushed, outputs=())
     kernel = compiled.kernel(c.point, (), moment=False)
@@ -137,6 +137,6 @@ def test_a_point_for_each_sample() -> None:
     c = case("masticatory")
     load = c.load.copy()
     load[:, 6] += np.linspace(0, 0.01, len(load))
-    compiled, interpreted = (Model(c.mechanism, backend=b) for b in ("compiled", "interpreted"))
+    compiled, interpreted = (Model(c.mechanism, backend=b) for b in ("compiled", "numpy"))
     got, wanted = (m.evaluate(c.q, c.q1, c.q2, load) for m in (compiled, interpreted))
-    assert error(got.torques.torque, wanted.torques.torque) < 1e-14
+    assert error(got.effort, wanted.effort) < 1e-14

@@ -10,7 +10,7 @@ import condyle
 from condyle.graph.graph import _BINARY, _UNARY
 from condyle.mechanism.surface import Expression
 from condyle.model import Model
-from kernels.cases import Case, case, error
+from support.cases import Case, case, error
 
 SIZE = 1e-5  # of what the functions add to a plane [m]
 
@@ -46,13 +46,13 @@ def test_kernels_agree_with_the_interpreter() -> None:
     left, right = mechanism.contacts
     left = left.model_copy(update={"surface": Expression(bumpy)})
     mechanism = mechanism.replace(contacts=(left, right))
-    wanted, ok = Model(mechanism, backend="interpreted").torques(*reference.arguments)
+    wanted, ok = Model(mechanism, backend="numpy").torques(*reference.arguments)
     kernel = Model(mechanism, backend="compiled").kernel.kernel(reference.point, (), True)
     found, status = kernel.run(reference.samples)
     good = (status == 0) & (ok == 0)
     assert good.mean() > 0.5
     assert error(kernel.in_order(found["torque"])[good], wanted.torque[good]) < 1e-10
-    plane = Model(condyle.load("masticatory"), backend="interpreted").torques(*reference.arguments)
+    plane = Model(condyle.load("masticatory"), backend="numpy").torques(*reference.arguments)
     assert error(plane[0].torque[good], wanted.torque[good]) > 1e-4  # the bumps are felt
 
 

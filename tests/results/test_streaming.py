@@ -17,8 +17,8 @@ from condyle.errors import CondyleError
 from condyle.model import Model
 from condyle.results import states
 from condyle.results.states import solve_file
-from kernels.cases import case
-from kernels.children import PATIENCE, end, start, wait_for
+from support.cases import case
+from support.children import PATIENCE, end, start, wait_for
 
 NAME = "masticatory"
 CHUNK = 200
@@ -36,7 +36,7 @@ main()
 
 @pytest.fixture(scope="module")
 def model() -> Model:
-    return Model(case(NAME).mechanism, backend="interpreted")
+    return Model(case(NAME).mechanism, backend="numpy")
 
 
 @pytest.fixture(autouse=True)
@@ -76,7 +76,7 @@ def peak(model: Model, folder: Path, count: int) -> int:
         tracemalloc.stop()
 
 
-@pytest.mark.parametrize("backend", ["interpreted", "compiled"])
+@pytest.mark.parametrize("backend", ["numpy", "compiled"])
 @pytest.mark.usefixtures("quick")
 def test_memory_does_not_grow(backend: str, tmp_path: Path) -> None:
     model = Model(case(NAME).mechanism, backend=backend)
@@ -166,7 +166,7 @@ def test_stopped_from_outside(tmp_path: Path, number: signal.Signals) -> None:
     pipe, out = tmp_path / "states", tmp_path / "out.csv"
     os.mkfifo(pipe)
     out.write_text("old")
-    child = start(SOLVE, "--states", pipe, "--out", out, "--backend", "interpreted")
+    child = start(SOLVE, "--states", pipe, "--out", out, "--backend", "numpy")
     with open(pipe, "w") as file:
         file.write(HEADER + "".join(rows(4 * CHUNK)))
         file.flush()
@@ -183,7 +183,7 @@ def test_through_pipes(tmp_path: Path) -> None:
     """In and out: a row as soon as its chunk is done, no file in between."""
     pipe = tmp_path / "states"
     os.mkfifo(pipe)
-    child = start(SOLVE, "--states", pipe, "--out", "/dev/stdout", "--backend", "interpreted", "-q")
+    child = start(SOLVE, "--states", pipe, "--out", "/dev/stdout", "--backend", "numpy", "-q")
     seen = Event()
 
     def feed() -> None:

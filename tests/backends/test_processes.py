@@ -17,14 +17,14 @@ from condyle.backends.compiler import find_compiler
 from condyle.kernels import compiled
 from condyle.kernels.compiled import Kernel
 from condyle.model import Model
-from kernels.cases import case, error
-from kernels.children import PATIENCE, end, start, wait_for
+from support.cases import case, error
+from support.children import PATIENCE, end, start, wait_for
 
 SOLVE = """
 import json, sys
 from condyle.backends import cache
 from condyle.model import Model
-from kernels.cases import case
+from support.cases import case
 c = case("gough-stewart")
 kernel = Model(c.mechanism, backend="compiled").kernel.kernel(c.point, (), True)
 sys.stdin.readline()  # the others are as far
@@ -107,7 +107,7 @@ def kernel() -> Kernel:
 def check(kernel: Kernel) -> None:
     """Right numbers."""
     c = case("gough-stewart")
-    wanted = Model(c.mechanism, backend="interpreted").kernel.solve(*c.arguments).torque
+    wanted = Model(c.mechanism, backend="numpy").kernel.solve(*c.arguments).torque
     assert error(kernel.in_order(kernel.run(c.samples)[0]["torque"]), wanted) < 1e-10
 
 
@@ -131,7 +131,7 @@ def test_processes_race(folder: Path) -> None:
     torques = [json.loads(out)[1] for out, _ in said]
     assert torques[0] == torques[1] == torques[2]
     c = case("gough-stewart")
-    wanted = Model(c.mechanism, backend="interpreted").kernel.solve(*c.arguments).torque
+    wanted = Model(c.mechanism, backend="numpy").kernel.solve(*c.arguments).torque
     assert error(np.array(torques[0]), wanted) < 1e-10
     check_clean(folder)
     again = kernel()
@@ -252,6 +252,6 @@ def test_kernels_of_one_process_go_with_it(folder: Path, tmp_path: Path) -> None
     out, err = child.communicate("\n", timeout=PATIENCE)
     assert err.count("\n") == 1 and f"cache {folder} cannot be used" in err
     c = case("gough-stewart")
-    wanted = Model(c.mechanism, backend="interpreted").kernel.solve(*c.arguments).torque
+    wanted = Model(c.mechanism, backend="numpy").kernel.solve(*c.arguments).torque
     assert error(json.loads(out)[1], wanted) < 1e-10
     assert list((tmp_path / "tmp").iterdir()) == []

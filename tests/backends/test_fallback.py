@@ -22,7 +22,7 @@ from condyle.backends import cache, compiler
 from condyle.backends.compiler import CompilerError, find_compiler
 from condyle.errors import InputError
 from condyle.model import Model
-from kernels.cases import case, error
+from support.cases import case, error
 
 NAME = "gough-stewart"
 SLOWER = "; the interpreter gives the same numbers, slower\n"
@@ -39,7 +39,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def interpreted() -> Model:
-    return Model(case(NAME).mechanism, backend="interpreted")
+    return Model(case(NAME).mechanism, backend="numpy")
 
 
 @functools.cache
@@ -147,7 +147,7 @@ def test_same_numbers_and_one_notice(
     model = Model(c.mechanism)
     for _ in range(2):
         check_numbers(model)
-    assert model.kernel.name == "interpreted"
+    assert model.kernel.name == "numpy"
     said = capsys.readouterr().err
     assert said.startswith("condyle: ") and said.count("condyle: ") == 1
     assert useless[1] in said and said.endswith(SLOWER)
@@ -222,10 +222,10 @@ def test_what_was_built_before_needs_no_second_build(monkeypatch: pytest.MonkeyP
 
 def test_the_environment_decides_what_auto_means(monkeypatch: pytest.MonkeyPatch) -> None:
     mechanism = case(NAME).mechanism
-    for value, name in (("interpreted", "interpreted"), ("compiled", "compiled"), ("", "compiled")):
+    for value, name in (("numpy", "numpy"), ("compiled", "compiled"), ("", "compiled")):
         monkeypatch.setenv("CONDYLE_BACKEND", value)
         assert Model(mechanism).kernel.name == name
-        for backend in ("compiled", "interpreted"):
+        for backend in ("compiled", "numpy"):
             assert Model(mechanism, backend=backend).kernel.name == backend
     monkeypatch.setenv("CONDYLE_BACKEND", "compilled")
     with pytest.raises(InputError, match=r'no backend "compilled"\. Did you mean "compiled"'):
@@ -237,7 +237,7 @@ def test_demanded_by_the_environment(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setenv("CONDYLE_BACKEND", "compiled")
     with pytest.raises(CompilerError, match=REMEDY):
         Model(case(NAME).mechanism)
-    assert Model(case(NAME).mechanism, backend="interpreted").kernel.name == "interpreted"
+    assert Model(case(NAME).mechanism, backend="numpy").kernel.name == "numpy"
 
 
 # -- on the command line ----------------------------------------------------------------------
@@ -271,7 +271,7 @@ def test_both_backends_write_the_same(
 ) -> None:
     """Kernel, interpreter, and interpreter for want of a compiler."""
     assert solve("compiled.csv", "--backend", "compiled").status == 0
-    assert solve("interpreted.csv", "--backend", "interpreted").err == ""
+    assert solve("interpreted.csv", "--backend", "numpy").err == ""
     absent(tmp_path, monkeypatch)
     outcome = solve("fallback.csv")
     assert outcome.status == 0 and outcome.err.count("\n") == 1 and outcome.err.endswith(SLOWER)

@@ -22,7 +22,7 @@ from condyle.errors import CondyleError
 from condyle.kernels import compiled
 from condyle.kernels.compiled import _recipe
 from condyle.questions.spec import KernelSpec, kernel_spec
-from kernels.cases import case
+from support.cases import case
 
 RECIPE, OTHER = cache.digest("one"), cache.digest("other")
 BYTES = b"a library"

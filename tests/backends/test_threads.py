@@ -14,7 +14,7 @@ from condyle.kernels.compiled import Kernel
 from condyle.model import Model
 from condyle.results import states
 from condyle.results.states import solve_file
-from kernels.cases import Case, case
+from support.cases import Case, case
 
 Results = tuple[dict[str, np.ndarray], np.ndarray]
 
@@ -49,7 +49,7 @@ def test_threads(kernel: Kernel, samples: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("threads", [0, -1])
-@pytest.mark.parametrize("backend", ["compiled", "interpreted"])
+@pytest.mark.parametrize("backend", ["compiled", "numpy"])
 def test_fewer_than_one_thread(backend: str, threads: int) -> None:
     c = case("masticatory")
     model = Model(c.mechanism, backend=backend)
@@ -116,7 +116,7 @@ def test_rows_of_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
 
 def write(path: Path, c: Case) -> Path:
     """A states file."""
-    names = Model(c.mechanism, backend="interpreted").independent
+    names = Model(c.mechanism, backend="numpy").independent
     head = [p + name for p in ("", "d", "dd") for name in names]
     head += ["Fx", "Fy", "Fz", "Mx", "My", "Mz"]
     lines = [",".join(head), *(",".join(map(repr, row)) for row in c.samples.tolist())]

@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 from condyle.errors import InputError, UnreachableError
 from condyle.kernels.compiled import LOOK_AGAIN
 from condyle.model import OK, SINGULAR_STATUS, UNREACHABLE, Evaluation, Model, with_point
-from kernels.cases import Case, case, error
+from support.cases import Case, case, error
 
 NAMES = ("masticatory", "masticatory-curved", "gough-stewart", "hexaglide")
 COUNT = 250
@@ -21,7 +21,7 @@ COUNT = 250
 def models(name: str) -> tuple[Model, Model]:
     """Compiled and interpreted."""
     mechanism = case(name).mechanism
-    return Model(mechanism, backend="compiled"), Model(mechanism, backend="interpreted")
+    return Model(mechanism, backend="compiled"), Model(mechanism, backend="numpy")
 
 
 @cache
@@ -51,7 +51,7 @@ def test_status_is_the_interpreters(name: str) -> None:
     np.testing.assert_array_equal(compiled.poses.reached, interpreted.poses.reached)
     ok = compiled.status == OK
     assert 0.1 < ok.mean() <= 1
-    assert error(compiled.torques.torque[ok], interpreted.torques.torque[ok]) < 1e-10
+    assert error(compiled.effort[ok], interpreted.effort[ok]) < 1e-10
     _, status = models(name)[0].torques(*c.arguments)
     np.testing.assert_array_equal(status, interpreted.status)
 
@@ -81,7 +81,7 @@ def test_others_keep_their_digits(name: str) -> None:
     for key in ("torque", "contact_force", "rate", "acceleration"):
         np.testing.assert_array_equal(getattr(got, key)[where], getattr(alone, key))
     np.testing.assert_array_equal(got.share[:, where], alone.share)
-    np.testing.assert_array_equal(got.poses.pose[where], alone.poses.pose)
+    np.testing.assert_array_equal(got.pose[where], alone.pose)
 
 
 @pytest.mark.usefixtures("quick")
@@ -98,7 +98,7 @@ def test_what_is_no_number(name: str, value: float) -> None:
             got, wanted = (m.evaluate(*spoiled) for m in models(name))
             found, status = model.torques(*spoiled)
         rest = np.arange(len(c.q)) != 5
-        np.testing.assert_array_equal(got.torques.torque[rest], clean.torques.torque[rest])
+        np.testing.assert_array_equal(got.effort[rest], clean.effort[rest])
         np.testing.assert_array_equal(got.status, wanted.status)
         if not np.isfinite(value):
             assert got.status[5] == (UNREACHABLE if wanted.status[5] == 1 else SINGULAR_STATUS)
@@ -135,7 +135,7 @@ def singular_pose(name: str) -> np.ndarray:
     def ratio(u: np.ndarray) -> float:
         q = (u * size)[None]
         poses = model.kernel.poses(q, 0 * q, 0 * q)
-        posture = model.posture(poses.pose)
+        posture = model.configuration(poses.pose)
         if not poses.reached[0] or (posture.reach < 0).any():
             return 1.0
         return float(posture.singularity.direct_ratio[0])
@@ -167,9 +167,9 @@ def test_near_singularities(name: str) -> None:
     compiled, interpreted = both(name, near)
     np.testing.assert_array_equal(compiled.status, interpreted.status)
     assert {OK, SINGULAR_STATUS} <= set(compiled.status)
-    condition = interpreted.posture.singularity.condition
+    condition = interpreted.configuration.singularity.condition
     assert condition.max() > 1e12
-    wanted = interpreted.torques.torque
+    wanted = interpreted.effort
     kernel = models(name)[0].kernel.kernel(c.point, (), moment=True)
     found, status = kernel.run(near.samples)
     lanes = kernel.in_order(found["torque"])
