@@ -1,19 +1,41 @@
 # make run    solve the reference case      make test   lint, types, tests
 # make bench  compare with other engines    make docs   build the documentation
+# make format  set the code                 make fuzz   the long run of the fuzzers
+# make lint    ruff and mypy alone          make house  which room imports which
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 
-.PHONY: run test bench docs clean
+.PHONY: run test lint house format fuzz narrow install bench docs clean
 
 run: $(VENV)/run.stamp
 	$(BIN)/condyle run --out results --figures
 
-test: $(VENV)/test.stamp
-	$(BIN)/ruff check src tests benchmarks examples docs
+test: lint house
+	$(BIN)/pytest --numprocesses 2 $(PYTEST)
+
+lint: $(VENV)/test.stamp
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check --quiet .
 	$(BIN)/mypy
-	$(BIN)/pytest --numprocesses 2
+
+house: $(VENV)/test.stamp
+	$(BIN)/lint-imports --no-logo
+
+format: $(VENV)/test.stamp
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+fuzz: $(VENV)/test.stamp
+	$(BIN)/pytest --numprocesses 2 tests/fuzz --fuzz-runs 100000
+
+narrow: $(VENV)/test.stamp
+	.ci/narrow x86-64-v3
+	.ci/narrow x86-64
+
+install: $(VENV)/test.stamp
+	CONDYLE_INSTALL=required $(BIN)/pytest tests/install
 
 bench: $(VENV)/bench.stamp
 	$(BIN)/condyle bench --out results/bench.json
@@ -27,7 +49,7 @@ clean:
 $(VENV)/run.stamp: pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "condyle needs Python 3.11 or newer; this is " + sys.version.split()[0] + ". Set PYTHON=...")'
 	$(PYTHON) -m venv $(VENV)
-	$(PIP) --editable .
+	$(PIP) --editable '.[all]'
 	@touch $@
 
 $(VENV)/%.stamp: $(VENV)/run.stamp

@@ -15,12 +15,17 @@ from pathlib import Path
 from types import UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
+from formulas import with_formulas
+from structure import structure
+
 os.environ.setdefault("MPLBACKEND", "agg")
 GENERATED = Path(__file__).parent / "generated"
 EXAMPLES = Path(__file__).parents[1] / "examples"
 FIGURES = ("motion", "path", "torque", "share", "contact_force", "contact_track", "singularity")
 PICTURES = ("mechanism", *FIGURES)
-PAGES = ("cli.md", "operations.md", "variables.md")  # pieces that pages take in
+# Pieces that pages take in.
+PAGES = ("cli.md", "operations.md", "structure.md", "variables.md")
+PAGES += ("dimensions.md", "statuses.md", "warnings.md")
 REPORT = "report.html"
 FILES = (*(f"{name}.png" for name in PICTURES), *PAGES, REPORT)
 
@@ -29,6 +34,11 @@ def on_pre_build(config: Any) -> None:
     """MkDocs calls this before it collects files; an example that fails ends the build."""
     run_examples()
     generate(GENERATED)
+
+
+def on_page_content(html: str, **_: Any) -> str:
+    """MkDocs calls this with each page; a formula that cannot be set ends the build."""
+    return with_formulas(html)
 
 
 def run_examples(folder: Path = EXAMPLES) -> None:
@@ -59,7 +69,9 @@ def generate(folder: Path) -> None:
 def text_pages(folder: Path) -> None:
     """Write `PAGES`."""
     pages = {"cli.md": command_help(), "operations.md": operation_counts()}
-    pages["variables.md"] = variable_table(reference_solution(100.0))
+    pages["structure.md"] = structure()
+    pages |= {"variables.md": variable_table(), "dimensions.md": dimension_table()}
+    pages |= {"statuses.md": status_table(), "warnings.md": warning_table()}
     for name, text in pages.items():
         (folder / name).write_text(text, encoding="utf-8")
 
@@ -74,23 +86,54 @@ def reference_solution(rate: float, reactions: bool = False) -> Any:
     return model.solve(motion, condyle.reference_load(), reactions=reactions)
 
 
-def variable_table(solution: Any) -> str:
+def variable_table() -> str:
     """Every variable of a solution: dimensions, unit and meaning."""
+    import condyle
+    from condyle.results.variables import VARIABLES
+
+    mechanism = condyle.load("masticatory")
     lines = ["| variable | dimensions | unit | what it is |", "|---|---|---|---|"]
-    for name, variable in solution.data_vars.items():
-        dims, units = ", ".join(variable.dims), variable.attrs.get("units", "1")
-        meaning = variable.attrs.get("long_name", "")
-        if flags := variable.attrs.get("flag_meanings"):
-            meaning += ": " + ", ".join(f"{i} {f}" for i, f in enumerate(str(flags).split()))
-        lines.append(f"| `{name}` | {dims} | {units} | {meaning} |")
+    for variable in VARIABLES:
+        about = variable.attributes(mechanism)
+        meaning = about["long_name"]
+        if flags := about.get("flag_meanings"):
+            meaning += ": " + ", ".join(f"{i} {f}" for i, f in enumerate(flags.split()))
+        dims = ", ".join(variable.dims)
+        lines.append(f"| `{variable.name}` | {dims} | {about['units']} | {meaning} |")
     return "\n".join(lines) + "\n"
+
+
+def dimension_table() -> str:
+    """What stands along each dimension of a solution."""
+    from condyle.results.variables import DIMENSIONS
+
+    rows = [f"| `{name}` | {entries} |" for name, entries in DIMENSIONS.items()]
+    return "\n".join(["| dimension | entries |", "|---|---|", *rows]) + "\n"
+
+
+def status_table() -> str:
+    """Every status of a sample."""
+    from condyle.status import Status
+
+    rows = [f"| {s.value} | {s.name} | {s.meaning} | {s.owner} |" for s in Status]
+    head = ["| status | name | meaning | the cause names |", "|---|---|---|---|"]
+    return "\n".join([*head, *rows]) + "\n"
+
+
+def warning_table() -> str:
+    """Every kind of warning, and what to do."""
+    from condyle.results.warnings import KINDS
+
+    rows = [f"| `{name}` | {kind.meaning} | {kind.advice} |" for name, kind in KINDS.items()]
+    return "\n".join(["| kind | warning | what to do |", "|---|---|---|", *rows]) + "\n"
 
 
 def operation_counts() -> str:
     """Operations a sample of Models 1 and 2: every subexpression once, and written out."""
+    from condyle.dynamics.equations import closure_function, core_function, direct_function
+
     import condyle
     from condyle.dynamics import FORMULATIONS
-    from condyle.dynamics.equations import closure_function, core_function, direct_function
 
     mechanism = condyle.load("masticatory")
     closure = count(closure_function(mechanism))
@@ -132,7 +175,6 @@ def count(function: Any) -> tuple[int, int]:
 
 def command_help() -> str:
     """Arguments and options of every command, from the functions that the terminal calls."""
-    from condyle.cli import commands  # noqa: F401 - registers them
     from condyle.cli.app import app
 
     return "\n\n".join(_section(c.callback, c.name, c.epilog) for c in app.registered_commands)

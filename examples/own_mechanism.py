@@ -9,13 +9,12 @@ import condyle
 
 # A heavier platform, and condyles that slide on steeper planes through the same home points.
 bundled = condyle.load("masticatory")
-contacts = []
+changes = {"name": "heavy", "platform.mass": 0.3}
 for contact in bundled.contacts:
     x, _, z = contact.point
-    plane = contact.surface.model_copy(update={"slope": (-0.8, 0.0), "offset": z + 0.8 * x})
-    contacts.append(contact.model_copy(update={"surface": plane}))
-platform = bundled.platform.model_copy(update={"mass": 0.3})
-robot = bundled.replace(name="heavy", platform=platform, contacts=contacts)
+    surface = f"contact.{contact.name}.surface"
+    changes |= {f"{surface}.slope": (-0.8, 0.0), f"{surface}.offset": z + 0.8 * x}
+robot = bundled.set(changes)
 
 with tempfile.TemporaryDirectory() as folder:
     path = Path(folder) / "heavy.toml"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import tomllib
 import warnings
@@ -14,6 +15,12 @@ import pytest
 
 import condyle
 from condyle.mechanism import bundled_text
+
+# What says of a terminal how wide and how coloured it is: no test may depend on it. Typer looks as
+# it is imported.
+for _name in ("FORCE_COLOR", "GITHUB_ACTIONS", "LINES", "NO_COLOR", "PY_COLORS", "TERMINAL_WIDTH"):
+    os.environ.pop(_name, None)
+os.environ["COLUMNS"] = "100"
 
 sys.path.insert(0, str(Path(__file__).parent))  # `from oracles import ...` from any folder
 

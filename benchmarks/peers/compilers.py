@@ -90,7 +90,7 @@ def version(family: str) -> str:
 def _processor() -> str:
     """What `-march=native` depends on."""
     try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
         return platform.processor() or platform.machine()
     return "\n".join(x for x in lines if x.startswith(("model name", "flags")))

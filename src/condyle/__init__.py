@@ -10,6 +10,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from .results.accessors import register
+
 __version__ = "0.1.0"
 
 # Heavy rooms open when they are entered: `import condyle` alone loads nothing.
@@ -49,6 +51,10 @@ if TYPE_CHECKING:
     from .motion import Load, Motion, reference_load, reference_motion, trial_motion
     from .results.model import Model, derive
     from .results.solution import Solution, open_solution
+
+# What the report gives to results and comparisons, which do not know it.
+register("solution.plot", "condyle.report.figures:SolutionPlots")
+register("comparison.text", "condyle.report.tables:comparison_text")
 
 __all__ = [*_HOMES, "__version__"]
 

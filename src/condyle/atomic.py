@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import os
+import re
 import secrets
+import socket
+import time
+import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from condyle.errors import InputError
+
+_PART = re.compile(r"\..*\.([0-9a-f]{8})-(\d+)-[0-9a-f]{8}\.part", re.DOTALL)
+_FORGOTTEN = 86400.0  # s without a change, after which a temporary file belongs to nobody
 
 
 @contextmanager
@@ -22,8 +29,10 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     """
     target = _checked(path)
     direct = target.exists() and not target.is_file()
-    name = f".{target.name[:100]}.{os.getpid()}-{secrets.token_hex(4)}.part"
+    name = f".{target.name[:100]}.{_host()}-{os.getpid()}-{secrets.token_hex(4)}.part"
     temporary = target if direct else target.with_name(name)
+    if not direct:
+        _sweep(target.parent)
     try:
         try:
             yield temporary
@@ -36,6 +45,38 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         if error.filename is not None and str(error.filename) != str(temporary):
             raise  # another file's trouble
         raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what killed processes left in a folder.
+
+    A file of this machine goes when its process is gone. Of another machine, or where the number
+    of the process was given anew, nobody can tell; those go after a day without a change.
+    """
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            if not (left := _PART.fullmatch(entry.name)):
+                continue
+            with suppress(OSError):
+                gone = left[1] == _host() and not _lives(int(left[2]))
+                if gone or time.time() - entry.stat().st_mtime > _FORGOTTEN:
+                    os.unlink(entry.path)
+
+
+def _host() -> str:
+    return f"{zlib.crc32(socket.gethostname().encode()):08x}"
+
+
+def _lives(process: int) -> bool:
+    if os.name != "posix":
+        return True  # there, asking would end it
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except OSError:  # it is somebody else's
+        pass
+    return True
 
 
 def _checked(path: str | os.PathLike[str]) -> Path:

@@ -1,19 +1,60 @@
 """What can go wrong, each said in a way that helps: what was got, what was expected, what to do.
 
 Every error of the library derives from `CondyleError`; the command line prints its message on
-stderr and exits with status 2. The facts behind a message are attributes of the exception.
+stderr and exits with status 2. The facts behind a message are attributes of the exception, and
+`to_dict` gives them for programs.
 """
 
 from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from typing import Any, ClassVar
+
+MANY = 10  # names of a list that a message shows
+LONGEST = 3900  # characters of a message
+LONGEST_NAME, MANY_CHOICES = 200, 5000  # among which a name that is alike is looked for
 
 
 class CondyleError(Exception):
-    """Base of all errors that condyle raises on purpose."""
+    """Base of all errors that condyle raises on purpose.
+
+    Whatever a file holds, the message can go to a terminal: see `printable`.
+
+    Attributes: message: what is wrong;  hint: what to do about it, where that is a sentence of
+                its own. `str` of the error is both.
+    """
+
+    facts: ClassVar[tuple[str, ...]] = ()  # names of the attributes that `to_dict` gives besides
+
+    def __init__(self, message: str = "", hint: str = "") -> None:
+        self.message, self.hint = printable(message), printable(hint)
+        whole = f"{self.message} {self.hint}" if hint else self.message
+        super().__init__(shortened(whole, LONGEST))
+
+    @property
+    def kind(self) -> str:
+        """ "unreachable" of an UnreachableError: for programs."""
+        return type(self).__name__.removesuffix("Error").lower()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Kind, message, hint, and the facts that are known, as JSON has them."""
+        known = {name: getattr(self, name) for name in self.facts}
+        said = {"kind": self.kind, "message": self.message, "hint": self.hint}
+        return said | {name: value for name, value in known.items() if value not in (None, [])}
+
+    def __reduce__(self) -> tuple[Callable[..., CondyleError], tuple[Any, ...]]:
+        """Errors cross processes whole, whatever their `__init__` takes."""
+        return _again, (type(self), self.args, self.__dict__)
+
+
+def _again(kind: type[CondyleError], said: tuple[str, ...], facts: dict[str, Any]) -> CondyleError:
+    error = kind.__new__(kind)
+    error.args = said
+    error.__dict__.update(facts)
+    return error
 
 
 class InputError(CondyleError):
@@ -23,37 +64,117 @@ class InputError(CondyleError):
 class MechanismError(InputError):
     """A mechanism that breaks the rules of the file format.
 
-    Attributes: problems: one line each, all that were found.
+    Attributes: source: the file;  problems: one line each, all that were found; the message shows
+                as many as a person reads.
     """
 
+    facts = ("source", "problems")
+
     def __init__(self, source: str, problems: Sequence[str]) -> None:
-        self.source = source
-        self.problems = list(problems)
+        self.source = shortened(printable(source, lines=False), 200)
+        self.problems = [shortened(printable(p, lines=False), 380) for p in problems]
         count = "1 problem" if len(self.problems) == 1 else f"{len(self.problems)} problems"
-        super().__init__("\n".join([f"{source}: {count}", *(f"  - {p}" for p in self.problems)]))
+        super().__init__("\n".join([f"{self.source}: {count}", *self._lines()]))
+
+    def _lines(self) -> list[str]:
+        """The problems in rows, as long as there is room for them."""
+        lines: list[str] = []
+        room = LONGEST - 300
+        for k, problem in enumerate(self.problems):
+            room -= len(problem) + 5
+            if room < 0:
+                return [*lines, f"  - and {len(self.problems) - k} more"]
+            lines.append(f"  - {problem}")
+        return lines
 
 
 class UnsupportedError(CondyleError):
     """A combination of options that has no meaning; the message names one that has."""
 
 
+class MissingExtraError(CondyleError):
+    """A package that is not installed, because only part of condyle needs it.
+
+    Attributes: package;  extra: what to install with, as in `pip install "condyle[view]"`.
+    """
+
+    facts = ("package", "extra")
+
+    def __init__(self, package: str, extra: str) -> None:
+        self.package, self.extra = package, extra
+        super().__init__(
+            f"this needs {package}, which is not installed.",
+            f'Install it: pip install "condyle[{extra}]", or all that is optional: '
+            'pip install "condyle[all]"',
+        )
+
+
 class SampleError(CondyleError):
     """Samples that cannot be computed.
 
-    Attributes: samples: their indices, in order.
+    Attributes: samples: their indices, in order; what follows is of the first:
+                chain, contact: name of the one that is the cause;  time: [s], along a motion;
+                row: of a table, from 1;
+                value, bound, unit: what was got, and what it may be at most or at least.
     """
 
-    def __init__(self, message: str, samples: Sequence[int]) -> None:
+    facts = ("sample", "count", "time", "row", "chain", "contact", "value", "bound", "unit")
+
+    def __init__(
+        self,
+        message: str,
+        samples: Sequence[int] = (),
+        *,
+        hint: str = "",
+        chain: str | None = None,
+        contact: str | None = None,
+        time: float | None = None,
+        row: int | None = None,
+        value: float | None = None,
+        bound: float | None = None,
+        unit: str | None = None,
+    ) -> None:
         self.samples = list(samples)
-        super().__init__(message)
+        self.chain, self.contact, self.time, self.row = chain, contact, time, row
+        self.value, self.bound, self.unit = value, bound, unit
+        super().__init__(message, hint)
+
+    @property
+    def sample(self) -> int | None:
+        """Index of the first sample."""
+        return self.samples[0] if self.samples else None
+
+    @property
+    def count(self) -> int:
+        """How many samples."""
+        return len(self.samples)
 
 
 class UnreachableError(SampleError):
     """A pose that a chain or the contacts cannot reach."""
 
 
+class LostError(SampleError):
+    """Joint coordinates of which it is no longer certain to which assembly mode they belong."""
+
+
+class InconsistentError(SampleError):
+    """Joint coordinates that no pose near the one found has."""
+
+
 class SingularError(SampleError):
     """A pose at which the torques are not determined."""
+
+
+class NumberRangeError(SingularError):
+    """Rates, accelerations or a load so large that the efforts are not finite.
+
+    A `SingularError`, as it was before it had a name of its own.
+    """
+
+    @property
+    def kind(self) -> str:
+        return "overflow"
 
 
 class BoundsError(SampleError):
@@ -65,15 +186,43 @@ def did_you_mean(name: str, available: Iterable[str]) -> str:
     choices = sorted(available)
     near = nearest(name, choices)
     guess = f' Did you mean "{near[0]}"?' if near else ""
-    listed = f" Available: {', '.join(choices)}." if choices else " None is available."
+    listed = f" Available: {few(choices)}." if choices else " None is available."
     return guess + listed
+
+
+def few(names: Iterable[str]) -> str:
+    """'a, b, c' of names, and of many the first ten."""
+    names = list(names)
+    more = f" and {len(names) - MANY} more" if len(names) > MANY else ""
+    return ", ".join(shortened(name, 80) for name in names[:MANY]) + more
+
+
+def printable(text: object, lines: bool = True) -> str:
+    """Text whose control characters are escaped: it cannot move a cursor or hide its neighbours.
+
+    Args: lines: whether it may have more than one.
+    """
+    kept = "\n" if lines else ""
+    text = str(text)
+    if text.isprintable():
+        return text
+    return "".join(
+        c if c.isprintable() or c in kept else c.encode("unicode_escape").decode() for c in text
+    )
+
+
+def shortened(text: str, length: int) -> str:
+    """Text of at most so many characters, ended with dots where it was longer."""
+    return text if len(text) <= length else f"{text[: length - 3]}..."
 
 
 def nearest(name: str, available: Iterable[str]) -> list[str]:
     """Up to three names like `name`, the most alike first; the same in other letters counts."""
     choices = sorted(available)
     same = [choice for choice in choices if choice.casefold() == name.casefold()]
-    return same or difflib.get_close_matches(name, choices, n=3)
+    if same or len(name) > LONGEST_NAME or len(choices) > MANY_CHOICES:
+        return same  # the search for near ones takes the time of all pairs of letters
+    return difflib.get_close_matches(name, choices, n=3)
 
 
 def no_such_file(path: str | os.PathLike[str]) -> InputError:
@@ -82,5 +231,5 @@ def no_such_file(path: str | os.PathLike[str]) -> InputError:
     if not folder.is_dir():
         return InputError(f"{path}: no such file; the folder {folder} does not exist")
     near = nearest(Path(path).name, os.listdir(folder))
-    guess = f" Did you mean {' or '.join(near)}?" if near else ""
-    return InputError(f"{path}: no such file in {folder}.{guess}")
+    hint = f"Did you mean {' or '.join(near)}?" if near else ""
+    return InputError(f"{path}: no such file in {folder}.", hint)

@@ -1,21 +1,53 @@
-"""What became of a sample: one place for the words."""
+"""What became of a sample: the one place of statuses, their words and their causes."""
 
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import Self
+
+import numpy as np
 
 
 class Status(IntEnum):
-    """Status of a sample, as results and files have it."""
+    """Status of a sample, as kernels, results and files state it.
 
-    OK = 0
-    UNREACHABLE = 1
-    SINGULAR = 2
-    OVERFLOW = 3
+    Attributes: meaning: in a few words;  owner: what can be named as its cause.
+    """
 
-    @property
-    def label(self) -> str:
-        return self.name.lower()
+    meaning: str
+    owner: str
+
+    def __new__(cls, value: int, meaning: str, owner: str) -> Self:
+        member = int.__new__(cls, value)
+        member._value_ = value
+        member.meaning, member.owner = meaning, owner
+        return member
+
+    ok = 0, "computed", "nothing"
+    unreachable = (
+        1,
+        "a chain is too short or too long, or no pose has the contacts on their surfaces",
+        "chain or contact",
+    )
+    singular = (
+        2,
+        "smallest over largest dimensionless singular value below 1e-12",
+        "chain or platform",
+    )
+    overflow = 3, "rates, accelerations or load are too large for numbers", "sample"
 
 
-STATUS_NAMES = tuple(status.label for status in Status)
+STATUS_NAMES = tuple(status.name for status in Status)
+
+
+def judge(reached: np.ndarray, regular: np.ndarray, finite: np.ndarray) -> np.ndarray:
+    """Status of N samples, (N,) int8.
+
+    Args: reached: where every chain and contact can be, (N,).
+          regular: where the mechanism is not singular, (N,).
+          finite:  where every effort is a finite number, (N,).
+    """
+    status = np.where(finite, Status.ok, Status.overflow).astype(np.int8)
+    status[~regular] = Status.singular
+    status[~reached] = Status.unreachable
+    return status

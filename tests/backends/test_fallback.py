@@ -228,7 +228,7 @@ def test_the_environment_decides_what_auto_means(monkeypatch: pytest.MonkeyPatch
         assert Evaluator(mechanism).backend.name == name
         for backend in ("compiled", "numpy"):
             assert Evaluator(mechanism, backend=backend).backend.name == backend
-        assert Evaluator(mechanism, backend="interpreted").backend.name == "numpy"
+        assert Evaluator(mechanism, backend="numpy").backend.name == "numpy"
     monkeypatch.setenv("CONDYLE_BACKEND", "compilled")
     with pytest.raises(InputError, match=r'no backend "compilled"\. Did you mean "compiled"'):
         Evaluator(mechanism)

@@ -52,7 +52,7 @@ def test_kernels_agree_with_casadi(backend: str) -> None:
     wanted = Interpreter(mechanism).solve(*reference.arguments)
     kernel = Evaluator(mechanism, backend=backend).kernel("inverse", ())
     answer = kernel.run(reference.inputs)
-    good = answer.status == Status.OK
+    good = answer.status == Status.ok
     assert wanted.reached[good].all() and good.mean() > 0.5
     assert error(answer.values["effort"].T[good], wanted.effort[good]) < 1e-10
     if backend == "compiled":

@@ -274,7 +274,7 @@ def test_legend_hides_a_line_and_shares_can_be_chosen(tab: Tab) -> None:
     tab.page.select_option("#panel-share-Nm select", label="masseter_left")
     tab.wait("() => document.querySelectorAll('#panel-share-Nm .legend button').length === 4")
     shown = legend(tab, "share-Nm")
-    assert list(shown) == ["platform", "couplers", "cranks", "bite"]
+    assert list(shown) == ["platform", "couplers", "cranks", "load"]
 
 
 def test_paper_gets_light_colours_and_a_still(tab: Tab) -> None:
@@ -299,19 +299,151 @@ def test_paper_gets_light_colours_and_a_still(tab: Tab) -> None:
     assert len(tab.page.pdf(format="A4")) > 50_000
 
 
-def test_samples_without_a_result_say_so(
+def torn_run(reference: condyle.Mechanism) -> Solution:
+    """Away and back under a load: samples 15 to 88 of 200 are out of reach."""
+    t = np.linspace(0, 1, 201)
+    names = ("X", "Y", "alpha", "beta")
+    motion = Motion.from_arrays(t, {n: 0.03 * np.sin(6 * t) * (n == "X") for n in names})
+    model = condyle.derive(reference, backend="interpreted")
+    return model.solve(motion, condyle.Load.constant((0, 0, -30), point="right_molar"), flag=True)
+
+
+def grey_share(tab: Tab) -> float:
+    """Part of the solids' faces that are drawn grey."""
+    return float(
+        tab.page.evaluate(
+            """() => {
+            const tints = ['platform', 'chains', 'joints', 'balls'].flatMap((name) =>
+                [...document.getElementById('stage').data.find((d) => d.name === name).facecolor]);
+            return tints.filter((c) => c === tints[0]).length / tints.length;
+        }"""
+        )
+    )
+
+
+def arrow_size(tab: Tab) -> float:
+    return float(
+        tab.page.evaluate(
+            """() => {
+            const { x } = document.getElementById('stage').data.find((d) => d.name === 'forces');
+            return Math.max(...x.slice(0, 20)) - Math.min(...x.slice(0, 20));
+        }"""
+        )
+    )
+
+
+def test_samples_without_a_result_say_so_and_show_no_forces(
     open_tab: Callable[..., Tab], reference: condyle.Mechanism, tmp_path: Path
 ) -> None:
-    t = np.linspace(0, 1, 41)
-    names = ("X", "Y", "alpha", "beta")
-    motion = Motion.from_arrays(t, {n: 0.2 * t * (n == "X") for n in names})
-    torn = condyle.derive(reference, backend="interpreted").solve(motion, flag=True)
+    torn = torn_run(reference)
+    failed = np.flatnonzero(torn["status"].values)
+    first = int(failed[0])
     tab = ready(open_tab(write_report(torn, tmp_path / "torn.html").as_uri()))
-    assert "speed limit" in tab.page.inner_text("#stage-message")
-    tab.page.keyboard.press("End")
-    assert "unreachable" in tab.page.inner_text("#stage-message")
+    scrub(tab, first - 2)
+    assert grey_share(tab) < 0.8 and arrow_size(tab) > 1
+    for sample in (first + 30, first + 10):  # from later, too, the last good one before
+        scrub(tab, sample)
+        told = tab.page.inner_text("#stage-message")
+        when = f"{torn['time'].values[first - 1]:.3f} s"
+        assert "no result, unreachable" in told and when in told and "without forces" in told
+        assert tab.page.get_attribute("#stage", "data-drawn") == str(first - 1)
+        tab.wait("() => document.getElementById('stage').dataset.grey === 'true'")
+        assert grey_share(tab) == 1.0 and arrow_size(tab) < 1e-6
     assert tab.page.locator("#panel-torque-Nm .value").first.inner_text() == "–"
-    assert "left empty" in tab.page.inner_text("#warnings")
+    shades = tab.page.evaluate(
+        "() => document.querySelector('#panel-torque-Nm .plot').firstChild.layout.shapes"
+        ".filter((s) => s.type === 'rect').map((s) => [s.x0, s.x1])"
+    )
+    assert shades[0] == [float(torn["time"].values[first]), pytest.approx(0.445)]
+    assert len(shades) == 2
+    assert "Without a result" in tab.page.inner_text(".lead")
+    scrub(tab, 90)
+    assert grey_share(tab) < 0.8 and arrow_size(tab) > 1
+
+
+def test_curves_are_drawn_as_they_are(tab: Tab, solution: Solution) -> None:
+    """At rest for a second, then up: no line from 0 s to the first bend, no kink at a peak."""
+    drawn = tab.page.evaluate(
+        """() => {
+            const plot = document.querySelector('#panel-pose-position .plot').firstChild;
+            const simplify = plot._fullData.map((d) => d.line.simplify);
+            return { y: Array.from(plot.data[2].y), simplify };
+        }"""
+    )
+    np.testing.assert_allclose(drawn["y"], 1e3 * solution["pose"].values[:, 2], atol=1e-5)
+    assert not any(drawn["simplify"])
+
+
+def test_peaks_of_a_long_run_are_drawn(
+    open_tab: Callable[..., Tab], solution: Solution, tmp_path: Path
+) -> None:
+    count = 60_000
+    long = solution.isel(time=np.arange(count) % solution.sizes["time"])
+    long = long.assign_coords(time=("time", np.arange(count) / 1000, {"units": "s"}))
+    long["torque"].values[31_234, 2] = 9.75
+    tab = ready(open_tab(write_report(long, tmp_path / "long.html").as_uri()))
+    x, y = tab.page.evaluate(
+        """() => {
+            const plot = document.querySelector('#panel-torque-Nm .plot').firstChild;
+            return [Array.from(plot.data[2].x), Array.from(plot.data[2].y)];
+        }"""
+    )
+    assert np.all(np.diff(x) >= -1e-9)
+    assert x[int(np.argmax(y))] == pytest.approx(31.234, abs=1e-4) and max(y) == 9.75
+    assert min(y) == pytest.approx(float(solution["torque"].values[:, 2].min()), rel=1e-6)
+
+
+ODD_NAMES = ["constructor", "__proto__", "toString", "hasOwnProperty", "valueOf", "<b>x</b>"]
+
+
+def test_names_of_the_language_are_names(
+    open_tab: Callable[..., Tab], reference: condyle.Mechanism, tmp_path: Path
+) -> None:
+    chains, contacts = (
+        tuple(one.model_copy(update={"name": n}) for one, n in zip(those, ODD_NAMES, strict=False))
+        for those in (reference.chains, reference.contacts)
+    )
+    machine = reference.replace(chains=chains, contacts=contacts)
+    t = np.linspace(0, 1, 41)
+    motion = Motion.from_arrays(t, {n: 0 * t for n in ("X", "Y", "alpha", "beta")})
+    solved = condyle.derive(machine, backend="interpreted").solve(motion)
+    tab = ready(open_tab(write_report(solved, tmp_path / "odd.html").as_uri()))
+    names = tab.page.locator("#panel-torque-Nm .legend .name").all_inner_texts()
+    assert names == ODD_NAMES
+    labels = tab.page.evaluate("document.getElementById('stage').data[5].text.join(' ')")
+    assert "constructor" in labels and "__proto__" in labels
+    assert [len(readout(tab, name)) for name in ODD_NAMES[2:]] == [3] * 4
+
+
+def test_names_at_one_place_stand_beside_each_other(tab: Tab) -> None:
+    """Seen from the side, left and right are one behind the other."""
+    texts = "() => document.getElementById('stage').data[5].text"
+    assert len([text for text in tab.page.evaluate(texts) if text]) == 5
+    tab.page.click("#cameras button:text-is('Side')")
+    tab.wait(f"() => ({texts})().some((text) => text.includes(', '))")
+    together = [set(text.split(", ")) for text in tab.page.evaluate(texts) if text]
+    assert {"left_condyle", "right_condyle"} in together
+    assert {"left_molar", "right_molar"} in together and {"incisor"} in together
+    tab.page.click("#cameras button:text-is('Front')")
+    tab.wait(f"() => ({texts})().filter((text) => text).length === 5")
+
+
+def test_first_printed_page_is_used(tab: Tab) -> None:
+    """The picture begins below the facts, on the same page."""
+    found = tab.page.evaluate(
+        """() => {
+            window.dispatchEvent(new Event('beforeprint'));
+            const style = getComputedStyle(document.querySelector('.stage')).breakInside;
+            window.dispatchEvent(new Event('afterprint'));
+            return style;
+        }"""
+    )
+    assert found == "auto"
+    tab.page.emulate_media(media="print")
+    assert (
+        tab.page.evaluate("getComputedStyle(document.querySelector('.stage')).breakInside")
+        == "auto"
+    )
 
 
 @pytest.mark.parametrize("name", ["gough-stewart", "hexaglide"])

@@ -197,18 +197,53 @@ def test_play_begins_where_it_stands_however_long_it_stood(chewing: Solution) ->
         view.close()
 
 
-def test_playback_of_failed_samples_keeps_the_picture(reference: condyle.Mechanism) -> None:
-    t = np.linspace(0, 1, 21)
+def test_playback_of_failed_samples_keeps_the_pose_and_shows_no_force(
+    reference: condyle.Mechanism,
+) -> None:
+    """The pose before in time, wherever one came from; why, since when; and neither load."""
+    t = np.linspace(0, 1, 201)
     names = ("X", "Y", "alpha", "beta")
-    motion = Motion.from_arrays(t, {n: 0.2 * t * (n == "X") for n in names})
-    torn = condyle.derive(reference, backend="interpreted").solve(motion, flag=True)
+    motion = Motion.from_arrays(t, {n: 0.03 * np.sin(6 * t) * (n == "X") for n in names})
+    push = Load.constant((0, 0, -30), point="right_molar")
+    torn = condyle.derive(reference, backend="interpreted").solve(motion, push, flag=True)
+    first = int(np.flatnonzero(torn["status"].values)[0])
     playback = Playback(torn)
     good = playback.snapshot()
-    assert good.level != "unreachable"
-    playback.seek(1.0)
-    found = playback.snapshot()
-    assert found.level == "unreachable" and "unreachable" in found.messages[0]
-    assert np.isnan(found.torque).all() and np.isfinite(found.pose).all()
+    assert good.level != "unreachable" and not good.stale and good.load[2] == -30
+    for before in (0.0, 0.6):  # 0.6 s has a result
+        playback.seek(before)
+        playback.snapshot()
+        playback.seek(0.3)
+        found = playback.snapshot()
+        assert found.stale and found.level == "unreachable"
+        np.testing.assert_array_equal(found.pose, torn["pose"].values[first - 1])
+        assert np.isnan(found.torque).all() and np.isnan(found.force_vector).all()
+        assert np.isnan(found.load).all()
+        assert "No result from 0.075 to 0.445 s: unreachable" in found.messages[0]
+        assert "t = 0.07 s" in found.messages[1]
+
+
+def test_a_stale_pose_is_drawn_grey_and_without_arrows(reference: condyle.Mechanism) -> None:
+    t = np.linspace(0, 1, 201)
+    names = ("X", "Y", "alpha", "beta")
+    motion = Motion.from_arrays(t, {n: 0.03 * np.sin(6 * t) * (n == "X") for n in names})
+    push = Load.constant((0, 0, -30), point="right_molar")
+    torn = condyle.derive(reference, backend="interpreted").solve(motion, push, flag=True)
+    view = open_view(solution=torn, port=0)
+    try:
+        assert view.playback is not None
+        tints = {}
+        for when in (0.02, 0.3):
+            view.playback.seek(when)
+            snapshot = view.playback.snapshot()
+            view.stage.show(snapshot)
+            parts = [view.stage._body, *view.stage._balls, *view.stage._rods.values()]
+            tints[when] = {tuple(part.color) for part in parts}
+            arrows = [arrow.visible for arrow in view.stage._arrows.values()]
+            assert any(arrows) == (when == 0.02)
+        assert len(tints[0.02]) > 3 and len(tints[0.3]) == 1
+    finally:
+        view.close()
 
 
 def test_readout_escapes_names_and_writes_the_numbers(reference: condyle.Mechanism) -> None:

@@ -190,3 +190,21 @@ def test_the_page_is_for_this_machine_only(view: View) -> None:
     assert view.url.startswith("http://127.0.0.1:")
     listening = view._server.get_host()
     assert listening == "127.0.0.1"
+
+
+def test_arrow_keys_on_a_slider_leave_the_camera_alone(tab: Tab, view: View) -> None:
+    """They move the slider by a step; away from it they turn the camera."""
+    client = next(iter(view._server.get_clients().values()))
+    before = np.array(client.camera.position)
+    slider = tab.page.get_by_role("slider").first
+    slider.focus()
+    for _ in range(3):
+        tab.page.keyboard.down("ArrowRight")
+        tab.page.wait_for_timeout(300)
+        tab.page.keyboard.up("ArrowRight")
+    tab.until(lambda: view.snapshot.pose.any(), "the slider moves the platform")
+    assert np.allclose(client.camera.position, before, atol=1e-6)
+    tab.page.evaluate("document.activeElement.blur()")
+    tab.page.keyboard.down("ArrowRight")
+    tab.until(lambda: not np.allclose(client.camera.position, before, atol=1e-3), "it turns")
+    tab.page.keyboard.up("ArrowRight")

@@ -12,12 +12,12 @@ from typing import Any
 import pytest
 
 import condyle
+from condyle.backends.choose import BACKENDS
 from condyle.cli import completion
 from condyle.dynamics import FORMULATIONS, ROUTES
 from condyle.mechanism import bundled_text
-from condyle.model import BACKENDS
 from condyle.motion import parse_units
-from condyle.report.figures import PLOTS
+from condyle.report.figures import PLOTS, STYLES
 
 # Loaded by the mathematics, the files and the pictures.
 HEAVY = {"casadi", "numpy", "scipy", "xarray", "matplotlib", "plotly", "viser"}
@@ -27,6 +27,7 @@ def test_the_names_are_those_of_the_registries() -> None:
     assert tuple(FORMULATIONS) == completion.FORMULATIONS
     assert (completion.ROUTES, completion.BACKENDS) == (ROUTES, BACKENDS)
     assert tuple(PLOTS) == completion.FIGURES
+    assert tuple(STYLES) == completion.STYLES
     assert tuple(completion.bundled()) == condyle.bundled_mechanisms()
     for units in completion.UNITS:
         parse_units(units)

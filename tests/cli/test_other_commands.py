@@ -22,7 +22,11 @@ def test_check_describes_a_mechanism(condyle_command: Callable[..., Any]) -> Non
         "dependent coordinates:   Z, gamma",
         "X, Y, alpha, beta",
         "left_condyle",
-        "off its surface at home",
+        "on its surface at home",
+        "9.81 m/s^2 along -Z",
+        "platform:                0.2 kg, radii of gyration",
+        "crank 20 mm",
+        "limits 3 N m, 6 rad/s",
         "singularity at home",
         "rank 4 of 4",
     ):
@@ -52,6 +56,24 @@ def test_check_warns_of_a_home_a_little_off(
     assert outcome.err.startswith(
         'condyle: warning: contact "left_condyle": the point is -0.000673'
     )
+
+
+def test_check_warns_of_numbers_that_do_not_go_together(
+    condyle_command: Callable[..., Any], tmp_path: Path
+) -> None:
+    text = bundled_text("masticatory").replace("x = [-27.65,", "x = [-20,", 1)
+    text = text.replace("mass = 0.2 ", "mass = 200 ").replace("-9.81", "9.81")
+    (tmp_path / "jaw.toml").write_text(text)
+    outcome = condyle_command("check", "jaw.toml")
+    assert outcome.status == 0 and "9.81 m/s^2 along +Z" in outcome.out
+    assert [line.split(": ")[2] for line in outcome.err.splitlines()] == [
+        "platform",
+        "gravity",
+        'contact "left_condyle"',
+    ]
+    data = json.loads(condyle_command("check", "jaw.toml", "--json").out)
+    kinds = [warning["kind"] for warning in data["warnings"]]
+    assert kinds == ["mass_large", "gravity_upwards", "home_outside_bounds"]
 
 
 def test_schema_is_json(condyle_command: Callable[..., Any]) -> None:

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 import condyle
+from condyle.backends.c import kernel
+from condyle.backends.c.kernel import CompiledKernel
 from condyle.backends.compiler import CompilerError, find_compiler
-from condyle.kernels import compiled
-from condyle.kernels.compiled import Compiled
 from condyle.mechanism import COORDINATES
-from condyle.model import Model, with_point
+from condyle.model.evaluator import with_point
+from condyle.results.model import Model
 
 NAMES = ("X", "Y", "alpha", "beta")
 LOAD = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
@@ -41,7 +42,7 @@ def test_columns_and_digits(
     read_csv: Callable[..., Any],
     model: Model,
 ) -> None:
-    """Columns in the contract's order; every cell is the double that Python gets, 17 digits."""
+    """Columns in the contract's order; every cell is the double that Python gets, in few digits."""
     q, q1, q2 = draw(9)
     wrench = np.random.default_rng(1).normal(0, 5, (9, 6))
     write_csv([*header(), *LOAD], np.hstack([q, q1, q2, wrench]), "states.csv")
@@ -56,10 +57,16 @@ def test_columns_and_digits(
         *(f"joint_{name}" for name in chains),
     ]
     found = model.evaluate(q, q1, q2, with_point(wrench, model.load_point("right_molar")))
-    t = found.torques
-    wanted = np.hstack([t.torque, t.contact_force, found.pose, found.configuration.joint])
+    parts = [found.effort, found.contact_force, found.pose, found.configuration.joint]
+    wanted = np.hstack(parts)
     np.testing.assert_array_equal(np.array(rows, dtype=float), wanted)
-    assert all(cell == f"{float(cell):.17g}" for row in rows for cell in row)
+    digits = [len(figures(cell)) for row in rows for cell in row]
+    assert digits == [len(figures(repr(value))) for value in wanted.ravel().tolist()]
+
+
+def figures(number: str) -> str:
+    """Its significant digits."""
+    return number.partition("e")[0].replace(".", "").strip("-0")
 
 
 @pytest.mark.parametrize("names", [NAMES, ("Y", "Z", "alpha", "beta")])
@@ -207,6 +214,23 @@ def test_loads_are_optional_and_act_at_their_point(
     assert (torques(LOAD, [0.0] * 6) == rest).all()
 
 
+def test_a_component_alone_and_columns_that_are_not_used(
+    condyle_command: Callable[..., Any],
+    write_csv: Callable[..., Path],
+    read_csv: Callable[..., Any],
+) -> None:
+    state = np.hstack(draw(2))
+    arguments = ("solve", "masticatory", "--states", "states.csv", "--out", "out.csv")
+    results = []
+    for columns, load in ((LOAD[:3], [0, 0, -9]), (("fz [kN]", "t", "label"), [-0.009, 1, 2])):
+        write_csv([*header(), *columns], np.hstack([state, [load, load]]), "states.csv")
+        outcome = condyle_command(*arguments)
+        assert outcome.status == 0
+        results.append(np.array(read_csv("out.csv")[1], dtype=float))
+    np.testing.assert_allclose(results[1], results[0], rtol=1e-12, atol=1e-15)
+    assert 'states.csv: columns "t", "label" are not used' in outcome.err
+
+
 def test_bounds_warn_and_strict_refuses(
     condyle_command: Callable[..., Any], write_csv: Callable[..., Path]
 ) -> None:
@@ -238,14 +262,15 @@ def test_threads(
     except CompilerError as error:
         pytest.skip(str(error))
     asked = []
-    real = Compiled.solve
+    real = CompiledKernel.run
 
-    def spy(self: Compiled, *arguments: Any, **options: Any) -> Any:
-        asked.append(options.get("threads"))
-        return real(self, *arguments, **options)
+    def spy(self: CompiledKernel, inputs: Any, threads: int | None = None) -> Any:
+        if "effort" in (result.name for result in self.interface.results):
+            asked.append(threads)
+        return real(self, inputs, threads)
 
-    monkeypatch.setattr(Compiled, "solve", spy)
-    monkeypatch.setattr(compiled, "CHUNK", 8)
+    monkeypatch.setattr(CompiledKernel, "run", spy)
+    monkeypatch.setattr(kernel, "WORTH_A_THREAD", 1000)
     write_csv(header(), np.hstack(draw(50)), "states.csv")
     arguments = ("solve", "masticatory", "--states", "states.csv", "--out", "out.csv")
     texts = []

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import condyle
+from condyle.motion import read_table, write_table
 
 NAMES = ("X", "Y", "alpha", "beta")
 TIMES = np.linspace(0, 1, 21)
@@ -76,6 +77,43 @@ def test_the_same_numbers(
         results[way] = out.read_bytes()
     assert all(result == results["plain"] for result in results.values())
     assert len(results["plain"]) > 1000
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_parquet_gives_the_same_numbers(
+    condyle_command: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, command: str
+) -> None:
+    """In and out, for every command that reads or writes a table."""
+    monkeypatch.setenv("CONDYLE_BACKEND", "numpy")
+    Path("in.csv").write_text(plain(command))
+    write_table("in.parquet", read_table("in.csv").columns)
+    tables = []
+    for ending in ("csv", "parquet"):
+        words = [word.replace(".csv", f".{ending}") for word in COMMANDS[command]]
+        assert condyle_command(*words).status == 0
+        [out] = [p for p in Path().glob("*.csv") if p.name != "in.csv"]
+        if "out.parquet" in words:
+            out = Path("out.parquet")
+        tables.append(read_table(out).columns)
+    assert list(tables[0]) == list(tables[1])
+    for name, column in tables[0].items():
+        np.testing.assert_array_equal(column, tables[1][name])
+
+
+def test_units_in_the_header_and_columns_that_are_not_used(
+    condyle_command: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CONDYLE_BACKEND", "numpy")
+    columns = {"Time [ms]": 1e3 * TIMES, "X (mm)": np.sin(3 * TIMES), "Y_mm": 0 * TIMES}
+    columns |= {"alpha": 0 * TIMES, "BETA [deg]": TIMES, "marker": TIMES}
+    write_table("in.csv", columns)
+    outcome = condyle_command("run", "--motion", "in.csv", "--out", "a")
+    assert outcome.status == 0 and 'in.csv: column "marker" is not used' in outcome.err
+    si = {"t": TIMES, "X": 1e-3 * np.sin(3 * TIMES), "Y": 0 * TIMES}
+    write_table("in.csv", si | {"alpha": 0 * TIMES, "beta": np.radians(TIMES)})
+    assert condyle_command("run", "--motion", "in.csv", "--out", "b", "--quiet").err == ""
+    a, b = (read_table(f"{folder}/masticatory.csv") for folder in "ab")
+    np.testing.assert_allclose(a.require(a.names), b.require(a.names), rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ where a line `<!-- not run: why -->` stands above it.
 from __future__ import annotations
 
 import importlib
+import json
 import re
 import shlex
 from collections.abc import Callable, Iterator
@@ -31,7 +32,7 @@ LONG = {"view", "bench", "compare"}
 BLOCK = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```", re.MULTILINE | re.DOTALL)
 EQUATIONS = 67
 # Blocks and commands of some pages, so that a test that finds none of them fails.
-RUN = {"tutorial.md": 8, "forward-kinematics.md": 3}
+RUN = {"tutorial.md": 9, "forward-kinematics.md": 5}
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,21 @@ def quick(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFact
     monkeypatch.setenv("MPLBACKEND", "agg")
     monkeypatch.setenv("CONDYLE_BACKEND", "numpy")
     monkeypatch.setenv("CONDYLE_CACHE", str(tmp_path_factory.getbasetemp() / "docs-kernels"))
+
+
+@pytest.fixture(autouse=True)
+def registers() -> Iterator[None]:
+    """What a page registers is gone after it."""
+    from condyle.dynamics import FORMULATIONS
+    from condyle.report.figures import PLOTS
+
+    kept: list[tuple[dict[str, Any], dict[str, Any]]] = [
+        (register, dict(register)) for register in (FORMULATIONS, PLOTS)
+    ]
+    yield
+    for register, before in kept:
+        register.clear()
+        register.update(before)
 
 
 def put_files_of_a_reader(folder: Path) -> None:
@@ -285,3 +301,34 @@ def test_nothing_is_fetched_from_elsewhere() -> None:
 
 def test_generated_files_are_not_kept() -> None:
     assert "/generated/" in (DOCS / ".gitignore").read_text(encoding="utf-8")
+
+
+# Command of the table of JSON keys -> how it is called here; compare and bench take too long.
+JSON = {
+    "condyle new": ("new", "a_robot"),
+    "condyle check": ("check", "masticatory"),
+    "condyle check --project": ("check", "--project", "off.toml"),
+    "condyle reference": ("reference", "--out", "reference"),
+    "condyle run": ("run", "--rate", "20", "--out", "results"),
+    "condyle solve": ("solve", "my.toml", "--states", "states.csv", "--out", "t.csv"),
+    "condyle pose": ("pose", "my.toml", "--joints", "encoders.csv", "--out", "p.csv"),
+    "condyle plot": ("plot",),
+    "condyle plot SOLUTION": (
+        *("plot", "results/masticatory.nc", "--figure", "torque", "--out", "figures"),
+    ),
+    "condyle report": ("report", "results/masticatory.nc"),
+    "condyle cache": ("cache",),
+}
+
+
+def test_json_keys_are_those_of_the_reference(condyle_command: Callable[..., Any]) -> None:
+    put_files_of_a_reader(Path.cwd())
+    off = bundled_text("masticatory").replace("offset = 13.215", "offset = 13.5")
+    Path("off.toml").write_text(off, encoding="utf-8")
+    rows = table_rows(DOCS / "reference" / "cli.md")
+    told = {row[0].strip("`"): set(re.findall(r"`(\w+)`", row[1])) for row in rows if len(row) == 2}
+    assert set(JSON) | {"condyle compare", "condyle bench"} == {t for t in told if "condyle" in t}
+    for name, words in JSON.items():
+        outcome = condyle_command(*words, "--json")
+        assert outcome.status == 0, outcome.err
+        assert set(json.loads(outcome.out)) == told[name], name

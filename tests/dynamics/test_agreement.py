@@ -15,7 +15,10 @@ import condyle
 from condyle import InputError, UnsupportedError
 from condyle.dynamics import FORMULATIONS, ROUTES
 from condyle.mechanism import Mechanism, parse
-from condyle.model import Evaluation, Model, with_point
+from condyle.model.data import Evaluation
+from condyle.model.evaluator import with_point
+from condyle.results.model import Model
+from condyle.status import Status
 
 
 def models(mechanism: Mechanism) -> Iterator[Model]:
@@ -32,8 +35,8 @@ def difference(got: Evaluation, wanted: Evaluation) -> float:
     """Largest difference of anything, over the largest component of its kind in its sample."""
     assert (got.status == 0).all() and (wanted.status == 0).all()
     worst = 0.0
-    for name in ("torque", "contact_force", "rate", "acceleration", "share"):
-        a, b = getattr(got.torques, name), getattr(wanted.torques, name)
+    for name in ("effort", "contact_force", "joint_rate", "joint_acceleration", "share"):
+        a, b = getattr(got, name), getattr(wanted, name)
         axes = tuple(i for i in range(b.ndim) if i != b.ndim - 2)
         size = np.abs(b).max(axis=axes, initial=0)
         size = np.maximum(size, 0.1 if name == "contact_force" else 1e-9)
@@ -88,8 +91,7 @@ def test_the_choice_of_dependent_coordinates_is_free(
     wanted = model.evaluate(q, q1, q2, load)
     other = condyle.derive(reference.replace(dependent=dependent), backend="numpy")
     columns = [("X", "Y", "Z", "alpha", "beta", "gamma").index(n) for n in other.independent]
-    poses = wanted.poses
-    whole = (poses.pose, poses.rate, poses.acceleration)
+    whole = (wanted.pose, wanted.pose_rate, wanted.pose_acceleration)
     got = other.evaluate(*(a[:, columns] for a in whole), load)
     assert difference(got, wanted) < 1e-10
 
@@ -106,7 +108,8 @@ def test_near_crank_singularities(reference: Mechanism, backend: str) -> None:
     for _ in range(60):  # to the end of the reach along X
         middle = (low + high) / 2
         pose = np.array([[middle, 0, 0, 0]])
-        reached = wanted_by.evaluate(pose, 0 * pose, 0 * pose, np.zeros((1, 9))).torques.reached[0]
+        status = wanted_by.evaluate(pose, 0 * pose, 0 * pose, np.zeros((1, 9))).status[0]
+        reached = status != Status.unreachable
         low, high = (middle, high) if reached else (low, middle)
     q = np.zeros((9, 4))
     q[:, 0] = low * (1 - 10.0 ** -np.arange(1, 10))

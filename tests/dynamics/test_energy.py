@@ -14,7 +14,8 @@ from oracles.rotations import Motion, platform_motion
 import condyle
 from condyle.dynamics import FORMULATIONS
 from condyle.mechanism import parse
-from condyle.model import Model, with_point
+from condyle.model.evaluator import with_point
+from condyle.results.model import Model
 
 CASES = {f"k{k}": {"contacts": k} for k in range(4)} | {"n8": {"chains": 8}}
 
@@ -67,8 +68,8 @@ def test_power_balance_along_a_trajectory(case: str) -> None:
         return unit * 60.0**order * np.sin(60 * t + phase + order * np.pi / 2)
 
     def energies(t: np.ndarray) -> np.ndarray:
-        poses = model.evaluate(q(t, 0), q(t, 1), q(t, 2), np.zeros((len(t), 9))).poses
-        motions = map(platform_motion, poses.pose, poses.rate)
+        found = model.evaluate(q(t, 0), q(t, 1), q(t, 2), np.zeros((len(t), 9)))
+        motions = map(platform_motion, found.pose, found.pose_rate)
         return np.array([sum(energy(d, motion)) for motion in motions])
 
     wrench = rng.normal(0, 2, (len(t), 6)) * np.repeat([1, 0.05], 3)
@@ -146,6 +147,6 @@ def test_at_rest_torques_carry_the_weight(case: str) -> None:
     forces = generalized(model, q, zero, zero) * unit
     np.testing.assert_allclose(forces, slope, atol=1e-8 * np.abs(slope).max())
     floating = condyle.derive(model.mechanism.replace(gravity=(0, 0, 0)), backend="numpy")
-    at_rest = floating.evaluate(q[None], zero[None], zero[None], np.zeros((1, 9))).torques
-    assert np.abs(at_rest.torque).max() == 0
+    at_rest = floating.evaluate(q[None], zero[None], zero[None], np.zeros((1, 9)))
+    assert np.abs(at_rest.effort).max() == 0
     assert np.abs(at_rest.contact_force).max(initial=0) == 0

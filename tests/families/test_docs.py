@@ -6,8 +6,8 @@ import re
 from pathlib import Path
 
 import condyle
-from condyle.model.reactions import reaction_places
 from condyle.kinematics.chain import FAMILIES
+from condyle.questions.reactions import reaction_places
 from families.cases import case
 
 PAGE = Path(__file__).parents[2] / "docs" / "chains.md"

@@ -16,7 +16,7 @@ import pytest
 import condyle
 from condyle.dynamics import FORMULATIONS
 from condyle.mechanism import bundled_text
-from condyle.model import Model
+from condyle.results.model import Model
 from families.bodies import Body, leg, platform
 from families.cases import close
 from families.jets import Array, Jet

@@ -8,7 +8,9 @@ import pytest
 import condyle
 from condyle.errors import UnreachableError
 from condyle.mechanism import Mechanism
-from condyle.model import UNREACHABLE, Model
+from condyle.model.judge import require_ok
+from condyle.results.model import Model
+from condyle.status import Status
 from families.cases import case
 
 
@@ -21,9 +23,9 @@ def test_a_rail_too_far_from_its_joint() -> None:
     q = np.zeros((2, 5))
     q[1, 1] = 0.3  # sideways, by more than the rods reach
     evaluation = model.evaluate(q, 0 * q, 0 * q, np.zeros((2, 9)))
-    assert evaluation.status.tolist() == [0, UNREACHABLE]
+    assert evaluation.status.tolist() == [0, Status.unreachable]
     with pytest.raises(UnreachableError) as caught:
-        model.require_ok(evaluation)
+        require_ok(model.mechanism, evaluation)
     # Up the slope of 0.1 as well: M is then at y = 355, z = 90, its rail at y = 0, z = 230 mm.
     distance, rod = np.hypot(355, 140), np.linalg.norm([310, 55, 170])
     assert (
@@ -39,7 +41,9 @@ def test_travel_follows_the_platform_along_the_rails() -> None:
     q = np.zeros((3, 6))
     q[:, 0] = [-0.03, 0.0, 0.04]
     evaluation = model.evaluate(q, 0 * q, 0 * q, np.zeros((3, 9)))
-    np.testing.assert_allclose(evaluation.configuration.joint, q[:, :1].repeat(6, axis=1), atol=1e-15)
+    np.testing.assert_allclose(
+        evaluation.configuration.joint, q[:, :1].repeat(6, axis=1), atol=1e-15
+    )
     # At rest the forces along the rails cancel: gravity has no part along them.
     total = evaluation.effort.sum(axis=1)
     assert np.abs(total).max() < 1e-12 * np.abs(evaluation.effort).max()

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
+from oracles.following import coordinate_closure
+from oracles.interpreter import closure_function
 from oracles.random_mechanism import random_mechanism, toml_text
 
 import condyle
-from condyle.dynamics.equations import closure_function, require_closed_form
 from condyle.kinematics.batch import evaluate
-from condyle.kinematics.closure import coordinate_closure
 from condyle.mechanism import Mechanism, parse
 from condyle.mechanism.home import (
     condition_of,
@@ -19,6 +19,7 @@ from condyle.mechanism.home import (
     independent_coordinates,
     usable_sets,
 )
+from condyle.questions.numbers import require_closed_form
 
 ANGLES = {"alpha", "beta", "gamma"}
 COUNT = 20

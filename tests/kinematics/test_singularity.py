@@ -14,7 +14,9 @@ from condyle import SingularError
 from condyle.kinematics.singularity import KINDS, measure
 from condyle.mechanism import Mechanism, parse
 from condyle.mechanism.files import from_data
-from condyle.model import STATUS_NAMES, Evaluation
+from condyle.model.data import Evaluation
+from condyle.model.judge import require_ok
+from condyle.status import STATUS_NAMES
 
 HOME = np.zeros((1, 6))
 
@@ -52,9 +54,7 @@ def spatial(kinks: tuple[float, ...] = (0.3,) * 6, meeting: bool = False) -> dic
 def at_home(raw: dict[str, Any]) -> Evaluation:
     mechanism = from_data(raw)
     zero = np.zeros((1, mechanism.degrees_of_freedom))
-    return condyle.derive(mechanism, backend="numpy").evaluate(
-        zero, zero, zero, np.zeros((1, 9))
-    )
+    return condyle.derive(mechanism, backend="numpy").evaluate(zero, zero, zero, np.zeros((1, 9)))
 
 
 def test_a_regular_home() -> None:
@@ -90,7 +90,7 @@ def test_a_singular_pose_is_an_error_that_names_it() -> None:
     evaluation = model.evaluate(q, 0 * q, 0 * q, np.zeros((3, 9)))
     assert evaluation.status.tolist() == [0, 2, 0]
     with pytest.raises(SingularError, match=r"singular at row 12: dimensionless ratio") as caught:
-        model.require_ok(evaluation, row_offset=10)
+        require_ok(model.mechanism, evaluation, row_offset=10)
     assert caught.value.samples == [1]
 
 

@@ -54,8 +54,8 @@ def test_status_and_numbers_are_those_of_numpy_and_of_the_witness(name: str) -> 
     compiled, numpy = both(name, c)
     witness = Interpreter(c.mechanism, "momentum").solve(*c.arguments)
     np.testing.assert_array_equal(compiled.status, numpy.status)
-    np.testing.assert_array_equal(compiled.status != Status.UNREACHABLE, witness.reached)
-    ok = compiled.status == Status.OK
+    np.testing.assert_array_equal(compiled.status != Status.unreachable, witness.reached)
+    ok = compiled.status == Status.ok
     assert 0.1 < ok.mean() <= 1
     # Far away some are nearly singular, where digits are lost as the condition number says.
     loss = np.maximum(numpy.configuration.singularity.condition[ok], 1e3)
@@ -109,11 +109,9 @@ def test_what_is_no_number(name: str, value: float) -> None:
         np.testing.assert_array_equal(got.effort[rest], clean.effort[rest])
         np.testing.assert_array_equal(got.status, wanted.status)
         if not np.isfinite(value):
-            assert got.status[5] == (UNREACHABLE if wanted.status[5] == 1 else SINGULAR_STATUS)
-            np.testing.assert_array_equal(status, got.status)
+            assert got.status[5] == (Status.overflow if which else Status.unreachable)
+            np.testing.assert_array_equal(found.status, got.status)
             assert np.isnan(found.effort[5]).all()
-            if which == 0 and c.mechanism.contacts:
-                assert got.status[5] == UNREACHABLE
 
 
 @pytest.mark.usefixtures("quick")
@@ -142,11 +140,11 @@ def singular_pose(name: str) -> np.ndarray:
 
     def ratio(u: np.ndarray) -> float:
         q = (u * size)[None]
-        poses = model.kernel.poses(q, 0 * q, 0 * q)
-        posture = model.configuration(poses.pose)
-        if not poses.reached[0] or (posture.reach < 0).any():
+        poses, reached = model._poses(q, 0 * q, 0 * q)
+        found = model.configuration(poses["pose"])
+        if not reached[0] or (found.discriminant < 0).any():
             return 1.0
-        return float(posture.singularity.direct_ratio[0])
+        return float(found.singularity.direct_ratio[0])
 
     rng = np.random.default_rng(0)
     options = {"maxiter": 400, "xatol": 1e-12, "fatol": 1e-16}
@@ -174,7 +172,7 @@ def test_near_singularities(name: str) -> None:
     near = Case(c.mechanism, q, q1, q2, load)
     compiled, numpy = both(name, near)
     np.testing.assert_array_equal(compiled.status, numpy.status)
-    assert {Status.OK, Status.SINGULAR} <= set(compiled.status)
+    assert {Status.ok, Status.singular} <= set(compiled.status)
     condition = numpy.configuration.singularity.condition
     assert condition.max() > 1e12
     wanted = numpy.effort

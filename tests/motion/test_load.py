@@ -23,10 +23,10 @@ def test_without_moments_they_are_zero(csv_file):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("t,Fx,Fy\n0,1,2\n", 'column "Fz" is missing'),
-        ("t,Fx,Fy,Fz,Mx\n0,1,2,3,4\n", 'columns "My", "Mz" are missing'),
+        ("t,x\n0,1\n", 'columns "Fx", "Fy", "Fz" are missing.*Available: t, x'),
+        ("t,Fx,Fzz\n0,1,2\n", 'column "Fzz" is not known here. Did you mean "Fz"'),
         ("Fx,Fy,Fz\n1,2,3\n", 'column "t" is missing'),
-        ("t,Fx,Fy,Fz,fz\n0,1,2,3,4\n", 'column "fz" is not known here'),
+        ("t,Fx,Fy,FZ,fz\n0,1,2,3,4\n", 'columns "FZ", "fz" both mean "Fz"'),
         ("t,Fx,Fy,Fz\n0,1,2,3\n0,1,2,3\n", "line 3: t is 0.0 s after 0.0 s"),
     ],
 )

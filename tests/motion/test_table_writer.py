@@ -34,7 +34,7 @@ def test_nan_is_an_empty_cell_and_text_is_quoted_where_needed(tmp_path):
     }
     write_table(tmp_path / "out.csv", columns)
     assert (tmp_path / "out.csv").read_text() == (
-        'a,"one, two",status\n0.10000000000000001,1,ok\n,2,"not ""ok"", nan"\n'
+        'a,"one, two",status\n0.1,1,"ok"\n,2,"not ""ok"", nan"\n'
     )
 
 

@@ -10,7 +10,7 @@ from families.jets import Jet
 from oracles.random_mechanism import random_mechanism
 
 from condyle.model.reactions import Reaction, reactions
-from condyle.model import Model
+from condyle.results.model import Model
 
 SURFACES = {
     "curved_k3": {"surface": "mixed", "contacts": 3, "families": ("RSS", "PSS", "SPS")},

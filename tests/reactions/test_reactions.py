@@ -14,10 +14,13 @@ from oracles.description import read, rod_angles
 from oracles.rotations import platform_motion
 
 import condyle
-from condyle.model.reactions import reaction_places, reaction_variables, reactions
 from condyle.mechanism import Mechanism
-from condyle.model import Evaluation, Model
+from condyle.model.data import Evaluation
+from condyle.model.reactions import reactions
 from condyle.motion import read_table, write_table
+from condyle.questions.reactions import reaction_places
+from condyle.results.model import Model
+from condyle.results.reactions import reaction_variables
 from condyle.results.states import solve_file
 
 # Our joint -> the oracle's link and whether it is its force or its moment.

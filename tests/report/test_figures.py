@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
 from pathlib import Path
 from xml.etree import ElementTree
@@ -19,9 +20,18 @@ from condyle.analysis.compare import Comparison
 from condyle.kinematics.rotation import rotation
 from condyle.mechanism.surface import Plane, Quadratic
 from condyle.report import figures
-from condyle.report.figures import PLOTS, SolutionPlots, figure_5, figure_8, figure_9
+from condyle.report.figures import (
+    PLOTS,
+    SolutionPlots,
+    figure_5,
+    figure_8,
+    figure_9,
+    registry,
+)
 from condyle.report.figures.chains import groups, heading, styles
 from condyle.report.figures.motion import track
+from condyle.report.figures.style import new_figure
+from condyle.results import accessors
 from condyle.results.solution import Solution
 
 
@@ -118,11 +128,110 @@ def test_path_of_the_landmark(solution: Solution) -> None:
     assert sagittal.get_xdata()[0] == pytest.approx(52.75)
 
 
-def test_failed_samples_are_shaded(solution: Solution, mixed: Solution) -> None:
-    def shades(one: Solution) -> list[Rectangle]:
-        return PLOTS["torque"](one).axes[0].findobj(Rectangle)
+def test_failed_samples_are_shaded_and_explained(solution: Solution, mixed: Solution) -> None:
+    def shades(one: Solution) -> int:
+        return len(PLOTS["torque"](one).axes[0].patches)
 
-    assert len(shades(mixed)) == len(shades(solution)) + 1
+    assert (shades(solution), shades(mixed)) == (0, 1)
+    text = words(PLOTS["torque"](mixed))
+    assert "no result" in text and "Grey: no result (unreachable)" in text
+    assert "no result" not in words(PLOTS["torque"](solution))
+
+
+def test_a_limit_names_the_chains_that_have_it(solution: Solution) -> None:
+    """One of two has it: the other is not said to."""
+    machine = solution.mechanism
+    first, *others = machine.chains
+    free = first.model_copy(
+        update={"actuator": first.actuator.model_copy(update={"torque_limit": None})}
+    )
+    partly = solution.copy(deep=True)
+    partly.attrs["mechanism"] = condyle.dumps(machine.replace(chains=(free, *others)))
+    titles = [axes.get_title("left") for axes in PLOTS["torque"](partly).axes]
+    assert "limit ±3 N m (temporalis right) is outside the view" in titles[0]
+    assert "(" not in titles[1]
+
+
+def test_no_load_no_share_of_it(solution: Solution) -> None:
+    titles = [axes.get_title("left") for axes in PLOTS["share"](solution).axes[:4]]
+    assert titles == ["platform", "couplers", "cranks", "load"]
+    idle = solution.copy(deep=True)
+    idle["share"].values[list(solution["part"].values).index("bite")] = 0.0
+    text = words(PLOTS["share"](idle))
+    assert "platform" in text and "load" not in text.split("Mechanism")[0] and "bite" not in text
+    named = solution.assign_coords(part=["platform", "couplers", "cranks", "load"])
+    assert len(figure_9(named).axes) == len(figure_9(solution).axes)
+
+
+@pytest.mark.parametrize("name", PLOTS)
+def test_figures_for_a_journal(name: str, solution: Solution) -> None:
+    figure = PLOTS[name](solution, style="journal", title=False, letters=True)
+    assert figure.get_size_inches()[0] * 25.4 == pytest.approx(175 if name == "share" else 85)
+    assert not figure.get_suptitle().strip() and "stand-in" not in words(figure)
+    letters = [axes.get_title("left").split()[0] for axes in figure.axes]
+    assert letters == [f"({chr(97 + i)})" for i in range(len(figure.axes))]
+    assert figure.axes[0].xaxis.label.get_size() == 8
+    figure.draw_without_rendering()
+    wide = PLOTS[name](solution, style="journal-wide", figsize=(5, 4))
+    assert tuple(wide.get_size_inches()) == (5, 4) and wide.get_suptitle()
+
+
+def test_wishes_end_with_the_figure(solution: Solution) -> None:
+    with pytest.raises(condyle.InputError, match="jurnal"):
+        PLOTS["load"](solution, style="jurnal")
+    solution.plot.load(style="journal", title=False)
+    after = PLOTS["load"](solution)
+    assert after.get_suptitle() and after.get_size_inches()[0] == 7
+
+
+@pytest.mark.parametrize("name", [n for n in PLOTS if n not in ("path", "contact_track")])
+def test_lines_differ_in_colour_and_in_dashes(name: str, solution: Solution) -> None:
+    """Of any two lines in a panel; a left and a right one share the colour alone."""
+    for axes in PLOTS[name](solution).axes:
+        named = [line for line in axes.get_lines() if not str(line.get_label()).startswith("_")]
+        dashes = [str(line._unscaled_dash_pattern) for line in named]  # type: ignore[attr-defined]
+        assert len(set(dashes)) == len(dashes), axes.get_title("left")
+
+
+def test_contact_track_fills_its_page(solution: Solution) -> None:
+    figure = PLOTS["contact_track"](solution)
+    figure.draw_without_rendering()
+    boxes = [
+        axes.get_tightbbox().transformed(figure.transFigure.inverted()) for axes in figure.axes
+    ]
+    assert min(box.x0 for box in boxes) < 0.06 and max(box.x1 for box in boxes) > 0.94
+
+
+def test_a_figure_registers_itself(solution: Solution, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry, "PLOTS", PLOTS)
+    monkeypatch.setitem(PLOTS, "power", None)
+
+    @registry.plot()
+    def power(given: Solution, factor: float = 1.0) -> Figure:
+        """Power of each actuator."""
+        made = new_figure("Power", "", 4, 3)
+        axes = made.add_subplot()
+        axes.plot(given["time"], factor * given["torque"] * given["joint_rate"])
+        return made
+
+    made = solution.plot.power(factor=2.0, figsize=(3, 2))
+    assert tuple(made.get_size_inches()) == (3, 2)
+    assert "power" in dir(solution.plot) and solution.plot.power.__doc__ == power.__doc__
+    with pytest.raises(AttributeError, match="torque"):
+        solution.plot.torqe  # noqa: B018
+
+
+def test_results_know_figures_by_name_alone(solution: Solution) -> None:
+    """No file of results or analysis imports the report, which registers itself."""
+    for room in ("results", "analysis"):
+        for path in (Path(condyle.__file__).parent / room).glob("*.py"):
+            imports = [node for node in ast.walk(ast.parse(path.read_text("utf-8")))]
+            named = [n.module or "" for n in imports if isinstance(n, ast.ImportFrom)]
+            assert not any("report" in name.split(".") for name in named), path
+    with pytest.raises(condyle.UnsupportedError, match=r"solution\.plot"):
+        accessors.extend("solution.nothing", solution)
+    accessors.register("solution.size", "builtins:len")
+    assert accessors.extend("solution.size", solution) == len(solution)
 
 
 def test_a_ball_runs_on_the_line_of_its_centre(reference: condyle.Mechanism) -> None:
@@ -202,8 +311,9 @@ def test_accessor_has_every_plot_and_xarrays_own(solution: Solution) -> None:
     plots = SolutionPlots(solution)
     for name, draw in PLOTS.items():
         assert inspect.getdoc(getattr(plots, name)) == inspect.getdoc(draw)
-    figure = plots.share(parts=["bite"])
-    assert figure.axes[0].get_title("left") == "bite"
+    for name in ("bite", "load"):  # as the file calls it, and as people do
+        figure = plots.share(parts=[name])
+        assert figure.axes[0].get_title("left") == "load"
     assert callable(plots.scatter)
 
 

@@ -7,6 +7,7 @@ import hashlib
 import itertools
 import json
 import re
+import tracemalloc
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -17,10 +18,12 @@ import pytest
 import condyle
 from condyle.errors import InputError
 from condyle.motion import Motion, bundled_reference
+from condyle.report.failures import at_sample, failures
 from condyle.report.page import report_html, write_report
-from condyle.report.page.columns import BUDGET, Columns
 from condyle.report.page.html import fill, json_for_script, tag
 from condyle.report.page.panels import reaction_magnitudes
+from condyle.report.page.reduce import BUDGET, reduced
+from condyle.report.page.source import opened
 from condyle.report.scene import DARK, LIGHT, styles
 from condyle.report.tables import Table, kept_tables, with_tables
 from condyle.results.solution import Solution
@@ -177,9 +180,12 @@ def test_what_was_run_is_named_with_hashes(solution: Solution, tmp_path: Path) -
     motion = tmp_path / "chewing <1>.csv"
     motion.write_text("t,X\n")
     text = Elements(report_html(solution, files=[motion])).text
-    assert str(motion) in text and hashlib.sha256(b"t,X\n").hexdigest() in text
+    assert motion.name in text and str(tmp_path) not in text, "no folder of the sender"
+    assert hashlib.sha256(b"t,X\n").hexdigest() in text
     assert hashlib.sha256(solution.attrs["mechanism"].encode()).hexdigest() in text
-    assert f"condyle {condyle.__version__}" in text and solution.options["motion"] in text
+    assert f"condyle {condyle.__version__}" in text
+    assert Path(solution.options["motion"]).name in text
+    assert str(Path(solution.options["motion"]).parent) not in report_html(solution)
     assert solution.attrs["mechanism"] in text
 
 
@@ -199,7 +205,7 @@ def test_files_are_named_with_the_hashes_of_what_was_read(
     copy = tmp_path / "copy.csv"
     copy.write_bytes(contents[0])
     text = Elements(report_html(solution, files=[copy])).text
-    assert text.count(hashes[0]) == 1 and str(copy) not in text
+    assert text.count(hashes[0]) == 1 and copy.name not in text
 
 
 def test_heading_names_files_without_their_folders(page: str, solution: Solution) -> None:
@@ -303,18 +309,113 @@ def test_other_families_have_a_page(name: str) -> None:
     assert len(data["machine"]["surfaces"]) == len(mechanism.contacts)
 
 
-def test_long_runs_are_thinned_and_keep_their_extremes() -> None:
-    count = 400_000
-    columns = Columns(np.arange(count) / 1000)
-    values = np.zeros(count)
-    values[123_457], values[321_001] = 5.0, -7.0
-    columns.add("spike", values)
-    for i in range(50):
-        columns.add(str(i), np.zeros(count))
-    packed = columns.packed()
-    assert packed["total"] == count and packed["samples"] * 4 * 51 <= BUDGET
-    kept = columns.kept()
-    assert {0, 123_457, 321_001, count - 1} <= set(kept)
+@pytest.fixture(scope="module")
+def long_run(solution: Solution) -> Solution:
+    """60 000 samples: the reference again and again, with one torque that peaks for a sample."""
+    count = 60_000
+    long = solution.isel(time=np.arange(count) % solution.sizes["time"])
+    long = long.assign_coords(time=("time", np.arange(count) / 1000 - 3.0, {"units": "s"}))
+    long["torque"].values[31_234, 2] = 9.75
+    long["torque"].values[41_235, 2] = -8.5
+    for name in ("torque", "joint", "pose", "contact_force"):
+        long[name].values[20_000:20_040] = np.nan
+    long["status"].values[20_000:20_040] = 1
+    return long
+
+
+def unpacked(data: str, kind: str) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(data), dtype=kind)
+
+
+def test_long_runs_are_thinned_and_keep_every_peak(long_run: Solution) -> None:
+    """Of every curve, in every span of time; its time is right to a part of the span."""
+    page = report_html(long_run)
+    data = payload(page)
+    packed = data["columns"]
+    assert packed["total"] == 60_000 and packed["samples"] < 10_000
+    assert len(packed["values"]) + len(packed["envelope"]["low"]) < 1.4 * BUDGET
+    edges = unpacked(packed["envelope"]["edges"], "<f8")
+    time = long_run["time"].values
+    starts = np.searchsorted(time, edges[:-1] - 1e-9)
+    line = packed["envelope"]["columns"].index(packed["names"].index("torque.masseter_left"))
+    values = long_run["torque"].values[:, 2]
+    for name, best in (("low", np.fmin), ("high", np.fmax)):
+        rows = unpacked(packed["envelope"][name], "<f4").reshape(-1, len(edges) - 1)
+        found = rows[line]
+        expected = best.reduceat(values, starts)
+        np.testing.assert_array_equal(found, expected.astype("f4"))
+    at = unpacked(packed["envelope"]["highAt"], "<u2").reshape(rows.shape)[line] / 65535
+    k = int(np.searchsorted(starts, 31_234, side="right")) - 1
+    assert edges[k] + at[k] * (edges[k + 1] - edges[k]) == pytest.approx(28.234, abs=1e-5)
+    text = Elements(page).text
+    assert "9.75 N m" in text and "28.234 s" in text
+    assert "60\u202f000" in text and "40 without a result" in text
+
+
+def test_a_file_is_read_piece_by_piece(long_run: Solution, tmp_path: Path) -> None:
+    long_run.save(tmp_path / "long.nc")
+    write_report(tmp_path / "long.nc", tmp_path / "pieces.html")
+    assert (tmp_path / "pieces.html").read_text("utf-8") == report_html(long_run)
+    with pytest.raises(InputError, match=r"gone\.nc"):
+        write_report(tmp_path / "gone.nc", tmp_path / "x.html")
+    (tmp_path / "bad.nc").write_text("no NetCDF")
+    with pytest.raises(InputError, match="not a NetCDF"):
+        write_report(tmp_path / "bad.nc", tmp_path / "x.html")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["bad.nc", "long.nc", "pieces.html"]
+
+
+def test_memory_does_not_grow_with_the_run(solution: Solution, tmp_path: Path) -> None:
+    """Twice the samples, as much memory: of Python's and numpy's objects, at its largest."""
+    peaks = []
+    for count in (200_000, 400_000):
+        path = tmp_path / f"{count}.nc"
+        long = solution.isel(time=np.arange(count) % solution.sizes["time"])
+        long.assign_coords(time=("time", np.arange(count) / 1000, {"units": "s"})).save(path)
+        del long
+        tracemalloc.start()
+        with opened(path) as lazy:
+            reduced(lazy)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+        path.unlink()
+    assert peaks[1] < peaks[0] + 30e6, "time and status of every sample, and little more"
+    assert peaks[1] < 150e6
+
+
+def test_spans_without_a_result_are_listed_and_marked(long_run: Solution) -> None:
+    page = report_html(long_run)
+    assert payload(page)["failures"] == [
+        [pytest.approx(17.0), pytest.approx(17.039), "unreachable"]
+    ]
+    text = Elements(page).text
+    assert "17 to 17.039 s" in text and "Without a result" in text
+
+
+def test_causes_come_from_the_solution(long_run: Solution) -> None:
+    class Knowing(Solution):
+        __slots__ = ()
+
+        @property
+        def failures(self) -> list[dict[str, Any]]:
+            return [
+                {"start": 16.9, "end": 17.1, "count": 40, "status": "unreachable", "cause": "why"},
+                {"start": 30.0, "end": 31.0, "count": 9, "status": "unreachable", "cause": "no"},
+            ]
+
+    knowing = Knowing(long_run.data_vars, long_run.coords, long_run.attrs)
+    [found] = failures(knowing)
+    assert (found.first, found.last, str(found)) == (20_000, 20_039, "unreachable: why")
+    assert at_sample([found], 20_010) is found and at_sample([found], 20_040) is None
+
+
+def test_no_load_no_share_of_it(solution: Solution) -> None:
+    """A machine without a load shows no share of zeros; with one it is called load."""
+    idle = solution.copy(deep=True)
+    idle["share"].values[list(solution["part"].values).index("bite")] = 0.0
+    for one, expected in ((solution, True), (idle, False)):
+        panel = next(p for p in payload(report_html(one))["panels"] if p["id"] == "share-Nm")
+        labels = [line["label"] for line in panel["sets"][0]["lines"]]
+        assert ("load" in labels) == expected and "bite" not in labels
 
 
 def test_json_cannot_leave_its_script_and_filling_is_one_pass() -> None:

@@ -15,7 +15,8 @@ from condyle.dynamics import FORMULATIONS
 from condyle.mechanism import Mechanism
 from condyle.mechanism.files import from_data
 from condyle.mechanism.surface import Expression, Plane, Profile, Quadratic, Sphere
-from condyle.model import Evaluation, Model
+from condyle.model.data import Evaluation
+from condyle.results.model import Model
 
 from .cases import close
 

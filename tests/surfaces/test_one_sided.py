@@ -10,8 +10,8 @@ import pytest
 import condyle
 from condyle.mechanism import Mechanism
 from condyle.mechanism.surface import Plane, Sphere
-from condyle.model import Model
 from condyle.motion import Motion
+from condyle.results.model import Model
 from condyle.results.solution import Solution, lift_off
 from condyle.results.summary import summarize
 
@@ -51,7 +51,7 @@ def test_what_a_push_is(reference: Mechanism, surface, side: str, push: int) -> 
         name="ball", point=first.point, surface=surface, side=side, one_sided=True
     )
     assert contact.push == push
-    machine = reference.model_copy(update={"contacts": (contact,)})
+    machine = reference.derived(contacts=(contact,))
     forces = np.array([[2.0], [-2.0], [0.0], [1e-15]])
     assert lift_off(machine, forces)[:, 0].tolist() == [push < 0, push > 0, False, False]
 

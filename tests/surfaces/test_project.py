@@ -14,8 +14,7 @@ from oracles.random_mechanism import random_mechanism, toml_text
 
 import condyle
 from condyle.errors import InputError
-from condyle.kinematics.contact import contacts_of
-from condyle.kinematics.contact import residuals
+from condyle.kinematics.contact import contacts_of, residuals
 from condyle.kinematics.project import project_home
 from condyle.mechanism.files import from_data
 from condyle.mechanism.home import characteristic_length
@@ -25,7 +24,7 @@ from .cases import CLOSED, KINDS, ball_options
 
 def phi_of(mechanism: condyle.Mechanism) -> ca.Function:
     x = ca.SX.sym("x", 6)
-    phi = residuals(contact_symbols(mechanism), x)
+    phi = residuals(contacts_of(mechanism), x)
     return ca.Function("phi", [x], [phi, ca.jacobian(phi, x)])
 
 

@@ -19,6 +19,7 @@ from ..errors import UnsupportedError
 from ..mechanism.mechanism import Mechanism
 from ..model.evaluator import Evaluator, with_point
 from ..progress import step
+from ..results.accessors import extend
 from .indices import Indices, indices
 from .runs import Run, Samples, TimedModel, run
 
@@ -101,9 +102,7 @@ class Comparison:
         return indices(runs[0].share, parts, self.units) if runs else []
 
     def __str__(self) -> str:
-        from ..report.tables import comparison_text
-
-        return comparison_text(self)
+        return str(extend("comparison.text", self))
 
 
 def compare(

@@ -116,8 +116,8 @@ def build(recipe: str, make: Make, say: Callable[[str, str], None]) -> Entry:
             manifest = Path(name) / "manifest.json"
             sealed = {"seal": _seal(recipe, facts), "facts": facts}
             manifest.write_text(json.dumps(sealed), encoding="utf-8")
-            os.replace(library, folder / facts["library"])
-            os.replace(manifest, folder / f"{recipe}.json")
+            _place(library, folder / facts["library"])
+            _place(manifest, folder / f"{recipe}.json")
         return Entry(folder / facts["library"], facts, False)
     except (OSError, CondyleError) as error:
         if isinstance(error, CondyleError) and _has_room(folder):
@@ -173,10 +173,27 @@ def clear() -> Contents:
         try:
             with _held(had.folder):
                 for path in _entries(had.folder):
-                    path.unlink(missing_ok=True)
+                    _remove(path)
         except OSError as error:
             raise CacheError(f"{had.folder} cannot be cleared: {error.strerror}") from None
     return had
+
+
+def _place(source: Path, target: Path) -> None:
+    """Rename a file to its place, where somebody may have put a folder."""
+    try:
+        os.replace(source, target)
+    except IsADirectoryError:
+        _remove(target)
+        os.replace(source, target)
+
+
+def _remove(path: Path) -> None:
+    """Remove an entry, also one that is a folder."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def _entries(folder: Path) -> list[Path]:
@@ -192,7 +209,7 @@ def _whole(folder: Path, recipe: str) -> Entry | None:
         if manifest["seal"] != _seal(recipe, facts) or _hash(library) != facts["sha256"]:
             return None
         return Entry(library, facts, True)
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
 
 
@@ -277,7 +294,7 @@ def _sweep(folder: Path, alone: bool) -> None:
         for path in _entries(folder):
             if path.suffix == ".so" and not _named(path):
                 with suppress(OSError):
-                    path.unlink()
+                    _remove(path)
 
 
 def _named(library: Path) -> bool:

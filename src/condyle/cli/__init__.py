@@ -1,5 +1,15 @@
-"""The command line."""
+"""The command line: one thin file a command, errors on stderr with exit status 2."""
 
-from .app import app, main
+from __future__ import annotations
 
-__all__ = ["app", "main"]
+import sys
+
+
+def main() -> None:
+    """Entry point of the `condyle` command."""
+    try:
+        from .app import run  # takes a moment, in which a person may press Ctrl-C
+
+        run()
+    except KeyboardInterrupt:
+        sys.exit(130)

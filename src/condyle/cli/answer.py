@@ -34,7 +34,7 @@ class Answer:
     def give(self, quiet: bool, as_json: bool) -> None:
         """Print it."""
         if as_json:
-            typer.echo(json.dumps(_plain(self.data), indent=2, allow_nan=False))
+            typer.echo(json.dumps(plain(self.data), indent=2, allow_nan=False))
             return
         if not quiet or self.kind != "summary":
             typer.echo(self.text)
@@ -59,12 +59,12 @@ def command_line(command: str, *words: object, **options: object) -> str:
     return shlex.join(parts)
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Data as JSON has it: a number that is not finite is null, a path is text."""
     if isinstance(value, float):
         return float(value) if math.isfinite(value) else None
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     return str(value) if isinstance(value, Path) else value

@@ -1,92 +1,73 @@
-"""The command line: one thin file a command, errors on stderr with exit status 2.
-
-A command does its work and returns an `Answer`; that it is printed for people, as JSON or not at
-all, and that a bar shows how far the work is, is the same for all and stands here.
-"""
+"""The command line as a whole: every command, and what becomes of errors and signals."""
 
 from __future__ import annotations
 
-import inspect
+import json
 import signal
 import sys
-from collections.abc import Callable
-from contextlib import suppress
-from functools import wraps
-from typing import Annotated, Any, get_type_hints
+from contextlib import redirect_stderr, suppress
+from typing import Any
 
 import typer
 
-from .. import __version__
 from ..errors import CondyleError
-from . import options
-from .answer import Answer
-from .bar import progress_bar
+from . import commands
+from .answer import plain
+from .command import app
+from .streams import Forgiving, drop
 
-# The chapters of the help page.
-BEGIN, COMPUTE, LOOK, UPKEEP = "Begin", "Compute", "Look", "Upkeep"
+__all__ = ["app", "commands", "run"]
 
-app = typer.Typer(
-    name="condyle",
-    no_args_is_help=True,
-    rich_markup_mode="rich",
-    pretty_exceptions_enable=False,
-    help=(
-        "Motor torques and contact forces of parallel robots whose platform also touches the "
-        "base, as a jaw does."
-    ),
-    epilog="Start with [bold]condyle run[/bold]: it solves the bundled chewing robot. "
-    "[bold]condyle COMMAND --help[/bold] shows units and an example.",
-)
-
-Command = Callable[..., Answer]
+# Of click, or of what typer carries in its place.
+Usage = next(k for k in typer.BadParameter.__mro__ if k.__name__ == "ClickException")
+INTERRUPTED = 130  # what shells take for Ctrl-C
 
 
-def command(chapter: str, *, example: str) -> Callable[[Command], Command]:
-    """Register a function as the command of its name, with `--quiet` and `--json` as well.
-
-    Args: chapter: of the help page;  example: one line to copy, shown below the options.
-    """
-
-    def register(work: Command) -> Command:
-        @wraps(work)
-        def shown(*, quiet: bool, as_json: bool, **given: Any) -> None:
-            with progress_bar(not quiet and not as_json):
-                answer = work(**given)
-            answer.give(quiet, as_json)
-
-        _take(shown, work, quiet=options.Quiet, as_json=options.Json)
-        app.command(rich_help_panel=chapter, epilog=f"Example: {example}")(shown)
-        return work
-
-    return register
+def run() -> None:
+    """Run the command that `sys.argv` names, and end the process with its exit status."""
+    _end_in_order()
+    with redirect_stderr(Forgiving(sys.stderr)):
+        sys.exit(_status(as_json="--json" in sys.argv[1:]))
 
 
-def _take(shown: Callable[..., None], work: Command, **switches: Any) -> None:
-    """Give `shown` the parameters of `work`, and some switches."""
-    hints = get_type_hints(work, include_extras=True) | switches
-    parameters = [
-        *inspect.signature(work).parameters.values(),
-        *(inspect.Parameter(s, inspect.Parameter.KEYWORD_ONLY, default=False) for s in switches),
-    ]
-    parameters = [one.replace(annotation=hints[one.name]) for one in parameters]
-    hints.pop("return", None)
-    shown.__annotations__ = hints
-    shown.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+def _status(as_json: bool) -> int:
+    """Run the command; 0, or what went wrong."""
+    try:
+        return app(standalone_mode=False) or 0
+    except typer.Abort:
+        return INTERRUPTED
+    except BrokenPipeError:  # who reads our results went away
+        drop(sys.stdout)
+        return 1
+    except CondyleError as error:
+        print(f"condyle: {error}", file=sys.stderr)
+        facts = error.to_dict()
+    except OSError as error:  # of the machine, such as a folder that went away
+        print(f"condyle: {error}", file=sys.stderr)
+        facts = {"kind": "system", "message": str(error), "hint": ""}
+    except Exception as error:
+        if not isinstance(error, Usage):
+            raise
+        facts = {"kind": "usage", "message": _show_usage(error), "hint": ""}
+    if as_json:
+        _tell({"error": plain(facts)})
+    return 2
 
 
-def _version(value: bool) -> None:
-    if value:
-        typer.echo(f"condyle {__version__}")
-        raise typer.Exit
+def _show_usage(error: Any) -> str:
+    """Show wrong usage, and return what is wrong."""
+    from typer.rich_utils import rich_format_error
+
+    rich_format_error(error)
+    return error.format_message()
 
 
-@app.callback()
-def _root(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
-    ] = False,
-) -> None:
-    pass
+def _tell(data: dict[str, Any]) -> None:
+    """A failure as JSON on stdout, if that can still be written."""
+    try:
+        print(json.dumps(data, indent=2, allow_nan=False), flush=True)
+    except OSError:
+        drop(sys.stdout)
 
 
 def _terminated(number: int, frame: object) -> None:
@@ -100,21 +81,3 @@ def _end_in_order() -> None:
         if number is not None and signal.getsignal(number) == signal.SIG_DFL:
             with suppress(ValueError):  # not the main thread
                 signal.signal(number, _terminated)
-
-
-def main() -> None:
-    """Entry point of the `condyle` command."""
-    from . import commands  # noqa: F401 - registers them
-
-    _end_in_order()
-    try:
-        app()
-    except CondyleError as error:
-        print(f"condyle: {error}", file=sys.stderr)
-        sys.exit(2)
-    except BrokenPipeError:
-        sys.stderr.close()
-        sys.exit(1)
-    except OSError as error:  # of the machine, such as a folder that went away
-        print(f"condyle: {error}", file=sys.stderr)
-        sys.exit(2)

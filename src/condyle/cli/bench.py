@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from .answer import Answer, files_line
-from .app import UPKEEP, command
+from .command import UPKEEP, command
 from .inputs import output_folder
 
 

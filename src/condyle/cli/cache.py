@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from .answer import Answer
-from .app import UPKEEP, command
+from .command import UPKEEP, command
 
 
 @command(UPKEEP, example="condyle cache --clear")

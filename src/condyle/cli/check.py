@@ -8,7 +8,7 @@ import typer
 
 from . import options
 from .answer import Answer, command_line
-from .app import BEGIN, command
+from .command import BEGIN, command
 from .inputs import warn
 
 Project = Annotated[
@@ -24,7 +24,8 @@ Project = Annotated[
 def check(mechanism: options.Mechanism, project: Project = False) -> Answer:
     """What a mechanism is, or all that is wrong with its file.
 
-    Its chains, contacts and freedoms, and how near it is to a singular pose where it starts.
+    Its chains, contacts and freedoms, sizes, masses, gravity and limits, how near it is to a
+    singular pose where it starts, and a warning where numbers do not go together.
     """
     import condyle
 
@@ -35,7 +36,7 @@ def check(mechanism: options.Mechanism, project: Project = False) -> Answer:
         return nearest
     machine = condyle.load(mechanism)
     description = describe(machine)
-    warn(home_warnings(machine))
+    warn([*home_warnings(machine), *(one["message"] for one in description.data["warnings"])])
     then = command_line("run", mechanism)
     return Answer(f"{description}\n", description.data, then, "result")
 
@@ -43,8 +44,9 @@ def check(mechanism: options.Mechanism, project: Project = False) -> Answer:
 def _projection(mechanism: str) -> Answer | None:
     """The nearest home on the surfaces; None if the file's home is there already."""
     from ..kinematics.project import project_home
-    from ..mechanism.files import from_data, read_tables, read_text
+    from ..mechanism.files import from_data
     from ..mechanism.quantities import PER_METRE
+    from ..mechanism.toml import read_tables, read_text
 
     tables = read_tables(read_text(mechanism), mechanism)
     projection = project_home(from_data(tables, mechanism, at_home=False))

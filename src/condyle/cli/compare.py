@@ -9,8 +9,8 @@ import typer
 
 from . import options
 from .answer import Answer, command_line, files_line
-from .app import COMPUTE, command
-from .inputs import file_stem, motion_and_load, output_folder, warn
+from .command import COMPUTE, command
+from .inputs import file_stem, motion_and_load, output_folder, require_drawing, warn
 
 if TYPE_CHECKING:
     from ..analysis.compare import Comparison
@@ -23,10 +23,11 @@ def compare(
     load: options.Load = None,
     load_point: options.LoadPoint = None,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("results"),
-    units: options.Units = "m,rad",
+    units: options.Units = None,
     landmark: options.Landmark = None,
     smooth: options.Smooth = None,
     rate: options.Rate = None,
+    trim: options.Trim = 0.0,
     figures: Annotated[bool, typer.Option(help="Draw Figures 5 to 9 of the paper.")] = True,
     report: Annotated[
         bool, typer.Option("--report", help="Write the page of condyle report, with the tables.")
@@ -37,13 +38,14 @@ def compare(
     How far their numbers differ and what they cost, with and without the contacts: Tables 1 and 2
     and Figures 5 to 9 of the paper.
     """
+    require_drawing(figures, report)
     import condyle
 
     from ..analysis.compare import compare as compare_models
     from ..report.tables import save_tables, tables, with_tables
 
     machine = condyle.load(mechanism)
-    path, acting = motion_and_load(machine, motion, load, units, landmark, smooth, rate)
+    path, acting = motion_and_load(machine, motion, load, units, landmark, smooth, rate, trim)
     comparison = compare_models(machine, path, acting, load_point)
     output_folder(out)
     files = save_tables(comparison, out)
@@ -60,20 +62,24 @@ def compare(
         inputs = [file for file in (motion, load) if file is not None]
         page = out / f"{file_stem(machine.name)}.html"
         files.append(write_report(solution, page, files=inputs))
-    warn(solution.warnings)
-    then = command_line(
-        "run",
-        mechanism,
-        motion=motion,
-        load=load,
-        load_point=load_point,
-        out=out if out != Path("results") else None,
-        units=units if units != "m,rad" else None,
-        landmark=landmark,
-        smooth=smooth,
-        rate=rate,
-        report=True,
-    )
+    warn([*path.warnings, *acting.warnings, *solution.warnings])
+    if report:  # the page is there already
+        then = command_line("view", solution=out / f"{file_stem(machine.name)}-compare.nc")
+    else:
+        then = command_line(
+            "run",
+            mechanism,
+            motion=motion,
+            load=load,
+            load_point=load_point,
+            out=out if out != Path("results") else None,
+            units=units,
+            landmark=landmark,
+            smooth=smooth,
+            rate=rate,
+            trim=trim or None,
+            report=True,
+        )
     return Answer(f"{comparison}\n{files_line(files)}", _data(comparison) | {"files": files}, then)
 
 

@@ -16,18 +16,19 @@ import typer
 FORMULATIONS = ("virtual_power", "momentum", "lagrange", "hessian", "newton_euler")
 ROUTES = ("core", "direct")
 BACKENDS = ("auto", "compiled", "numpy")
+STYLES = ("screen", "journal", "journal-wide")
 UNITS = ("m,rad", "m,deg", "mm,rad", "mm,deg", "cm,rad", "cm,deg")
 FIGURES = (
-    "motion",
-    "path",
-    "joint",
-    "load",
-    "torque",
-    "share",
     "contact_force",
     "contact_track",
     "jacobian",
+    "joint",
+    "load",
+    "motion",
+    "path",
+    "share",
     "singularity",
+    "torque",
 )
 
 

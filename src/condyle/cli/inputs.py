@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import BoundsError, InputError
+from ..errors import InputError
+from ..extras import require
 
 if TYPE_CHECKING:
     from ..mechanism import Mechanism
@@ -18,23 +20,25 @@ def motion_and_load(
     machine: Mechanism,
     motion: Path | None,
     load: Path | None,
-    units: str = "m,rad",
+    units: str | None = None,
     landmark: str | None = None,
     smooth: str | None = None,
     rate: float | None = None,
+    trim: float = 0.0,
 ) -> tuple[Motion, Load]:
-    """The files named; without a motion the reference case, or a trial motion if it is no jaw."""
+    """The files named; without a motion the reference case, or a trial motion."""
     from ..mechanism.home import independent_coordinates
-    from ..motion import Load, Motion, bundled_reference, trial_motion
+    from ..motion import Load, Motion, bundled_reference, resolve_landmark, trial_motion
 
-    if motion is None and units != "m,rad":
+    if motion is None and units is not None:
         raise InputError("--units is for a motion of your own; name it with --motion")
     reference_path, reference_load = bundled_reference()
     reference = motion is None and chews(machine, landmark)
     if motion is None and landmark is not None and not reference:
         raise InputError(
-            f'--landmark {landmark}: "{machine.name}" has no jaw\'s two contacts for the bundled '
-            "path. Name a motion of t, x, y, z with --motion"
+            f"--landmark {landmark}: the bundled path is for two contacts; "
+            f'"{machine.name}" has {len(machine.contacts)}. Name a motion of t, x, y, z with '
+            "--motion"
         )
     if load is not None:
         acting = Load.from_csv(load)
@@ -47,10 +51,17 @@ def motion_and_load(
                 f"{', '.join(independent_coordinates(machine))} about home"
             ]
         )
-        return trial_motion(machine, cutoff=smooth, rate=rate), acting
+        return trial_motion(machine, cutoff=smooth, rate=rate, trim=trim), acting
     path = Motion.from_csv(
-        motion or reference_path, units=units, landmark=landmark, cutoff=smooth, rate=rate
+        motion or reference_path,
+        units=units,
+        landmark=landmark,
+        cutoff=smooth,
+        rate=rate,
+        trim=trim,
     )
+    if path.kind == "landmark":
+        path = replace(path, landmark=resolve_landmark(landmark, machine.platform.points))
     return path, acting
 
 
@@ -79,14 +90,15 @@ def file_stem(name: str) -> str:
     return re.sub(r"[^\w.+-]+", "_", name)
 
 
+def require_drawing(figures: bool, report: bool) -> None:
+    """Raises MissingExtraError before minutes pass, if what draws them is not installed."""
+    if figures:
+        require("matplotlib", "figures")
+    if report:
+        require("plotly", "report")
+
+
 def warn(warnings: list[str]) -> None:
     """Warnings on stderr, so that they never mix with results."""
-    for warning in warnings:
+    for warning in dict.fromkeys(warnings):
         print(f"condyle: warning: {warning}", file=sys.stderr)
-
-
-def require_inside(warnings: list[str]) -> None:
-    """Raises BoundsError if a contact left its bounds (`--strict`)."""
-    outside = [w for w in warnings if "leaves its bounds" in w]
-    if outside:
-        raise BoundsError("; ".join(outside) + ". Without --strict this is a warning", [])

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from ..errors import InputError
+from ..errors import InputError, shortened
 from .answer import Answer, command_line
-from .app import BEGIN, command
+from .command import BEGIN, command
 
 
 @command(BEGIN, example="condyle new my-robot")
@@ -23,11 +23,10 @@ def new(
     """
     from ..atomic import write_text
     from ..mechanism import parse
+    from ..mechanism.quantities import NAME_CHARACTERS
     from ..mechanism.starter import starter_text
 
     path = Path(name if name.endswith(".toml") else f"{name}.toml")
-    if path.exists() and not force:
-        raise InputError(f"{path} exists already; choose another name or add --force")
     stem = path.name.removesuffix(".toml")
     text = starter_text(stem)
     try:
@@ -36,7 +35,10 @@ def new(
         parse(text)
     except InputError:
         raise InputError(
-            f'"{stem}" cannot be the name of a mechanism; use letters, digits, - and _'
+            f'"{shortened(stem, 80)}" cannot be the name of a mechanism; use at most '
+            f"{NAME_CHARACTERS} letters, digits, - and _"
         ) from None
+    if path.exists() and not force:
+        raise InputError(f"{path} exists already; choose another name or add --force")
     write_text(path, text)
     return Answer(f"Wrote {path}", {"files": [path]}, command_line("check", path))

@@ -37,36 +37,39 @@ Route = Annotated[
 LoadPoint = Annotated[
     str | None,
     typer.Option(
-        help="Platform point the load acts at. Default: right_molar if there is one.",
+        help="Platform point the load acts at. Default: that of the load, right_molar, or the only "
+        "point.",
         autocompletion=completion.points,
     ),
 ]
 Motion = Annotated[
     Path | None,
     typer.Option(
-        help="Motion to follow (CSV): t (s) and pose coordinates such as X, Y (m), alpha, beta "
-        "(rad), or the path x, y, z (m) of a landmark. Default: the bundled chewing path, "
-        "for mechanisms that are no jaw a trial motion about home (both synthetic)."
+        help="Motion to follow (CSV or Parquet): t (s) and pose coordinates such as X, Y (m), "
+        "alpha, beta (rad), or the path x, y, z (m) of a landmark. Default: the bundled chewing "
+        "path, or a trial motion about home for mechanisms that it does not fit (both synthetic)."
     ),
 ]
 Load = Annotated[
     Path | None,
     typer.Option(
-        help="Load on the platform (CSV): t (s), Fx, Fy, Fz (N) and, if you like, Mx, My, Mz "
-        "(N m). Default: the bundled bite force (synthetic) with the bundled motion, else none."
+        help="Load on the platform (CSV or Parquet): t (s), some of Fx, Fy, Fz (N), Mx, My, Mz "
+        "(N m). Default: the bundled load (synthetic) with the bundled motion, else none."
     ),
 ]
 Units = Annotated[
-    str,
+    str | None,
     typer.Option(
-        help="Units of the motion's lengths (m, cm, mm, um) and angles (rad, deg), as in mm,deg.",
+        help="Units of the motion's times (s, ms, us, min), lengths (m, cm, mm, um) and angles "
+        "(rad, deg, mrad), as in ms,mm,deg. A header such as x [mm] says so too.",
         autocompletion=completion.one_of(*completion.UNITS),
     ),
 ]
 Landmark = Annotated[
     str | None,
     typer.Option(
-        help="Platform point whose path x, y, z is given. Default: incisor.",
+        help="Platform point whose path x, y, z is given. Default: incisor if there is one, else "
+        "the only point.",
         autocompletion=completion.points,
     ),
 ]
@@ -80,6 +83,14 @@ Smooth = Annotated[
 Rate = Annotated[
     float | None,
     typer.Option(help="Samples a second (Hz) of the results. Default: those of the motion."),
+]
+Trim = Annotated[
+    float,
+    typer.Option(
+        min=0.0,
+        help="Leave out so many seconds of the motion at either end, where smoothing is least "
+        "certain: 0.2 with --smooth auto.",
+    ),
 ]
 Reactions = Annotated[
     bool, typer.Option("--reactions", help="Forces and moments in every joint too.")

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from ..errors import InputError, did_you_mean
+from ..extras import require
 from . import completion
 from .answer import Answer, command_line
-from .app import LOOK, command
+from .command import LOOK, command
 from .inputs import output_folder
 
 RESULT = Path("results/masticatory.nc")  # of `condyle run` as it stands
@@ -29,8 +31,20 @@ def plot(
         ),
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder for PNG and SVG files.")] = Path("figures"),
+    style: Annotated[
+        str,
+        typer.Option(
+            help="screen; journal (85 mm wide, letters of 8 pt); or journal-wide (175 mm).",
+            autocompletion=completion.one_of(*completion.STYLES),
+        ),
+    ] = "screen",
+    title: Annotated[
+        bool, typer.Option(help="Draw the heading, and where the data come from.")
+    ] = True,
+    letters: Annotated[bool, typer.Option("--letters", help="Mark panels (a), (b) ...")] = False,
 ) -> Answer:
     """Figures of a run, to look at or to print."""
+    require("matplotlib", "figures")
     import condyle
 
     from ..report.figures import PLOTS, save_each
@@ -44,6 +58,8 @@ def plot(
         then = command_line("plot", RESULT) if RESULT.is_file() else "condyle run --figures"
         return Answer(text, {"figures": shows}, then, "result")
     data = condyle.open_solution(solution)
-    files = save_each({name: PLOTS[name] for name in figure or PLOTS}, data, output_folder(out))
+    wishes = {"style": style, "title": title, "letters": letters}
+    plots = {name: partial(PLOTS[name], **wishes) for name in figure or PLOTS}
+    files = save_each(plots, data, output_folder(out))
     text = "\n".join(f"Wrote {path}" for path in files)
     return Answer(text, {"files": files}, command_line("report", solution))

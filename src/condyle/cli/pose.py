@@ -10,7 +10,7 @@ import typer
 
 from . import options
 from .answer import Answer, command_line, files_line
-from .app import COMPUTE, command
+from .command import COMPUTE, command
 
 
 @command(COMPUTE, example="condyle pose jaw.toml --joints encoders.csv --out poses.csv")
@@ -19,12 +19,29 @@ def pose(
     joints: Annotated[
         Path,
         typer.Option(
-            help="Joint coordinates (CSV): joint_CHAIN for each chain (rad, or m for a slider), "
-            "zero at home, and t (s) if you like."
+            help="Joint coordinates (CSV or Parquet): joint_CHAIN for each chain (rad, or m for a "
+            "slider), zero at home. With a column t (s) each row follows the one before, else each "
+            "stands alone and follows from home."
         ),
     ],
-    out: Annotated[Path, typer.Option(help="File for the poses (CSV).")],
+    out: Annotated[Path, typer.Option(help="File for the poses (.csv or .parquet).")],
     flag: options.Flag = False,
+    tolerance: Annotated[
+        float,
+        typer.Option(
+            min=0.0,
+            help="Largest difference of a joint of the pose from the given one (rad, or m).",
+        ),
+    ] = 1e-6,
+    every: Annotated[
+        bool,
+        typer.Option(
+            "--all", help="List the assembly modes that a search finds; it may miss some."
+        ),
+    ] = False,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Of the search of --all. Default: 0.")
+    ] = None,
 ) -> Answer:
     """Where the platform is, from what encoders read.
 
@@ -33,8 +50,18 @@ def pose(
     """
     import condyle
 
-    from ..results.poses import pose_file
+    from ..errors import UnsupportedError
+    from ..results.poses import ModesReport, PoseReport, modes_file, pose_file
 
-    report = pose_file(condyle.load(mechanism), joints, out, flag)
+    if every and flag:
+        raise UnsupportedError("--all lists all poses of a row, be it none; leave out --flag")
+    if seed is not None and not every:
+        raise UnsupportedError("--seed is of the search of --all; add that, or leave --seed out")
+    machine = condyle.load(mechanism)
+    report: ModesReport | PoseReport
+    if every:
+        report = modes_file(machine, joints, out, seed or 0, tolerance)
+    else:
+        report = pose_file(machine, joints, out, flag, tolerance)
     text = f"{report}\n{files_line([out])}"
     return Answer(text, asdict(report) | {"files": [out]}, command_line("view", mechanism))

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .answer import Answer, command_line
-from .app import BEGIN, command
+from .command import BEGIN, command
 from .inputs import output_folder
 
 

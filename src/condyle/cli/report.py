@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
+from ..extras import require
 from .answer import Answer, command_line
-from .app import LOOK, command
+from .command import LOOK, command
 
 
 @command(LOOK, example="condyle report results/masticatory.nc")
@@ -27,12 +28,12 @@ def report(
     One HTML file that opens without a network: the moving mechanism, linked plots, tables and
     every warning.
     """
-    import condyle
-
+    require("plotly", "report")
     from ..report.page import write_report
 
-    data = condyle.open_solution(solution)
-    path = write_report(data, out or solution.with_suffix(".html"), files=[solution, *(file or ())])
+    path = write_report(
+        solution, out or solution.with_suffix(".html"), files=[solution, *(file or ())]
+    )
     size = path.stat().st_size
     return Answer(
         f"Wrote {path} ({size / 1e6:.1f} MB); open it in a browser",

@@ -9,8 +9,8 @@ import typer
 
 from . import options
 from .answer import Answer, command_line, files_line
-from .app import COMPUTE, command
-from .inputs import file_stem, motion_and_load, output_folder, require_inside, warn
+from .command import COMPUTE, command
+from .inputs import file_stem, motion_and_load, output_folder, require_drawing, warn
 
 
 @command(
@@ -25,10 +25,11 @@ def run(
     formulation: options.Formulation = "virtual_power",
     route: options.Route = "core",
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("results"),
-    units: options.Units = "m,rad",
+    units: options.Units = None,
     landmark: options.Landmark = None,
     smooth: options.Smooth = None,
     rate: options.Rate = None,
+    trim: options.Trim = 0.0,
     figures: Annotated[bool, typer.Option("--figures", help="Draw figures too.")] = False,
     reactions: options.Reactions = False,
     report: Annotated[
@@ -43,16 +44,18 @@ def run(
 
     Without arguments: the bundled chewing robot, a synthetic chewing path and bite force.
     """
+    require_drawing(figures, report)
     import condyle
 
     from ..results.summary import summarize
+    from ..results.warnings import refuse
 
     machine = condyle.load(mechanism)
-    path, acting = motion_and_load(machine, motion, load, units, landmark, smooth, rate)
+    path, acting = motion_and_load(machine, motion, load, units, landmark, smooth, rate, trim)
     model = condyle.derive(machine, formulation, route, backend)
     solution = model.solve(path, acting, load_point, flag, reactions, threads)
     if strict:
-        require_inside(solution.warnings)
+        refuse(solution.notices)
     folder, stem = output_folder(out), file_stem(machine.name)
     files = [folder / f"{stem}.nc", folder / f"{stem}.csv"]
     solution.save(*files)
@@ -66,7 +69,7 @@ def run(
         inputs = [file for file in (motion, load) if file is not None]
         inputs += [Path(mechanism)] if Path(mechanism).is_file() else []
         files.append(write_report(solution, folder / f"{stem}.html", files=inputs))
-    warn(solution.warnings)
+    warn([*path.warnings, *acting.warnings, *solution.warnings])
     summary = summarize(solution)
     return Answer(
         f"{summary}\n\n{files_line(files)}",

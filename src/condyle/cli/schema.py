@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 from .answer import Answer
-from .app import UPKEEP, command
+from .command import UPKEEP, command
 
 
 @command(UPKEEP, example="condyle schema > condyle.schema.json")

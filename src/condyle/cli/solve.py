@@ -9,7 +9,7 @@ import typer
 
 from . import options
 from .answer import Answer, command_line
-from .app import COMPUTE, command
+from .command import COMPUTE, command
 from .inputs import warn
 
 
@@ -19,12 +19,12 @@ def solve(
     states: Annotated[
         Path,
         typer.Option(
-            help="States to solve (CSV), one a row: pose coordinates such as X, Y (m), alpha, "
-            "beta (rad), their rates dX ... (per s) and accelerations ddX ... (per s^2), and if "
-            "you like Fx, Fy, Fz (N), Mx, My, Mz (N m)."
+            help="States to solve (CSV or Parquet), one a row: pose coordinates such as X, Y (m), "
+            "alpha, beta (rad), their rates dX ... (per s) and accelerations ddX ... (per s^2), "
+            "and if you like some of Fx, Fy, Fz (N), Mx, My, Mz (N m)."
         ),
     ],
-    out: Annotated[Path, typer.Option(help="File for the results (CSV).")],
+    out: Annotated[Path, typer.Option(help="File for the results (.csv or .parquet).")],
     load_point: options.LoadPoint = None,
     formulation: options.Formulation = "virtual_power",
     route: options.Route = "core",

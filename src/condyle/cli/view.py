@@ -7,9 +7,10 @@ from typing import Annotated
 
 import typer
 
+from ..extras import require
 from . import options
 from .answer import command_line
-from .app import LOOK, app
+from .command import LOOK, app
 
 
 @app.command(rich_help_panel=LOOK, epilog="Example: condyle view jaw.toml")
@@ -27,6 +28,7 @@ def view(
     A page of this machine alone: move the platform and read torques, contact forces and reach, or
     play back a run. It stays until Ctrl-C.
     """
+    require("viser", "view")
     from ..view import serve
 
     serve(None if solution else mechanism, solution, port=port, open_browser=browser)

@@ -7,7 +7,7 @@ join in the order in which they are ready.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from . import operations
@@ -17,6 +17,9 @@ from .graph import Graph, Node, Value, reachable
 def latency(node: Node) -> int:
     """Cycles from a node's arguments to its value."""
     return operations.latency(node.op) if node.args else 0
+
+
+Note = Callable[[Value], Value]  # remembers when a new value is ready
 
 
 @dataclass(frozen=True)
@@ -108,7 +111,7 @@ def _inside(graph: Graph, order: Sequence[Value], uses: dict[Value, int]) -> set
     return inside
 
 
-def _product(new: Graph, factors: list[Value], ready: dict[Value, int], note) -> Value:
+def _product(new: Graph, factors: list[Value], ready: dict[Value, int], note: Note) -> Value:
     """Factors that are ready first are multiplied first."""
     rest = sorted(factors, key=lambda x: ready[x])
     while len(rest) > 1:
@@ -117,7 +120,7 @@ def _product(new: Graph, factors: list[Value], ready: dict[Value, int], note) ->
     return rest[0]
 
 
-def _sum(new: Graph, terms: list[Term], chain: int, note) -> Value:
+def _sum(new: Graph, terms: list[Term], chain: int, note: Note) -> Value:
     if len(terms) > chain:
         products = [t for t in terms if len(t.factors) > 1]
         plain = [t for t in terms if len(t.factors) == 1]

@@ -64,7 +64,8 @@ class Singularity:
     @property
     def rank(self) -> np.ndarray:
         """Rank of J_W, (N,): singular values above `SINGULAR` times the largest."""
-        return (self.J_W_sigma > SINGULAR * self.J_W_sigma[:, :1]).sum(axis=1)
+        least = SINGULAR * self.J_W_sigma[:, 0]
+        return np.add.reduce([sigma > least for sigma in self.J_W_sigma.T], dtype=np.int8)
 
     def kind(self, threshold: float = NEAR) -> np.ndarray:
         """Index into `KINDS` of what each sample is near to, (N,)."""

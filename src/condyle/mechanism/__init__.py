@@ -1,7 +1,9 @@
 """What the machine is: platform, chains, contacts, surfaces; files in, files out."""
 
-from .files import bundled_mechanisms, bundled_text, dump, dumps, json_schema, load, parse
+from .files import json_schema, load, parse
+from .library import bundled_mechanisms, bundled_text
 from .mechanism import COORDINATES, Contact, Mechanism, Platform
+from .writing import dump, dumps
 
 __all__ = [
     "COORDINATES",

@@ -6,86 +6,63 @@ A family's mathematics is in `condyle.kinematics.chain`.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
 
-from .quantities import (
-    Direction,
-    Fraction,
-    Name,
-    NonNegative,
-    NonNegativeLength,
-    Point,
-    Positive,
-    Table,
+from .bodies import (
+    Crank,
+    LegBody,
+    LinearActuator,
+    Rod,
+    RotaryActuator,
+    Slider,
+    across,
+    check_rod_length,
+    distance,
 )
+from .quantities import Direction, Name, Point
+from .table import Table
 
 AXIS_TOLERANCE = math.radians(0.5)  # how far an axis may be off the perpendicular
 NO_BRANCH = 1e-9  # sine of the transmission angle below which home has no branch
 
 
-class Rod(Table):
-    """A rod with two ball ends, symmetric about its line."""
+class Limits(NamedTuple):
+    """What an actuator can do at most, None where nothing is said.
 
-    mass: NonNegative
-    com: Fraction = Field(description="mass centre: fraction of the way to the platform joint")
-    transverse: NonNegative = Field(description="central moment of inertia across the rod")
-    axial: NonNegative = Field(description="moment of inertia along the rod")
+    effort: [N m or N];  speed: [rad/s or m/s].
+    """
 
-    @field_validator("axial")
-    @classmethod
-    def _triangle(cls, axial: float, info: ValidationInfo) -> float:
-        return check_rod_inertia(axial, info.data.get("transverse"))
-
-
-def check_rod_inertia(axial: float, transverse: float | None) -> float:
-    """The triangle inequality on the principal moments (transverse, transverse, axial)."""
-    if transverse is not None and axial > 2 * transverse * (1 + 1e-12):
-        raise ValueError(
-            f"inertia breaks the triangle inequality: axial {axial:g} kg m^2 is more than "
-            f"twice transverse {transverse:g} kg m^2; no rigid body has such moments"
-        )
-    return axial
-
-
-class Crank(Table):
-    inertia: Positive = Field(description="about the shaft; its mass centre is on the shaft")
-
-
-class Slider(Table):
-    mass: NonNegative = Field(description="its mass centre is at its joint")
-
-
-class LegBody(Table):
-    """One of the two bodies of a telescopic leg, symmetric about the leg's line."""
-
-    mass: NonNegative
-    com: NonNegativeLength = Field(description="mass centre: distance from the body's own joint")
-    transverse: NonNegative = Field(description="central moment of inertia across the leg")
-    axial: NonNegative = Field(description="moment of inertia along the leg")
-
-    @field_validator("axial")
-    @classmethod
-    def _triangle(cls, axial: float, info: ValidationInfo) -> float:
-        return check_rod_inertia(axial, info.data.get("transverse"))
-
-
-class RotaryActuator(Table):
-    torque_limit: Positive | None = None
-    speed_limit: Positive | None = None
-
-
-class LinearActuator(Table):
-    force_limit: Positive | None = None
-    speed_limit: Positive | None = None
+    effort: float | None
+    speed: float | None
 
 
 class ChainTable(Table):
     """What every family has: a name and a joint on the platform."""
 
     name: Name
+
+    @property
+    def lengths(self) -> dict[str, float]:
+        """Of its links at home [m]."""
+        return {}
+
+    @property
+    def masses(self) -> dict[str, float]:
+        """Of its moving bodies [kg], those that have one."""
+        return {}
+
+    @property
+    def radii_of_gyration(self) -> dict[str, float]:
+        """Radii of gyration of its bodies across themselves [m], by the link they belong to."""
+        return {}
+
+    @property
+    def fixed_points(self) -> tuple[tuple[float, ...], ...]:
+        """Where it is at home, in {S} [m]; its joint on the platform apart."""
+        return ()
 
 
 class RSS(ChainTable):
@@ -99,6 +76,23 @@ class RSS(ChainTable):
     crank: Crank
     coupler: Rod
     actuator: RotaryActuator = RotaryActuator()
+
+    @property
+    def lengths(self) -> dict[str, float]:
+        crank, coupler = (self.base, self.crank_tip), (self.crank_tip, self.platform)
+        return {"crank": distance(*crank), "coupler": distance(*coupler)}
+
+    @property
+    def masses(self) -> dict[str, float]:
+        return {"coupler": self.coupler.mass}
+
+    @property
+    def radii_of_gyration(self) -> dict[str, float]:
+        return {"coupler": across(self.coupler)}
+
+    @property
+    def fixed_points(self) -> tuple[tuple[float, ...], ...]:
+        return self.base, self.crank_tip
 
     @field_validator("crank_tip")
     @classmethod
@@ -150,6 +144,22 @@ class PSS(ChainTable):
     rod: Rod
     actuator: LinearActuator = LinearActuator()
 
+    @property
+    def lengths(self) -> dict[str, float]:
+        return {"rod": distance(self.base, self.platform)}
+
+    @property
+    def masses(self) -> dict[str, float]:
+        return {"slider": self.slider.mass, "rod": self.rod.mass}
+
+    @property
+    def radii_of_gyration(self) -> dict[str, float]:
+        return {"rod": across(self.rod)}
+
+    @property
+    def fixed_points(self) -> tuple[tuple[float, ...], ...]:
+        return (self.base,)
+
     @field_validator("platform")
     @classmethod
     def _rod(cls, joint: Any, info: ValidationInfo) -> Any:
@@ -178,6 +188,22 @@ class SPS(ChainTable):
     piston: LegBody = Field(description="the body at M")
     actuator: LinearActuator = LinearActuator()
 
+    @property
+    def lengths(self) -> dict[str, float]:
+        return {"leg": distance(self.base, self.platform)}
+
+    @property
+    def masses(self) -> dict[str, float]:
+        return {"cylinder": self.cylinder.mass, "piston": self.piston.mass}
+
+    @property
+    def radii_of_gyration(self) -> dict[str, float]:
+        return {"leg": max(across(self.cylinder), across(self.piston))}
+
+    @property
+    def fixed_points(self) -> tuple[tuple[float, ...], ...]:
+        return (self.base,)
+
     @field_validator("platform")
     @classmethod
     def _leg(cls, joint: Any, info: ValidationInfo) -> Any:
@@ -186,9 +212,12 @@ class SPS(ChainTable):
         return joint
 
 
-def check_rod_length(rod: np.ndarray, name: str, start: str) -> None:
-    if not np.linalg.norm(rod):
-        raise ValueError(f"the {name} has zero length: {start} and platform are the same point")
-
-
 Chain = Annotated[RSS | PSS | SPS, Field(discriminator="kind")]
+
+
+def limits(chain: RSS | PSS | SPS) -> Limits:
+    """Limits of a chain's actuator, whatever its effort is called in the file."""
+    actuator = chain.actuator
+    if isinstance(actuator, RotaryActuator):
+        return Limits(actuator.torque_limit, actuator.speed_limit)
+    return Limits(actuator.force_limit, actuator.speed_limit)

@@ -3,13 +3,16 @@ the contacts hold at all."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import combinations
+from typing import Protocol
 
 import casadi as ca
 import numpy as np
 
-from .mechanism import COORDINATES, Contact, Mechanism
+from .chain import Chain
+from .contact import Contact
+from .coordinates import COORDINATES
 from .surface import Parallel
 
 DEPENDENT_ORDER = ("Z", "gamma", "alpha", "beta", "Y", "X")
@@ -18,7 +21,18 @@ HOME_ERROR = 1e-5  # metres off the surface at home: an error beyond this,
 HOME_WARNING = 1e-9  # a warning beyond that
 
 
-def characteristic_length(mechanism: Mechanism) -> float:
+class Parts(Protocol):
+    """What the geometry at home is decided by: a mechanism, or what is valid of one."""
+
+    @property
+    def chains(self) -> tuple[Chain, ...]: ...
+    @property
+    def contacts(self) -> tuple[Contact, ...]: ...
+    @property
+    def dependent(self) -> tuple[str, ...] | None: ...
+
+
+def characteristic_length(mechanism: Parts) -> float:
     """Mean distance of the platform joints and contact points from O_M [m].
 
     It multiplies angles wherever lengths and angles meet in one norm.
@@ -36,7 +50,7 @@ def contact_gradient(contact: Contact) -> tuple[float, np.ndarray]:
     return float(value), np.asarray(gradient).ravel()
 
 
-def home_residuals(mechanism: Mechanism) -> np.ndarray:
+def home_residuals(mechanism: Parts) -> np.ndarray:
     """Distance of each contact point from its surface at home, (k,) [m]."""
     return np.array([home_residual(contact) for contact in mechanism.contacts])
 
@@ -47,7 +61,7 @@ def home_residual(contact: Contact) -> float:
     return value / steepness if steepness else value
 
 
-def constraint_jacobian(mechanism: Mechanism) -> np.ndarray:
+def constraint_jacobian(mechanism: Parts) -> np.ndarray:
     """C = d phi / d X_EE at home, (k, 6), angles multiplied by the characteristic length."""
     length = characteristic_length(mechanism)
     rows = []
@@ -61,6 +75,8 @@ def constraint_jacobian(mechanism: Mechanism) -> np.ndarray:
 def condition_of(jacobian: np.ndarray, names: tuple[str, ...]) -> float:
     """Condition number of the columns of C that belong to `names`; inf when they vanish."""
     columns = jacobian[:, [COORDINATES.index(name) for name in names]]
+    if not np.isfinite(jacobian).all():
+        return float("inf")
     singular = np.linalg.svd(columns, compute_uv=False)
     scale = np.linalg.norm(jacobian, 2)
     # Rounding must not turn a coordinate the contacts ignore into one they determine.
@@ -69,7 +85,7 @@ def condition_of(jacobian: np.ndarray, names: tuple[str, ...]) -> float:
     return float(singular[0] / singular[-1])
 
 
-def usable_sets(mechanism: Mechanism) -> Iterator[tuple[str, ...]]:
+def usable_sets(mechanism: Parts) -> Iterator[tuple[str, ...]]:
     """Sets of dependent coordinates that the contacts determine at home, best known first."""
     jacobian = constraint_jacobian(mechanism)
     for names in combinations(DEPENDENT_ORDER, len(mechanism.contacts)):
@@ -77,27 +93,44 @@ def usable_sets(mechanism: Mechanism) -> Iterator[tuple[str, ...]]:
             yield names
 
 
-def dependent_coordinates(mechanism: Mechanism) -> tuple[str, ...]:
+def dependent_coordinates(mechanism: Parts) -> tuple[str, ...]:
     """The coordinates that the contacts determine: (Z, gamma) for the paper's mechanism.
 
     Those of the file, else the first set in lexicographic order of Z, gamma, alpha, beta, Y, X
-    whose columns of C have a condition number below 1e4. For `check_home`ed mechanisms there is
-    one.
+    whose columns of C have a condition number below 1e4. A checked mechanism has one.
     """
     if not mechanism.contacts:
         return ()
     return mechanism.dependent or next(usable_sets(mechanism))
 
 
-def independent_coordinates(mechanism: Mechanism) -> tuple[str, ...]:
+def independent_coordinates(mechanism: Parts) -> tuple[str, ...]:
     """The remaining coordinates, in the order of X_EE: q_EE of [Cheng2023] eq. (7)."""
     dependent = dependent_coordinates(mechanism)
     return tuple(name for name in COORDINATES if name not in dependent)
 
 
+def home_problems(mechanism: Parts) -> list[str]:
+    """Contacts that are off their surface at home, or cannot hold the platform.
+
+    Those whose surface is only a note of one cannot be judged.
+    """
+    if not all(contact.surface.known for contact in mechanism.contacts):
+        return list(off_surface(c for c in mechanism.contacts if c.surface.known))
+    return list(off_surface(mechanism.contacts)) or list(holding_problems(mechanism))
+
+
+def off_surface(contacts: Iterable[Contact]) -> Iterator[str]:
+    """A line for each contact that cannot be at its point at home."""
+    for contact in contacts:
+        if (problem := home_problem(contact)) is not None:
+            yield f'contact "{contact.name}": {problem}'
+
+
 def home_problem(contact: Contact) -> str | None:
     """Why the contact cannot be at its point at home, or None."""
-    off, locus = home_residual(contact), contact.locus
+    with np.errstate(all="ignore"):
+        off, locus = home_residual(contact), contact.locus
     if not np.isfinite(off):
         if isinstance(locus, Parallel):
             return f"{_ball(contact)} finds no point of the surface to touch"
@@ -118,7 +151,7 @@ def _ball(contact: Contact) -> str:
     return f'a ball of radius {contact.ball_radius * 1e3:g} mm on the side "{contact.side}"'
 
 
-def holding_problems(mechanism: Mechanism) -> Iterator[str]:
+def holding_problems(mechanism: Parts) -> Iterator[str]:
     """Why the contacts do not determine the dependent coordinates, if they do not."""
     if not mechanism.contacts:
         return
@@ -140,10 +173,10 @@ def holding_problems(mechanism: Mechanism) -> Iterator[str]:
             )
 
 
-def home_warnings(mechanism: Mechanism) -> list[str]:
+def home_warnings(mechanism: Parts) -> list[str]:
     """Residuals at home that are small enough to accept and large enough to mention."""
     return [
-        f'contact "{name}": the point is {off * 1e3:+.3g} mm off its surface at home'
-        for name, off in zip(mechanism.contact_names, home_residuals(mechanism), strict=True)
+        f'contact "{contact.name}": the point is {off * 1e3:+.3g} mm off its surface at home'
+        for contact, off in zip(mechanism.contacts, home_residuals(mechanism), strict=True)
         if abs(off) > HOME_WARNING
     ]

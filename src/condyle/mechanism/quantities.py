@@ -1,66 +1,123 @@
-"""The kinds of number a mechanism file holds, and how each becomes SI.
+"""The kinds of number a mechanism file holds, how each becomes SI, and how large it may be.
 
 A file states every length in its `length_unit`; all else is SI already. The unit stands in the
 type of a field, so that reading a file is one validation with the context `{"per_metre": 1000.0}`
 for millimetres. Without a context (in Python) numbers are taken as SI.
+
+Beyond the bounds here no machine was ever built, and products of such numbers overflow.
 """
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Callable
+from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo
+from pydantic import AfterValidator, Field, ValidationInfo
 
 PER_METRE = {"m": 1.0, "mm": 1000.0}
+LONGEST, SHORTEST = 1e5, 1e-9  # metres; the shortest of those that must be positive
+LARGEST, SMALLEST = 1e6, 1e-18  # of all else, in SI; the smallest of what is not zero
+LARGEST_LIMIT = 1e12  # N m, N, rad/s or m/s: some write a limit that is none
+NAME_CHARACTERS, NAME_BYTES = 80, 160  # with an ending it names a file and a column
 
 
-def _per_metre(info: ValidationInfo) -> float:
+def per_metre(info: ValidationInfo) -> float:
+    """How many of the file's lengths are in a metre."""
     return (info.context or {}).get("per_metre", 1.0)
 
 
-def _length(value: float, info: ValidationInfo) -> float:
-    # Division rounds once: 13.215 mm becomes the double nearest to 0.013215.
-    return value / _per_metre(info)
+def _unit(info: ValidationInfo) -> str:
+    return "mm" if per_metre(info) == 1000.0 else "m"
+
+
+def _within(value: float, least: float, most: float, unit: str) -> None:
+    if abs(value) > most:
+        raise ValueError(f"expected at most {most:g}{unit}, got {value:g}")
+    if 0 < abs(value) < least:
+        raise ValueError(f"expected at least {least:g}{unit}, got {value:g}")
+
+
+def _bounded(unit: str, least: float = 0.0, most: float = LARGEST) -> AfterValidator:
+    """Refuses a number that is out of all proportion."""
+
+    def check(value: float) -> float:
+        _within(value, least, most, f" {unit}".rstrip())
+        return value
+
+    return AfterValidator(check)
+
+
+def _in_metres(least: float = 0.0) -> AfterValidator:
+    def convert(value: float, info: ValidationInfo) -> float:
+        scale = per_metre(info)
+        _within(value, least * scale, LONGEST * scale, f" {_unit(info)}")
+        # Division rounds once: 13.215 mm becomes the double nearest to 0.013215.
+        return value / scale
+
+    return AfterValidator(convert)
 
 
 def _curvature(value: float, info: ValidationInfo) -> float:
-    return value * _per_metre(info)
+    scale = per_metre(info)
+    _within(value, 0.0, LARGEST / scale, f" per {_unit(info)}")
+    return value * scale
 
 
 def _name(value: str) -> str:
     if value != value.strip() or any(c in ',;"' or not c.isprintable() for c in value):
-        raise ValueError("a name has no comma, semicolon, quote or outer space")
+        raise ValueError("a name has no comma, semicolon, quote, control character or outer space")
+    if len(value) > NAME_CHARACTERS or len(value.encode()) > NAME_BYTES:
+        raise ValueError(
+            f"a name has at most {NAME_CHARACTERS} characters ({NAME_BYTES} bytes), since files "
+            f"and columns are called by it; got {len(value)}"
+        )
     return value
 
 
-def _interval(value: tuple[float, float]) -> tuple[float, float]:
+def _interval(value: tuple[float, float], info: ValidationInfo) -> tuple[float, float]:
     if not value[0] < value[1]:
-        raise ValueError(f"expected [lower, upper] with lower < upper, got {list(value)}")
+        scale = per_metre(info)
+        low, high = (f"{v * scale:.9g}" for v in value)
+        raise ValueError(
+            f"expected [lower, upper] with lower < upper, got [{low}, {high}] {_unit(info)}"
+        )
     return value
 
 
 def _nonzero(value: tuple[float, float, float]) -> tuple[float, float, float]:
     if not any(value):
         raise ValueError("a direction cannot be the zero vector")
+    if max(map(abs, value)) < 1 / LARGEST:
+        raise ValueError(f"a direction needs an entry of at least {1 / LARGEST:g}")
     return value
 
 
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Positive = Annotated[Number, Field(gt=0)]
-NonNegative = Annotated[Number, Field(ge=0)]
-Fraction = Annotated[Number, Field(ge=0, le=1)]
-Length = Annotated[Number, AfterValidator(_length)]
-PositiveLength = Annotated[Positive, AfterValidator(_length)]
-NonNegativeLength = Annotated[NonNegative, AfterValidator(_length)]
-Curvature = Annotated[Number, AfterValidator(_curvature)]
+def listed(value: Any) -> Any:
+    """A numpy array is as good as a list."""
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+_number: Callable[..., Any] = Field(strict=True, allow_inf_nan=False)
+_Any = Annotated[float, _number]
+_Above = Annotated[_Any, Field(gt=0)]
+_NotBelow = Annotated[_Any, Field(ge=0)]
+
+Number = Annotated[_Any, _bounded("")]
+Acceleration = Annotated[_Any, _bounded("m/s^2")]
+Fraction = Annotated[_Any, Field(ge=0, le=1)]
+Mass = Annotated[_Above, _bounded("kg", SMALLEST)]
+MassOrNone = Annotated[_NotBelow, _bounded("kg", SMALLEST)]
+Moment = Annotated[_Above, _bounded("kg m^2", SMALLEST)]
+MomentOrNone = Annotated[_NotBelow, _bounded("kg m^2", SMALLEST)]
+Product = Annotated[_Any, _bounded("kg m^2")]
+Limit = Annotated[_Above, _bounded("", SMALLEST, LARGEST_LIMIT)]
+Length = Annotated[_Any, _in_metres()]
+PositiveLength = Annotated[_Above, _in_metres(SHORTEST)]
+NonNegativeLength = Annotated[_NotBelow, _in_metres()]
+Curvature = Annotated[_Any, AfterValidator(_curvature)]
 Vector = tuple[Number, Number, Number]
+Gravity = tuple[Acceleration, Acceleration, Acceleration]
 Point = tuple[Length, Length, Length]
 Direction = Annotated[Vector, AfterValidator(_nonzero)]
 Interval = Annotated[tuple[Length, Length], AfterValidator(_interval)]
 Name = Annotated[str, Field(min_length=1), AfterValidator(_name)]
-
-
-class Table(BaseModel):
-    """A table of the file: frozen, and with no key that it does not know."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)

@@ -10,12 +10,10 @@ import numpy as np
 from ..backends.choose import Backend
 from ..backends.kernel import AGAIN
 from ..errors import InputError, did_you_mean
-from ..kinematics.contact import indices
 from ..mechanism.home import (
     MAX_CONDITION,
     condition_of,
     constraint_jacobian,
-    independent_coordinates,
     usable_sets,
 )
 from ..mechanism.mechanism import COORDINATES, Mechanism
@@ -27,8 +25,6 @@ from .follow import Follow, PlatformMotion
 
 if TYPE_CHECKING:
     from ..backends.kernel import Kernel
-
-States = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 class Closure:
@@ -67,7 +63,7 @@ class Closure:
             answer.values[name].T for name in ("pose", "pose_rate", "pose_acceleration")
         )
         found = (pose, rate, acceleration)
-        reached = answer.status == Status.OK
+        reached = answer.status == Status.ok
         again = np.flatnonzero(answer.status == AGAIN)
         if again.size:
             self._follow = self._follow or Follow(*self._robust)
@@ -79,36 +75,6 @@ class Closure:
             for target in found:
                 target[~reached] = np.nan
         return PlatformMotion(pose, rate, acceleration, reached)
-
-
-def closed_states(
-    mechanism: Mechanism,
-    names: Sequence[str],
-    given: States,
-    landmark: str | None = None,
-    backend: Backend | None = None,
-    threads: int | None = None,
-) -> States:
-    """q_EE and its rates, (N, m) each, from other coordinates or a landmark's displacement.
-
-    Samples that the contacts cannot meet come back as NaN.
-    """
-    independent = independent_coordinates(mechanism)
-    if landmark is None and tuple(names) == independent:
-        return given
-    if landmark is None and sorted(names) == sorted(independent):
-        order = [list(names).index(name) for name in independent]
-        return tuple(a[:, order] for a in given)  # type: ignore[return-value]
-    closure = Closure(mechanism, names, landmark, backend)
-    if landmark is not None:
-        # The fourth condition prescribes zero: the midpoint of the contacts stays put.
-        given = tuple(np.column_stack([a, np.zeros(len(a))]) for a in given)  # type: ignore[assignment]
-    else:
-        order = [list(names).index(name) for name in closure.names]
-        given = tuple(a[:, order] for a in given)  # type: ignore[assignment]
-    found = closure.solve(*given, threads)
-    columns = indices(independent)
-    return found.pose[:, columns], found.rate[:, columns], found.acceleration[:, columns]
 
 
 def require_independent(mechanism: Mechanism, names: Sequence[str]) -> None:

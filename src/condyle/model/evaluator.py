@@ -28,7 +28,7 @@ from ..mechanism.home import (
     independent_coordinates,
 )
 from ..mechanism.mechanism import Mechanism
-from ..motion import Motion
+from ..motion import Motion, resolve_landmark, resolve_load_point
 from ..progress import step
 from ..questions import Prescribed, Question
 from ..questions.equations import part_names
@@ -36,11 +36,10 @@ from ..questions.inverse import OUTPUTS
 from ..questions.numbers import Layout, require_closed_form, specialised
 from ..questions.structure import structure_of
 from ..status import Status
-from .closing import closed_states
+from .closing import Closure
 from .data import Configuration, Efforts, Evaluation
 from .robust import Robust
 
-DEFAULT_LOAD_POINT = "right_molar"
 CONDITION = "condition"
 EVERYTHING = ("contact", "share", "motion", "joint", "configuration")
 # Names of results, by what is asked for.
@@ -88,6 +87,7 @@ class Evaluator:
             self._numbers = Layout.of(structure).numbers(mechanism)
             self._structure = specialised(structure, self._numbers)
         self._kernels: dict[Any, Kernel] = {}
+        self._closures: dict[Any, Closure] = {}
         self.derivation_seconds = time.perf_counter() - start
 
     # -- what it is ------------------------------------------------------------------------
@@ -152,7 +152,7 @@ class Evaluator:
         values, status = self._solve(q, q1, q2, load, wanted, threads)
         effort = values["effort"].T
         if status.any():
-            effort[status != Status.OK] = np.nan
+            effort[status != Status.ok] = np.nan
         others = {
             name: _sample_first(name, values[name])
             for output in outputs
@@ -298,7 +298,7 @@ class Evaluator:
         """X_EE and its rates, (N, 6) each, and where the contacts can be met."""
         answer = self.kernel("motion").run({"q": q, "q1": q1, "q2": q2})
         poses = {name: a.T for name, a in answer.values.items()}
-        reached = answer.status == Status.OK
+        reached = answer.status == Status.ok
         again = np.flatnonzero(answer.status == AGAIN)
         if again.size:
             better, reached[again] = self._robust.motion(q[again], q1[again], q2[again])
@@ -309,20 +309,12 @@ class Evaluator:
     # -- motions and loads -------------------------------------------------------------------
 
     def load_point(self, name: str | None) -> np.ndarray:
-        """Where a load acts, (3,) [m] in {M}: a named point, or right_molar if there is one.
+        """Where a load acts, (3,) [m] in {M}: a named point; else right_molar, or the only one.
 
         Raises: InputError: if the mechanism has no such point.
         """
         points = self.mechanism.platform.points
-        if name is None and DEFAULT_LOAD_POINT not in points:
-            raise InputError(
-                f"the load needs a point: this mechanism has no {DEFAULT_LOAD_POINT}. "
-                f"Choose one with --load-point (load point).{did_you_mean('', points)}"
-            )
-        name = name or DEFAULT_LOAD_POINT
-        if name not in points:
-            raise InputError(f'the platform has no point "{name}".{did_you_mean(name, points)}')
-        return np.array(points[name])
+        return np.array(points[resolve_load_point(name, points)])
 
     def independent_motion(self, motion: Motion) -> tuple[States, float | None]:
         """q_EE and its rates, (N, m) each, from a motion of any kind.
@@ -335,7 +327,9 @@ class Evaluator:
             columns = indices(self.independent)
             q, q1, q2 = (a[:, columns] for a in given)
             return (q, q1, q2), self.contact_residual(motion.value)
-        landmark = motion.landmark if motion.kind == "landmark" else None
+        landmark = None
+        if motion.kind == "landmark":
+            landmark = resolve_landmark(motion.landmark, self.mechanism.platform.points)
         return self.independent_states(motion.names, *given, landmark), None
 
     def contact_residual(self, pose: np.ndarray) -> float:
@@ -359,7 +353,29 @@ class Evaluator:
         Samples that the contacts cannot meet come back as NaN.
         """
         given = (value, rate, acceleration)
-        return closed_states(self.mechanism, names, given, landmark, self.backend, threads)
+        if landmark is None and sorted(names) == sorted(self.independent):
+            if tuple(names) == self.independent:
+                return given
+            order = [list(names).index(name) for name in self.independent]
+            q, q1, q2 = (a[:, order] for a in given)
+            return q, q1, q2
+        closure = self._closure(tuple(names), landmark)
+        if landmark is None:
+            order = [list(names).index(name) for name in closure.names]
+            s, s1, s2 = (a[:, order] for a in given)
+        else:
+            # The fourth condition prescribes zero: the midpoint of the contacts stays put.
+            s, s1, s2 = (np.column_stack([a, np.zeros(len(a))]) for a in given)
+        found = closure.solve(s, s1, s2, threads)
+        columns = indices(self.independent)
+        q, q1, q2 = (a[:, columns] for a in (found.pose, found.rate, found.acceleration))
+        return q, q1, q2
+
+    def _closure(self, names: tuple[str, ...], landmark: str | None) -> Closure:
+        key = ("closure", names, landmark)
+        if key not in self._closures:
+            self._closures[key] = Closure(self.mechanism, names, landmark, self.backend)
+        return self._closures[key]
 
 
 def _names(outputs: Collection[str]) -> list[str]:

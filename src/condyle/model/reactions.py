@@ -41,7 +41,7 @@ def reactions(
         "contact_force": evaluation.contact_force,
     }
     values = model.kernel("reactions").run(inputs).values
-    failed = evaluation.status != Status.OK
+    failed = evaluation.status != Status.ok
     found = {}
     seen: dict[str, int] = {}
     for place in reaction_places(model.mechanism):

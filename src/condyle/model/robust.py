@@ -19,7 +19,7 @@ from ..kinematics.singularity import SINGULAR, ratio
 from ..questions import Prescribed, Question
 from ..questions.numbers import characteristic
 from ..questions.structure import Structure
-from ..status import Status
+from ..status import Status, judge
 from .follow import Follow
 
 Arrays = dict[str, np.ndarray]
@@ -83,7 +83,7 @@ class Robust:
         """X_EE and its rates, (N, 6) each, and where the contacts can be met."""
         answer = self._motion.run({"q": q, "q1": q1, "q2": q2})
         poses = {name: a.T.copy() for name, a in answer.values.items()}
-        reached = answer.status == Status.OK
+        reached = answer.status == Status.ok
         doubtful = np.flatnonzero(answer.status == AGAIN)
         if doubtful.size:
             found = self._follow.solve(q[doubtful], q1[doubtful], q2[doubtful])
@@ -112,11 +112,8 @@ class Robust:
         return mu * s["n_length"]
 
     def _judged(self, reached: np.ndarray, values: Arrays, effort: np.ndarray) -> np.ndarray:
-        status = np.full(len(reached), Status.OK, dtype=np.uint8)
         least, most = values["J_A_extremes"]
         sigma = values["J_W_sigma"]
         regular = np.minimum(ratio(least, most), ratio(sigma[-1], sigma[0])) >= SINGULAR
-        status[~np.isfinite(effort).all(axis=1)] = Status.OVERFLOW
-        status[~regular] = Status.SINGULAR
-        status[~(reached & (values["discriminant"] >= 0).all(axis=0))] = Status.UNREACHABLE
-        return status
+        assembled = reached & (values["discriminant"] >= 0).all(axis=0)
+        return judge(assembled, regular, np.isfinite(effort).all(axis=1))

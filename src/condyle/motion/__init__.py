@@ -1,7 +1,8 @@
 """Paths and loads: from files and arrays to clean samples, and tables back to files."""
 
-from condyle.motion.load import Load
-from condyle.motion.path import Motion
+from condyle.motion.load import Load, as_load
+from condyle.motion.path import Motion, as_motion
+from condyle.motion.points import resolve_landmark, resolve_load_point
 from condyle.motion.reference import (
     bundled_reference,
     reference_load,
@@ -12,11 +13,13 @@ from condyle.motion.smoothing import AUTO_CUTOFF, Smoothing
 from condyle.motion.table import Table, iter_table, read_table
 from condyle.motion.table_writer import TableWriter, write_table
 from condyle.motion.trial import trial_motion
-from condyle.motion.units import LANDMARK, POSE, Units, parse_units
+from condyle.motion.units import FORCE, LANDMARK, MOMENT, POSE, Units, parse_units
 
 __all__ = [
     "AUTO_CUTOFF",
+    "FORCE",
     "LANDMARK",
+    "MOMENT",
     "POSE",
     "Load",
     "Motion",
@@ -24,12 +27,16 @@ __all__ = [
     "Table",
     "TableWriter",
     "Units",
+    "as_load",
+    "as_motion",
     "bundled_reference",
     "iter_table",
     "parse_units",
     "read_table",
     "reference_load",
     "reference_motion",
+    "resolve_landmark",
+    "resolve_load_point",
     "trial_motion",
     "write_reference",
     "write_table",

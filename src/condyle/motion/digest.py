@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import os
-from pathlib import Path
 
 
 def digest(path: str | os.PathLike[str]) -> str | None:
     """SHA-256 of a file in hexadecimal; None for a pipe, which can be read only once."""
-    return hashlib.sha256(Path(path).read_bytes()).hexdigest() if os.path.isfile(path) else None
+    if not os.path.isfile(path):
+        return None
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -11,10 +11,10 @@ import numpy as np
 from condyle.errors import InputError
 from condyle.motion.arrays import as_samples, check_rising
 from condyle.motion.digest import digest
-from condyle.motion.table import read_table
-
-FORCE = ("Fx", "Fy", "Fz")
-MOMENT = ("Mx", "My", "Mz")
+from condyle.motion.frame import is_frame, table_from_frame
+from condyle.motion.suspicion import load_warnings
+from condyle.motion.table import Table, read_table
+from condyle.motion.units import FORCE, MOMENT
 
 _SLACK = 1e-9  # [s], by which times may miss the load's ends through rounding
 
@@ -28,6 +28,7 @@ class Load:
                 point: name of the platform point; None leaves the choice to the mechanism.
                 source: where the load came from, for messages.
                 sha256: hash of the file that was read, or None.
+                warnings: what looks wrong about it, for whoever reads the results.
     """
 
     t: np.ndarray
@@ -35,17 +36,34 @@ class Load:
     point: str | None = None
     source: str = "load"
     sha256: str | None = None
+    warnings: tuple[str, ...] = ()
 
     @classmethod
     def from_csv(cls, path: str | os.PathLike[str], point: str | None = None) -> Load:
-        """Read `t,Fx,Fy,Fz`, optionally with `Mx,My,Mz`, in SI."""
-        table = read_table(path, known=("t", *FORCE, *MOMENT))
-        t = table.require(["t"])[:, 0]
-        force = table.require(FORCE)
-        moment = table.require(MOMENT) if set(MOMENT) & set(table.columns) else None
-        check_rising(t, table.where)
-        load = cls.from_arrays(t, force, moment, point, table.source)
+        """Read a load file: `t` and some of `Fx,Fy,Fz,Mx,My,Mz`; what is not there is zero.
+
+        CSV, or Parquet if the name ends in .parquet. SI, unless the header names units.
+        """
+        load = cls._from_table(read_table(path, known=("t", *FORCE, *MOMENT)), point)
         return replace(load, sha256=digest(path))
+
+    @classmethod
+    def from_frame(cls, frame: Any, point: str | None = None, source: str = "load") -> Load:
+        """The same from a pandas DataFrame; its index is the time if no column is."""
+        table = table_from_frame(frame, ("t", *FORCE, *MOMENT), source)
+        return cls._from_table(table, point)
+
+    @classmethod
+    def _from_table(cls, table: Table, point: str | None) -> Load:
+        t = table.require(["t"])[:, 0]
+        given = [name for name in (*FORCE, *MOMENT) if name in table.columns]
+        if not given:
+            table.require(FORCE)
+        zero = np.zeros(table.rows)
+        wrench = np.column_stack([table.columns.get(name, zero) for name in (*FORCE, *MOMENT)])
+        check_rising(t, table.where)
+        load = cls.from_arrays(t, wrench, point=point, source=table.source)
+        return replace(load, warnings=(*table.warnings, *load.warnings))
 
     @classmethod
     def from_arrays(
@@ -56,16 +74,24 @@ class Load:
         point: str | None = None,
         source: str = "load",
     ) -> Load:
-        """Load through samples: t (N,) [s], force (N, 3) [N], moment (N, 3) [N m] or none."""
+        """Load through samples.
+
+        Args:   t: (N,) [s], rising.
+                force: (N, 3) [N]; or (N, 6) with the moment in the last three columns.
+                moment: (N, 3) [N m]; none by default.
+        Raises: InputError: for arrays that cannot be used.
+        """
         t = as_samples(t, "t", source)
         if len(t) == 0:
             raise InputError(f"{source}: no samples")
         check_rising(t, f"{source}, sample {{}}".format)
         wrench = np.zeros((len(t), 6))
+        if moment is None and np.shape(force) == wrench.shape:
+            force, moment = np.asarray(force)[:, :3], np.asarray(force)[:, 3:]
         wrench[:, :3] = _vectors(force, "force", source, len(t))
         if moment is not None:
             wrench[:, 3:] = _vectors(moment, "moment", source, len(t))
-        return cls(t, wrench, point, source)
+        return cls(t, wrench, point, source, warnings=load_warnings(source, t, wrench))
 
     @classmethod
     def constant(cls, force: Any, moment: Any = (0, 0, 0), point: str | None = None) -> Load:
@@ -101,17 +127,43 @@ class Load:
             raise InputError(
                 f"{self.source}: runs from {first:.9g} to {last:.9g} s, but the motion from"
                 f" {start:.9g} to {end:.9g} s; no load at {' and '.join(gaps)}."
-                " Add rows there, of zeros if nothing acts."
+                " Add rows there, of zeros if nothing acts. If one of them has its times in"
+                ' milliseconds, name its column "t [ms]".'
             )
 
 
+def as_load(load: Any) -> Load:
+    """A load from what people give for one: a Load, a path, a DataFrame; None is no load.
+
+    Raises: InputError: for anything else.
+    """
+    if isinstance(load, Load):
+        return load
+    if load is None:
+        return Load.zero()
+    if isinstance(load, str | os.PathLike):
+        return Load.from_csv(load)
+    if is_frame(load):
+        return Load.from_frame(load)
+    raise InputError(
+        f"load: got a {type(load).__name__}, expected a condyle.Load, the path of a file, or a "
+        "DataFrame. Arrays become one by Load.from_arrays(t, force, moment)"
+        + (". The order is solve(motion, load)" if type(load).__name__ == "Motion" else "")
+    )
+
+
 def _vectors(values: Any, name: str, source: str, rows: int) -> np.ndarray:
+    columns = ", ".join(FORCE if name == "force" else MOMENT)
     try:
         array = np.array(values, dtype=float)
     except (TypeError, ValueError) as error:
         raise InputError(f"{source}: {name} is not made of numbers ({error})") from error
     if array.shape != (rows, 3):
-        raise InputError(f"{source}: {name} has shape {array.shape}, expected ({rows}, 3)")
+        hint = "; give its transpose" if array.shape == (3, rows) else ""
+        raise InputError(
+            f"{source}: {name} has shape {array.shape}, expected ({rows}, 3): {columns}{hint}"
+        )
     if not np.isfinite(array).all():
-        raise InputError(f"{source}: {name} has a number that is not finite")
+        i = np.flatnonzero(~np.isfinite(array).all(axis=1))[0]
+        raise InputError(f"{source}, sample {i}: {name} has a number that is not finite")
     return array

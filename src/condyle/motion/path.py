@@ -13,18 +13,21 @@ import numpy as np
 from condyle.errors import InputError
 from condyle.motion.arrays import as_samples, check_rising
 from condyle.motion.digest import digest
+from condyle.motion.frame import is_frame, table_from_frame
+from condyle.motion.memory import memory_at_hand
 from condyle.motion.smoothing import Smoothing, parse_cutoff, smoothing_spline
-from condyle.motion.table import read_table
+from condyle.motion.suspicion import motion_warnings
+from condyle.motion.table import Table, read_table
 from condyle.motion.units import LANDMARK, POSE, Units, parse_units
+from condyle.motion.words import listed
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
 Kind = Literal["coordinates", "pose", "landmark"]
 
-DEFAULT_LANDMARK = "incisor"
 MIN_ROWS = 6
-_MAX_SAMPLES = 10**8
+_SAMPLE_BYTES = 3000  # that a sample takes until its results are written
 _SLACK = 1e-9  # [s], by which output times may miss the input's ends through rounding
 
 
@@ -40,12 +43,14 @@ class Motion:
         kind: "coordinates" (fewer than six of the pose), "pose" (all six), "landmark" (x, y, z).
         names: columns, (m,); in the order of the file for coordinates, else X, Y, Z, alpha, beta,
             gamma or x, y, z.
-        landmark: name of the platform point that x, y, z displace from home; None for other kinds.
+        landmark: name of the platform point that x, y, z displace from home; None for other kinds,
+            or to leave the choice to the mechanism (`resolve_landmark`).
         t: (N,) [s], rising.
         value, rate, acceleration: (N, m), [m, rad], [m/s, rad/s], [m/s^2, rad/s^2].
         source: where the samples came from, for messages.
         smoothing: what was smoothed away, or None.
         sha256: hash of the file that was read, or None.
+        warnings: what looks wrong about it, for whoever reads the results.
     """
 
     kind: Kind
@@ -58,6 +63,7 @@ class Motion:
     source: str
     smoothing: Smoothing | None = None
     sha256: str | None = None
+    warnings: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.t)
@@ -67,28 +73,50 @@ class Motion:
         cls,
         path: str | os.PathLike[str],
         *,
-        units: str | Units = "m,rad",
+        units: str | Units | None = None,
         landmark: str | None = None,
         cutoff: float | str | None = None,
         rate: float | None = None,
         times: Any = None,
+        trim: float = 0.0,
     ) -> Motion:
-        """Read a motion file: `t` and pose coordinates, or `t,x,y,z`; see `from_arrays`."""
+        """Read a motion file: `t` and pose coordinates, or `t,x,y,z`; see `from_arrays`.
+
+        CSV, or Parquet if the name ends in .parquet. Where the header names units, those hold.
+        """
         table = read_table(path, known=("t", *POSE, *LANDMARK))
-        t = table.require(["t"])[:, 0]
-        values = {name: column for name, column in table.columns.items() if name != "t"}
-        check_rising(t, table.where)
-        motion = cls.from_arrays(
-            t,
-            values,
-            units=units,
-            landmark=landmark,
-            cutoff=cutoff,
-            rate=rate,
-            times=times,
-            source=table.source,
+        motion = cls._from_table(
+            table, units, landmark=landmark, cutoff=cutoff, rate=rate, times=times, trim=trim
         )
         return replace(motion, sha256=digest(path))
+
+    @classmethod
+    def from_frame(
+        cls,
+        frame: Any,
+        *,
+        units: str | Units | None = None,
+        landmark: str | None = None,
+        cutoff: float | str | None = None,
+        rate: float | None = None,
+        times: Any = None,
+        trim: float = 0.0,
+        source: str = "motion",
+    ) -> Motion:
+        """The same from a pandas DataFrame; its index is the time if no column is."""
+        table = table_from_frame(frame, ("t", *POSE, *LANDMARK), source)
+        return cls._from_table(
+            table, units, landmark=landmark, cutoff=cutoff, rate=rate, times=times, trim=trim
+        )
+
+    @classmethod
+    def _from_table(cls, table: Table, units: str | Units | None, **options: Any) -> Motion:
+        table.require(["t"])
+        values = table.si(parse_units(units))
+        t = values.pop("t")
+        check_rising(t, table.where)
+        motion = cls.from_arrays(t, values, source=table.source, **options)
+        return replace(motion, warnings=(*table.warnings, *motion.warnings))
 
     @classmethod
     def from_arrays(
@@ -97,11 +125,12 @@ class Motion:
         values: Mapping[str, Any] | np.ndarray,
         names: Sequence[str] | None = None,
         *,
-        units: str | Units = "m,rad",
+        units: str | Units | None = None,
         landmark: str | None = None,
         cutoff: float | str | None = None,
         rate: float | None = None,
         times: Any = None,
+        trim: float = 0.0,
         source: str = "motion",
     ) -> Motion:
         """Motion through samples, at least six, at strictly rising times.
@@ -109,24 +138,31 @@ class Motion:
         Args:
             t: (N,) [s].
             values: name -> (N,); or (N, m) with `names`, (m,).
-            units: of lengths and angles, such as "mm,deg".
-            landmark: platform point whose displacement x, y, z are; default "incisor".
+            units: of times, lengths and angles where they are not SI, such as "ms,mm,deg".
+            landmark: platform point whose displacement x, y, z are; by default the mechanism's
+                incisor, or its only point.
             cutoff: smooth measured data at this frequency [Hz], or "auto" (10 Hz); None: do not.
             rate: output samples a second, from t[0] on; or
-            times: output times within the input's, rising; default: the input's.
+            times: output times within the input's, rising; default: the input's. Both in seconds.
+            trim: leave out so much of the output at either end [s]; a smoothed motion is least
+                certain there.
         Raises:
             InputError: for samples or options that cannot be used.
         """
         if not isinstance(values, Mapping):
-            values = _by_name(np.asarray(values), names, source)
-        t = as_samples(t, "t", source)
+            values = _by_name(values, names, source)
+        unit = parse_units(units)
+        t = as_samples(t, "t", source) * unit.time
         columns = {name: as_samples(v, name, source, len(t)) for name, v in values.items()}
         kind, names = _kind(columns, source)
-        landmark = _landmark(kind, landmark, names, source)
+        if kind != "landmark" and landmark is not None:
+            raise InputError(
+                f'{source}: landmark "{landmark}" was given, but the columns are '
+                f"{', '.join(names)}; a landmark's path has x, y, z"
+            )
         if len(t) < MIN_ROWS:
             raise InputError(f"{source}: {len(t)} rows, expected at least {MIN_ROWS}")
         check_rising(t, f"{source}, sample {{}}".format)
-        unit = parse_units(units)
         samples = np.column_stack([columns[name] * unit.scale(name) for name in names])
 
         since_start = t - t[0]  # keeps large times, such as those of a clock, exact
@@ -139,38 +175,65 @@ class Motion:
             removed = samples - spline(since_start)
             rms, peak = np.sqrt((removed**2).mean(axis=0)), np.abs(removed).max(axis=0)
             smoothing = Smoothing(frequency, cutoff == "auto", names, rms, peak)
-        out = _output_times(t, rate, times, source)
+        out = _trimmed(_output_times(t, rate, times, source), t, trim, source)
         value, first, second = (spline(out - t[0], nu) for nu in range(3))
         if not np.isfinite(second).all():
             raise InputError(f"{source}: times or values are too extreme to differentiate")
-        return cls(kind, names, landmark, out, value, first, second, source, smoothing)
-
-
-def _by_name(values: np.ndarray, names: Sequence[str] | None, source: str) -> dict[str, np.ndarray]:
-    distinct = names is not None and len(set(names)) == len(names)
-    if names is None or not distinct or values.shape[1:] != (len(names),):
-        raise InputError(
-            f"{source}: got values of shape {values.shape} for names {names},"
-            " expected (samples, columns) and a different name for each column"
+        warnings = motion_warnings(source, names, t, value, first)
+        return cls(
+            kind,
+            names,
+            landmark,
+            out,
+            value,
+            first,
+            second,
+            source,
+            smoothing,
+            warnings=warnings,
         )
-    return dict(zip(names, values.T, strict=True))
 
 
-def _landmark(kind: Kind, landmark: str | None, names: Sequence[str], source: str) -> str | None:
-    if kind == "landmark":
-        return landmark or DEFAULT_LANDMARK
-    if landmark is not None:
+def as_motion(motion: Any) -> Motion:
+    """A motion from what people give for one: a Motion, the path of a file, a DataFrame.
+
+    Raises: InputError: for anything else.
+    """
+    if isinstance(motion, Motion):
+        return motion
+    if isinstance(motion, str | os.PathLike):
+        return Motion.from_csv(motion)
+    if is_frame(motion):
+        return Motion.from_frame(motion)
+    raise InputError(
+        f"motion: got a {type(motion).__name__}, expected a condyle.Motion, the path of a file, or "
+        "a DataFrame. Arrays become one by Motion.from_arrays(t, values, names)"
+        + (". The order is solve(motion, load)" if type(motion).__name__ == "Load" else "")
+    )
+
+
+def _by_name(values: Any, names: Sequence[str] | None, source: str) -> dict[str, np.ndarray]:
+    array = np.asarray(values)
+    taken = (
+        "expected a mapping name -> (samples,), or (samples, columns) with a different name for "
+        f"each column: of {', '.join(POSE)}, or x, y, z"
+    )
+    if array.ndim != 2:
+        got = f"shape {array.shape}" if array.ndim else f"a {type(values).__name__}"
+        raise InputError(f"{source}: got values of {got}; {taken}")
+    if names is None or len(set(names)) != len(names) or array.shape[1] != len(names):
+        hint = "; give its transpose" if names is not None and len(names) == len(array) else ""
         raise InputError(
-            f'{source}: landmark "{landmark}" was given, but the columns are {", ".join(names)};'
-            " a landmark's path has x, y, z"
+            f"{source}: got values of shape {array.shape} for names "
+            f"{None if names is None else listed(names)}{hint}; {taken}"
         )
-    return None
+    return dict(zip(names, array.T, strict=True))
 
 
 def _kind(columns: Mapping[str, Any], source: str) -> tuple[Kind, tuple[str, ...]]:
     """What the columns describe, and their names in the order to keep them in."""
     rules = f"pose coordinates ({', '.join(POSE)}), or a landmark's path (x, y, z)"
-    got = f"{source}: got columns {', '.join(columns)}" if columns else f"{source}: got only t"
+    got = f"{source}: got columns {listed(columns, '')}" if columns else f"{source}: got only t"
     if not columns or not set(columns) <= {*POSE, *LANDMARK}:
         raise InputError(f"{got}; expected {rules}")
     if set(columns) <= set(LANDMARK):
@@ -211,9 +274,26 @@ def _output_times(
     if not (math.isfinite(rate) and rate > 0):
         raise InputError(f"{source}: rate: got {rate!r}, expected samples a second, above 0")
     intervals = (t[-1] - t[0]) * rate
-    if intervals > _MAX_SAMPLES:
-        raise InputError(f"{source}: rate {rate:g} Hz would give {intervals:.3g} samples")
+    if intervals * _SAMPLE_BYTES > (free := memory_at_hand()):
+        raise InputError(
+            f"{source}: rate {rate:g} Hz would give {intervals:.3g} samples, which take about "
+            f"{intervals * _SAMPLE_BYTES / 1e9:.3g} GB (there are {free / 1e9:.3g} GB). Ask for "
+            "fewer, or follow a part of the motion"
+        )
     # i / rate is correctly rounded, so grids of different rates meet in the same bits.
     out: np.ndarray = t[0] + np.arange(math.floor(intervals + 1e-6) + 1) / rate
     out[-1] = min(out[-1], t[-1])
     return out
+
+
+def _trimmed(out: np.ndarray, t: np.ndarray, trim: float, source: str) -> np.ndarray:
+    if not (math.isfinite(trim) and trim >= 0):
+        raise InputError(f"{source}: trim: got {trim!r}, expected seconds, 0 or more")
+    if not trim:
+        return out
+    kept = out[(out >= t[0] + trim - _SLACK) & (out <= t[-1] - trim + _SLACK)]
+    if not len(kept):
+        raise InputError(
+            f"{source}: trim {trim:g} s at either end leaves nothing of {t[-1] - t[0]:.4g} s"
+        )
+    return kept

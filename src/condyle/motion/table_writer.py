@@ -1,21 +1,28 @@
-"""Columns of numbers to CSV, with 17 digits, so that reading gives the same bits back."""
+"""Columns of numbers to CSV, the shortest that read back in the same bits, or to Parquet."""
 
 from __future__ import annotations
 
-import math
 import os
+from collections import deque
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
 from types import TracebackType
-from typing import Self, TextIO
+from typing import TYPE_CHECKING, Any, BinaryIO, Self
 
 import numpy as np
 
 from condyle.atomic import replacing
+from condyle.motion.table import is_parquet
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 Column = np.ndarray | Sequence[str] | Sequence[float]
 
-_BLOCK = 8192  # rows formatted at once, so that memory stays flat
+_BLOCK = 16_384  # rows formatted at once, so that memory stays flat
+_THREADS = 2
+_WAITING = 4  # blocks
 
 
 class TableWriter:
@@ -25,20 +32,25 @@ class TableWriter:
             for chunk in iter_table("in.csv"):
                 out.write({"twice": 2 * chunk.columns["x"]})
 
-    The first chunk sets the columns. NaN becomes an empty cell. After an exception there is no
-    file, or the old one; without any chunk likewise.
+    A name that ends in .parquet makes a Parquet file. The first chunk sets the columns. NaN becomes
+    an empty cell. After an exception there is no file, or the old one; without any chunk likewise.
     """
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
+    def __init__(self, path: str | os.PathLike[str], *, parquet: bool | None = None) -> None:
         self.path = path
+        self._parquet = is_parquet(path) if parquet is None else parquet
         self._names: list[str] = []
-        self._file: TextIO
+        self._file: BinaryIO
+        self._pool: ThreadPoolExecutor
+        self._waiting: deque[Future[bytes]] = deque()
+        self._to: Any = None
         self._open: ExitStack
 
     def __enter__(self) -> Self:
         with ExitStack() as stack:
             temporary = stack.enter_context(replacing(self.path))
-            self._file = stack.enter_context(open(temporary, "w", encoding="utf-8", newline=""))
+            self._file = stack.enter_context(open(temporary, "wb"))
+            self._pool = stack.enter_context(ThreadPoolExecutor(_THREADS))
             self._open = stack.pop_all()
         return self
 
@@ -48,32 +60,66 @@ class TableWriter:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        try:
+            if error is None:
+                self._finish(0)
+            if self._to is not None:
+                self._to.close()
+        except BaseException as own:
+            kind, error, trace = type(own), error or own, trace or own.__traceback__
+            self._open.__exit__(kind, error, trace)
+            raise
         if error is None and not self._names:
             kind, error = _NothingWritten, _NothingWritten()
         self._open.__exit__(kind, error, trace)
 
     def write(self, columns: Mapping[str, Column]) -> None:
-        """Append rows: numbers or strings by column name, all of one length."""
+        """Append rows: numbers or strings by column name, all of one length.
+
+        The arrays must not change afterwards: they are formatted in other threads.
+        """
+        import pyarrow as pa
+
         names = list(columns)
         if names != (self._names or names):
             raise ValueError(f"columns {names} differ from those of the first chunk, {self._names}")
-        values = [np.asarray(column) for column in columns.values()]
-        sizes = {len(value) for value in values}
-        if len(sizes) != 1:
-            raise ValueError(f"expected columns of one length, got lengths {sorted(sizes)}")
+        if len({len(column) for column in columns.values()}) != 1:
+            sizes = sorted({len(column) for column in columns.values()})
+            raise ValueError(f"expected columns of one length, got lengths {sizes}")
+        table = pa.table({name: _array(column) for name, column in columns.items()})
         if not self._names:
             self._names = names
-            self._file.write(",".join(map(_text, names)) + "\n")
-        for start in range(0, sizes.pop(), _BLOCK):
-            self._file.writelines(_lines([value[start : start + _BLOCK] for value in values]))
+            if not self._parquet:
+                self._file.write((",".join(map(_quoted, names)) + "\n").encode())
+        if self._parquet:
+            self._write_parquet(table)
+            return
+        for start in range(0, table.num_rows, _BLOCK):
+            self._waiting.append(self._pool.submit(_csv, table.slice(start, _BLOCK)))
+            self._finish(_WAITING)
+
+    def _finish(self, left: int) -> None:
+        """Write blocks in their order until so many are left."""
+        while len(self._waiting) > left:
+            self._file.write(self._waiting.popleft().result())
+
+    def _write_parquet(self, table: pa.Table) -> None:
+        import pyarrow.parquet as pq
+
+        if self._to is None:
+            self._to = pq.ParquetWriter(self._file, table.schema)
+        self._to.write_table(table)
 
 
-def write_table(path: str | os.PathLike[str], columns: Mapping[str, Column]) -> None:
-    """Write a table of numbers or strings by column name as CSV, whole or not at all.
+def write_table(
+    path: str | os.PathLike[str], columns: Mapping[str, Column], *, parquet: bool | None = None
+) -> None:
+    """Write a table of numbers or strings by column name, whole or not at all.
 
+    Args:   parquet: whether as Parquet, else as CSV; by the end of the name if not told.
     Raises: InputError: if the file cannot be written.
     """
-    with TableWriter(path) as out:
+    with TableWriter(path, parquet=parquet) as out:
         out.write(columns)
 
 
@@ -81,27 +127,28 @@ class _NothingWritten(Exception):
     """Tells `replacing` to drop a file that never got a header."""
 
 
-def _lines(values: Sequence[np.ndarray]) -> list[str]:
-    numbers = [value.dtype.kind in "biuf" for value in values]
-    cells = [
-        value.tolist() if number else [_text(str(cell)) for cell in value]
-        for value, number in zip(values, numbers, strict=True)
-    ]
-    form = ",".join("%.17g" if number else "%s" for number in numbers) + "\n"
-    rows = list(zip(*cells, strict=True))
-    lines = [form % row for row in rows]
-    holes = [np.isnan(v) for v, number in zip(values, numbers, strict=True) if number]
-    for i in np.flatnonzero(np.logical_or.reduce(holes)) if holes else ():
-        lines[i] = ",".join(map(_cell, rows[i])) + "\n"
-    return lines
+def _array(column: Column) -> pa.Array:
+    import pyarrow as pa
+
+    values = np.asarray(column)
+    if values.dtype.kind in "biu":
+        return pa.array(values.astype(np.int64))
+    if values.dtype.kind == "f":
+        return pa.array(values.astype(float, copy=False), from_pandas=True)  # NaN is a hole
+    return pa.array([str(cell) for cell in values], pa.string())
 
 
-def _cell(value: float | str) -> str:
-    if isinstance(value, str):
-        return value
-    return "" if math.isnan(value) else f"{value:.17g}"
+def _csv(table: pa.Table) -> bytes:
+    import pyarrow as pa
+    from pyarrow import csv
+
+    texts = [c.unique().to_pylist() for c in table.columns if pa.types.is_string(c.type)]
+    style = "needed" if any(_quoted(t) != t for text in texts for t in text) else "none"
+    out = pa.BufferOutputStream()
+    csv.write_csv(table, out, csv.WriteOptions(include_header=False, quoting_style=style))
+    return out.getvalue()
 
 
-def _text(value: str) -> str:
+def _quoted(text: str) -> str:
     """A string as a CSV cell, quoted where it has to be."""
-    return '"' + value.replace('"', '""') + '"' if set(value) & set(',;"\t\r\n') else value
+    return '"' + text.replace('"', '""') + '"' if set(text) & set(',;"\t\r\n') else text

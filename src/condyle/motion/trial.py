@@ -14,7 +14,11 @@ SLOWEST, STEP = 0.4, 0.15  # of the first coordinate's sway, and from one to the
 
 
 def trial_motion(
-    mechanism: Mechanism, *, cutoff: float | str | None = None, rate: float | None = None
+    mechanism: Mechanism,
+    *,
+    cutoff: float | str | None = None,
+    rate: float | None = None,
+    trim: float = 0.0,
 ) -> Motion:
     """Five seconds in which the independent coordinates sway about home, each at its own pace.
 
@@ -23,7 +27,7 @@ def trial_motion(
     with a_i = 3 % of the characteristic length or 0.03 rad, and w rising from 0 to 1 in the first
     second. Synthetic.
 
-    Args: cutoff, rate: as of `Motion.from_arrays`.
+    Args: cutoff, rate, trim: as of `Motion.from_arrays`.
     """
     t = np.round(np.linspace(0, 5, 5001), 3)
     names = independent_coordinates(mechanism)
@@ -35,4 +39,4 @@ def trial_motion(
         for i, name in enumerate(names)
     }
     source = "trial motion (synthetic)"
-    return Motion.from_arrays(t, columns, cutoff=cutoff, rate=rate, source=source)
+    return Motion.from_arrays(t, columns, cutoff=cutoff, rate=rate, trim=trim, source=source)

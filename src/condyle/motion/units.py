@@ -1,52 +1,133 @@
-"""Units of the files that people bring: `--units mm,deg`. Inside, all is SI."""
+"""Units of the files that people bring: `--units ms,mm,deg` or a header `x [mm]`. Inside is SI."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, field
 
-from condyle.errors import InputError, did_you_mean
+from condyle.errors import InputError
+from condyle.motion.words import guess, short
 
 POSE = ("X", "Y", "Z", "alpha", "beta", "gamma")
 LANDMARK = ("x", "y", "z")
+FORCE = ("Fx", "Fy", "Fz")
+MOMENT = ("Mx", "My", "Mz")
 
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
 LENGTH_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
-ANGLE_UNITS = {"rad": 1.0, "deg": math.pi / 180}
+ANGLE_UNITS = {"rad": 1.0, "deg": math.pi / 180, "mrad": 1e-3}
+_FORCE_UNITS = {"N": 1.0, "kN": 1e3, "mN": 1e-3}
+_MOMENT_UNITS = {
+    f"{force}{length}": a * b
+    for force, a in _FORCE_UNITS.items()
+    for length, b in LENGTH_UNITS.items()
+}
+_UNITS = {
+    "time": TIME_UNITS,
+    "length": LENGTH_UNITS,
+    "angle": ANGLE_UNITS,
+    "force": _FORCE_UNITS,
+    "moment": _MOMENT_UNITS,
+}
+_SYNONYMS = {"sec": "s", "seconds": "s", "degrees": "deg", "radians": "rad", "\u00b0": "deg"}
 
-_LENGTHS = frozenset("XYZxyz")
-_ANGLES = frozenset(POSE[3:])
+Dimension = tuple[str, int]
+"""A kind of quantity, and how often it is divided by time: ("length", 2) is an acceleration."""
 
 
 @dataclass(frozen=True)
 class Units:
-    """What one unit of length and of angle is, in metres and radians."""
+    """What one unit of length, of angle and of time is, in metres, radians and seconds.
+
+    Attributes: given: which of the three somebody asked for.
+    """
 
     length: float = 1.0
     angle: float = 1.0
+    time: float = 1.0
+    given: frozenset[str] = field(default=frozenset(), compare=False)
 
     def scale(self, column: str) -> float:
-        """Factor to SI of a column: of X, x, alpha and so on, their rates dX and accelerations ddX.
+        """Factor to SI of a column: of t, of X, x, alpha and so on, their rates dX, ddX.
 
-        1 for all else: time, force and moment are SI in every file.
+        1 for all else: forces and moments are SI unless the header says so.
         """
-        name = column if column in _ANGLES else column.lstrip("d")
-        return self.length if name in _LENGTHS else self.angle if name in _ANGLES else 1.0
+        kind, per_time = dimension(column) or ("", 0)
+        scales = {"length": self.length, "angle": self.angle, "time": self.time}
+        return scales.get(kind, 1.0) / self.time**per_time
 
 
-def parse_units(text: str | Units) -> Units:
-    """Units from 'mm,deg': a length, an angle or both, in either order; SI for what is not given.
+def dimension(column: str) -> Dimension | None:
+    """What the column of a motion, a load or a state is; None for other columns."""
+    if column == "t":
+        return "time", 0
+    if column in FORCE:
+        return "force", 0
+    if column in MOMENT:
+        return "moment", 0
+    for rates in range(3):
+        name = column[rates:]
+        if column.startswith("d" * rates) and name in (*POSE, *LANDMARK):
+            return "angle" if name in POSE[3:] else "length", rates
+    return None
+
+
+def unit_factor(text: str, of: Dimension) -> float:
+    """Factor to SI of a unit such as "mm", "N mm" or "deg/s^2".
+
+    Raises: InputError: for an unknown unit, or one of something else than `of`.
+    """
+    parsed = _parse(text)
+    kind, per_time = of
+    if parsed is None or parsed[:2] != of:
+        suffix = ("", "/s", "/s^2")[per_time]
+        what = f"a unit of {kind}{suffix and f' {suffix}'}"
+        expected = ", ".join(unit + suffix for unit in _UNITS[kind])
+        raise InputError(f'"{short(text)}" is not {what}; expected {expected}')
+    return parsed[2]
+
+
+def is_unit(text: str) -> bool:
+    """Whether `text` is a unit of anything that stands in a table."""
+    return _parse(text) is not None
+
+
+def _parse(text: str) -> tuple[str, int, float] | None:
+    """Kind, powers of time below the line, factor to SI."""
+    plain = text.strip().replace("\u00b2", "^2").replace("\u00b5", "u").replace("\u03bc", "u")
+    above, _, below = plain.partition("/")
+    above = re.sub(r"[\s.*\u00b7]", "", above)
+    above = _SYNONYMS.get(above, above)
+    parts = re.fullmatch(r"\s*([a-z]+)\s*\^?\s*([12]?)\s*", below) if below else None
+    if below and (parts is None or parts[1] not in TIME_UNITS):
+        return None
+    per_time = int(parts[2] or 1) if parts else 0
+    for kind, table in _UNITS.items():
+        if above in table:
+            return kind, per_time, table[above] / (TIME_UNITS[parts[1]] if parts else 1) ** per_time
+    return None
+
+
+def parse_units(text: str | Units | None) -> Units:
+    """Units from 'ms,mm,deg': a time, a length, an angle, in any order; SI for what is not given.
 
     Raises: InputError: for an unknown unit, or two of a kind.
     """
-    if isinstance(text, Units):
-        return text
+    if text is None or isinstance(text, Units):
+        return text or Units()
+    if not isinstance(text, str):
+        raise InputError(f'units: got {short(repr(text))}, expected text such as "mm,deg"')
+    tables = {"time": TIME_UNITS, "length": LENGTH_UNITS, "angle": ANGLE_UNITS}
     found: dict[str, float] = {}
     for word in (part.strip() for part in text.split(",")):
-        kind, table = ("angle", ANGLE_UNITS) if word in ANGLE_UNITS else ("length", LENGTH_UNITS)
-        if word not in table:
-            hint = did_you_mean(word, [*LENGTH_UNITS, *ANGLE_UNITS])
-            raise InputError(f'units "{text}": "{word}" is not a unit.{hint}')
+        kind = next((kind for kind, table in tables.items() if word in table), None)
+        if kind is None:
+            hint = guess(word, [unit for table in tables.values() for unit in table])
+            raise InputError(f'units "{short(text)}": "{short(word)}" is not a unit.{hint}')
         if kind in found:
-            raise InputError(f'units "{text}": two units of {kind}; expected one, as in "mm,deg"')
-        found[kind] = table[word]
-    return Units(**found)
+            raise InputError(
+                f'units "{short(text)}": two units of {kind}; expected one, as in "ms,mm,deg"'
+            )
+        found[kind] = tables[kind][word]
+    return Units(**found, given=frozenset(found))

@@ -73,7 +73,7 @@ def closure(structure: Structure, prescribed: Prescribed) -> Program:
     b.output("pose_rate", rate, "per s")
     b.output("pose_acceleration", acceleration, "per s^2")
     if placement.reach is not None:
-        below = None if placement.iterated else Status.UNREACHABLE
+        below = None if placement.iterated else Status.unreachable
         b.check(placement.reach, CERTAIN if placement.iterated else 0.0, below)
     return b.finish()
 

@@ -87,7 +87,7 @@ def program(
         b.output("joint_acceleration", [c.law.acceleration for c in eq.chains], "per s^2")
     if "configuration" in wanted:
         configuration.add(b, platform)
-    b.check(_feasibility(b, platform, eq), NEAR, Status.UNREACHABLE)
+    b.check(_feasibility(b, platform, eq), NEAR, Status.unreachable)
     b.check(pivots * (ca.fabs(b.total(effort)) < HUGE), NEAR)
     return b.finish()
 
@@ -99,7 +99,7 @@ def motion(structure: Structure) -> Program:
     _add_motion(b, platform)
     placement = platform.placement
     if placement.reach is not None:
-        below = None if placement.iterated else Status.UNREACHABLE
+        below = None if placement.iterated else Status.unreachable
         b.check(placement.reach, CERTAIN if placement.iterated else 0.0, below)
     return b.finish()
 
@@ -112,8 +112,9 @@ def system(structure: Structure) -> Program:
     still = [b.at_zero(part, *_rates(eq, platform)) for part in eq.parts.values()]
     assert eq.G is not None
     b.output("A", eq.A, "")
-    b.output("b", ca.horzcat(*(eq.basis.pull(p) for p in eq.parts.values())).T, "")
-    b.output("b_gravity", ca.horzcat(*(eq.basis.pull(p) for p in still)).T, "")
+    shape = len(still), structure.m
+    b.output("b", ca.horzcat(*(eq.basis.pull(p) for p in eq.parts.values())).T, "", *shape)
+    b.output("b_gravity", ca.horzcat(*(eq.basis.pull(p) for p in still)).T, "", *shape)
     b.output("Q", eq.Q, "N, N m", 6)
     b.output("J", [c.row for c in eq.chains], "")
     b.output("G", eq.G, "", 6, len(structure.contacts))

@@ -1,8 +1,8 @@
-"""What a mechanism is: freedoms, dependent coordinates, residuals, singularity at home."""
+"""What a mechanism is: freedoms, sizes, masses, gravity, limits, and singularity at home."""
 
 from __future__ import annotations
 
-from collections.abc import Sized
+from collections.abc import Iterator, Mapping, Sized
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,8 +10,9 @@ import numpy as np
 
 from ..kinematics.chain import FAMILIES
 from ..kinematics.singularity import KINDS
-from ..mechanism.home import home_residuals
-from ..mechanism.mechanism import Mechanism
+from ..mechanism.home import HOME_WARNING, home_residuals
+from ..mechanism.mechanism import Contact, Mechanism
+from ..mechanism.plausibility import extent, length_text, plausibility_warnings
 from ..model.evaluator import Evaluator
 
 
@@ -22,43 +23,92 @@ class Description:
     data: dict[str, Any]
 
     def __str__(self) -> str:
-        d, s = self.data, self.data["singularity"]
+        d = self.data
         width = max(len(name) for name in [*d["chains"], *d["contacts"]])
-        lines = [
-            f"{d['name']}: {_count(d['chains'], 'chain')}, {_count(d['contacts'], 'contact')}, "
-            f"{d['degrees_of_freedom']} degrees of freedom, "
-            f"actuation redundancy {d['redundancy']}",
-            f"independent coordinates: {', '.join(d['independent'])}",
-            f"dependent coordinates:   {', '.join(d['dependent']) or 'none'}",
-            f"characteristic length:   {d['characteristic_length'] * 1e3:.3f} mm "
-            "(mean distance of platform joints and contact points from O_M)",
-            "chains",
-        ]
-        for name, chain in d["chains"].items():
-            lines.append(
-                f"  {name:<{width}}  {chain['kind']}, joint [{chain['joint_unit']}], effort "
-                f"[{chain['effort_unit']}], transmission at home {chain['transmission']:+.4f}"
-            )
-        if d["contacts"]:
-            lines.append("contacts")
-        for name, contact in d["contacts"].items():
-            ball = contact["ball_radius"]
-            options = [f", {contact['side']}"] if contact["side"] else []
-            options += [f", ball of radius {ball * 1e3:g} mm"] if ball is not None else []
-            options += [", one-sided"] if contact["one_sided"] else []
-            lines.append(
-                f"  {name:<{width}}  {contact['kind']}{''.join(options)}, "
-                f"{contact['residual'] * 1e3:+.2g} mm off its surface at home"
-            )
-        sigma = ", ".join(f"{v:.4g}" for v in s["J_W_sigma"])
-        lines += [
-            "singularity at home (dimensionless)",
-            f"  J_W: rank {s['J_W_rank']} of {d['degrees_of_freedom']}, singular values {sigma}, "
-            f"condition {s['J_W_condition']:.4g}",
-            f"  J_A: smallest over largest {s['J_A_ratio']:.4g}",
-            f"  near: {s['near']}",
-        ]
-        return "\n".join(lines)
+        return "\n".join(
+            [
+                *_whole(d),
+                "chains",
+                *(f"  {name:<{width}}  {_chain(one)}" for name, one in d["chains"].items()),
+                *["contacts"] * bool(d["contacts"]),
+                *(f"  {name:<{width}}  {_contact(one)}" for name, one in d["contacts"].items()),
+                *_singularity(d),
+            ]
+        )
+
+
+def _whole(d: Mapping[str, Any]) -> Iterator[str]:
+    yield (
+        f"{d['name']}: {_count(d['chains'], 'chain')}, {_count(d['contacts'], 'contact')}, "
+        f"{d['degrees_of_freedom']} degrees of freedom, actuation redundancy {d['redundancy']}"
+    )
+    yield f"independent coordinates: {', '.join(d['independent'])}"
+    yield f"dependent coordinates:   {', '.join(d['dependent']) or 'none'}"
+    yield f"gravity:                 {_gravity(d['gravity'])}"
+    radii = ", ".join(length_text(radius) for radius in d["platform"]["radii_of_gyration"])
+    yield f"platform:                {d['platform']['mass']:g} kg, radii of gyration {radii}"
+    yield f"moving mass:             {d['moving_mass']:g} kg with the chains"
+    sides = " x ".join(length_text(side) for side in d["size"])
+    yield f"size at home:            {sides} (X x Y x Z, all joints and points)"
+    yield (
+        f"characteristic length:   {length_text(d['characteristic_length'])} "
+        "(mean distance of platform joints and contact points from O_M)"
+    )
+
+
+def _gravity(gravity: list[float]) -> str:
+    """'9.81 m/s^2 along -Z', or with the components where it is along none."""
+    size = float(np.linalg.norm(gravity))
+    if not size:
+        return "none"
+    k = int(np.argmax(np.abs(gravity)))
+    if abs(gravity[k]) > (1 - 1e-9) * size:
+        return f"{size:g} m/s^2 along {'-' if gravity[k] < 0 else '+'}{'XYZ'[k]}"
+    return f"{size:g} m/s^2, [{', '.join(f'{g:g}' for g in gravity)}] in {{S}}"
+
+
+def _chain(chain: Mapping[str, Any]) -> str:
+    facts = []
+    for name in dict.fromkeys([*chain["lengths"], *chain["masses"]]):
+        length, mass = chain["lengths"].get(name), chain["masses"].get(name)
+        said = [length_text(length)] if length is not None else []
+        said += [f"{mass:g} kg"] if mass is not None else []
+        facts.append(" ".join([name, *said]))
+    effort, joint = chain["effort_unit"], chain["joint_unit"]
+    limits = []
+    if chain["effort_limit"] is not None:
+        limits.append(f"{chain['effort_limit']:g} {effort}")
+    if chain["speed_limit"] is not None:
+        limits.append(f"{chain['speed_limit']:g} {joint}/s")
+    limit = f"limits {', '.join(limits)}" if limits else "no limits"
+    return (
+        f"{chain['kind']}, {', '.join(facts)}, {limit}, joint [{joint}], effort [{effort}], "
+        f"transmission at home {chain['transmission']:+.4f}"
+    )
+
+
+def _contact(contact: Mapping[str, Any]) -> str:
+    ball, off = contact["ball_radius"], contact["residual"]
+    options = [f", {contact['side']}"] if contact["side"] else []
+    options += [f", ball of radius {length_text(ball)}"] if ball is not None else []
+    options += [", one-sided"] if contact["one_sided"] else []
+    if abs(off) > HOME_WARNING:
+        place = f"{off * 1e3:+.2g} mm off its surface at home"
+    else:  # what is left is rounding
+        place = "on its surface at home"
+    return f"{contact['kind']}{''.join(options)}, {place}"
+
+
+def _singularity(d: Mapping[str, Any]) -> Iterator[str]:
+    s = d["singularity"]
+    sigma = ", ".join(f"{v:.4g}" for v in s["J_W_sigma"])
+    yield "singularity at home (dimensionless)"
+    yield (
+        f"  J_W: rank {s['J_W_rank']} of {d['degrees_of_freedom']}, singular values {sigma}, "
+        f"condition {s['J_W_condition']:.4g}"
+    )
+    yield f"  J_A: smallest over largest {s['J_A_ratio']:.4g}"
+    yield f"  near: {s['near']}"
 
 
 def _count(items: Sized, word: str) -> str:
@@ -70,6 +120,13 @@ def describe(mechanism: Mechanism) -> Description:
     model = Evaluator(mechanism, backend="numpy")  # one pose: building a kernel takes longer
     s = model.configuration(np.zeros((1, 6))).singularity
     m = mechanism.degrees_of_freedom
+    platform = mechanism.platform
+    chains = {
+        chain.name: _chain_data(chain) | {"transmission": float(s.transmission[0, i])}
+        for i, chain in enumerate(mechanism.chains)
+    }
+    rods = sum(mass for chain in chains.values() for mass in chain["masses"].values())
+    pairs = zip(mechanism.contacts, home_residuals(mechanism), strict=True)
     return Description(
         {
             "name": mechanism.name,
@@ -78,27 +135,15 @@ def describe(mechanism: Mechanism) -> Description:
             "independent": list(model.independent),
             "dependent": list(model.dependent),
             "characteristic_length": s.length,
-            "chains": {
-                chain.name: {
-                    "kind": chain.kind,
-                    "joint_unit": FAMILIES[chain.kind].joint_unit,
-                    "effort_unit": FAMILIES[chain.kind].effort_unit,
-                    "transmission": float(s.transmission[0, i]),
-                }
-                for i, chain in enumerate(mechanism.chains)
+            "size": extent(mechanism).tolist(),
+            "gravity": list(mechanism.gravity),
+            "platform": {
+                "mass": platform.mass,
+                "radii_of_gyration": np.sqrt(platform.inertia.principal() / platform.mass).tolist(),
             },
-            "contacts": {
-                contact.name: {
-                    "kind": contact.surface.kind,
-                    "side": contact.side,
-                    "ball_radius": contact.ball_radius,
-                    "one_sided": contact.one_sided,
-                    "residual": float(residual),
-                }
-                for contact, residual in zip(
-                    mechanism.contacts, home_residuals(mechanism), strict=True
-                )
-            },
+            "moving_mass": platform.mass + rods,
+            "chains": chains,
+            "contacts": {contact.name: _contact_data(contact, off) for contact, off in pairs},
             "singularity": {
                 "J_W_sigma": [float(v) for v in s.J_W_sigma[0]],
                 "J_W_rank": int(s.rank[0]),
@@ -106,5 +151,33 @@ def describe(mechanism: Mechanism) -> Description:
                 "J_A_ratio": float(s.inverse_ratio[0]),
                 "near": KINDS[int(s.kind()[0])],
             },
+            "warnings": [
+                {"kind": found.kind, "message": found.message, **found.data}
+                for found in plausibility_warnings(mechanism)
+            ],
         }
     )
+
+
+def _chain_data(chain: Any) -> dict[str, Any]:
+    family, actuator = FAMILIES[chain.kind], chain.actuator
+    limits = (getattr(actuator, key, None) for key in ("torque_limit", "force_limit"))
+    return {
+        "kind": chain.kind,
+        "joint_unit": family.joint_unit,
+        "effort_unit": family.effort_unit,
+        "lengths": chain.lengths,
+        "masses": chain.masses,
+        "effort_limit": next((limit for limit in limits if limit is not None), None),
+        "speed_limit": actuator.speed_limit,
+    }
+
+
+def _contact_data(contact: Contact, residual: float) -> dict[str, Any]:
+    return {
+        "kind": contact.surface.kind,
+        "side": contact.side,
+        "ball_radius": contact.ball_radius,
+        "one_sided": contact.one_sided,
+        "residual": float(residual),
+    }

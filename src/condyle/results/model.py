@@ -11,13 +11,14 @@ import time
 import numpy as np
 
 from ..mechanism.mechanism import Mechanism
-from ..model.evaluator import DEFAULT_LOAD_POINT, Evaluator, with_point
+from ..model.evaluator import Evaluator, with_point
 from ..model.judge import require_ok
 from ..model.reactions import reactions as joint_reactions
-from ..motion import Load, Motion
+from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
 from ..progress import step
+from .assemble import assemble
 from .reactions import reaction_variables
-from .solution import Solution, assemble
+from .solution import Solution
 
 
 class Model(Evaluator):
@@ -44,12 +45,12 @@ class Model(Evaluator):
                 InputError: if motion or load do not fit the mechanism.
         """
         start = time.perf_counter()
-        load = load or Load.zero()
+        motion, load = as_motion(motion), as_load(load)
         wrench = load.at(motion.t)
         name = load_point or load.point
-        loaded = np.any(wrench) or name is not None
-        point = self.load_point(name) if loaded else np.zeros(3)
-        name = (name or DEFAULT_LOAD_POINT) if loaded else None
+        if np.any(wrench) or name is not None:
+            name = resolve_load_point(name, self.mechanism.platform.points)
+        point = np.zeros(3) if name is None else self.load_point(name)
         with step("solving"):
             states, residual = self.independent_motion(motion)
             evaluation = self.evaluate(*states, with_point(wrench, point), threads)

@@ -7,30 +7,58 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import UnreachableError
+from ..errors import InconsistentError, LostError, SampleError, UnreachableError
 from ..kinematics.chain import FAMILIES
-from ..kinematics.forward import ForwardKinematics
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..model.evaluator import check_home
-from ..motion import read_table, write_table
+from ..model.forward import TOLERANCE, ForwardKinematics, PoseStatus
+from ..motion import Table, read_table, write_table
 from ..progress import step
+
+ERRORS: dict[PoseStatus, tuple[type[SampleError], str]] = {
+    PoseStatus.UNREACHABLE: (
+        UnreachableError,
+        "no pose has the joint coordinates of row {row}, or none that is reached from {start} "
+        "without passing a singularity. Check units and zero positions (zero at home); "
+        "--all looks for poses anywhere",
+    ),
+    PoseStatus.LOST: (
+        LostError,
+        "from row {row} on it is not certain to which assembly mode the joint coordinates belong: "
+        "next to a singularity two modes meet, and what came before points to another one than "
+        "the joints lead to. Sample more densely, or cut the file there; --all lists the modes",
+    ),
+    PoseStatus.INCONSISTENT: (
+        InconsistentError,
+        "no pose near the one found has the joint coordinates of row {row}: they differ by up to "
+        "{residual:.3g} {unit}, more than the tolerance of {tolerance:g}. Encoders may disagree: "
+        "check zero positions and geometry, or raise --tolerance to their error. Or the row is so "
+        "far from {start} that the way to its pose ended early: give all rows between and a "
+        "column t, or look for poses anywhere with --all",
+    ),
+}
 
 
 @dataclass(frozen=True)
 class PoseReport:
     """What forward kinematics found in a file.
 
-    residual: largest difference of a joint from the given one, by unit; empty without a pose.
+    missing:   rows without a pose.
+    failed:    the same by status.
+    residual:  largest difference of a joint from the given one, by unit; empty without a pose.
     condition: largest condition number of the dimensionless actuator Jacobian.
     """
 
     rows: int
     missing: int
+    failed: dict[str, int]
     residual: dict[str, float]
     condition: float
 
     def __str__(self) -> str:
         found = f"{self.rows - self.missing} of {self.rows} poses found"
+        if self.failed:
+            found += f" ({', '.join(f'{count} {name}' for name, count in self.failed.items())})"
         if self.missing == self.rows:
             return found
         worst = ", ".join(f"{value:.3g} {unit}" for unit, value in self.residual.items())
@@ -40,50 +68,136 @@ class PoseReport:
         )
 
 
+@dataclass(frozen=True)
+class ModesReport:
+    """How many assembly modes were found: of each row, in their order."""
+
+    rows: int
+    modes: list[int]
+
+    def __str__(self) -> str:
+        few, many = min(self.modes), max(self.modes)
+        each = str(few) if few == many else f"{few} to {many}"
+        rows = "1 row" if self.rows == 1 else f"{self.rows} rows"
+        return f"{each} assembly modes found for {rows}; the search may miss some"
+
+
 def pose_file(
-    mechanism: Mechanism, joints: str | Path, out: str | Path, flag: bool = False
+    mechanism: Mechanism,
+    joints: str | Path,
+    out: str | Path,
+    flag: bool = False,
+    tolerance: float = TOLERANCE,
 ) -> PoseReport:
     """Poses for every row of a file of joint coordinates.
 
-    Args:   joints: CSV with the columns joint_<chain> [rad or m, zero at home], optionally t.
+    Args:   joints: CSV with the columns joint_<chain> [rad or m, zero at home], optionally t [s]:
+                    then each row follows the one before, else each follows from home, alone.
             out:    CSV: t if given, X ... gamma, residual (largest of the row, in the unit of the
                     joints; where chains slide and turn, residual_m and residual_rad) and
                     condition; with `flag` also status.
             flag:   keep rows for which no pose is found, empty, with a status.
-    Raises: UnreachableError: for such a row without `flag`; nothing is written then.
+            tolerance: largest residual of a joint [rad or m].
+    Raises: UnreachableError, LostError, InconsistentError: for such a row without `flag`; nothing
+            is written then.
     """
-    check_home(mechanism)
-    names = [f"joint_{name}" for name in mechanism.chain_names]
-    table = read_table(joints, known=("t", *names))
+    table, given = _read(mechanism, joints)
+    time = table.columns.get("t")
     with step("finding poses"):
-        solution = ForwardKinematics(mechanism).solve(table.require(names))
-    missing = np.flatnonzero(~solution.found)
+        solution = ForwardKinematics(mechanism).solve(given, time, tolerance)
+    status, found = solution.status, solution.found
+    units = _units(mechanism)
+    missing = np.flatnonzero(~found)
     if missing.size and not flag:
-        raise UnreachableError(
-            f"{joints}: no pose has the joint coordinates of row {missing[0] + 1}"
-            + (f" ({missing.size - 1} more rows fail too)" if missing.size > 1 else "")
-            + ". Check units and zero positions (zero at home), or keep such rows with --flag",
-            missing.tolist(),
+        row = int(missing[0])
+        error, text = ERRORS[PoseStatus(status[row])]
+        worst_joint = int(np.argmax(np.abs(np.nan_to_num(solution.residual[row]))))
+        text = text.format(
+            row=row + 1,
+            start="home" if time is None or not row else "the row before",
+            residual=abs(solution.residual[row, worst_joint]),
+            unit=units[worst_joint],
+            tolerance=tolerance,
         )
-    units = np.array([FAMILIES[chain.kind].joint_unit for chain in mechanism.chains])
-    worst = {
-        str(unit): np.abs(solution.residual[:, units == unit]).max(axis=1)
-        for unit in np.unique(units)
-    }
-    columns: dict[str, np.ndarray | list[str]] = {}
-    if "t" in table.columns:
-        columns["t"] = table.columns["t"]
+        more = f" ({missing.size - 1} more rows have no pose)" if missing.size > 1 else ""
+        raise error(f"{joints}: {text}. --flag keeps such rows, empty{more}", missing.tolist())
+    residual = np.where(found[:, None], solution.residual, np.nan)
+    columns: dict[str, np.ndarray | list[str]] = {} if time is None else {"t": time}
     columns |= {name: solution.pose[:, i] for i, name in enumerate(COORDINATES)}
-    for unit, residual in worst.items():
-        columns["residual" if len(worst) == 1 else f"residual_{unit}"] = residual
+    columns |= (worst := _largest(residual, units))
     columns["condition"] = solution.condition
     if flag:
-        columns["status"] = ["ok" if found else "unreachable" for found in solution.found]
+        columns["status"] = [PoseStatus(value).name.lower() for value in status]
     write_table(out, columns)
-    some = solution.found.any()
+    counts = {one.name.lower(): int((status == one).sum()) for one in PoseStatus if one}
     return PoseReport(
         table.rows,
         int(missing.size),
-        {unit: float(np.nanmax(residual)) for unit, residual in worst.items()} if some else {},
-        float(np.nanmax(solution.condition)) if some else float("nan"),
+        {name: count for name, count in counts.items() if count},
+        {
+            str(unit): float(np.nanmax(column))
+            for unit, column in zip(np.unique(units), worst.values(), strict=True)
+        }
+        if found.any()
+        else {},
+        float(np.nanmax(solution.condition)) if found.any() else float("nan"),
     )
+
+
+def modes_file(
+    mechanism: Mechanism,
+    joints: str | Path,
+    out: str | Path,
+    seed: int = 0,
+    tolerance: float = TOLERANCE,
+) -> ModesReport:
+    """The assembly modes that a seeded search finds for every row of a file.
+
+    Args: joints, tolerance: as of `pose_file`; rows never influence each other.
+          out: CSV, one mode a row: row (of `joints`, from 1), t if given, mode (from 1, the nearest
+               to home first), X ... gamma, distance (from home: characteristic lengths and rad),
+               residual and condition as of `pose_file`.
+    """
+    table, given = _read(mechanism, joints)
+    forward, units = ForwardKinematics(mechanism), _units(mechanism)
+    found = []
+    with step("looking for assembly modes", table.rows) as advance:
+        for row in given:
+            found.append(forward.modes(row, seed, tolerance))
+            advance(1)
+    counts = [len(modes.pose) for modes in found]
+    pose = np.concatenate([modes.pose for modes in found])
+    columns: dict[str, np.ndarray] = {"row": np.repeat(np.arange(table.rows), counts) + 1}
+    if "t" in table.columns:
+        columns["t"] = np.repeat(table.columns["t"], counts)
+    columns["mode"] = np.concatenate([np.arange(count) + 1 for count in counts])
+    columns |= {name: pose[:, i] for i, name in enumerate(COORDINATES)}
+    columns["distance"] = np.concatenate([modes.distance for modes in found])
+    columns |= _largest(np.concatenate([modes.residual for modes in found]), units)
+    columns["condition"] = np.concatenate([modes.condition for modes in found])
+    write_table(out, columns)
+    return ModesReport(table.rows, counts)
+
+
+def _read(mechanism: Mechanism, joints: str | Path) -> tuple[Table, np.ndarray]:
+    check_home(mechanism)
+    names = [f"joint_{name}" for name in mechanism.chain_names]
+    turns = {"rad": "angle", "m": "length"}
+    kinds = {n: (turns[unit], 0) for n, unit in zip(names, _units(mechanism), strict=True)}
+    table = read_table(joints, known={"t": ("time", 0), **kinds})
+    return table, table.require(names)
+
+
+def _units(mechanism: Mechanism) -> np.ndarray:
+    return np.array([FAMILIES[chain.kind].joint_unit for chain in mechanism.chains])
+
+
+def _largest(residual: np.ndarray, units: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns of the largest residual of each row, one for each unit."""
+    kinds = np.unique(units)
+    return {
+        "residual" if len(kinds) == 1 else f"residual_{unit}": np.abs(
+            residual[:, units == unit]
+        ).max(axis=1)
+        for unit in kinds
+    }

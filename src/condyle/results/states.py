@@ -6,24 +6,20 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import BoundsError, InputError
+from ..errors import InputError
 from ..mechanism.mechanism import COORDINATES
 from ..model.evaluator import Evaluator, with_point
 from ..model.judge import require_ok
 from ..model.reactions import reactions as joint_reactions
 from ..motion import Table, TableWriter, iter_table
-from ..status import STATUS_NAMES
-from .solution import (
-    AXES,
-    BOUND_TOLERANCE,
-    WRENCH,
-    bound_margins,
-    lift_off,
-    lift_off_columns,
-    named_columns,
-)
+from .contacts import AXES, lift_off_columns
+from .derived import Derived
+from .failures import status_columns
+from .solution import named_columns
+from .variables import WRENCH
+from .warnings import Watch, refuse
 
-CHUNK_ROWS = 65536
+CHUNK_ROWS = 16384
 
 
 def solve_file(
@@ -40,48 +36,29 @@ def solve_file(
 
     Rows never influence each other.
 
-    Args:    states: CSV with 6 - k pose coordinates, their rates dX... and accelerations
-             ddX..., and optionally Fx, Fy, Fz, Mx, My, Mz.
+    Args:    states: CSV, or Parquet if its name ends in .parquet, with 6 - k pose coordinates,
+             their rates dX... and accelerations ddX..., and optionally some of Fx, Fy, Fz, Mx,
+             My, Mz. Other columns are named in a warning, or refused if they look misspelt.
+             out: likewise CSV or Parquet.
              reactions: columns reaction_<joint>_<chain>_x, _y, _z ... too.
              threads: at most so many; the file does not depend on it.
     Returns: number of rows, and warnings.
     Raises:  InputError, UnreachableError, SingularError, BoundsError: nothing is written then.
     """
     known = [p + name for p in ("", "d", "dd") for name in COORDINATES] + list(WRENCH)
-    worst: dict[str, tuple[float, int, int]] = {}
-    lifts: dict[str, tuple[int, int]] = {}
-    rows = 0
+    watch = Watch(model.mechanism, rows=True)
+    rows, unused = 0, list[str]()
     with TableWriter(out) as writer:
         for table in iter_table(states, CHUNK_ROWS, known=known, doing="solving"):
-            columns, margins, lifted = solve_table(
-                model, table, load_point, flag, rows, reactions, threads
-            )
-            for i, name in enumerate(model.mechanism.contact_names):
-                outside = np.flatnonzero(margins[:, i] < -BOUND_TOLERANCE)
-                if outside.size:
-                    row = int(outside[np.argmin(margins[outside, i])])
-                    depth, count, at = worst.get(name, (0.0, 0, 0))
-                    if -margins[row, i] > depth:
-                        depth, at = -margins[row, i], rows + row + 1
-                    worst[name] = (depth, count + outside.size, at)
-                if (pulls := np.flatnonzero(lifted[:, i])).size:
-                    first, count = lifts.get(name, (rows + int(pulls[0]) + 1, 0))
-                    lifts[name] = (first, count + pulls.size)
+            columns, derived = solve_table(model, table, load_point, flag, rows, reactions, threads)
+            watch.see(derived, np.arange(rows, rows + table.rows) + 1)
             writer.write(columns)
             rows += table.rows
-        warnings = [
-            f'contact "{name}" is outside its bounds in {count} rows, by up to '
-            f"{depth * 1e3:.3g} mm in row {at}"
-            for name, (depth, count, at) in worst.items()
-        ]
-        if strict and warnings:
-            raise BoundsError("; ".join(warnings) + ". Without --strict this is a warning", [])
-    warnings += [
-        f'contact "{name}" lifts off in {count} rows, first in row {first}: there its surface '
-        "would have to pull the ball"
-        for name, (first, count) in lifts.items()
-    ]
-    return rows, warnings
+            unused = list(table.warnings)
+        notices = watch.notices()
+        if strict:
+            refuse(notices)
+    return rows, [*unused, *(notice.text for notice in notices)]
 
 
 def solve_table(
@@ -92,23 +69,26 @@ def solve_table(
     first_row: int,
     reactions: bool = False,
     threads: int | None = None,
-) -> tuple[dict[str, np.ndarray | list[str]], np.ndarray, np.ndarray]:
-    """Output columns for the rows of one table; bound margins and lift-off, (N, k)."""
+) -> tuple[dict[str, np.ndarray | list[str]], Derived]:
+    """Output columns for the rows of one table, and what follows from its evaluation."""
     names = state_coordinates(model, table)
     q, q1, q2 = (table.require([p + name for name in names]) for p in ("", "d", "dd"))
-    q, q1, q2 = model.independent_states(names, q, q1, q2)
+    q, q1, q2 = model.independent_states(names, q, q1, q2, threads=threads)
     wrench = np.zeros((table.rows, 6))
     point = np.zeros(3)
-    for part, group in ((slice(0, 3), WRENCH[:3]), (slice(3, 6), WRENCH[3:])):
-        if any(name in table.columns for name in group):
-            wrench[:, part] = table.require(group)
-    if load_point is not None or "Fx" in table.columns:
+    given = [name for name in WRENCH if name in table.columns]
+    for name in given:
+        wrench[:, WRENCH.index(name)] = table.columns[name]
+    if load_point is not None or set(given) & set(WRENCH[:3]):
         point = model.load_point(load_point)
     evaluation = model.evaluate(q, q1, q2, with_point(wrench, point), threads)
-    ok = evaluation.status == 0
-    if not flag and not ok.all():
-        require_ok(model.mechanism, evaluation, row_offset=first_row)
-    mechanism = model.mechanism
+    mechanism, derived = model.mechanism, Derived(model.mechanism, evaluation, wrench)
+    if not flag:
+        require_ok(mechanism, evaluation, row_offset=first_row)
+
+    def filled(array: np.ndarray) -> np.ndarray:
+        return array if derived.all_ok else np.where(derived.ok[:, None], array, np.nan)
+
     values = {
         "tau_": (mechanism.chain_names, evaluation.effort),
         "contact_": (mechanism.contact_names, evaluation.contact_force),
@@ -117,18 +97,15 @@ def solve_table(
     }
     columns: dict[str, np.ndarray | list[str]] = {}
     for prefix, (labels, array) in values.items():
-        columns |= named_columns(prefix, labels, np.where(ok[:, None], array, np.nan))
+        columns |= named_columns(prefix, labels, filled(array))
     if reactions:
         for name, reaction in joint_reactions(model, evaluation).items():
-            array = np.where(ok[:, None], reaction.array, np.nan)
+            array = filled(reaction.array)
             columns |= {f"reaction_{name}_{axis}": array[:, i] for i, axis in enumerate(AXES)}
-    force = evaluation.contact_force
-    lifted = lift_off(mechanism, force) & ok[:, None]
-    columns |= lift_off_columns(mechanism, lifted)
+    columns |= lift_off_columns(mechanism, derived.lifted)
     if flag:
-        columns["status"] = [STATUS_NAMES[i] for i in evaluation.status]
-    margins = bound_margins(mechanism, evaluation.configuration.contact_point)
-    return columns, np.where(ok[:, None], margins, np.inf), lifted
+        columns |= status_columns(mechanism, evaluation.status, derived.cause)
+    return columns, derived
 
 
 def state_coordinates(model: Evaluator, table: Table) -> list[str]:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .contacts import BOUND_TOLERANCE
+from .failures import Failure
+
 if TYPE_CHECKING:
     from .solution import Solution
+
+FEW = 6  # intervals without a result that a screen shows
 
 
 @dataclass(frozen=True)
@@ -41,8 +45,8 @@ class Summary:
             )
         for name, bound in d["closest_to_bounds"].items():
             lines.append(
-                f"closest to the bounds: {name}, {bound['margin'] * 1e3:.4g} mm "
-                f"{'inside' if bound['margin'] >= 0 else 'OUTSIDE'} at t = {bound['time']:g} s"
+                f"closest to the bounds: {name}, {abs(bound['margin']) * 1e3:.4g} mm "
+                f"{'OUTSIDE' if bound['margin'] < 0 else 'inside'} at t = {bound['time']:g} s"
             )
         for name, lift in d["lift_off"].items():
             lines.append(
@@ -50,6 +54,9 @@ class Summary:
             )
         if d["failed_samples"]:
             lines.append(f"samples without a result: {d['failed_samples']}")
+            lines += [f"  {Failure(**one)}" for one in d["failures"][:FEW]]
+            if (more := len(d["failures"]) - FEW) > 0:
+                lines.append(f"  and {more} more intervals")
         return "\n".join(lines)
 
 
@@ -66,7 +73,10 @@ def summarize(solution: Solution) -> Summary:
     for i, name in enumerate(solution["contact"].values):
         if some and np.isfinite(margins[ok, i]).any():
             k = int(np.nanargmin(margins[:, i]))
-            bounds[str(name)] = {"margin": float(margins[k, i]), "time": float(time[k])}
+            margin = float(margins[k, i])
+            if abs(margin) < BOUND_TOLERANCE:  # rounding is no distance
+                margin = 0.0
+            bounds[str(name)] = {"margin": margin, "time": float(time[k])}
     lifted = solution["lift_off"].values
     closest = int(np.nanargmin(ratio)) if some else None
     return Summary(
@@ -74,6 +84,7 @@ def summarize(solution: Solution) -> Summary:
             "mechanism": solution.attrs["mechanism_name"],
             "samples": len(time),
             "failed_samples": int((~ok).sum()),
+            "failures": [asdict(failure) for failure in solution.failures],
             "time": [float(time[0]), float(time[-1])],
             "formulation": options["formulation"],
             "route": options["route"],
@@ -103,6 +114,7 @@ def summarize(solution: Solution) -> Summary:
                 for i, name in enumerate(solution["contact"].values)
                 if lifted[:, i].any()
             },
-            "warnings": json.loads(solution.attrs["warnings"]),
+            "warnings": solution.warnings,
+            "notices": [notice.to_dict() for notice in solution.notices],
         }
     )

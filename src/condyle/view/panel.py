@@ -7,31 +7,46 @@ from collections.abc import Callable
 from functools import partial
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 import viser
 
 from ..errors import InputError
-from ..mechanism import bundled_mechanisms, load, parse
-from ..results.solution import open_solution
+from ..mechanism import Mechanism, bundled_mechanisms, load, parse
+from ..results.solution import Solution, open_solution
+from .playback import Playback
 from .readout import COLOURS, status_html, tables_html
+from .session import Session
 from .snapshot import Snapshot
-from .stage import VIEWS
-
-if TYPE_CHECKING:
-    from .playback import Playback
-    from .serve import View
+from .stage import VIEWS, Stage
 
 WEIGHTS = 25  # the load's sliders go to this many weights of the platform,
 LEAST_LOAD = 100.0  # and at least to this [N]
 SPEEDS = {"0.1×": 0.1, "0.25×": 0.25, "0.5×": 0.5, "1×": 1.0, "2×": 2.0}
 
 
+class Page(Protocol):
+    """What the controls need of the page that they stand on."""
+
+    session: Session
+    stage: Stage
+    snapshot: Snapshot
+    playback: Playback | None
+    dragging: bool
+    dark: bool
+
+    def wish(self, kind: str, action: Callable[[], None]) -> None: ...
+    def set_dark(self, dark: bool) -> None: ...
+    def look_from(self, name: str) -> None: ...
+    def open_mechanism(self, mechanism: Mechanism) -> None: ...
+    def play_solution(self, solution: Solution) -> None: ...
+
+
 class Panel:
     """The controls of one mechanism. They note wishes; the view's worker fulfils them."""
 
-    def __init__(self, server: viser.ViserServer, view: View) -> None:
+    def __init__(self, server: viser.ViserServer, view: Page) -> None:
         self._gui = server.gui
         self._view = view
         self._playback: Playback | None = None

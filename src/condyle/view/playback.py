@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..kinematics.singularity import KINDS
+from ..report.failures import Failure, at_sample, failures
 from ..report.scene import place
 from ..results.solution import Solution
-from ..status import STATUS_NAMES
 from .session import force_vectors, state_messages
 from .snapshot import Level, Snapshot
 
@@ -26,8 +26,8 @@ class Playback:
         self.playing = False
         self.speed = 1.0
         self._clock = 0.0
-        good = np.flatnonzero(solution["status"].values == 0)
-        self._last_good = int(good[0]) if good.size else None
+        self._good = np.flatnonzero(solution["status"].values == 0)
+        self._failures = failures(solution)
         names = ("pose", "joint", "joint_rate", "torque", "contact_force", "bound_margin", "load")
         self._values = {name: solution[name].values for name in names}
 
@@ -72,12 +72,10 @@ class Playback:
         return place(self.mechanism, pose[good], self._values["joint"][good]).on_platform(point)
 
     def snapshot(self) -> Snapshot:
-        """The mechanism at the sample shown; without a result there, the last good picture."""
+        """The mechanism at the sample shown; without a result, where it was last, and no forces."""
         i, s = self.index, self.solution
-        status = int(s["status"].values[i])
-        if status == 0:
-            self._last_good = i
-        drawn = i if status == 0 or self._last_good is None else self._last_good
+        failed = at_sample(self._failures, i)
+        drawn = i if failed is None else self._good_before(i)
         here = {name: values[i] for name, values in self._values.items()}
         pose, joint = self._values["pose"][drawn], self._values["joint"][drawn]
         pose = np.nan_to_num(pose)  # home, where there is not one good sample
@@ -85,7 +83,8 @@ class Playback:
         points = self.mechanism.platform.points
         at = points.get(s.options["load_point"] or "", (0.0, 0.0, 0.0))
         force = here["contact_force"]
-        level, messages = self._messages(status, here)
+        load = here["load"][:3] if failed is None else np.full(3, np.nan)
+        level, messages = self._messages(failed, drawn, here)
         return Snapshot(
             mechanism=self.mechanism,
             pose=pose,
@@ -99,7 +98,7 @@ class Playback:
             contact_force=force,
             force_vector=force_vectors(self.mechanism, scene.contacts, force),
             margin=here["bound_margin"],
-            load=here["load"][:3],
+            load=load,
             load_at=np.array(at),
             ratio=float(s["singularity_ratio"].values[i]),
             condition=float(s["condition"].values[i]),
@@ -107,11 +106,23 @@ class Playback:
             level=level,
             messages=messages,
             time=self.now,
+            stale=failed is not None,
         )
 
-    def _messages(self, status: int, here: dict[str, np.ndarray]) -> tuple[Level, tuple[str, ...]]:
-        if status != 0:
-            return "unreachable", (f"No result at this time: {STATUS_NAMES[status]}",)
+    def _good_before(self, sample: int) -> int:
+        """The nearest sample with a result: before, else after, else the sample itself."""
+        if not self._good.size:
+            return sample
+        return int(self._good[max(int(np.searchsorted(self._good, sample)) - 1, 0)])
+
+    def _messages(
+        self, failed: Failure | None, drawn: int, here: dict[str, np.ndarray]
+    ) -> tuple[Level, tuple[str, ...]]:
+        if failed is not None:
+            return "unreachable", (
+                f"No result from {failed.start:g} to {failed.end:g} s: {failed}",
+                f"Grey: the mechanism at t = {self.time[drawn]:g} s, without forces",
+            )
         margin, force = here["bound_margin"], here["contact_force"]
         messages = state_messages(self.mechanism, margin, force, here["torque"], here["joint_rate"])
         return ("warning" if messages else "calm"), tuple(messages)

@@ -8,7 +8,7 @@ from html import escape
 import numpy as np
 
 from ..kinematics.chain import FAMILIES
-from .session import effort_limit
+from ..mechanism.chain import limits
 from .snapshot import Snapshot
 
 COLOURS = {"calm": "#2b8a3e", "warning": "#b35c00", "unreachable": "#c92a2a"}
@@ -55,7 +55,7 @@ def _chains(s: Snapshot) -> str:
         family = FAMILIES[chain.kind]
         angle = family.joint_unit == "rad"
         unit, scale = ("°", 180 / np.pi) if angle else ("mm", 1e3)
-        limit = effort_limit(chain)
+        limit = limits(chain).effort
         row = [
             chain.name,
             number(s.joint[i] * scale, 2, unit),

@@ -18,6 +18,7 @@ import viser
 from ..errors import CondyleError
 from ..mechanism import Mechanism, load
 from ..results.solution import Solution, open_solution
+from .gate import Gate, guarded
 from .panel import Panel
 from .playback import Playback
 from .session import Session
@@ -33,7 +34,7 @@ class View:
     """A running page. `url` is where it is; `close` ends it.
 
     Attributes: session: the pose and the load that people move;  playback: a solution, or None;
-                snapshot: what is shown now.
+                snapshot: what is shown now;  port: that was free.
     """
 
     session: Session
@@ -50,12 +51,15 @@ class View:
     ) -> None:
         """Start serving. Raises: MechanismError: if the contacts do not hold the platform."""
         session = Session(mechanism)
-        with contextlib.redirect_stdout(io.StringIO()):  # viser greets in its own name
+        gate = Gate(host)
+        # viser greets in its own name.
+        with contextlib.redirect_stdout(io.StringIO()), guarded(gate):
             self._server = viser.ViserServer(host=host, port=port, label="condyle", verbose=False)
         self.set_dark(False)
         # Pictures of rooms would come from the network.
         self._server.scene.configure_environment_map(None)
-        self.host = host
+        self.host, self._token = host, gate.token
+        self.port = self._server.get_port()
         self._wishes: dict[str, Callable[[], None]] = {}
         self._noting = threading.Lock()
         self._wake = threading.Event()
@@ -71,7 +75,9 @@ class View:
 
     @property
     def url(self) -> str:
-        return f"http://{self.host}:{self._server.get_port()}"
+        """Where the page is, with the key without which it does not answer."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"http://{host}:{self.port}/{self._token}/"
 
     def wish(self, kind: str, action: Callable[[], None]) -> None:
         """Let the worker call `action` soon, in place of an earlier wish of the same kind.
@@ -207,6 +213,8 @@ def serve(
     Raises: CondyleError: if mechanism or solution cannot be used.
     """
     view = open_view(mechanism, solution, host, port)
+    if view.port != port and port:
+        print(f"condyle view: port {port} is in use; took {view.port}", flush=True)
     print(f"condyle view: {view.url} (stop with Ctrl-C)", flush=True)
     if open_browser:
         import webbrowser

@@ -13,9 +13,11 @@ from ..errors import InputError, did_you_mean
 from ..kinematics.contact import indices
 from ..kinematics.singularity import KINDS, NEAR
 from ..mechanism import COORDINATES, Mechanism
+from ..mechanism.chain import limits
 from ..model.data import Evaluation
-from ..model.evaluator import DEFAULT_LOAD_POINT, Evaluator
+from ..model.evaluator import Evaluator
 from ..model.judge import unreachable_cause
+from ..motion.points import DEFAULT_LOAD_POINT
 from ..report.scene import contact_normals, place
 from ..results.solution import BOUND_TOLERANCE, bound_margins, lift_off
 from ..status import Status
@@ -73,7 +75,7 @@ class Session:
             value = np.linspace(-span, span, SCAN)
             q = np.zeros((SCAN, len(self.q)))
             q[:, i] = value
-            reached = self._evaluate(q).status == Status.OK
+            reached = self._evaluate(q).status == Status.ok
             low, high = _around_home(value, reached)
             unit, scale = ("°", 180 / np.pi) if angle else ("mm", 1e3)
             found.append(Coordinate(name, BEYOND * low, BEYOND * high, unit, scale))
@@ -140,7 +142,7 @@ class Session:
         if met:
             self._joint = np.where(in_reach, joint, self._joint)
         scene = place(self.mechanism, self._pose[None], self._joint[None])
-        force = _or_nan(found.contact_force, len(self.mechanism.contacts), status == Status.OK)
+        force = _or_nan(found.contact_force, len(self.mechanism.contacts), status == Status.ok)
         measures = found.configuration.singularity
         ratio = float(measures.ratio[0])
         near = KINDS[int(measures.kind()[0])] if np.isfinite(ratio) else KINDS[0]
@@ -154,7 +156,7 @@ class Session:
             broken=tuple(broken) if met else (),
             joint=np.where(in_reach, joint, np.nan),
             rate=None,
-            torque=_or_nan(found.effort, len(in_reach), status == Status.OK),
+            torque=_or_nan(found.effort, len(in_reach), status == Status.ok),
             reach=reach,
             contact_force=force,
             force_vector=force_vectors(self.mechanism, scene.contacts, force),
@@ -192,7 +194,7 @@ class Session:
         near: str,
     ) -> tuple[Level, tuple[str, ...]]:
         status = int(found.status[0])
-        if status == Status.UNREACHABLE:
+        if status == Status.unreachable:
             cause = unreachable_cause(self.mechanism, found, 0)
             messages = [f"Out of reach: {cause}"]
             others = [name for name in broken if f'"{name}"' not in cause]
@@ -200,10 +202,10 @@ class Session:
                 messages.append(f"Also out of reach: {', '.join(others)}")
             return "unreachable", (*messages, *bound_messages(self.mechanism, margin))
         messages = []
-        if status != Status.OK:
+        if status != Status.ok:
             messages.append("Singular: the efforts are not determined here")
         messages += state_messages(self.mechanism, margin, force, found.effort[0], None)
-        if near != KINDS[0] and status == Status.OK:
+        if near != KINDS[0] and status == Status.ok:
             messages.append(f"Near a singularity of the kind {near} (ratio below {NEAR:g})")
         return ("warning" if messages else "calm"), tuple(messages)
 
@@ -224,8 +226,7 @@ def state_messages(
         if up
     ]
     for i, chain in enumerate(mechanism.chains):
-        effort = effort_limit(chain)
-        speed = chain.actuator.speed_limit
+        effort, speed = limits(chain)
         if effort is not None and abs(torque[i]) > effort:
             messages.append(f"{chain.name} is above its effort limit of {effort:g}")
         if rate is not None and speed is not None and abs(rate[i]) > speed:
@@ -240,12 +241,6 @@ def bound_messages(mechanism: Mechanism, margin: np.ndarray) -> list[str]:
         for name, m in zip(mechanism.contact_names, margin, strict=True)
         if m < -BOUND_TOLERANCE
     ]
-
-
-def effort_limit(chain: object) -> float | None:
-    """Torque or force limit of a chain [N m or N]."""
-    actuator = chain.actuator  # type: ignore[attr-defined]
-    return getattr(actuator, "torque_limit", None) or getattr(actuator, "force_limit", None)
 
 
 def force_vectors(

@@ -29,6 +29,7 @@ class Snapshot:
     ratio, condition: of the singularity measures;  near: its kind, or "none".
     level, messages: what a reader should know, the worst first.
     time:           of a solution that is played [s], or None.
+    stale:          there is no result, and `pose` is that of another time.
     """
 
     mechanism: Mechanism
@@ -51,3 +52,4 @@ class Snapshot:
     level: Level
     messages: tuple[str, ...]
     time: float | None = None
+    stale: bool = False

@@ -123,10 +123,12 @@ class Stage:
         self._scene.add_mesh_simple(
             "/ghost/body", self.scale * vertices, faces, color=ALARM, wireframe=True
         )
+        self._balls: list[Any] = []
         for i, contact in enumerate(self.mechanism.contacts):
             radius = self._ball_radius(contact)
             at = self.scale * np.asarray(contact.point)
-            self._scene.add_icosphere(f"/platform/ball{i}", radius, BALL, position=at)
+            ball = self._scene.add_icosphere(f"/platform/ball{i}", radius, BALL, position=at)
+            self._balls.append(ball)
             self._scene.add_label(f"/platform/ball{i}/name", contact.name)
         for i, (name, point) in enumerate(self.mechanism.platform.points.items()):
             at = self.scale * np.asarray(point)
@@ -163,7 +165,9 @@ class Stage:
         turn = quaternion(scene.rotation[0])
         position = self.scale * scene.position[0]
         self._platform.position, self._platform.wxyz = position, turn
-        self._body.color = BODY[snapshot.level]
+        self._body.color = NEUTRAL if snapshot.stale else BODY[snapshot.level]
+        for ball in self._balls:
+            ball.color = NEUTRAL if snapshot.stale else BALL
         if not dragging:
             self.control.position, self.control.wxyz = position, turn
         self._ghost.visible = snapshot.wanted is not None
@@ -177,12 +181,17 @@ class Stage:
             drawing = scene.chains[chain.name]
             points = {n: self.scale * np.atleast_2d(p)[0] for n, p in drawing.points.items()}
             for rod in drawing.rods:
-                self._lay(chain.name, rod, points, chain.name in snapshot.broken)
+                tint = self._colours[chain.name, rod.body]
+                if snapshot.stale:
+                    tint = NEUTRAL
+                elif chain.name in snapshot.broken and rod.moving:
+                    tint = ALARM
+                self._lay(chain.name, rod, points, tint)
             for name in drawing.balls:
                 self._joints[chain.name, name].position = points[name]
         self._show_forces(snapshot)
 
-    def _lay(self, chain: str, rod: Rod, points: dict[str, np.ndarray], broken: bool) -> None:
+    def _lay(self, chain: str, rod: Rod, points: dict[str, np.ndarray], tint: RGB) -> None:
         handle = self._rods[chain, rod.body]
         start, along = points[rod.start], points[rod.end] - points[rod.start]
         length = float(np.linalg.norm(along))
@@ -190,7 +199,7 @@ class Stage:
         if handle.visible:
             handle.position, handle.wxyz = start, turn_onto(along / length)
             handle.scale = (1.0, 1.0, length)
-        handle.color = ALARM if broken and rod.moving else self._colours[chain, rod.body]
+        handle.color = tint
 
     def _show_forces(self, snapshot: Snapshot) -> None:
         """A load leaves its point; a contact force points at the skin of the ball it pushes."""

@@ -65,7 +65,8 @@ class CompiledKernel:
         count, columns = columns_of(self.interface, inputs, self.order)
         columns = [_readable(column) for column in columns]
         status = np.empty(count, dtype=np.uint8)
-        results = np.empty((self.columns, count))
+        rows = -(-count // UNIT) * UNIT
+        results = _aligned(self.columns * rows).reshape(self.columns, rows)
         strides = [column.strides[0] // 8 for column in columns]
         starts = [column.ctypes.data for column in columns]
         steps = (ctypes.c_ssize_t * len(columns))(*strides)
@@ -81,7 +82,7 @@ class CompiledKernel:
                 ctypes.addressof(steps),
                 end - start,
                 out + 8 * start,
-                count,
+                rows,
                 judged + start,
             )
 
@@ -90,7 +91,7 @@ class CompiledKernel:
         values, row = {}, 0
         for r in self.interface.results:
             width = self.interface.width(r)
-            block = results[row : row + width]
+            block = results[row : row + width, :count]
             values[r.name] = arranged(self.interface, r, block, self.order)
             row += width
         return Answer(values, status)
@@ -211,7 +212,7 @@ def _load(path: str) -> ctypes.CDLL:
 
 def _aligned(count: int) -> np.ndarray:
     """An array that starts on a cache line, as vector loads like it."""
-    raw = np.zeros(count + 8)
+    raw = np.empty(count + 8)
     offset = (-raw.ctypes.data // 8) % 8
     return raw[offset : offset + count]
 

@@ -26,6 +26,21 @@ typedef double unaligned __attribute__((vector_size(8 * W), aligned(8)));
 
 INLINE vec load(const double *p) { return *(const unaligned *)p; }
 INLINE void store(double *p, vec v) { *(unaligned *)p = v; }
+/* Stores that go past the caches, to aligned places; `fence` before others read them. */
+#if W == 8 && defined(__AVX512F__)
+INLINE void store_past(double *p, vec v) { _mm512_stream_pd(p, (__m512d)v); }
+#elif W == 4 && defined(__AVX__)
+INLINE void store_past(double *p, vec v) { _mm256_stream_pd(p, (__m256d)v); }
+#elif W == 2 && defined(__SSE2__)
+INLINE void store_past(double *p, vec v) { _mm_stream_pd(p, (__m128d)v); }
+#else
+INLINE void store_past(double *p, vec v) { store(p, v); }
+#endif
+#if defined(__SSE2__)
+INLINE void fence(void) { _mm_sfence(); }
+#else
+INLINE void fence(void) {}
+#endif
 #if W == 8 && defined(__AVX512F__)
 INLINE void store_some(double *p, vec v, int some) {
     _mm512_mask_storeu_pd(p, (__mmask8)((1 << some) - 1), (__m512d)v);

@@ -198,6 +198,13 @@ class Family(ABC):
     def explain(self, chain: Any, pose: np.ndarray) -> str:
         """Why the chain cannot reach its platform joint at a pose, in numbers."""
 
+    def span(self, chain: Any, pose: np.ndarray) -> tuple[float, float] | None:
+        """What the rod would have to span at a pose that is out of reach, and its length [m].
+
+        None for families whose reach has no such bound.
+        """
+        return None
+
     @classmethod
     def size(cls) -> int:
         return sum(cls.shapes.values())

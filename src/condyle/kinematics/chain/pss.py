@@ -139,13 +139,16 @@ class PSSFamily(Family):
         )
 
     def explain(self, chain: Any, pose: np.ndarray) -> str:
-        c = self.constants(chain)
-        d = joint_position(chain, pose) - c["S"]
-        across = np.linalg.norm(d - (d @ c["axis"]) * c["axis"])
+        across, length = self.span(chain, pose)
         return (
             f'chain "{chain.name}" cannot reach M: its rail passes M at {across * 1e3:.1f} mm, '
-            f"the rod is {float(c['L']) * 1e3:.1f} mm long"
+            f"the rod is {length * 1e3:.1f} mm long"
         )
+
+    def span(self, chain: Any, pose: np.ndarray) -> tuple[float, float]:
+        c = self.constants(chain)
+        d = joint_position(chain, pose) - c["S"]
+        return float(np.linalg.norm(d - (d @ c["axis"]) * c["axis"])), float(c["L"])
 
     @staticmethod
     def _close(c: Constants, M: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:

@@ -182,14 +182,27 @@ class RSSFamily(Family):
         )
 
     def explain(self, chain: Any, pose: np.ndarray) -> str:
+        near, far = self._distances(chain, pose)
+        return (
+            f'chain "{chain.name}" cannot reach M: its crank tip is {near * 1e3:.1f} to '
+            f"{far * 1e3:.1f} mm from M, the coupler is {self._length(chain) * 1e3:.1f} mm long"
+        )
+
+    def span(self, chain: Any, pose: np.ndarray) -> tuple[float, float]:
+        near, far = self._distances(chain, pose)
+        length = self._length(chain)
+        return (near if near > length else far), length
+
+    def _length(self, chain: Any) -> float:
+        return float(self.constants(chain)["L"])
+
+    def _distances(self, chain: Any, pose: np.ndarray) -> tuple[float, float]:
+        """Least and largest distance of the crank tip from M, over a turn of the crank [m]."""
         c = self.constants(chain)
         d = joint_position(chain, pose) - c["G"]
         across, along = np.linalg.norm(c["C"][:, :2].T @ d), c["C"][:, 2] @ d
         near, far = np.hypot(across - c["l"], along), np.hypot(across + c["l"], along)
-        return (
-            f'chain "{chain.name}" cannot reach M: its crank tip is {near * 1e3:.1f} to '
-            f"{far * 1e3:.1f} mm from M, the coupler is {float(c['L']) * 1e3:.1f} mm long"
-        )
+        return float(near), float(far)
 
     @staticmethod
     def _crank_tip(c: Constants, q_r: ca.SX) -> ca.SX:

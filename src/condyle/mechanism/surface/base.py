@@ -12,7 +12,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import Any, ClassVar
 
-from ..quantities import Table
+from ..table import Table
 from .parallel import Parallel
 from .smooth import Smooth
 

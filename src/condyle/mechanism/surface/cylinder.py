@@ -32,4 +32,4 @@ class Cylinder(SurfaceTable):
         return about_itself(across / (2 * self.radius), across @ self.point, self.radius / 2)
 
     def parallel(self, distance: float, point: Coordinates) -> Cylinder:
-        return self.model_copy(update={"radius": self.radius + distance})
+        return self.derived(radius=self.radius + distance)

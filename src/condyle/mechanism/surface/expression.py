@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, ClassVar
 
 import casadi as ca
@@ -22,6 +23,9 @@ class Expression(Smooth):
     phi is in metres, twice differentiable where the contact goes, with a gradient of order 1
     along the normal: upwards, or outwards where the surface is closed. It lives in Python only: a
     mechanism file names kinds and numbers, and nothing in it is evaluated.
+
+    It can be pickled: what travels is the expression, not the function. Two are equal where their
+    expressions are.
 
     Args:   function: (3,) SX -> scalar SX;  closed: whether the surface has an inside.
     Raises: InputError: if `function` is none, or does not return a scalar expression of the point
@@ -51,6 +55,24 @@ class Expression(Smooth):
             )
         object.__setattr__(self, "_equation", ca.Function("phi", [p], [ca.densify(value)]))
 
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Expression):
+            return NotImplemented
+        return self is other or (self.closed, self.form) == (other.closed, other.form)
+
+    def __hash__(self) -> int:
+        return hash((self.closed, self.form))
+
+    def __reduce__(self) -> tuple[Callable[[str, bool], Expression], tuple[str, bool]]:
+        return _unpickled, (self._serialized, self.closed)
+
+    def __deepcopy__(self, memo: Any) -> Expression:
+        return self  # frozen
+
+    @cached_property
+    def _serialized(self) -> str:
+        return self._equation.serialize()
+
     def phi(self, point: Any, constants: Any = None) -> Any:
         return self._equation(ca.vertcat(point[0], point[1], point[2]))
 
@@ -59,7 +81,11 @@ class Expression(Smooth):
 
     @property
     def form(self) -> str:
-        return f"expression {self._equation.serialize()}"
+        return f"expression {self._serialized}"
 
     def parallel(self, distance: float, point: Any) -> Parallel:
         return Parallel.near(self, distance, point)
+
+
+def _unpickled(serialized: str, closed: bool) -> Expression:
+    return Expression(ca.Function.deserialize(serialized), closed)

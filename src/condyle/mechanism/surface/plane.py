@@ -25,4 +25,4 @@ class Plane(SurfaceTable):
 
     def parallel(self, distance: float, point: Coordinates) -> Plane:
         steepness = math.hypot(1.0, *self.slope)
-        return self.model_copy(update={"offset": self.offset + distance * steepness})
+        return self.derived(offset=self.offset + distance * steepness)

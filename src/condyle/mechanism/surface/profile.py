@@ -45,7 +45,9 @@ class Profile(SurfaceTable):
         tuple[Number, ...], Field(min_length=2, max_length=3), AfterValidator(_horizontal)
     ] = Field(description="unit vector in the X-Y plane along which s is measured")
     points: Annotated[
-        tuple[tuple[Length, Length], ...], Field(min_length=3), AfterValidator(_rising)
+        tuple[tuple[Length, Length], ...],
+        Field(min_length=3, max_length=1000),
+        AfterValidator(_rising),
     ] = Field(description="[[s, z], ...] with rising s")
 
     def phi(self, point: Coordinates, constants: Coordinates | None = None) -> Scalar:

@@ -35,4 +35,4 @@ class Sphere(SurfaceTable):
         return about_itself(A, np.array(self.centre), self.radius / 2)[:8]
 
     def parallel(self, distance: float, point: Coordinates) -> Sphere:
-        return self.model_copy(update={"radius": self.radius + distance})
+        return self.derived(radius=self.radius + distance)

@@ -14,23 +14,28 @@ from .accessor import SolutionPlots
 from .files import save, save_each
 from .load import load as figure_7
 from .motion import figure_5
-from .registry import PLOTS
+from .registry import PLOTS, find_figures, plot
 from .share import figure_9
 from .singularity import jacobian as figure_6
+from .style import STYLES
 from .torque import figure_8
 
 if TYPE_CHECKING:
     from ...analysis.compare import Comparison
     from ...results.solution import Solution
 
+find_figures()
+
 __all__ = [
     "PLOTS",
+    "STYLES",
     "SolutionPlots",
     "figure_5",
     "figure_6",
     "figure_7",
     "figure_8",
     "figure_9",
+    "plot",
     "save",
     "save_figures",
     "save_solution_figures",

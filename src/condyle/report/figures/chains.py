@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from .style import PALETTE, look
+from .style import look
 
 _SIDE = re.compile(r"(?<![a-zA-Z])(left|right|l|r)(?![a-zA-Z])", re.IGNORECASE)
 
@@ -39,16 +39,9 @@ def by_unit(units: Sequence[str]) -> dict[str, list[int]]:
 
 
 def styles(names: Sequence[str]) -> list[dict[str, Any]]:
-    """A line style for each name: a pair has one colour, solid and dashed."""
+    """A line style for each name: a pair has one colour, and every line dashes of its own."""
     stems = list(dict.fromkeys(map(stem, names)))
-    used = dict.fromkeys(stems, 0)
-    found = []
-    for name in names:
-        colour = stems.index(stem(name))
-        turn = used[stem(name)] + colour // len(PALETTE)
-        used[stem(name)] += 1
-        found.append(look(colour, turn))
-    return found
+    return [look(stems.index(stem(name)), i) for i, name in enumerate(names)]
 
 
 def readable(name: str) -> str:

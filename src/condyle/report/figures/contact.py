@@ -14,8 +14,9 @@ from ...kinematics.batch import evaluate
 from ...mechanism.mechanism import Bounds, Contact
 from .chains import readable, styles
 from .labels import caption
-from .panels import finish, legend, lines
-from .style import ALERT, GREY, PALETTE, house, new_figure, nothing_to_draw
+from .panels import finish, legend, legend_above, lines
+from .registry import plot
+from .style import ALERT, GREY, PALETTE, figsize_is_free, narrow, new_figure, nothing_to_draw
 
 if TYPE_CHECKING:
     from ...results.solution import Solution
@@ -23,10 +24,11 @@ if TYPE_CHECKING:
 NO_CONTACTS = "this mechanism has no contacts"
 VIEWS = (("from above", "x", "y"), ("from the side", "x", "z"))
 VIEW_RATIO = 0.7  # height over width of a view
+BESIDE, BELOW, ABOVE = 0.65, 0.75, 0.7  # labels of a view, and the heading [inch]
 GRID = 120  # points an axis on which a surface is traced
 
 
-@house
+@plot()
 def contact_force(solution: Solution) -> Figure:
     """Force of each contact on the platform along the unit normal, over time."""
     title = "Contact forces on the platform, along the unit normals"
@@ -44,7 +46,7 @@ def contact_force(solution: Solution) -> Figure:
     return figure
 
 
-@house
+@plot()
 def contact_track(solution: Solution) -> Figure:
     """Track of each contact point, from above and from the side, against its bounds."""
     title = "Tracks of the contact points"
@@ -52,7 +54,10 @@ def contact_track(solution: Solution) -> Figure:
     names = [str(name) for name in solution["contact"].values]
     if not names:
         return nothing_to_draw(title, caption(solution), NO_CONTACTS)
-    figure = new_figure(title, caption(solution), 1.3 + 3.8 * len(names), 6.4)
+    figure = new_figure(title, caption(solution), 0.3 + 3.7 * len(names), 6.0)
+    if figsize_is_free():  # the views have a shape of their own
+        wide = figure.get_figwidth() / len(names) - BESIDE
+        figure.set_figheight(2 * (VIEW_RATIO * wide + BELOW) + (2 if narrow() else 1) * ABOVE)
     grid = figure.subplots(2, len(names), squeeze=False)
     points = solution["contact_point"].values * 1e3
     margins = solution["bound_margin"].values
@@ -66,11 +71,7 @@ def contact_track(solution: Solution) -> Figure:
         if contacts[name].surface.known:
             draw_surface(grid[1, k], contacts[name])
     figure.set_layout_engine("compressed", w_pad=0.12)  # made for axes of fixed shape
-    entries: dict[str, Any] = {}
-    for axes in grid.ravel():
-        handles, labels = axes.get_legend_handles_labels()
-        entries |= dict(zip(labels, handles, strict=True))
-    figure.legend(list(entries.values()), list(entries), loc="outside right upper")
+    legend_above(figure, grid.ravel(), 4 if len(names) > 1 else 2)
     return figure
 
 

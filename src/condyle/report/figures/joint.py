@@ -8,8 +8,9 @@ from matplotlib.figure import Figure
 
 from .chains import by_unit, readable, styles
 from .labels import caption, shown
-from .panels import finish, limits, lines
-from .style import house, new_figure
+from .panels import finish, legend_above, limits, lines
+from .registry import plot
+from .style import new_figure
 
 if TYPE_CHECKING:
     from ...results.solution import Solution
@@ -17,12 +18,12 @@ if TYPE_CHECKING:
 ROWS = (("joint", "coordinate"), ("joint_rate", "rate"), ("joint_acceleration", "acceleration"))
 
 
-@house
+@plot()
 def joint(solution: Solution) -> Figure:
     """Joint coordinates from home, their rates with the limits, and accelerations."""
     names = [str(name) for name in solution["chain"].values]
     columns = by_unit([str(unit) for unit in solution["joint_unit"].values])
-    figure = new_figure("Joint coordinates", caption(solution), 2.5 + 5.5 * len(columns), 6.8)
+    figure = new_figure("Joint coordinates", caption(solution), 1.5 + 5.5 * len(columns), 7.2)
     grid = figure.subplots(3, len(columns), sharex=True, squeeze=False)
     looks, bounds = styles(names), speed_limits(solution)
     labels = []
@@ -34,17 +35,12 @@ def joint(solution: Solution) -> Figure:
             own = [names[i] for i in members]
             lines(axes, solution, values, list(map(readable, own)), [looks[i] for i in members])
             if order == 1:
-                for limit in {bounds[name] for name in own if name in bounds}:
-                    limits(axes, values, limit * factor, unit)
+                shown_bounds = {name: limit * factor for name, limit in bounds.items()}
+                limits(axes, values, shown_bounds, own, unit)
             row_labels.append(f"{kind} [{unit}]")
         labels.append(row_labels)
     finish(grid, labels)
-    handles, texts = [], []
-    for axes in grid[0]:
-        more = axes.get_legend_handles_labels()
-        handles += more[0]
-        texts += more[1]
-    figure.legend(handles, texts, loc="outside right upper")
+    legend_above(figure, grid[0])
     return figure
 
 

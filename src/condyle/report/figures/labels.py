@@ -7,11 +7,13 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 from ...analysis.paper import is_stand_in, is_synthetic
+from ..failures import failures
 
 if TYPE_CHECKING:
     from ...results.solution import Solution
 
 TIME = "time [s]"
+MOST_REASONS = 3  # why samples have no result, in a caption
 COORDINATE = {"alpha": "α", "beta": "β", "gamma": "γ"}
 
 # SI unit -> the unit on the axis, and what to multiply by.
@@ -38,4 +40,6 @@ def caption(solution: Solution) -> str:
         for what in ("motion", "load")
         if what not in invented
     ]
-    return "; ".join(parts) + "."
+    reasons = dict.fromkeys(str(one) for one in failures(solution))
+    grey = [f" Grey: no result ({', '.join(list(reasons)[:MOST_REASONS])})."] if reasons else []
+    return "; ".join(parts) + "." + "".join(grey)

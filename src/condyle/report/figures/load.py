@@ -10,13 +10,14 @@ from matplotlib.figure import Figure
 from .chains import readable
 from .labels import caption
 from .panels import finish, legend, lines
-from .style import XYZ, house, new_figure
+from .registry import plot
+from .style import XYZ, new_figure
 
 if TYPE_CHECKING:
     from ...results.solution import Solution
 
 
-@house
+@plot()
 def load(solution: Solution) -> Figure:
     """Force on the platform over time, and its moment where there is one."""
     wrench = solution["load"]

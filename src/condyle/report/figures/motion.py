@@ -10,7 +10,8 @@ from matplotlib.figure import Figure, FigureBase
 from ...mechanism.mechanism import COORDINATES
 from .labels import COORDINATE, caption, shown
 from .panels import finish, legend, lines
-from .style import PALETTE, XYZ, house, new_figure
+from .registry import plot
+from .style import PALETTE, XYZ, house, narrow, new_figure
 
 if TYPE_CHECKING:
     from ...results.solution import Solution
@@ -29,7 +30,7 @@ KINDS = (
 DEFAULT_LANDMARK = "incisor"
 
 
-@house
+@plot()
 def motion(solution: Solution) -> Figure:
     """Pose coordinates, their rates and accelerations over time."""
     figure = new_figure("Motion of the platform", caption(solution), 8, 6.2)
@@ -37,10 +38,11 @@ def motion(solution: Solution) -> Figure:
     return figure
 
 
-@house
+@plot()
 def path(solution: Solution) -> Figure:
     """Path of a platform point from the side, the front, above and in space."""
-    figure = new_figure(f"Path of {landmark(solution)[0]}", caption(solution), 10, 2.9)
+    height = 4.4 if narrow() else 2.9
+    figure = new_figure(f"Path of {landmark(solution)[0]}", caption(solution), 10, height)
     draw_path(figure, solution)
     return figure
 
@@ -77,8 +79,13 @@ def draw_coordinates(figure: FigureBase, solution: Solution) -> None:
 def draw_path(figure: FigureBase, solution: Solution) -> None:
     point = landmark(solution)[1]
     place = track(solution, point) * 1e3
-    [[flat, space]] = figure.subfigures(1, 2, squeeze=False, width_ratios=(3, 1.2))
-    row = flat.subplots(1, 3)
+    if narrow():
+        row = [figure.add_subplot(2, 2, i) for i in (1, 2, 3)]
+        axes_in_space = figure.add_subplot(2, 2, 4, projection="3d")
+    else:
+        [[flat, space]] = figure.subfigures(1, 2, squeeze=False, width_ratios=(3, 1.2))
+        row = flat.subplots(1, 3)
+        axes_in_space = space.add_subplot(projection="3d")
     home = point * 1e3
     for axes, (view, across, up) in zip(row, VIEWS, strict=True):
         i, j = "XYZ".index(across), "XYZ".index(up)
@@ -87,8 +94,8 @@ def draw_path(figure: FigureBase, solution: Solution) -> None:
         axes.set(title=view, xlabel=f"{across} [mm]", ylabel=f"{up} [mm]")
         axes.set_aspect("equal", adjustable="datalim")
         axes.margins(0.1)
-    row[0].annotate("home", home[[0, 2]], (6, -3), textcoords="offset points", fontsize=8)
-    axes = space.add_subplot(projection="3d")
+    row[0].annotate("home", (home[0], home[2]), (6, -3), textcoords="offset points", fontsize=8)
+    axes = axes_in_space
     axes.plot(*place.T, color=PALETTE[0], lw=0.9)
     axes.plot(*home[:, None], "o", color=PALETTE[1], ms=4)
     axes.set_title("in space")
@@ -100,9 +107,10 @@ def draw_path(figure: FigureBase, solution: Solution) -> None:
 
 
 def landmark(solution: Solution) -> tuple[str, np.ndarray]:
-    """The point whose path is drawn: that of the motion, the incisor, or O_M; its place in {M}."""
+    """The point whose path is drawn: of the motion, the only one, the incisor, or O_M."""
     points = solution.mechanism.platform.points
-    name = solution.options["landmark"] or DEFAULT_LANDMARK
+    only = next(iter(points)) if len(points) == 1 else DEFAULT_LANDMARK
+    name = solution.options["landmark"] or only
     if name in points:
         return name, np.array(points[name])
     return "the mass centre", np.zeros(3)

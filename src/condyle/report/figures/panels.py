@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
+from ..failures import failures, longest
+from .chains import readable
 from .labels import TIME
-from .style import DARK, GREY, look
+from .style import DARK, GREY, look, narrow
 
 if TYPE_CHECKING:
     from ...results.solution import Solution
 
+NO_RESULT = "no result"
 REACH = 2.5  # a limit beyond this many times the data would flatten them
 
 
@@ -38,12 +43,10 @@ def lines(
 
 
 def shade_failed(axes: Axes, solution: Solution) -> None:
-    """Grey where samples are unreachable or singular."""
-    failed = np.concatenate([[False], solution["status"].values != 0, [False]])
-    time = solution["time"].values
-    edges = np.flatnonzero(np.diff(failed.astype(int)))
-    for start, end in zip(edges[::2], edges[1::2], strict=True):
-        axes.axvspan(time[start], time[end - 1], color=GREY, alpha=0.2, lw=1)
+    """Grey where samples have no result; the legend says so."""
+    for i, one in enumerate(longest(failures(solution))):
+        label = NO_RESULT if i == 0 else None
+        axes.axvspan(one.start, one.end, color=GREY, alpha=0.2, lw=1, label=label)
 
 
 def finish(grid: np.ndarray, y_labels: Sequence[Sequence[str]]) -> None:
@@ -58,9 +61,21 @@ def finish(grid: np.ndarray, y_labels: Sequence[Sequence[str]]) -> None:
         axes.tick_params(labelbottom=False)
 
 
-def limits(axes: Axes, values: np.ndarray, limit: float, unit: str) -> None:
-    """An actuator's limit as lines, or in the title where the data stay far below it."""
-    text = f"limit ±{limit:.4g} {unit}"
+def limits(
+    axes: Axes, values: np.ndarray, bounds: Mapping[str, float], names: Sequence[str], unit: str
+) -> None:
+    """Limits of the actuators `names` as lines, or in the title where the data stay far below.
+
+    Args: bounds: limit by name, of those that have one, in the unit of the axis.
+    """
+    for limit in dict.fromkeys(bounds[name] for name in names if name in bounds):
+        whose = [readable(name) for name in names if bounds.get(name) == limit]
+        who = "" if len(whose) == len(names) else f" ({', '.join(whose)})"
+        draw_limit(axes, values, limit, f"limit ±{limit:.4g} {unit}{who}")
+
+
+def draw_limit(axes: Axes, values: np.ndarray, limit: float, text: str) -> None:
+    """One limit, at plus and minus."""
     peak = float(np.nanmax(np.abs(values), initial=0.0))
     if limit > REACH * peak:
         title = axes.get_title(loc="left")
@@ -86,10 +101,36 @@ def same_scale(column: Sequence[Axes]) -> None:
 
 
 def legend_beside(axes: Axes) -> None:
-    """A legend to the right of the axes."""
+    """A legend to the right of the axes, above them where there is no room."""
+    if narrow():
+        legend(axes, 2)
+        return
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
 
 
 def legend(axes: Axes, columns: int = 1) -> None:
     """A legend above the axes' right end, where no curve runs."""
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=columns, borderaxespad=0.0)
+
+
+def legend_above(figure: Figure, panels: Iterable[Axes], columns: int = 3) -> None:
+    """One legend between the heading and all panels, each label once."""
+    entries: dict[str, Any] = {}
+    for axes in panels:
+        handles, labels = axes.get_legend_handles_labels()
+        entries |= dict(zip(labels, handles, strict=True))
+    columns = 2 if narrow() else columns
+    rows = -(-len(entries) // columns)
+    # The heading keeps the room: blank lines below it.
+    heading, small = mpl.rcParams["figure.titlesize"], mpl.rcParams["legend.fontsize"]
+    title = figure.get_suptitle()
+    blank = -(-int(rows * 2.0 * small) // int(1.2 * heading))
+    figure.suptitle(title + "\n" * blank, x=0.01, ha="left")
+    below = 1.9 * heading if title else 0.0
+    figure.legend(
+        list(entries.values()),
+        list(entries),
+        loc="upper left",
+        bbox_to_anchor=(0.0, 1.0 - below / (72 * figure.get_figheight())),
+        ncols=columns,
+    )

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
-from ...analysis.indices import LOAD_PART
+from ...errors import InputError, did_you_mean
+from ..words import LOAD_PARTS, part_word, parts_in_use
 from .chains import groups, readable
 from .labels import caption
 from .panels import finish, legend_beside, lines
-from .style import house, new_figure
+from .registry import plot
+from .style import new_figure
 from .torque import chains_of, effort_label, scale_by_unit
 
 if TYPE_CHECKING:
@@ -20,13 +22,13 @@ if TYPE_CHECKING:
 PAPER_ORDER = ("platform", "cranks", "couplers")
 
 
-@house
+@plot()
 def share(solution: Solution, parts: Sequence[str] | None = None) -> Figure:
     """Efforts by part: a column a part, a row a pair of chains.
 
-    Args: parts: names; all by default.
+    Args: parts: names; by default all that there are.
     """
-    parts = [str(part) for part in (parts or solution["part"].values)]
+    parts = [named_part(solution, part) for part in parts or parts_in_use(solution)]
     names, units = chains_of(solution)
     panels = groups(names, units)
     figure = new_figure(
@@ -34,6 +36,7 @@ def share(solution: Solution, parts: Sequence[str] | None = None) -> Figure:
         caption(solution),
         max(6.0, 1.8 + 2.7 * len(parts)),
         1.1 + 1.7 * len(panels),
+        len(parts),
     )
     grid = figure.subplots(len(panels), len(parts), sharex=True, squeeze=False)
     for row, members in zip(grid, panels, strict=True):
@@ -43,14 +46,23 @@ def share(solution: Solution, parts: Sequence[str] | None = None) -> Figure:
             lines(axes, solution, values, own)
         legend_beside(row[-1])
     for axes, part in zip(grid[0], parts, strict=True):
-        axes.set_title(readable(part), pad=20)
+        axes.set_title(part_word(part), pad=20)
     scale_by_unit(grid, panels, units)
     finish(grid, [[effort_label(units[m[0]])] + [""] * (len(parts) - 1) for m in panels])
     return figure
 
 
 def figure_9(solution: Solution) -> Figure:
-    """The paper's Fig. 9: end effector, cranks and couplers, without the bite force."""
-    there = [str(part) for part in solution["part"].values if part != LOAD_PART]
+    """The paper's Fig. 9: end effector, cranks and couplers, without the load."""
+    there = [str(part) for part in solution["part"].values if part not in LOAD_PARTS]
     first = [part for part in PAPER_ORDER if part in there]
     return share(solution, first + [part for part in there if part not in first])
+
+
+def named_part(solution: Solution, part: str) -> str:
+    """The part in the solution that a caller means; the load has two names."""
+    there = [str(name) for name in solution["part"].values]
+    meant = [name for name in there if name == part or {name, part} <= set(LOAD_PARTS)]
+    if not meant:
+        raise InputError(f'no part "{part}".{did_you_mean(part, there)}')
+    return meant[0]

@@ -11,7 +11,8 @@ from ...kinematics.singularity import NEAR
 from .chains import groups, heading, readable, styles
 from .labels import caption
 from .panels import finish, legend, legend_beside, lines
-from .style import ALERT, DASHES, house, new_figure
+from .registry import plot
+from .style import ALERT, DASHES, new_figure
 
 if TYPE_CHECKING:
     from ...results.solution import Solution
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 J_A_UNITS = {"rad": ("mm²/rad", 1e6), "m": ("mm", 1e3)}
 
 
-@house
+@plot()
 def jacobian(solution: Solution) -> Figure:
     """Diagonal of J_A, eq. (26): a chain is at an inverse singularity where its entry is zero."""
     names = [str(name) for name in solution["chain"].values]
@@ -41,7 +42,7 @@ def jacobian(solution: Solution) -> Figure:
     return figure
 
 
-@house
+@plot()
 def singularity(solution: Solution) -> Figure:
     """Dimensionless measures: transmission of each chain, singular values of J_W, their ratio."""
     figure = new_figure("Distance from singularities", caption(solution), 8.5, 7)

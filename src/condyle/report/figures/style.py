@@ -7,18 +7,30 @@ drawn in a script, a notebook or a server alike.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextvars import ContextVar
+from dataclasses import dataclass
 from functools import wraps
-from typing import Any, ParamSpec
+from string import ascii_lowercase
+from textwrap import fill
+from typing import Any
 
 import matplotlib as mpl
 from cycler import cycler
 from matplotlib.figure import Figure
+from matplotlib.transforms import ScaledTranslation
 
-P = ParamSpec("P")
+from ...errors import InputError, did_you_mean
 
 # Okabe and Ito's colours, told apart by colour-blind readers; without yellow, which pales on white.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-DASHES = ("-", (0, (4, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)))
+DASHES = (
+    "-",
+    (0, (4, 2)),
+    (0, (1, 1.5)),
+    (0, (5, 1.5, 1, 1.5)),
+    (0, (8, 2)),
+    (0, (5, 1.5, 1, 1.5, 1, 1.5)),
+)
 GREY = "#666666"
 DARK = "#333333"
 ALERT = "#D55E00"
@@ -53,32 +65,155 @@ STYLE: Any = {
 }
 
 
+JOURNAL: Any = STYLE | {
+    "savefig.dpi": 600,
+    "font.size": 8,
+    "axes.titlesize": 8,
+    "axes.labelsize": 8,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "legend.fontsize": 7,
+    "legend.handlelength": 1.8,
+    "legend.columnspacing": 1.0,
+    "legend.handletextpad": 0.5,
+    "figure.titlesize": 8,
+    "lines.linewidth": 1.0,
+    "axes.linewidth": 0.6,
+}
+
+
+@dataclass(frozen=True)
+class Paper:
+    """Settings of matplotlib, and the width [mm] and part of the height that figures get."""
+
+    settings: Any
+    width: float | None = None
+    height: float = 1.0
+
+
+# One or two columns of a journal; the screen takes each figure's own size.
+STYLES = {
+    "screen": Paper(STYLE),
+    "journal": Paper(JOURNAL, 85.0, 0.75),
+    "journal-wide": Paper(JOURNAL, 175.0, 0.75),
+}
+INCH = 25.4
+NARROW = 120.0  # [mm]
+MARGIN = 44  # of a panel, for its numbers and label [pt]
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What a caller asks of a figure, whichever it is."""
+
+    figsize: tuple[float, float] | None = None
+    title: bool = True
+    paper: Paper = STYLES["screen"]
+
+
+PLAIN = Wishes()
+_wishes: ContextVar[Wishes] = ContextVar("wishes", default=PLAIN)
+
+
 def look(i: int, turn: int | None = None) -> dict[str, Any]:
     """Colour i of the palette; the dashes change with it, or are those of `turn`."""
     dashes = i if turn is None else turn
     return {"color": PALETTE[i % len(PALETTE)], "linestyle": DASHES[dashes % len(DASHES)]}
 
 
-# For three components; the third dashed, since alpha and gamma nearly coincide in chewing.
-XYZ = (look(0, 0), look(1, 0), look(-1, 1))
+# For three components; the third with gaps, since alpha and gamma nearly coincide in chewing.
+XYZ = (look(0, 0), look(1, 2), look(-1) | {"linestyle": (0, (3, 3))})
 
 
-def house(draw: Callable[P, Figure]) -> Callable[P, Figure]:
-    """Draw in the house style, whatever the caller's settings are."""
+def house(draw: Callable[..., Figure]) -> Callable[..., Figure]:
+    """Draw in the house style, whatever the caller's settings are.
+
+    Adds to the arguments of `draw`:
+
+    Args:   figsize: width and height [inch].
+            title: whether the heading, and the line that says where the data come from, are drawn;
+                without them both belong into the caption of whoever prints the figure.
+            letters: whether panels are marked (a), (b), ...
+            style: of `STYLES`: "screen"; "journal", 85 mm wide with letters of 8 pt, or
+                "journal-wide", 175 mm, which figures of many columns take anyway.
+    Raises: InputError: if there is no such style.
+    """
 
     @wraps(draw)
-    def styled(*args: P.args, **kwargs: P.kwargs) -> Figure:
-        with mpl.rc_context(STYLE):
-            return draw(*args, **kwargs)
+    def styled(
+        *args: Any,
+        figsize: tuple[float, float] | None = None,
+        title: bool = True,
+        letters: bool = False,
+        style: str = "screen",
+        **kwargs: Any,
+    ) -> Figure:
+        if style not in STYLES:
+            raise InputError(f'no style "{style}" of figures.{did_you_mean(style, STYLES)}')
+        paper = STYLES[style]
+        before = _wishes.set(Wishes(figsize, title, paper))
+        try:
+            with mpl.rc_context(paper.settings):
+                figure = draw(*args, **kwargs)
+                if letters:
+                    mark_panels(figure)
+                if narrow():
+                    make_room(figure)
+                return figure
+        finally:
+            _wishes.reset(before)
 
     return styled
 
 
-def new_figure(title: str, caption: str, width: float, height: float) -> Figure:
-    """An empty figure [inch] with a title, and a caption that says where its data come from."""
-    figure = Figure(figsize=(width, height), layout="constrained")
-    figure.suptitle(title, x=0.01, ha="left")
-    figure.supxlabel(caption, x=0.01, ha="left", fontsize=7, color=GREY)
+def figsize_is_free() -> bool:
+    """Whether the caller leaves the size of the figure to it."""
+    return _wishes.get().figsize is None
+
+
+def narrow() -> bool:
+    """Whether the figure that is being drawn is for one column of a page."""
+    width = _wishes.get().paper.width
+    return width is not None and width < NARROW
+
+
+def make_room(figure: Figure) -> None:
+    """Break titles to the width of their panels, and put legends above them."""
+    size = mpl.rcParams["axes.titlesize"]
+    for axes in figure.axes:
+        spec = axes.get_subplotspec()
+        columns = 1 if spec is None else spec.get_gridspec().ncols
+        room = 72 * figure.get_figwidth() / columns - MARGIN
+        title = fill(axes.get_title(loc="left"), max(int(room / (0.58 * size)), 10))
+        axes.set_title(title, loc="left", pad=4)
+        if (legend := axes.get_legend()) is not None:
+            lines = title.count("\n") + 1 if title else 0
+            up = ScaledTranslation(0.0, 1.3 * size * lines / 72, figure.dpi_scale_trans)
+            legend.set_bbox_to_anchor((1.0, 1.0), transform=axes.transAxes + up)
+
+
+def mark_panels(figure: Figure) -> None:
+    """Put (a), (b), ... before the titles of the panels."""
+    for i, axes in enumerate(figure.axes):
+        letter = ascii_lowercase[i % 26] * (1 + i // 26)
+        axes.set_title(f"({letter}) {axes.get_title(loc='left')}".rstrip(), loc="left")
+
+
+def new_figure(title: str, caption: str, width: float, height: float, columns: int = 1) -> Figure:
+    """An empty figure [inch] with a title, and a caption that says where its data come from.
+
+    The caller's wishes go before.
+
+    Args: columns: of panels; more than two do not fit into one column of a journal.
+    """
+    wishes = _wishes.get()
+    paper = STYLES["journal-wide"] if narrow() and columns > 2 else wishes.paper
+    size = (width if paper.width is None else paper.width / INCH, height * paper.height)
+    figure = Figure(figsize=wishes.figsize or size, layout="constrained")
+    if wishes.title:
+        words = mpl.rcParams["font.size"]
+        figure.suptitle(title, x=0.01, ha="left")
+        figure.supxlabel(caption, x=0.01, ha="left", fontsize=words - 2, color=GREY, wrap=True)
     return figure
 
 

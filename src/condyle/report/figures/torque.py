@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
+from ...mechanism.chain import limits as actuator_limits
 from .chains import by_unit, groups, heading, readable
 from .labels import caption
 from .panels import finish, legend, legend_beside, limits, lines, same_scale
+from .registry import plot
 from .style import house, new_figure
 
 if TYPE_CHECKING:
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
     from ...results.solution import Solution
 
 
-@house
+@plot()
 def torque(solution: Solution) -> Figure:
     """Effort of each chain over time, with its actuator's limit."""
     names, units = chains_of(solution)
@@ -33,8 +35,7 @@ def torque(solution: Solution) -> Figure:
         legend(axes, 2)
         axes.set_title(heading(own))
         unit = units[members[0]]
-        for limit in {bounds[name] for name in own if name in bounds}:
-            limits(axes, values[:, by_unit(units)[unit]], limit, unit)
+        limits(axes, values[:, by_unit(units)[unit]], bounds, own, unit)
     scale_by_unit(grid, panels, units)
     finish(grid, [[effort_label(units[members[0]])] for members in panels])
     return figure
@@ -54,6 +55,7 @@ def figure_8(comparison: Comparison) -> Figure:
         caption(solution),
         1.2 + 3.4 * len(columns),
         1.1 + 1.7 * len(panels),
+        len(columns),
     )
     grid = figure.subplots(len(panels), len(columns), sharex=True, squeeze=False)
     for row, members in zip(grid, panels, strict=True):
@@ -96,8 +98,7 @@ def effort_limits(solution: Solution) -> dict[str, float]:
     """Chain -> its actuator's largest effort, where it has one."""
     found = {}
     for chain in solution.mechanism.chains:
-        actuator = chain.actuator.model_dump()
-        limit = actuator.get("torque_limit") or actuator.get("force_limit")
+        limit = actuator_limits(chain).effort
         if limit is not None:
             found[chain.name] = limit
     return found

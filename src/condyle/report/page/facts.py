@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,18 +13,24 @@ import numpy as np
 
 from ...errors import InputError
 from ...results.summary import summarize
+from ..failures import failures, longest
 from .html import Markup, table, tag
 from .panels import effort_limits, reaction_magnitudes, reaction_variables, speed_limits
 
 if TYPE_CHECKING:
     from ...results.solution import Solution
     from ..tables import Table
+    from .reduce import Reduced
 
 
 _WORDS = {
     "characteristic_length": "characteristic length [m]",
     "contact_residual_of_given_pose": "contact residual of the given pose [m]",
 }
+
+
+FAILURES = 30  # spans without a result that are listed
+SOURCES = ("motion", "load")  # options that may be paths
 
 
 @dataclass(frozen=True)
@@ -51,7 +58,7 @@ def warnings_box(warnings: Sequence[str]) -> Markup:
     )
 
 
-def fact_cards(solution: Solution) -> Markup:
+def fact_cards(page: Reduced) -> Markup:
     cards = [
         tag(
             "div",
@@ -59,19 +66,20 @@ def fact_cards(solution: Solution) -> Markup:
             tag("dd", fact.value, tag("small", fact.where)),
             class_="fact alarm" if fact.alarm else "fact",
         )
-        for fact in _facts(solution)
+        for fact in _facts(page)
     ]
     return tag("dl", *cards, class_="facts")
 
 
-def _facts(solution: Solution) -> Iterator[Fact]:
+def _facts(page: Reduced) -> Iterator[Fact]:
+    """Peaks come from the samples kept, where every curve's largest is; counts from all."""
+    solution, failed = page.solution, page.failed
     data = summarize(solution).data
-    start, end = data["time"]
+    start, end = page.time[[0, -1]]
     time = solution["time"].values
-    failed = data["failed_samples"]
     yield Fact(
         "Samples",
-        f"{data['samples']:,}".replace(",", "\u202f"),
+        f"{page.total:,}".replace(",", "\u202f"),
         f"{failed} without a result" if failed else f"{start:g} to {end:g} s",
         alarm=bool(failed),
     )
@@ -105,8 +113,28 @@ def _facts(solution: Solution) -> Iterator[Fact]:
             "Closest to a singularity",
             f"{near['ratio']:.4g}",
             f"ratio, t = {near['time']:g} s",
-            alarm=bool(data["samples_near_singularity"]),
+            alarm=bool(page.near),
         )
+
+
+def failure_table(page: Reduced) -> Markup:
+    """When there is no result, and why."""
+    found = failures(page.solution, page.time, page.status)
+    if not found:
+        return Markup("")
+    rows = [
+        [
+            f"{one.start:g} to {one.end:g} s",
+            f"{one.last - one.first + 1}",
+            one.status,
+            one.cause or "not stated",
+        ]
+        for one in longest(found, FAILURES)
+    ]
+    more = len(found) - len(rows)
+    notes = [f"The longest of {len(found)} spans."] if more else []
+    header = ["Time", "Samples", "Status", "Cause"]
+    return table(header, rows, "Without a result", notes)
 
 
 def _peak(values: np.ndarray) -> tuple[int, int, float] | None:
@@ -179,15 +207,17 @@ def provenance(solution: Solution, files: Sequence[Path]) -> Markup:
     chosen = solution.options
     listed = [["mechanism as solved (below)", hashlib.sha256(text.encode()).hexdigest()]]
     listed += [
-        [str(chosen[name]), chosen[f"{name}_sha256"]]
-        for name in ("motion", "load")
+        [file_name(chosen[name]), chosen[f"{name}_sha256"]]
+        for name in SOURCES
         if chosen.get(f"{name}_sha256")
     ]
     known = {row[1] for row in listed}
     listed += [row for file in files if (row := _file_row(Path(file)))[1] not in known]
     rows = [[name, tag("code", digest)] for name, digest in listed]
     options = [
-        [_words(key), _said(value)] for key, value in chosen.items() if not key.endswith("_sha256")
+        [_words(key), file_name(value) if key in SOURCES else _said(value)]
+        for key, value in chosen.items()
+        if not key.endswith("_sha256")
     ]
     return tag(
         "section",
@@ -201,11 +231,19 @@ def provenance(solution: Solution, files: Sequence[Path]) -> Markup:
 
 
 def _file_row(path: Path) -> list[str]:
+    digest = hashlib.sha256()
     try:
-        content = path.read_bytes()
+        with path.open("rb") as file:
+            while block := file.read(1 << 20):
+                digest.update(block)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
-    return [str(path), hashlib.sha256(content).hexdigest()]
+    return [path.name, digest.hexdigest()]
+
+
+def file_name(source: Any) -> str:
+    """A file's name without its folders, which tell of the sender's machine; words stay."""
+    return re.split(r"[/\\](?=[^/\\]*$)", str(source))[-1]
 
 
 def _words(key: str) -> str:

@@ -8,13 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...mechanism.chain import limits as actuator_limits
 from ..scene import Style, styles
+from ..words import part_word, parts_in_use
 from .columns import Columns
 from .units import Shown, shown
 
 if TYPE_CHECKING:
     from ...results.solution import Solution
 
+# The third with gaps, through which one that it lies on can be seen, as gamma on alpha in chewing.
+COMPONENTS = [Style(0, "solid"), Style(1, "dot"), Style(2, "dash")]
 LIMITS_IN_VIEW = 0.25  # of a limit: peaks above this bring the limit into view
 MAX_BOUND = 1e9  # metres; a margin without a bound is infinite
 
@@ -31,13 +35,25 @@ class Line:
     style: Style
 
 
-def time_panels(solution: Solution, columns: Columns) -> list[Panel]:
-    """Every plot over time, in the order of the page."""
+@dataclass(frozen=True)
+class Limit:
+    """A level drawn at plus and minus `value` (SI), and the lines that it holds for."""
+
+    value: float
+    label: str
+    of: list[str]
+
+
+def time_panels(solution: Solution, columns: Columns, every: bool = False) -> list[Panel]:
+    """Every plot over time, in the order of the page.
+
+    Args: every: those too in which there is nothing but zeros, as in one piece of a run.
+    """
     return [
         *_motion(solution, columns),
         *_chains(solution, columns),
-        *_shares(solution, columns),
-        *_contacts(solution, columns),
+        *_shares(solution, columns, every),
+        *_contacts(solution, columns, every),
         *_singularity(solution, columns),
         *_reactions(solution, columns),
     ]
@@ -51,16 +67,13 @@ def panel(
     unit: Shown,
     sets: dict[str, list[Line]],
     note: str = "",
-    limits: Sequence[tuple[float, str]] = (),
+    limits: Sequence[Limit] = (),
 ) -> Panel:
-    """A plot over time; several `sets` of lines become a choice.
-
-    Args: limits: (value in SI, label); drawn at plus and minus the value.
-    """
+    """A plot over time; several `sets` of lines become a choice."""
     values = np.concatenate([line.values for lines in sets.values() for line in lines])
     finite = np.abs(values[np.isfinite(values)])
     peak = float(finite.max(initial=0.0))
-    nearest = min((value for value, _ in limits), default=np.inf)
+    nearest = min((limit.value for limit in limits), default=np.inf)
     return {
         "id": name,
         "section": section,
@@ -68,7 +81,9 @@ def panel(
         "unit": unit.unit,
         "decimals": unit.decimals(values),
         "note": note,
-        "limits": [{"value": v * unit.scale, "label": label} for v, label in limits],
+        "limits": [
+            {"value": one.value * unit.scale, "label": one.label, "of": one.of} for one in limits
+        ],
         "limitsInView": peak >= LIMITS_IN_VIEW * nearest,
         "sets": [
             {
@@ -76,7 +91,7 @@ def panel(
                 "lines": [
                     {
                         "label": line.label,
-                        "column": columns.add(line.column, line.values),
+                        "column": columns.add_line(line.column, line.values),
                         "scale": unit.scale,
                         "colour": line.style.colour,
                         "dash": line.style.dash,
@@ -104,7 +119,7 @@ def _motion(solution: Solution, columns: Columns) -> Iterator[Panel]:
         lines = variable_lines(solution, variable, "coordinate")
         lines = [
             Line(line.label + "′" * bool(suffix), line.column, line.values, style)
-            for line, style in zip(lines, styles(list("abc")) * 2, strict=True)
+            for line, style in zip(lines, COMPONENTS * 2, strict=True)
         ]
         for part, what, unit in ((lines[:3], "position", "m"), (lines[3:], "angles", "rad")):
             people = shown(unit)
@@ -145,31 +160,28 @@ def _chains(solution: Solution, columns: Columns) -> Iterator[Panel]:
 
 def effort_limits(solution: Solution) -> list[float | None]:
     """Torque or force limit of each chain [N m or N]."""
-    actuators = [chain.actuator for chain in solution.mechanism.chains]
-    names = ("torque_limit", "force_limit")
-    return [next((v for n in names if (v := getattr(a, n, None))), None) for a in actuators]
+    return [actuator_limits(chain).effort for chain in solution.mechanism.chains]
 
 
 def speed_limits(solution: Solution) -> list[float | None]:
     """Speed limit of each chain [rad/s or m/s]."""
-    return [getattr(chain.actuator, "speed_limit", None) for chain in solution.mechanism.chains]
+    return [actuator_limits(chain).speed for chain in solution.mechanism.chains]
 
 
-def _distinct(
-    limits: Sequence[float | None], names: Sequence[str], unit: Shown
-) -> list[tuple[float, str]]:
+def _distinct(limits: Sequence[float | None], names: Sequence[str], unit: Shown) -> list[Limit]:
     """Each limit once, with the chains it is for unless it is for all."""
     found = []
     for value in dict.fromkeys(v for v in limits if v is not None):
         whose = [name for name, v in zip(names, limits, strict=True) if v == value]
         who = "" if len(whose) == len(names) else f" ({', '.join(whose)})"
-        found.append((value, f"limit ±{value * unit.scale:g} {unit.unit}{who}"))
+        found.append(Limit(value, f"limit ±{value * unit.scale:g} {unit.unit}{who}", whose))
     return found
 
 
-def _shares(solution: Solution, columns: Columns) -> Iterator[Panel]:
+def _shares(solution: Solution, columns: Columns, every: bool) -> Iterator[Panel]:
     """What platform, couplers, cranks and load need of each effort."""
     parts = [str(part) for part in solution["part"].values]
+    used = [p for p, name in enumerate(parts) if every or name in parts_in_use(solution)]
     chains = [str(chain) for chain in solution["chain"].values]
     units = [str(unit) for unit in solution["effort_unit"].values]
     share = solution["share"].values
@@ -179,13 +191,14 @@ def _shares(solution: Solution, columns: Columns) -> Iterator[Panel]:
         norm = np.linalg.norm(share[:, :, mine], axis=2)
         sets = {
             "all chains (2-norm)": [
-                Line(part, f"share.{unit}.{part}", norm[p], look[p]) for p, part in enumerate(parts)
+                Line(part_word(parts[p]), f"share.{unit}.{parts[p]}", norm[p], look[p])
+                for p in used
             ]
         }
         for i in mine:
             sets[chains[i]] = [
-                Line(part, f"share.{chains[i]}.{part}", share[p, :, i], look[p])
-                for p, part in enumerate(parts)
+                Line(part_word(parts[p]), f"share.{chains[i]}.{parts[p]}", share[p, :, i], look[p])
+                for p in used
             ]
         yield panel(
             columns,
@@ -198,11 +211,11 @@ def _shares(solution: Solution, columns: Columns) -> Iterator[Panel]:
         )
 
 
-def _contacts(solution: Solution, columns: Columns) -> Iterator[Panel]:
+def _contacts(solution: Solution, columns: Columns, every: bool) -> Iterator[Panel]:
     load = [
         Line(line.label, line.column, line.values, style)
         for line, style in zip(
-            variable_lines(solution, "load", "component"), styles(list("abc")) * 2, strict=True
+            variable_lines(solution, "load", "component"), COMPONENTS * 2, strict=True
         )
     ]
     if solution.sizes["contact"]:
@@ -233,7 +246,7 @@ def _contacts(solution: Solution, columns: Columns) -> Iterator[Panel]:
     point = solution.options.get("load_point")
     at = f" at {point}" if point else ""
     for name, lines, unit in (("load", load[:3], "N"), ("moment", load[3:], "N m")):
-        if any(np.any(line.values) for line in lines):
+        if every or any(np.nan_to_num(line.values).any() for line in lines):
             title = f"{'Load' if name == 'load' else 'Moment of the load'}{at}"
             yield panel(columns, "contacts", name, title, Shown(unit), {"": lines})
 

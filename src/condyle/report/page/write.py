@@ -12,12 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 from ...atomic import write_text
 from ...progress import step
+from ..failures import failures, longest
 from ..scene import DARK, LIGHT
 from .alerts import alerts
 from .columns import Columns
 from .facts import (
     chain_table,
     fact_cards,
+    failure_table,
     given_tables,
     provenance,
     reaction_tables,
@@ -26,6 +28,8 @@ from .facts import (
 from .html import Markup, fill, json_for_script, tag, text
 from .machine import machine
 from .panels import time_panels
+from .reduce import Reduced, reduced
+from .source import opened
 from .tracks import track_panels
 
 if TYPE_CHECKING:
@@ -50,7 +54,7 @@ _SCRIPTS = (
 
 
 def write_report(
-    solution: Solution,
+    solution: Solution | str | os.PathLike[str],
     path: str | os.PathLike[str],
     *,
     tables: Sequence[Table] | None = None,
@@ -58,7 +62,9 @@ def write_report(
 ) -> Path:
     """Write the report, whole or not at all.
 
-    Args:   solution: what to show; more samples than a page can carry are thinned, extremes kept.
+    Args:   solution: what to show, or its file (.nc), which is read piece by piece, so that a run
+                of any length fits into memory. More samples than a screen can show are thinned;
+                every peak stays.
             path: the HTML file.
             tables: of `condyle.report.tables`, to print on it; default: those that the solution
                 keeps, which `condyle compare` puts there.
@@ -67,7 +73,12 @@ def write_report(
     Raises: InputError: if a file cannot be read or the report cannot be written.
     """
     with step("writing the report"):
-        write_text(path, report_html(solution, tables=tables, files=files))
+        if isinstance(solution, str | os.PathLike):
+            with opened(solution) as found:
+                page = report_html(found, tables=tables, files=files)
+        else:
+            page = report_html(solution, tables=tables, files=files)
+        write_text(path, page)
     return Path(path)
 
 
@@ -82,6 +93,8 @@ def report_html(
 
     from ..tables import kept_tables
 
+    page = reduced(solution)
+    solution = page.solution
     scripts = [_lines(get_plotlyjs()), _script()]
     name, options = solution.attrs["mechanism_name"], solution.options
     parts = {
@@ -95,32 +108,36 @@ def report_html(
         ),
         "version": text(solution.attrs.get("source", "condyle")),
         "warnings": warnings_box(solution.warnings),
-        "facts": fact_cards(solution),
+        "facts": fact_cards(page),
+        "failures": failure_table(page),
         "chains": chain_table(solution),
         "reactions": reaction_tables(solution),
         "tables": given_tables(kept_tables(solution) if tables is None else tables),
         "run": provenance(solution, [Path(file) for file in files or ()]),
-        "payload": json_for_script(_payload(solution)),
+        "payload": json_for_script(_payload(page)),
         "plotly": tag("script", Markup(scripts[0])),
         "script": tag("script", Markup(scripts[1])),
     }
     return fill(_asset("page.html"), parts)
 
 
-def _payload(solution: Solution) -> dict[str, Any]:
+def _payload(page: Reduced) -> dict[str, Any]:
     """What the page's script draws from."""
+    solution = page.solution
     columns = Columns(solution["time"].values)
     drawn = machine(solution, columns)
     panels = time_panels(solution, columns)
     tracks = track_panels(solution, columns)
     told = alerts(solution, columns)
+    failed = failures(solution, page.time, page.status)
     return {
         "machine": drawn,
         "panels": panels,
         "tracks": tracks,
         "alerts": told,
+        "failures": [[one.start, one.end, str(one)] for one in longest(failed)],
         "palette": {"light": LIGHT, "dark": DARK},
-        "columns": columns.packed(),  # last, when all columns are in
+        "columns": columns.packed(page.total, page.envelope),  # last, when all are in
     }
 
 

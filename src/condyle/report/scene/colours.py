@@ -28,7 +28,8 @@ class Style:
 def styles(names: Sequence[str]) -> list[Style]:
     """A style for each name: a left and a right one share their colour and differ in dash.
 
-    Where there is one pair alone, they differ in colour too.
+    Where there is one pair alone, they differ in colour too; names without pairs differ in both,
+    and a dashed line over a solid one hides nothing.
     """
     stems = [_SIDE.sub("", name) for name in names]
     paired = any(stems.count(stem) == 2 for stem in stems)
@@ -42,6 +43,6 @@ def styles(names: Sequence[str]) -> list[Style]:
         number, twin = groups.index(group), seen.get(group, 0)
         seen[group] = twin + 1
         lap = number // len(LIGHT)
-        step = twin + 2 * lap if paired else lap
+        step = twin + 2 * lap if paired else number + lap
         result.append(Style(number % len(LIGHT), DASHES[step % len(DASHES)]))
     return result

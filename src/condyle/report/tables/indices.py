@@ -34,7 +34,7 @@ def table_2(comparison: Comparison) -> Table:
             records += entries
             rows.append(_row("saved by contacts", entries, parts, "{:.2%}"))
     heads = [paper.INDEX_NAMES.get(part, f"F_{part}") for part in parts]
-    title = "Table 2. Mean norm of the efforts, all without the bite force, and by part" + (
+    title = "Table 2. Mean norm of the efforts, all without the load, and by part" + (
         ": here (paper, ratio)" if beside else ""
     )
     notes = list(_notes_2(comparison, beside))

@@ -18,6 +18,14 @@ function axisLook() {
   };
 }
 
+// Grey where there is no result.
+function failureShapes() {
+  return payload.failures.map(([x0, x1]) => ({
+    type: "rect", layer: "below", x0, x1, yref: "paper", y0: 0, y1: 1, fillcolor: css("--soft"), opacity: 0.25,
+    line: { color: css("--soft"), width: 1 },
+  }));
+}
+
 function swatch(line) {
   const ns = "http://www.w3.org/2000/svg";
   const svg = document.createElementNS(ns, "svg");
@@ -86,8 +94,10 @@ class Panel {
 
   traces() {
     return this.lines.map((line, n) => ({
-      x: time, y: scaled(line.column, line.scale), name: plain(line.label), type: "scatter", mode: "lines",
-      visible: !this.hidden.has(n), hoverinfo: "skip", line: { color: colour(line.colour), dash: line.dash, width: 1.8 },
+      ...curve(line.column, line.scale), name: plain(line.label), type: "scatter", mode: "lines",
+      visible: !this.hidden.has(n), hoverinfo: "skip",
+      // Without simplifying: that moves where a curve begins to rise, and bends peaks.
+      line: { color: colour(line.colour), dash: line.dash, width: 1.8, simplify: false },
     }));
   }
 
@@ -102,9 +112,9 @@ class Panel {
       modebar: { bgcolor: "rgba(0,0,0,0)", color: css("--soft"), activecolor: css("--accent") },
       xaxis: { ...look, range: this.zoom ?? [time[0], time[samples - 1]], ticksuffix: " s", zeroline: false },
       yaxis: range ? { ...y, range } : { ...y, autorange: true },
-      shapes: levels.map(([value]) => ({
+      shapes: [...failureShapes(), ...levels.map(([value]) => ({
         type: "line", xref: "paper", x0: 0, x1: 1, y0: value, y1: value, line: { color: css("--cursor"), width: 1.5, dash: "longdash" },
-      })),
+      }))],
       annotations: !range ? [] : levels.filter(([, label]) => label).map(([value, label]) => ({
         text: plain(label), xref: "paper", x: 1, xanchor: "right", y: value, yanchor: "top", showarrow: false,
         font: { size: 11, color: css("--cursor") },
@@ -116,9 +126,9 @@ class Panel {
     const edge = 1.08 * Math.max(...this.spec.limits.map((l) => l.value));
     let low = -edge, high = edge;
     for (const line of this.lines) {
-      for (const value of column(line.column)) {
-        if (value * line.scale < low) low = 1.05 * value * line.scale;
-        if (value * line.scale > high) high = 1.05 * value * line.scale;
+      for (const value of curve(line.column, line.scale).y) {
+        if (value < low) low = 1.05 * value;
+        if (value > high) high = 1.05 * value;
       }
     }
     return [low, high];

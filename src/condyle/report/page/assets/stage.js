@@ -65,28 +65,29 @@ const SURFACE = { light: "#e5b567", dark: "#b98a3c" };
 const FORCE = { contact: "--cursor", load: "--ink" };
 
 const rodRadius = 0.022 * drawn.size;
-const lastGood = { index: 0 };
 
-function bodies(index) {
+// Solids at a sample; grey and without forces where they stand for one that has no result.
+function bodies(index, grey) {
   const theme = themeName();
+  const tinted = (tint) => (grey ? NEUTRAL[theme] : tint);
   const chains = new Solids(), joints = new Solids(), balls = new Solids(), forces = new Solids();
   for (const rod of drawn.rods) {
     const tint = rod.colour === null ? NEUTRAL[theme] : colour(rod.colour);
     const radius = rodRadius * rod.thickness;
-    chains.cone(position(rod.from, index), position(rod.to, index), radius, radius, tint);
+    chains.cone(position(rod.from, index), position(rod.to, index), radius, radius, tinted(tint));
   }
   for (const joint of drawn.joints) joints.sphere(position(joint, index), 1.9 * rodRadius, NEUTRAL[theme], 12);
-  for (const ball of drawn.balls) balls.sphere(position(ball.at, index), ball.radius, css("--cursor"), 18);
+  for (const ball of drawn.balls) balls.sphere(position(ball.at, index), ball.radius, tinted(css("--cursor")), 18);
   for (const arrow of drawn.arrows) {
     const perNewton = drawn.scales[arrow.kind]?.metresPerNewton ?? 0;
-    const vector = arrow.columns.map((c) => column(c)[index] * perNewton);
+    const vector = arrow.columns.map((c) => grey ? 0 : column(c)[index] * perNewton);
     // At the ball's skin, or a small force would hide in it.
     const near = plus(position(arrow.at, index), unit(vector), arrow.into ? -arrow.gap : arrow.gap);
     forces.arrow(arrow.into ? minus(near, vector) : near, vector, 0.026 * drawn.size, css(FORCE[arrow.kind]));
   }
   const platform = new Solids();
   for (const v of drawn.hull.vertices) platform.vertex(onPlatform(v));
-  for (const [a, b, c] of drawn.hull.faces) platform.face(a, b, c, PLATFORM[theme]);
+  for (const [a, b, c] of drawn.hull.faces) platform.face(a, b, c, tinted(PLATFORM[theme]));
   return { platform, chains, joints, balls, forces };
 }
 
@@ -135,21 +136,42 @@ function pathTraces() {
   });
 }
 
+// Names at one place of the picture stand beside each other, where the first is.
+function labelTexts(named, places) {
+  const texts = named.map((item) => plain(item.name));
+  if (!view) return texts;
+  const { from, up } = CAMERAS[view], right = unit(cross(up, from)), above = cross(unit(from), right);
+  const seen = places.map((p) => [dot(p, right) / 1e3 / longest, dot(p, above) / 1e3 / longest]);
+  seen.forEach(([x, y], n) => {
+    const first = seen.findIndex(([a, b]) => Math.abs(a - x) < LABEL_WIDE && Math.abs(b - y) < LABEL_HIGH);
+    if (first === n) return;
+    texts[first] = `${texts[first].trimEnd()}, ${texts[n]}`;
+    texts[n] = "";
+  });
+  return texts;
+}
+
+const LABEL_WIDE = 0.12, LABEL_HIGH = 0.03;  // of the longest side, about a name's size
+
 function labelTrace(index) {
   const named = [...drawn.landmarks, ...drawn.balls];
   const places = named.map((item) => position(item.at, index).map((v) => 1e3 * v));
   return {
     type: "scatter3d", mode: "markers+text", name: "landmarks",
     x: places.map((p) => p[0]), y: places.map((p) => p[1]), z: places.map((p) => p[2]),
-    text: named.map((item) => plain(item.name)),
+    text: labelTexts(named, places),
     textposition: named.map((_, n) => n < drawn.landmarks.length ? "top right" : "bottom center"),
     textfont: { size: 11, color: css("--ink") }, hoverinfo: "skip",
     marker: { size: named.map((_, n) => n < drawn.landmarks.length ? 4 : 0.1), color: css("--ink") },
   };
 }
 
-// Plotly reads a little HTML in labels; a name is only text.
-const plain = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
+// Plotly reads a little HTML in labels, and looks texts up in plain objects, where "constructor" is
+// found before it was put there; a name is only text.
+const plain = (text) => {
+  const written = text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
+  return written in {} ? `${written} ` : written;
+};
 
 // The directions of {S}, with arms of a round length: cleaner than ticks in space.
 function triadTraces() {
@@ -179,8 +201,8 @@ function stageLayout() {
 // Traces by layer, in the order plotly holds them: moving solids, labels, then what stays.
 let layerOf = [];
 
-function stageTraces(index) {
-  const solids = bodies(index);
+function stageTraces(index, grey) {
+  const solids = bodies(index, grey);
   const traces = Object.entries(solids).map(([name, s]) => ({ ...solidTrace(name, s), layer: SOLID_LAYERS[name] }));
   traces.push({ ...labelTrace(index), layer: "labels" });
   traces.push(...surfaceTraces().map((t) => ({ ...t, layer: "surfaces" })));
@@ -195,48 +217,81 @@ function stageTraces(index) {
   return traces;
 }
 
-let stageReady = false, stageBusy = false, stageShows = -1;
+let stageReady = false, stageBusy = false, stageShows = "";
+
+// What the picture shows at a sample: it, or grey the nearest one that has a result.
+const wantedAt = (index) => ({ sample: index, drawn: goodSample[index], grey: isFailed(index) });
+const keyOf = ({ drawn, grey }) => `${drawn} ${grey}`;
 
 async function drawStage() {
   stageBusy = true;
-  setPose(lastGood.index);
+  const wanted = wantedAt(clock.index);
+  setPose(wanted.drawn);
   const layout = stageLayout();
   const before = stageNode.layout?.scene;
   Object.assign(layout.scene, before ? { camera: before.camera, aspectratio: before.aspectratio } : fitted(view));
-  await Plotly.react(stageNode, stageTraces(lastGood.index), layout, { displayModeBar: false, responsive: false });
+  await Plotly.react(stageNode, stageTraces(wanted.drawn, wanted.grey), layout, { displayModeBar: false, responsive: false });
   if (!stageReady) stageNode.on("plotly_relayout", turnedByHand);
   stageReady = true;
   stageBusy = false;
-  stageShows = lastGood.index;
+  shown3d(wanted);
   moveStage(clock.index);
 }
 
+function shown3d(wanted) {
+  stageShows = keyOf(wanted);
+  stageNode.dataset.sample = wanted.sample;
+  stageNode.dataset.drawn = wanted.drawn;
+  stageNode.dataset.grey = wanted.grey;
+}
+
 const MOVING = 6;  // platform, chains, joints, balls, forces, labels
+const LABELS = 5;
+
+// Names after the picture was turned; they may lie on each other now.
+function relabel() {
+  if (!stageReady) return;
+  const wanted = wantedAt(clock.index);
+  setPose(wanted.drawn);
+  const { text } = labelTrace(wanted.drawn);
+  if (String(text) !== String(stageNode.data[LABELS].text)) Plotly.restyle(stageNode, { text: [text] }, [LABELS]);
+}
 
 // At most one update is under way; the newest time wins.
 async function moveStage(index) {
   showAlerts(index);
-  if (!stageReady || stageBusy || lastGood.index === stageShows) return;
+  if (!stageReady || stageBusy) return;
+  if (keyOf(wantedAt(index)) === stageShows) return shown3d(wantedAt(index));
   stageBusy = true;
-  while (stageShows !== lastGood.index && stageReady) {
-    const wanted = lastGood.index;
-    setPose(wanted);
-    const parts = [...Object.values(bodies(wanted)), labelTrace(wanted)];
+  while (keyOf(wantedAt(clock.index)) !== stageShows && stageReady) {
+    const wanted = wantedAt(clock.index);
+    setPose(wanted.drawn);
+    const solids = Object.values(bodies(wanted.drawn, wanted.grey));
+    const parts = [...solids, labelTrace(wanted.drawn)];
+    if (stageShows.endsWith("true") !== wanted.grey) {
+      await Plotly.restyle(stageNode, { facecolor: solids.map((s) => s.colours) }, [...solids.keys()]);
+    }
     await Plotly.restyle(stageNode, { x: parts.map((p) => p.x), y: parts.map((p) => p.y), z: parts.map((p) => p.z) },
       [...Array(MOVING).keys()]);
-    stageShows = wanted;
-    stageNode.dataset.sample = wanted;
+    shown3d(wanted);
   }
+  relabel();
   stageBusy = false;
 }
 
-// What is wrong at this sample. One without a result keeps the last picture.
+// What is wrong at this sample.
 function showAlerts(index) {
   const told = payload.alerts.filter((alert) => column(alert.column)[index] === 1);
   const message = document.getElementById("stage-message");
   message.hidden = !told.length;
-  if (told.length) message.textContent = `t = ${time[index].toFixed(timeDecimals)} s: ${told.map((a) => a.text).join("; ")}`;
-  if (!told.some((alert) => alert.failed)) lastGood.index = index;
+  if (!told.length) return;
+  const when = (i) => `t = ${time[i].toFixed(timeDecimals)} s`;
+  if (told.some((alert) => alert.failed)) {
+    const why = failureAt(time[index]) || told.find((alert) => alert.failed).text;
+    message.textContent = `${when(index)}: no result, ${why}. Grey: the mechanism at ${when(goodSample[index])}, without forces`;
+  } else {
+    message.textContent = `${when(index)}: ${told.map((a) => a.text).join("; ")}`;
+  }
 }
 
 function setCamera(name) {
@@ -247,7 +302,7 @@ function setCamera(name) {
   flat = CAMERAS[name].flat;
   if (!stageReady) return;
   const solids = stageNode.data.flatMap((trace, n) => (trace.type === "mesh3d" ? [n] : []));
-  Plotly.update(stageNode, { lightposition: LIGHT[flat] }, change(name), solids);
+  Plotly.update(stageNode, { lightposition: LIGHT[flat] }, change(name), solids).then(relabel);
 }
 
 function change(name) {
@@ -267,6 +322,7 @@ function resizeStage() {
 function turnedByHand(event) {
   if (!event["scene.camera"]) return;
   view = null;
+  relabel();
   for (const button of document.querySelectorAll("#cameras button")) button.setAttribute("aria-pressed", "false");
 }
 
@@ -282,7 +338,11 @@ const lengthText = (metres) => (metres < 1 ? `${short(1e3 * metres, 3)} mm` : `$
 function stageNote() {
   const notes = [];
   const { samples: kept, total } = payload.columns;
-  if (kept < total) notes.push(`The page shows ${kept} of ${total} samples, the largest and smallest values among them.`);
+  if (kept < total) {
+    const span = short((time[samples - 1] - time[0]) / (envelope.edges.length - 1), 2);
+    notes.push(`The page has ${kept} of ${total} samples; plots show the smallest and largest value of every ${span} s.`);
+  }
+  if (payload.failures.length) notes.push("Grey in the plots: no result.");
   notes.push(`Arms of the axes: ${lengthText(drawn.triad.arm)}.`);
   const arrows = Object.entries(drawn.scales).map(([kind, { metresPerNewton, largest }]) =>
     `${{ load: "load", contact: "contact forces" }[kind]} ${lengthText(drawn.triad.arm)} for ${short(drawn.triad.arm / metresPerNewton, 2)} N, at most ${short(largest, 4)} N`);

@@ -7,14 +7,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from oracles.random_mechanism import random_mechanism
+from oracles.rotations import bryant
 
 import condyle
-from condyle.errors import UnreachableError
-from condyle.kinematics.forward import ForwardKinematics
+from condyle.errors import InconsistentError, InputError, UnreachableError
 from condyle.mechanism import bundled_mechanisms
 from condyle.mechanism.files import from_data
+from condyle.model.forward import ForwardKinematics
+from condyle.model.forward.orientation import bryant_angles, principal, rotations
+from condyle.model.forward.pose_status import PoseStatus
 from condyle.motion import read_table, write_table
 from condyle.results.poses import pose_file
+from condyle.status import Status
 
 
 def poses_and_joints(name: str, count: int, size: float) -> tuple[np.ndarray, np.ndarray]:
@@ -22,9 +26,8 @@ def poses_and_joints(name: str, count: int, size: float) -> tuple[np.ndarray, np
     m = model.mechanism.degrees_of_freedom
     unit = [model.characteristic_length if c in "XYZ" else 1.0 for c in model.independent]
     q = np.random.default_rng(7).uniform(-size, size, (count, m)) * unit
-    result = model.kernel.solve(q, 0 * q, 0 * q, np.zeros((count, 9)))
-    assert result.poses is not None
-    pose = result.pose[result.reached]
+    result = model.evaluate(q, 0 * q, 0 * q, np.zeros((count, 9)))
+    pose = result.pose[(result.status != Status.unreachable)]
     return pose, model.configuration(pose).joint
 
 
@@ -51,7 +54,10 @@ def test_noise_is_spread_in_the_least_squares_sense() -> None:
     _pose, joints = poses_and_joints("masticatory", 30, 0.05)
     noise = 1e-4 * np.random.default_rng(1).normal(size=joints.shape)
     forward = ForwardKinematics(mechanism)
-    found = forward.solve(joints + noise)
+    refused = forward.solve(joints + noise)
+    assert (refused.status == PoseStatus.INCONSISTENT).all()
+    assert np.isnan(refused.pose).all() and np.abs(refused.residual).max() > 1e-6
+    found = forward.solve(joints + noise, tolerance=1e-3)
     assert found.found.all()
     left = np.linalg.norm(found.residual, axis=1)
     assert (left > 0).all() and (left <= np.linalg.norm(noise, axis=1) + 1e-15).all()
@@ -64,8 +70,7 @@ def test_noise_is_spread_in_the_least_squares_sense() -> None:
             q = found.pose[:, columns].copy()
             q[:, k] += sign * step
             zero = np.zeros_like(q)
-            result = model.kernel.solve(q, zero, zero, np.zeros((len(q), 9)))
-            assert result.poses is not None
+            result = model.evaluate(q, zero, zero, np.zeros((len(q), 9)))
             moved.append(model.configuration(result.pose).joint)
         slope = (moved[0] - moved[1]) / (2 * step)
         cosine = (slope * found.residual).sum(axis=1) / np.linalg.norm(slope, axis=1) / left
@@ -98,10 +103,15 @@ def test_residuals_of_chains_that_turn_and_slide(tmp_path: Path) -> None:
     mechanism = from_data(raw)
     names = [f"joint_{name}" for name in mechanism.chain_names]
     write_table(tmp_path / "joints.csv", dict.fromkeys(names, np.zeros(2)) | {names[0]: [0, 1e-4]})
-    report = pose_file(mechanism, tmp_path / "joints.csv", tmp_path / "poses.csv")
-    table = read_table(tmp_path / "poses.csv")
+    files = tmp_path / "joints.csv", tmp_path / "poses.csv"
+    with pytest.raises(InconsistentError, match=r"row 2.*raise --tolerance") as error:
+        pose_file(mechanism, *files)
+    assert error.value.samples == [1] and not files[1].exists()
+    report = pose_file(mechanism, *files, tolerance=1e-3)
+    table = read_table(files[1])
     assert table.names[6:] == ("residual_m", "residual_rad", "condition")
-    found = ForwardKinematics(mechanism).solve(np.array([[0.0] * 6, [1e-4] + [0.0] * 5]))
+    joints = np.array([[0.0] * 6, [1e-4] + [0.0] * 5])
+    found = ForwardKinematics(mechanism).solve(joints, tolerance=1e-3)
     for unit, kind in (("rad", "RSS"), ("m", "PSS")):
         mine = [chain.kind == kind for chain in mechanism.chains]
         worst = np.abs(found.residual[:, mine]).max(axis=1)
@@ -118,4 +128,44 @@ def test_joints_that_no_pose_has(tmp_path: Path) -> None:
         pose_file(mechanism, tmp_path / "joints.csv", tmp_path / "poses.csv")
     assert not (tmp_path / "poses.csv").exists()
     report = pose_file(mechanism, tmp_path / "joints.csv", tmp_path / "poses.csv", flag=True)
-    assert report.missing == 1
+    assert (report.missing, report.failed) == (1, {"unreachable": 1})
+    assert "1 of 2 poses found (1 unreachable)" in str(report)
+    assert (tmp_path / "poses.csv").read_text().splitlines()[2] == "," * 8 + "unreachable"
+
+
+def test_rows_without_times_never_influence_each_other() -> None:
+    _pose, joints = poses_and_joints("masticatory", 60, 0.3)
+    joints = np.vstack([joints, joints[:5] + 0.5, np.full((1, 6), np.nan)])
+    order = np.random.default_rng(2).permutation(len(joints))
+    forward = ForwardKinematics(condyle.load("masticatory"))
+    together, mixed = forward.solve(joints), forward.solve(joints[order])
+    alone = [forward.solve(row[None]) for row in joints]
+    for name in ("pose", "status", "residual"):
+        expected = getattr(together, name)
+        np.testing.assert_array_equal(getattr(mixed, name), expected[order])
+        np.testing.assert_array_equal(
+            np.vstack([getattr(a, name) for a in alone]).squeeze(), expected
+        )
+
+
+def test_times_must_rise() -> None:
+    forward = ForwardKinematics(condyle.load("gough-stewart"))
+    with pytest.raises(InputError, match=r"times must rise: 1 s follows 1 s \(row 3\)"):
+        forward.solve(np.zeros((3, 6)), np.array([0.0, 1.0, 1.0]))
+
+
+def test_angles_are_principal_values() -> None:
+    """The same orientations, with alpha and gamma in (-pi, pi] and beta within a right angle."""
+    rng = np.random.default_rng(4)
+    pose = np.hstack([rng.normal(size=(300, 3)), rng.uniform(-20, 20, (300, 3))])
+    pose[0, 3:], pose[1, 3:] = (np.pi, 0, -np.pi), (-np.pi, 0.5, np.pi)
+    told = principal(pose)
+    np.testing.assert_allclose(rotations(told[:, 3:]), rotations(pose[:, 3:]), atol=1e-14)
+    np.testing.assert_array_equal(told[:, :3], pose[:, :3])
+    assert (np.abs(told[:, 4]) <= np.pi / 2).all()
+    assert (told[:, [3, 5]] > -np.pi).all() and (told[:, [3, 5]] <= np.pi).all()
+    assert told[0, 5] == told[1, 3] == np.pi
+    np.testing.assert_array_equal(principal(told), told)
+    np.testing.assert_allclose(bryant_angles(rotations(told[:, 3:])), told[:, 3:], atol=1e-7)
+    R = np.array([bryant(angles) for angles in pose[:, 3:]])
+    np.testing.assert_allclose(rotations(pose[:, 3:]), R, atol=1e-14)

@@ -1,0 +1,85 @@
+"""What a command is: a function that does its work and returns an `Answer`.
+
+That the answer is printed for people, as JSON or not at all, and that a bar shows how far the
+work is, is the same for all and stands here.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from functools import wraps
+from typing import Annotated, Any, get_type_hints
+
+import typer
+
+from .. import __version__
+from . import options
+from .answer import Answer
+from .bar import progress_bar
+
+# The chapters of the help page.
+BEGIN, COMPUTE, LOOK, UPKEEP = "Begin", "Compute", "Look", "Upkeep"
+
+app = typer.Typer(
+    name="condyle",
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+    help=(
+        "Motor torques and contact forces of parallel robots whose platform also touches the "
+        "base, as a jaw does."
+    ),
+    epilog="Start with [bold]condyle run[/bold]: it solves the bundled chewing robot. "
+    "[bold]condyle COMMAND --help[/bold] shows units and an example.",
+)
+
+Command = Callable[..., Answer]
+
+
+def command(chapter: str, *, example: str) -> Callable[[Command], Command]:
+    """Register a function as the command of its name, with `--quiet` and `--json` as well.
+
+    Args: chapter: of the help page;  example: one line to copy, shown below the options.
+    """
+
+    def register(work: Command) -> Command:
+        @wraps(work)
+        def shown(*, quiet: bool, as_json: bool, **given: Any) -> None:
+            with progress_bar(not quiet and not as_json):
+                answer = work(**given)
+            answer.give(quiet, as_json)
+
+        _take(shown, work, quiet=options.Quiet, as_json=options.Json)
+        app.command(rich_help_panel=chapter, epilog=f"Example: {example}")(shown)
+        return work
+
+    return register
+
+
+def _take(shown: Callable[..., None], work: Command, **switches: Any) -> None:
+    """Give `shown` the parameters of `work`, and some switches."""
+    hints = get_type_hints(work, include_extras=True) | switches
+    parameters = [
+        *inspect.signature(work).parameters.values(),
+        *(inspect.Parameter(s, inspect.Parameter.KEYWORD_ONLY, default=False) for s in switches),
+    ]
+    parameters = [one.replace(annotation=hints[one.name]) for one in parameters]
+    hints.pop("return", None)
+    shown.__annotations__ = hints
+    shown.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+
+
+def _version(value: bool) -> None:
+    if value:
+        typer.echo(f"condyle {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    pass

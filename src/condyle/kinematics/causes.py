@@ -1,0 +1,157 @@
+"""Why samples fail: the chain, the contacts, the platform or the numbers that are the cause."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import NumberRangeError, SampleError, SingularError, UnreachableError
+from ..mechanism.mechanism import Mechanism
+from ..status import Status
+from .chain import FAMILIES
+from .singularity import SINGULAR, Singularity
+
+FLAG = "or keep such samples with --flag (flag=True)."
+
+
+@dataclass(frozen=True)
+class Owner:
+    """What a failure is the fault of.
+
+    kind: chain, contact, platform or sample; "" for none.  names: of the chain or the contacts.
+    """
+
+    kind: str
+    names: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        return " & ".join(self.names)
+
+    def __str__(self) -> str:
+        kind = f"{self.kind}s" if len(self.names) > 1 else self.kind
+        return f"{kind} {self.name}" if self.names else kind
+
+
+def owners(mechanism: Mechanism) -> tuple[Owner, ...]:
+    """All that can be a cause, in the order that `causes` counts them: none, each chain, ...
+
+    The contacts are met together or not at all, so they are one cause.
+    """
+    chains = [Owner("chain", (name,)) for name in mechanism.chain_names]
+    contacts = Owner("contact", mechanism.contact_names)
+    return (Owner(""), *chains, contacts, Owner("platform"), Owner("sample"))
+
+
+def causes(
+    status: np.ndarray, pose: np.ndarray, discriminant: np.ndarray, singularity: Singularity
+) -> np.ndarray:
+    """Index into `owners` of what each sample fails by, (N,) int16; 0 where it does not.
+
+    Args: pose: (N, 6), NaN where the contacts cannot be met.
+          discriminant: of the chains' assembly, (N, n); negative or NaN out of reach.
+    """
+    n = discriminant.shape[1]
+    found = np.zeros(len(status), dtype=np.int16)
+    failed = np.flatnonzero(status != Status.ok)
+    if not failed.size:
+        return found
+    kind = status[failed]
+    short = ~(discriminant[failed] >= 0)
+    met = np.isfinite(pose[failed]).all(axis=1) & short.any(axis=1)
+    transmission = np.abs(singularity.transmission[failed])
+    smallest, largest = transmission.min(axis=1), transmission.max(axis=1)
+    locked = smallest < SINGULAR * largest
+    found[failed] = np.select(
+        [kind == Status.unreachable, kind == Status.singular],
+        [
+            np.where(met, 1 + short.argmax(axis=1), 1 + n),
+            np.where(locked, 1 + transmission.argmin(axis=1), 2 + n),
+        ],
+        3 + n,
+    )
+    return found
+
+
+def cause_text(status: int, owner: Owner) -> str:
+    """A cause in words, as in 'chain "x" cannot reach its platform joint'."""
+    named = ", ".join(f'"{name}"' for name in owner.names)
+    texts: dict[tuple[int, str], str] = {
+        (Status.unreachable, "chain"): f"chain {named} cannot reach its platform joint",
+        (Status.unreachable, "contact"): (
+            f"no pose with the given coordinates has the contacts {named} on their surfaces"
+            if len(owner.names) > 1
+            else f"no pose with the given coordinates has the contact {named} on its surface"
+        ),
+        (Status.singular, "chain"): f"chain {named} is in line: its actuator has no hold",
+        (Status.singular, "platform"): "the platform can move while all actuators are locked",
+    }
+    return texts.get((status, owner.kind), list(Status)[status].meaning)
+
+
+def unreachable_text(mechanism: Mechanism, owner: Owner, pose: np.ndarray) -> str:
+    """Why a pose, (6,), is out of reach, in numbers where a chain is the cause."""
+    if owner.kind != "chain":
+        return cause_text(Status.unreachable, owner)
+    chain = mechanism.chains[mechanism.chain_names.index(owner.name)]
+    with np.errstate(all="ignore"):
+        return FAMILIES[chain.kind].explain(chain, pose)
+
+
+def sample_error(
+    mechanism: Mechanism,
+    status: np.ndarray,
+    pose: np.ndarray,
+    discriminant: np.ndarray,
+    singularity: Singularity,
+    t: np.ndarray | None = None,
+    first_row: int = 0,
+) -> SampleError | None:
+    """The error for samples that could not be computed: it names the first and its cause.
+
+    Args: as for `causes`;  t: their times;  without, they are rows of a file from `first_row` on.
+    """
+    bad = np.flatnonzero(status != Status.ok)
+    if not bad.size:
+        return None
+    i = int(bad[0])
+    owner = owners(mechanism)[causes(status, pose, discriminant, singularity)[i]]
+    where = f"row {first_row + i + 1}" if t is None else f"t = {t[i]:g} s (sample {i})"
+    more = f" {bad.size - 1} more samples fail too." if bad.size > 1 else ""
+    named = {owner.kind: owner.name} if owner.names else {}
+    about: dict[str, Any] = {
+        "samples": bad.tolist(),
+        "time": None if t is None else float(t[i]),
+        "row": first_row + i + 1 if t is None else None,
+        **named,
+    }
+    if status[i] == Status.overflow:
+        return NumberRangeError(
+            f"the torques at {where} are not finite: its rates, accelerations or load are "
+            f"too large for numbers.{more}",
+            **about,
+        )
+    if status[i] == Status.singular:
+        ratio = float(singularity.ratio[i])
+        return SingularError(
+            f"the mechanism is singular at {where}: dimensionless ratio {ratio:.2g}, must be "
+            f"above {SINGULAR:g} ({cause_text(Status.singular, owner)}).{more}",
+            hint=f"The torques are not determined there; avoid the pose, {FLAG}",
+            value=ratio,
+            bound=SINGULAR,
+            unit="1",
+            **about,
+        )
+    text = unreachable_text(mechanism, owner, pose[i])
+    if owner.kind == "chain":
+        chain = mechanism.chains[mechanism.chain_names.index(owner.name)]
+        with np.errstate(all="ignore"):
+            if (span := FAMILIES[chain.kind].span(chain, pose[i])) is not None:
+                about |= {"value": span[0], "bound": span[1], "unit": "m"}
+    return UnreachableError(
+        f"{text} at {where}.{more}",
+        hint=f"The motion goes too far for this mechanism; scale it down, {FLAG}",
+        **about,
+    )

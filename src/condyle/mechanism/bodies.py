@@ -1,0 +1,81 @@
+"""The bodies of chains and what drives them, as the tables of a file."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from pydantic import Field, ValidationInfo, field_validator
+
+from .quantities import Fraction, Limit, MassOrNone, Moment, MomentOrNone, NonNegativeLength
+from .table import Table
+
+
+class Rod(Table):
+    """A rod with two ball ends, symmetric about its line."""
+
+    mass: MassOrNone
+    com: Fraction = Field(description="mass centre: fraction of the way to the platform joint")
+    transverse: MomentOrNone = Field(description="central moment of inertia across the rod")
+    axial: MomentOrNone = Field(description="moment of inertia along the rod")
+
+    @field_validator("axial")
+    @classmethod
+    def _triangle(cls, axial: float, info: ValidationInfo) -> float:
+        return check_rod_inertia(axial, info.data.get("transverse"))
+
+
+def check_rod_inertia(axial: float, transverse: float | None) -> float:
+    """The triangle inequality on the principal moments (transverse, transverse, axial)."""
+    if transverse is not None and axial > 2 * transverse * (1 + 1e-12):
+        raise ValueError(
+            f"inertia breaks the triangle inequality: axial {axial:g} kg m^2 is more than "
+            f"twice transverse {transverse:g} kg m^2; no rigid body has such moments"
+        )
+    return axial
+
+
+class Crank(Table):
+    inertia: Moment = Field(description="about the shaft; its mass centre is on the shaft")
+
+
+class Slider(Table):
+    mass: MassOrNone = Field(description="its mass centre is at its joint")
+
+
+class LegBody(Table):
+    """One of the two bodies of a telescopic leg, symmetric about the leg's line."""
+
+    mass: MassOrNone
+    com: NonNegativeLength = Field(description="mass centre: distance from the body's own joint")
+    transverse: MomentOrNone = Field(description="central moment of inertia across the leg")
+    axial: MomentOrNone = Field(description="moment of inertia along the leg")
+
+    @field_validator("axial")
+    @classmethod
+    def _triangle(cls, axial: float, info: ValidationInfo) -> float:
+        return check_rod_inertia(axial, info.data.get("transverse"))
+
+
+class RotaryActuator(Table):
+    torque_limit: Limit | None = None
+    speed_limit: Limit | None = None
+
+
+class LinearActuator(Table):
+    force_limit: Limit | None = None
+    speed_limit: Limit | None = None
+
+
+def distance(start: tuple[float, ...], end: tuple[float, ...]) -> float:
+    return float(np.linalg.norm(np.subtract(end, start)))
+
+
+def across(body: Rod | LegBody) -> float:
+    """Radius of gyration across a body [m]; 0 without mass."""
+    return math.sqrt(body.transverse / body.mass) if body.mass else 0.0
+
+
+def check_rod_length(rod: np.ndarray, name: str, start: str) -> None:
+    if not np.linalg.norm(rod):
+        raise ValueError(f"the {name} has zero length: {start} and platform are the same point")

@@ -1,0 +1,100 @@
+"""A point contact: a ball of the platform on a surface of the base."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Literal, Self
+
+import casadi as ca
+import numpy as np
+from pydantic import Field, StrictBool, model_validator
+
+from .quantities import Interval, Name, Point, PositiveLength
+from .schema import SIDE_OPTIONS
+from .surface import Surface, sides
+from .table import Table
+
+Side = Literal["below", "above", "inside", "outside"]
+
+
+class Bounds(Table):
+    """Where the surface ends: the ranges of the contact point in {S}."""
+
+    x: Interval | None = None
+    y: Interval | None = None
+    z: Interval | None = None
+
+
+class Contact(Table):
+    """A platform point (the centre of a condyle ball) that stays on a surface fixed in {S}.
+
+    With `ball_radius` the surface is the wall that the ball touches, and the centre keeps that
+    distance from it; with `one_sided` the ball can lift off.
+    """
+
+    name: Name
+    point: Point = Field(description="centre of the ball, in {M}")
+    surface: Surface
+    side: Side | None = Field(default=None, description="where the ball is, seen from the surface")
+    ball_radius: PositiveLength | None = Field(
+        default=None, description="the surface is the wall, and the centre this far from it"
+    )
+    one_sided: StrictBool = Field(
+        default=False, description="the surface can push the ball and not pull it"
+    )
+    bounds: Bounds = Bounds()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _options_of_the_surface(cls, data: Any) -> Any:
+        """`side` and its two options may stand in the table of the surface too."""
+        surface = data.get("surface") if isinstance(data, Mapping) else None
+        if not isinstance(surface, Mapping):
+            return data
+        moved = {key: surface[key] for key in SIDE_OPTIONS if key in surface}
+        if twice := sorted(moved.keys() & data.keys()):
+            raise ValueError(f"{', '.join(twice)} stands in the contact and in its surface")
+        kept = {key: value for key, value in surface.items() if key not in moved}
+        return {**data, **moved, "surface": kept}
+
+    @model_validator(mode="after")
+    def _sided(self) -> Self:
+        known = sides(self.surface.closed)
+        kind = self.surface.kind
+        article = "an" if kind[0] in "aeiou" else "a"
+        expected = f'expected "{known[0]}" or "{known[1]}" for {article} {kind}'
+        if self.side is None and (self.ball_radius is not None or self.one_sided):
+            raise ValueError(f"side is missing, and ball_radius and one_sided need it: {expected}")
+        if self.side is not None and self.side not in known:
+            raise ValueError(f'side: {expected}, got "{self.side}"')
+        room, ball = getattr(self.surface, "radius", math.inf), self.ball_radius or 0.0
+        if self.side == "inside" and ball >= room:
+            raise ValueError(
+                f"ball_radius: a ball of radius {ball * 1e3:g} mm has no room inside a "
+                f"{kind} of radius {room * 1e3:g} mm"
+            )
+        return self
+
+    @property
+    def locus(self) -> Any:
+        """The surface on which the centre of the ball stays: parallel to the wall, if it is one."""
+        if self.ball_radius is None:
+            return self.surface
+        return self.surface.parallel(self.push * self.ball_radius, self.point)
+
+    @property
+    def touching_point(self) -> tuple[float, ...]:
+        """Where the ball touches the surface at home, (3,) [m] in {S}; without a ball its point."""
+        if self.ball_radius is None:
+            return self.point
+        p = ca.SX.sym("p", 3)
+        gradient = ca.Function("n", [p], [ca.gradient(self.locus.phi(p), p)])(self.point)
+        n = np.asarray(gradient).ravel()
+        away = self.push * self.ball_radius * n / np.linalg.norm(n)
+        return tuple(map(float, np.subtract(self.point, away)))
+
+    @property
+    def push(self) -> int:
+        """Sign of a contact force lambda with which the surface pushes the ball; 0 if unknown."""
+        return {None: 0, "above": 1, "outside": 1, "below": -1, "inside": -1}[self.side]

@@ -1,0 +1,28 @@
+"""The mechanisms that come with the package."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+
+from ..errors import InputError, did_you_mean, shortened
+
+_BUNDLED = files(__package__) / "bundled"
+
+
+def bundled_mechanisms() -> tuple[str, ...]:
+    """Names of the mechanisms that come with the package."""
+    return tuple(sorted(f.name[:-5] for f in _BUNDLED.iterdir() if f.name.endswith(".toml")))
+
+
+def bundled_text(name: str) -> str:
+    """The file of a bundled mechanism, with its comments and provenance marks.
+
+    Raises: InputError: if no bundled mechanism has that name.
+    """
+    known = bundled_mechanisms()
+    if name not in known:
+        raise InputError(
+            f'no bundled mechanism is called "{shortened(str(name), 80)}".'
+            f"{did_you_mean(str(name), known)}"
+        )
+    return (_BUNDLED / f"{name}.toml").read_text(encoding="utf-8")

@@ -1,0 +1,118 @@
+"""What pydantic found wrong, in the words of the file: where, what was got, what would be right."""
+
+from __future__ import annotations
+
+import re
+import reprlib
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from ..errors import did_you_mean, shortened
+from .schema import keys_at
+
+_SHORT = reprlib.Repr()
+_SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 60
+_SHORT.maxlevel = 3
+
+
+def describe(error: ValidationError, data: Any, root: type[BaseModel]) -> list[str]:
+    """One line a problem: where it is, by the names of the file, and what would be right.
+
+    Args: data: what was validated;  root: the kind of table that it is not.
+    """
+    lines = []
+    for problem in error.errors(include_url=False):
+        if _follows(problem):
+            continue
+        place = place_of(problem["loc"], data)
+        text = _message(problem, root)
+        lines.append(f"{place}: {text}" if place else text)
+    return list(dict.fromkeys(lines))
+
+
+def _follows(problem: Any) -> bool:
+    """Whether it follows from other problems: entries that were refused are not missing."""
+    if problem["type"] != "too_short":
+        return False
+    given, context = problem.get("input"), problem["ctx"]
+    return isinstance(given, list | tuple) and len(given) >= context["min_length"]
+
+
+def place_of(location: Iterable[Any], data: Any) -> str:
+    """'chain "masseter_left".coupler.mass' for ("chain", 2, "RSS", "coupler", "mass")."""
+    text, here = "", data
+    for part in location:
+        if isinstance(part, int):
+            here = here[part] if isinstance(here, list | tuple) and part < len(here) else None
+            name = entry(here, "name")
+            text += f' "{shortened(name, 40)}"' if isinstance(name, str) else f"[{part}]"
+        elif entry(here, part) is None and entry(here, "kind") == part:
+            continue  # pydantic names the family of a union too
+        else:
+            here = entry(here, part)
+            key = shortened(str(part), 40)
+            text += f".{key}" if text else key
+    return text
+
+
+def entry(table: Any, key: str) -> Any:
+    """What a table, of a file or validated, has under a key; None if nothing."""
+    if isinstance(table, Mapping):
+        return table.get(key)
+    return getattr(table, key, None) if isinstance(table, BaseModel) else None
+
+
+def _message(problem: Any, root: type[BaseModel]) -> str:
+    kind, got, context = problem["type"], problem.get("input"), problem.get("ctx", {})
+    location = problem["loc"]
+    if kind == "extra_forbidden":
+        return unknown_key(str(location[-1]), location[:-1], root)
+    if kind == "tuple_type" and location in (("contact",), ("chain",)):
+        return f"expected tables, each under [[{location[0]}]], got {shown(got)}"
+    expected = {
+        "missing": "is missing",
+        "float_type": f"expected a number, got {shown(got)}",
+        "finite_number": f"expected a finite number, got {shown(got)}",
+        "greater_than": f"expected a value above {context.get('gt')}, got {shown(got)}",
+        "greater_than_equal": f"expected a value of at least {context.get('ge')}, got {shown(got)}",
+        "less_than_equal": f"expected a value of at most {context.get('le')}, got {shown(got)}",
+        "tuple_type": f"expected a list of numbers, got {shown(got)}",
+        "too_long": f"expected at most {context.get('max_length')} entries, "
+        f"got {context.get('actual_length')}",
+        "too_short": f"expected at least {context.get('min_length')} entries, "
+        f"got {context.get('actual_length')}",
+        "model_type": f"expected a table, got {shown(got)}",
+        "model_attributes_type": f"expected a table, got {shown(got)}",
+        "dict_type": f"expected a table, got {shown(got)}",
+        "string_type": f"expected text in quotes, got {shown(got)}",
+        "bool_type": f"expected true or false, got {shown(got)}",
+        "value_error": str(context.get("error", "")),
+        "literal_error": f"expected {context.get('expected')}, got {shown(got)}",
+        "union_tag_invalid": f"the kind {shown(context.get('tag'))} is unknown."
+        + did_you_mean(str(context.get("tag")), _quoted(context.get("expected_tags"))),
+        "union_tag_not_found": "the key `kind` is missing",
+    }.get(kind)
+    if expected is None:
+        expected = re.sub(r"^Value error, ", "", problem["msg"]) + f", got {shown(got)}"
+    return expected
+
+
+def unknown_key(key: str, location: Iterable[Any], root: type[BaseModel]) -> str:
+    """What to do about a key that a table at this place does not have."""
+    hint = did_you_mean(key, keys_at(root, location))
+    return f"is not a key of the file format; remove it or mend its spelling.{hint}"
+
+
+def _quoted(text: Any) -> list[str]:
+    """a, b of "'a', 'b'"."""
+    return re.findall("'([^']*)'", str(text))
+
+
+def shown(value: Any) -> str:
+    """A value in a message, short whatever it is."""
+    try:
+        return shortened(_SHORT.repr(value), 60)
+    except ValueError:  # Python writes no integers of so many digits
+        return "an integer of thousands of digits"

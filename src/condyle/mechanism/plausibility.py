@@ -1,0 +1,190 @@
+"""Numbers that are allowed and do not go together: what a person would recognise as wrong at once.
+
+None of these is an error, since somebody may mean it; each has a kind that programs can tell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..errors import few
+from .home import characteristic_length
+from .mechanism import Mechanism
+
+LARGE, SMALL = 10.0, 1e-4  # metres
+EARTH, EARTH_SPREAD = 9.81, 0.06  # m/s^2: 9.76 at the equator's mountains, 9.83 at the poles
+DENSEST = 2e4  # kg/m^3 of a cube as large as the mechanism; nearly osmium
+SOUND = 340.0  # m/s
+POINTLIKE = 3e-3  # radius of gyration over the platform's own size
+ROUNDING = 1e-12  # metres outside a bound
+
+
+@dataclass(frozen=True)
+class Implausible:
+    """Something to look at; `str` for people.
+
+    kind: one word for programs, the same for ever;  data: the numbers of the message, SI.
+    """
+
+    kind: str
+    message: str
+    data: Mapping[str, Any] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        return self.message
+
+
+def plausibility_warnings(mechanism: Mechanism) -> list[Implausible]:
+    """Sizes, masses, gravity, limits and bounds that look like a slip of units or of a sign."""
+    return [
+        *_sizes(mechanism),
+        *_platform(mechanism),
+        *_rods(mechanism),
+        *_gravity(mechanism),
+        *_speeds(mechanism),
+        *_bounds(mechanism),
+    ]
+
+
+def extent(mechanism: Mechanism) -> np.ndarray:
+    """Sides of the box around all points of the mechanism at home, (3,) [m]."""
+    points = [*platform_points(mechanism)]
+    points += [point for chain in mechanism.chains for point in chain.fixed_points]
+    return np.ptp(np.array(points), axis=0)
+
+
+def platform_points(mechanism: Mechanism) -> list[tuple[float, ...]]:
+    """Joints, contacts and landmarks of the platform, in {M} [m]."""
+    points: list[tuple[float, ...]] = [chain.platform for chain in mechanism.chains]
+    return [*points, *(c.point for c in mechanism.contacts), *mechanism.platform.points.values()]
+
+
+def length_text(metres: float) -> str:
+    """A length as people say it: millimetres, and metres from ten on."""
+    return f"{metres:.4g} m" if abs(metres) >= LARGE else f"{metres * 1e3:.4g} mm"
+
+
+def _sizes(mechanism: Mechanism) -> Iterator[Implausible]:
+    whole = {"the characteristic length": characteristic_length(mechanism)}
+    parts = {
+        f'the {name} of chain "{chain.name}"': length
+        for chain in mechanism.chains
+        for name, length in chain.lengths.items()
+    } | {
+        f'the ball of contact "{contact.name}"': contact.ball_radius
+        for contact in mechanism.contacts
+        if contact.ball_radius is not None
+    }
+    for lengths in (whole, parts):
+        large = {name: v for name, v in lengths.items() if v > LARGE}
+        small = {name: v for name, v in lengths.items() if v < SMALL}
+        if large:
+            yield _size("length_large", large, 'are these millimetres in a file of length_unit "m"')
+        if small:
+            yield _size("length_small", small, 'are these metres in a file of length_unit "mm"')
+        if large or small:
+            return
+
+
+def _size(kind: str, lengths: Mapping[str, float], question: str) -> Implausible:
+    listed = few(f"{name} {length_text(v)}" for name, v in list(lengths.items()))
+    return Implausible(kind, f"lengths: {listed}; {question}?", {"lengths": dict(lengths)})
+
+
+def _platform(mechanism: Mechanism) -> Iterator[Implausible]:
+    mass = mechanism.platform.mass
+    gyration = float(np.sqrt(mechanism.platform.inertia.principal()[-1] / mass))
+    size = float(np.linalg.norm(platform_points(mechanism), axis=1).max())
+    whole = max(float(extent(mechanism).max()), size)
+    data = {"gyration": gyration, "size": size, "mass": mass}
+    if gyration > whole:
+        yield Implausible(
+            "gyration_large",
+            f"platform: its radius of gyration, {length_text(gyration)}, is beyond the size of the "
+            f"mechanism, {length_text(whole)}; inertia is in kg m^2 and mass in kg, whatever the "
+            "length_unit",
+            data,
+        )
+    elif gyration < POINTLIKE * size:
+        yield Implausible(
+            "gyration_small",
+            f"platform: its radius of gyration is {length_text(gyration)}, and its joints are up "
+            f"to {length_text(size)} from its mass centre; inertia is in kg m^2",
+            data,
+        )
+    most = DENSEST * whole**3
+    if mass > most:
+        yield Implausible(
+            "mass_large",
+            f"platform: {mass:g} kg in a mechanism of {length_text(whole)} is denser than any "
+            "metal; mass is in kg",
+            data,
+        )
+
+
+def _rods(mechanism: Mechanism) -> Iterator[Implausible]:
+    beyond = {
+        f'{name} of chain "{chain.name}"': (radius, chain.lengths[name])
+        for chain in mechanism.chains
+        for name, radius in chain.radii_of_gyration.items()
+        if radius > chain.lengths[name]
+    }
+    if beyond:
+        listed = few(
+            f"the {name} {length_text(radius)} (it is {length_text(length)} long)"
+            for name, (radius, length) in beyond.items()
+        )
+        yield Implausible(
+            "rod_gyration",
+            f"radius of gyration beyond the body's length: {listed}; transverse is in kg m^2",
+            {"rods": {name: list(pair) for name, pair in beyond.items()}},
+        )
+
+
+def _gravity(mechanism: Mechanism) -> Iterator[Implausible]:
+    gravity = np.array(mechanism.gravity)
+    size = float(np.linalg.norm(gravity))
+    data = {"gravity": list(mechanism.gravity)}
+    if size and abs(size - EARTH) > EARTH_SPREAD:
+        yield Implausible(
+            "gravity_size", f"gravity: {size:g} m/s^2 is neither the Earth's 9.81 nor none", data
+        )
+    if gravity[2] > 0.5 * size:
+        yield Implausible(
+            "gravity_upwards", "gravity: it points up, along +Z; down is negative", data
+        )
+
+
+def _speeds(mechanism: Mechanism) -> Iterator[Implausible]:
+    beyond = {}
+    for chain in mechanism.chains:
+        if (limit := chain.actuator.speed_limit) is not None:
+            speed = limit * chain.lengths.get("crank", 1.0)  # rad/s of a crank, else m/s
+            if speed > SOUND:
+                beyond[chain.name] = speed
+    if beyond:
+        listed = few(f'chain "{name}" {speed:.4g} m/s' for name, speed in beyond.items())
+        yield Implausible(
+            "speed_limit", f"speed_limit: beyond the speed of sound: {listed}", {"speeds": beyond}
+        )
+
+
+def _bounds(mechanism: Mechanism) -> Iterator[Implausible]:
+    for contact in mechanism.contacts:
+        bounds = contact.bounds.entries()
+        if not contact.surface.known or not any(bounds.values()):
+            continue
+        for axis, value in zip("xyz", contact.touching_point, strict=True):
+            low, high = bounds[axis] or (-np.inf, np.inf)
+            if value < low - ROUNDING or value > high + ROUNDING:
+                yield Implausible(
+                    "home_outside_bounds",
+                    f'contact "{contact.name}": home is outside its bounds: {axis} is '
+                    f"{value * 1e3:.6g} mm, and the surface goes from {low * 1e3:.6g} to "
+                    f"{high * 1e3:.6g} mm",
+                    {"contact": contact.name, "axis": axis, "value": value, "bounds": [low, high]},
+                )

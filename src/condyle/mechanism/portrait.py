@@ -1,0 +1,74 @@
+"""A mechanism in a few lines: for a console, and for a notebook."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from html import escape
+from typing import Protocol
+
+import numpy as np
+
+from ..errors import CondyleError, few
+from .coordinates import COORDINATES
+from .home import Parts, dependent_coordinates
+from .platform import Platform
+
+
+class Whole(Parts, Protocol):
+    """A mechanism."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def platform(self) -> Platform: ...
+
+
+def in_words(mechanism: Whole) -> str:
+    """Name, freedoms, chains by family, contacts by surface; four lines at most."""
+    head, *rows = _rows(mechanism)
+    lines = [f'Mechanism "{mechanism.name}": {head[1]}']
+    return "\n".join([*lines, *(f"  {title}: {text}" for title, text in rows)])
+
+
+def in_html(mechanism: Whole) -> str:
+    """The same as a small table."""
+    rows = "".join(
+        f'<tr><th style="text-align:left">{escape(title)}</th>'
+        f'<td style="text-align:left">{escape(text)}</td></tr>'
+        for title, text in _rows(mechanism)
+    )
+    name = escape(mechanism.name)
+    return f"<table><caption>Mechanism <b>{name}</b></caption><tbody>{rows}</tbody></table>"
+
+
+def _rows(mechanism: Whole) -> list[tuple[str, str]]:
+    chains = _grouped((chain.kind, chain.name) for chain in mechanism.chains)
+    contacts = _grouped((contact.surface.kind, contact.name) for contact in mechanism.contacts)
+    radii = np.sqrt(mechanism.platform.inertia.principal() / mechanism.platform.mass) * 1e3
+    gyration = ", ".join(f"{radius:.3g}" for radius in radii)
+    return [
+        ("freedoms", _freedoms(mechanism)),
+        ("chains", chains),
+        ("contacts", contacts or "none"),
+        ("platform", f"{mechanism.platform.mass:g} kg, radii of gyration {gyration} mm"),
+    ]
+
+
+def _freedoms(mechanism: Whole) -> str:
+    count = 6 - len(mechanism.contacts)
+    text = f"{count} degree{'s' * (count != 1)} of freedom"
+    try:
+        dependent = dependent_coordinates(mechanism)
+    except (CondyleError, StopIteration):  # a draft, or a note in the place of a surface
+        return text
+    independent = ", ".join(name for name in COORDINATES if name not in dependent)
+    depend = f"; dependent {', '.join(dependent)}" if dependent else ""
+    return f"{text} ({independent}{depend})"
+
+
+def _grouped(kinds: Iterable[tuple[str, str]]) -> str:
+    """'4 RSS (a, b, c, d), 2 PSS (e, f)'."""
+    groups: dict[str, list[str]] = {}
+    for kind, name in kinds:
+        groups.setdefault(kind, []).append(name)
+    return ", ".join(f"{len(names)} {kind} ({few(names)})" for kind, names in groups.items())

@@ -1,0 +1,89 @@
+"""The tables of a TOML file, whatever the file is."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError, did_you_mean, shortened
+from .library import bundled_mechanisms, bundled_text
+from .messages import shown
+
+LARGEST_FILE = 1_000_000  # bytes; the bundled mechanisms have some thousands
+DEEPEST = 20  # tables and lists within each other; the format needs six
+
+
+def read_text(source: str | Path) -> str:
+    """The text of a mechanism file or of a bundled mechanism.
+
+    Raises: InputError: if there is no such file, or it is no text of a sensible length.
+    """
+    if not isinstance(source, str | Path):
+        raise InputError(
+            f"expected the path of a mechanism file or the name of a bundled mechanism, got "
+            f"{shown(source)}"
+        )
+    path = Path(source)
+    try:
+        if str(source) in bundled_mechanisms() and not path.is_file():
+            return bundled_text(str(source))
+        with path.open("rb") as file:
+            content = file.read(LARGEST_FILE + 1)
+    except FileNotFoundError:
+        near = {p.name for p in path.parent.glob("*.toml")} if path.parent.is_dir() else set()
+        raise InputError(
+            f"mechanism file {shortened(str(source), 200)} does not exist, and no bundled "
+            "mechanism has that name." + did_you_mean(path.name, {*bundled_mechanisms(), *near})
+        ) from None
+    except OSError as error:
+        raise InputError(
+            f'mechanism file "{shortened(str(source), 200)}" cannot be read: {error.strerror}'
+        ) from None
+    except ValueError:  # a null character
+        raise InputError(f'"{shortened(str(source), 200)}" cannot be the path of a file') from None
+    if len(content) > LARGEST_FILE:
+        raise InputError(f"{source} is no mechanism file: it has more than a megabyte")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{source} is not a text file (UTF-8 expected)") from None
+
+
+def read_tables(text: str, source: str) -> dict[str, Any]:
+    """The tables of a file as TOML gives them; `source` names it in messages.
+
+    Raises: InputError: if the text is not TOML, or nests deeper than Python can follow.
+    """
+    if not isinstance(text, str):
+        raise InputError(f"{source}: expected the text of a mechanism file, got {shown(text)}")
+    if len(text) > LARGEST_FILE:
+        raise InputError(f"{source} is no mechanism file: it has more than a megabyte")
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{source} is not TOML: {shortened(str(error), 300)}") from None
+    except ValueError:  # Python reads no integers of so many digits
+        raise InputError(f"{source}: an integer has thousands of digits") from None
+    except RecursionError:
+        raise too_deep(source) from None
+
+
+def too_deep(source: str) -> InputError:
+    return InputError(
+        f"{source}: tables or lists stand more than {DEEPEST} deep in each other; "
+        "a mechanism needs six"
+    )
+
+
+def nests_too_deep(data: Any) -> bool:
+    """Whether tables and lists stand deeper in each other than any mechanism needs."""
+    waiting = [(1, data)]
+    while waiting:
+        depth, node = waiting.pop()
+        if depth > DEEPEST:
+            return True
+        inner = node.values() if isinstance(node, Mapping) else node
+        waiting += [(depth + 1, n) for n in inner if isinstance(n, Mapping | list | tuple)]
+    return False

@@ -1,0 +1,65 @@
+"""Mechanisms as TOML: files of people, and the record that a solution keeps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from .mechanism import Mechanism
+from .surface import Unknown
+
+
+def dump(mechanism: Mechanism, path: str | Path) -> None:
+    """Write the mechanism as a TOML file in SI, whole or not at all."""
+    from ..atomic import write_text
+
+    write_text(path, dumps(mechanism))
+
+
+def dumps(mechanism: Mechanism) -> str:
+    """The mechanism as a TOML file in SI; `parse(dumps(m)) == m` to the last bit.
+
+    Raises: InputError: if a surface is a Python expression, which a file cannot hold.
+    """
+    if names := written_in_python(mechanism):
+        raise InputError(
+            f"{mechanism.name}: the surface of {', '.join(names)} is a Python expression; a "
+            "mechanism file holds kinds and numbers only. Use a kind of surface instead"
+        )
+    return _toml(mechanism)
+
+
+def record(mechanism: Mechanism) -> str:
+    """The mechanism as a solution keeps it: as `dumps`, with notes of surfaces from Python."""
+    python = written_in_python(mechanism)
+    if not python:
+        return dumps(mechanism)
+    note = f"# The surface of {', '.join(python)} was written in Python; a file cannot hold it.\n"
+    return note + _toml(mechanism)
+
+
+def written_in_python(mechanism: Mechanism) -> list[str]:
+    """Names of contacts whose surface is, or was, a Python expression."""
+    return [c.name for c in mechanism.contacts if c.surface.kind == Unknown.kind]
+
+
+def _toml(mechanism: Mechanism) -> str:
+    import tomli_w
+
+    return tomli_w.dumps({"length_unit": "m", **_plain(mechanism)})
+
+
+def _plain(value: Any) -> Any:
+    """Tables and lists as TOML has them, without what is None and tables that are empty."""
+    if getattr(value, "kind", None) == Unknown.kind:
+        return {"kind": Unknown.kind, "closed": value.closed}
+    if hasattr(value, "entries"):
+        value = value.entries()
+    if isinstance(value, Mapping):
+        kept = {key: _plain(item) for key, item in value.items() if item is not None}
+        return {key: item for key, item in kept.items() if item != {}}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value

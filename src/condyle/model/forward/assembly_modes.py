@@ -1,0 +1,116 @@
+"""The assembly modes of a mechanism: all poses, as far as found, with the same joint coordinates.
+
+From many random starts about home, damped Gauss-Newton runs to the nearest pose; those that fit
+the joints are kept once each. The search is seeded, so it repeats, and it may miss modes: those
+that few starts lead to, and those of other chains' branches than home's, which are not looked for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...mechanism.mechanism import Mechanism
+from .follow import CONVERGED
+from .gauss_newton import GaussNewton
+from .orientation import bryant_angles, principal, rotations
+from .pose_status import PoseStatus, judge
+
+STARTS = 2000  # that chains can reach, at most, of so many
+DRAWN = 20000
+WIDTHS = 4  # of boxes, each half as wide as the one before
+ITERATIONS = 60
+LONGEST = 0.5  # step, in characteristic lengths and radians
+HALVINGS = 4
+SAME = 1e-6  # modes closer than this are one, in characteristic lengths and entries of R
+
+
+@dataclass(frozen=True)
+class AssemblyModes:
+    """M poses of one sample of joint coordinates, the nearest to home first.
+
+    pose:      X_EE, (M, 6) [m, rad].
+    distance:  from home, (M,): root of squares of O_M's way in characteristic lengths and of the
+               angle of the rotation [rad].
+    residual:  (M, n), given less computed joint coordinates [rad or m].
+    condition: (M,), condition number of the dimensionless actuator Jacobian.
+    """
+
+    pose: np.ndarray
+    distance: np.ndarray
+    residual: np.ndarray
+    condition: np.ndarray
+
+
+def search(
+    mechanism: Mechanism, newton: GaussNewton, joints: np.ndarray, seed: int, tolerance: float
+) -> AssemblyModes:
+    """Poses of joint coordinates, (n,), that fit within `tolerance` [rad or m]."""
+    starts = _starts(mechanism, np.random.default_rng(seed))
+    starts = starts[np.isfinite(newton.joints(starts)).all(axis=1)][:STARTS]
+    given = np.tile(joints, (len(starts), 1))
+    pose, converged = _descend(newton, starts, given)
+    pose, given = principal(pose[converged]), given[converged]
+    residual = newton.step(pose, given).residual
+    pose = pose[judge(np.ones(len(pose), bool), residual, tolerance) == PoseStatus.OK]
+    R = rotations(pose[:, 3:])
+    turn = np.arccos(np.clip((np.trace(R, axis1=1, axis2=2) - 1) / 2, -1, 1))
+    distance = np.hypot(np.linalg.norm(pose[:, :3], axis=1) / newton.length, turn)
+    place = np.hstack([pose[:, :3] / newton.length, R.reshape(-1, 9)])
+    kept: list[int] = []
+    for i in np.argsort(distance, kind="stable"):
+        if not kept or (np.abs(place[kept] - place[i]).max(axis=1) > SAME).all():
+            kept.append(int(i))
+    at = newton.step(pose[kept], given[: len(kept)])
+    condition = np.linalg.cond(at.A) if kept else np.zeros(0)
+    return AssemblyModes(pose[kept], distance[kept], at.residual, condition)
+
+
+def _starts(mechanism: Mechanism, rng: np.random.Generator) -> np.ndarray:
+    """Poses about home, (N, 6): home itself, then boxes up to twice as far as the base reaches."""
+    points = [chain.base for chain in mechanism.chains]
+    width = 2 * np.linalg.norm(points, axis=1).max() * 0.5 ** (np.arange(DRAWN) % WIDTHS)
+    place = rng.uniform(-1, 1, (DRAWN, 3)) * width[:, None]
+    axis = rng.normal(size=(DRAWN, 3))
+    axis /= np.linalg.norm(axis, axis=1)[:, None]
+    half = rng.uniform(0, np.pi / 2, DRAWN)
+    w, v = np.cos(half)[:, None, None], axis * np.sin(half)[:, None]
+    x, y, z = v.T
+    zero = np.zeros(DRAWN)
+    skew = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
+    R = np.eye(3) + 2 * w * skew + 2 * skew @ skew  # Rodrigues, of a unit quaternion (w, v)
+    starts = np.hstack([place, bryant_angles(R)])
+    starts[0] = 0.0
+    return starts
+
+
+def _descend(
+    newton: GaussNewton, x: np.ndarray, joints: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Damped Gauss-Newton from poses x, (N, 6); where it converged, (N,)."""
+    x, converged = x.copy(), np.zeros(len(x), dtype=bool)
+    active = np.arange(len(x))
+    step = newton.step(x, joints)
+    for _ in range(ITERATIONS):
+        finite = np.isfinite(step.size) & np.isfinite(step.error)
+        small = finite & ((step.size <= CONVERGED) | step.settled)
+        converged[active[small]] = True
+        x[active[small]] += step.move[small]
+        going = finite & ~small
+        active, step = active[going], step.of(going)
+        if not active.size:
+            break
+        part = np.minimum(1.0, LONGEST / step.size)
+        given = joints[active]
+        tried = x[active] + step.move * part[:, None]
+        new = newton.step(tried, given)
+        for _ in range(HALVINGS):
+            worse = np.flatnonzero(~(new.error <= 2 * step.error))
+            if not worse.size:
+                break
+            part[worse] /= 2
+            tried[worse] = x[active[worse]] + step.move[worse] * part[worse, None]
+            new.put(worse, newton.step(tried[worse], given[worse]))
+        x[active], step = tried, new
+    return x, converged

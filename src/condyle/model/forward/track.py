@@ -1,0 +1,116 @@
+"""Poses of joint coordinates that follow one another in time.
+
+Each row is followed from the row before, in the sense of `follow`, the first from home. Rows
+without a pose are passed over: the next is followed from the last one found.
+
+At a singularity two assembly modes meet, and joint coordinates alone do not say in which of them a
+mechanism goes on: one mode goes through, the other turns back. Rows to either side of it are well
+followed one by one, into the wrong mode. But the poses so far say where the next is expected, by
+their last step carried on in time. Where Newton from there finds another pose that fits, nearer to
+what is expected, the track is lost: from this row on nothing is certain.
+
+To be fast, many rows are first followed at once from one anchor. What is found so is a candidate
+until every link from one row to the next is certified, by the Jacobians at its two ends where these
+suffice. At the first broken link the row before becomes the anchor.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .follow import ALIKE, CONVERGED, LONGEST, SHRINK, follow, nearest, unlikeness
+from .gauss_newton import GaussNewton, Step
+from .pose_status import PoseStatus, judge
+
+FEW = 32  # rows followed at once behind a broken link; four times as many after each success
+SAME = 1e-6  # poses closer than this are one, in characteristic lengths and radians
+FALLEN = 0.3  # smallest singular value of A, over that of the row before
+BETTER = 0.5  # distance from what is expected, over that of the pose followed
+
+
+def track(
+    newton: GaussNewton, joints: np.ndarray, time: np.ndarray, tolerance: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Poses (N, 6) and statuses (N,) of joint coordinates (N, n) at rising times (N,) [s].
+
+    Args: tolerance: largest residual of a joint [rad or m].
+    """
+    count = len(joints)
+    pose, status = np.zeros((count, 6)), np.full(count, PoseStatus.LOST)
+    found = np.zeros(0, dtype=int)
+    row, few = 0, count
+    while row < count:
+        rows = np.arange(row, min(row + few, count))
+        anchor = pose[found[-1]] if found.size else np.zeros(6)
+        X, reached = follow(newton, np.tile(anchor, (len(rows), 1)), joints[rows])
+        at = newton.step(X, joints[rows])
+        verdict = judge(reached, at.residual, tolerance)
+        good = verdict == PoseStatus.OK
+        first = int(np.argmax(good)) if good.any() else len(rows)
+        stop = first + _leading(good[first:])
+        linked = first + _linked(newton, X[first:stop], at, joints[rows], first)
+        # From the same anchor, rows before the first good one stay without a pose.
+        taken = rows[:linked]
+        pose[taken], status[taken] = X[:linked], verdict[:linked]
+        new = np.concatenate([found[-2:], taken[first:]])
+        unsure = _unsure(newton, pose[new], joints[new], time[new], tolerance)
+        unsure[: len(new) - len(taken[first:])] = False
+        if unsure.any():
+            # The row before is the one that may have been next to the singularity.
+            status[new[np.argmax(unsure) - 1] :] = PoseStatus.LOST
+            break
+        found = new
+        row += linked
+        few = 4 * few if linked == len(rows) else FEW
+    return pose, status
+
+
+def _linked(newton: GaussNewton, pose: np.ndarray, at: Step, joints: np.ndarray, first: int) -> int:
+    """How many poses from the first on are each followed from the one before.
+
+    Args: at, joints: of more rows, of which `pose` are those from `first` on.
+    """
+    run = slice(first + 1, first + len(pose))
+    before, after, given = pose[:-1], pose[1:], joints[run]
+    if not len(after):
+        return len(pose)
+    move, way = newton.step(before, given).move, newton.between(before, after)
+    size = newton.size(move)
+    linked = newton.size(move - way) <= SHRINK * size + CONVERGED
+    linked &= (size <= LONGEST) & (unlikeness(at.A[first : run.stop - 1], at.A[run]) <= ALIKE)
+    doubtful = np.flatnonzero(~linked)
+    end, reached = follow(newton, before[doubtful], given[doubtful])
+    linked[doubtful] = reached & (newton.size(newton.between(end, after[doubtful])) <= SAME)
+    return 1 + _leading(linked)
+
+
+def _unsure(
+    newton: GaussNewton, pose: np.ndarray, joints: np.ndarray, time: np.ndarray, tolerance: float
+) -> np.ndarray:
+    """Where another pose fits and is nearer to what the two poses before let expect, (N,)."""
+    unsure = np.zeros(len(pose), dtype=bool)
+    if len(pose) < 3:
+        return unsure
+    ratio = np.diff(time)[1:] / np.diff(time)[:-1]
+    here, given = pose[2:], joints[2:]
+    expected = pose[1:-1] + newton.between(pose[:-2], pose[1:-1]) * ratio[:, None]
+    off = newton.size(newton.between(expected, here))
+    other, fits = nearest(newton, expected, given)
+    residual = newton.step(other, given).residual
+    fits &= judge(fits, residual, tolerance) == PoseStatus.OK
+    fits &= newton.size(newton.between(here, other)) > SAME
+    another = fits & (newton.size(newton.between(expected, other)) < BETTER * off)
+    # Next to a singularity, A changes altogether within less than what is expected is off by.
+    A = newton.step(pose[1:], joints[1:]).A
+    step = newton.size(newton.between(pose[1:-1], here))
+    at_border = unlikeness(A[:-1], A[1:]) * off > step
+    sigma = np.linalg.svd(A[:-1][at_border], compute_uv=False)[:, -1]
+    fallen = np.linalg.svd(A[1:][at_border], compute_uv=False)[:, -1]
+    at_border[at_border] = fallen < FALLEN * sigma
+    unsure[2:] = another | at_border
+    return unsure
+
+
+def _leading(good: np.ndarray) -> int:
+    """How many are true from the first on."""
+    return len(good) if good.all() else int(np.argmin(good))

@@ -1,0 +1,211 @@
+"""CSV as programs and spreadsheets write it, in chunks.
+
+Comma, semicolon or tab between the columns, decimal point or decimal comma, with or without quotes
+and byte order mark (UTF-8, or UTF-16 as "Unicode text" is saved), any line ends, spaces around
+names and numbers, empty lines at the end, empty columns without a name, a first line "sep=;", lines
+of comment that begin with #.
+
+A library reads what is plain, a hundred times faster than Python could. What it refuses is read
+line by line, to say what is wrong, or to forgive it.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+import re
+from collections.abc import Iterator
+
+import numpy as np
+
+from condyle.errors import InputError
+from condyle.motion.csv_head import NUMBER, Head, Source, opened, read_head, read_line, split
+from condyle.motion.header import Header, read_header
+from condyle.motion.table import Known, Table
+from condyle.motion.words import listed, printable, short
+
+_CELL = 20  # bytes that a number takes with its separator
+
+_COMMENT = re.compile(r"[ \t\"]*#(?!N/A|REF!|DIV/0!|VALUE!|NAME\?|NUM!|NULL!)")
+_HAS_COMMENT = re.compile(rb"^[ \t\"]*#", re.MULTILINE)
+_GROUPED = re.compile(r"[+-]?\d{1,3}([., '\u2019\u00a0\u202f]\d{3})+([.,]\d+)?")
+_NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)|n/?a|#\S+", re.IGNORECASE)
+
+
+def iter_csv(
+    path: str | os.PathLike[str], chunk_rows: int, known: Known | None
+) -> Iterator[tuple[Table, int]]:
+    """Tables of up to `chunk_rows` rows, and how many bytes of the file each of them took."""
+    source = printable(os.fspath(path))
+    with opened(path) as file:
+        head = read_head(source, file)
+        header = read_header(f"{source}, line {head.line}", head.names, known)
+        parser = _Parser(source, head, header)
+        line, block, found = head.first_line, head.rows, False
+        while block := block + _block(file, chunk_rows * len(head.names) * _CELL, source):
+            values, lines, count = parser.parse(block, line)
+            columns = {
+                name: column * header.scale.get(name, 1.0)
+                for name, column in zip(header.index, values, strict=True)
+            }
+            line += count
+            rows = len(lines)
+            for start in range(0, rows, chunk_rows):
+                found = True
+                part = slice(start, start + chunk_rows)
+                chunk = {name: column[part] for name, column in columns.items()}
+                share = len(block) * len(lines[part]) // rows
+                yield Table(source, chunk, lines[part], header.scale, header.ignored), share
+            block = b""
+        if not found:
+            raise InputError(f"{source}: has column names but no rows of numbers")
+
+
+def _block(file: Source, size: int, source: str) -> bytes:
+    """Whole lines, of about `size` bytes."""
+    block = file.read(size)
+    return block if not block or block.endswith(b"\n") else block + read_line(file, source)
+
+
+class _Parser:
+    """From lines to numbers, for one file. Remembers its separator and its decimal sign."""
+
+    def __init__(self, source: str, head: Head, header: Header) -> None:
+        self.source, self.names, self.separator = source, head.names, head.separator
+        self.wanted = {i: name for name, i in header.index.items()}
+        self.nameless = [i for i, name in enumerate(head.names) if not name]
+        self.blank = head.separator + ' "\n\t\r\f'
+        self.decimal = ""
+        self.empty_line = 0  # the first since the last row
+
+    def parse(self, block: bytes, line: int) -> tuple[list[np.ndarray], np.ndarray, int]:
+        """Columns, lines on which their rows stand, and the number of lines in the block."""
+        end = block.find(b"\n", len(block.rstrip(self.blank.encode()))) + 1 or len(block)
+        body = block[:end] if block.rstrip(self.blank.encode()) else b""
+        columns = self._quickly(body) if body and not self.empty_line else None
+        if columns is None:
+            return self._carefully(block, line)
+        rows = len(columns[0])
+        total = block.count(b"\n") + (not block.endswith(b"\n"))
+        if total > rows:
+            self.empty_line = line + rows
+        return columns, np.arange(line, line + rows), total
+
+    def _quickly(self, body: bytes) -> list[np.ndarray] | None:
+        """By the library; None if it is not sure what every cell means."""
+        import pyarrow as pa
+        import pyarrow.compute as pc
+        from pyarrow import csv as arrow_csv
+
+        comma = self.separator != "," and b"," in body
+        sign = self.decimal or ("," if comma else ".")
+        odd_ends = b"\r" in body and body.count(b"\r") != body.count(b"\r\n")
+        if sign == self.separator or odd_ends or body.count(b'"') % 2:
+            return None
+        if b"#" in body and _HAS_COMMENT.search(body):
+            return None
+        types = {str(i): pa.float64() for i in self.wanted}
+        types |= {str(i): pa.binary() for i in self.nameless}
+        try:
+            table = arrow_csv.read_csv(
+                pa.BufferReader(body),
+                arrow_csv.ReadOptions(
+                    use_threads=False,
+                    block_size=len(body) + 1,
+                    column_names=[str(i) for i in range(len(self.names))],
+                ),
+                arrow_csv.ParseOptions(delimiter=self.separator, ignore_empty_lines=False),
+                arrow_csv.ConvertOptions(
+                    column_types=types,
+                    include_columns=list(types),
+                    null_values=[],
+                    check_utf8=False,
+                    decimal_point=sign,
+                ),
+            )
+        except pa.ArrowException:
+            return None
+        if table.num_rows != body.count(b"\n") + (not body.endswith(b"\n")):
+            return None
+        if any(pc.max(pc.binary_length(table[str(i)])).as_py() for i in self.nameless):
+            return None
+        columns = [table[str(i)].to_numpy() for i in self.wanted]
+        if not all(np.isfinite(column).all() for column in columns):
+            return None
+        self.decimal = self.decimal or (sign if sign.encode() in body else "")
+        return columns
+
+    def _carefully(self, block: bytes, line: int) -> tuple[list[np.ndarray], np.ndarray, int]:
+        texts = re.split(r"\r\n|\r|\n", block.decode())
+        if not texts[-1]:
+            texts.pop()
+        rows, lines = [], []
+        for at, text in enumerate(texts, line):
+            if _COMMENT.match(text):
+                continue
+            if not text.strip(self.blank):
+                self.empty_line = self.empty_line or at
+                continue
+            if self.empty_line:
+                raise InputError(
+                    f"{self.source}, line {self.empty_line}: is empty, but rows follow. "
+                    "Remove the line."
+                )
+            rows.append(self._row(text, f"{self.source}, line {at}"))
+            lines.append(at)
+        values = np.array(rows, dtype=float).reshape(len(rows), len(self.wanted))
+        return list(values.T), np.array(lines, dtype=int), len(texts)
+
+    def _row(self, text: str, where: str) -> list[float]:
+        if text.count('"') % 2:
+            raise InputError(f"{where}: a quotation mark is not closed")
+        try:
+            cells = next(split([text], self.separator))
+        except csv.Error as error:
+            raise InputError(f"{where}: cannot be read ({error})") from error
+        while len(cells) > len(self.names) and not cells[-1].strip():
+            cells.pop()
+        while len(cells) < len(self.names) and not self.names[len(cells)]:
+            cells.append("")
+        if len(cells) != len(self.names):
+            hint = ""
+            if self.separator == "," and len(cells) > len(self.names):
+                hint = " Decimal commas need semicolons between the columns."
+            named = listed([name for name in self.names if name], "")
+            raise InputError(
+                f"{where}: {len(cells)} cells, expected {len(self.names)} ({named}).{hint}"
+            )
+        for i in self.nameless:
+            if cells[i].strip():
+                raise InputError(
+                    f'{where}: got "{short(cells[i])}" in column {i + 1}, which has no name; '
+                    "name the column or delete it"
+                )
+        return [
+            self._number(cells[i].strip(), f'{where}, column "{short(self.names[i])}"')
+            for i in self.wanted
+        ]
+
+    def _number(self, cell: str, where: str) -> float:
+        if not cell:
+            raise InputError(f"{where}: the cell is empty; every cell needs a number")
+        sign = "," if "," in cell else "." if "." in cell else ""
+        if sign and self.decimal and sign != self.decimal:
+            raise InputError(
+                f'{where}: got "{short(cell)}" where the numbers before have "{self.decimal}" '
+                "as their decimal sign. Use one sign, and no thousands separators."
+            )
+        plain = cell.replace(",", ".") if cell.count(",") == 1 else cell
+        if NUMBER.fullmatch(plain):
+            self.decimal = self.decimal or sign
+            if math.isfinite(value := float(plain)):
+                return value
+            raise InputError(f"{where}: {short(cell)} is too large for a number")
+        if _NOT_FINITE.fullmatch(cell):
+            raise InputError(
+                f'{where}: got "{short(cell)}", expected a finite number.'
+                " Fill the gap or leave the row out."
+            )
+        hint = " Thousands are written without separators." if _GROUPED.fullmatch(cell) else ""
+        raise InputError(f'{where}: got "{short(cell)}", expected a number.{hint}')

@@ -1,0 +1,56 @@
+"""A pandas DataFrame, or what looks like one, as a table. Nothing here imports pandas."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from condyle.errors import InputError
+from condyle.motion.header import read_header
+from condyle.motion.table import Known, Table, checked_columns
+from condyle.motion.words import short
+
+
+def is_frame(data: Any) -> bool:
+    """Whether `data` has columns by name, and an index."""
+    return all(hasattr(data, name) for name in ("columns", "index", "iloc"))
+
+
+def table_from_frame(frame: Any, known: Known, source: str) -> Table:
+    """The columns of a frame; its index is the time if no column is.
+
+    Raises: InputError: for what is not a frame of finite numbers.
+    """
+    if not is_frame(frame):
+        raise InputError(f"{source}: got a {type(frame).__name__}, expected a pandas DataFrame")
+    names = [str(name) for name in frame.columns]
+    header = read_header(source, names, known)
+    columns = {
+        name: _numbers(frame.iloc[:, i], f'{source}, column "{short(names[i])}"')
+        * header.scale.get(name, 1.0)
+        for name, i in header.index.items()
+    }
+    scale = dict(header.scale)
+    if "t" not in columns and "t" in known:
+        name = str(frame.index.name or "t")
+        try:
+            index = read_header("index", [name], ("t",))
+        except InputError as error:
+            raise InputError(
+                f'{source}: has no column "t", nor is its index one ({error})'
+            ) from None
+        t = _numbers(frame.index, f"{source}, index") * index.scale.get("t", 1.0)
+        columns, scale = {"t": t, **columns}, scale | index.scale
+    rows = np.arange(1, len(frame) + 1)
+    return checked_columns(Table(source, columns, rows, scale, header.ignored, "row"))
+
+
+def _numbers(values: Any, where: str) -> np.ndarray:
+    array = np.asarray(values)
+    if array.dtype.kind == "m":
+        return array / np.timedelta64(1, "s")
+    try:
+        return array.astype(float)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{where}: is not made of numbers ({short(str(error))})") from error

@@ -1,0 +1,26 @@
+"""How much memory is at hand, so that what cannot fit is refused before it is begun."""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+
+_UNKNOWN = 8 << 30  # bytes, where the system does not say
+
+
+def memory_at_hand() -> int:
+    """Bytes that this process can still take, as far as the system tells."""
+    limits = []
+    with suppress(OSError, ValueError, IndexError), open("/proc/meminfo", encoding="ascii") as file:
+        limits += [int(line.split()[1]) << 10 for line in file if line.startswith("MemAvailable")]
+    if not limits:
+        with suppress(OSError, ValueError, AttributeError):
+            limits.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    with suppress(OSError, ValueError), open("/sys/fs/cgroup/memory.max", encoding="ascii") as file:
+        limits.append(int(file.read()))  # of a container; "max" is no limit
+    with suppress(ImportError, OSError):
+        import resource
+
+        address_space = resource.getrlimit(resource.RLIMIT_AS)[0]
+        limits += [address_space] if address_space != resource.RLIM_INFINITY else []
+    return min(limits, default=_UNKNOWN)

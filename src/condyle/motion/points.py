@@ -1,0 +1,42 @@
+"""Which point of the platform is meant where none was named."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from condyle.errors import InputError
+from condyle.motion.words import guess, listed
+
+DEFAULT_LANDMARK = "incisor"
+DEFAULT_LOAD_POINT = "right_molar"
+
+
+def resolve_landmark(name: str | None, points: Iterable[str]) -> str:
+    """The point whose path a motion gives: the one named, `incisor`, or the only one there is.
+
+    Raises: InputError: if there is no such point, or none was named of several.
+    """
+    return _resolve(name, points, DEFAULT_LANDMARK, "landmark", "--landmark (landmark=...)")
+
+
+def resolve_load_point(name: str | None, points: Iterable[str]) -> str:
+    """The point a load acts at: the one named, `right_molar`, or the only one there is.
+
+    Raises: InputError: as of `resolve_landmark`.
+    """
+    return _resolve(name, points, DEFAULT_LOAD_POINT, "load point", "--load-point (load_point=...)")
+
+
+def _resolve(name: str | None, points: Iterable[str], default: str, what: str, option: str) -> str:
+    points = list(points)
+    if name is not None:
+        if name not in points:
+            raise InputError(f'the mechanism has no {what} "{name}".{guess(name, points)}')
+        return name
+    if default in points:
+        return default
+    if len(points) == 1:
+        return points[0]
+    there = f"choose one of {listed(points)}" if points else "give it some in platform.points"
+    has = f"{len(points)} points" if points else "no points"
+    raise InputError(f"no {what} is named, and the platform has {has}; {there} with {option}")

@@ -1,0 +1,61 @@
+"""Motions and loads that no machine makes: mostly units that nobody named."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from condyle.motion.units import dimension
+
+SOUND = 343.0  # m/s
+_PATH = 3.0  # m: a platform goes no farther
+_SLOW = {"length": 0.1, "angle": 0.5}  # per second: a machine that is hardly seen to move
+_STEP, _STEPS = 0.5, 100  # s between samples, and so many of them: perhaps milliseconds
+_FORCE = 1e6  # N or N m
+
+_MS = 'if t is in milliseconds, name the column "t [ms]" or say --units ms'
+
+
+def motion_warnings(
+    source: str, names: Sequence[str], t: np.ndarray, value: np.ndarray, rate: np.ndarray
+) -> tuple[str, ...]:
+    """What in a motion, (N,) [s] and (N, m) in SI, looks like a wrong unit."""
+    warnings = []
+    slow = True
+    for name, x, v in zip(names, value.T, np.abs(rate).max(axis=0), strict=True):
+        kind = (dimension(name) or ("length", 0))[0]
+        slow = slow and v < _SLOW[kind]
+        span = np.ptp(x)
+        if kind == "length" and v > SOUND:
+            warnings.append(
+                f"{source}: {name} moves at {v:.4g} m/s, faster than sound. Are lengths in mm "
+                "(--units mm) or times in other units?"
+            )
+        elif kind == "length" and span > _PATH:
+            warnings.append(
+                f"{source}: {name} goes over {span:.4g} m; if lengths are in mm, say --units mm"
+            )
+        elif kind == "angle" and np.abs(x).max() > 2 * np.pi:
+            warnings.append(
+                f"{source}: {name} reaches {np.abs(x).max():.4g} rad, more than a turn; if angles "
+                "are in degrees, say --units deg"
+            )
+    return (*warnings, *(time_warnings(source, t) if slow else ()))
+
+
+def load_warnings(source: str, t: np.ndarray, wrench: np.ndarray) -> tuple[str, ...]:
+    """What in a load, (N,) [s] and (N, 6) [N, N m], looks like a wrong unit."""
+    largest = np.abs(wrench).max(initial=0)
+    huge = (
+        f"{source}: reaches {largest:.4g} N or N m; name other units in the header, as Fz [mN]",
+    )
+    return (*time_warnings(source, t), *(huge if largest > _FORCE else ()))
+
+
+def time_warnings(source: str, t: np.ndarray) -> tuple[str, ...]:
+    """Whether the times look like milliseconds."""
+    if len(t) < _STEPS or (step := float(np.median(np.diff(t)))) < _STEP:
+        return ()
+    total = f"{len(t)} rows in steps of {step:.4g} s, {t[-1] - t[0]:.4g} s in all"
+    return (f"{source}: {total}; {_MS}",)

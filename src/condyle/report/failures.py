@@ -1,0 +1,80 @@
+"""When and why a run has no result, as the figures, the page and the live view say it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from ..results.solution import Solution
+
+
+MOST = 500
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Samples in a row without a result.
+
+    first, last: their numbers;  start, end: their times [s];  status: its word;  cause: or "".
+    """
+
+    first: int
+    last: int
+    start: float
+    end: float
+    status: str
+    cause: str
+
+    def __str__(self) -> str:
+        return f"{self.status}: {self.cause}" if self.cause else self.status
+
+
+def failures(
+    solution: Solution, time: np.ndarray | None = None, status: np.ndarray | None = None
+) -> list[Failure]:
+    """Runs of failed samples, in the order of time.
+
+    Args: time, status: of the whole run, (N,), where the solution has fewer samples.
+    """
+    time = solution["time"].values if time is None else time
+    status = solution["status"].values if status is None else status
+    words = solution["status"].attrs["flag_meanings"].split()
+    known = [_fields(record) for record in getattr(solution, "failures", ())]
+    edges = np.flatnonzero(np.diff(status, prepend=0, append=0))
+    found = []
+    for first, after in pairwise(edges):
+        if status[first] == 0:
+            continue
+        start, end = float(time[first]), float(time[after - 1])
+        word = words[int(status[first])]
+        causes = [
+            str(one["cause"])
+            for one in known
+            if one["cause"] and one["start"] <= end and start <= one["end"]
+        ]
+        cause = "; ".join(dict.fromkeys(causes))
+        found.append(Failure(int(first), int(after) - 1, start, end, word, cause))
+    return found
+
+
+def longest(found: list[Failure], most: int = MOST) -> list[Failure]:
+    """The longest ones, in the order of time: more could not be told apart on a screen."""
+    kept = sorted(found, key=lambda one: one.start - one.end)[:most]
+    return sorted(kept, key=lambda one: one.first)
+
+
+def at_sample(found: list[Failure], sample: int) -> Failure | None:
+    """The failure that a sample is in, or None."""
+    return next((one for one in found if one.first <= sample <= one.last), None)
+
+
+def _fields(record: Any) -> Mapping[str, Any]:
+    """A record of `solution.failures`: a mapping, or an object with such attributes."""
+    if isinstance(record, Mapping):
+        return record
+    return {name: getattr(record, name) for name in ("start", "end", "cause")}

@@ -1,0 +1,168 @@
+"""A run of any length as what a screen can show, in flat memory.
+
+The solution is read in pieces. The page gets samples at even steps, with every curve's largest and
+smallest among them, and of each curve the largest and smallest value of each of `BUCKETS` spans of
+time. So no peak is lost, in the plots or in the tables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .columns import Columns
+from .envelope import Envelope
+from .panels import time_panels
+from .tracks import track_panels
+
+if TYPE_CHECKING:
+    from ...results.solution import Solution
+
+BUDGET = 3_400_000  # bytes of samples, so that a page of 5001 samples stays under 10 MB
+BUCKETS = 1200  # of an envelope: two of them a pixel of a wide plot
+DRAWN = (4, 20)  # columns a chain, and besides, that the picture in space needs
+PIECE = 32_768  # samples that are looked at together
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """A solution with the samples that a page keeps.
+
+    solution: with `samples` (K,) of the run's `total`;  envelope: of its curves, or None if the
+    page has every sample.   status, time: of every sample, (N,), [s];  near: how many of them are
+    near a singularity.
+    """
+
+    solution: Solution
+    samples: np.ndarray
+    envelope: Envelope | None
+    status: np.ndarray
+    time: np.ndarray
+    near: int
+
+    @property
+    def total(self) -> int:
+        return len(self.time)
+
+    @property
+    def failed(self) -> int:
+        return int((self.status != 0).sum())
+
+
+def reduced(solution: Solution) -> Reduced:
+    """The solution as a page can carry it; one in a file is read piece by piece."""
+    time, status = solution["time"].values, solution["status"].values
+    count = len(time)
+    lines = curve_values(solution.isel(time=slice(0, 2)).load())
+    columns = len(lines) + DRAWN[0] * solution.sizes["chain"] + DRAWN[1]
+    affordable = max(BUDGET // (4 * max(columns, 1)), 2)
+    if count <= affordable:
+        whole = solution.load()
+        near = int((whole["singularity"].values != 0).sum())
+        return Reduced(whole, np.arange(count), None, status, time, near)
+    # An envelope takes 12 bytes a curve and span, a sample 4 bytes a column.
+    spare = affordable - 3 * BUCKETS * len(lines) // columns
+    starts = np.linspace(0, count, BUCKETS + 1).astype(int)
+    envelope = Envelope(np.append(time[starts[:-1]], time[-1]))
+    extremes, near = {0, count - 1}, 0
+    for first, last in pieces(starts):
+        piece = solution.isel(time=slice(starts[first], starts[last])).load()
+        near += int((piece["singularity"].values != 0).sum())
+        for name, values in curve_values(piece).items():
+            _take(envelope, name, values, time, starts, first, last)
+    for name in envelope.low:
+        for best, values, at in (
+            (np.nanargmin, envelope.low[name], envelope.low_at[name]),
+            (np.nanargmax, envelope.high[name], envelope.high_at[name]),
+        ):
+            if np.isfinite(values).any():
+                k = int(best(values))
+                extremes.add(int(starts[k] + at[k]))
+    _as_fractions(envelope, time, starts)
+    extremes |= set(_edges(status).tolist())
+    steps = np.linspace(0, count - 1, max(spare - len(extremes), 2)).astype(int)
+    samples = np.unique([*steps, *extremes])
+    return Reduced(_at(solution, samples), samples, envelope, status, time, near)
+
+
+def curve_values(solution: Solution) -> dict[str, np.ndarray]:
+    """Every curve of the page, (N,) by name, and the tracks, whose extremes count too."""
+    columns = Columns(solution["time"].values)
+    time_panels(solution, columns, every=True)
+    for number in {n for panel in track_panels(solution, columns) for n in panel["columns"]}:
+        name = list(columns.values)[number]
+        columns.lines[name] = number
+    return {name: columns.values[name] for name in columns.lines}
+
+
+def pieces(starts: np.ndarray) -> Iterator[tuple[int, int]]:
+    """Runs of whole spans, (first, last), of `PIECE` samples or one span."""
+    first, last = 0, len(starts) - 1
+    while first < last:
+        end = int(np.searchsorted(starts, starts[first] + PIECE, side="right")) - 1
+        end = min(max(end, first + 1), last)
+        yield first, end
+        first = end
+
+
+def _take(
+    envelope: Envelope,
+    name: str,
+    values: np.ndarray,
+    time: np.ndarray,
+    starts: np.ndarray,
+    first: int,
+    last: int,
+) -> None:
+    """Put the spans `first` to `last` of a curve into the envelope, places as sample numbers."""
+    size = np.diff(starts[first : last + 1])
+    at = np.arange(size.max())
+    inside = at < size[:, None]
+    wide = np.full(inside.shape, np.nan)
+    wide[inside] = values
+    span = slice(first, last)
+    for best, store, places, worst in (
+        (np.argmin, envelope.low, envelope.low_at, np.inf),
+        (np.argmax, envelope.high, envelope.high_at, -np.inf),
+    ):
+        if name not in store:
+            store[name] = np.full(len(starts) - 1, np.nan)
+            places[name] = np.zeros(len(starts) - 1)
+        k = best(np.where(np.isnan(wide), worst, wide), axis=1)
+        store[name][span] = wide[np.arange(len(k)), k]
+        places[name][span] = k
+
+
+def _as_fractions(envelope: Envelope, time: np.ndarray, starts: np.ndarray) -> None:
+    """Places as parts of their span's time, in place of sample numbers."""
+    length = np.maximum(np.diff(envelope.edges), 1e-300)
+    for places in (envelope.low_at, envelope.high_at):
+        for name, at in places.items():
+            when = time[starts[:-1] + at.astype(int)]
+            places[name] = np.clip((when - envelope.edges[:-1]) / length, 0.0, 1.0)
+
+
+def _edges(status: np.ndarray, most: int = 200) -> np.ndarray:
+    """Samples on both sides of a change of status; the first so many changes."""
+    change = np.flatnonzero(np.diff(status))[:most]
+    return np.concatenate([change, change + 1])
+
+
+def _at(solution: Solution, samples: np.ndarray) -> Solution:
+    """The solution at these samples; read in slices, since single rows of a file are slow."""
+    import xarray as xr
+
+    parts = []
+    for start in range(0, solution.sizes["time"], PIECE):
+        chosen = samples[(samples >= start) & (samples < start + PIECE)] - start
+        piece = solution.isel(time=slice(start, start + PIECE))
+        parts.append(piece.isel(time=chosen).load())
+    fixed = [name for name in solution.data_vars if "time" not in solution[name].dims]
+    joined = xr.concat(
+        [p.drop_vars(fixed) for p in parts], "time", coords="minimal", compat="override"
+    )
+    joined = joined.assign({name: solution[name] for name in fixed})
+    return type(solution)(joined.data_vars, joined.coords, solution.attrs)

@@ -1,0 +1,122 @@
+"""From an evaluation to a labelled solution."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from .. import __version__
+from ..kinematics.chain import FAMILIES
+from ..mechanism.files import record
+from ..mechanism.mechanism import COORDINATES
+from ..model.data import Evaluation
+from ..model.evaluator import Evaluator
+from ..motion import Load, Motion
+from ..questions.equations import LOAD as LOAD_PART
+from .contacts import AXES
+from .derived import Derived
+from .solution import Solution
+from .variables import VARIABLES, WRENCH, Variable
+from .warnings import Watch
+
+
+def assemble(
+    model: Evaluator,
+    motion: Motion,
+    load: Load,
+    wrench: np.ndarray,
+    load_point: str | None,
+    evaluation: Evaluation,
+    residual: float | None,
+    seconds: float,
+) -> Solution:
+    """The labelled dataset of an evaluation along a motion.
+
+    Arrays of the evaluation become those of the solution, without a copy where no sample failed.
+    The share of the load is left out where there is no load.
+    """
+    mechanism = model.mechanism
+    derived = Derived(mechanism, evaluation, wrench)
+    parts = list(model.parts)
+    loaded = bool(np.any(wrench))
+    kept = [i for i, part in enumerate(parts) if loaded or part != LOAD_PART]
+    variables = {v.name: _variable(v, derived) for v in VARIABLES}
+    if len(kept) < len(parts):
+        dims, share, attributes = variables["share"]
+        variables["share"] = dims, share[kept], attributes
+    watch = Watch(mechanism, residual=residual)
+    watch.see(derived, motion.t)
+    notices = watch.notices()
+    solution = Solution(variables, _coordinates(model, motion, [parts[i] for i in kept]))
+    solution.attrs = {
+        "title": f"Inverse dynamics of {mechanism.name}",
+        "source": f"condyle {__version__}",
+        "condyle_version": __version__,
+        "mechanism_name": mechanism.name,
+        "mechanism": record(mechanism),
+        "options": json.dumps(_options(model, motion, load, load_point, residual, seconds)),
+        "warnings": json.dumps([notice.text for notice in notices]),
+        "notices": json.dumps([notice.to_dict() for notice in notices]),
+    }
+    return solution
+
+
+def _variable(
+    variable: Variable, derived: Derived
+) -> tuple[tuple[str, ...], np.ndarray, dict[str, str]]:
+    """What xarray makes a variable of; numbers of failed samples are NaN."""
+    values = variable.values(derived)
+    if values.dtype.kind == "f" and not derived.all_ok:
+        values = values.copy()
+        values[(slice(None),) * variable.dims.index("time") + (~derived.ok,)] = np.nan
+    return variable.dims, values, variable.attributes(derived.mechanism)
+
+
+def _coordinates(model: Evaluator, motion: Motion, parts: Sequence[str]) -> dict[str, Any]:
+    """Labels along every dimension of `DIMENSIONS`, and the units of each chain."""
+    mechanism = model.mechanism
+    families = [FAMILIES[chain.kind] for chain in mechanism.chains]
+    return {
+        "time": ("time", motion.t, {"units": "s", "long_name": "time"}),
+        "chain": list(mechanism.chain_names),
+        "contact": np.array(mechanism.contact_names, dtype=object),
+        "coordinate": list(COORDINATES),
+        "part": list(parts),
+        "axis": list(AXES),
+        "component": list(WRENCH),
+        "independent": list(model.independent),
+        "effort_unit": ("chain", [family.effort_unit for family in families]),
+        "joint_unit": ("chain", [family.joint_unit for family in families]),
+    }
+
+
+def _options(
+    model: Evaluator,
+    motion: Motion,
+    load: Load,
+    load_point: str | None,
+    residual: float | None,
+    seconds: float,
+) -> dict[str, Any]:
+    """How the solution was made."""
+    return {
+        "formulation": model.formulation,
+        "route": model.route,
+        "motion": motion.source,
+        "motion_sha256": motion.sha256,
+        "motion_kind": motion.kind,
+        "landmark": motion.landmark,
+        "load": load.source,
+        "load_sha256": load.sha256,
+        "load_point": load_point,
+        "independent": list(model.independent),
+        "dependent": list(model.dependent),
+        "characteristic_length": model.characteristic_length,
+        "contact_residual_of_given_pose": residual,
+        "smoothing": None if motion.smoothing is None else str(motion.smoothing),
+        "derivation_seconds": model.derivation_seconds,
+        "solve_seconds": seconds,
+    }

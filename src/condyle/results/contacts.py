@@ -1,0 +1,41 @@
+"""What contacts are told by: their bounds, and the pull that a one-sided one cannot take."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..mechanism.mechanism import Mechanism
+
+AXES = ("x", "y", "z")
+BOUND_TOLERANCE = 1e-12  # metres: rounding at a bound is not outside
+FORCE_TOLERANCE = 1e-12  # newtons: rounding of no force is not a pull
+
+
+def bound_margins(mechanism: Mechanism, points: np.ndarray) -> np.ndarray:
+    """Distance of contact points, (N, k, 3), to their nearest bound, (N, k); inf without one."""
+    margins = np.full(points.shape[:2], np.inf)
+    for i, contact in enumerate(mechanism.contacts):
+        for axis, name in enumerate(AXES):
+            if (interval := getattr(contact.bounds, name)) is not None:
+                low, high = interval
+                coordinate = points[:, i, axis]
+                inside = np.minimum(coordinate - low, high - coordinate)
+                np.minimum(margins[:, i], inside, out=margins[:, i])
+    return margins
+
+
+def lift_off(mechanism: Mechanism, force: np.ndarray) -> np.ndarray:
+    """Whether one-sided contacts would have to pull at contact forces (N, k), (N, k)."""
+    push = np.array([c.push if c.one_sided else 0 for c in mechanism.contacts], dtype=float)
+    if not push.any():
+        return np.zeros(force.shape, dtype=bool)
+    return push * force < -FORCE_TOLERANCE
+
+
+def lift_off_columns(mechanism: Mechanism, lifted: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns lift_off_<contact>, 0 or 1, of the contacts that can lift off."""
+    return {
+        f"lift_off_{contact.name}": lifted[:, i].astype(int)
+        for i, contact in enumerate(mechanism.contacts)
+        if contact.one_sided
+    }

@@ -1,0 +1,188 @@
+"""The variables of a solution in one table: dataset, columns of CSV and docs follow from it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..kinematics.causes import owners
+from ..kinematics.chain import FAMILIES
+from ..kinematics.singularity import KINDS
+from ..mechanism.mechanism import COORDINATES, Mechanism
+from ..status import STATUS_NAMES
+from .contacts import AXES
+from .derived import Derived
+
+WRENCH = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+
+Rule = Callable[[Mechanism], str]
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable of a solution.
+
+    units:  or a rule that gives them for a mechanism; with several, one an entry or a chain.
+    values: from an evaluation. Floating-point ones become NaN where a sample failed.
+    column: what the names of its columns begin with in CSV, before that of the entry; None: it
+            has none there.
+    flags:  what its integers mean, or a rule for that: words that a blank parts.
+    """
+
+    name: str
+    dims: tuple[str, ...]
+    units: str | Rule
+    meaning: str
+    values: Callable[[Derived], np.ndarray]
+    column: str | None = None
+    flags: str | Rule = ""
+
+    def attributes(self, mechanism: Mechanism) -> dict[str, str]:
+        """`units`, `long_name` and, where there are flags, `flag_meanings`."""
+        units = self.units if isinstance(self.units, str) else self.units(mechanism)
+        flags = self.flags if isinstance(self.flags, str) else self.flags(mechanism)
+        named = {"flag_meanings": flags} if flags else {}
+        return {"units": units, "long_name": self.meaning, **named}
+
+
+def of_effort(form: str = "{}") -> Rule:
+    """Units of efforts, each kind that the chains have, in a form such as '{}/s'."""
+    return lambda mechanism: _each((FAMILIES[c.kind].effort_unit for c in mechanism.chains), form)
+
+
+def of_joint(form: str = "{}") -> Rule:
+    """Likewise of joint coordinates."""
+    return lambda mechanism: _each((FAMILIES[c.kind].joint_unit for c in mechanism.chains), form)
+
+
+def of_pose(form: str) -> str:
+    """Units of X_EE: one for each coordinate."""
+    return ", ".join(form.format(unit) for unit in ("m", "m", "m", "rad", "rad", "rad"))
+
+
+def cause_flags(mechanism: Mechanism) -> str:
+    """The causes of failed samples, each without a blank."""
+    return " ".join(str(owner).replace(" ", "_") or "none" for owner in owners(mechanism))
+
+
+def _each(units: Iterable[str], form: str) -> str:
+    return ", ".join(form.format(unit) for unit in dict.fromkeys(units))
+
+
+_CHAIN, _POSE, _CONTACT = ("time", "chain"), ("time", "coordinate"), ("time", "contact")
+_PLACE = (*_CONTACT, "axis")
+
+# Those with columns come first, in the order of the columns.
+# fmt: off
+VARIABLES = (
+    Variable(
+        "torque", _CHAIN, of_effort(), "actuator effort of least norm",
+        lambda d: d.evaluation.effort, column="tau_",
+    ),
+    Variable(
+        "contact_force", _CONTACT, "N",
+        "contact force on the platform along the unit normal of the surface",
+        lambda d: d.evaluation.contact_force, column="contact_",
+    ),
+    Variable(
+        "pose", _POSE, of_pose("{}"), "pose of the platform X_EE",
+        lambda d: d.evaluation.pose, column="",
+    ),
+    Variable(
+        "joint", _CHAIN, of_joint(), "joint coordinate, zero at home",
+        lambda d: d.evaluation.configuration.joint, column="joint_",
+    ),
+    Variable(
+        "pose_rate", _POSE, of_pose("{}/s"), "rate of X_EE", lambda d: d.evaluation.pose_rate
+    ),
+    Variable(
+        "pose_acceleration", _POSE, of_pose("{}/s^2"), "acceleration of X_EE",
+        lambda d: d.evaluation.pose_acceleration,
+    ),
+    Variable(
+        "share", ("part", *_CHAIN), of_effort(), "part of the effort each part needs",
+        lambda d: d.evaluation.share,
+    ),
+    Variable(
+        "lift_off", _CONTACT, "1",
+        "whether a one-sided contact would have to pull: the ball lifts off",
+        lambda d: d.lifted,
+    ),
+    Variable(
+        "contact_point", _PLACE, "m", "centre of the contact ball in {S}",
+        lambda d: d.evaluation.configuration.contact_point,
+    ),
+    Variable(
+        "contact_normal", _PLACE, "1", "unit normal of the surface at the contact in {S}",
+        lambda d: d.evaluation.configuration.contact_normal,
+    ),
+    Variable(
+        "bound_margin", _CONTACT, "m",
+        "distance of the contact point to its nearest bound; negative outside",
+        lambda d: d.margin,
+    ),
+    Variable(
+        "joint_rate", _CHAIN, of_joint("{}/s"), "joint rate", lambda d: d.evaluation.joint_rate
+    ),
+    Variable(
+        "joint_acceleration", _CHAIN, of_joint("{}/s^2"), "joint acceleration",
+        lambda d: d.evaluation.joint_acceleration,
+    ),
+    Variable(
+        "rod_beta", _CHAIN, "rad", "rod angle beta_i", lambda d: d.evaluation.configuration.beta
+    ),
+    Variable(
+        "rod_gamma", _CHAIN, "rad", "rod angle gamma_i", lambda d: d.evaluation.configuration.gamma
+    ),
+    Variable(
+        "load", ("time", "component"), "N, N m", "load on the platform in {S}", lambda d: d.wrench
+    ),
+    Variable(
+        "J_A", _CHAIN, of_joint("m^2/{}"), "diagonal of J_A, eq. (26)",
+        lambda d: d.evaluation.configuration.singularity.J_A,
+    ),
+    Variable(
+        "transmission", _CHAIN, "1", "J_A made dimensionless",
+        lambda d: d.evaluation.configuration.singularity.transmission,
+    ),
+    Variable(
+        "J_W_sigma", ("time", "independent"), "1", "singular values of the dimensionless J_W",
+        lambda d: d.evaluation.configuration.singularity.J_W_sigma,
+    ),
+    Variable("condition", ("time",), "1", "condition number of J_W", lambda d: d.condition),
+    Variable(
+        "rank", ("time",), "1", "rank of J_W; 0 where the pose cannot be reached",
+        lambda d: d.evaluation.configuration.singularity.rank,
+    ),
+    Variable(
+        "singularity_ratio", ("time",), "1",
+        "smallest over largest singular value of J_A or J_W", lambda d: d.ratio,
+    ),
+    Variable(
+        "singularity", ("time",), "1", "kind of singularity that is near",
+        lambda d: d.near, flags=" ".join(KINDS),
+    ),
+    Variable(
+        "status", ("time",), "1", "status",
+        lambda d: d.evaluation.status.astype(np.int8, copy=False), flags=" ".join(STATUS_NAMES),
+    ),
+    Variable(
+        "cause", ("time",), "1", "what the sample fails by", lambda d: d.cause, flags=cause_flags
+    ),
+)
+# fmt: on
+
+# Dimension -> what stands along it.
+DIMENSIONS = {
+    "time": "samples [s]",
+    "chain": "names of the mechanism file",
+    "contact": "names of the mechanism file",
+    "coordinate": ", ".join(COORDINATES),
+    "independent": "the independent coordinates; `J_W_sigma` has as many values, falling",
+    "part": "platform, links of the chains and, where there is one, the load; shares add up to "
+    "the torque",
+    "axis": f"{', '.join(AXES)} in {{S}}",
+    "component": ", ".join(WRENCH),
+}

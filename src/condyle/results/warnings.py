@@ -1,0 +1,273 @@
+"""Warnings as data: what the reader of results should know, with whose it is, when and how much.
+
+watch = Watch(mechanism)
+for derived, times in blocks:
+    watch.see(derived, times)
+notices = watch.notices()
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import BoundsError
+from ..kinematics.causes import cause_text, owners
+from ..kinematics.chain import FAMILIES
+from ..kinematics.singularity import NEAR
+from ..mechanism.chain import limits
+from ..mechanism.home import HOME_WARNING, home_residuals, home_warnings
+from ..mechanism.mechanism import Mechanism
+from ..status import STATUS_NAMES
+from .contacts import BOUND_TOLERANCE
+from .derived import Derived
+
+POSE_RESIDUAL = 1e-9  # metres off the surfaces, beyond which given poses are told of
+
+
+class Kind(NamedTuple):
+    """A kind of warning: what it says, what to do, and whether `--strict` makes it an error."""
+
+    meaning: str
+    advice: str
+    strict: bool = False
+
+
+KINDS = {
+    "home_residual": Kind(
+        "a contact point is off its surface at home", "`condyle check --project` shows where it is"
+    ),
+    "bounds": Kind(
+        "a contact leaves its bounds",
+        "scale the motion, or move the bounds; `--strict` makes it an error",
+        strict=True,
+    ),
+    "lift_off": Kind(
+        "a one-sided contact lifts off",
+        "the ball would leave the surface: the model no longer holds there",
+    ),
+    "given_pose_residual": Kind(
+        "poses off the contact surfaces",
+        "the measured poses do not fit the surfaces; the dependent coordinates were recomputed",
+    ),
+    "failed_samples": Kind(
+        "samples that could not be computed (`--flag`)",
+        "see their intervals and causes; scale the motion",
+    ),
+    "near_singularity": Kind(
+        "samples near a singularity",
+        f"ratio below {NEAR:g}: torques grow, and so does the effect of every error in the "
+        "geometry",
+    ),
+    "effort_limit": Kind("effort above a limit", "another actuator, or another motion"),
+    "speed_limit": Kind("speed above a limit", "another actuator, or another motion"),
+    "rod_angles": Kind(
+        "gamma_i near 90 degrees",
+        "the two rod angles lose their meaning, not the mechanism; `virtual_power` does not use "
+        "them",
+    ),
+}
+
+STRICT = frozenset(name for name, kind in KINDS.items() if kind.strict)
+
+
+@dataclass(frozen=True)
+class Notice:
+    """A warning.
+
+    kind:  one of `KINDS`; "other" in files that were written before there were kinds.
+    text:  for people.
+    owner: name of the chain or contact it is about;  status: of the samples that failed.
+    count: samples or rows;  time: of the first [s], along a motion;  row: of a table, from 1.
+    value, bound, unit: the largest or smallest that was met, and what it is held against.
+    """
+
+    kind: str
+    text: str
+    owner: str | None = None
+    count: int | None = None
+    time: float | None = None
+    row: int | None = None
+    value: float | None = None
+    bound: float | None = None
+    unit: str | None = None
+    status: str | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """What is known, as JSON has it."""
+        return {name: value for name, value in asdict(self).items() if value is not None}
+
+
+class _Tally:
+    """How often something was met, when first, and the largest of its size, so far."""
+
+    def __init__(self) -> None:
+        self.count, self.first, self.worst, self.worst_at = 0, 0.0, -np.inf, 0.0
+
+    def see(self, where: np.ndarray, at: np.ndarray, size: np.ndarray) -> None:
+        """Args: where: (N,), whether it is met;  at: (N,), times or rows;  size: (N,)."""
+        met = np.flatnonzero(where)
+        if not met.size:
+            return
+        if not self.count:
+            self.first = at[met[0]].item()
+        self.count += met.size
+        largest = met[size[met].argmax()]
+        if size[largest] > self.worst:
+            self.worst, self.worst_at = size[largest].item(), at[largest].item()
+
+
+class Watch:
+    """Sees blocks of samples, in order, and tells in the end what was wrong.
+
+    Args: rows: samples are rows of a table and stand alone; otherwise they follow a motion.
+          residual: largest distance of given poses from the contact surfaces [m].
+    """
+
+    def __init__(
+        self, mechanism: Mechanism, rows: bool = False, residual: float | None = None
+    ) -> None:
+        self.mechanism, self.rows, self.residual = mechanism, rows, residual
+        self._tallies: dict[tuple[str, int, int], _Tally] = {}
+
+    def see(self, derived: Derived, at: np.ndarray) -> None:
+        """Look at a block.
+
+        Args: at: times [s], or numbers of rows from 1, (N,).
+        """
+        e, ok = derived.evaluation, derived.ok
+        configuration = e.configuration
+
+        def tally(kind: str, i: int, where: np.ndarray, size: np.ndarray, status: int = 0) -> None:
+            if status == 0 and not derived.all_ok:
+                where = where & ok
+            if where.any():
+                self._tallies.setdefault((kind, i, status), _Tally()).see(where, at, size)
+
+        with np.errstate(invalid="ignore"):
+            for i in range(len(self.mechanism.contacts)):
+                margin = derived.margin[:, i]
+                tally("bounds", i, margin < -BOUND_TOLERANCE, -margin)
+                tally("lift_off", i, derived.lifted[:, i], np.abs(e.contact_force[:, i]))
+            tally("near_singularity", 0, derived.near != 0, -derived.ratio)
+            for i, chain in enumerate(self.mechanism.chains):
+                for kind, limit, values in zip(
+                    ("effort_limit", "speed_limit"),
+                    limits(chain),
+                    (e.effort, e.joint_rate),
+                    strict=True,
+                ):
+                    if limit is not None:
+                        size = np.abs(values[:, i])
+                        tally(kind, i, size > limit, size)
+            flat = np.abs(configuration.cos_gamma)
+            if (flat < NEAR).any():
+                for i in range(flat.shape[1]):
+                    tally("rod_angles", i, flat[:, i] < NEAR, -flat[:, i])
+        if not derived.all_ok:
+            for code in np.unique(derived.cause[~ok]):
+                mine = derived.cause == code
+                for status in np.unique(e.status[mine]):
+                    of_both = mine & (e.status == status)
+                    tally("failed_samples", int(code), of_both, np.zeros(len(ok)), int(status))
+
+    def notices(self) -> list[Notice]:
+        """What there is to say, in the order of `KINDS`."""
+        found = list(home_notices(self.mechanism))
+        if self.residual is not None and self.residual > POSE_RESIDUAL:
+            found.append(
+                Notice(
+                    "given_pose_residual",
+                    f"the given poses are up to {self.residual * 1e3:.3g} mm off the contact "
+                    "surfaces; the dependent coordinates were recomputed",
+                    value=self.residual,
+                    bound=POSE_RESIDUAL,
+                    unit="m",
+                )
+            )
+        order = list(KINDS)
+        found += [self._notice(*key, self._tallies[key]) for key in sorted(self._tallies)]
+        return sorted(found, key=lambda notice: order.index(notice.kind))
+
+    def _notice(self, kind: str, i: int, status: int, tally: _Tally) -> Notice:
+        about: dict[str, Any] = {"count": tally.count}
+        about |= {"row": int(tally.first)} if self.rows else {"time": tally.first}
+        when, worst, size = self._when(tally), self._at(tally.worst_at), tally.worst
+        count = f"{tally.count} {'row' if self.rows else 'sample'}{'s' * (tally.count != 1)}"
+        if kind in ("bounds", "lift_off"):
+            name = self.mechanism.contact_names[i]
+            if kind == "lift_off":
+                text = f'contact "{name}" lifts off {when}: there its surface would have to pull'
+                return Notice(
+                    kind, f"{text} the ball", name, value=size, bound=0.0, unit="N", **about
+                )
+            text = (
+                f'contact "{name}" leaves its bounds {when}, by up to {size * 1e3:.3g} mm {worst}'
+            )
+            return Notice(kind, text, name, value=size, bound=0.0, unit="m", **about)
+        if kind == "near_singularity":
+            are = "is" if tally.count == 1 else "are"
+            text = (
+                f"{count} {are} near a singularity (ratio below {NEAR:g}), closest {-size:.3g} "
+                f"{worst}"
+            )
+            return Notice(kind, text, value=-size, bound=NEAR, unit="1", **about)
+        if kind == "failed_samples":
+            owner = owners(self.mechanism)[i]
+            text = f"{count} left empty, first {self._at(tally.first)}: {cause_text(status, owner)}"
+            named = owner.name or None
+            return Notice(kind, text, named, status=STATUS_NAMES[status], **about)
+        chain = self.mechanism.chains[i]
+        if kind == "rod_angles":
+            text = (
+                f'chain "{chain.name}": its rod comes near gamma_i = +-90 degrees {worst}, where '
+                "its two angles lose their meaning; that is a singularity of the description, not "
+                "of the mechanism"
+            )
+            return Notice(kind, text, chain.name, value=-size, bound=NEAR, unit="1", **about)
+        family, limit = FAMILIES[chain.kind], limits(chain)
+        what, unit, bound = (
+            ("effort", family.effort_unit, limit.effort)
+            if kind == "effort_limit"
+            else ("speed", f"{family.joint_unit}/s", limit.speed)
+        )
+        text = (
+            f'chain "{chain.name}": {what} reaches {size:.4g} {unit} {worst}, above its limit of '
+            f"{bound:g}"
+        )
+        return Notice(kind, text, chain.name, value=size, bound=bound, unit=unit, **about)
+
+    def _at(self, place: float) -> str:
+        return f"in row {int(place)}" if self.rows else f"at t = {place:g} s"
+
+    def _when(self, tally: _Tally) -> str:
+        if self.rows:
+            return f"in {tally.count} rows, first {self._at(tally.first)}"
+        return f"{self._at(tally.first)} ({tally.count} samples)"
+
+
+def home_notices(mechanism: Mechanism) -> Iterable[Notice]:
+    """Contact points that are off their surfaces at home, a little."""
+    off = zip(mechanism.contact_names, home_residuals(mechanism), strict=True)
+    told = [(name, float(value)) for name, value in off if abs(value) > HOME_WARNING]
+    for (name, value), text in zip(told, home_warnings(mechanism), strict=True):
+        yield Notice("home_residual", text, name, value=value, bound=HOME_WARNING, unit="m")
+
+
+def refuse(notices: Iterable[Notice]) -> None:
+    """Raises BoundsError for a notice of a kind that `--strict` does not let pass."""
+    refused = [notice for notice in notices if notice.kind in STRICT]
+    if refused:
+        first = refused[0]
+        raise BoundsError(
+            "; ".join(notice.text for notice in refused) + ".",
+            hint="Without --strict this is a warning",
+            contact=first.owner,
+            time=first.time,
+            value=first.value,
+            bound=first.bound,
+            unit=first.unit,
+        )

@@ -1,0 +1,73 @@
+"""The documentation as a folder on disk: no formula is cut, search works, nothing is fetched."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+# What sticks out of its box, in a page of the site.
+CUT = """() => [...document.querySelectorAll(".md-content .formula, .md-content math, .structure")]
+    .filter(e => e.scrollWidth > e.clientWidth + 1).map(e => e.textContent.trim().slice(0, 60))"""
+SIDEWAYS = "() => document.documentElement.scrollWidth > document.documentElement.clientWidth"
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    pytest.importorskip("mkdocs")
+    folder = tmp_path_factory.mktemp("site")
+    call = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "-d", str(folder)]
+    environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
+    done = subprocess.run(call, cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr + done.stdout
+    return folder
+
+
+def test_no_formula_is_cut(site: Path, open_tab: Callable) -> None:
+    tab = open_tab((site / "index.html").as_uri(), width=1300)
+    for page in sorted(site.rglob("*.html")):
+        if "generated" in page.parts or page.name == "404.html":  # that one is for a server
+            continue
+        tab.page.set_viewport_size({"width": 1300, "height": 900})
+        tab.page.goto(page.as_uri())
+        assert tab.page.evaluate(CUT) == [], page.name
+        tab.page.set_viewport_size({"width": 700, "height": 900})
+        assert not tab.page.evaluate(SIDEWAYS), page.name
+    assert [u for u in tab.requests if not u.startswith(("file:", "data:", "blob:"))] == []
+
+
+def test_formulas_are_set(site: Path, open_tab: Callable) -> None:
+    tab = open_tab((site / "theory" / "virtual-power.html").as_uri())
+    assert tab.page.locator("math[display=block]").count() > 12
+    assert "$" not in tab.page.locator(".md-content").inner_text()
+    # The browser lays them out: a fraction is taller than its numerator.
+    tall = "() => document.querySelector('mfrac').getBoundingClientRect().height"
+    assert tab.page.evaluate(tall) > 20
+
+
+def test_search_answers_from_a_folder(site: Path, open_tab: Callable) -> None:
+    tab = open_tab((site / "theory" / "kernels.html").as_uri())
+    found = tab.page.locator(".md-search-result__item a")
+
+    def answered() -> bool:
+        # The page may not listen yet. Each question begins the search anew, so leave it time.
+        for text in ("", "transmission"):
+            tab.page.fill("input[name=query]", text)
+        tab.page.wait_for_timeout(5000)
+        return found.count() > 0
+
+    tab.until(answered, "the search answers")
+    links = found.evaluate_all("e => e.map(a => a.href)")
+    assert any("symbols.html" in link for link in links)
+    assert all(link.startswith("file:") for link in links)
+
+
+def test_arguments_stand_in_tables(site: Path, open_tab: Callable) -> None:
+    tab = open_tab((site / "reference" / "api.html").as_uri())
+    row = tab.page.locator("tr.doc-section-item", has_text="keep samples").first.inner_text()
+    assert row.split()[:2] == ["flag", "bool"] and row.split()[-1] == "False"

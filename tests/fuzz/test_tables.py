@@ -1,0 +1,127 @@
+"""Broken tables: each is read as finite numbers, or refused in a message fit for a terminal."""
+
+from __future__ import annotations
+
+import csv
+import io
+import random
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from condyle.errors import CondyleError
+from condyle.motion import FORCE, LANDMARK, MOMENT, POSE, Table, iter_table, read_table
+
+PLAIN = (
+    "t,X,Y,alpha,beta\n0,0.001,-2e-3,0.1,.5\n1,0.5,0.25,-1,+0\n2,1e-5,0,0,7\n",
+    "t [ms];x [mm];y [mm];z [mm];note\n0;1,5;0;-2;a\n1;2,5;1;-3;b\n2;1;1;1;\n",
+    '# made by hand\n\ufeff"Time (s)","Fz"\n"0","-5"\n"0.5","-10"\n\n',
+    "sep=;\r\nX;dX;ddX;Fx\r\n1,0;2,0;3,0;4,0\r\n5,0;6,0;7,0;8,0\r\n;;;\r\n",
+    "\tt\tx\ty\tz\t\n\t0\t1\t2\t3\t\n\t1\t2\t3\t4\t\n",
+)
+WORDS = (
+    ", ; \t \n \r \r\n \" ' . - + e E # \0 \x1b[31m _ nan inf 1e999 0x1 1.000,5 NaN #N/A sep=; "
+    "[mm] (s) /s^2 [ Fx t x X dX ddX \u00b5 \u0662 \ufeff \u00a0"
+)
+BITS = (*WORDS.split(" "), " ", "", ",,,", "9" * 400, "\n\n", "\ud800")
+KNOWN = ("t", *POSE, *LANDMARK, *(d + n for d in ("d", "dd") for n in POSE), *FORCE, *MOMENT)
+
+
+def mutated(rng: random.Random) -> bytes:
+    """One of the plain tables with a few changes to its text, and perhaps to its bytes."""
+    text = rng.choice(PLAIN)
+    for _ in range(rng.choice((0, 1, 1, 2, 3, 8))):
+        at, size = rng.randrange(len(text) + 1), rng.choice((0, 0, 1, 3, 20))
+        new = rng.choice((*BITS, text[rng.randrange(len(text) + 1) :][:30]))
+        text = text[:at] + new * rng.choice((1, 1, 1, 30)) + text[at + size :]
+        text = text or "t"
+    coding = rng.choice(("utf-8",) * 8 + ("utf-16", "utf-16-le", "latin-1"))
+    data = bytearray(text.encode(coding, "surrogatepass" if coding[:3] == "utf" else "replace"))
+    for _ in range(rng.choice((0, 0, 0, 1, 4))):
+        data[rng.randrange(len(data)) :][:1] = bytes([rng.randrange(256)])
+        data.insert(rng.randrange(len(data) + 1), rng.randrange(256))
+    return bytes(data)
+
+
+def test_a_broken_table(tmp_path: Path, fuzz_runs: int) -> None:
+    rng, read = random.Random(0), 0
+    for run in range(fuzz_runs):
+        path = tmp_path / "in.csv"
+        path.write_bytes(data := mutated(rng))
+        known = rng.choice((None, KNOWN))
+        chunk = rng.choice((1, 2, 16384))
+        try:
+            tables = list(iter_table(path, chunk, known=known))
+        except CondyleError as error:
+            message = str(error)
+            assert len(message) < 4000 and message.isprintable(), (run, data)
+        else:
+            read += 1
+            check(tables, known, (run, data))
+    assert read > fuzz_runs / 20
+
+
+def check(tables: list[Table], known: tuple[str, ...] | None, case: tuple[int, bytes]) -> None:
+    for table in tables:
+        assert table.rows and all(len(c) == table.rows for c in table.columns.values()), case
+        assert all(np.isfinite(c).all() for c in table.columns.values()), case
+        assert all(warning.isprintable() for warning in table.warnings), case
+        assert known is None or set(table.columns) <= set(known), case
+    lines = np.concatenate([table.lines for table in tables])
+    assert (np.diff(lines) > 0).all(), case
+
+
+def independent(text: str) -> list[list[float]]:
+    """Numbers of a plain table, by Python's own reader of CSV."""
+    rows = list(csv.reader(io.StringIO(text)))
+    return [[float(cell) for cell in row] for row in rows[1:]]
+
+
+@pytest.mark.parametrize("chunk_rows", [1, 5, 16384])
+def test_plain_tables_are_what_another_reader_gets(
+    tmp_path: Path, fuzz_runs: int, chunk_rows: int
+) -> None:
+    rng = random.Random(1)
+    forms = ("{!r}", "{:.3f}", " {:.17g} ", "{:+.4e}", '"{:.6g}"', "{:.0f}")
+    for _ in range(fuzz_runs // 10):
+        width, rows = rng.randrange(1, 6), rng.randrange(1, 30)
+        lines = [",".join(f"c{i}" for i in range(width))]
+        for _ in range(rows):
+            values = [rng.uniform(-1, 1) * 10 ** rng.uniform(-30, 30) for _ in range(width)]
+            lines.append(",".join(rng.choice(forms).format(value) for value in values))
+        path = tmp_path / "plain.csv"
+        path.write_text(text := "\n".join(lines) + "\n")
+        chunks = list(iter_table(path, chunk_rows))
+        got = np.vstack([np.column_stack(list(chunk.columns.values())) for chunk in chunks])
+        np.testing.assert_array_equal(got, independent(text))
+
+
+@pytest.mark.parametrize("ending", ["parquet", "PARQUET"])
+def test_a_broken_parquet_file(tmp_path: Path, fuzz_runs: int, ending: str) -> None:
+    from condyle.motion import write_table
+
+    rng = random.Random(2)
+    path = tmp_path / f"in.{ending}"
+    write_table(path, {"t": np.arange(50.0), "x": np.arange(50) / 7, "label": ["a"] * 50})
+    whole = path.read_bytes()
+    for _ in range(fuzz_runs // 4):
+        data = bytearray(whole)
+        for _ in range(rng.randrange(1, 5)):
+            data[rng.randrange(len(data))] = rng.randrange(256)
+        path.write_bytes(bytes(data[: rng.choice((len(data), rng.randrange(len(data))))]))
+        try:
+            table = read_table(path, known=("t", "x"))
+        except CondyleError as error:
+            assert len(str(error)) < 4000 and str(error).isprintable()
+        else:
+            assert all(np.isfinite(column).all() for column in table.columns.values())
+
+
+def test_messages_never_carry_a_terminal_s_orders(tmp_path: Path) -> None:
+    path = tmp_path / "in.csv"
+    path.write_bytes(b"t,x\n" + b"0,1\n" * 40000 + "0,\u202e\x1b]0;title\x07\n".encode())
+    with pytest.raises(CondyleError) as caught:
+        read_table(path)
+    assert re.search(r'got "\\u202e\\x1b\]0;title\\x07"', str(caught.value))

@@ -1,0 +1,216 @@
+"""Changes in Python are checked like files: by path, by table, and into nested tables."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import tomllib
+from collections.abc import Callable
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from condyle.errors import InputError, MechanismError
+from condyle.mechanism import Mechanism, bundled_text, dumps, parse
+from condyle.mechanism.files import from_data
+from condyle.mechanism.paths import parsed, written
+from condyle.mechanism.platform import Platform
+from condyle.mechanism.surface import Expression, Sphere
+
+
+def every_number(node: Any, path: str = "") -> list[tuple[str, float]]:
+    """Paths of a file's numbers, written by hand from its tables."""
+    if isinstance(node, dict):
+        return [f for k, v in node.items() for f in every_number(v, f"{path}.{k}".strip("."))]
+    if isinstance(node, list):
+        named = [(e["name"] if isinstance(e, dict) else None) for e in node]
+        steps = [f".{n}" if n else f"[{k}]" for k, n in enumerate(named)]
+        return [f for s, v in zip(steps, node, strict=True) for f in every_number(v, path + s)]
+    return [(path, node)] if isinstance(node, float | int) else []
+
+
+@pytest.mark.parametrize("name", ["masticatory", "hexaglide", "gough-stewart"])
+def test_every_number_of_a_file_has_its_path(name: str) -> None:
+    """`get` and `set` at each place agree with the file written in SI."""
+    machine = parse(bundled_text(name))
+    numbers = every_number(tomllib.loads(dumps(machine)))
+    assert len(numbers) > 80
+    for path, value in numbers:
+        assert machine.get(path) == value, path
+        assert machine.set(path, value) == machine, path
+    assert machine.set(dict(numbers)) == machine
+
+
+def test_a_change_changes_that_and_nothing_else(reference: Mechanism) -> None:
+    heavy = reference.set("platform.mass", 0.25)
+    assert heavy.get("platform.mass") == 0.25 and reference.get("platform.mass") == 0.2
+    tables = tomllib.loads(dumps(reference))
+    tables["platform"]["mass"] = 0.25
+    assert heavy == from_data(tables)
+    moved = heavy.set({"chain.masseter_left.platform[1]": 0.04, "gravity[2]": -1.62})
+    x, _, z = reference.chains[2].platform
+    assert moved.chains[2].platform == (x, 0.04, z)
+    assert moved.gravity == (0.0, 0.0, -1.62) and moved.contacts == reference.contacts
+    assert moved.chain_names == reference.chain_names
+
+
+def test_what_must_agree_is_changed_together(reference: Mechanism) -> None:
+    z, x = reference.get("contact.left_condyle.point[2]"), reference.contacts[0].point[0]
+    with pytest.raises(MechanismError, match=r'"left_condyle": the point is .* mm off the surface'):
+        reference.set("contact.left_condyle.surface.slope[0]", -0.8)
+    steep = {
+        "contact.left_condyle.surface.slope[0]": -0.8,
+        "contact.left_condyle.surface.offset": z + 0.8 * x,
+    }
+    assert reference.set(steep).contacts[0].surface.slope == (-0.8, 0.0)
+
+
+def test_tables_lists_and_nothing(reference: Mechanism) -> None:
+    centre = np.array(reference.contacts[0].point) - [0, 0, 0.02]
+    round_ = {"kind": "sphere", "centre": centre, "radius": 0.02}
+    assert isinstance(
+        reference.set("contact.left_condyle.surface", round_).contacts[0].surface, Sphere
+    )
+    assert reference.set("chain.masseter_left.actuator", {}).chains[2].actuator.torque_limit is None
+    free = reference.set("chain.masseter_left.actuator.torque_limit", None)
+    assert free.get("chain.masseter_left.actuator.torque_limit") is None
+    assert free.get("chain.masseter_left.actuator.speed_limit") == 6.0
+    chin = reference.set("platform.points.chin", np.array([0.05, 0, -0.01]))
+    assert chin.get("platform.points.chin") == (0.05, 0.0, -0.01)
+    assert set(chin.platform.points) == {*reference.platform.points, "chin"}
+    assert reference.set({"contact": [], "dependent": None}).degrees_of_freedom == 6
+    assert reference.set('chain "masseter_left".base[0]', 0.05).get("chain[2].base[0]") == 0.05
+
+
+WRONG: dict[str, tuple[Any, Any, str]] = {
+    "typo": ("platform.mas", 1, 'platform has no "mas". Did you mean "mass"?'),
+    "chain": ("chain.maseter_left.base", 1, 'Did you mean "masseter_left"'),
+    "top": ("platfrom.mass", 1, 'a mechanism has no "platfrom". Did you mean "platform"'),
+    "index": ("gravity[3]", 1, r"gravity has 3 entries, [0] to [2]"),
+    "key of a list": ("gravity.z", 1, "gravity is a list"),
+    "index of a table": ("platform[0]", 1, "platform is a table, not a list"),
+    "below a number": ("platform.mass.kg", 1, "platform.mass is 0.2, which has no entries"),
+    "unit": ("length_unit", "mm", "Values in Python are SI"),
+    "side": ("contact.left_condyle.surface.side", "below", "contact.left_condyle.side"),
+    "no path": ("platform..mass", 1, "is no path"),
+    "empty": ("", 1, "is no path"),
+    "index alone": ("[0]", 1, "is no path"),
+    "number": (3, 1, "a path is text"),
+    "no value": ({"platform": {"mass": 1}, "platform.mass": 1}, ..., "is within platform"),
+    "text": ("platform.mass", "0.2 kg", "platform.mass: expected a number, got '0.2 kg'"),
+    "negative": ("platform.mass", -1, "platform.mass: expected a value above 0"),
+    "nan": ("gravity[2]", float("nan"), "gravity[2]: expected a finite number"),
+    "millimetres of a planet": ("chain.masseter_left.base[0]", 1e9, "at most 100000 m, got 1e+09"),
+    "inertia": ("platform.inertia.zz", 1.0, "triangle inequality"),
+    "name": ("chain.masseter_left.name", "masseter_right", '"masseter_right" stands 2 times'),
+    "too few": ("chain", (), "expected at least 1 entries"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_what_is_wrong_is_said(reference: Mechanism, case: str) -> None:
+    path, value, message = WRONG[case]
+    with pytest.raises(InputError) as caught:
+        reference.set(path) if value is ... else reference.set(path, value)
+    assert message in str(caught.value)
+    if isinstance(path, str) and not isinstance(caught.value, MechanismError):
+        with pytest.raises(InputError) as same:
+            reference.get(path)
+        assert str(same.value) == str(caught.value)
+
+
+def test_set_wants_both_or_a_table(reference: Mechanism) -> None:
+    for arguments in (("platform.mass",), ({"platform.mass": 1.0}, 2.0)):
+        with pytest.raises(InputError, match="a path and a value"):
+            reference.set(*arguments)
+
+
+@pytest.mark.parametrize("path", ["platform.mass", 'chain."a.b".base[2]', "contact.a b.x[0][1]"])
+def test_paths_are_written_as_they_are_read(path: str) -> None:
+    assert written(parsed(path)) == path
+
+
+BENT: dict[str, Callable[[Mechanism], Any]] = {
+    "mass": lambda m: m.platform.model_copy(update={"mass": -1}),
+    "typo": lambda m: m.platform.model_copy(update={"mas": 1}),
+    "text": lambda m: m.platform.model_copy(update={"mass": "0.2 kg"}),
+    "old copy": lambda m: m.platform.copy(update={"mass": -1}),
+    "nested": lambda m: m.platform.inertia.model_copy(update={"zz": 1.0}),
+    "chain": lambda m: m.chains[0].model_copy(update={"crank_tip": m.chains[0].base}),
+    "whole": lambda m: m.model_copy(update={"chains": m.chains[:3]}),
+    "home": lambda m: m.model_copy(update={"contacts": m.contacts[::-1] + m.contacts}),
+    "replace": lambda m: m.replace(platfrom=m.platform),
+    "built": lambda m: m.replace(platform=Platform.model_construct(mass=-1)),
+    "built within": lambda m: m.replace(
+        chains=(m.chains[0].derived(base=(1e9, 0.0, 0.0)), *m.chains[1:])
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BENT)
+def test_no_table_is_bent_past_its_checks(reference: Mechanism, case: str) -> None:
+    with pytest.raises(MechanismError):
+        BENT[case](reference)
+
+
+def test_replace_looks_at_home(reference: Mechanism) -> None:
+    left, right = reference.contacts
+    up = left.model_copy(update={"point": (*left.point[:2], left.point[2] + 1e-3)})
+    with pytest.raises(MechanismError, match=r'contact "left_condyle": the point is \+0\.67'):
+        reference.replace(contacts=(up, right))
+    with pytest.raises(ValueError, match="mm off the surface"):
+        Mechanism(**{**reference.entries(), "contact": (up, right)})
+    again = right.model_copy(update={"name": "again"})
+    with pytest.raises(MechanismError, match="cannot hold the platform"):
+        reference.replace(contacts=(right, again))
+
+
+def test_landmarks_are_frozen_too(reference: Mechanism) -> None:
+    points: Any = reference.platform.points
+    for bend in (
+        lambda: points.update(tip=(0, 0, 0)),
+        lambda: points.pop("incisor"),
+        lambda: points.__setitem__("incisor", "here"),
+        lambda: points.__ior__({"tip": 1}),
+    ):
+        with pytest.raises(TypeError, match=r"mechanism\.set"):
+            bend()
+    assert points == dict(points)
+
+
+def test_copies_keep_no_memory_of_other_names(reference: Mechanism) -> None:
+    assert reference.chain_names[0] == "temporalis_left"  # cached from here on
+    renamed = reference.set("chain.temporalis_left.name", "first")
+    assert renamed.chain_names[0] == "first"
+
+
+def wave(p: ca.SX) -> ca.SX:
+    return p[2] + 1.1 * p[0] - 0.013215 - 1e-4 * ca.sin(60 * (p[0] + 0.02665))
+
+
+@pytest.mark.parametrize("python", [False, True])
+def test_mechanisms_travel(reference: Mechanism, python: bool) -> None:
+    """Pickled and copied they are the same, a surface from Python too."""
+    machine = reference
+    if python:
+        machine = reference.set("contact.left_condyle.surface", Expression(lambda p: wave(p)))
+    for other in (pickle.loads(pickle.dumps(machine)), copy.deepcopy(machine), copy.copy(machine)):
+        assert other == machine and hash(other) == hash(machine)
+        surface, point = other.contacts[0].surface, (-0.02, 0.07, 0.03)
+        assert float(surface.phi(point)) == float(machine.contacts[0].surface.phi(point))
+        assert other.set("platform.mass", 0.3) == machine.set("platform.mass", 0.3)
+
+
+def test_expressions_are_equal_where_their_equations_are() -> None:
+    assert Expression(wave) == Expression(lambda p: wave(p))
+    assert Expression(wave) != Expression(wave, closed=True)
+    assert Expression(wave) != Expression(lambda p: p[2])
+
+
+def test_errors_travel() -> None:
+    with pytest.raises(MechanismError) as caught:
+        parse("name = 3")
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert (str(again), again.problems) == (str(caught.value), caught.value.problems)

@@ -1,0 +1,53 @@
+"""A disk that is full: a clear word, no half-written file, and a process that lives on."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import condyle
+
+resource = pytest.importorskip("resource")
+
+FULL = """
+    import resource, signal, sys
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    import condyle
+    model = condyle.derive(condyle.load("masticatory"), backend="numpy")
+    solution = model.solve(condyle.reference_motion(), condyle.reference_load())
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20480, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
+    for name in ("full.nc", "full.csv"):
+        try:
+            solution.save(name)
+        except condyle.InputError as error:
+            print(error)
+    del solution
+    print("alive")
+"""
+
+
+def test_a_full_disk(tmp_path: Path) -> None:
+    code = textwrap.dedent(FULL)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0 and done.stderr == "", done.stderr
+    assert "full.nc: cannot be written" in done.stdout and done.stdout.endswith("alive\n")
+    assert [*tmp_path.iterdir()] == []
+
+
+def test_the_file_is_the_dataset(tmp_path: Path) -> None:
+    model = condyle.derive(condyle.load("hexaglide"), backend="numpy")
+    t = np.linspace(0, 1, 9)
+    motion = condyle.Motion.from_arrays(
+        t, np.zeros((9, len(model.independent))), names=model.independent
+    )
+    solution = model.solve(motion)
+    solution.save(tmp_path / "a.nc")
+    xr.testing.assert_identical(solution, condyle.open_solution(tmp_path / "a.nc"))

@@ -1,0 +1,67 @@
+"""The table of variables: what it says is what a solution has."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.motion import Motion
+from condyle.results.variables import DIMENSIONS, VARIABLES
+
+
+@pytest.fixture(scope="module")
+def model() -> condyle.Model:
+    return condyle.derive(condyle.load("masticatory"), backend="numpy")
+
+
+def along_x(model: condyle.Model, reach: float, count: int = 41) -> Motion:
+    t = np.linspace(0, 1, count)
+    value = np.column_stack([reach * t, *[0 * t] * 3])
+    return Motion.from_arrays(t, value, names=model.independent)
+
+
+def test_a_solution_is_the_table(model: condyle.Model) -> None:
+    solution = model.solve(along_x(model, 0.002))
+    assert [*solution.data_vars] == [variable.name for variable in VARIABLES]
+    for variable in VARIABLES:
+        found = solution[variable.name]
+        assert found.dims == variable.dims and {*found.dims} <= {*DIMENSIONS}
+        assert found.attrs == variable.attributes(model.mechanism)
+    assert solution["joint_rate"].attrs["units"] == "rad/s"
+    assert {*solution.sizes} == {*DIMENSIONS}
+
+
+def test_units_follow_the_joints() -> None:
+    slides = condyle.load("hexaglide")
+    units = {v.name: v.attributes(slides)["units"] for v in VARIABLES}
+    assert units["torque"] == "N" and units["joint_acceleration"] == "m/s^2"
+    assert units["J_A"] == "m^2/m"
+
+
+def test_only_failed_samples_are_empty(model: condyle.Model) -> None:
+    """Numbers of the others are those of a motion on which nothing fails."""
+    whole = model.solve(along_x(model, 0.02), flag=True)
+    ok = whole["status"].values == 0
+    assert 0 < ok.sum() < ok.size
+    for variable in VARIABLES:
+        values = np.moveaxis(whole[variable.name].values, variable.dims.index("time"), 0)
+        if values.dtype.kind == "f":
+            assert np.isnan(values[~ok]).all() and not np.isnan(values[ok]).any(), variable.name
+
+
+def test_rank_is_that_of_the_singular_values(model: condyle.Model) -> None:
+    solution = model.solve(along_x(model, 0.02), flag=True)
+    ok = solution["status"].values == 0
+    assert (solution["rank"].values[ok] == 4).all() and (solution["rank"].values[~ok] == 0).all()
+
+
+def test_the_load_has_a_share_where_there_is_one(model: condyle.Model) -> None:
+    motion = along_x(model, 0.002)
+    without = model.solve(motion)
+    load = condyle.Load(np.array([0.0, 1.0]), np.tile([0, 0, -5.0, 0, 0, 0], (2, 1)))
+    loaded = model.solve(motion, load)
+    assert {*loaded["part"].values} - {*without["part"].values} == {model.parts[-1]}
+    for solution in (without, loaded):
+        total = solution["share"].sum("part")
+        np.testing.assert_allclose(total, solution["torque"], atol=1e-13)

@@ -1,0 +1,121 @@
+"""Warnings as data: kinds, owners and bounds, whole or block by block."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.errors import BoundsError
+from condyle.kinematics.singularity import Singularity
+from condyle.mechanism import bundled_text, parse
+from condyle.mechanism.chain import limits
+from condyle.motion import Motion
+from condyle.results.derived import Derived
+from condyle.results.summary import summarize
+from condyle.results.warnings import KINDS, Notice, Watch, refuse
+
+PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "errors.md"
+
+
+def made_up(mechanism: condyle.Mechanism, count: int) -> Any:
+    """An evaluation of random numbers that breaks every rule somewhere."""
+    rng = np.random.default_rng(4)
+    n, k = len(mechanism.chains), len(mechanism.contacts)
+    sigma = -np.sort(-(10 ** rng.uniform(-5, 0, (count, 4))), axis=1)
+    configuration = SimpleNamespace(
+        contact_point=rng.normal(0, 0.1, (count, k, 3)),
+        cos_gamma=rng.uniform(0, 0.05, (count, n)),
+        discriminant=rng.uniform(-0.2, 1, (count, n)),
+        singularity=Singularity(np.ones((count, n)), rng.uniform(0.1, 1, (count, n)), sigma, 0.1),
+    )
+    return SimpleNamespace(
+        pose=np.zeros((count, 6)),
+        effort=rng.normal(0, 3, (count, n)),
+        joint_rate=rng.normal(0, 6, (count, n)),
+        contact_force=rng.normal(0, 1, (count, k)),
+        configuration=configuration,
+        status=rng.choice([0, 0, 0, 1, 2, 3], count).astype(np.int8),
+    )
+
+
+def part(value: Any, rows: slice) -> Any:
+    if isinstance(value, np.ndarray):
+        return value[rows]
+    if isinstance(value, float):
+        return value
+    if isinstance(value, Singularity):
+        return Singularity(**{name: part(v, rows) for name, v in vars(value).items()})
+    return SimpleNamespace(**{name: part(v, rows) for name, v in vars(value).items()})
+
+
+@pytest.fixture(scope="module")
+def one_sided() -> condyle.Mechanism:
+    text = bundled_text("masticatory")
+    return parse(re.sub(r"(\[\[contact\]\]\n)", r'\1one_sided = true\nside = "below"\n', text))
+
+
+def test_blocks_say_what_the_whole_says(one_sided: condyle.Mechanism) -> None:
+    whole = made_up(one_sided, 1000)
+    at = np.arange(1, 1001)
+    together, apart = Watch(one_sided, rows=True), Watch(one_sided, rows=True)
+    together.see(Derived(one_sided, whole), at)
+    for start in range(0, 1000, 130):
+        rows = slice(start, start + 130)
+        apart.see(Derived(one_sided, part(whole, rows)), at[rows])
+    assert apart.notices() == together.notices()
+    kinds = {notice.kind for notice in together.notices()}
+    assert kinds == {*KINDS} - {"home_residual", "given_pose_residual"}
+    ok = whole.status == 0
+    for i, chain in enumerate(one_sided.chains):
+        peak = np.abs(whole.effort[ok, i]).max()
+        mine = [n for n in together.notices() if (n.kind, n.owner) == ("effort_limit", chain.name)]
+        limit = limits(chain).effort
+        assert len(mine) == (limit is not None and peak > limit)
+        for notice in mine:
+            over = np.abs(whole.effort[:, i]) > limit
+            assert (notice.value, notice.bound, notice.unit) == (peak, limit, "N m")
+            assert notice.count == (over & ok).sum() and notice.row == at[over & ok][0]
+
+
+def test_limits_of_every_family() -> None:
+    chains = [*condyle.load("hexaglide").chains, *condyle.load("gough-stewart").chains]
+    chains += condyle.load("masticatory").chains
+    for chain in chains:
+        stated = chain.actuator.model_dump()
+        effort = stated.get("torque_limit", stated.get("force_limit"))
+        assert limits(chain) == (effort, stated["speed_limit"])
+
+
+def test_strict_goes_by_kind_not_by_words() -> None:
+    said = "leaves its bounds"
+    refuse([Notice("effort_limit", f'chain "{said}": effort reaches 4, above its limit of 3')])
+    with pytest.raises(BoundsError, match="anything at all") as caught:
+        refuse([Notice("bounds", "anything at all", "left", time=0.5, value=1e-3, bound=0.0)])
+    assert (caught.value.contact, caught.value.time, caught.value.value) == ("left", 0.5, 1e-3)
+    assert "--strict" in caught.value.hint
+
+
+def test_rounding_is_no_alarm() -> None:
+    """A contact point at its bound to the last bit but one."""
+    mechanism = condyle.load("masticatory")
+    model = condyle.derive(mechanism, backend="numpy")
+    t = np.linspace(0, 1, 9)
+    motion = Motion.from_arrays(t, np.zeros((9, 4)), names=model.independent)
+    solution = model.solve(motion)
+    margin = solution["bound_margin"].values.copy()
+    margin[3, 0] = -3.469e-18
+    solution["bound_margin"] = solution["bound_margin"].copy(data=margin)
+    text = str(summarize(solution))
+    assert "OUTSIDE" not in text and "e-15" not in text
+    assert "closest to the bounds: left_condyle, 0 mm inside" in text
+
+
+def test_every_kind_is_documented() -> None:
+    page = PAGE.read_text(encoding="utf-8")
+    assert "warnings.md" in page and "statuses.md" in page
