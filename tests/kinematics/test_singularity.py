@@ -11,7 +11,7 @@ from oracles.random_mechanism import random_mechanism, random_state, toml_text
 
 import condyle
 from condyle import SingularError
-from condyle.kinematics.singularity import KINDS, measure
+from condyle.kinematics.singularity import KINDS, Singularity
 from condyle.mechanism import Mechanism, parse
 from condyle.mechanism.files import from_data
 from condyle.model.data import Evaluation
@@ -143,10 +143,10 @@ def test_the_measures_do_not_depend_on_the_unit_of_length(raw: dict[str, Any]) -
 
 
 def test_kinds_by_their_thresholds() -> None:
-    ones = np.ones((4, 2))
     J_A = np.array([[1, 1], [1, 1e-4], [1, 1], [1, -1e-4]])
-    J_W = np.array([np.eye(2), np.eye(2), np.diag([1, 1e-4]), np.diag([1, 1e-13])])
-    s = measure(J_A, ones, J_W, ones / 2, np.array([False, False]), 1.0)
+    sigma = np.array([[1, 1], [1, 1], [1, 1e-4], [1, 1e-13]])
+    extremes = np.sort(np.abs(J_A), axis=1).T
+    s = Singularity.of(J_A, J_A, sigma, extremes, 1.0)
     assert [KINDS[k] for k in s.kind()] == ["none", "inverse", "direct", "combined"]
     assert s.rank.tolist() == [2, 2, 2, 1]
     assert (s.kind(threshold=1e-5) == [0, 0, 0, 2]).all()

@@ -109,7 +109,10 @@ def test_what_is_no_number(name: str, value: float) -> None:
         np.testing.assert_array_equal(got.effort[rest], clean.effort[rest])
         np.testing.assert_array_equal(got.status, wanted.status)
         if not np.isfinite(value):
-            assert got.status[5] == (Status.overflow if which else Status.unreachable)
+            wanted_status = {Status.overflow} if which else {Status.unreachable}
+            if which == 0 and not c.mechanism.contacts:
+                wanted_status.add(Status.singular)  # a leg may be as long as it likes
+            assert got.status[5] in wanted_status
             np.testing.assert_array_equal(found.status, got.status)
             assert np.isnan(found.effort[5]).all()
 

@@ -128,8 +128,8 @@ def test_bad_rows_late_that_are_kept(model: Evaluator, tmp_path: Path) -> None:
     path = write(tmp_path / "states.csv", 900, row_733=LATE["unreachable"][0])
     assert solve_file(model, path, tmp_path / "out.csv", flag=True)[0] == 900
     lines = (tmp_path / "out.csv").read_text().splitlines()
-    assert len(lines) == 901 and lines[733].endswith(",unreachable")
-    assert all(line.endswith(",ok") for i, line in enumerate(lines) if i not in (0, 733))
+    assert len(lines) == 901 and lines[733].endswith(",unreachable,chain temporalis_left")
+    assert all(line.endswith(",ok,") for i, line in enumerate(lines) if i not in (0, 733))
 
 
 def test_warnings_count_rows_of_the_file(model: Evaluator, tmp_path: Path) -> None:

@@ -146,7 +146,7 @@ def test_swinging_about_home_is_no_reason_to_be_lost() -> None:
     holes = [0, 7, 8, 60]
     given[holes[:3]], given[60] = np.nan, -50.0
     found = forward.solve(given, time)
-    np.testing.assert_array_equal(np.flatnonzero(found.status == Status.unreachable), holes)
+    np.testing.assert_array_equal(np.flatnonzero(found.status == UNREACHABLE), holes)
     kept = np.delete(np.arange(len(u)), holes)
     np.testing.assert_allclose(found.pose[kept], poses[kept], rtol=0, atol=1e-12)
 
