@@ -69,7 +69,7 @@ def hooks(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> None:
     monkeypatch.setenv("MPLBACKEND", "agg")
-    monkeypatch.setenv("CONDYLE_BACKEND", "interpreted")
+    monkeypatch.setenv("CONDYLE_BACKEND", "numpy")
     monkeypatch.setenv("CONDYLE_CACHE", str(tmp_path_factory.getbasetemp() / "docs-kernels"))
 
 

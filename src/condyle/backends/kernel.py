@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
@@ -79,7 +80,7 @@ def arranged(
         return block.reshape(*result.shape, count)
     starts = np.cumsum([0, *interface.counts])
     mine = [k for g in result.groups for k in order[starts[g] : starts[g + 1]]]
-    found = block.reshape(-1, len(mine), count)
+    found = block.reshape(math.prod(result.shape), len(mine), count)
     if mine != sorted(mine):
         found = found[:, np.argsort(mine)]
     return found.reshape(*result.shape, len(mine), count)
