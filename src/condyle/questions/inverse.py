@@ -21,8 +21,7 @@ from .structure import Structure
 
 # What can be asked for besides the efforts.
 OUTPUTS = ("contact", "share", "gravity", "motion", "joint", "configuration")
-DOUBTFUL = 1e-14  # discriminant below which a sample is looked at again,
-WEAK = 1e-20  # and ratio of a pivot to its column, squared
+DOUBTFUL = 1e-14  # discriminant or squared pivot ratio below which a sample is looked at again
 HUGE = 1e300
 CERTAIN = 0.5  # of a placement's discriminant, which is 0 or 1 where it was iterated
 
@@ -89,7 +88,7 @@ def program(
     if "configuration" in wanted:
         configuration.add(b, platform)
     b.check(_feasibility(b, platform, eq), DOUBTFUL, Status.unreachable)
-    b.check(pivots * (ca.fabs(b.total(effort)) < HUGE), WEAK)
+    b.check(pivots * (ca.fabs(b.total(effort)) < HUGE), DOUBTFUL)
     return b.finish()
 
 
