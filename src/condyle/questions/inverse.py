@@ -16,7 +16,7 @@ from ..status import Status
 from . import configuration
 from .builder import Builder
 from .equations import Equations, Wrench, equations, total
-from .platform import ANGLE_UNITS, Platform, closed, given
+from .platform import ANGLE_UNITS, Platform, closed, given, independent_indices
 from .structure import Structure
 
 # What can be asked for besides the efforts.
@@ -88,7 +88,8 @@ def program(
     if "configuration" in wanted:
         configuration.add(b, platform)
     b.check(_feasibility(b, platform, eq), NEAR, Status.unreachable)
-    b.check(pivots * (ca.fabs(b.total(effort)) < HUGE), NEAR)
+    sure = (ca.fabs(b.total(effort)) < HUGE) * _every_rate_is_felt(b, eq)
+    b.check(pivots * sure, NEAR)
     return b.finish()
 
 
@@ -138,6 +139,21 @@ def _core(b: Builder, platform: Platform, load: Wrench) -> Equations:
     """Route `direct` has no equations across the contacts: those of the core have."""
     lump = FORMULATIONS[b.structure.formulation].lumps
     return equations(b, platform, load, route="core", lump=lump)
+
+
+def _every_rate_is_felt(b: Builder, eq: Equations) -> ca.SX:
+    """Whether no independent rate leaves all joints at rest, but for rounding: 1, else 0.
+
+    Pivots are measured by their own columns, so they do not see a column that is rounding itself.
+    """
+    length = b.parameter("length")
+    angles = [i >= 3 for i in independent_indices(b.structure.dependent)]
+    scale = ca.vertcat(*(1 / length if angle else ca.SX(1) for angle in angles))
+    sizes = scale * scale * b.total([a * a for a in eq.A])
+    least = sizes[0]
+    for size in ca.vertsplit(sizes)[1:]:
+        least = ca.fmin(least, size)
+    return least >= NEAR * ca.sum1(sizes)
 
 
 def _feasibility(b: Builder, platform: Platform, eq: Equations) -> ca.SX:
