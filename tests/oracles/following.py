@@ -140,7 +140,7 @@ def coordinate_closure(mechanism: Mechanism, names: Sequence[str]) -> Closure:
     """Poses from 6 - k pose coordinates."""
     dependent = [name for name in COORDINATES if name not in names]
     x = ca.SX.sym("x", 6)
-    forms = [contact.locus.form for contact in mechanism.contacts]
+    forms = [contact.offset_surface.form for contact in mechanism.contacts]
     return Closure(
         mechanism,
         ca.Function("coordinates", [x], [x[indices(names)]]),

@@ -19,7 +19,7 @@ import numpy as np
 from condyle.dynamics import FORMULATIONS
 from condyle.dynamics.formulation import Body, Formulation
 from condyle.kinematics.batch import evaluate
-from condyle.kinematics.chain import FAMILIES, Constants, Family, Law
+from condyle.kinematics.chain import FAMILIES, ChainDynamics, Constants, Family
 from condyle.kinematics.contact import (
     closed_form,
     contact_frame,
@@ -160,26 +160,26 @@ def core_function(mechanism: Mechanism, formulation: Formulation) -> ca.Function
     parts["platform"] = formulation.platform(state, body, g)
     r, force, moment = state.R @ load[6:], load[:3], load[3:6]
     parts["load"] = -(state.B.T @ ca.vertcat(force, ca.cross(r, force) + moment))
-    laws: list[Law] = []
+    laws: list[ChainDynamics] = []
     rows = []
-    cached: dict[str, Callable[..., Law]] = {}
+    cached: dict[str, Callable[..., ChainDynamics]] = {}
     for chain in mechanism.chains:
         family = FAMILIES[chain.kind]
         if chain.kind not in cached:
-            cached[chain.kind] = law_function(formulation, family)
+            cached[chain.kind] = chain_function(formulation, family)
         M = state.point(ca.SX(ca.DM(chain.platform)))
         constants = ca.SX(ca.DM(family.vector(family.constants(chain))))
         law = cached[chain.kind](constants, M, g)
         laws.append(law)
         for name, f in law.forces.items():
-            parts[name] += state.pull(f, M.lever)
-        rows.append(state.pull(law.J, M.lever).T)
+            parts[name] += state.generalized_force(f, M.lever)
+        rows.append(state.generalized_force(law.J, M.lever).T)
     columns = [
         ca.horzcat(*parts.values()),
         ca.vertcat(*rows),
         Pi,
         *(ca.vertcat(*(getattr(law, a) for law in laws)) for a in ("rate", "acceleration")),
-        ca.vertcat(*(law.reach for law in laws)),
+        ca.vertcat(*(law.discriminant for law in laws)),
         G,
         frame.n_length,
     ]
@@ -197,24 +197,24 @@ def closure_function(mechanism: Mechanism) -> ca.Function:
     pose = placement.pose()
     # The given angles as they are: arc functions would take them to their principal values.
     pose[indices(independent_coordinates(mechanism))] = q
-    reach = placement.reach if placement.reach is not None else ca.SX(1.0)
+    reach = placement.discriminant if placement.discriminant is not None else ca.SX(1.0)
     return _function("closure", [q, q1, q2], [pose, motion.rate, motion.acceleration, reach])
 
 
-def law_function(formulation: Formulation, family: Family) -> Callable[..., Law]:
+def chain_function(formulation: Formulation, family: Family) -> Callable[..., ChainDynamics]:
     """A family's law, derived once and called for each chain with its numbers."""
     c = ca.SX.sym("c", family.size())
     P, V, A, r, g = (ca.SX.sym(name, 3) for name in "PVArg")
     named: Constants = family.named(c)
     law = formulation.chain(family, named, PointMotion(P, V, A, r), g)
     names = list(law.forces)
-    outputs = [*law.forces.values(), law.J, law.reach, law.rate, law.acceleration]
+    outputs = [*law.forces.values(), law.J, law.discriminant, law.rate, law.acceleration]
     function = ca.Function("law", [c, P, V, A, g], outputs)
 
-    def call(constants: ca.SX, M: PointMotion, gravity: ca.SX) -> Law:
+    def call(constants: ca.SX, M: PointMotion, gravity: ca.SX) -> ChainDynamics:
         values = function.call([constants, M.position, M.velocity, M.acceleration, gravity])
         forces = dict(zip(names, values, strict=False))
-        return Law(forces, *values[len(names) :])
+        return ChainDynamics(forces, *values[len(names) :])
 
     return call
 

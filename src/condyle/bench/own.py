@@ -126,7 +126,7 @@ def own_probes(mechanism: Mechanism, formulations: list[str]) -> Iterator[Probe]
     yield _python_probe(
         f"{name} numpy: batch", lambda: numpy.torques(*case.states, case.load), SAMPLES
     )
-    if all(c.locus.form == "plane" for c in mechanism.contacts):
+    if all(c.offset_surface.form == "plane" for c in mechanism.contacts):
         yield from _straight_probes(f"{name} CasADi straight-line C, gcc", timer, case)
 
 

@@ -1,4 +1,4 @@
-"""What a formulation is: the platform's generalized force, and the law of a chain.
+"""What a formulation is: the platform's generalized force, and the dynamics of a chain.
 
 A formulation sees the platform through a `State` and each chain through the motion of its joint M
 alone, so that one text serves every route, every family and any number of contacts:
@@ -13,7 +13,7 @@ from typing import ClassVar, Protocol
 
 import casadi as ca
 
-from ..kinematics.chain import Constants, Family, Law
+from ..kinematics.chain import ChainDynamics, Constants, Family
 from ..kinematics.state import PointMotion, State
 
 
@@ -37,12 +37,12 @@ class Formulation(Protocol):
     # Whether a chain's bodies can act as one, with end masses that are part of the platform, and
     # whether idle constants (`Family.idle`) alone make a lane do nothing.
     lumps: ClassVar[bool] = False
-    idles: ClassVar[bool] = False
+    pads: ClassVar[bool] = False
 
     def platform(self, state: State, body: Body, g: ca.SX) -> ca.SX:
         """Inertia less gravity of the platform, dual to the state's c', (m,)."""
         ...
 
-    def chain(self, family: Family, c: Constants, M: PointMotion, g: ca.SX) -> Law:
+    def chain(self, family: Family, c: Constants, M: PointMotion, g: ca.SX) -> ChainDynamics:
         """Forces of a chain's bodies on its platform joint, and the joint's motion."""
         ...

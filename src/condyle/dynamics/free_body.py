@@ -40,12 +40,12 @@ class Carried:
 class FreeBodies:
     """The balances of one chain, expressions in a joint state.
 
-    tip: M, (3,).
+    end_point: M, (3,).
     K: (3 + guides, 3 + guides)   E: (3 + guides,)   R: (3 + guides, links), one column a link.
     """
 
     joints: list[Joint]
-    tip: ca.SX
+    end_point: ca.SX
     unknown: ca.SX
     weight: ca.SX
     carried: Carried
@@ -57,7 +57,7 @@ class FreeBodies:
 def free_bodies(family: Family, c: Constants, s: JointState, g: ca.SX) -> FreeBodies:
     """Cut a chain free at the joint state `s`."""
     links, joints = family.links(c, s.q), family.joints(c, s.q)
-    M = family.tip(c, s.q)
+    M = family.end_point(c, s.q)
     count = sum(joint.guide is not None for joint in joints)
     unknown, weight = ca.SX.sym("unknown", 3 + count), ca.SX.sym("weight", len(links))
     F = unknown[:3]

@@ -6,8 +6,8 @@ time. The kinetic energy T(c, c') of a body has the Hessian
     [ T_cc    T_cc'  ]
     [ T_c'c   T_c'c' ],    inertia force = T_c'c' c'' + T_c'c c' - T_c,
 
-with the mass matrix T_c'c'. The loop constraints f = tip(q_r) - M = 0 of a chain have the
-Jacobian M_1 = d tip / d q_r and, one for each component a, a Hessian H_a, so that
+with the mass matrix T_c'c'. The loop constraints f = end_point(q_r) - M = 0 of a chain have the
+Jacobian M_1 = d end_point / d q_r and, one for each component a, a Hessian H_a, so that
 
     q_r'  = M_1^-1 M',    q_r'' = M_1^-1 (M'' - [q_r'^T H_a q_r']_a).
 
@@ -21,17 +21,17 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ..kinematics.chain import Constants, Family, Law, Link
+from ..kinematics.chain import ChainDynamics, Constants, Family, Link
 from ..kinematics.state import PointMotion, State
 from .formulation import Body
-from .joint_space import JointState, joint_space_law
+from .joint_space import JointState, joint_space_dynamics
 
 
 class Hessian:
     name: ClassVar[str] = "hessian"
     uses_twist: ClassVar[bool] = False
     lumps: ClassVar[bool] = False
-    idles: ClassVar[bool] = False
+    pads: ClassVar[bool] = False
 
     def platform(self, state: State, body: Body, g: ca.SX) -> ca.SX:
         V, omega_M = state.twist[:3], state.R.T @ state.twist[3:]
@@ -40,13 +40,13 @@ class Hessian:
         c = state.coordinates
         return hessian_force(kinetic, potential, c, state.rate, state.acceleration)
 
-    def chain(self, family: Family, c: Constants, M: PointMotion, g: ca.SX) -> Law:
-        return joint_space_law(family, c, M, g, link_force, constraint_bias)
+    def chain(self, family: Family, c: Constants, M: PointMotion, g: ca.SX) -> ChainDynamics:
+        return joint_space_dynamics(family, c, M, g, link_force, constraint_bias)
 
 
-def constraint_bias(tip: ca.SX, s: JointState) -> ca.SX:
+def constraint_bias(end_point: ca.SX, s: JointState) -> ca.SX:
     """q_r'^T H_a q_r' of the three loop constraints, (3,)."""
-    hessians = [ca.hessian(tip[a], s.q)[0] for a in range(3)]
+    hessians = [ca.hessian(end_point[a], s.q)[0] for a in range(3)]
     return ca.vertcat(*(ca.bilin(H, s.rate, s.rate) for H in hessians))
 
 

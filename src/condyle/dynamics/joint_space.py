@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ..kinematics.chain import Constants, Family, Law, Link, Loop
+from ..kinematics.chain import ChainDynamics, Constants, Family, Link, Loop
 from ..kinematics.contact import solve_small
 from ..kinematics.state import PointMotion
 
@@ -51,17 +51,17 @@ class JointMotion:
         values = [self.loop.q_r, self.rate, self.acceleration]
         return ca.substitute(list(expressions), symbols, values)
 
-    def law(self, forces: dict[str, ca.SX]) -> Law:
-        """The law of a chain whose links need `forces`, dual to q_r', (3,) each."""
+    def dynamics(self, forces: dict[str, ca.SX]) -> ChainDynamics:
+        """The dynamics of a chain whose links need `forces`, dual to q_r', (3,) each."""
         on_M = {name: self.inverse.T @ force for name, force in forces.items()}
         J = self.inverse[0, :].T
-        return Law(on_M, J, self.loop.reach, self.rate[0], self.acceleration[0])
+        return ChainDynamics(on_M, J, self.loop.discriminant, self.rate[0], self.acceleration[0])
 
 
 def chain_jacobians(family: Family, c: Constants, q_r: ca.SX) -> tuple[ca.SX, ca.SX]:
     """M_1, (3, 3), with M' = M_1 q_r', and its inverse ([Cheng2023] eqs 16, 17)."""
     q = ca.SX.sym("q_r", 3)
-    M_1 = ca.substitute(ca.jacobian(family.tip(c, q), q), q, q_r)
+    M_1 = ca.substitute(ca.jacobian(family.end_point(c, q), q), q, q_r)
     return M_1, solve_small(M_1, ca.SX.eye(3))
 
 
@@ -69,34 +69,34 @@ LinkForce = Callable[[Link, JointState, ca.SX], ca.SX]
 Bias = Callable[[ca.SX, JointState], ca.SX]
 
 
-def rate_bias(tip: ca.SX, s: JointState) -> ca.SX:
+def rate_bias(end_point: ca.SX, s: JointState) -> ca.SX:
     """M_1' q_r', (3,), by the derivative of M_1 along the motion."""
-    return ca.jtimes(ca.jacobian(tip, s.q) @ s.rate, s.q, s.rate)
+    return ca.jtimes(ca.jacobian(end_point, s.q) @ s.rate, s.q, s.rate)
 
 
 def joint_motion(
     family: Family, c: Constants, M: PointMotion, bias: Bias = rate_bias
 ) -> JointMotion:
-    """Joint motion of a chain. Args: bias: (tip, joint state) -> M_1' q_r', (3,)."""
+    """Joint motion of a chain. Args: bias: (end_point, joint state) -> M_1' q_r', (3,)."""
     s = JointState.symbols()
-    tip = family.tip(c, s.q)
+    end_point = family.end_point(c, s.q)
     loop = family.loop(c, M.position)
-    M_1, left = ca.substitute([ca.jacobian(tip, s.q), bias(tip, s)], [s.q], [loop.q_r])
+    M_1, left = ca.substitute([ca.jacobian(end_point, s.q), bias(end_point, s)], [s.q], [loop.q_r])
     inverse = solve_small(M_1, ca.SX.eye(3))
     rate = inverse @ M.velocity
     acceleration = inverse @ (M.acceleration - ca.substitute(left, s.rate, rate))
     return JointMotion(loop, rate, acceleration, inverse)
 
 
-def joint_space_law(
+def joint_space_dynamics(
     family: Family,
     c: Constants,
     M: PointMotion,
     g: ca.SX,
     link_force: LinkForce,
     bias: Bias = rate_bias,
-) -> Law:
-    """The law of a chain whose links' forces are derived in joint space.
+) -> ChainDynamics:
+    """The dynamics of a chain whose links' forces are derived in joint space.
 
     Args: link_force: (link, joint state, gravity) -> force dual to q_r', (3,).
     """
@@ -104,4 +104,4 @@ def joint_space_law(
     links = family.links(c, s.q)
     motion = joint_motion(family, c, M, bias)
     forces = motion.insert(s, [link_force(link, s, g) for link in links])
-    return motion.law({link.name: f for link, f in zip(links, forces, strict=True)})
+    return motion.dynamics({link.name: f for link, f in zip(links, forces, strict=True)})

@@ -14,17 +14,17 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ..kinematics.chain import Constants, Family, Law, Link
+from ..kinematics.chain import ChainDynamics, Constants, Family, Link
 from ..kinematics.state import PointMotion, State
 from .formulation import Body
-from .joint_space import JointState, joint_space_law
+from .joint_space import JointState, joint_space_dynamics
 
 
 class Momentum:
     name: ClassVar[str] = "momentum"
     uses_twist: ClassVar[bool] = False
     lumps: ClassVar[bool] = False
-    idles: ClassVar[bool] = False
+    pads: ClassVar[bool] = False
 
     def platform(self, state: State, body: Body, g: ca.SX) -> ca.SX:
         """Eqs (29)-(32)."""
@@ -34,8 +34,8 @@ class Momentum:
         kinetic = state.B.T @ state.time_derivative(momentum)
         return kinetic + ca.gradient(potential, state.coordinates)
 
-    def chain(self, family: Family, c: Constants, M: PointMotion, g: ca.SX) -> Law:
-        return joint_space_law(family, c, M, g, link_force)
+    def chain(self, family: Family, c: Constants, M: PointMotion, g: ca.SX) -> ChainDynamics:
+        return joint_space_dynamics(family, c, M, g, link_force)
 
 
 def link_force(link: Link, s: JointState, g: ca.SX) -> ca.SX:

@@ -16,7 +16,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ..kinematics.chain import Constants, Family, Law
+from ..kinematics.chain import ChainDynamics, Constants, Family
 from ..kinematics.contact import solve_small
 from ..kinematics.state import PointMotion, State
 from .formulation import Body
@@ -28,7 +28,7 @@ class NewtonEuler:
     name: ClassVar[str] = "newton_euler"
     uses_twist: ClassVar[bool] = True
     lumps: ClassVar[bool] = False
-    idles: ClassVar[bool] = False
+    pads: ClassVar[bool] = False
 
     def platform(self, state: State, body: Body, g: ca.SX) -> ca.SX:
         """Newton, and Euler about O_M, which the mass centre is S / m away from."""
@@ -40,7 +40,7 @@ class NewtonEuler:
         moment = ca.cross(S, lift) + inertia @ omega_rate + ca.cross(omega, inertia @ omega)
         return state.B.T @ ca.vertcat(force, moment)
 
-    def chain(self, family: Family, c: Constants, M: PointMotion, g: ca.SX) -> Law:
+    def chain(self, family: Family, c: Constants, M: PointMotion, g: ca.SX) -> ChainDynamics:
         s = JointState.symbols()
         bodies = free_bodies(family, c, s, g)
         motion = joint_motion(family, c, M)
@@ -48,4 +48,4 @@ class NewtonEuler:
         solved = solve_small(K, ca.horzcat(bodies.E, R))[:3, :]
         forces = {name: solved[:, 1 + i] for i, name in enumerate(family.bodies)}
         J, loop = solved[:, 0], motion.loop
-        return Law(forces, J, loop.reach, motion.rate[0], motion.acceleration[0])
+        return ChainDynamics(forces, J, loop.discriminant, motion.rate[0], motion.acceleration[0])

@@ -1,6 +1,6 @@
 """The operation-minimal formulation: virtual power of each body with closed-form rates.
 
-The platform's balance is written in twist coordinates, the chains by the hand-derived `law` of
+The platform's balance is written in twist coordinates, the chains by the hand-derived `dynamics` of
 their family: no joint space, no arc functions. Same numbers as the paper's models.
 """
 
@@ -10,7 +10,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ..kinematics.chain import Constants, Family, Law
+from ..kinematics.chain import ChainDynamics, Constants, Family
 from ..kinematics.state import PointMotion, State
 from .formulation import Body
 
@@ -19,7 +19,7 @@ class VirtualPower:
     name: ClassVar[str] = "virtual_power"
     uses_twist: ClassVar[bool] = True
     lumps: ClassVar[bool] = True
-    idles: ClassVar[bool] = True
+    pads: ClassVar[bool] = True
 
     def platform(self, state: State, body: Body, g: ca.SX) -> ca.SX:
         """Newton and Euler about O_M, with a first moment S = R s:
@@ -38,6 +38,6 @@ class VirtualPower:
         moment = ca.cross(S, lift) + state.R @ moment_M
         return state.B.T @ ca.vertcat(force, moment)
 
-    def chain(self, family: Family, c: Constants, M: PointMotion, g: ca.SX) -> Law:
-        law = family.law(c, M.position, M.velocity, M.acceleration, g)
-        return law.complete(M.acceleration, g)
+    def chain(self, family: Family, c: Constants, M: PointMotion, g: ca.SX) -> ChainDynamics:
+        dynamics = family.dynamics(c, M.position, M.velocity, M.acceleration, g)
+        return dynamics.complete(M.acceleration, g)

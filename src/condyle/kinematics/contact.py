@@ -28,7 +28,7 @@ class ContactSymbols:
     Two contacts on parallel planes can also be written as their mean and their difference; the
     latter does not depend on O_M: it is not `anchored`.
 
-    surface: where the ball's centre stays, `Contact.locus` or another one of its form.
+    surface: where the ball's centre stays, `Contact.offset_surface` or another one of its form.
     """
 
     surface: Any
@@ -70,7 +70,9 @@ class ContactSymbols:
 def contacts_of(mechanism: Mechanism) -> list[ContactSymbols]:
     """A mechanism's contacts with their numbers in place."""
     return [
-        ContactSymbols(c.locus, ca.SX(ca.DM(c.point)), ca.SX(ca.DM(c.locus.constants())))
+        ContactSymbols(
+            c.offset_surface, ca.SX(ca.DM(c.point)), ca.SX(ca.DM(c.offset_surface.constants()))
+        )
         for c in mechanism.contacts
     ]
 
@@ -194,13 +196,13 @@ def closed_form_available(kinds: Sequence[str], dependent: Sequence[str]) -> boo
 class Placement:
     """A pose that satisfies the contacts: O_M, the Bryant angles, and whether it is real.
 
-    reach: dimensionless; the contacts can be met where it is not negative (None: always).
-    iterated: found in a fixed number of steps; `reach` is then 0 where they were too few.
+    discriminant: dimensionless; the contacts can be met where it is not negative (None: always).
+    iterated: found in a fixed number of steps; `discriminant` is then 0 where they were too few.
     """
 
     position: ca.SX
     bryant: Bryant
-    reach: ca.SX | None
+    discriminant: ca.SX | None
     iterated: bool = False
 
     def pose(self) -> ca.SX:
@@ -272,7 +274,7 @@ def closed_form(
     dep = indices(dependent)
     positions = [i for i in dep if i < 3]
     s = angle_equation(contacts, dependent, q)
-    base, bryant, equations, reach = s.base, s.bryant, s.equations, None
+    base, bryant, equations, discriminant = s.base, s.bryant, s.equations, None
     if len(positions) < len(dep):
         A, B, k = s.A, s.B, s.k
         h = A * A + B * B
@@ -280,7 +282,7 @@ def closed_form(
         inverse_h = 1 / h
         k_h, s_h = k * inverse_h, branch * inverse_h * ca.sqrt(root)
         solution = ca.vertcat(A * k_h - B * s_h, B * k_h + A * s_h)
-        reach = root * inverse_h
+        discriminant = root * inverse_h
         bryant, equations = (
             Bryant(*(ca.substitute(v, s.unknown, solution) for v in (bryant.cos, bryant.sin))),
             [ca.substitute(e, s.unknown, solution) for e in equations],
@@ -296,7 +298,7 @@ def closed_form(
             found = [solved[0], solved[1]]
         for i, value in zip(positions, found, strict=True):
             base[i] = value
-    return Placement(base, bryant, reach)
+    return Placement(base, bryant, discriminant)
 
 
 def mean_and_difference(

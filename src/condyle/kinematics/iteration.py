@@ -4,7 +4,7 @@ A fixed number of steps, for kernels that cannot loop until it is enough. What t
 says whether it was; where not, the sample needs `Closure`, which follows it from home.
 
 Most mechanisms on curved surfaces z = f(x, y) depend in Z and one angle; see `one_angle`. The
-others follow the sample from home in pieces, as `Closure` does.
+others follow the sample from home in steps, as `Closure` does.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .contact import (
     solve_small,
 )
 from .one_angle import one_angle
-from .parasitic import gyration
+from .parasitic import angular_bias
 from .rotation import Bryant, turn_by, turned
 
 TINY = 1e-10  # steps that need not shrink
@@ -38,10 +38,10 @@ class _Plan:
 
     shrink: of a step to the next in the same piece, at the most; `Closure`: a quarter.
     fold:   least 1 - 2 h, and least determinant of C_dep over home's.
-    far:    the longest way whose pieces are short enough.
+    far:    the longest way whose steps are short enough.
     """
 
-    pieces: int
+    steps: int
     shrink: float
     fold: float
     far: float
@@ -62,7 +62,7 @@ PLANS = (
 def newton(contacts: Sequence[ContactSymbols], dependent: Sequence[str], q: ca.SX) -> Placement:
     """A pose with phi = 0, from q in the order of X_EE.
 
-    Its `reach` is 1 where the steps sufficed, and 0 where they did not.
+    Its `discriminant` is 1 where the steps sufficed, and 0 where they did not.
     """
     dep = indices(dependent)
     if all(_is_graph(c) for c in contacts) and 2 in dep:
@@ -92,7 +92,7 @@ def followed(contacts: Sequence[ContactSymbols], dep: list[int], q: ca.SX) -> Pl
 
     Guides move along with the way.
 
-    Each piece is a step that follows the bend of the contacts, and one of Newton that shows how
+    Each piece is a step that follows the bending of the contacts, and one of Newton that shows how
     good it was. Branches meet at folds, where the determinant of C_dep changes its sign; steps
     that shrink quickly and determinants away from zero leave a fold little room between them.
     """
@@ -102,10 +102,10 @@ def followed(contacts: Sequence[ContactSymbols], dep: list[int], q: ca.SX) -> Pl
     home = there.determinant
     sure = []
     plan = PLANS[len(dep) - 1]
-    for part, goal in _way(dep, q, plan.pieces):
+    for part, goal in _homotopy(dep, q, plan.steps):
         pose = pose.with_goal(goal, dep)
         here = there.guided(part).at_pose(pose)
-        step, fold = here.bent_step(unit)
+        step, fold = here.curved_step(unit)
         pose = pose.moved(dep, step)
         there = here.at_pose(pose)
         rest = there.step()
@@ -114,16 +114,18 @@ def followed(contacts: Sequence[ContactSymbols], dep: list[int], q: ca.SX) -> Pl
         sure += [fold > plan.fold, shrunk]
         sure += [c.determinant * home > plan.fold * home * home for c in (here, there)]
     there = there.at_pose(pose)
-    pose = pose.moved(dep, there.bent_step(unit)[0])
+    pose = pose.moved(dep, there.curved_step(unit)[0])
     last = there.at_pose(pose)
     pose = pose.moved(dep, last.step())
     phi = _phi([c.part_of_way(1.0) for c in contacts], pose)
     sure.append(unit.square(solve_small(last.C, phi), dep) < CLOSED**2)
     sure.append(pose.square(unit) < plan.far**2)
-    reach = ca.SX(1)
+    discriminant = ca.SX(1)
     for condition in sure:
-        reach = reach * condition  # 0 and 1: no comparison with what is no number holds
-    return Placement(pose.position, pose.bryant, reach, iterated=True)
+        discriminant = (
+            discriminant * condition
+        )  # 0 and 1: no comparison with what is no number holds
+    return Placement(pose.position, pose.bryant, discriminant, iterated=True)
 
 
 @dataclass(frozen=True)
@@ -179,14 +181,14 @@ class _Pose:
         return _Pose(position, turns)
 
 
-def _way(dep: Sequence[int], q: ca.SX, pieces: int) -> list[tuple[float, _Pose]]:
+def _homotopy(dep: Sequence[int], q: ca.SX, steps: int) -> list[tuple[float, _Pose]]:
     """Poses with the independent coordinates of equal parts of the way from home to q."""
     given = iter(ca.vertsplit(q))
     values = [ca.SX(0) if i in dep else next(given) for i in range(6)]
-    first = [ca.vertcat(ca.cos(v / pieces), ca.sin(v / pieces)) for v in values[3:]]
+    first = [ca.vertcat(ca.cos(v / steps), ca.sin(v / steps)) for v in values[3:]]
     goals, turns = [], first
-    for part in range(1, pieces + 1):
-        share = part / pieces
+    for part in range(1, steps + 1):
+        share = part / steps
         goals.append((share, _Pose(ca.vertcat(*values[:3]) * share, turns)))
         turns = [turned(turn, by) for turn, by in zip(turns, first, strict=True)]
     return goals
@@ -233,7 +235,7 @@ class _Contacts:
         """Newton's."""
         return -solve_small(self.C, self.phi)
 
-    def bent_step(self, unit: _Unit) -> tuple[ca.SX, ca.SX]:
+    def curved_step(self, unit: _Unit) -> tuple[ca.SX, ca.SX]:
         """To the root of the quadratic along Newton's step s, which also leads to near folds.
 
             b = C^-1 phi''(s, s),   h = -(s . b) / (s . s),
@@ -242,18 +244,18 @@ class _Contacts:
         Returns: the step, and 1 - 2 h: negative where the quadratic has no root.
         """
         s = self.step()
-        b = solve_small(self.C, self._bend(s))
+        b = solve_small(self.C, self._curvature_term(s))
         h = -unit.dot(s, b, self.dep) / (unit.square(s, self.dep) + NOTHING)
         fold = 1 - 2 * h
         t = 2 / (1 + ca.sqrt(ca.fmax(fold, 0)))
         return t * s - (t * t / 2) * (b + h * s), fold
 
-    def _bend(self, s: ca.SX) -> ca.SX:
+    def _curvature_term(self, s: ca.SX) -> ca.SX:
         """phi'' that constant rates s of the dependent coordinates make, (k,)."""
         rate = ca.SX.zeros(6)
         rate[self.dep] = s
         bryant = self.pose.bryant
-        turning = gyration(bryant, rate[3:])
+        turning = angular_bias(bryant, rate[3:])
         twist = ca.vertcat(rate[:3], bryant.angular_velocity() @ rate[3:])
         frame = contact_frame(self.contacts, self.pose.position, bryant.rotation())
         bias = contact_bias(self.contacts, frame, self.pose.position, twist)

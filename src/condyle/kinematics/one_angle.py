@@ -16,9 +16,9 @@ from .contact import ContactSymbols, Placement, contact_frame
 from .rotation import Bryant, turned, turned_slightly
 
 CLOSED = 1e-13  # radians that are as good as none
-NEAR = 0.55  # least product of the angles' cosines: farther off, other branches look the same
+WITHIN = 0.55  # least product of the angles' cosines: farther off, other branches look the same
 SHORT = 2e-4  # radians of the last step at the most
-BENT = 0.45  # E E'' / E'^2 at the most: from one half on there need be no root
+CURVED = 0.45  # E E'' / E'^2 at the most: from one half on there need be no root
 
 Derivatives = tuple[ca.SX, ca.SX, ca.SX]  # E and its first two in the angle
 
@@ -30,19 +30,19 @@ def one_angle(contacts: Sequence[ContactSymbols], angle: int, q: ca.SX) -> Place
     equation = _equation(contacts, base, bryant.rotation(), unknown)
     home = _home_slope(contacts, angle)
     side = home / ca.fabs(home)
-    E, slope, bend = equation(ca.SX([1, 0]))
+    E, slope, curvature = equation(ca.SX([1, 0]))
     # The branch of home ends at a fold, where the slope changes its sign: none on the way.
     margin = slope * side
-    turn = _osculating(E, slope, bend, side)
+    turn = _osculating(E, slope, curvature, side)
     c = ca.substitute(bryant.cos, unknown, turn)
     away = ca.dot(base, base) / (contacts[0].square_lever + contacts[1].square_lever)
-    margin = ca.fmin(margin, c[0] * c[1] * c[2] - away - NEAR)
+    margin = ca.fmin(margin, c[0] * c[1] * c[2] - away - WITHIN)
     margin = ca.fmin(margin, ca.fmin(c[0], c[1]))  # then all three are positive
-    E, slope, bend = equation(turn)
-    margin = ca.fmin(margin, ca.fmin(slope * side, BENT * slope * slope - ca.fabs(E * bend)))
-    turn = turned(turn, _osculating(E, slope, bend, side))
-    E, slope, bend = equation(turn)
-    inverse = 1 / (slope * slope - E * bend / 2)
+    E, slope, curvature = equation(turn)
+    margin = ca.fmin(margin, ca.fmin(slope * side, CURVED * slope * slope - ca.fabs(E * curvature)))
+    turn = turned(turn, _osculating(E, slope, curvature, side))
+    E, slope, curvature = equation(turn)
+    inverse = 1 / (slope * slope - E * curvature / 2)
     step = -(E * slope) * inverse
     margin = ca.fmin(margin, SHORT - ca.fabs(step))
     turn = turned_slightly(turn, step)
@@ -84,10 +84,10 @@ def _equation(
         E = contacts[0].phi(points[0]) - contacts[1].phi(points[1])
         along = ca.vertcat(-unknown[1], unknown[0])
         slope = ca.jtimes(E, unknown, along)
-        bend = ca.jtimes(slope, unknown, along)
+        curvature = ca.jtimes(slope, unknown, along)
 
         def long(turn: ca.SX) -> Derivatives:
-            values = ca.substitute(ca.vertcat(E, slope, bend), unknown, turn)
+            values = ca.substitute(ca.vertcat(E, slope, curvature), unknown, turn)
             return values[0], values[1], values[2]
 
         return long
@@ -124,24 +124,24 @@ def _coefficients(contact: ContactSymbols, H: ca.SX, p: ca.SX, unknown: ca.SX) -
     a, b = ca.jacobian(p, unknown[0]), ca.jacobian(p, unknown[1])
     start = ca.substitute(p, unknown, ca.SX([1, 0]))
     gradient, H_a, H_b = contact.gradient(start), H @ a, H @ b
-    bend = ca.dot(b, H_b)
+    curvature = ca.dot(b, H_b)
     return ca.vertcat(
         contact.phi(start),
         ca.dot(gradient, b),
-        bend - ca.dot(gradient, a),
-        (ca.dot(a, H_a) - bend) / 2,
+        curvature - ca.dot(gradient, a),
+        (ca.dot(a, H_a) - curvature) / 2,
         -ca.dot(a, H_b),
     )
 
 
-def _osculating(E: ca.SX, slope: ca.SX, bend: ca.SX, side: ca.SX) -> ca.SX:
+def _osculating(E: ca.SX, slope: ca.SX, curvature: ca.SX, side: ca.SX) -> ca.SX:
     """Cosine and sine of the turn to E = 0, were E the sinusoid with these derivatives.
 
-    E + slope sin + bend (1 - cos) = 0, where its slope has the sign of `side`.
+    E + slope sin + curvature (1 - cos) = 0, where its slope has the sign of `side`.
     """
-    k, h = E + bend, slope * slope + bend * bend
+    k, h = E + curvature, slope * slope + curvature * curvature
     inverse, root = 1 / h, ca.sqrt(h - k * k)
     return ca.vertcat(
-        bend * k * inverse + side * slope * inverse * root,
-        side * bend * inverse * root - slope * k * inverse,
+        curvature * k * inverse + side * slope * inverse * root,
+        side * curvature * inverse * root - slope * k * inverse,
     )

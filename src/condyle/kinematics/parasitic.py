@@ -52,7 +52,7 @@ def whole_motion(
     M_J = parasitic_jacobian(C, dependent)
     rate = M_J @ q_rate
     twist = E @ rate
-    turning = gyration(placement.bryant, rate[3:])
+    turning = angular_bias(placement.bryant, rate[3:])
     dep = indices(dependent)
     ind = [i for i in range(6) if i not in dep]
     acceleration = ca.SX(6, 1)
@@ -65,7 +65,7 @@ def whole_motion(
     return WholeMotion(rate, acceleration, twist, twist_rate, M_J, E, R, frame)
 
 
-def gyration(bryant: Bryant, angle_rates: ca.SX) -> ca.SX:
+def angular_bias(bryant: Bryant, angle_rates: ca.SX) -> ca.SX:
     """R_omega' (alpha', beta', gamma'), (3,): the angular acceleration that rates alone make."""
     c, s = bryant.cos, bryant.sin
     a1, b1, g1 = angle_rates[0], angle_rates[1], angle_rates[2]

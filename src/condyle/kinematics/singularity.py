@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-NEAR = 1e-3  # ratio below which a pose is near a singularity,
+NEAR_SINGULAR = 1e-3  # ratio below which a pose is near a singularity,
 SINGULAR = 1e-12  # and below which it is at one
 KINDS = ("none", "inverse", "direct", "combined")
 
@@ -67,7 +67,7 @@ class Singularity:
         least = SINGULAR * self.J_W_sigma[:, 0]
         return np.add.reduce([sigma > least for sigma in self.J_W_sigma.T], dtype=np.int8)
 
-    def kind(self, threshold: float = NEAR) -> np.ndarray:
+    def kind(self, threshold: float = NEAR_SINGULAR) -> np.ndarray:
         """Index into `KINDS` of what each sample is near to, (N,)."""
         return (self.inverse_ratio < threshold) + 2 * (self.direct_ratio < threshold)
 

@@ -65,7 +65,7 @@ class State:
         spin = ca.skew(self.twist[3:])
         return ca.skew(self.twist_rate[3:]) + spin @ spin
 
-    def pull(self, force: ca.SX, lever: ca.SX) -> ca.SX:
+    def generalized_force(self, force: ca.SX, lever: ca.SX) -> ca.SX:
         """Generalized force, (m,), of a force (3,) acting at `lever` from O_M: M_2^T force."""
         return self.B.T @ ca.vertcat(force, ca.cross(lever, force))
 

@@ -77,7 +77,7 @@ class Contact(Table):
         return self
 
     @property
-    def locus(self) -> Any:
+    def offset_surface(self) -> Any:
         """The surface on which the centre of the ball stays: parallel to the wall, if it is one."""
         if self.ball_radius is None:
             return self.surface
@@ -89,7 +89,7 @@ class Contact(Table):
         if self.ball_radius is None:
             return self.point
         p = ca.SX.sym("p", 3)
-        gradient = ca.Function("n", [p], [ca.gradient(self.locus.phi(p), p)])(self.point)
+        gradient = ca.Function("n", [p], [ca.gradient(self.offset_surface.phi(p), p)])(self.point)
         n = np.asarray(gradient).ravel()
         away = self.push * self.ball_radius * n / np.linalg.norm(n)
         return tuple(map(float, np.subtract(self.point, away)))

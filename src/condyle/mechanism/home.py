@@ -45,7 +45,7 @@ def characteristic_length(mechanism: Parts) -> float:
 def contact_gradient(contact: Contact) -> tuple[float, np.ndarray]:
     """phi [m] and its gradient, (3,) [1], of one contact at home."""
     p = ca.SX.sym("p", 3)
-    phi = contact.locus.phi(p)
+    phi = contact.offset_surface.phi(p)
     value, gradient = ca.Function("phi", [p], [phi, ca.gradient(phi, p)])(contact.point)
     return float(value), np.asarray(gradient).ravel()
 
@@ -130,7 +130,7 @@ def off_surface(contacts: Iterable[Contact]) -> Iterator[str]:
 def home_problem(contact: Contact) -> str | None:
     """Why the contact cannot be at its point at home, or None."""
     with np.errstate(all="ignore"):
-        off, locus = home_residual(contact), contact.locus
+        off, locus = home_residual(contact), contact.offset_surface
     if not np.isfinite(off):
         if isinstance(locus, Parallel):
             return f"{_ball(contact)} finds no point of the surface to touch"

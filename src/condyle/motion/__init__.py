@@ -1,5 +1,6 @@
 """Paths and loads: from files and arrays to clean samples, and tables back to files."""
 
+from condyle.motion.columns import Table
 from condyle.motion.load import Load, as_load
 from condyle.motion.path import Motion, as_motion
 from condyle.motion.points import resolve_landmark, resolve_load_point
@@ -10,7 +11,7 @@ from condyle.motion.reference import (
     write_reference,
 )
 from condyle.motion.smoothing import AUTO_CUTOFF, Smoothing
-from condyle.motion.table import Table, iter_table, read_table
+from condyle.motion.table import iter_table, read_table
 from condyle.motion.table_writer import TableWriter, write_table
 from condyle.motion.trial import trial_motion
 from condyle.motion.units import FORCE, LANDMARK, MOMENT, POSE, Units, parse_units

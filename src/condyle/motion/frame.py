@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from condyle.errors import InputError
+from condyle.motion.columns import Known, Table, checked_columns
 from condyle.motion.header import read_header
-from condyle.motion.table import Known, Table, checked_columns
 from condyle.motion.words import short
 
 

@@ -12,12 +12,13 @@ import numpy as np
 
 from condyle.errors import InputError
 from condyle.motion.arrays import as_samples, check_rising
+from condyle.motion.columns import Table
 from condyle.motion.digest import digest
 from condyle.motion.frame import is_frame, table_from_frame
 from condyle.motion.memory import memory_at_hand
 from condyle.motion.smoothing import Smoothing, parse_cutoff, smoothing_spline
 from condyle.motion.suspicion import motion_warnings
-from condyle.motion.table import Table, read_table
+from condyle.motion.table import read_table
 from condyle.motion.units import LANDMARK, POSE, Units, parse_units
 from condyle.motion.words import listed
 

@@ -65,7 +65,7 @@ class Builder:
         return self.symbols(name, [self._number(-1, start + i) for i in range(count)])
 
     def lane(self, group: int, name: str) -> ca.SX:
-        """Constants of the chains of a group: `active`, `joint` or `constants`."""
+        """Constants of the chains of a group: `mask`, `joint` or `constants`."""
         start, count = self.layout.lanes[group][name]
         return self.symbols(
             f"{name}_{group}", [self._number(group, start + i) for i in range(count)]

@@ -26,7 +26,7 @@ from ..kinematics.contact import (
 )
 from ..kinematics.guide import Guide
 from ..kinematics.iteration import followed, newton
-from ..kinematics.parasitic import gyration, whole_motion
+from ..kinematics.parasitic import angular_bias, whole_motion
 from ..kinematics.rotation import Bryant
 from ..mechanism.mechanism import COORDINATES
 from ..status import Status
@@ -72,9 +72,9 @@ def closure(structure: Structure, prescribed: Prescribed) -> Program:
     b.output("pose", pose, ANGLE_UNITS)
     b.output("pose_rate", rate, "per s")
     b.output("pose_acceleration", acceleration, "per s^2")
-    if placement.reach is not None:
+    if placement.discriminant is not None:
         below = None if placement.iterated else Status.unreachable
-        b.check(placement.reach, CERTAIN if placement.iterated else 0.0, below)
+        b.check(placement.discriminant, CERTAIN if placement.iterated else 0.0, below)
     return b.finish()
 
 
@@ -88,7 +88,7 @@ def _rates(
     still = ca.SX.zeros(6 - s1.numel())
     rate = solve_small(K, ca.vertcat(still, s1))
     bias = contact_bias(contacts, frame, position, E @ rate)
-    bias += frame.N[3:, :].T @ gyration(bryant, rate[3:])
+    bias += frame.N[3:, :].T @ angular_bias(bryant, rate[3:])
     return rate, solve_small(K, ca.vertcat(still, s2) - bias)
 
 

@@ -24,22 +24,22 @@ CONVERGED = 0.0  # what the quality of singular values must be at least
 def configuration(structure: Structure) -> Program:
     """The configuration at whole poses that meet the contacts."""
     b = Builder(structure)
-    add(b, given(b, still=True))
+    rows = add(b, given(b, still=True))
+    b.output("J_W", rows, "1")
     return b.finish()
 
 
-def add(b: Builder, platform: Platform) -> None:
-    """The configuration among a question's outputs."""
+def add(b: Builder, platform: Platform) -> Lanes:
+    """The configuration among a question's outputs; returns the dimensionless rows of J_W."""
     loops, rows = _loops(b, platform)
     b.output("joint", [loop.q_r[0] for loop in loops], "rad or m")
     b.output("beta", [loop.q_r[1] for loop in loops], "rad")
     b.output("gamma", [loop.q_r[2] for loop in loops], "rad")
     b.output("cos_gamma", [loop.cos_gamma for loop in loops], "1")
-    b.output("discriminant", [loop.reach for loop in loops], "1")
+    b.output("discriminant", [loop.discriminant for loop in loops], "1")
     b.output("J_A", [loop.J_A for loop in loops], "m^2 per rad or m")
     transmission = [loop.J_A / loop.J_A_scale for loop in loops]
     b.output("transmission", transmission, "1")
-    b.output("J_W", rows, "1")
     sigma, quality = singular_values(b.total, rows)
     b.output("J_W_sigma", sigma, "1", b.structure.m)
     size = [ca.fabs(t) for t in transmission]
@@ -54,6 +54,7 @@ def add(b: Builder, platform: Platform) -> None:
     normals = [n / ca.norm_2(n) for n in frame.gradients]
     for name, vectors, unit in (("contact_point", points, "m"), ("contact_normal", normals, "1")):
         b.output(name, ca.horzcat(ca.SX(3, 0), *vectors).T, unit, k, 3)
+    return rows
 
 
 def _loops(b: Builder, platform: Platform) -> tuple[list[Loop], Lanes]:
@@ -70,7 +71,7 @@ def _loops(b: Builder, platform: Platform) -> tuple[list[Loop], Lanes]:
         position = platform.placement.position + r
         loop = family.loop(family.named(b.lane(group, "constants")), position)
         e = loop.rod / loop.rod_length
-        active = b.lane(group, "active")
-        rows.append(active * scale * (B.T @ ca.vertcat(e, ca.cross(r, e))))
+        mask = b.lane(group, "mask")
+        rows.append(mask * scale * (B.T @ ca.vertcat(e, ca.cross(r, e))))
         loops.append(loop)
     return loops, rows

@@ -25,7 +25,7 @@ def encoders(structure: Structure) -> Program:
         M = state.point(b.lane(group, "joint"))
         loop = family.loop(family.named(b.lane(group, "constants")), M.position)
         joints.append(loop.q_r[0])
-        rows.append(state.pull(loop.J, M.lever))
+        rows.append(state.generalized_force(loop.J, M.lever))
     b.output("joint", joints, "rad or m")
     b.output("J_theta", rows, "")
     b.output("M_J", platform.motion.M_J, "", 6, structure.m)

@@ -17,7 +17,7 @@ import casadi as ca
 
 from ..dynamics import FORMULATIONS
 from ..dynamics.formulation import Body, Formulation
-from ..kinematics.chain import FAMILIES, Constants, Family, Law
+from ..kinematics.chain import FAMILIES, ChainDynamics, Constants, Family
 from ..kinematics.contact import indices, solve_small
 from ..kinematics.state import PointMotion, State, independent_state, pose_state, twist_state
 from .builder import Builder, Lanes
@@ -55,7 +55,7 @@ class Wrench:
 class ChainTerms:
     """What the chains of one group contribute, lane by lane, dual to the state's rates."""
 
-    law: Law
+    dynamics: ChainDynamics
     forces: dict[str, ca.SX]
     row: ca.SX
 
@@ -84,7 +84,7 @@ class Equations:
     @property
     def A(self) -> Lanes:
         """Rows of J Pi, one a group."""
-        return [self.basis.pull(c.row) for c in self.chains]
+        return [self.basis.generalized_force(c.row) for c in self.chains]
 
     def contact_forces(self, platform: Platform, effort: Lanes) -> ca.SX:
         """lambda along the unit normals, (k,), from the dependent rows of G mu = Q - J^T tau."""
@@ -111,7 +111,7 @@ def equations(
     """The equations of motion.
 
     Args: formulation, route: if not those of the structure.
-          lump: let each chain's bodies act as one, with end masses that are part of the platform.
+          lump: cut each chain's bodies act as one, with end masses that are part of the platform.
           low_latency: fewer operations after one another, for more of them in all.
           state: in which they are written, if not that of route and formulation.
     """
@@ -165,24 +165,24 @@ def _chain_terms(
     constants: Constants = family.named(b.lane(group, "constants"))
     M = state.point(b.lane(group, "joint"))
     if lump:
-        law, force = _lumped(family, constants, M, g, low_latency)
+        dynamics, force = _lumped(family, constants, M, g, low_latency)
         forces = {"chains": force}
     else:
-        law = method.chain(family, constants, M, g)
-        forces = law.forces
-    if not (method.idles and family.idle):
+        dynamics = method.chain(family, constants, M, g)
+        forces = dynamics.forces
+    if not (method.pads and family.padding):
         # A lane without a chain has neither J nor force; elsewhere idle constants see to that.
-        active = b.lane(group, "active")
-        forces = {name: active * f for name, f in forces.items()}
-        law = replace(law, J=active * law.J)
-    pulled = {name: state.pull(f, M.lever) for name, f in forces.items()}
-    return ChainTerms(law, pulled, state.pull(law.J, M.lever))
+        mask = b.lane(group, "mask")
+        forces = {name: mask * f for name, f in forces.items()}
+        dynamics = replace(dynamics, J=mask * dynamics.J)
+    pulled = {name: state.generalized_force(f, M.lever) for name, f in forces.items()}
+    return ChainTerms(dynamics, pulled, state.generalized_force(dynamics.J, M.lever))
 
 
 def _lumped(
     family: Family, c: Constants, M: PointMotion, g: ca.SX, low_latency: bool
-) -> tuple[Law, ca.SX]:
-    """A chain's law, and all its force on M but that of its end masses, (3,).
+) -> tuple[ChainDynamics, ca.SX]:
+    """A chain's dynamics, and all its force on M but that of its end masses, (3,).
 
     With low latency the force is ready one step after the joint's acceleration, of which it is an
     affine function; that takes a few operations more.
@@ -190,18 +190,20 @@ def _lumped(
     held: list[ca.SX] = []
     acceleration = ca.SX.sym("acceleration")
 
-    def let(value: ca.SX) -> ca.SX:
+    def cut(value: ca.SX) -> ca.SX:
         held.append(value)
         return acceleration
 
-    law = family.law(c, M.position, M.velocity, M.acceleration, g, let if low_latency else ca.SX)
-    force = total(list(law.forces.values())) + law.J * law.effort
+    dynamics = family.dynamics(
+        c, M.position, M.velocity, M.acceleration, g, cut if low_latency else ca.SX
+    )
+    force = total(list(dynamics.forces.values())) + dynamics.J * dynamics.effort
     if held:
         slope = ca.jacobian(force, acceleration)
         rest = ca.substitute(force, acceleration, 0)
-        law = replace(law, acceleration=held[0])
+        dynamics = replace(dynamics, acceleration=held[0])
         force = rest + slope * held[0]
-    return law, force
+    return dynamics, force
 
 
 def _body(b: Builder, lumped: bool) -> Body:

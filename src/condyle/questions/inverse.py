@@ -21,7 +21,8 @@ from .structure import Structure
 
 # What can be asked for besides the efforts.
 OUTPUTS = ("contact", "share", "gravity", "motion", "joint", "configuration")
-NEAR = 1e-14  # feasibility or pivot ratio below which a sample is looked at again
+DOUBTFUL = 1e-14  # discriminant below which a sample is looked at again,
+WEAK = 1e-20  # and ratio of a pivot to its column, squared
 HUGE = 1e300
 CERTAIN = 0.5  # of a placement's discriminant, which is 0 or 1 where it was iterated
 
@@ -61,7 +62,7 @@ def program(
     apart = bool({"share", "gravity"} & set(wanted))
     lump = FORMULATIONS[structure.formulation].lumps and not apart
     eq = equations(b, platform, load, lump=lump, low_latency=low_latency)
-    parts = [eq.basis.pull(part) for part in eq.parts.values()]
+    parts = [eq.basis.generalized_force(part) for part in eq.parts.values()]
     right = ca.horzcat(*parts) if apart else total(parts)
     if "gravity" in wanted:
         # Forces of bodies at rest: what gravity alone asks for, and the load.
@@ -83,13 +84,13 @@ def program(
     if "motion" in wanted:
         _add_motion(b, platform)
     if "joint" in wanted:
-        b.output("joint_rate", [c.law.rate for c in eq.chains], "rad/s or m/s")
-        b.output("joint_acceleration", [c.law.acceleration for c in eq.chains], "per s^2")
+        b.output("joint_rate", [c.dynamics.rate for c in eq.chains], "rad/s or m/s")
+        b.output("joint_acceleration", [c.dynamics.acceleration for c in eq.chains], "per s^2")
     if "configuration" in wanted:
         configuration.add(b, platform)
-    b.check(_feasibility(b, platform, eq), NEAR, Status.unreachable)
+    b.check(_feasibility(b, platform, eq), DOUBTFUL, Status.unreachable)
     sure = (ca.fabs(b.total(effort)) < HUGE) * _every_rate_is_felt(b, eq)
-    b.check(pivots * sure, NEAR)
+    b.check(pivots * sure, WEAK)
     return b.finish()
 
 
@@ -99,9 +100,9 @@ def motion(structure: Structure) -> Program:
     platform = closed(b)
     _add_motion(b, platform)
     placement = platform.placement
-    if placement.reach is not None:
+    if placement.discriminant is not None:
         below = None if placement.iterated else Status.unreachable
-        b.check(placement.reach, CERTAIN if placement.iterated else 0.0, below)
+        b.check(placement.discriminant, CERTAIN if placement.iterated else 0.0, below)
     return b.finish()
 
 
@@ -113,15 +114,15 @@ def system(structure: Structure) -> Program:
     still = [b.at_zero(part, *_rates(eq, platform)) for part in eq.parts.values()]
     assert eq.G is not None
     b.output("A", eq.A, "")
-    shape = len(still), structure.m
-    b.output("b", ca.horzcat(*(eq.basis.pull(p) for p in eq.parts.values())).T, "", *shape)
-    b.output("b_gravity", ca.horzcat(*(eq.basis.pull(p) for p in still)).T, "", *shape)
+    for name, parts in (("b", list(eq.parts.values())), ("b_gravity", still)):
+        rows = ca.horzcat(*(eq.basis.generalized_force(p) for p in parts)).T
+        b.output(name, rows, "", len(parts), structure.m)
     b.output("Q", eq.Q, "N, N m", 6)
     b.output("J", [c.row for c in eq.chains], "")
     b.output("G", eq.G, "", 6, len(structure.contacts))
     b.output("n_length", platform.motion.frame.n_length, "", len(structure.contacts))
-    b.output("joint_rate", [c.law.rate for c in eq.chains], "rad/s or m/s")
-    b.output("joint_acceleration", [c.law.acceleration for c in eq.chains], "per s^2")
+    b.output("joint_rate", [c.dynamics.rate for c in eq.chains], "rad/s or m/s")
+    b.output("joint_acceleration", [c.dynamics.acceleration for c in eq.chains], "per s^2")
     return b.finish()
 
 
@@ -153,13 +154,17 @@ def _every_rate_is_felt(b: Builder, eq: Equations) -> ca.SX:
     least = sizes[0]
     for size in ca.vertsplit(sizes)[1:]:
         least = ca.fmin(least, size)
-    return least >= NEAR * ca.sum1(sizes)
+    return least >= WEAK * ca.sum1(sizes)
 
 
 def _feasibility(b: Builder, platform: Platform, eq: Equations) -> ca.SX:
     """Least of the dimensionless discriminants: not negative where the pose can be reached."""
-    least, placement = b.least([c.law.reach for c in eq.chains]), platform.placement
-    if placement.reach is None:
+    least, placement = b.least([c.dynamics.discriminant for c in eq.chains]), platform.placement
+    if placement.discriminant is None:
         return least
     # A pose that Newton did not find is not unreachable but unknown: 0, to be looked at again.
-    return least * placement.reach if placement.iterated else ca.fmin(least, placement.reach)
+    return (
+        least * placement.discriminant
+        if placement.iterated
+        else ca.fmin(least, placement.discriminant)
+    )

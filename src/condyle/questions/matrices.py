@@ -58,7 +58,7 @@ def jacobians(structure: Structure) -> Program:
         c = family.named(b.lane(group, "constants"))
         M = state.point(b.lane(group, "joint"))
         loop = family.loop(c, M.position)
-        rows.append(state.pull(loop.J, M.lever))
+        rows.append(state.generalized_force(loop.J, M.lever))
         one, inverse = chain_jacobians(family, c, loop.q_r)
         two = ca.horzcat(ca.SX.eye(3), -ca.skew(M.lever)) @ state.B
         M_1.append(one)

@@ -54,7 +54,7 @@ class Layout:
         if structure.parallel:
             sizes |= {"slope": 2, "mean": 3, "mean_offset": 1, "difference": 3, "gap": 1}
         lanes = [
-            _slots({"active": 1, "joint": 3, "constants": FAMILIES[kind].size()})
+            _slots({"mask": 1, "joint": 3, "constants": FAMILIES[kind].size()})
             for kind in structure.families
         ]
         return Layout(structure, _slots(sizes), lanes)
@@ -76,10 +76,10 @@ class Layout:
         }
         for i, contact in enumerate(mechanism.contacts):
             values[f"contact_point_{i}"] = contact.point
-            values[f"contact_surface_{i}"] = contact.locus.constants()
+            values[f"contact_surface_{i}"] = contact.offset_surface.constants()
         if self.structure.parallel:
             first, second = (np.array(c.point) for c in mechanism.contacts)
-            a, b = (c.locus.constants() for c in mechanism.contacts)
+            a, b = (c.offset_surface.constants() for c in mechanism.contacts)
             values |= {"slope": a[:2], "mean": (first + second) / 2, "difference": first - second}
             values |= {"mean_offset": (a[2] + b[2]) / 2, "gap": a[2] - b[2]}
         if has_closed_form(mechanism):
@@ -96,7 +96,7 @@ class Layout:
             chains = [c for c in mechanism.chains if c.kind == kind]
             rows = [[1.0, *c.platform, *family.vector(family.constants(c))] for c in chains]
             idle = family.constants(chains[0])
-            idle |= {name: np.zeros_like(idle[name]) for name in self.idle(kind)}
+            idle |= {name: np.zeros_like(idle[name]) for name in self.pads(kind)}
             lanes.append(np.array(rows, dtype=float).T.copy())
             padding.append(np.array([0.0, *chains[0].platform, *family.vector(idle)]))
         order = tuple(
@@ -107,10 +107,10 @@ class Layout:
         )
         return Numbers(parameters.astype(float), tuple(lanes), tuple(padding), order)
 
-    def idle(self, kind: str) -> tuple[str, ...]:
+    def pads(self, kind: str) -> tuple[str, ...]:
         """Constants of a family that, at 0, make a lane that stands for no chain do nothing."""
-        own = FORMULATIONS[self.structure.formulation].idles
-        return FAMILIES[kind].idle if own else ()
+        own = FORMULATIONS[self.structure.formulation].pads
+        return FAMILIES[kind].padding if own else ()
 
 
 def specialised(structure: Structure, numbers: Numbers) -> Structure:
@@ -151,7 +151,7 @@ def single_contacts(
 
 def has_closed_form(mechanism: Mechanism) -> bool:
     """Whether the parasitic motion of the mechanism needs no iteration."""
-    forms = [contact.locus.form for contact in mechanism.contacts]
+    forms = [contact.offset_surface.form for contact in mechanism.contacts]
     return closed_form_available(forms, dependent_coordinates(mechanism))
 
 

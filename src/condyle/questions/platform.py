@@ -17,7 +17,7 @@ from ..kinematics.contact import (
     solve_small,
 )
 from ..kinematics.iteration import newton
-from ..kinematics.parasitic import WholeMotion, gyration, whole_motion
+from ..kinematics.parasitic import WholeMotion, angular_bias, whole_motion
 from ..kinematics.rotation import Bryant
 from .builder import Builder
 from .numbers import contact_symbols
@@ -76,7 +76,7 @@ def given(b: Builder, still: bool = False) -> Platform:
     R, R_omega = bryant.rotation(), bryant.angular_velocity()
     frame = contact_frame(contacts, pose[:3], R)
     E = ca.diagcat(ca.SX.eye(3), R_omega)
-    turning = gyration(bryant, rate[3:])
+    turning = angular_bias(bryant, rate[3:])
     twist_rate = ca.vertcat(acceleration[:3], R_omega @ acceleration[3:] + turning)
     M_J = parasitic_jacobian(frame.N.T @ E, s.dependent)
     motion = WholeMotion(rate, acceleration, E @ rate, twist_rate, M_J, E, R, frame)
@@ -101,7 +101,7 @@ class Basis:
     others: Sequence[int]
     rest: ca.SX
 
-    def pull(self, f: ca.SX) -> ca.SX:
+    def generalized_force(self, f: ca.SX) -> ca.SX:
         """Pi^T f, with a column for each of f."""
         own = f[list(self.identity), :]
         return own + self.rest.T @ f[list(self.others), :] if len(self.others) else own

@@ -119,7 +119,7 @@ def chain_reactions(
 
 def _quantities(bodies: FreeBodies) -> Iterator[tuple[ca.SX, ca.SX]]:
     """Vector and point of each reaction of a chain, in the order of `chain_places`."""
-    yield bodies.unknown[:3], bodies.tip
+    yield bodies.unknown[:3], bodies.end_point
     for i, joint in enumerate(bodies.joints):
         yield bodies.carried.forces[i], joint.point
         if not is_ball(joint):

@@ -56,7 +56,7 @@ def structure_of(
     counts: dict[str, int] = {}
     for chain in mechanism.chains:
         counts[chain.kind] = counts.get(chain.kind, 0) + 1
-    loci = [c.locus for c in mechanism.contacts]
+    loci = [c.offset_surface for c in mechanism.contacts]
     contacts = tuple((locus.form, len(locus.constants())) for locus in loci)
     planes = [locus for locus in loci if locus.form == "plane"]
     return Structure(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..kinematics.causes import causes
-from ..kinematics.singularity import NEAR
+from ..kinematics.singularity import NEAR_SINGULAR
 from ..mechanism.mechanism import Mechanism
 from ..status import Status
 from .contacts import bound_margins, lift_off
@@ -74,6 +74,6 @@ class Derived:
     @cached_property
     def near(self) -> np.ndarray:
         """Index into `KINDS` of the singularity that is near, (N,) int8; 0 at failed samples."""
-        kind = (self.inverse_ratio < NEAR).astype(np.int8)
-        kind += 2 * (self.direct_ratio < NEAR).astype(np.int8)
+        kind = (self.inverse_ratio < NEAR_SINGULAR).astype(np.int8)
+        kind += 2 * (self.direct_ratio < NEAR_SINGULAR).astype(np.int8)
         return kind if self.all_ok else np.where(self.ok, kind, 0).astype(np.int8)

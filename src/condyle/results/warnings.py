@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import BoundsError
 from ..kinematics.causes import cause_text, owners
 from ..kinematics.chain import FAMILIES
-from ..kinematics.singularity import NEAR
+from ..kinematics.singularity import NEAR_SINGULAR
 from ..mechanism.chain import limits
 from ..mechanism.home import HOME_WARNING, home_residuals, home_warnings
 from ..mechanism.mechanism import Mechanism
@@ -59,8 +59,8 @@ KINDS = {
     ),
     "near_singularity": Kind(
         "samples near a singularity",
-        f"ratio below {NEAR:g}: torques grow, and so does the effect of every error in the "
-        "geometry",
+        f"ratio below {NEAR_SINGULAR:g}: torques grow, and so does the effect of every error in "
+        "the geometry",
     ),
     "effort_limit": Kind("effort above a limit", "another actuator, or another motion"),
     "speed_limit": Kind("speed above a limit", "another actuator, or another motion"),
@@ -164,9 +164,9 @@ class Watch:
                         size = np.abs(values[:, i])
                         tally(kind, i, size > limit, size)
             flat = np.abs(configuration.cos_gamma)
-            if (flat < NEAR).any():
+            if (flat < NEAR_SINGULAR).any():
                 for i in range(flat.shape[1]):
-                    tally("rod_angles", i, flat[:, i] < NEAR, -flat[:, i])
+                    tally("rod_angles", i, flat[:, i] < NEAR_SINGULAR, -flat[:, i])
         if not derived.all_ok:
             for code in np.unique(derived.cause[~ok]):
                 mine = derived.cause == code
@@ -211,10 +211,10 @@ class Watch:
         if kind == "near_singularity":
             are = "is" if tally.count == 1 else "are"
             text = (
-                f"{count} {are} near a singularity (ratio below {NEAR:g}), closest {-size:.3g} "
-                f"{worst}"
+                f"{count} {are} near a singularity (ratio below {NEAR_SINGULAR:g}), closest "
+                f"{-size:.3g} {worst}"
             )
-            return Notice(kind, text, value=-size, bound=NEAR, unit="1", **about)
+            return Notice(kind, text, value=-size, bound=NEAR_SINGULAR, unit="1", **about)
         if kind == "failed_samples":
             owner = owners(self.mechanism)[i]
             text = f"{count} left empty, first {self._at(tally.first)}: {cause_text(status, owner)}"
@@ -227,7 +227,9 @@ class Watch:
                 "its two angles lose their meaning; that is a singularity of the description, not "
                 "of the mechanism"
             )
-            return Notice(kind, text, chain.name, value=-size, bound=NEAR, unit="1", **about)
+            return Notice(
+                kind, text, chain.name, value=-size, bound=NEAR_SINGULAR, unit="1", **about
+            )
         family, limit = FAMILIES[chain.kind], limits(chain)
         what, unit, bound = (
             ("effort", family.effort_unit, limit.effort)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import InputError, did_you_mean
 from ..kinematics.contact import indices
-from ..kinematics.singularity import KINDS, NEAR
+from ..kinematics.singularity import KINDS, NEAR_SINGULAR
 from ..mechanism import COORDINATES, Mechanism
 from ..mechanism.chain import limits
 from ..model.data import Evaluation
@@ -206,7 +206,9 @@ class Session:
             messages.append("Singular: the efforts are not determined here")
         messages += state_messages(self.mechanism, margin, force, found.effort[0], None)
         if near != KINDS[0] and status == Status.ok:
-            messages.append(f"Near a singularity of the kind {near} (ratio below {NEAR:g})")
+            messages.append(
+                f"Near a singularity of the kind {near} (ratio below {NEAR_SINGULAR:g})"
+            )
         return ("warning" if messages else "calm"), tuple(messages)
 
 

@@ -14,7 +14,7 @@ from itertools import groupby
 from ...graph.graph import Value
 from ...graph.operations import REDUCTIONS
 from ...graph.program import Program
-from .printer import Printer, fold
+from .printer import Printer, nested
 
 ABREAST = 2  # chains whose statements alternate, to keep both arithmetic ports busy
 LONG = 700  # statements of a chain above which one at a time is enough
@@ -212,4 +212,4 @@ class Loops(Printer):
     def reduction(self, v: Value) -> str:
         shared = [self.repeated(v, t, count) for count, t in self.shared_terms(v)]
         terms = [f"r{v}", *shared] if self.lane_terms(v) else shared
-        return " + ".join(terms) if self.g.nodes[v].op == "sum" else fold("fmin_v", terms)
+        return " + ".join(terms) if self.g.nodes[v].op == "sum" else nested("fmin_v", terms)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...graph.graph import Value
 from ...graph.operations import REDUCTIONS
-from .printer import INFIX, Printer, arithmetic, fold, number
+from .printer import INFIX, Printer, arithmetic, nested, number
 
 
 def prepare(printer: Printer, name: str) -> str:
@@ -61,4 +61,4 @@ def _reduction(printer: Printer, v: Value) -> str:
         f"{count} * {_name(printer, t)}" if sums else _name(printer, t)
         for count, t in printer.shared_terms(v)
     ]
-    return " + ".join(lanes + shared) if sums else fold("fmin_s", lanes + shared)
+    return " + ".join(lanes + shared) if sums else nested("fmin_s", lanes + shared)

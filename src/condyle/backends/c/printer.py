@@ -183,7 +183,7 @@ def padded_counts(program: Program, width: int) -> list[int]:
     return [-(-count // width) * width for count in program.counts]
 
 
-def fold(function: str, terms: list[str]) -> str:
+def nested(function: str, terms: list[str]) -> str:
     """Calls of a function of two arguments, one inside the other."""
     text = terms[0]
     for term in terms[1:]:

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from ...graph.graph import Value
 from ...graph.program import Program
 from ...graph.schedule import ready_times, scheduled
-from .printer import Printer, fold, padded_counts
+from .printer import Printer, nested, padded_counts
 
-NEAR = 12  # cycles between sums that are worth waiting for
+WAIT = 12  # cycles between sums that are worth waiting for
 
 
 class Straight(Printer):
@@ -51,7 +51,7 @@ class Straight(Printer):
         waiting = sorted((v for v in sums if not self.shared_terms(v)), key=lambda v: ready[v])
         bundles = []
         while waiting:
-            near = [v for v in waiting if ready[v] <= ready[waiting[0]] + NEAR]
+            near = [v for v in waiting if ready[v] <= ready[waiting[0]] + WAIT]
             size = 4 if len(near) >= 4 else 2 if len(near) >= 2 else 1
             if size > 1:
                 bundles.append(waiting[:size])
@@ -78,7 +78,7 @@ class Straight(Printer):
         shared = [self.repeated(v, t, count) for count, t in self.shared_terms(v)]
         if self.g.nodes[v].op == "sum":
             return " + ".join([f"lanes_sum({' + '.join(lanes)})", *shared])
-        return fold("fmin_s", [f"lanes_least({fold('fmin_v', lanes)})", *shared])
+        return nested("fmin_s", [f"lanes_least({nested('fmin_v', lanes)})", *shared])
 
     def lane_sample(self, first: object, copy: int) -> str:
         return f"load(in + {first} + {copy * self.width})"

@@ -1,6 +1,6 @@
 """Chain families: one file each, found here by the `kind` of the mechanism file."""
 
-from .family import Constants, Family, Joint, Law, Link, Loop
+from .family import ChainDynamics, Constants, Family, Joint, Link, Loop
 from .pss import PSSFamily
 from .rss import RSSFamily
 from .sps import SPSFamily
@@ -9,4 +9,4 @@ FAMILIES: dict[str, Family] = {
     family.kind: family for family in (RSSFamily(), PSSFamily(), SPSFamily())
 }
 
-__all__ = ["FAMILIES", "Constants", "Family", "Joint", "Law", "Link", "Loop"]
+__all__ = ["FAMILIES", "ChainDynamics", "Constants", "Family", "Joint", "Link", "Loop"]

@@ -1,8 +1,8 @@
 """What a chain family is: the one place where a new family plugs in.
 
-A chain meets the platform at one point M, so all that the rest of the system asks of it is a law
-of that point: from its position, velocity and acceleration to the joint coordinate, its rates,
-and the forces its bodies put on the platform. A family answers in two ways:
+A chain meets the platform at one point M, so all that the rest of the system asks of it is a
+function of that point: from its position, velocity and acceleration to the joint coordinate, its
+rates, and the forces its bodies put on the platform. A family answers in two ways:
 
 - joint space (Section 3.2): joint coordinates q_r = (joint, beta, gamma) in closed form, the
   loop's tip as an expression in q_r, the moving links and the joints between them. The textbook
@@ -24,7 +24,7 @@ import numpy as np
 
 from ..rotation import rotation, rotation_y, rotation_z
 
-Let = Callable[[ca.SX], ca.SX]
+Cut = Callable[[ca.SX], ca.SX]
 
 NEAR_X = np.cos(np.radians(5.0))  # a rod this near X_S takes Y_S for its frame
 
@@ -94,7 +94,7 @@ class Loop:
     """The closed loop at a position of M ([Cheng2023] eqs 12-14, 25-26).
 
     q_r:      joint coordinates, (3,): (joint, beta, gamma).
-    reach:    dimensionless; the chain reaches M where it is not negative.
+    discriminant:    dimensionless; the chain reaches M where it is not negative.
     J:        row of the actuator Jacobian on M: joint' = J . M', (3,).
     rod:      the vector e that closes the loop, (3,) [m].
     J_A:      d L / d joint, and its scale: J_A / scale is the sine of the transmission angle.
@@ -102,7 +102,7 @@ class Loop:
     """
 
     q_r: ca.SX
-    reach: ca.SX
+    discriminant: ca.SX
     J: ca.SX
     rod: ca.SX
     rod_length: ca.SX
@@ -112,7 +112,7 @@ class Loop:
 
 
 @dataclass(frozen=True)
-class Law:
+class ChainDynamics:
     """Forces of a chain's bodies on M, (3,) each, and the joint's motion.
 
     forces:     body name -> force dual to M' (inertia less gravity).
@@ -125,7 +125,7 @@ class Law:
 
     forces: dict[str, ca.SX]
     J: ca.SX
-    reach: ca.SX
+    discriminant: ca.SX
     rate: ca.SX
     acceleration: ca.SX
     efforts: dict[str, ca.SX] = field(default_factory=dict)
@@ -138,8 +138,8 @@ class Law:
         inertia = sum(self.inertias.values(), ca.SX(0))
         return inertia * self.acceleration + sum(self.efforts.values(), ca.SX(0))
 
-    def complete(self, A: ca.SX, g: ca.SX) -> Law:
-        """The same law with everything among the forces."""
+    def complete(self, A: ca.SX, g: ca.SX) -> ChainDynamics:
+        """The same dynamics with everything among the forces."""
         forces = {name: ca.SX.zeros(3) for name in (*self.efforts, *self.inertias)}
         forces |= self.forces
         for name, effort in self.efforts.items():
@@ -159,16 +159,16 @@ class Family(ABC):
     joint_unit: ClassVar[str]
     effort_unit: ClassVar[str]
     shapes: ClassVar[dict[str, int]]  # constant -> number of entries (1, 3 or 9)
-    # Constants that, at 0, leave `law` without J and forces: for lanes that stand for no chain.
+    # Constants that, at 0, leave `dynamics` without J and forces: of lanes without a chain.
     # A family that has none pays for such lanes with a few multiplications.
-    idle: ClassVar[tuple[str, ...]] = ()
+    padding: ClassVar[tuple[str, ...]] = ()
 
     @abstractmethod
     def constants(self, chain: Any) -> dict[str, np.ndarray]:
         """Numbers of one chain, by the names of `shapes`."""
 
     @abstractmethod
-    def tip(self, c: Constants, q_r: ca.SX) -> ca.SX:
+    def end_point(self, c: Constants, q_r: ca.SX) -> ca.SX:
         """M by way of the chain: the left side of [Cheng2023] eq. (15), (3,)."""
 
     @abstractmethod
@@ -184,14 +184,16 @@ class Family(ABC):
         """Inverse kinematics in closed form, on the branch of home."""
 
     def end_masses(self, c: Constants) -> dict[str, ca.SX]:
-        """`Law.end_masses`, from constants alone."""
+        """`ChainDynamics.end_masses`, from constants alone."""
         return {}
 
     @abstractmethod
-    def law(self, c: Constants, M: ca.SX, V: ca.SX, A: ca.SX, g: ca.SX, let: Let = ca.SX) -> Law:
+    def dynamics(
+        self, c: Constants, M: ca.SX, V: ca.SX, A: ca.SX, g: ca.SX, cut: Cut = ca.SX
+    ) -> ChainDynamics:
         """Virtual power: forces on M from its motion.
 
-        Args: let: passes the joint's acceleration on, or puts a symbol in its place.
+        Args: cut: passes the joint's acceleration on, or puts a symbol in its place.
         """
 
     @abstractmethod

@@ -12,11 +12,11 @@ import casadi as ca
 import numpy as np
 
 from .family import (
+    ChainDynamics,
     Constants,
+    Cut,
     Family,
     Joint,
-    Law,
-    Let,
     Link,
     Loop,
     axial_force,
@@ -37,7 +37,7 @@ class PSSFamily(Family):
     joint_unit = "m"
     effort_unit = "N"
     # S is the slider's joint at home; N is N_i0 and Y its second axis.
-    idle = ("branch", "mass", "transverse", "axial", "slider")
+    padding = ("branch", "mass", "transverse", "axial", "slider")
     shapes = {
         "S": 3,
         "axis": 3,
@@ -71,7 +71,7 @@ class PSSFamily(Family):
         }
         return {name: np.asarray(value, dtype=float) for name, value in values.items()}
 
-    def tip(self, c: Constants, q_r: ca.SX) -> ca.SX:
+    def end_point(self, c: Constants, q_r: ca.SX) -> ca.SX:
         return c.S + q_r[0] * c.axis + c.L * rod_direction(c.N, q_r)
 
     def links(self, c: Constants, q_r: ca.SX) -> list[Link]:
@@ -99,7 +99,7 @@ class PSSFamily(Family):
         beta, gamma, cos_gamma = rod_angles(c.N, e, c.L)
         return Loop(
             q_r=ca.vertcat(x, beta, gamma),
-            reach=root / c.L**2,
+            discriminant=root / c.L**2,
             J=e / e_a,
             rod=e,
             rod_length=c.L,
@@ -111,23 +111,25 @@ class PSSFamily(Family):
     def end_masses(self, c: Constants) -> dict[str, ca.SX]:
         return {"rods": rod_masses(c.mass, c.com, c.transverse, c.L)[0]}
 
-    def law(self, c: Constants, M: ca.SX, V: ca.SX, A: ca.SX, g: ca.SX, let: Let = ca.SX) -> Law:
+    def dynamics(
+        self, c: Constants, M: ca.SX, V: ca.SX, A: ca.SX, g: ca.SX, cut: Cut = ca.SX
+    ) -> ChainDynamics:
         _, root, e, _ = self._close(c, M)
         inverse = c.branch * (1 / ca.sqrt(root))  # 1 / e.a
         J = e * inverse
         rate = ca.dot(J, V)
         e_rate = V - c.axis * rate
         # e.(A - a x'') + |e'|^2 = 0
-        acceleration = let(ca.dot(J, A) + ca.dot(e_rate, e_rate) * inverse)
+        acceleration = cut(ca.dot(J, A) + ca.dot(e_rate, e_rate) * inverse)
         S_acceleration = c.axis * acceleration
 
         _, m_SM, m_SS = rod_masses(c.mass, c.com, c.transverse, c.L)
         axial = axial_force(e, e_rate, A - S_acceleration, c.Y, c.L, c.axial)
         # m (1 - com) = m_SM + m_SS splits the weight that the slider carries.
-        return Law(
+        return ChainDynamics(
             forces={"rods": m_SM * S_acceleration - m_SM * g + axial},
             J=J,
-            reach=root / c.L**2,
+            discriminant=root / c.L**2,
             rate=rate,
             acceleration=acceleration,
             efforts={
@@ -156,6 +158,6 @@ class PSSFamily(Family):
         d = M - c.S
         along = ca.dot(d, c.axis)
         root = along * along - ca.dot(d, d) + c.L**2
-        e_a = c.branch * (root * (1 / ca.sqrt(root)))  # shares the law's inverse root
+        e_a = c.branch * (root * (1 / ca.sqrt(root)))  # shares the dynamics's inverse root
         x = along - e_a
         return x, root, d - x * c.axis, e_a

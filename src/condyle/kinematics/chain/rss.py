@@ -14,11 +14,11 @@ import numpy as np
 
 from ..rotation import rotation_z
 from .family import (
+    ChainDynamics,
     Constants,
+    Cut,
     Family,
     Joint,
-    Law,
-    Let,
     Link,
     Loop,
     axial_force,
@@ -32,7 +32,7 @@ from .family import (
     rod_spin,
 )
 
-LEVEL = 1e-15  # sine of a shaft's tilt below which its crank plane is level to rounding
+LEVEL = 1e-15  # sine of a shaft's tilt below which its crank plane is plane_1 to rounding
 
 
 class RSSFamily(Family):
@@ -40,13 +40,13 @@ class RSSFamily(Family):
     bodies = ("cranks", "couplers")
     joint_unit = "rad"
     effort_unit = "N m"
-    # `level` and `steep` span the crank plane, level[2] = 0: one constant fewer in the hot path.
+    # `plane_1` and `plane_2` span the crank plane; plane_1[2] = 0 saves a constant.
     # C and N are C_i0 and N_i0; Y is the second axis of N.
-    idle = ("branch", "mass", "transverse", "axial", "crank")
+    padding = ("branch", "mass", "transverse", "axial", "crank")
     shapes = {
         "G": 3,
-        "level": 2,
-        "steep": 3,
+        "plane_1": 2,
+        "plane_2": 3,
         "l": 1,
         "L": 1,
         "branch": 1,
@@ -67,16 +67,16 @@ class RSSFamily(Family):
         z = np.asarray(chain.axis) - np.dot(chain.axis, x) * x
         z /= np.linalg.norm(z)
         y = np.cross(z, x)
-        level = np.array([-z[1], z[0]])
-        size = np.linalg.norm(level)
-        level = level / size if size > LEVEL else np.array([1.0, 0.0])
+        plane_1 = np.array([-z[1], z[0]])
+        size = np.linalg.norm(plane_1)
+        plane_1 = plane_1 / size if size > LEVEL else np.array([1.0, 0.0])
         if size <= LEVEL:
-            z = np.array([0.0, 0.0, np.sign(z[2])])  # the crank plane is level to rounding
+            z = np.array([0.0, 0.0, np.sign(z[2])])  # the crank plane is plane_1 to rounding
         N = rod_frame(coupler)
         values = {
             "G": chain.base,
-            "level": level,
-            "steep": np.cross(z, [*level, 0.0]),
+            "plane_1": plane_1,
+            "plane_2": np.cross(z, [*plane_1, 0.0]),
             "l": np.linalg.norm(crank),
             "L": np.linalg.norm(coupler),
             "branch": -np.sign(coupler @ y),
@@ -91,7 +91,7 @@ class RSSFamily(Family):
         }
         return {name: np.asarray(value, dtype=float) for name, value in values.items()}
 
-    def tip(self, c: Constants, q_r: ca.SX) -> ca.SX:
+    def end_point(self, c: Constants, q_r: ca.SX) -> ca.SX:
         return self._crank_tip(c, q_r) + c.L * rod_direction(c.N, q_r)
 
     def links(self, c: Constants, q_r: ca.SX) -> list[Link]:
@@ -130,7 +130,7 @@ class RSSFamily(Family):
         beta, gamma, cos_gamma = rod_angles(c.N, e, c.L)
         return Loop(
             q_r=ca.vertcat(ca.atan2(b * k + a * s, a * k - b * s), beta, gamma),
-            reach=root / c.L**2,
+            discriminant=root / c.L**2,
             J=e / ca.dot(e, tangent),
             rod=e,
             rod_length=c.L,
@@ -142,11 +142,13 @@ class RSSFamily(Family):
     def end_masses(self, c: Constants) -> dict[str, ca.SX]:
         return {"couplers": rod_masses(c.mass, c.com, c.transverse, c.L)[0]}
 
-    def law(self, c: Constants, M: ca.SX, V: ca.SX, A: ca.SX, g: ca.SX, let: Let = ca.SX) -> Law:
+    def dynamics(
+        self, c: Constants, M: ca.SX, V: ca.SX, A: ca.SX, g: ca.SX, cut: Cut = ca.SX
+    ) -> ChainDynamics:
         d = M - c.G
         # Both vectors of the crank plane times l: constants, as all that is made of constants.
-        level, steep = c.l * ca.vertcat(c.level[0], c.level[1], 0), c.l * c.steep
-        a, b = ca.dot(d, level), ca.dot(d, steep)
+        plane_1, plane_2 = c.l * ca.vertcat(c.plane_1[0], c.plane_1[1], 0), c.l * c.plane_2
+        a, b = ca.dot(d, plane_1), ca.dot(d, plane_2)
         k = ca.dot(d, d) * 0.5 + (c.l**2 - c.L**2) * 0.5
         h = a * a + b * b
         root = h - k * k
@@ -155,8 +157,8 @@ class RSSFamily(Family):
         k_h, s_h = k * inverse_h, root * inverse_e_t * inverse_h
         cosine, sine = a * k_h + b * s_h, b * k_h - a * s_h
 
-        r = cosine * level + sine * steep
-        t = cosine * steep - sine * level
+        r = cosine * plane_1 + sine * plane_2
+        t = cosine * plane_2 - sine * plane_1
         e = d - r
         J = e * inverse_e_t
         rate = ca.dot(J, V)
@@ -164,16 +166,16 @@ class RSSFamily(Family):
         rate2 = rate * rate
         # e.(A - S'') + |e'|^2 = 0 with S'' = t theta'' - r theta'^2 and e.r = k - l^2
         square = ca.dot(e_rate, e_rate) + (k - c.l**2) * rate2
-        acceleration = let(ca.dot(J, A) + square * inverse_e_t)
+        acceleration = cut(ca.dot(J, A) + square * inverse_e_t)
         S_acceleration = t * acceleration - r * rate2
 
         _, m_SM, m_SS = rod_masses(c.mass, c.com, c.transverse, c.L)
         axial = axial_force(e, e_rate, A - S_acceleration, c.Y, c.L, c.axial)
         # m (1 - com) = m_SM + m_SS splits the weight that the crank carries.
-        return Law(
+        return ChainDynamics(
             forces={"couplers": m_SM * S_acceleration - m_SM * g + axial},
             J=J,
-            reach=root * (1 / (c.l * c.L) ** 2),
+            discriminant=root * (1 / (c.l * c.L) ** 2),
             rate=rate,
             acceleration=acceleration,
             efforts={"couplers": ca.dot(t, m_SM * A - (m_SM + m_SS) * g - axial)},

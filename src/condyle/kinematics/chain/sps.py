@@ -13,11 +13,11 @@ import casadi as ca
 import numpy as np
 
 from .family import (
+    ChainDynamics,
     Constants,
+    Cut,
     Family,
     Joint,
-    Law,
-    Let,
     Link,
     Loop,
     rod_angles,
@@ -38,7 +38,7 @@ class SPSFamily(Family):
     effort_unit = "N"
     # cylinder_com is the distance from B, piston_com the distance from M, both along the leg.
     # `present` is 1; at 0 the leg has no row.
-    idle = ("present", "piston_mass")
+    padding = ("present", "piston_mass")
     shapes = {
         "B": 3,
         "home": 1,
@@ -60,7 +60,7 @@ class SPSFamily(Family):
         values = {**home, "Y": N[:, 1], **bodies, "N": N}
         return {name: np.asarray(value, dtype=float) for name, value in values.items()}
 
-    def tip(self, c: Constants, q_r: ca.SX) -> ca.SX:
+    def end_point(self, c: Constants, q_r: ca.SX) -> ca.SX:
         return c.B + (c.home + q_r[0]) * rod_direction(c.N, q_r)
 
     def links(self, c: Constants, q_r: ca.SX) -> list[Link]:
@@ -71,13 +71,15 @@ class SPSFamily(Family):
         )
         return [
             Link("cylinders", c.cylinder_mass, c.B + c.cylinder_com * n, spin, cylinder),
-            Link("pistons", c.piston_mass, self.tip(c, q_r) - c.piston_com * n, spin, piston),
+            Link("pistons", c.piston_mass, self.end_point(c, q_r) - c.piston_com * n, spin, piston),
         ]
 
     def joints(self, c: Constants, q_r: ca.SX) -> list[Joint]:
         return [
             Joint.ball("base_joint", "base joint B", c.B, rod_guide(c.N, q_r)),
-            Joint.slide("sleeve", "platform joint M", self.tip(c, q_r), rod_direction(c.N, q_r)),
+            Joint.slide(
+                "sleeve", "platform joint M", self.end_point(c, q_r), rod_direction(c.N, q_r)
+            ),
         ]
 
     def loop(self, c: Constants, M: ca.SX) -> Loop:
@@ -86,7 +88,7 @@ class SPSFamily(Family):
         beta, gamma, cos_gamma = rod_angles(c.N, e, r)
         return Loop(
             q_r=ca.vertcat(r - c.home, beta, gamma),
-            reach=ca.dot(e, e) / c.home**2,  # a leg reaches everywhere
+            discriminant=ca.dot(e, e) / c.home**2,  # a leg reaches everywhere
             J=e / r,
             rod=e,
             rod_length=r,
@@ -98,7 +100,9 @@ class SPSFamily(Family):
     def end_masses(self, c: Constants) -> dict[str, ca.SX]:
         return {"pistons": c.piston_mass}
 
-    def law(self, c: Constants, M: ca.SX, V: ca.SX, A: ca.SX, g: ca.SX, let: Let = ca.SX) -> Law:
+    def dynamics(
+        self, c: Constants, M: ca.SX, V: ca.SX, A: ca.SX, g: ca.SX, cut: Cut = ca.SX
+    ) -> ChainDynamics:
         """With w = r u'' across the leg, W = |V|^2 - r'^2 = r^2 |u'|^2 and z = com_piston / r:
 
         cylinder: (m com^2 + I) w / r^2 - (m com / r) (g across u),
@@ -136,13 +140,13 @@ class SPSFamily(Family):
         z = c.piston_com * inverse
         lag = c.piston_mass * z
         about_M = c.piston_transverse * inverse2 - (c.piston_mass - lag) * z
-        return Law(
+        return ChainDynamics(
             forces={
                 "cylinders": about_B * w - arm * g + c.cylinder_axial * spin,
                 "pistons": about_M * w - lag * (A - g) + c.piston_axial * spin,
             },
             J=u,
-            reach=r2 * (1 / c.home**2),
+            discriminant=r2 * (1 / c.home**2),
             rate=rate,
             acceleration=u_A + swing,
             efforts={

@@ -1,18 +1,18 @@
 """The surface at a distance from a wall: where the centre of a ball is that touches the wall.
 
-The foot w of a point p, where the ball would touch, solves with the wall's equation g
+The closest point w of a point p, where the ball would touch, solves with the wall's equation g
 
     p = w + mu grad g(w),   g(w) = 0.
 
-Newton goes there from the foot at home, along the straight line from the home centre to p: so
-the foot is that of home's branch, also for a ball that nearly fills its socket. The number of
-steps is fixed, which makes the foot an expression. With n = grad g / |grad g| at w,
+Newton goes there from the closest point at home, along the straight line from the home centre to p:
+so it is that of home's branch, also for a ball that nearly fills its socket. The number of steps is
+fixed, which makes the closest point an expression. With n = grad g / |grad g| at w,
 
     phi(p) = n . (p - w) + g(w) / |grad g(w)| - distance,   grad phi = n.
 
-phi is stationary in w at the foot: an error of w enters phi squared, its first and second
-derivatives at first order; the last steps start from a converged foot and remove it from all
-three, so that automatic derivatives are exact too. Where Newton has not converged phi is
+phi is stationary in w at the closest point: an error of w enters phi squared, its first and second
+derivatives at first order; the last steps start from a converged closest point and remove it from
+all three, so that automatic derivatives are exact too. Where Newton has not converged phi is
 infinite, never wrong.
 """
 
@@ -29,10 +29,10 @@ from .smooth import Smooth
 
 ON_THE_WAY = (1 / 3, 2 / 3)  # parts of the way from home at which Newton makes one step,
 STEPS = 6  # and how many it makes at the point itself,
-AGAIN = 2  # or from the foot of a point nearby
-CONVERGED = 1e-10  # metres off the foot's conditions
+AGAIN = 2  # or from the closest point of a point nearby
+CONVERGED = 1e-10  # metres off the closest point's conditions
 STILL = 1e-15  # metres of a step that is rounding
-DIRECTIONS, STARTS, HOME_STEPS = 1000, 20, 50  # with which the foot of home is looked for
+DIRECTIONS, STARTS, HOME_STEPS = 1000, 20, 50  # with which the closest point of home is looked for
 _FUNCTIONS: dict[tuple[str, int], tuple[ca.Function, ca.Function]] = {}
 
 
@@ -40,14 +40,15 @@ _FUNCTIONS: dict[tuple[str, int], tuple[ca.Function, ca.Function]] = {}
 class Parallel(Smooth):
     """Points at a signed distance [m] from a wall, positive along its normal.
 
-    centre, foot, multiplier: a point near the surface, its foot and mu there: where Newton begins.
-    start: foot and mu, (4,), with which it begins instead: see `started_at`.
+    centre, closest_point, multiplier: a point near the surface, its closest point and mu there:
+    where Newton begins.
+    start: closest_point and mu, (4,), with which it begins instead: see `started_at`.
     """
 
     wall: Any
     distance: float
     centre: tuple[float, ...] = (0.0, 0.0, 0.0)
-    foot: tuple[float, ...] = (0.0, 0.0, 0.0)
+    closest_point: tuple[float, ...] = (0.0, 0.0, 0.0)
     multiplier: float = 0.0
     start: Any = field(default=None, compare=False)
 
@@ -56,8 +57,12 @@ class Parallel(Smooth):
     def near(wall: Any, distance: float, point: tuple[float, ...]) -> Parallel:
         """The parallel surface as seen from `point`, (3,) [m]."""
         equation = _functions(wall, len(wall.constants()))[0]
-        foot, multiplier = _home_foot(equation, wall.constants(), distance, np.array(point))
-        return Parallel(wall, distance, tuple(point), tuple(map(float, foot)), float(multiplier))
+        closest_point, multiplier = _home_closest_point(
+            equation, wall.constants(), distance, np.array(point)
+        )
+        return Parallel(
+            wall, distance, tuple(point), tuple(map(float, closest_point)), float(multiplier)
+        )
 
     @property
     def kind(self) -> str:
@@ -72,23 +77,23 @@ class Parallel(Smooth):
         return f"parallel {self.wall.form}"
 
     def constants(self) -> tuple[float, ...]:
-        """distance, centre, foot, multiplier, then the wall's."""
-        start = (*self.centre, *self.foot, self.multiplier)
+        """distance, centre, closest point, multiplier, then the wall's."""
+        start = (*self.centre, *self.closest_point, self.multiplier)
         return (self.distance, *start, *self.wall.constants())
 
     def phi(self, point: Any, constants: Any = None) -> Any:
         return self._at(point, constants)[0]
 
     def gradient(self, point: ca.SX, constants: Any = None) -> ca.SX:
-        """n at the foot, (3,)."""
+        """n at the closest point, (3,)."""
         return self._at(point, constants)[1]
 
     def bending(self, point: ca.SX, velocity: ca.SX, constants: Any = None) -> ca.SX:
-        """v . dn/dt, from the velocity of the foot."""
+        """v . dn/dt, from the velocity of the closest point."""
         _, n, size, H, inverse, along, _ = self._at(point, constants)
         still = inverse @ velocity
-        foot_velocity = still - along * (ca.dot(n, still) / ca.dot(n, along))
-        turn = (H @ foot_velocity) / size
+        point_velocity = still - along * (ca.dot(n, still) / ca.dot(n, along))
+        turn = (H @ point_velocity) / size
         return ca.dot(velocity, turn) - ca.dot(velocity, n) * ca.dot(n, turn)
 
     def started_at(self, point: ca.SX, constants: Any = None) -> Parallel:
@@ -97,7 +102,7 @@ class Parallel(Smooth):
         return replace(self, start=start)
 
     def grip(self) -> float:
-        """Smallest eigenvalue of 1 + distance * curvature at the foot of `centre`.
+        """Smallest eigenvalue of 1 + distance * curvature at the closest point of `centre`.
 
         It is 1 on a flat wall and 0 for a ball of the wall's radius of curvature; where it is not
         positive, the ball does not fit.
@@ -118,7 +123,7 @@ class Parallel(Smooth):
         w, mu = self.start[:3], self.start[3]
         for _ in range(AGAIN):
             w, mu = newton_step(equation, p, w, mu, c[8:])
-        phi, _, *more = _at_foot(equation, p, w, mu, c)
+        phi, _, *more = _at_closest_point(equation, p, w, mu, c)
         return [phi, *more]
 
     def _numbers(self, constants: Any) -> Any:
@@ -144,17 +149,19 @@ def _equation(wall: Any, count: int) -> ca.Function:
 
 
 def _touching(equation: ca.Function, count: int) -> ca.Function:
-    """(p, constants) -> phi, n, |grad g|, H, (1 + mu H)^-1, (1 + mu H)^-1 n, foot and mu."""
+    """(p, constants) -> phi, n, |grad g|, H, (1 + mu H)^-1, (1 + mu H)^-1 n, w and mu."""
     p, c = ca.SX.sym("p", 3), ca.SX.sym("c", count + 8)
     home, w, mu, wall = c[1:4], c[4:7], c[7], c[8:]
     for part in (*ON_THE_WAY, *[1.0] * STEPS):
         w, mu = newton_step(equation, home + part * (p - home) if part < 1 else p, w, mu, wall)
-    phi, converged, *more = _at_foot(equation, p, w, mu, c)
+    phi, converged, *more = _at_closest_point(equation, p, w, mu, c)
     return ca.Function("touching", [p, c], [phi / converged, *more])
 
 
-def _at_foot(equation: ca.Function, p: ca.SX, w: ca.SX, mu: ca.SX, c: ca.SX) -> list[ca.SX]:
-    """phi, whether w is the foot, and the rest of what `_touching` returns."""
+def _at_closest_point(
+    equation: ca.Function, p: ca.SX, w: ca.SX, mu: ca.SX, c: ca.SX
+) -> list[ca.SX]:
+    """phi, whether w is the closest point, and the rest of what `_touching` returns."""
     g, a, H = equation(w, c[8:])
     size = ca.norm_2(a)
     n = a / size
@@ -166,7 +173,7 @@ def _at_foot(equation: ca.Function, p: ca.SX, w: ca.SX, mu: ca.SX, c: ca.SX) -> 
 
 
 def newton_step(equation: ca.Function, p: Any, w: Any, mu: Any, constants: Any) -> tuple[Any, Any]:
-    """One step of w and mu towards the foot of p.
+    """One step of w and mu towards the closest point of p.
 
     (1 + mu H) dw + a dmu = p - w - mu a,   a . dw = -g,   a = grad g.
     """
@@ -177,14 +184,14 @@ def newton_step(equation: ca.Function, p: Any, w: Any, mu: Any, constants: Any) 
     return w + rest - step * along, mu + step
 
 
-def _home_foot(
+def _home_closest_point(
     equation: ca.Function, constants: tuple[float, ...], distance: float, p: np.ndarray
 ) -> tuple[np.ndarray, float]:
     """Foot and mu of a point at about `distance` from the wall.
 
-    The ball's own surface passes through the foot: points all over it that are nearest the wall,
-    with radii nearest the normal, start Newton; the foot whose distance is nearest `distance` is
-    the one.
+    The ball's own surface passes through the closest point: points all over it that are nearest the
+    wall, with radii nearest the normal, start Newton; the one whose distance is nearest `distance`
+    is taken.
     """
     numbers = ca.DM(constants)
     u = spread_directions(DIRECTIONS)
@@ -193,7 +200,7 @@ def _home_foot(
     with np.errstate(all="ignore"):
         size = np.linalg.norm(a, axis=0)
         miss = np.abs(g[0]) / size + abs(distance) * np.linalg.norm(a / size - u.T, axis=0)
-    feet = []
+    closest_points = []
     for k in np.argsort(np.where(np.isfinite(miss), miss, np.inf))[:STARTS]:
         w, mu = ca.DM(starts[k]), ca.DM(distance / size[k])
         for _ in range(HOME_STEPS):
@@ -201,10 +208,12 @@ def _home_foot(
             if not float(ca.norm_2(w - last)) > STILL:
                 break
         off = abs(float(mu * ca.norm_2(equation(w, numbers)[1])) - distance)
-        feet.append((off if np.isfinite(off) else np.inf, np.asarray(w).ravel(), float(mu)))
+        closest_points.append(
+            (off if np.isfinite(off) else np.inf, np.asarray(w).ravel(), float(mu))
+        )
         if off < CONVERGED:
             break
-    return min(feet, key=lambda foot: foot[0])[1:]
+    return min(closest_points, key=lambda closest_point: closest_point[0])[1:]
 
 
 def spread_directions(count: int) -> np.ndarray:

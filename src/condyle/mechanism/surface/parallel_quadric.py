@@ -1,12 +1,12 @@
-"""The parallel of a second-order surface: its foot by one unknown.
+"""The parallel of a second-order surface: its closest point by one unknown.
 
-In the principal axes of g = sum(h y^2 / 2 + b y) + e the foot of y is
+In the principal axes of g = sum(h y^2 / 2 + b y) + e the closest point of y is
 
     w = (y - mu b) / (1 + mu h),   g(w) = 0:
 
 one equation in mu, monotonic as long as all 1 + mu h are positive, as they are at the nearest
-foot. Where they come near zero, for a ball that nearly fills a steep socket, the general way is
-the safer one. All else is as for any `Parallel`, at a fraction of its cost.
+closest point. Where they come near zero, for a ball that nearly fills a steep socket, the general
+way is the safer one. All else is as for any `Parallel`, at a fraction of its cost.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 
 from .parallel import AGAIN, CONVERGED, Parallel
 
-GUESSES = 2  # from the normal at a guessed foot to a better one,
+GUESSES = 2  # from the normal at a guessed closest point to a better one,
 STEPS = 5  # and steps of Newton then
 EASY = 0.5  # least 1 + mu h at home for this way
 COUNT = 20  # constants
@@ -60,7 +60,7 @@ class ParallelQuadric(Parallel):
         y, mu = _axes(c).T @ (p - c[1:4]), self.start
         for _ in range(AGAIN):
             mu = _stepped(y, mu, c)
-        phi, _, *more = _at_foot(y, mu, c)
+        phi, _, *more = _at_closest_point(y, mu, c)
         return [phi, *more]
 
 
@@ -70,7 +70,7 @@ def cheapest(general: Parallel) -> Parallel:
     if not (1 + general.multiplier * h > EASY).all():
         return general
     return ParallelQuadric(
-        general.wall, general.distance, general.centre, general.foot, general.multiplier
+        general.wall, general.distance, general.centre, general.closest_point, general.multiplier
     )
 
 
@@ -90,7 +90,7 @@ def _touching() -> ca.Function:
     mu = c[0] / ca.norm_2(h * w + b)
     for _ in range(STEPS):
         mu = _stepped(y, mu, c)
-    phi, converged, *more = _at_foot(y, mu, c)
+    phi, converged, *more = _at_closest_point(y, mu, c)
     return ca.Function("touching", [p, c], [phi / converged, *more])
 
 
@@ -99,7 +99,7 @@ def _stepped(y: ca.SX, mu: ca.SX, c: ca.SX) -> ca.SX:
     return mu + g / ca.dot(a, a * shrink)
 
 
-def _at_foot(y: ca.SX, mu: ca.SX, c: ca.SX) -> list[ca.SX]:
+def _at_closest_point(y: ca.SX, mu: ca.SX, c: ca.SX) -> list[ca.SX]:
     """phi, whether mu has converged, and the rest of what `_touching` returns."""
     axes, h = _axes(c), c[13:16]
     g, a, shrink, w = _foot(y, mu, h, c[16:19], c[19])

@@ -116,7 +116,7 @@ def draw_surface(axes: Axes, contact: Contact) -> None:
     (x0, x1), (z0, z1) = axes.get_xlim(), axes.get_ylim()
     x, z = np.meshgrid(np.linspace(x0, x1, GRID), np.linspace(z0, z1, GRID))
     p = ca.SX.sym("p", 3)
-    phi = ca.Function("phi", [p], [contact.locus.phi(p)])
+    phi = ca.Function("phi", [p], [contact.offset_surface.phi(p)])
     where = np.column_stack([x.ravel(), np.full(x.size, contact.point[1] * 1e3), z.ravel()]) / 1e3
     value = evaluate(phi, where)[0].reshape(x.shape)
     value[~np.isfinite(value)] = np.nan  # a ball far from its wall

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...kinematics.singularity import NEAR
+from ...kinematics.singularity import NEAR_SINGULAR
 from .chains import groups, heading, readable, styles
 from .labels import caption
 from .panels import finish, legend, legend_beside, lines
@@ -58,7 +58,7 @@ def singularity(solution: Solution) -> Figure:
 
     ratio = solution["singularity_ratio"].values[:, None]
     lines(bottom, solution, ratio, ["smaller ratio"])
-    bottom.axhline(NEAR, color=ALERT, lw=1, ls=DASHES[1], label=f"near: {NEAR:g}")
+    bottom.axhline(NEAR_SINGULAR, color=ALERT, lw=1, ls=DASHES[1], label=f"near: {NEAR_SINGULAR:g}")
     bottom.set_title("smallest over largest, of the transmissions or of the singular values")
     for axes in (top, middle, bottom):
         legend_beside(axes)

@@ -38,7 +38,7 @@ class Patch:
 
 def contact_normals(contact: Contact, points: np.ndarray) -> np.ndarray:
     """Unit normals n of the contact at ball centres (N, 3): grad phi / |grad phi|."""
-    _, gradient = _phi(contact.locus, points)
+    _, gradient = _phi(contact.offset_surface, points)
     with np.errstate(invalid="ignore", divide="ignore"):
         return gradient / np.linalg.norm(gradient, axis=1, keepdims=True)
 
@@ -81,7 +81,7 @@ def contact_profile(contact: Contact, low: float, high: float, y: float) -> np.n
         return None
     x = np.linspace(low, high, 61)
     flat = np.column_stack([x, np.full_like(x, y)]) - np.asarray(contact.point)[:2]
-    return _solve(contact.locus, contact.point, frame, flat)
+    return _solve(contact.offset_surface, contact.point, frame, flat)
 
 
 def _phi(surface: Any, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,143 @@
+"""What is asked at N samples: which efforts and contact forces balance a generalized force.
+
+    Q = J^T tau + sum_k lambda_k D_k,    D_k = N_k - sigma_k T_k,    sigma_k = sign(lambda_k),
+
+six equations for n efforts and k contact forces. The effort is tau + offset, where the offset is
+what the actuator loses (or gives) by itself; limits and objective apply to the effort.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from ..errors import InputError
+
+MOST_CONTACTS = 5
+
+
+@dataclass(frozen=True)
+class Problem:
+    """N samples of one machine.
+
+    Q:        generalized force that efforts and contacts balance, (N, 6) [N, N m].
+    J:        rows of the actuator Jacobian on the platform's twist, (N, n, 6).
+    normal:   wrench of a unit contact force without friction, (N, k, 6).
+    friction: what friction takes off it where the contact pushes, mu [u; c x u], (N, k, 6);
+              zero where there is none.
+    low, high: limits of the efforts, (n,); infinite where there is none.
+    push:     sign of a one-sided contact's force, 0 where the contact is two-sided, (k,).
+    preload:  least size of a one-sided contact's force [N].
+    offset:   effort less tau, (N, n).
+    contact_weight: W / N_ref^2 [1/N^2]: `weighted` adds W (lambda_k / N_ref)^2 of every contact.
+    """
+
+    Q: np.ndarray
+    J: np.ndarray
+    normal: np.ndarray
+    friction: np.ndarray | None = None
+    low: np.ndarray | None = None
+    high: np.ndarray | None = None
+    push: np.ndarray | None = None
+    preload: float = 0.0
+    offset: np.ndarray | None = None
+    contact_weight: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Fill in what was left out, and refuse what does not fit together."""
+        if np.ndim(self.J) != 3 or np.ndim(self.normal) != 3:
+            raise InputError(
+                f"J must be (N, n, 6) and normal (N, k, 6); got {np.shape(self.J)} and "
+                f"{np.shape(self.normal)}"
+            )
+        count, n, k = np.shape(self.J)[0], np.shape(self.J)[1], np.shape(self.normal)[1]
+        defaults = {
+            "friction": np.zeros((count, k, 6)),
+            "low": np.full(n, -np.inf),
+            "high": np.full(n, np.inf),
+            "push": np.zeros(k),
+            "offset": np.zeros((count, n)),
+        }
+        shapes = {"Q": (count, 6), "J": (count, n, 6), "normal": (count, k, 6)}
+        shapes |= {name: a.shape for name, a in defaults.items()}
+        for name, shape in shapes.items():
+            given = getattr(self, name)
+            array = defaults[name] if given is None else np.asarray(given, dtype=float)
+            if array.shape != shape:
+                raise InputError(f"{name} must be of shape {shape}; got {array.shape}")
+            object.__setattr__(self, name, array)
+        self._check_numbers()
+
+    def _check_numbers(self) -> None:
+        low, high, push = self.limits[0], self.limits[1], self.pushes
+        if self.k > MOST_CONTACTS:
+            raise InputError(f"at most {MOST_CONTACTS} contacts; got {self.k}")
+        if not (low <= high).all() or (low == np.inf).any() or (high == -np.inf).any():
+            worst = int(np.argmin((low <= high) & (low < np.inf) & (high > -np.inf)))
+            raise InputError(
+                f"limits of effort {worst}: [{low[worst]:g}, {high[worst]:g}]; the first must be a "
+                "number not above the second"
+            )
+        if not np.isin(push, (-1, 0, 1)).all():
+            raise InputError(f"push must be -1, 0 or 1; got {push.tolist()}")
+        for name in ("preload", "contact_weight"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value >= 0):
+                raise InputError(f"{name} must be a number, 0 or more; got {value}")
+
+    @property
+    def count(self) -> int:
+        """N."""
+        return self.J.shape[0]
+
+    @property
+    def n(self) -> int:
+        """Number of efforts."""
+        return self.J.shape[1]
+
+    @property
+    def k(self) -> int:
+        """Number of contacts."""
+        return self.normal.shape[1]
+
+    @property
+    def limits(self) -> tuple[np.ndarray, np.ndarray]:
+        """low and high, (n,) each."""
+        assert self.low is not None and self.high is not None
+        return self.low, self.high
+
+    @property
+    def pushes(self) -> np.ndarray:
+        """push, (k,)."""
+        assert self.push is not None
+        return self.push
+
+    @property
+    def frictions(self) -> np.ndarray:
+        """friction, (N, k, 6)."""
+        assert self.friction is not None
+        return self.friction
+
+    @property
+    def offsets(self) -> np.ndarray:
+        """offset, (N, n)."""
+        assert self.offset is not None
+        return self.offset
+
+    @property
+    def scale(self) -> np.ndarray:
+        """max_i, the larger of |limits|, (n,)."""
+        return np.maximum(*np.abs(self.limits))
+
+    @property
+    def finite(self) -> np.ndarray:
+        """Samples whose numbers are all finite, (N,)."""
+        parts = (self.Q, self.J, self.normal, self.frictions, self.offsets)
+        return np.all([np.isfinite(a).all(axis=tuple(range(1, a.ndim))) for a in parts], axis=0)
+
+    def take(self, rows: np.ndarray) -> Problem:
+        """The same machine at some of the samples."""
+        names = ("Q", "J", "normal", "friction", "offset")
+        return replace(self, **{f.name: getattr(self, f.name)[rows] for f in fields(self)
+                                if f.name in names})  # fmt: skip

@@ -1,0 +1,101 @@
+"""Columns of numbers, and where in their file each row stands."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from condyle.errors import InputError
+from condyle.motion.units import Dimension, Units, dimension
+from condyle.motion.words import columns_are, guess
+
+Known = Collection[str] | Mapping[str, Dimension]
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Finite numbers by column name, in the order of the file.
+
+    Attributes: source: what to call the table in messages, usually the path as given.
+                columns: name -> (rows,), in SI where the header names a unit.
+                lines: on which line of the file (from 1) each row stands, (rows,); or the rows'
+                    numbers where the file has no lines.
+                scale: name -> factor to SI that was applied, where the header names a unit.
+                ignored: columns that were not asked for.
+                counted: what `lines` counts.
+    """
+
+    source: str
+    columns: dict[str, np.ndarray]
+    lines: np.ndarray
+    scale: dict[str, float] = field(default_factory=dict)
+    ignored: tuple[str, ...] = ()
+    counted: str = "line"
+
+    @property
+    def rows(self) -> int:
+        return len(self.lines)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self.columns)
+
+    @property
+    def first_line(self) -> int:
+        return int(self.lines[0])
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the reader of the results should know about the file."""
+        if not self.ignored:
+            return ()
+        return (f"{self.source}: {columns_are(self.ignored)} not used",)
+
+    def where(self, row: int) -> str:
+        """'motion.csv, line 57' for a row counted from 0."""
+        return f"{self.source}, {self.counted} {self.lines[row]}"
+
+    def require(self, names: Iterable[str]) -> np.ndarray:
+        """The columns `names` side by side, (rows, number of names).
+
+        Raises: InputError: naming those that are missing.
+        """
+        names = list(names)
+        if missing := [name for name in names if name not in self.columns]:
+            hint = guess(missing[0], [*self.columns, *self.ignored])
+            raise InputError(f"{self.source}: {columns_are(missing)} missing.{hint}")
+        return np.column_stack([self.columns[name] for name in names])
+
+    def si(self, units: Units) -> dict[str, np.ndarray]:
+        """The columns in SI: by their header where that names a unit, else by `units`.
+
+        Raises: InputError: where both are given and differ.
+        """
+        for name, scale in self.scale.items():
+            kind = (dimension(name) or ("", 0))[0]
+            if kind in units.given and not np.isclose(scale, units.scale(name), rtol=1e-12, atol=0):
+                raise InputError(
+                    f'{self.source}: the header of column "{name}" and the units asked for differ;'
+                    f" leave out the unit of {kind} from one of them"
+                )
+        return {
+            name: column if name in self.scale else column * units.scale(name)
+            for name, column in self.columns.items()
+        }
+
+
+def checked_columns(table: Table) -> Table:
+    """The table, if all its numbers are finite.
+
+    Raises: InputError: for the first that is not.
+    """
+    for name, column in table.columns.items():
+        bad = np.flatnonzero(~np.isfinite(column))
+        if len(bad):
+            raise InputError(
+                f'{table.where(bad[0])}, column "{name}": got {column[bad[0]]}, expected a finite '
+                "number. Fill the gap or leave the row out."
+            )
+    return table
