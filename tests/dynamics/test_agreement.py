@@ -74,7 +74,7 @@ def test_the_reference_motion(reference: Mechanism) -> None:
     motion = condyle.reference_motion()
     wrench = condyle.reference_load().at(motion.t)[::25]
     model = condyle.derive(reference)
-    q, q1, q2, _ = model.independent_motion(motion)
+    (q, q1, q2), _ = model.independent_motion(motion)
     load = with_point(wrench, model.load_point("right_molar"))
     assert compare_all(reference, q[::25], q1[::25], q2[::25], load) == len(FORMULATIONS) * 2 - 1
 

@@ -16,12 +16,13 @@ from ..status import Status
 from . import configuration
 from .builder import Builder
 from .equations import Equations, Wrench, equations, total
-from .platform import ANGLE_UNITS, Platform, closed, given
+from .platform import ANGLE_UNITS, Platform, closed, given, independent_indices
 from .structure import Structure
 
 # What can be asked for besides the efforts.
 OUTPUTS = ("contact", "share", "gravity", "motion", "joint", "configuration")
-DOUBTFUL = 1e-14  # discriminant or squared pivot ratio below which a sample is looked at again
+DOUBTFUL = 1e-14  # discriminant below which a sample is looked at again,
+WEAK = 1e-20  # and ratio of a pivot to its column, squared
 HUGE = 1e300
 CERTAIN = 0.5  # of a placement's discriminant, which is 0 or 1 where it was iterated
 
@@ -88,7 +89,8 @@ def program(
     if "configuration" in wanted:
         configuration.add(b, platform)
     b.check(_feasibility(b, platform, eq), DOUBTFUL, Status.unreachable)
-    b.check(pivots * (ca.fabs(b.total(effort)) < HUGE), DOUBTFUL)
+    sure = (ca.fabs(b.total(effort)) < HUGE) * _every_rate_is_felt(b, eq)
+    b.check(pivots * sure, WEAK)
     return b.finish()
 
 
@@ -138,6 +140,21 @@ def _core(b: Builder, platform: Platform, load: Wrench) -> Equations:
     """Route `direct` has no equations across the contacts: those of the core have."""
     lump = FORMULATIONS[b.structure.formulation].lumps
     return equations(b, platform, load, route="core", lump=lump)
+
+
+def _every_rate_is_felt(b: Builder, eq: Equations) -> ca.SX:
+    """Whether no independent rate leaves all joints at rest, but for rounding: 1, else 0.
+
+    Pivots are measured by their own columns, so they do not see a column that is rounding itself.
+    """
+    length = b.parameter("length")
+    angles = [i >= 3 for i in independent_indices(b.structure.dependent)]
+    scale = ca.vertcat(*(1 / length if angle else ca.SX(1) for angle in angles))
+    sizes = scale * scale * b.total([a * a for a in eq.A])
+    least = sizes[0]
+    for size in ca.vertsplit(sizes)[1:]:
+        least = ca.fmin(least, size)
+    return least >= WEAK * ca.sum1(sizes)
 
 
 def _feasibility(b: Builder, platform: Platform, eq: Equations) -> ca.SX:
