@@ -105,7 +105,7 @@ class Evaluator:
     @property
     def parts(self) -> tuple[str, ...]:
         """Names of the parts that share the efforts."""
-        return part_names(self._structure.families)
+        return part_names(self._structure)
 
     @cached_property
     def characteristic_length(self) -> float:

@@ -104,12 +104,12 @@ class Robust:
 
     def _contact_forces(self, s: Arrays, effort: np.ndarray) -> np.ndarray:
         """lambda along the unit normals, (N, k), from what the efforts leave over."""
-        G = s["G"]
+        G = s["normal"].transpose(0, 2, 1)
         left = s["Q"] - (s["J"] @ effort[..., None])[..., 0]
         mu = np.full(G.shape[:1] + G.shape[2:], np.nan)
         good = np.isfinite(left).all(axis=1) & np.isfinite(G).all(axis=(1, 2))
         mu[good] = (np.linalg.pinv(G[good]) @ left[good][..., None])[..., 0]
-        return mu * s["n_length"]
+        return mu
 
     def _judged(self, reached: np.ndarray, values: Arrays, effort: np.ndarray) -> np.ndarray:
         least, most = values["J_A_extremes"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..mechanism.bodies import LinearActuator, RotaryActuator
 from ..mechanism.home import dependent_coordinates
 from ..mechanism.mechanism import Mechanism
 
@@ -16,6 +17,8 @@ class Structure:
     contacts:  (form of the surface, number of its constants).
     dependent: the coordinates that the contacts determine.
     parallel:  two contacts on planes of one slope, written as their mean and difference.
+    losses:    whether an actuator has a rotor or friction of its own.
+    friction:  contacts with friction, by number.
     zeros:     parameters that are zero, (-1, i), and constants that are zero in every chain of a
                group, (group, i): what they multiply is left out.
     """
@@ -26,6 +29,8 @@ class Structure:
     contacts: tuple[tuple[str, int], ...]
     dependent: tuple[str, ...]
     parallel: bool = False
+    losses: bool = False
+    friction: tuple[int, ...] = ()
     zeros: frozenset[tuple[int, int]] = frozenset()
 
     @property
@@ -49,6 +54,11 @@ class Structure:
         return tuple(kind for kind, _ in self.chains)
 
 
+def loses(actuator: RotaryActuator | LinearActuator) -> bool:
+    """Whether an actuator takes part of its effort for itself."""
+    return bool(actuator.rotor_inertia or actuator.viscous or actuator.coulomb)
+
+
 def structure_of(
     mechanism: Mechanism, formulation: str = "virtual_power", route: str = "core"
 ) -> Structure:
@@ -59,11 +69,16 @@ def structure_of(
     loci = [c.offset_surface for c in mechanism.contacts]
     contacts = tuple((locus.form, len(locus.constants())) for locus in loci)
     planes = [locus for locus in loci if locus.form == "plane"]
+    friction = tuple(i for i, c in enumerate(mechanism.contacts) if c.friction is not None)
     return Structure(
         formulation=formulation,
         route=route,
         chains=tuple(counts.items()),
         contacts=contacts,
         dependent=dependent_coordinates(mechanism),
-        parallel=len(contacts) == len(planes) == 2 and planes[0].slope == planes[1].slope,
+        parallel=not friction
+        and len(contacts) == len(planes) == 2
+        and planes[0].slope == planes[1].slope,
+        losses=any(loses(chain.actuator) for chain in mechanism.chains),
+        friction=friction,
     )
