@@ -57,7 +57,7 @@ def condyle_command(
     try:
         find_compiler()
     except CompilerError:  # else the notice of it would mix with what is said on stderr
-        monkeypatch.setenv("CONDYLE_BACKEND", "interpreted")
+        monkeypatch.setenv("CONDYLE_BACKEND", "numpy")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("TERM", "dumb")
 

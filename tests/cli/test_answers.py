@@ -48,7 +48,7 @@ RESULTS = {"check", "check of another", "check --project", "plot", "cache", "cac
 @pytest.fixture(scope="module")
 def solution() -> condyle.Solution:
     motion = condyle.Motion.from_csv(bundled_reference()[0], rate=20)
-    model = condyle.derive(condyle.load("masticatory"), backend="interpreted")
+    model = condyle.derive(condyle.load("masticatory"), backend="numpy")
     return model.solve(motion, condyle.reference_load())
 
 
@@ -60,7 +60,7 @@ def command(
     tmp_path: Path,
 ) -> Callable[..., Any]:
     """Runs commands where the files of `CALLS` are."""
-    monkeypatch.setenv("CONDYLE_BACKEND", "interpreted")
+    monkeypatch.setenv("CONDYLE_BACKEND", "numpy")
     monkeypatch.setenv("CONDYLE_CACHE", str(tmp_path / "kernels"))
     text = bundled_text("masticatory")
     Path("my jaw.toml").write_text(text)

@@ -12,10 +12,10 @@ from typing import Any
 import pytest
 
 import condyle
+from condyle.backends.choose import BACKENDS
 from condyle.cli import completion
 from condyle.dynamics import FORMULATIONS, ROUTES
 from condyle.mechanism import bundled_text
-from condyle.model import BACKENDS
 from condyle.motion import parse_units
 from condyle.report.figures import PLOTS, STYLES
 

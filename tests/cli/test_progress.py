@@ -121,7 +121,7 @@ def test_a_bar_of_a_command(
 ) -> None:
     """On stderr, while it works; never with --quiet or --json; stdout has the answer alone."""
     monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.setenv("CONDYLE_BACKEND", "interpreted")
+    monkeypatch.setenv("CONDYLE_BACKEND", "numpy")
 
     def solve(*_: Any) -> tuple[int, list[str]]:
         with step("solving a file", 10) as advance:
@@ -179,7 +179,7 @@ def watcher() -> Iterator[Watcher]:
 
 
 def interpreted() -> condyle.Model:
-    return condyle.derive(condyle.load("masticatory"), backend="interpreted")
+    return condyle.derive(condyle.load("masticatory"), backend="numpy")
 
 
 def path(**options: Any) -> Motion:

@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from condyle.kernels import compiled
-from condyle.kernels.compiled import Compiled
 
 import condyle
+from condyle.backends.c import kernel
+from condyle.backends.c.kernel import CompiledKernel
 from condyle.backends.compiler import CompilerError, find_compiler
 from condyle.mechanism import COORDINATES
-from condyle.model import Model, with_point
+from condyle.model.evaluator import with_point
+from condyle.results.model import Model
 
 NAMES = ("X", "Y", "alpha", "beta")
 LOAD = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
@@ -56,8 +57,8 @@ def test_columns_and_digits(
         *(f"joint_{name}" for name in chains),
     ]
     found = model.evaluate(q, q1, q2, with_point(wrench, model.load_point("right_molar")))
-    t = found.torques
-    wanted = np.hstack([t.torque, t.contact_force, found.poses.pose, found.posture.joint])
+    parts = [found.effort, found.contact_force, found.pose, found.configuration.joint]
+    wanted = np.hstack(parts)
     np.testing.assert_array_equal(np.array(rows, dtype=float), wanted)
     digits = [len(figures(cell)) for row in rows for cell in row]
     assert digits == [len(figures(repr(value))) for value in wanted.ravel().tolist()]
@@ -108,16 +109,16 @@ def test_any_valid_set_of_coordinates(
     q, q1, q2 = draw(12)
     found = model.evaluate(q, q1, q2, np.zeros((12, 9)))
     columns = [COORDINATES.index(name) for name in names]
-    poses = (found.poses.pose, found.poses.rate, found.poses.acceleration)
+    poses = (found.pose, found.pose_rate, found.pose_acceleration)
     cells = np.hstack([a[:, columns] for a in poses])
     mix = np.random.default_rng(2).permutation(12)
     write_csv([header(names)[i] for i in mix], cells[:, mix], "states.csv")
     outcome = condyle_command("solve", "masticatory", "--states", "states.csv", "--out", "out.csv")
     assert outcome.status == 0, outcome.err
     table = np.array(read_csv("out.csv")[1], dtype=float)
-    torque = found.torques.torque
+    torque = found.effort
     np.testing.assert_allclose(table[:, :6], torque, atol=1e-11 * np.abs(torque).max())
-    np.testing.assert_allclose(table[:, 8:14], found.poses.pose, atol=1e-13)
+    np.testing.assert_allclose(table[:, 8:14], found.pose, atol=1e-13)
 
 
 def test_flagged_rows_are_kept_and_empty(
@@ -261,14 +262,15 @@ def test_threads(
     except CompilerError as error:
         pytest.skip(str(error))
     asked = []
-    real = Compiled.solve
+    real = CompiledKernel.run
 
-    def spy(self: Compiled, *arguments: Any, **options: Any) -> Any:
-        asked.append(options.get("threads"))
-        return real(self, *arguments, **options)
+    def spy(self: CompiledKernel, inputs: Any, threads: int | None = None) -> Any:
+        if "effort" in (result.name for result in self.interface.results):
+            asked.append(threads)
+        return real(self, inputs, threads)
 
-    monkeypatch.setattr(Compiled, "solve", spy)
-    monkeypatch.setattr(compiled, "CHUNK", 8)
+    monkeypatch.setattr(CompiledKernel, "run", spy)
+    monkeypatch.setattr(kernel, "WORTH_A_THREAD", 1000)
     write_csv(header(), np.hstack(draw(50)), "states.csv")
     arguments = ("solve", "masticatory", "--states", "states.csv", "--out", "out.csv")
     texts = []

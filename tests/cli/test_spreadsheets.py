@@ -67,7 +67,7 @@ WAYS: dict[str, Callable[[str], bytes]] = {
 def test_the_same_numbers(
     condyle_command: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, command: str
 ) -> None:
-    monkeypatch.setenv("CONDYLE_BACKEND", "interpreted")
+    monkeypatch.setenv("CONDYLE_BACKEND", "numpy")
     results = {}
     for way, write in {"plain": str.encode, **WAYS}.items():
         Path("in.csv").write_bytes(write(plain(command)))
@@ -84,7 +84,7 @@ def test_parquet_gives_the_same_numbers(
     condyle_command: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, command: str
 ) -> None:
     """In and out, for every command that reads or writes a table."""
-    monkeypatch.setenv("CONDYLE_BACKEND", "interpreted")
+    monkeypatch.setenv("CONDYLE_BACKEND", "numpy")
     Path("in.csv").write_text(plain(command))
     write_table("in.parquet", read_table("in.csv").columns)
     tables = []
@@ -103,7 +103,7 @@ def test_parquet_gives_the_same_numbers(
 def test_units_in_the_header_and_columns_that_are_not_used(
     condyle_command: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("CONDYLE_BACKEND", "interpreted")
+    monkeypatch.setenv("CONDYLE_BACKEND", "numpy")
     columns = {"Time [ms]": 1e3 * TIMES, "X (mm)": np.sin(3 * TIMES), "Y_mm": 0 * TIMES}
     columns |= {"alpha": 0 * TIMES, "BETA [deg]": TIMES, "marker": TIMES}
     write_table("in.csv", columns)

@@ -13,7 +13,7 @@ from oracles.random_mechanism import random_mechanism, random_state, toml_text
 import condyle
 from condyle.kinematics.chain import FAMILIES
 from condyle.mechanism import parse
-from condyle.model import with_point
+from condyle.model.evaluator import with_point
 
 MODULES = {"pinocchio": "pinocchio", "mujoco": "mujoco", "newton_euler": "numpy"}
 PLANES: list[dict[str, Any]] = [
@@ -78,9 +78,9 @@ def test_shafts_that_are_upright_or_nearly(tilt: float) -> None:
     level_cranks(raw, tilt)
     by_engine = engine("newton_euler", raw)
     states = random_state(np.random.default_rng(1), raw, 2, scale=0.3)
-    model = condyle.derive(parse(toml_text(raw)), backend="interpreted")
+    model = condyle.derive(parse(toml_text(raw)), backend="numpy")
     load = with_point(states["wrench"], model.load_point("right_molar"))
-    torque = model.evaluate(states["q"], states["qd"], states["qdd"], load).torques.torque
+    torque = model.evaluate(states["q"], states["qd"], states["qdd"], load).effort
     given = ("pose", "pose_rate", "pose_acceleration", "wrench")
     for i in range(2):
         wanted = by_engine(*(states[key][i] for key in given), "right_molar")["tau"]
@@ -94,18 +94,18 @@ def test_an_outside_engine_agrees(options: dict[str, Any], name: str) -> None:
     raw = random_mechanism(rng, tilted_gravity=True, **options)
     by_engine = engine(name, raw)
     mechanism = parse(toml_text(raw))
-    model = condyle.derive(mechanism, backend="interpreted")
+    model = condyle.derive(mechanism, backend="numpy")
     states = random_state(rng, raw, 3)
     assert model.independent == tuple(states["names"])
     load = with_point(states["wrench"], model.load_point("right_molar"))
     got = model.evaluate(states["q"], states["qd"], states["qdd"], load)
     assert (got.status == 0).all()
     ours = {
-        "tau": got.torques.torque,
-        "contact": got.torques.contact_force,
-        "joint": got.posture.joint,
-        "joint_rate": got.torques.rate,
-        "joint_acceleration": got.torques.acceleration,
+        "tau": got.effort,
+        "contact": got.contact_force,
+        "joint": got.configuration.joint,
+        "joint_rate": got.joint_rate,
+        "joint_acceleration": got.joint_acceleration,
     }
     given = ("pose", "pose_rate", "pose_acceleration", "wrench")
     for i in range(3):
@@ -115,7 +115,9 @@ def test_an_outside_engine_agrees(options: dict[str, Any], name: str) -> None:
             if key == "contact":  # small differences of large forces
                 size = max(size, np.abs(states["wrench"][i]).max())
             np.testing.assert_allclose(value[i], wanted[key], rtol=0, atol=1e-9 * size)
-        for key, value in zip(given[:3], vars(got.poses).values(), strict=False):
+        for key, value in zip(
+            given[:3], (got.pose, got.pose_rate, got.pose_acceleration), strict=False
+        ):
             np.testing.assert_allclose(
                 value[i], states[key][i], atol=1e-11 * np.abs(value[i]).max()
             )

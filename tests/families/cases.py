@@ -11,7 +11,8 @@ from oracles.description import Raw
 from oracles.random_mechanism import random_mechanism, random_state, toml_text
 
 from condyle.mechanism import Mechanism, parse
-from condyle.model import Evaluation, Model
+from condyle.model.data import Evaluation
+from condyle.results.model import Model
 
 MIXED = ("RSS", "PSS", "SPS")
 MECHANISMS: dict[str, dict[str, Any]] = {
@@ -49,7 +50,7 @@ class Case:
         self,
         formulation: str = "virtual_power",
         route: str = "core",
-        backend: str = "interpreted",
+        backend: str = "numpy",
     ) -> Evaluation:
         model = Model(self.mechanism, formulation, route, backend)
         assert model.independent == tuple(self.states["names"])

@@ -5,10 +5,9 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from condyle.dynamics.reactions import reaction_places
-
 import condyle
 from condyle.kinematics.chain import FAMILIES
+from condyle.questions.reactions import reaction_places
 from families.cases import case
 
 PAGE = Path(__file__).parents[2] / "docs" / "chains.md"

@@ -28,13 +28,13 @@ def test_efforts_contacts_and_joints(name: str, engine: str) -> None:
     assert (ours.status == 0).all()
     for i in range(len(c.load)):
         theirs = compute(*c.sample(i))
-        close(ours.torques.torque[i], theirs["tau"], TOLERANCE)
+        close(ours.effort[i], theirs["tau"], TOLERANCE)
         force = np.abs(c.load[i, :3]).max()
-        close(ours.torques.contact_force[i], theirs["contact"], TOLERANCE, floor=force)
+        close(ours.contact_force[i], theirs["contact"], TOLERANCE, floor=force)
         # Joint coordinates are zero at home.
-        close(ours.posture.joint[i], theirs["joint"], TOLERANCE, floor=1e-3)
-        close(ours.torques.rate[i], theirs["joint_rate"], TOLERANCE)
-        close(ours.torques.acceleration[i], theirs["joint_acceleration"], TOLERANCE)
+        close(ours.configuration.joint[i], theirs["joint"], TOLERANCE, floor=1e-3)
+        close(ours.joint_rate[i], theirs["joint_rate"], TOLERANCE)
+        close(ours.joint_acceleration[i], theirs["joint_acceleration"], TOLERANCE)
 
 
 @pytest.mark.parametrize("name", ["pss", "sps_k1", "mixed"])
@@ -43,5 +43,5 @@ def test_rod_angles(name: str) -> None:
     ours, engine = c.evaluate(), PinocchioEngine(c.raw)
     for i in range(len(c.load)):
         theirs = engine.inverse_dynamics(*c.sample(i))
-        close(ours.posture.beta[i], theirs["beta_i"], TOLERANCE, floor=1e-3)
-        close(ours.posture.gamma[i], theirs["gamma_i"], TOLERANCE, floor=1e-3)
+        close(ours.configuration.beta[i], theirs["beta_i"], TOLERANCE, floor=1e-3)
+        close(ours.configuration.gamma[i], theirs["gamma_i"], TOLERANCE, floor=1e-3)

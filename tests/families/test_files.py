@@ -125,8 +125,8 @@ def test_massless_links_are_allowed() -> None:
             chain(raw, kind)[body] |= nothing
     mechanism = from_data(raw)
     q = np.zeros((1, 4))
-    model = condyle.derive(mechanism, backend="interpreted")
-    assert np.isfinite(model.evaluate(q, q, q, np.zeros((1, 9))).torques.torque).all()
+    model = condyle.derive(mechanism, backend="numpy")
+    assert np.isfinite(model.evaluate(q, q, q, np.zeros((1, 9))).effort).all()
 
 
 def test_schema_knows_every_family() -> None:

@@ -16,7 +16,7 @@ import pytest
 import condyle
 from condyle.dynamics import FORMULATIONS
 from condyle.mechanism import bundled_text
-from condyle.model import Model
+from condyle.results.model import Model
 from families.bodies import Body, leg, platform
 from families.cases import close
 from families.jets import Array, Jet
@@ -112,16 +112,16 @@ def wanted() -> list[dict[str, Any]]:
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_efforts(wanted: list[dict[str, Any]], formulation: str) -> None:
-    model = Model(condyle.load("gough-stewart"), formulation, backend="interpreted")
+    model = Model(condyle.load("gough-stewart"), formulation, backend="numpy")
     q, q1, q2, wrench = states()
     load = np.hstack([wrench, np.tile(PAYLOAD, (len(q), 1))])
-    close(model.evaluate(q, q1, q2, load).torques.torque, [w["tau"] for w in wanted], 1e-11)
+    close(model.evaluate(q, q1, q2, load).effort, [w["tau"] for w in wanted], 1e-11)
 
 
 def test_reactions(wanted: list[dict[str, Any]]) -> None:
-    from condyle.dynamics.reactions import reactions
+    from condyle.model.reactions import reactions
 
-    model = Model(condyle.load("gough-stewart"), backend="interpreted")
+    model = Model(condyle.load("gough-stewart"), backend="numpy")
     q, q1, q2, wrench = states()
     load = np.hstack([wrench, np.tile(PAYLOAD, (len(q), 1))])
     found = reactions(model, model.evaluate(q, q1, q2, load))
@@ -134,10 +134,10 @@ def test_reactions(wanted: list[dict[str, Any]]) -> None:
 
 def test_weight_alone_at_home() -> None:
     """At rest the vertical forces at the base carry the whole weight."""
-    from condyle.dynamics.reactions import reactions
+    from condyle.model.reactions import reactions
 
     mechanism = condyle.load("gough-stewart")
-    model = Model(mechanism, backend="interpreted")
+    model = Model(mechanism, backend="numpy")
     zero = np.zeros((1, 6))
     found = reactions(model, model.evaluate(zero, zero, zero, np.zeros((1, 9))))
     total = sum(found[f"base_joint_{name}"].array[0] for name in mechanism.chain_names)

@@ -30,7 +30,7 @@ class Chain:
         self.rates, self.accelerations = rng.normal(size=(2, joints, 3))
 
     def law(self, *symbols: ca.SX) -> Any:
-        return self.family.law(self.c, *symbols, ca.SX([0.3, -0.2, -9.81]))
+        return self.family.dynamics(self.c, *symbols, ca.SX([0.3, -0.2, -9.81]))
 
 
 @pytest.fixture(params=FAMILIES)
@@ -41,7 +41,7 @@ def chain(request: pytest.FixtureRequest) -> Chain:
 def test_the_loop_closes_on_the_branch_of_home(chain: Chain) -> None:
     M = ca.SX.sym("M", 3)
     loop = chain.family.loop(chain.c, M)
-    closes = ca.Function("closes", [M], [chain.family.tip(chain.c, loop.q_r) - M, loop.q_r])
+    closes = ca.Function("closes", [M], [chain.family.end_point(chain.c, loop.q_r) - M, loop.q_r])
     for joint in chain.joints:
         gap, _ = closes(joint)
         close(gap, np.zeros((3, 1)), 1e-15, floor=1)
@@ -59,7 +59,7 @@ def test_row_rate_and_acceleration_are_derivatives_of_the_joint(chain: Chain) ->
     function = ca.Function(
         "both",
         [M, V, A],
-        [J.T, law.J, rate, law.rate, acceleration, law.acceleration, law.reach],
+        [J.T, law.J, rate, law.rate, acceleration, law.acceleration, law.discriminant],
     )
     for state in zip(chain.joints, chain.rates, chain.accelerations, strict=True):
         wanted_J, got_J, wanted_rate, got_rate, wanted, got, reach = function(*state)
@@ -96,7 +96,7 @@ def test_dimensionless_transmission(chain: Chain) -> None:
 def test_laws_stay_cheap(chain: Chain) -> None:
     c, g = ca.SX.sym("c", chain.family.size()), ca.SX.sym("g", 3)
     M, V, A = (ca.SX.sym(name, 3) for name in "MVA")
-    law = chain.family.law(chain.family.named(c), M, V, A, g).complete(A, g)
+    law = chain.family.dynamics(chain.family.named(c), M, V, A, g).complete(A, g)
     outputs = [sum(law.forces.values(), ca.SX(3, 1)), law.J]
     f = ca.Function("law", [c, g, M, V, A], ca.cse(outputs))
     made: dict[int, int] = {}  # where a value is kept -> the operation that made it

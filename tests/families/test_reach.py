@@ -8,7 +8,9 @@ import pytest
 import condyle
 from condyle.errors import UnreachableError
 from condyle.mechanism import Mechanism
-from condyle.model import UNREACHABLE, Model
+from condyle.model.judge import require_ok
+from condyle.results.model import Model
+from condyle.status import Status
 from families.cases import case
 
 
@@ -17,13 +19,13 @@ def hexaglide() -> Mechanism:
 
 
 def test_a_rail_too_far_from_its_joint() -> None:
-    model = Model(hexaglide(), backend="interpreted")
+    model = Model(hexaglide(), backend="numpy")
     q = np.zeros((2, 5))
     q[1, 1] = 0.3  # sideways, by more than the rods reach
     evaluation = model.evaluate(q, 0 * q, 0 * q, np.zeros((2, 9)))
-    assert evaluation.status.tolist() == [0, UNREACHABLE]
+    assert evaluation.status.tolist() == [0, Status.unreachable]
     with pytest.raises(UnreachableError) as caught:
-        model.require_ok(evaluation)
+        require_ok(model.mechanism, evaluation)
     # Up the slope of 0.1 as well: M is then at y = 355, z = 90, its rail at y = 0, z = 230 mm.
     distance, rod = np.hypot(355, 140), np.linalg.norm([310, 55, 170])
     assert (
@@ -35,14 +37,16 @@ def test_a_rail_too_far_from_its_joint() -> None:
 def test_travel_follows_the_platform_along_the_rails() -> None:
     """Moving along parallel rails moves every slider as far, and its force does the work."""
     mechanism = hexaglide().replace(contacts=())
-    model = Model(mechanism, backend="interpreted")
+    model = Model(mechanism, backend="numpy")
     q = np.zeros((3, 6))
     q[:, 0] = [-0.03, 0.0, 0.04]
     evaluation = model.evaluate(q, 0 * q, 0 * q, np.zeros((3, 9)))
-    np.testing.assert_allclose(evaluation.posture.joint, q[:, :1].repeat(6, axis=1), atol=1e-15)
+    np.testing.assert_allclose(
+        evaluation.configuration.joint, q[:, :1].repeat(6, axis=1), atol=1e-15
+    )
     # At rest the forces along the rails cancel: gravity has no part along them.
-    total = evaluation.torques.torque.sum(axis=1)
-    assert np.abs(total).max() < 1e-12 * np.abs(evaluation.torques.torque).max()
+    total = evaluation.effort.sum(axis=1)
+    assert np.abs(total).max() < 1e-12 * np.abs(evaluation.effort).max()
 
 
 def test_the_slider_keeps_the_branch_of_home() -> None:
@@ -51,16 +55,16 @@ def test_the_slider_keeps_the_branch_of_home() -> None:
     for i, chain in enumerate(c.mechanism.chains):
         axis = np.array(chain.axis) / np.linalg.norm(chain.axis)
         home = np.subtract(chain.platform, chain.base) @ axis
-        sines = evaluation.posture.singularity.transmission[:, i]
+        sines = evaluation.configuration.singularity.transmission[:, i]
         assert (np.sign(-sines) == np.sign(home)).all()
 
 
 def test_leg_coordinate_is_the_change_of_length() -> None:
     c = case("sps_k0")
-    model = Model(c.mechanism, backend="interpreted")
+    model = Model(c.mechanism, backend="numpy")
     q = np.zeros((2, 6))
     q[1, :3] = [0.004, -0.003, 0.006]
-    joint = model.evaluate(q, 0 * q, 0 * q, np.zeros((2, 9))).posture.joint
+    joint = model.evaluate(q, 0 * q, 0 * q, np.zeros((2, 9))).configuration.joint
     for i, chain in enumerate(c.mechanism.chains):
         leg = np.subtract(chain.platform, chain.base)
         change = np.linalg.norm(leg + q[1, :3]) - np.linalg.norm(leg)
@@ -71,11 +75,11 @@ def test_leg_coordinate_is_the_change_of_length() -> None:
 def test_extension_pushes() -> None:
     """A load that presses a Gough-Stewart platform down needs positive, pushing efforts."""
     mechanism = condyle.load("gough-stewart")
-    model = Model(mechanism, backend="interpreted")
+    model = Model(mechanism, backend="numpy")
     zero = np.zeros((1, 6))
     load = np.zeros((1, 9))
     load[0, 2] = -1e4
-    torque = model.evaluate(zero, zero, zero, load).torques.torque
+    torque = model.evaluate(zero, zero, zero, load).effort
     assert (torque > 1e4 / 6).all()
 
 

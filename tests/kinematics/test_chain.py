@@ -34,7 +34,11 @@ def numeric(kind: str) -> dict[str, ca.Function]:
     c, q = ca.SX.sym("c", family.size()), ca.SX.sym("q", 3)
     M, V, A, g = (ca.SX.sym(name, 3) for name in "MVAg")
     named = family.named(c)
-    loop, law, tip = family.loop(named, M), family.law(named, M, V, A, g), family.tip(named, q)
+    loop, law, tip = (
+        family.loop(named, M),
+        family.dynamics(named, M, V, A, g),
+        family.end_point(named, q),
+    )
     return {
         "loop": ca.Function("loop", [c, M], [loop.q_r, loop.J, loop.rod, loop.J_A]),
         "law": ca.Function("law", [c, M, V, A, g], [law.rate, law.acceleration, law.J]),
@@ -48,18 +52,18 @@ def test_joint_coordinates_meet_the_oracle(case: str) -> None:
     raw, mechanism = drawn(case)
     model, d = condyle.derive(mechanism), read(raw)
     poses = np.vstack([random_state(np.random.default_rng(1), raw, 6)["pose"], np.zeros(6)])
-    posture = model.posture(poses)
+    found = model.configuration(poses)
     for i, pose in enumerate(poses):
         motion = platform_motion(pose)
         for k, chain in enumerate(d.chains):
             P = motion.point(chain.M)[0]
             x, S = joint(chain, P)
             wanted = (x, *rod_angles(chain, P - S))
-            got = [a[i, k] for a in (posture.joint, posture.beta, posture.gamma)]
+            got = [a[i, k] for a in (found.joint, found.beta, found.gamma)]
             np.testing.assert_allclose(got, wanted, atol=1e-14)
-            assert posture.cos_gamma[i, k] == pytest.approx(np.cos(wanted[2]), abs=1e-14)
-            assert posture.reach[i, k] > 0
-    np.testing.assert_allclose(posture.joint[-1], 0, atol=1e-14)
+            assert found.cos_gamma[i, k] == pytest.approx(np.cos(wanted[2]), abs=1e-14)
+            assert found.discriminant[i, k] > 0
+    np.testing.assert_allclose(found.joint[-1], 0, atol=1e-14)
 
 
 def test_joint_coordinates_meet_the_reference_cases(reference: Mechanism) -> None:
@@ -68,10 +72,10 @@ def test_joint_coordinates_meet_the_reference_cases(reference: Mechanism) -> Non
 
     path = Path(__file__).parents[1] / "oracles" / "reference_cases.json"
     cases = json.loads(path.read_text())["cases"]
-    posture = condyle.derive(reference).posture(np.array([case["pose"] for case in cases]))
+    found = condyle.derive(reference).configuration(np.array([case["pose"] for case in cases]))
     for name, got in (("theta", "joint"), ("beta_i", "beta"), ("gamma_i", "gamma")):
         wanted = np.array([case[name] for case in cases])
-        np.testing.assert_allclose(getattr(posture, got), wanted, atol=1e-13)
+        np.testing.assert_allclose(getattr(found, got), wanted, atol=1e-13)
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -126,5 +130,5 @@ def test_rods_turn_with_their_two_angles() -> None:
 def test_out_of_reach_is_said_with_numbers(reference: Mechanism) -> None:
     text = FAMILIES["RSS"].explain(reference.chains[2], np.array([0.2, 0, 0, 0, 0, 0]))
     assert 'chain "masseter_left" cannot reach M' in text and "mm" in text
-    posture = condyle.derive(reference).posture(np.array([[0.2, 0, 0, 0, 0, 0]]))
-    assert posture.reach[0, 2] < 0 and np.isnan(posture.joint[0, 2])
+    found = condyle.derive(reference).configuration(np.array([[0.2, 0, 0, 0, 0, 0]]))
+    assert found.discriminant[0, 2] < 0 and np.isnan(found.joint[0, 2])

@@ -8,11 +8,12 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from condyle.kinematics.closure import contact_symbols, coordinate_closure
+from oracles.following import coordinate_closure
 from oracles.random_mechanism import random_mechanism, toml_text
 
 import condyle
 from condyle.kinematics.batch import evaluate
+from condyle.kinematics.contact import contacts_of
 from condyle.kinematics.iteration import newton
 from condyle.mechanism import Mechanism, parse
 from condyle.mechanism.home import dependent_coordinates, independent_coordinates
@@ -37,8 +38,8 @@ def mechanism(kind: str, contacts: int, ball: float, seed: int = 3) -> Mechanism
 def function(m: Mechanism) -> ca.Function:
     """q -> X_EE and reach."""
     q = ca.SX.sym("q", 6 - len(m.contacts))
-    placement = newton(contact_symbols(m), dependent_coordinates(m), q)
-    reach = ca.SX(1) if placement.reach is None else placement.reach
+    placement = newton(contacts_of(m), dependent_coordinates(m), q)
+    reach = ca.SX(1) if placement.discriminant is None else placement.discriminant
     return ca.Function("newton", [q], [placement.pose(), reach])
 
 

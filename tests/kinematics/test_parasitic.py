@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from condyle.dynamics.equations import closure_function, require_closed_form
-from condyle.kinematics.closure import coordinate_closure
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
+from oracles.following import coordinate_closure
+from oracles.interpreter import closure_function
 from oracles.random_mechanism import random_mechanism, toml_text
 
 import condyle
@@ -19,6 +19,7 @@ from condyle.mechanism.home import (
     independent_coordinates,
     usable_sets,
 )
+from condyle.questions.numbers import require_closed_form
 
 ANGLES = {"alpha", "beta", "gamma"}
 COUNT = 20

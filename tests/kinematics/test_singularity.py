@@ -11,10 +11,12 @@ from oracles.random_mechanism import random_mechanism, random_state, toml_text
 
 import condyle
 from condyle import SingularError
-from condyle.kinematics.singularity import KINDS, measure
+from condyle.kinematics.singularity import KINDS, Singularity
 from condyle.mechanism import Mechanism, parse
 from condyle.mechanism.files import from_data
-from condyle.model import STATUS_NAMES, Evaluation
+from condyle.model.data import Evaluation
+from condyle.model.judge import require_ok
+from condyle.status import STATUS_NAMES
 
 HOME = np.zeros((1, 6))
 
@@ -52,14 +54,12 @@ def spatial(kinks: tuple[float, ...] = (0.3,) * 6, meeting: bool = False) -> dic
 def at_home(raw: dict[str, Any]) -> Evaluation:
     mechanism = from_data(raw)
     zero = np.zeros((1, mechanism.degrees_of_freedom))
-    return condyle.derive(mechanism, backend="interpreted").evaluate(
-        zero, zero, zero, np.zeros((1, 9))
-    )
+    return condyle.derive(mechanism, backend="numpy").evaluate(zero, zero, zero, np.zeros((1, 9)))
 
 
 def test_a_regular_home() -> None:
     evaluation = at_home(spatial())
-    s = evaluation.posture.singularity
+    s = evaluation.configuration.singularity
     assert KINDS[s.kind()[0]] == "none" and s.rank[0] == 6 and evaluation.status[0] == 0
     assert s.condition[0] == pytest.approx(1 / s.direct_ratio[0]) and 1 < s.condition[0] < 100
 
@@ -67,7 +67,7 @@ def test_a_regular_home() -> None:
 def test_inverse_singularity_of_a_stretched_crank() -> None:
     """J_A tells how far a crank is from in line, as a sine; here 1e-4 against 0.3."""
     kinks = (0.3, 0.3, 1e-4, 0.3, 0.3, 0.3)
-    s = at_home(spatial(kinks)).posture.singularity
+    s = at_home(spatial(kinks)).configuration.singularity
     assert KINDS[s.kind()[0]] == "inverse"
     crank = np.argsort(np.abs(s.transmission[0]))[0]
     assert crank == 2 and s.rank[0] == 6
@@ -77,20 +77,20 @@ def test_inverse_singularity_of_a_stretched_crank() -> None:
 def test_direct_singularity_of_rods_that_meet_an_axis() -> None:
     """No force along such rods turns the platform about it."""
     evaluation = at_home(spatial(meeting=True))
-    s = evaluation.posture.singularity
+    s = evaluation.configuration.singularity
     assert s.rank[0] == 5 and s.direct_ratio[0] < 1e-12
     assert KINDS[s.kind()[0]] == "direct" and STATUS_NAMES[evaluation.status[0]] == "singular"
-    both = at_home(spatial((1e-4, 0.3, 0.3, 0.3, 0.3, 0.3), meeting=True)).posture.singularity
+    both = at_home(spatial((1e-4, 0.3, 0.3, 0.3, 0.3, 0.3), meeting=True)).configuration.singularity
     assert KINDS[both.kind()[0]] == "combined"
 
 
 def test_a_singular_pose_is_an_error_that_names_it() -> None:
-    model = condyle.derive(from_data(spatial(meeting=True)), backend="interpreted")
+    model = condyle.derive(from_data(spatial(meeting=True)), backend="numpy")
     q = np.random.default_rng(0).normal(0, 1e-4, (3, 6)) * [[1], [0], [1]]
     evaluation = model.evaluate(q, 0 * q, 0 * q, np.zeros((3, 9)))
     assert evaluation.status.tolist() == [0, 2, 0]
     with pytest.raises(SingularError, match=r"singular at row 12: dimensionless ratio") as caught:
-        model.require_ok(evaluation, row_offset=10)
+        require_ok(model.mechanism, evaluation, row_offset=10)
     assert caught.value.samples == [1]
 
 
@@ -104,7 +104,7 @@ def test_measures_are_those_of_the_actuator_jacobian(contacts: int) -> None:
     mechanism = parse(toml_text(raw))
     model, engine = condyle.derive(mechanism), PinocchioEngine(raw)
     states = random_state(np.random.default_rng(1), raw, 3)
-    s = model.posture(states["pose"]).singularity
+    s = model.configuration(states["pose"]).singularity
     length = model.characteristic_length
     for i, pose in enumerate(states["pose"]):
         zero = np.zeros(6)
@@ -135,23 +135,23 @@ def test_the_measures_do_not_depend_on_the_unit_of_length(raw: dict[str, Any]) -
     huge = from_data(raw)
     pose = np.array([[0.002, 0.001, 0, 0.05, -0.1, 0.02]])
     scaled = pose * np.repeat([1000.0, 1.0], 3)
-    a = condyle.derive(large).posture(pose).singularity
-    b = condyle.derive(huge).posture(scaled).singularity
+    a = condyle.derive(large).configuration(pose).singularity
+    b = condyle.derive(huge).configuration(scaled).singularity
     np.testing.assert_allclose(a.J_W_sigma, b.J_W_sigma, rtol=1e-12)
     np.testing.assert_allclose(a.transmission, b.transmission, rtol=1e-12)
     assert b.length == pytest.approx(1000 * a.length)
 
 
 def test_kinds_by_their_thresholds() -> None:
-    ones = np.ones((4, 2))
     J_A = np.array([[1, 1], [1, 1e-4], [1, 1], [1, -1e-4]])
-    J_W = np.array([np.eye(2), np.eye(2), np.diag([1, 1e-4]), np.diag([1, 1e-13])])
-    s = measure(J_A, ones, J_W, ones / 2, np.array([False, False]), 1.0)
+    sigma = np.array([[1, 1], [1, 1], [1, 1e-4], [1, 1e-13]])
+    extremes = np.sort(np.abs(J_A), axis=1).T
+    s = Singularity.of(J_A, J_A, sigma, extremes, 1.0)
     assert [KINDS[k] for k in s.kind()] == ["none", "inverse", "direct", "combined"]
     assert s.rank.tolist() == [2, 2, 2, 1]
     assert (s.kind(threshold=1e-5) == [0, 0, 0, 2]).all()
 
 
 def test_home_of_the_reference_is_regular(reference: Mechanism) -> None:
-    s = condyle.derive(reference).posture(HOME).singularity
+    s = condyle.derive(reference).configuration(HOME).singularity
     assert s.rank[0] == 4 and s.kind()[0] == 0 and s.ratio[0] > 0.05

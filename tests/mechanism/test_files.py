@@ -115,7 +115,7 @@ def test_the_starter_is_a_mechanism() -> None:
     evaluation = condyle.derive(mechanism, backend="interpreted").evaluate(
         state, state, state, np.zeros((1, 9))
     )
-    assert evaluation.status[0] == 0 and np.isfinite(evaluation.torques.torque).all()
+    assert evaluation.status[0] == 0 and np.isfinite(evaluation.effort).all()
 
 
 def spoil(path: Path, kind: str) -> Path:

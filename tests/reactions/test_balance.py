@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from condyle.dynamics.reactions import Reaction, reactions
 from families.bodies import Body, bodies
 from families.cases import MECHANISMS, Case, case, of_raw
 from families.jets import Jet
 from oracles.random_mechanism import random_mechanism
 
-from condyle.model import Model
+from condyle.model.reactions import Reaction, reactions
+from condyle.results.model import Model
 
 SURFACES = {
     "curved_k3": {"surface": "mixed", "contacts": 3, "families": ("RSS", "PSS", "SPS")},
@@ -28,7 +28,7 @@ def build(name: str) -> Case:
 
 
 def found_reactions(c: Case, formulation: str = "virtual_power") -> dict[str, Reaction]:
-    model = Model(c.mechanism, formulation, backend="interpreted")
+    model = Model(c.mechanism, formulation, backend="numpy")
     q, q1, q2 = (c.states[key] for key in ("q", "qd", "qdd"))
     return reactions(model, model.evaluate(q, q1, q2, c.load))
 

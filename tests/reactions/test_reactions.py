@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from condyle.dynamics.reactions import reaction_places, reaction_variables, reactions
 from families.cases import MECHANISMS, Case, case, close
 from oracles import newton_euler
 from oracles.closure import contact_normals
@@ -16,8 +15,12 @@ from oracles.rotations import platform_motion
 
 import condyle
 from condyle.mechanism import Mechanism
-from condyle.model import Evaluation, Model
+from condyle.model.data import Evaluation
+from condyle.model.reactions import reactions
 from condyle.motion import read_table, write_table
+from condyle.questions.reactions import reaction_places
+from condyle.results.model import Model
+from condyle.results.reactions import reaction_variables
 from condyle.results.states import solve_file
 
 # Our joint -> the oracle's link and whether it is its force or its moment.
@@ -30,7 +33,7 @@ DRIVEN = {"RSS": "shaft_moment", "PSS": "rail_force", "SPS": "sleeve_force"}
 
 
 def evaluated(c: Case) -> tuple[Model, Evaluation]:
-    model = Model(c.mechanism, backend="interpreted")
+    model = Model(c.mechanism, backend="numpy")
     q, q1, q2 = (c.states[key] for key in ("q", "qd", "qdd"))
     return model, model.evaluate(q, q1, q2, c.load)
 
@@ -66,7 +69,7 @@ def test_the_effort_is_in_the_driven_joint(name: str) -> None:
             if chain.kind == "SPS":
                 P = platform_motion(*c.sample(i)[:3]).point(chain.M)[0]
                 axis = (P - chain.S) / np.linalg.norm(P - chain.S)
-            close(r.array[i] @ axis, evaluation.torques.torque[i, k], 1e-10)
+            close(r.array[i] @ axis, evaluation.effort[i, k], 1e-10)
 
 
 def test_the_guide_acts_across_both_swing_axes() -> None:
@@ -96,8 +99,8 @@ def test_contact_forces_along_the_normals() -> None:
         normals = contact_normals(d, platform_motion(c.sample(i)[0]))
         for k, contact in enumerate(c.mechanism.contacts):
             r = found[f"contact_{contact.name}"]
-            close(r.array[i], evaluation.torques.contact_force[i, k] * normals[k], 1e-12)
-            close(r.point[i], evaluation.posture.contact_point[i, k], 1e-14)
+            close(r.array[i], evaluation.contact_force[i, k] * normals[k], 1e-12)
+            close(r.point[i], evaluation.configuration.contact_point[i, k], 1e-14)
             assert (r.body, r.by, r.unit, r.frame) == ("platform", "surface", "N", "{S}")
 
 
@@ -125,7 +128,7 @@ def test_given_efforts() -> None:
     """Efforts along the null space move the joint forces, and each shaft carries its own."""
     c = case("rss")
     model, evaluation = evaluated(c)
-    effort = evaluation.torques.torque + 0.3
+    effort = evaluation.effort + 0.3
     found = reactions(model, evaluation, effort)
     for k, chain in enumerate(read(c.raw).chains):
         moment = found[f"shaft_moment_{chain.name}"].array
@@ -133,7 +136,7 @@ def test_given_efforts() -> None:
 
 
 def test_failed_samples_are_empty(reference: Mechanism) -> None:
-    model = Model(reference, backend="interpreted")
+    model = Model(reference, backend="numpy")
     q = np.zeros((2, 4))
     q[1, 0] = 0.5
     evaluation = model.evaluate(q, 0 * q, 0 * q, np.zeros((2, 9)))
@@ -177,7 +180,7 @@ def test_variables_of_mixed_families_have_no_holes() -> None:
 def test_columns_of_files_have_the_names_of_the_reactions(tmp_path: Path) -> None:
     """`run` and `solve` write the same columns, contact forces as vectors included."""
     machine = case("mixed_k3").mechanism
-    model = Model(machine, backend="interpreted")
+    model = Model(machine, backend="numpy")
     t = np.linspace(0, 1, 6)
     motion = condyle.Motion.from_arrays(t, {name: 0 * t for name in model.independent})
     columns = model.solve(motion, reactions=True).columns()
@@ -197,7 +200,7 @@ def test_columns_of_files_have_the_names_of_the_reactions(tmp_path: Path) -> Non
 def test_nothing_moves_nothing_weighs(name: str) -> None:
     c = case(name)
     mechanism = c.mechanism.replace(gravity=(0.0, 0.0, 0.0))
-    model = Model(mechanism, backend="interpreted")
+    model = Model(mechanism, backend="numpy")
     q = c.states["q"]
     found = reactions(model, model.evaluate(q, 0 * q, 0 * q, np.zeros((len(q), 9))))
     assert all(np.abs(r.array).max() == 0 for r in found.values())

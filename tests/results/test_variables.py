@@ -12,7 +12,7 @@ from condyle.results.variables import DIMENSIONS, VARIABLES
 
 @pytest.fixture(scope="module")
 def model() -> condyle.Model:
-    return condyle.derive(condyle.load("masticatory"), backend="interpreted")
+    return condyle.derive(condyle.load("masticatory"), backend="numpy")
 
 
 def along_x(model: condyle.Model, reach: float, count: int = 41) -> Motion:

@@ -28,11 +28,13 @@ def made_up(mechanism: condyle.Mechanism, count: int) -> Any:
     rng = np.random.default_rng(4)
     n, k = len(mechanism.chains), len(mechanism.contacts)
     sigma = -np.sort(-(10 ** rng.uniform(-5, 0, (count, 4))), axis=1)
+    transmission = rng.uniform(0.1, 1, (count, n))
+    extremes = np.stack([transmission.min(axis=1), transmission.max(axis=1)])
     configuration = SimpleNamespace(
         contact_point=rng.normal(0, 0.1, (count, k, 3)),
         cos_gamma=rng.uniform(0, 0.05, (count, n)),
         discriminant=rng.uniform(-0.2, 1, (count, n)),
-        singularity=Singularity(np.ones((count, n)), rng.uniform(0.1, 1, (count, n)), sigma, 0.1),
+        singularity=Singularity.of(transmission, transmission, sigma, extremes, 0.1),
     )
     return SimpleNamespace(
         pose=np.zeros((count, 6)),
@@ -104,7 +106,7 @@ def test_strict_goes_by_kind_not_by_words() -> None:
 def test_rounding_is_no_alarm() -> None:
     """A contact point at its bound to the last bit but one."""
     mechanism = condyle.load("masticatory")
-    model = condyle.derive(mechanism, backend="interpreted")
+    model = condyle.derive(mechanism, backend="numpy")
     t = np.linspace(0, 1, 9)
     motion = Motion.from_arrays(t, np.zeros((9, 4)), names=model.independent)
     solution = model.solve(motion)

@@ -148,7 +148,7 @@ def test_the_bundled_curved_mechanism(reference: Mechanism) -> None:
         assert np.hypot(1, 1.1) / (2 * s.yy) == pytest.approx(-59.5e-3, abs=1e-4)
     assert np.abs(home_residuals(curved)).max() < 1e-15
     assert curved.chains == reference.chains and curved.platform == reference.platform
-    model = condyle.derive(curved, backend="interpreted")
+    model = condyle.derive(curved, backend="numpy")
     solution = model.solve(condyle.reference_motion(), condyle.reference_load())
     assert (solution["status"] == 0).all() and (solution["bound_margin"] > 0).all()
     peak = np.abs(solution["torque"]).max()

@@ -10,8 +10,8 @@ import pytest
 import condyle
 from condyle.mechanism import Mechanism
 from condyle.mechanism.surface import Plane, Sphere
-from condyle.model import Model
 from condyle.motion import Motion
+from condyle.results.model import Model
 from condyle.results.solution import Solution, lift_off
 from condyle.results.summary import summarize
 
@@ -31,7 +31,7 @@ def chewing() -> Motion:
 
 
 def solve(mechanism: Mechanism, motion: Motion) -> Solution:
-    model = Model(mechanism, backend="interpreted")
+    model = Model(mechanism, backend="numpy")
     return model.solve(motion, condyle.reference_load())
 
 
@@ -130,6 +130,7 @@ def test_rows_of_a_states_file(reference: Mechanism, condyle_command, tmp_path: 
     pulls = [row for row, force in enumerate(left, 1) if force > 0]
     flags = [line.split(",")[columns.index("lift_off_left_condyle")] for line in lines[1:]]
     assert flags == ["1" if row in pulls else "0" for row in range(1, 5)]
-    assert columns[-3:] == ["lift_off_left_condyle", "lift_off_right_condyle", "status"]
+    lifted = ["lift_off_left_condyle", "lift_off_right_condyle"]
+    assert columns[-4:] == [*lifted, "status", "cause"]
     assert len(pulls) == 2
     assert f'"left_condyle" lifts off in 2 rows, first in row {pulls[0]}' in outcome.err

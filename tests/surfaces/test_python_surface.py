@@ -13,10 +13,10 @@ from condyle.analysis.compare import compare
 from condyle.errors import InputError, MechanismError
 from condyle.mechanism import Contact, Mechanism, dumps, parse
 from condyle.mechanism.surface import Expression, Unknown
-from condyle.model import Model
 from condyle.motion import Motion
 from condyle.report.figures import PLOTS
 from condyle.report.page import write_report
+from condyle.results.model import Model
 from condyle.results.solution import Solution
 
 from .cases import close
@@ -45,7 +45,7 @@ def motion() -> Motion:
 
 @pytest.fixture(scope="module")
 def solution(machine: Mechanism, motion: Motion) -> Solution:
-    return Model(machine, backend="interpreted").solve(motion)
+    return Model(machine, backend="numpy").solve(motion)
 
 
 @pytest.fixture
@@ -112,7 +112,7 @@ def test_options_of_the_note(machine: Mechanism, motion: Motion) -> None:
     ball = {"surface": shell, "side": "inside", "ball_radius": 0.004}
     left = machine.contacts[0].model_copy(update=ball)
     held = machine.replace(contacts=(left, machine.contacts[1]))
-    found = Model(held, backend="interpreted").solve(motion).mechanism.contacts[0]
+    found = Model(held, backend="numpy").solve(motion).mechanism.contacts[0]
     assert found.surface == Unknown(closed=True)
     assert (found.side, found.ball_radius) == ("inside", 0.004)
 

@@ -2,7 +2,7 @@
 
     F = 1/N sum_k |tau(t_k)|,   F_part = 1/N sum_k |tau_part(t_k)|
 
-without the bite force, |.| the 2-norm over the chains. Since norms of sums are not sums of norms,
+without the load, |.| the 2-norm over the chains. Since norms of sums are not sums of norms,
 F is not F_EE + F_SM + F_GS.
 
 Differs from the paper: any parts; chains of different effort units have indices of their own.
@@ -16,10 +16,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..questions.equations import LOAD
+
 if TYPE_CHECKING:
     from ..results.solution import Solution
 
-LOAD_PART = "bite"
+LOAD_PARTS = (LOAD, "bite")  # as older solutions call it
 ALL = "all"
 
 
@@ -27,7 +29,7 @@ ALL = "all"
 class Indices:
     """Mean norms of one unit's efforts.
 
-    values:  part -> index [unit]; "all" is F, without the bite force.
+    values:  part -> index [unit]; "all" is F, without the load.
     samples: how many entered; empty ones do not.
     """
 
@@ -40,9 +42,9 @@ def indices(share: np.ndarray, parts: Sequence[str], units: Sequence[str]) -> li
     """The indices of eq. (67), once for each effort unit.
 
     Args: share: (parts, N, n): what each part needs of each effort.
-          parts: names, "bite" among them or not;  units: of the chains' efforts, (n,).
+          parts: names, the load's among them or not;  units: of the chains' efforts, (n,).
     """
-    own = [i for i, part in enumerate(parts) if part != LOAD_PART]
+    own = [i for i, part in enumerate(parts) if part not in LOAD_PARTS]
     good = np.isfinite(share).all(axis=(0, 2))
     count = int(good.sum())
     found = []

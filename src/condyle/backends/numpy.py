@@ -70,7 +70,7 @@ class _Runner:
                 if node.args:
                     given = [self._fixed[self._place[a]] for a in node.args]
                     lanes = self._lanes(v)
-                    out = np.empty((lanes, 1) if lanes else ())
+                    out = np.empty((lanes, 1) if lanes else 1)
                     with np.errstate(all="ignore"):
                         self._call(v)(*given, out=out)
                     self._fixed[-1] = out

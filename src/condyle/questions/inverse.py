@@ -18,7 +18,7 @@ from . import configuration
 from .builder import Builder, Lanes
 from .equations import Equations, Wrench, equations, total
 from .friction import Contacts, LeastNorm, contacts, least_norm_pattern
-from .platform import ANGLE_UNITS, Platform, closed, given
+from .platform import ANGLE_UNITS, Platform, closed, given, independent_indices
 from .structure import Structure
 
 # What can be asked for besides the efforts.
@@ -85,7 +85,8 @@ def program(
         if structure.friction:
             _add_sliding(b, contacts(b, platform))
     b.check(_feasibility(b, platform, eq), DOUBTFUL, Status.unreachable)
-    b.check(best.quality * (ca.fabs(b.total(best.effort)) < HUGE), WEAK)
+    finite = ca.fabs(b.total(best.effort)) < HUGE
+    b.check(best.quality * finite * _every_rate_is_felt(b, eq), WEAK)
     return b.finish()
 
 
@@ -191,6 +192,21 @@ def _core(b: Builder, platform: Platform, load: Wrench) -> Equations:
     """Route `direct` has no equations across the contacts: those of the core have."""
     lump = FORMULATIONS[b.structure.formulation].lumps
     return equations(b, platform, load, route="core", lump=lump)
+
+
+def _every_rate_is_felt(b: Builder, eq: Equations) -> ca.SX:
+    """Whether no independent rate leaves all joints at rest, but for rounding: 1, else 0.
+
+    Pivots are measured by their own columns, so they do not see a column that is rounding itself.
+    """
+    length = b.parameter("length")
+    angles = [i >= 3 for i in independent_indices(b.structure.dependent)]
+    scale = ca.vertcat(*(1 / length if angle else ca.SX(1) for angle in angles))
+    sizes = scale * scale * b.total([a * a for a in eq.A])
+    least = sizes[0]
+    for size in ca.vertsplit(sizes)[1:]:
+        least = ca.fmin(least, size)
+    return least >= WEAK * ca.sum1(sizes)
 
 
 def _feasibility(b: Builder, platform: Platform, eq: Equations) -> ca.SX:

@@ -7,11 +7,11 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from condyle.kernels.compiled import Kernel
-from condyle.kernels.result import Torques
 from oracles import description
 from oracles.random_mechanism import random_mechanism, random_state, toml_text
 
+from condyle.backends.c.kernel import CompiledKernel
+from condyle.backends.kernel import arranged
 from condyle.mechanism import Mechanism, load, parse
 
 Array = np.ndarray
@@ -50,13 +50,20 @@ class Case:
         return self.q, self.q1, self.q2, self.load
 
     @property
+    def inputs(self) -> dict[str, Array]:
+        """What the question `inverse` takes."""
+        force, moment, point = np.hsplit(self.load, 3)
+        parts = {"force": force, "moment": moment, "point": point}
+        return {"q": self.q, "q1": self.q1, "q2": self.q2, **parts}
+
+    @property
     def point(self) -> Array:
         return self.load[0, 6:]
 
     @property
     def samples(self) -> Array:
-        """Inputs of a kernel with moments, (N, 3 m + 6)."""
-        return np.hstack([self.q, self.q1, self.q2, self.load[:, :6]])
+        """A row of the inputs' columns a sample, (N, 3 m + 9)."""
+        return np.hstack([self.q, self.q1, self.q2, self.load])
 
     def repeated(self, count: int) -> Case:
         """`count` states, all different: those of the case, drawn together by a common factor."""
@@ -96,17 +103,30 @@ def error(got: Any, wanted: Any) -> float:
     return float(np.nanmax(np.abs(got - wanted)) / (scale or 1.0))
 
 
-def errors(got: Torques, wanted: Torques) -> dict[str, float]:
-    """Relative errors of all results that both have."""
-    names = ("torque", "share", "contact_force", "rate", "acceleration")
-    pairs = {name: (getattr(got, name), getattr(wanted, name)) for name in names}
-    if got.poses is not None and wanted.poses is not None:
-        for name in ("pose", "rate", "acceleration"):
-            pairs[f"poses.{name}"] = getattr(got.poses, name), getattr(wanted.poses, name)
-    return {k: error(a, b) for k, (a, b) in pairs.items() if a is not None and b is not None}
+NAMES = (
+    "effort",
+    "share",
+    "contact_force",
+    "joint_rate",
+    "joint_acceleration",
+    "pose",
+    "pose_rate",
+    "pose_acceleration",
+)
 
 
-def ones(kernel: Kernel, samples: Array) -> dict[str, Array]:
-    """What `one` says of samples, as `Kernel.run` returns it."""
-    rows = np.array([kernel.one(sample) for sample in samples])
-    return {name: rows[:, a : a + count] for name, (a, count) in kernel.outputs.items()}
+def errors(got: Any, wanted: Any) -> dict[str, float]:
+    """Relative errors of the results of inverse dynamics."""
+    return {name: error(getattr(got, name), getattr(wanted, name)) for name in NAMES}
+
+
+def ones(kernel: CompiledKernel, samples: Array) -> tuple[dict[str, Array], Array]:
+    """What `one` says of samples, one after the other, as `run` returns it."""
+    found = [kernel.one(sample) for sample in samples]
+    columns = np.array([row for row, _ in found]).T
+    values, start, face = {}, 0, kernel.interface
+    for result in face.results:
+        width = face.width(result)
+        values[result.name] = arranged(face, result, columns[start : start + width], kernel.order)
+        start += width
+    return values, np.array([status for _, status in found])

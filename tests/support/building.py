@@ -1,4 +1,5 @@
-"""A cache folder of these tests' own, and a compiler that is quick because it does not optimise."""
+"""Kernels for tests: a cache folder of their own, and a compiler that is quick because it does not
+optimise. A room's conftest takes what it needs."""
 
 from __future__ import annotations
 
@@ -11,11 +12,6 @@ import pytest
 
 from condyle.backends import notice
 from condyle.backends.compiler import CompilerError, find_compiler
-
-try:
-    COMPILER = find_compiler().command
-except CompilerError as error:
-    pytest.skip(str(error), allow_module_level=True)
 
 
 @pytest.fixture(scope="session")
@@ -42,9 +38,18 @@ def nothing_said(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(scope="session")
-def quick_command(kernel_folder: Path) -> str:
+def compiler_command() -> tuple[str, ...]:
+    """The compiler of this machine; without one the test is skipped."""
+    try:
+        return find_compiler().command
+    except CompilerError as error:
+        pytest.skip(str(error))
+
+
+@pytest.fixture(scope="session")
+def quick_command(kernel_folder: Path, compiler_command: tuple[str, ...]) -> str:
     """The compiler without optimisation: builds take half a second."""
-    return script(kernel_folder / "quick", f'exec {shlex.join(COMPILER)} "$@" -O0')
+    return script(kernel_folder / "quick", f'exec {shlex.join(compiler_command)} "$@" -O0')
 
 
 @pytest.fixture

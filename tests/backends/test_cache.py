@@ -15,14 +15,16 @@ from typing import Any
 
 import platformdirs
 import pytest
-from condyle.kernels import compiled
-from condyle.kernels.compiled import _recipe
-from condyle.questions.spec import KernelSpec, kernel_spec
+from support.cases import case
 
+from condyle import questions
 from condyle.backends import cache, compiler
+from condyle.backends.c import kernel
+from condyle.backends.c.kernel import _recipe
 from condyle.backends.compiler import Compiler, find_compiler
 from condyle.errors import CondyleError
-from kernels.cases import case
+from condyle.questions import Prescribed, Question
+from condyle.questions.structure import structure_of
 
 RECIPE, OTHER = cache.digest("one"), cache.digest("other")
 BYTES = b"a library"
@@ -169,10 +171,11 @@ def test_parts_of_a_recipe_stand_apart() -> None:
 
 
 def test_everything_that_matters_is_in_the_recipe(monkeypatch: pytest.MonkeyPatch) -> None:
-    spec = kernel_spec(case("masticatory").mechanism, "virtual_power", "core")
+    structure = structure_of(case("masticatory").mechanism)
+    question = Question.about(structure, "inverse", ("contact",))
     tool = Compiler(("cc",), ("-O2",), "gcc 13 AVX2", 4)
-    specs: list[KernelSpec] = [spec] + [
-        dataclasses.replace(spec, **change)
+    structures = [
+        dataclasses.replace(structure, **change)
         for change in (
             {"formulation": "momentum"},
             {"route": "direct"},
@@ -180,11 +183,19 @@ def test_everything_that_matters_is_in_the_recipe(monkeypatch: pytest.MonkeyPatc
             {"chains": (("RSS", 7),)},
             {"contacts": (("quadric", 10), ("plane", 5))},
             {"dependent": ("X", "gamma")},
-            {"parallel": not spec.parallel},
-            {"outputs": ("contact",)},
-            {"moment": True},
-            {"zeros": ((-1, 0),)},
+            {"parallel": not structure.parallel},
+            {"zeros": frozenset({(-1, 0)})},
+            {"zeros": frozenset({(0, 0)})},
         )
+    ]
+    asked = [
+        question,
+        *(Question.about(s, "inverse", ("contact",)) for s in structures),
+        Question.about(structure, "inverse", ()),
+        Question.about(structure, "inverse", ("joint",)),
+        Question.about(structure, "matrices"),
+        Question.about(structure, "motion"),
+        *(Question.about(structure, "closure", Prescribed(n)) for n in ((), ("X", "Y"))),
     ]
     tools = [
         dataclasses.replace(tool, **change)
@@ -198,14 +209,28 @@ def test_everything_that_matters_is_in_the_recipe(monkeypatch: pytest.MonkeyPatc
             {"lanes": 8},
         )
     ]
-    recipes = [_recipe(s, tool) for s in specs] + [_recipe(spec, t) for t in tools]
-    monkeypatch.setattr(compiled, "version", lambda name: "0.0")
-    recipes.append(_recipe(spec, tool))
-    monkeypatch.setattr(compiled, "generator_digest", lambda: "other sources")
-    recipes.append(_recipe(spec, tool))
+    recipes = [_recipe(q.key, tool) for q in asked] + [_recipe(question.key, t) for t in tools]
+    with monkeypatch.context() as patch:
+        patch.setattr(questions, "version", lambda name: "0.0")
+        recipes.append(_recipe(question.key, tool))
+        patch.setattr(questions, "_sources", lambda: "other sources")
+        recipes.append(_recipe(question.key, tool))
+        patch.setattr(kernel, "_generator", lambda: "another generator")
+        recipes.append(_recipe(question.key, tool))
     assert len(set(recipes)) == len(recipes)
-    monkeypatch.undo()
-    assert _recipe(dataclasses.replace(spec), dataclasses.replace(tool)) == recipes[0]
+    again = Question.about(dataclasses.replace(structure), "inverse", ("contact",))
+    assert _recipe(again.key, dataclasses.replace(tool)) == recipes[0]
+
+
+def test_formulation_and_route_make_no_difference_to_geometry() -> None:
+    mechanism = case("masticatory").mechanism
+    for name in questions.GEOMETRY:
+        details = (Prescribed(),) if name in ("closure", "conditions") else ()
+        keys = {
+            Question.about(structure_of(mechanism, *choice), name, *details).key
+            for choice in (("virtual_power", "core"), ("momentum", "direct"))
+        }
+        assert len(keys) == 1
 
 
 def test_what_is_known_of_a_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.cases import case
+from support.children import PATIENCE, end, start, wait_for
 
 from condyle.errors import CondyleError
-from condyle.model import Model
+from condyle.model.evaluator import Evaluator
 from condyle.results import states
 from condyle.results.states import solve_file
-from kernels.cases import case
-from kernels.children import PATIENCE, end, start, wait_for
 
 NAME = "masticatory"
 CHUNK = 200
@@ -35,8 +35,8 @@ main()
 
 
 @pytest.fixture(scope="module")
-def model() -> Model:
-    return Model(case(NAME).mechanism, backend="interpreted")
+def model() -> Evaluator:
+    return Evaluator(case(NAME).mechanism, backend="numpy")
 
 
 @pytest.fixture(autouse=True)
@@ -64,7 +64,7 @@ def names(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def peak(model: Model, folder: Path, count: int) -> int:
+def peak(model: Evaluator, folder: Path, count: int) -> int:
     """Bytes at most in use while a file is solved."""
     path = write(folder / f"{count}.csv", count)
     gc.collect()
@@ -76,16 +76,16 @@ def peak(model: Model, folder: Path, count: int) -> int:
         tracemalloc.stop()
 
 
-@pytest.mark.parametrize("backend", ["interpreted", "compiled"])
+@pytest.mark.parametrize("backend", ["numpy", "compiled"])
 @pytest.mark.usefixtures("quick")
 def test_memory_does_not_grow(backend: str, tmp_path: Path) -> None:
-    model = Model(case(NAME).mechanism, backend=backend)
+    model = Evaluator(case(NAME).mechanism, backend=backend)
     solve_file(model, write(tmp_path / "first.csv", CHUNK), tmp_path / "out.csv")
     few, many = (peak(model, tmp_path, count) for count in (3 * CHUNK, 15 * CHUNK))
     assert many < 1.5 * few
 
 
-def test_as_in_one_piece(model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_as_in_one_piece(model: Evaluator, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write(tmp_path / "states.csv", 2 * CHUNK + 7)
     solve_file(model, path, tmp_path / "pieces.csv")
     monkeypatch.setattr(states, "CHUNK_ROWS", 65536)
@@ -110,7 +110,7 @@ LATE = {
 
 @pytest.mark.parametrize("old", [None, "old"])
 @pytest.mark.parametrize("kind", LATE)
-def test_a_bad_row_late(model: Model, tmp_path: Path, kind: str, old: str | None) -> None:
+def test_a_bad_row_late(model: Evaluator, tmp_path: Path, kind: str, old: str | None) -> None:
     """The error names it, counted from the top of the file; nothing is written."""
     text, said = LATE[kind]
     path = write(tmp_path / "states.csv", 900, row_733=text)
@@ -124,15 +124,15 @@ def test_a_bad_row_late(model: Model, tmp_path: Path, kind: str, old: str | None
     assert not old or out.read_text() == old
 
 
-def test_bad_rows_late_that_are_kept(model: Model, tmp_path: Path) -> None:
+def test_bad_rows_late_that_are_kept(model: Evaluator, tmp_path: Path) -> None:
     path = write(tmp_path / "states.csv", 900, row_733=LATE["unreachable"][0])
     assert solve_file(model, path, tmp_path / "out.csv", flag=True)[0] == 900
     lines = (tmp_path / "out.csv").read_text().splitlines()
-    assert len(lines) == 901 and lines[733].endswith(",unreachable")
-    assert all(line.endswith(",ok") for i, line in enumerate(lines) if i not in (0, 733))
+    assert len(lines) == 901 and lines[733].endswith(",unreachable,chain temporalis_left")
+    assert all(line.endswith(",ok,") for i, line in enumerate(lines) if i not in (0, 733))
 
 
-def test_warnings_count_rows_of_the_file(model: Model, tmp_path: Path) -> None:
+def test_warnings_count_rows_of_the_file(model: Evaluator, tmp_path: Path) -> None:
     path = write(tmp_path / "states.csv", 900, row_733="0,0.004" + ",0" * 10)
     _, warnings = solve_file(model, path, tmp_path / "out.csv")
     assert any("in 1 rows" in text and "in row 733" in text for text in warnings)
@@ -140,7 +140,7 @@ def test_warnings_count_rows_of_the_file(model: Model, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt(), MemoryError()])
 def test_interrupted(
-    model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException
+    model: Evaluator, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException
 ) -> None:
     real, calls = states.solve_table, []
 
@@ -166,7 +166,7 @@ def test_stopped_from_outside(tmp_path: Path, number: signal.Signals) -> None:
     pipe, out = tmp_path / "states", tmp_path / "out.csv"
     os.mkfifo(pipe)
     out.write_text("old")
-    child = start(SOLVE, "--states", pipe, "--out", out, "--backend", "interpreted")
+    child = start(SOLVE, "--states", pipe, "--out", out, "--backend", "numpy")
     with open(pipe, "w") as file:
         file.write(HEADER + "".join(rows(4 * CHUNK)))
         file.flush()
@@ -183,7 +183,7 @@ def test_through_pipes(tmp_path: Path) -> None:
     """In and out: a row as soon as its chunk is done, no file in between."""
     pipe = tmp_path / "states"
     os.mkfifo(pipe)
-    child = start(SOLVE, "--states", pipe, "--out", "/dev/stdout", "--backend", "interpreted", "-q")
+    child = start(SOLVE, "--states", pipe, "--out", "/dev/stdout", "--backend", "numpy", "-q")
     seen = Event()
 
     def feed() -> None:

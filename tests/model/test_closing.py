@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
-from condyle.kinematics.closure import (
-    contact_symbols,
-    coordinate_closure,
-    landmark_closure,
-    solve_samples,
-)
 from oracles.closure import complete_state, contact_rows
 from oracles.description import read
 from oracles.random_mechanism import random_mechanism, random_state, toml_text
 from oracles.rotations import platform_motion
 
 from condyle import InputError
-from condyle.kinematics.contact import contact_frame, indices, parasitic_jacobian, residuals
+from condyle.backends.choose import Backend
+from condyle.kinematics.contact import (
+    contact_frame,
+    contacts_of,
+    indices,
+    parasitic_jacobian,
+    residuals,
+)
 from condyle.kinematics.rotation import angular_velocity_matrix, rotation
 from condyle.mechanism import COORDINATES, Mechanism, parse
 from condyle.mechanism.home import (
@@ -30,6 +32,16 @@ from condyle.mechanism.home import (
     independent_coordinates,
     usable_sets,
 )
+from condyle.model.closing import Closure
+from condyle.model.follow import solve_samples
+
+
+def coordinate_closure(mechanism: Mechanism, names: Sequence[str]) -> Closure:
+    return Closure(mechanism, names, backend=Backend("numpy"))
+
+
+def landmark_closure(mechanism: Mechanism, landmark: str) -> Closure:
+    return Closure(mechanism, landmark=landmark, backend=Backend("numpy"))
 
 
 @cache
@@ -41,7 +53,7 @@ def drawn(contacts: int) -> tuple[dict[str, Any], Mechanism]:
 def off(mechanism: Mechanism, pose: np.ndarray) -> float:
     """Largest distance of a contact point from its plane [m]."""
     x = ca.SX.sym("x", 6)
-    phi = ca.Function("phi", [x], [residuals(contact_symbols(mechanism), x)])
+    phi = ca.Function("phi", [x], [residuals(contacts_of(mechanism), x)])
     return float(np.abs(phi(pose.T).full()).max())
 
 
@@ -90,7 +102,7 @@ def test_parasitic_jacobian(contacts: int) -> None:
     raw, mechanism = drawn(contacts)
     d, dependent = read(raw), dependent_coordinates(mechanism)
     x = ca.SX.sym("x", 6)
-    frame = contact_frame(contact_symbols(mechanism), x[:3], rotation(x[3:]))
+    frame = contact_frame(contacts_of(mechanism), x[:3], rotation(x[3:]))
     C = frame.N.T @ ca.diagcat(ca.SX.eye(3), angular_velocity_matrix(x[3:]))
     M_J_of = ca.Function("M_J", [x], [ca.densify(parasitic_jacobian(C, dependent))])
     states = random_state(np.random.default_rng(2), raw, 4)

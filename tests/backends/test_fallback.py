@@ -17,15 +17,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.cases import case, error
 
 from condyle.backends import cache, compiler
 from condyle.backends.compiler import CompilerError, find_compiler
 from condyle.errors import InputError
-from condyle.model import Model
-from kernels.cases import case, error
+from condyle.model.evaluator import Evaluator
 
 NAME = "gough-stewart"
-SLOWER = "; the interpreter gives the same numbers, slower\n"
+SLOWER = "; numpy gives the same numbers, slower\n"
 HANGS = "exec sleep 60"
 REMEDY = "Install gcc or clang, name another compiler in CC"
 
@@ -38,20 +38,20 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cache"
 
 
-def interpreted() -> Model:
-    return Model(case(NAME).mechanism, backend="interpreted")
+def by_numpy() -> Evaluator:
+    return Evaluator(case(NAME).mechanism, backend="numpy")
 
 
 @functools.cache
 def wanted() -> np.ndarray:
-    return interpreted().kernel.solve(*case(NAME).arguments).torque
+    return by_numpy().torques(*case(NAME).arguments).effort
 
 
-def check_numbers(model: Model) -> None:
-    """Those of the interpreter."""
-    found = model.kernel.solve(*case(NAME).arguments, outputs=())
+def check_numbers(model: Evaluator) -> None:
+    """Those of numpy."""
+    found = model.torques(*case(NAME).arguments)
     tolerance = 1e-12 if model.route == "direct" else 0
-    assert error(found.torque, wanted()) <= tolerance
+    assert error(found.effort, wanted()) <= tolerance
 
 
 def absent(tmp_path: Path, patch: pytest.MonkeyPatch) -> None:
@@ -144,10 +144,10 @@ def test_same_numbers_and_one_notice(
 ) -> None:
     """However often it is called; and nothing stays behind."""
     c = case(NAME)
-    model = Model(c.mechanism)
+    model = Evaluator(c.mechanism)
     for _ in range(2):
         check_numbers(model)
-    assert model.kernel.name == "interpreted"
+    assert model.backend.name == "numpy"
     said = capsys.readouterr().err
     assert said.startswith("condyle: ") and said.count("condyle: ") == 1
     assert useless[1] in said and said.endswith(SLOWER)
@@ -164,10 +164,10 @@ def test_one_notice_for_many_models(
 ) -> None:
     """Whatever it is that is wrong with the compiler next."""
     for _ in range(2):
-        check_numbers(Model(case(NAME).mechanism))
-    check_numbers(Model(case(NAME).mechanism, route="direct"))
+        check_numbers(Evaluator(case(NAME).mechanism))
+    check_numbers(Evaluator(case(NAME).mechanism, route="direct"))
     monkeypatch.setenv("CC", "no-such-cc")
-    check_numbers(Model(case(NAME).mechanism))
+    check_numbers(Evaluator(case(NAME).mechanism))
     assert capsys.readouterr().err.count("condyle: ") == 1
 
 
@@ -178,7 +178,7 @@ def test_kernels_that_are_demanded(
     """At the latest when the first of them is needed."""
     c = case(NAME)
     with pytest.raises(CompilerError) as failure:
-        Model(c.mechanism, backend="compiled").torques(*c.arguments)
+        Evaluator(c.mechanism, backend="compiled").torques(*c.arguments)
     assert useless[1] in str(failure.value) and REMEDY in str(failure.value)
     assert capsys.readouterr().err == ""
 
@@ -202,7 +202,7 @@ def test_no_place_to_build(
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(tempfile, "mkdtemp", full)
-    check_numbers(Model(case(NAME).mechanism))
+    check_numbers(Evaluator(case(NAME).mechanism))
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and os.strerror(errno.ENOSPC) in said and said.endswith(SLOWER)
 
@@ -211,9 +211,9 @@ def test_no_place_to_build(
 def test_what_was_built_before_needs_no_second_build(monkeypatch: pytest.MonkeyPatch) -> None:
     """A compiler that has broken since is not called for what is there."""
     c = case(NAME)
-    first = Model(c.mechanism).kernel.kernel(c.point)
+    first = Evaluator(c.mechanism).kernel("inverse", ())
     monkeypatch.setattr(compiler.Compiler, "build", lambda *call: pytest.fail("built again"))
-    second = Model(c.mechanism).kernel.kernel(c.point)
+    second = Evaluator(c.mechanism).kernel("inverse", ())
     assert second.cached and not first.cached
 
 
@@ -222,22 +222,24 @@ def test_what_was_built_before_needs_no_second_build(monkeypatch: pytest.MonkeyP
 
 def test_the_environment_decides_what_auto_means(monkeypatch: pytest.MonkeyPatch) -> None:
     mechanism = case(NAME).mechanism
-    for value, name in (("interpreted", "interpreted"), ("compiled", "compiled"), ("", "compiled")):
+    meant = {"numpy": "numpy", "interpreted": "numpy", "compiled": "compiled", "": "compiled"}
+    for value, name in meant.items():
         monkeypatch.setenv("CONDYLE_BACKEND", value)
-        assert Model(mechanism).kernel.name == name
-        for backend in ("compiled", "interpreted"):
-            assert Model(mechanism, backend=backend).kernel.name == backend
+        assert Evaluator(mechanism).backend.name == name
+        for backend in ("compiled", "numpy"):
+            assert Evaluator(mechanism, backend=backend).backend.name == backend
+        assert Evaluator(mechanism, backend="numpy").backend.name == "numpy"
     monkeypatch.setenv("CONDYLE_BACKEND", "compilled")
     with pytest.raises(InputError, match=r'no backend "compilled"\. Did you mean "compiled"'):
-        Model(mechanism)
+        Evaluator(mechanism)
 
 
 def test_demanded_by_the_environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     absent(tmp_path, monkeypatch)
     monkeypatch.setenv("CONDYLE_BACKEND", "compiled")
     with pytest.raises(CompilerError, match=REMEDY):
-        Model(case(NAME).mechanism)
-    assert Model(case(NAME).mechanism, backend="interpreted").kernel.name == "interpreted"
+        Evaluator(case(NAME).mechanism)
+    assert Evaluator(case(NAME).mechanism, backend="numpy").backend.name == "numpy"
 
 
 # -- on the command line ----------------------------------------------------------------------
@@ -249,7 +251,7 @@ def solve(
 ) -> Callable[..., Any]:
     """`condyle solve` on the states of the case."""
     c = case(NAME)
-    names = interpreted().independent
+    names = by_numpy().independent
     with open(tmp_path / "states.csv", "w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow([p + n for p in ("", "d", "dd") for n in names])
@@ -269,18 +271,18 @@ def table(path: Path) -> np.ndarray:
 def test_both_backends_write_the_same(
     solve: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Kernel, interpreter, and interpreter for want of a compiler."""
+    """Kernel, numpy, and numpy for want of a compiler."""
     assert solve("compiled.csv", "--backend", "compiled").status == 0
-    assert solve("interpreted.csv", "--backend", "interpreted").err == ""
+    assert solve("numpy.csv", "--backend", "numpy").err == ""
     absent(tmp_path, monkeypatch)
     outcome = solve("fallback.csv")
     assert outcome.status == 0 and outcome.err.count("\n") == 1 and outcome.err.endswith(SLOWER)
-    wanted = table(tmp_path / "interpreted.csv")
+    wanted = table(tmp_path / "numpy.csv")
     got = table(tmp_path / "compiled.csv")
     assert got.shape == (len(case(NAME).q), 18)
     for columns in (slice(0, 6), slice(6, 12), slice(12, 18)):
         assert error(got[:, columns], wanted[:, columns]) < 1e-10
-    assert (tmp_path / "fallback.csv").read_bytes() == (tmp_path / "interpreted.csv").read_bytes()
+    assert (tmp_path / "fallback.csv").read_bytes() == (tmp_path / "numpy.csv").read_bytes()
 
 
 @pytest.mark.parametrize(

@@ -11,27 +11,28 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from condyle.kernels import compiled
-from condyle.kernels.compiled import Kernel
+from oracles.interpreter import Interpreter
+from support.cases import case, error
+from support.children import PATIENCE, end, start, wait_for
 
 from condyle.backends import cache
+from condyle.backends.c.kernel import CompiledKernel, _recipe
 from condyle.backends.compiler import find_compiler
-from condyle.model import Model
-from kernels.cases import case, error
-from kernels.children import PATIENCE, end, start, wait_for
+from condyle.model.evaluator import Evaluator
+from condyle.questions import Question
 
 SOLVE = """
 import json, sys
 from condyle.backends import cache
-from condyle.model import Model
-from kernels.cases import case
+from condyle.model.evaluator import Evaluator
+from support.cases import case
 c = case("gough-stewart")
-kernel = Model(c.mechanism, backend="compiled").kernel.kernel(c.point, (), True)
+kernel = Evaluator(c.mechanism, backend="compiled").kernel("inverse", ())
 sys.stdin.readline()  # the others are as far
 """
 RUN = """
-values, status = kernel.run(c.samples)
-print(json.dumps([kernel.cached, kernel.in_order(values["torque"]).tolist()]))
+effort = kernel.run(c.inputs).values["effort"].T
+print(json.dumps([kernel.cached, effort.tolist()]))
 """
 SOLVE_TOGETHER = SOLVE.replace(
     "kernel = ", 'print("here", flush=True)\nsys.stdin.readline()\nkernel = '
@@ -99,16 +100,23 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cache"
 
 
-def kernel() -> Kernel:
+def kernel() -> CompiledKernel:
+    model = Evaluator(case("gough-stewart").mechanism, backend="compiled")
+    return model.kernel("inverse", ())
+
+
+def wanted() -> np.ndarray:
     c = case("gough-stewart")
-    return Model(c.mechanism, backend="compiled").kernel.kernel(c.point, (), True)
+    return Interpreter(c.mechanism).solve(*c.arguments).effort
 
 
-def check(kernel: Kernel) -> None:
+def efforts(kernel: CompiledKernel) -> np.ndarray:
+    return kernel.run(case("gough-stewart").inputs).values["effort"].T
+
+
+def check(kernel: CompiledKernel) -> None:
     """Right numbers."""
-    c = case("gough-stewart")
-    wanted = Model(c.mechanism, backend="interpreted").kernel.solve(*c.arguments).torque
-    assert error(kernel.in_order(kernel.run(c.samples)[0]["torque"]), wanted) < 1e-10
+    assert error(efforts(kernel), wanted()) < 1e-10
 
 
 def check_clean(folder: Path, kernels: int = 1) -> None:
@@ -130,9 +138,7 @@ def test_processes_race(folder: Path) -> None:
     assert [err for _, err in said] == [""] * 3
     torques = [json.loads(out)[1] for out, _ in said]
     assert torques[0] == torques[1] == torques[2]
-    c = case("gough-stewart")
-    wanted = Model(c.mechanism, backend="interpreted").kernel.solve(*c.arguments).torque
-    assert error(np.array(torques[0]), wanted) < 1e-10
+    assert error(np.array(torques[0]), wanted()) < 1e-10
     check_clean(folder)
     again = kernel()
     assert again.cached
@@ -215,8 +221,7 @@ def test_a_library_put_in_place_of_ours_is_never_loaded(folder: Path, tmp_path: 
     assert err == "" and not mark.exists()
     cached, torque = json.loads(out)
     assert not cached
-    c = case("gough-stewart")
-    assert error(torque, first.in_order(first.run(c.samples)[0]["torque"])) == 0
+    assert error(torque, efforts(first)) == 0
     check_clean(folder)
 
 
@@ -225,7 +230,10 @@ def test_a_library_that_no_longer_loads_is_built_again(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Whole, but of another machine, say."""
-    recipe = compiled._recipe(kernel().spec, find_compiler())
+    model = Evaluator(case("gough-stewart").mechanism, backend="numpy")
+    question = Question.about(model._structure, "inverse", ())
+    kernel()
+    recipe = _recipe(question.key, find_compiler())
     facts = cache.find(recipe).facts
     cache.clear()
 
@@ -251,7 +259,5 @@ def test_kernels_of_one_process_go_with_it(folder: Path, tmp_path: Path) -> None
     child = start(SOLVE.replace("c = ", hold + "c = ", 1) + RUN, tmp_path / "tmp")
     out, err = child.communicate("\n", timeout=PATIENCE)
     assert err.count("\n") == 1 and f"cache {folder} cannot be used" in err
-    c = case("gough-stewart")
-    wanted = Model(c.mechanism, backend="interpreted").kernel.solve(*c.arguments).torque
-    assert error(json.loads(out)[1], wanted) < 1e-10
+    assert error(json.loads(out)[1], wanted()) < 1e-10
     assert list((tmp_path / "tmp").iterdir()) == []

@@ -1,0 +1,35 @@
+"""Small programs made by hand, and how to run them every way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from condyle.backends.kernel import arranged
+from condyle.graph.graph import Graph, Value
+from condyle.graph.program import Check, Numbers, Output, Port, Program
+from condyle.graph.write import casadi_function
+
+LANES = 3  # no whole number of vectors
+
+
+def program(
+    graph: Graph, roots: Sequence[Value], columns: int, checks: Sequence[Check] = ()
+) -> Program:
+    """Shared values of one port x as outputs 0, 1, ...; one group of `LANES` lanes."""
+    outputs = tuple(Output(str(i), (), "", False, ((v,),)) for i, v in enumerate(roots))
+    return Program(
+        graph, (LANES,), columns, (Port("x", columns, "", False, 0),), outputs, tuple(checks)
+    )
+
+
+def no_numbers(lanes: int = LANES) -> Numbers:
+    return Numbers(np.zeros(1), (np.zeros((1, lanes)),), (np.zeros(1),), tuple(range(lanes)))
+
+
+def by_casadi(p: Program, numbers: Numbers, samples: np.ndarray) -> dict[str, np.ndarray]:
+    """Results by name, samples last, by CasADi's interpreter; samples: (N, columns)."""
+    *outputs, _ = casadi_function(p, numbers).map(len(samples))(samples.T)
+    blocks = zip(p.interface.results, outputs, strict=True)
+    return {r.name: arranged(p.interface, r, np.array(o), numbers.order) for r, o in blocks}
