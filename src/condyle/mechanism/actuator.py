@@ -43,6 +43,11 @@ class Limits(NamedTuple):
         return self.low == -self.high
 
     @property
+    def of_speed(self) -> Limits:
+        """The limit of the speed in the place of those of the effort, to show both alike."""
+        return Limits(-self.speed, self.speed, self.speed)
+
+    @property
     def greatest(self) -> float:
         """The larger of |limits| of the effort, which activations are measured by."""
         return max(abs(self.low), abs(self.high))

@@ -117,7 +117,9 @@ def _end(value: float) -> float:
 def _rising(value: tuple[float, float]) -> tuple[float, float]:
     low, high = value
     if not low < high or low == math.inf or high == -math.inf:
-        raise ValueError(f"expected [least, greatest] with least < greatest, got [{low:g}, {high:g}]")
+        raise ValueError(
+            f"expected [least, greatest] with least < greatest, got [{low:g}, {high:g}]"
+        )
     return value
 
 

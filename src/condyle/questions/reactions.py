@@ -131,7 +131,7 @@ def _quantities(bodies: FreeBodies) -> Iterator[tuple[ca.SX, ca.SX]]:
 
 
 def chain_places(family: Family, owner: str) -> Iterator[Place]:
-    """The reactions of one chain, in the order of `_quantities`; of one without bodies, its pull."""
+    """The reactions of one chain, in the order of `_quantities`; without bodies, its pull."""
     if not family.bodies:
         yield Place("platform_joint", owner, "platform", family.kind, "platform joint M")
         return
