@@ -204,7 +204,7 @@ class Cable(ChainTable):
 
     @property
     def lengths(self) -> dict[str, float]:
-        return {"cable": distance(self.base, self.platform)}
+        return {"line": distance(self.base, self.platform)}
 
     @property
     def fixed_points(self) -> tuple[tuple[float, ...], ...]:

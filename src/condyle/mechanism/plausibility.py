@@ -20,7 +20,7 @@ LARGE, SMALL = 10.0, 1e-4  # metres
 EARTH, EARTH_SPREAD = 9.81, 0.06  # m/s^2: 9.76 at the equator's mountains, 9.83 at the poles
 DENSEST = 2e4  # kg/m^3 of a cube as large as the mechanism; nearly osmium
 SOUND = 340.0  # m/s
-SLIPPERY = 2.0  # coefficient of friction: rubber has 1, and hardly anything more than this
+ROUGHEST = 2.0  # coefficient of friction: hardly any pair has more
 POINTLIKE = 3e-3  # radius of gyration over the platform's own size
 ROUNDING = 1e-12  # metres outside a bound
 
@@ -206,14 +206,13 @@ def _friction(mechanism: Mechanism) -> Iterator[Implausible]:
     large = {
         contact.name: contact.friction.coefficient
         for contact in mechanism.contacts
-        if contact.friction.coefficient > SLIPPERY
+        if contact.friction.coefficient > ROUGHEST
     }
     if large:
         listed = few(f'contact "{name}" {mu:g}' for name, mu in large.items())
         yield Implausible(
             "friction_large",
-            f"friction: a coefficient above {SLIPPERY:g}: {listed}; steel on steel has 0.6, joint "
-            "cartilage 0.02; is it a percentage?",
+            f"friction: a coefficient above {ROUGHEST:g}: {listed}; is it a percentage?",
             {"contacts": large},
         )
 

@@ -126,7 +126,11 @@ def _rising(value: tuple[float, float]) -> tuple[float, float]:
 def _effort_limit(value: Any) -> Any:
     """A number, or least and greatest; each complains of what it is meant to be."""
     value = listed(value)
-    return (_RANGE if isinstance(value, list | tuple) else _SIZE).validate_python(value)
+    if not isinstance(value, list | tuple):
+        return _SIZE.validate_python(value)
+    if len(value) != 2:
+        raise ValueError(f"expected a number or [least, greatest], got {len(value)} entries")
+    return _RANGE.validate_python(value)
 
 
 def _pull_only(value: float | tuple[float, float]) -> float | tuple[float, float]:
