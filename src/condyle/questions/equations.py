@@ -258,6 +258,9 @@ def _summed(b: Builder, chains: Sequence[ChainTerms], lumped: bool) -> dict[str,
 
 
 def total(terms: Sequence[ca.SX]) -> ca.SX:
+    """The sum; 0 of nothing, as of a family without bodies."""
+    if not terms:
+        return ca.SX(0)
     found = terms[0]
     for term in terms[1:]:
         found = found + term
