@@ -31,7 +31,7 @@ from .platform import (
 )
 from .structure import Structure
 
-LOAD, ACTUATORS, FRICTION = "load", "actuators", "friction"
+LOAD, ACTUATORS, FRICTION, INTERNAL = "load", "actuators", "friction", "internal"
 
 
 @dataclass(frozen=True)
@@ -158,9 +158,14 @@ def equations(
 
 
 def part_names(structure: Structure) -> tuple[str, ...]:
-    """Parts that share the efforts: platform, the links of the chains, actuators, load."""
+    """Parts that share the efforts: platform, links of the chains, actuators, load, friction.
+
+    Each is what the part asks for with least norm. Where the efforts are others, because the forces
+    of friction depend on them or limits bind, what is left is internal: it balances itself.
+    """
     actuators = (ACTUATORS,) if structure.losses else ()
-    return ("platform", *_links(structure), *actuators, LOAD)
+    friction = (FRICTION, INTERNAL) if structure.friction else ()
+    return ("platform", *_links(structure), *actuators, LOAD, *friction)
 
 
 def _links(structure: Structure) -> tuple[str, ...]:

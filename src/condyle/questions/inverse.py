@@ -161,6 +161,8 @@ def system(structure: Structure) -> Program:
     for name, parts in (("b", list(eq.parts.values())), ("b_gravity", still)):
         rows = ca.horzcat(*(eq.basis.generalized_force(p) for p in parts)).T
         b.output(name, rows, "", len(parts), structure.m)
+    pulled = eq.basis.generalized_force(ca.SX.eye(eq.Q.numel()))
+    b.output("Pi", pulled, "", structure.m, 6)  # Pi^T
     b.output("Q", eq.Q, "N, N m", 6)
     b.output("J", [c.row for c in eq.chains], "")
     touch, k = contacts(b, platform), len(structure.contacts)

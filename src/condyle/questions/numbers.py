@@ -123,7 +123,7 @@ class Layout:
         if not self.structure.losses:
             return []
         a = chain.actuator
-        return [a.rotor_inertia * a.gear**2, a.viscous, a.coulomb, a.smoothing_speed**2]
+        return [a.reflected_inertia, a.viscous, a.coulomb, a.smoothing_speed**2]
 
     def pads(self, kind: str) -> tuple[str, ...]:
         """Constants of a family that, at 0, make a lane that stands for no chain do nothing."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..mechanism.bodies import LinearActuator, RotaryActuator
 from ..mechanism.home import dependent_coordinates
 from ..mechanism.mechanism import Mechanism
 
@@ -54,11 +53,6 @@ class Structure:
         return tuple(kind for kind, _ in self.chains)
 
 
-def loses(actuator: RotaryActuator | LinearActuator) -> bool:
-    """Whether an actuator takes part of its effort for itself."""
-    return bool(actuator.rotor_inertia or actuator.viscous or actuator.coulomb)
-
-
 def structure_of(
     mechanism: Mechanism, formulation: str = "virtual_power", route: str = "core"
 ) -> Structure:
@@ -79,6 +73,6 @@ def structure_of(
         parallel=not friction
         and len(contacts) == len(planes) == 2
         and planes[0].slope == planes[1].slope,
-        losses=any(loses(chain.actuator) for chain in mechanism.chains),
+        losses=any(not chain.actuator.ideal for chain in mechanism.chains),
         friction=friction,
     )
