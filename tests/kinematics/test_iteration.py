@@ -39,7 +39,7 @@ def function(m: Mechanism) -> ca.Function:
     """q -> X_EE and reach."""
     q = ca.SX.sym("q", 6 - len(m.contacts))
     placement = newton(contacts_of(m), dependent_coordinates(m), q)
-    reach = ca.SX(1) if placement.reach is None else placement.reach
+    reach = ca.SX(1) if placement.discriminant is None else placement.discriminant
     return ca.Function("newton", [q], [placement.pose(), reach])
 
 
