@@ -82,7 +82,7 @@ def reference_solution(rate: float, reactions: bool = False) -> Any:
     from condyle.motion import Motion, bundled_reference
 
     motion = Motion.from_csv(bundled_reference()[0], rate=rate)
-    model = condyle.derive(condyle.load("masticatory"), backend="interpreted")
+    model = condyle.derive(condyle.load("masticatory"), backend="numpy")
     return model.solve(motion, condyle.reference_load(), reactions=reactions)
 
 
@@ -130,22 +130,27 @@ def warning_table() -> str:
 
 def operation_counts() -> str:
     """Operations a sample of Models 1 and 2: every subexpression once, and written out."""
-    from condyle.dynamics.equations import closure_function, core_function, direct_function
-
     import condyle
     from condyle.dynamics import FORMULATIONS
+    from condyle.questions.inverse import motion
+    from condyle.questions.numbers import Layout, specialised
+    from condyle.questions.platform import closed, given
+    from condyle.questions.structure import structure_of
 
     mechanism = condyle.load("masticatory")
-    closure = count(closure_function(mechanism))
     lines = [
         "| formulation | shared, Model 1 | shared, Model 2 | ratio "
         "| written out, Model 1 | written out, Model 2 | ratio |",
         "|---|---|---|---|---|---|---|",
     ]
-    for name in ("momentum", "lagrange", "hessian", "newton_euler", "virtual_power"):
-        one = count(direct_function(mechanism, FORMULATIONS[name]))
-        core = count(core_function(mechanism, FORMULATIONS[name]))
-        two = [core[i] + closure[i] for i in range(2)]
+    for name in FORMULATIONS:
+        counts = []
+        for route, platform in (("direct", closed), ("core", given)):
+            structure = structure_of(mechanism, name, route)
+            structure = specialised(structure, Layout.of(structure).numbers(mechanism))
+            counts.append(count(_model(structure, platform)))
+        closure = count(motion(structure))
+        one, two = counts[0], [counts[1][i] + closure[i] for i in range(2)]
         lines.append(
             f"| `{name}` | {one[0]} | {two[0]} | {two[0] / one[0]:.0%} "
             f"| {one[1]:.1e} | {two[1]:.1e} | {two[1] / one[1]:.1%} |"
@@ -153,23 +158,41 @@ def operation_counts() -> str:
     return "\n".join(lines) + "\n"
 
 
-def count(function: Any) -> tuple[int, int]:
-    """Operations of a CasADi function: as it is, and with nothing shared."""
-    import casadi as ca
+def _model(structure: Any, platform: Any) -> Any:
+    """A and b of the equations of motion, with the platform from q or as a whole pose."""
+    from condyle.questions.builder import Builder
+    from condyle.questions.equations import Wrench, equations
 
-    leaves = (ca.OP_INPUT, ca.OP_CONST)
+    b = Builder(structure)
+    eq = equations(b, platform(b), Wrench.of(b))
+    b.output("A", eq.A, "")
+    b.output("b", eq.basis.generalized_force(eq.Q), "")
+    return b.finish()
+
+
+def count(program: Any) -> tuple[int, int]:
+    """Operations of a sample: as the graph has them, and with nothing shared."""
+    nodes, counts = program.graph.nodes, program.counts
     size: dict[int, int] = {}
-    shared = written_out = 0
-    for k in range(function.n_instructions()):
-        op = function.instruction_id(k)
-        arguments, results = function.instruction_input(k), function.instruction_output(k)
-        if op in leaves:
-            size[results[0]] = 0
-        elif op == ca.OP_OUTPUT:
-            written_out += size[arguments[0]]
-        else:
-            shared += 1
-            size[results[0]] = 1 + sum(size[i] for i in arguments)
+    shared = 0
+    for v in program.order:
+        node = nodes[v]
+        own = 0 if node.group is None else node.group
+        lanes = 1 if node.group is None else counts[own]
+        each = [1] * len(node.args)
+        if node.op in ("sum", "least"):  # one term a group
+            each = list(counts)
+        operations = (sum(each) - 1 if node.op in ("sum", "least") else 1) if node.args else 0
+        shared += lanes * operations * node.varies
+        size[v] = node.varies * (
+            operations + sum(k * size[a] for k, a in zip(each, node.args, strict=True))
+        )
+    written_out = 0
+    for output in program.outputs:
+        for entry in output.entries:
+            for group, v in enumerate(entry):
+                if v is not None:
+                    written_out += (counts[group] if output.lanes else 1) * size[v]
     return shared, written_out
 
 

@@ -30,7 +30,7 @@ def ball(surface, point, radius: float = 0.004, side: str = "below", **more) -> 
 
 def test_plane_moves_along_its_normal() -> None:
     plane = Plane(slope=(-1.1, 0.2), offset=0.01)
-    below, above = (ball(plane, POINT, side=side).locus for side in ("below", "above"))
+    below, above = (ball(plane, POINT, side=side).offset_surface for side in ("below", "above"))
     steepness = np.sqrt(1 + 1.1**2 + 0.2**2)
     assert below.kind == "plane" and below.slope == plane.slope
     assert below.offset == pytest.approx(0.01 - 0.004 * steepness, abs=1e-18)
@@ -42,7 +42,7 @@ def test_sphere_and_cylinder_change_their_radius(side: str, radius: float) -> No
     sphere = Sphere(centre=(0.01, 0.0, 0.02), radius=0.03)
     cylinder = Cylinder(point=(0.0, 0.01, 0.0), axis=(0.0, 3.0, 4.0), radius=0.03)
     for surface in (sphere, cylinder):
-        locus = ball(surface, POINT, side=side).locus
+        locus = ball(surface, POINT, side=side).offset_surface
         assert type(locus) is type(surface)
         assert locus.radius == pytest.approx(radius, abs=1e-18)
 
@@ -55,7 +55,7 @@ def test_round_ellipsoid_is_a_sphere(side: str) -> None:
     ellipsoid = Ellipsoid(centre=tuple(centre), semi_axes=(0.006,) * 3, rotation=(0.1, 0.2, 0.3))
     u = np.array([2.0, -1.0, 2.0]) / 3
     point = centre + u * (0.001 if side == "inside" else 0.011)  # a socket that fits closely
-    exact, general = (ball(s, point, 0.005, side).locus for s in (sphere, ellipsoid))
+    exact, general = (ball(s, point, 0.005, side).offset_surface for s in (sphere, ellipsoid))
     assert isinstance(general, Parallel) and not isinstance(exact, Parallel)
     rng = np.random.default_rng(0)
     for _ in range(20):
@@ -77,7 +77,7 @@ def test_flat_walls_are_planes(kind: str, side: str) -> None:
         "quadratic": Quadratic(slope=(-1.1, 0.2), offset=0.01),
         "expression": Expression(lambda p: p[2] + 1.1 * p[0] - 0.2 * p[1] - 0.01),
     }[kind]
-    exact, general = (ball(s, POINT, side=side).locus for s in (plane, flat))
+    exact, general = (ball(s, POINT, side=side).offset_surface for s in (plane, flat))
     steepness = np.linalg.norm([1.1, -0.2, 1])
     rng = np.random.default_rng(0)
     for _ in range(5):
@@ -95,11 +95,11 @@ def test_a_ball_that_fits_closely_goes_along() -> None:
     curvature, radius = 150.0, 0.006  # radius of curvature at the bottom 6.67 mm
     contact = ball(trough(curvature), (0.0, 0.0, radius), radius, "above")
     assert home_problem(contact) is None
-    assert contact.locus.grip() == pytest.approx(1 - radius * curvature, abs=1e-12)
+    assert contact.offset_surface.grip() == pytest.approx(1 - radius * curvature, abs=1e-12)
     for x in np.linspace(-0.01, 0.01, 21):
         foot, slope = np.array([x, 0.0, curvature * x * x / 2]), curvature * x
         n = np.array([-slope, 0.0, 1.0]) / np.hypot(slope, 1.0)
-        got = jet(contact.locus, foot + radius * n)
+        got = jet(contact.offset_surface, foot + radius * n)
         assert abs(got.value) < 1e-15
         close(got.gradient, n, 1e-12)
         bend = -curvature / np.hypot(slope, 1.0) ** 3  # signed curvature of the wall
@@ -127,7 +127,7 @@ def test_off_the_surface_is_said_in_distance() -> None:
 def test_a_number_is_always_a_distance() -> None:
     """Where Newton has not converged phi is not finite; it is never a wrong distance."""
     radius = 0.006
-    locus = ball(trough(150.0), (0.0, 0.0, radius), radius, "above").locus
+    locus = ball(trough(150.0), (0.0, 0.0, radius), radius, "above").offset_surface
     rng = np.random.default_rng(3)
     finite = 0
     for p in rng.uniform(-0.05, 0.05, (200, 3)):

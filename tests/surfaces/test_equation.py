@@ -24,7 +24,7 @@ def options(kind: str, side: int | None) -> dict:
 @pytest.mark.parametrize(("kind", "side"), WALLS)
 def test_derivatives(kind: str, side: int | None) -> None:
     """Automatic derivatives against central differences; `gradient` and `bending` against both."""
-    locus = contact(table(kind), **options(kind, side)).locus
+    locus = contact(table(kind), **options(kind, side)).offset_surface
     p, v = ca.SX.sym("p", 3), ca.SX.sym("v", 3)
     methods = ca.Function("m", [p, v], [locus.gradient(p), locus.bending(p, v)])
     h, velocity = 1e-5, np.array([0.3, -0.5, 0.8])
@@ -50,7 +50,7 @@ def test_oracles_agree(kind: str, side: int | None) -> None:
     """
     given = table(kind) | options(kind, side)
     expected = read_surface({"surface": table(kind)} | options(kind, side), 1e-3)
-    locus = contact(table(kind), **options(kind, side)).locus
+    locus = contact(table(kind), **options(kind, side)).offset_surface
     assert given["kind"] == locus.kind
     for point in NEAR:
         on = point.copy()
@@ -71,8 +71,8 @@ def test_oracles_agree(kind: str, side: int | None) -> None:
 @pytest.mark.parametrize(("kind", "side"), WALLS)
 def test_one_expression_serves_a_form(kind: str, side: int | None) -> None:
     """Kernels take phi from `of_form` and the numbers as inputs."""
-    locus = contact(table(kind), **options(kind, side)).locus
-    other = of_form(contact(table(kind, seed=5), **options(kind, side)).locus.form)
+    locus = contact(table(kind), **options(kind, side)).offset_surface
+    other = of_form(contact(table(kind, seed=5), **options(kind, side)).offset_surface.form)
     point = ca.SX(ca.DM(NEAR[0]))
     constants = ca.SX(ca.DM(locus.constants()))
     assert float(other.phi(point, constants)) == float(locus.phi(NEAR[0]))
@@ -80,7 +80,7 @@ def test_one_expression_serves_a_form(kind: str, side: int | None) -> None:
 
 def test_parallel_gradient_is_a_unit_vector() -> None:
     for kind in ("quadratic", "ellipsoid", "profile"):
-        locus = contact(table(kind), **ball_options(kind, True)).locus
+        locus = contact(table(kind), **ball_options(kind, True)).offset_surface
         assert locus.kind == kind
         for point in NEAR:
             assert np.linalg.norm(jet(locus, point).gradient) == pytest.approx(1, abs=1e-13)

@@ -62,7 +62,7 @@ def test_nearest(options: dict[str, Any]) -> None:
     assert np.linalg.norm(left) < 0.05 * np.linalg.norm(along)
     for contact, point in zip(mechanism.contacts, projection.points, strict=True):
         moved = contact.model_copy(update={"point": tuple(map(float, point))})
-        assert abs(float(moved.locus.phi(point))) < 1e-12
+        assert abs(float(moved.offset_surface.phi(point))) < 1e-12
         assert np.linalg.norm(point - contact.point) < 1.5e-3
 
 

@@ -26,6 +26,7 @@ class Backend:
         Raises: InputError:    for an unknown backend.
                 CompilerError: if compiled is asked for and there is no compiler.
         """
+        self.asked = name
         chosen = os.environ.get("CONDYLE_BACKEND") or "auto" if name == "auto" else name
         chosen = ALIASES.get(chosen, chosen)
         if chosen not in BACKENDS:

@@ -52,13 +52,16 @@ def columns_of(
     count = None
     columns: list[np.ndarray] = []
     for port in interface.ports:
-        a = np.asarray(inputs[port.name], dtype=np.float64)
+        a = _numbers(port.name, inputs[port.name])
         want: tuple[int, ...] = (port.size,)
         if port.lanes:
             want = (interface.lanes,) if port.size == 1 else (port.size, interface.lanes)
         if a.shape[1:] != want:
             shape = ", ".join(["N", *map(str, want)])
-            raise InputError(f"{port.name}: expected an array of shape ({shape}), got {a.shape}")
+            one = " (one sample is an array of one)" if a.ndim == 1 and a.shape == want else ""
+            raise InputError(
+                f"{port.name}: expected an array of shape ({shape}), got {a.shape}{one}"
+            )
         if count is not None and len(a) != count:
             raise InputError(f"{port.name}: {len(a)} samples, where others have {count}")
         count = len(a)
@@ -69,6 +72,16 @@ def columns_of(
             rows = a if port.size == 1 else a[:, i]
             columns += [rows[:, k] for k in order]
     return count or 0, columns
+
+
+def _numbers(name: str, given: object) -> np.ndarray:
+    try:
+        return np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        kind = type(given).__name__
+        raise InputError(
+            f"{name}: expected an array of numbers, got {kind} {given!r:.60}"
+        ) from None
 
 
 def arranged(

@@ -1,6 +1,6 @@
-"""The benchmark: our kernels, the interpreter and other engines, in one run on one core.
+"""The benchmark: our kernels, numpy and other engines, in one run on one core.
 
-Every row is checked against the interpreter before it is timed. Peers live in the repository's
+Every row is checked against numpy before it is timed. Peers live in the repository's
 `benchmarks/peers` and take part when the command runs from its root and their packages are there.
 """
 

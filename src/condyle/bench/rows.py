@@ -14,7 +14,7 @@ class Probe:
     """Something to time.
 
     run:        does some milliseconds of work; seconds an evaluation.
-    error:      largest difference from the interpreter's torques, relative to the largest.
+    error:      largest difference from numpy's torques, relative to the largest.
     operations: vector operations of a batch step, a fused multiply-add counting one.
     """
 

@@ -6,6 +6,7 @@ path. `condyle.derive` returns one that also labels what it finds, `condyle.resu
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property
@@ -13,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ..backends.c.kernel import CompiledKernel
 from ..backends.choose import Backend
 from ..backends.kernel import AGAIN, Kernel
 from ..dynamics import ROUTES
@@ -36,6 +38,7 @@ from ..questions.inverse import OUTPUTS
 from ..questions.numbers import Layout, require_closed_form, specialised
 from ..questions.structure import structure_of
 from ..status import Status
+from .checks import LOAD_COLUMNS, POSE_COLUMNS, check_array, check_states
 from .closing import Closure
 from .data import Configuration, Efforts, Evaluation
 from .robust import Robust
@@ -88,7 +91,19 @@ class Evaluator:
             self._structure = specialised(structure, self._numbers)
         self._kernels: dict[Any, Kernel] = {}
         self._closures: dict[Any, Closure] = {}
+        self._local = threading.local()  # what belongs to one thread
         self.derivation_seconds = time.perf_counter() - start
+
+    def __repr__(self) -> str:
+        return (
+            f'Model of "{self.mechanism.name}": {self.formulation}, route {self.route}, '
+            f"{self.backend.name}\n"
+            f"  {len(self.mechanism.chains)} efforts from q = ({', '.join(self.independent)})"
+        )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Models travel as their recipe; kernels are found again in the cache."""
+        return type(self), (self.mechanism, self.formulation, self.route, self.backend.asked)
 
     # -- what it is ------------------------------------------------------------------------
 
@@ -162,6 +177,36 @@ class Evaluator:
             others[CONDITION] = self._singularity(values).condition
         return Efforts(effort, others, status)
 
+    def one(self, q: np.ndarray, q1: np.ndarray, q2: np.ndarray, load: np.ndarray) -> np.ndarray:
+        """Efforts of one sample, (n,) [N m or N], at least latency: for a control loop.
+
+        Args: q, q1, q2: (m,) each, in the order of `independent`;  load: (9,), as of `evaluate`.
+        Returns: efforts in the order of the chains; NaN where there are none.
+        """
+        kernel = self.kernel("inverse", ())
+        if not isinstance(kernel, CompiledKernel):
+            return self._one_robustly(q, q1, q2, load)
+        if (own := getattr(self._local, "single", None)) is None:
+            own = self._local.single = kernel.single(), np.argsort(kernel.order)
+        single, order = own
+        m, given = len(q), single.given
+        given[:m] = q
+        given[m : 2 * m] = q1
+        given[2 * m : 3 * m] = q2
+        given[3 * m :] = load
+        status = single()
+        if status == Status.ok:
+            return single.found[order]
+        if status == AGAIN:
+            return self._one_robustly(q, q1, q2, load)
+        return np.full(len(order), np.nan)
+
+    def _one_robustly(
+        self, q: np.ndarray, q1: np.ndarray, q2: np.ndarray, load: np.ndarray
+    ) -> np.ndarray:
+        rows = [np.asarray(a, dtype=float)[None] for a in (q, q1, q2, load)]
+        return self.torques(rows[0], rows[1], rows[2], rows[3]).effort[0]
+
     def evaluate(
         self,
         q: np.ndarray,
@@ -195,11 +240,11 @@ class Evaluator:
     ) -> tuple[dict[str, np.ndarray], np.ndarray]:
         """Results by name, samples last, and their statuses."""
         kernel = self.kernel("inverse", tuple(o for o in OUTPUTS if o in wanted))
+        check_array("load", load, 9, LOAD_COLUMNS)
         load = np.asarray(load)
-        if load.shape[1:] != (9,):
-            raise InputError(f"load: expected an array of shape (N, 9), got {load.shape}")
         wrench = {"force": load[:, :3], "moment": load[:, 3:6], "point": load[:, 6:]}
         inputs = {"q": q, "q1": q1, "q2": q2, **wrench}
+        check_states(self.independent, q, q1, q2)
         answer = kernel.run(inputs, threads)
         again = np.flatnonzero(answer.status == AGAIN)
         if again.size:
@@ -213,6 +258,7 @@ class Evaluator:
 
     def configuration(self, pose: np.ndarray, threads: int | None = None) -> Configuration:
         """Joint coordinates, contact points and singularity measures at poses X_EE, (N, 6)."""
+        check_array("pose", pose, 6, POSE_COLUMNS)
         answer = self.kernel("configuration").run({"pose": pose}, threads)
         again = np.flatnonzero(answer.status == AGAIN)
         if again.size:
@@ -267,6 +313,7 @@ class Evaluator:
     def _matrices(self, q: np.ndarray, q1: np.ndarray, name: str, space: str) -> np.ndarray:
         if space not in ("q", "X"):
             raise InputError(f'no space "{space}".{did_you_mean(space, ("q", "X"))}')
+        check_states(self.independent, q, q1)
         values = self._at("matrices", q, q1)
         return np.moveaxis(values[name if space == "q" else f"{name}_X"], -1, 0)
 
@@ -276,6 +323,7 @@ class Evaluator:
         Returns: J_theta (N, n, 6): theta' = J_theta X_EE'; M_J (N, 6, m); M_1 (N, n, 3, 3), M_2 and
                  M_3 (N, n, 3, 6): M_1 q_r' = M_2 X_EE', q_r' = M_3 X_EE' of every chain.
         """
+        check_states(self.independent, q)
         values = self._at("jacobians", q, np.zeros_like(q))
         found = {"J_theta": np.moveaxis(values["J_theta"], -1, 0).transpose(0, 2, 1)}
         found["M_J"] = np.moveaxis(values["M_J"], -1, 0)

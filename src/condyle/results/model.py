@@ -6,10 +6,13 @@ solution = model.solve(motion, load)
 
 from __future__ import annotations
 
+import os
 import time
 
 import numpy as np
 
+from ..errors import InputError
+from ..mechanism import load as load_mechanism
 from ..mechanism.mechanism import Mechanism
 from ..model.evaluator import Evaluator, with_point
 from ..model.judge import require_ok
@@ -66,10 +69,20 @@ class Model(Evaluator):
 
 
 def derive(
-    mechanism: Mechanism,
+    mechanism: Mechanism | str | os.PathLike[str],
     formulation: str = "virtual_power",
     route: str = "core",
     backend: str = "auto",
 ) -> Model:
-    """Derive the equations of motion of a mechanism; see `Model`."""
+    """Derive the equations of motion of a mechanism, or of one by its file or name; see `Model`.
+
+    Raises: InputError: for what is no mechanism;  as of `Model`.
+    """
+    if isinstance(mechanism, str | os.PathLike):
+        mechanism = load_mechanism(os.fspath(mechanism))
+    if not isinstance(mechanism, Mechanism):
+        raise InputError(
+            f"derive takes a mechanism, the path of its file, or the name of a bundled one; got "
+            f"{type(mechanism).__name__}"
+        )
     return Model(mechanism, formulation, route, backend)

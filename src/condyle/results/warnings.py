@@ -21,6 +21,7 @@ from ..kinematics.singularity import NEAR_SINGULAR
 from ..mechanism.chain import limits
 from ..mechanism.home import HOME_WARNING, home_residuals, home_warnings
 from ..mechanism.mechanism import Mechanism
+from ..mechanism.plausibility import plausibility_warnings
 from ..status import STATUS_NAMES
 from .contacts import BOUND_TOLERANCE
 from .derived import Derived
@@ -37,6 +38,10 @@ class Kind(NamedTuple):
 
 
 KINDS = {
+    "implausible": Kind(
+        "numbers of the mechanism that do not go together",
+        "`condyle check` shows sizes, masses, gravity and limits: mind the units",
+    ),
     "home_residual": Kind(
         "a contact point is off its surface at home", "`condyle check --project` shows where it is"
     ),
@@ -252,7 +257,9 @@ class Watch:
 
 
 def home_notices(mechanism: Mechanism) -> Iterable[Notice]:
-    """Contact points that are off their surfaces at home, a little."""
+    """What the file alone gives rise to: odd sizes, contacts a little off their surfaces."""
+    for odd in plausibility_warnings(mechanism):
+        yield Notice("implausible", str(odd))
     off = zip(mechanism.contact_names, home_residuals(mechanism), strict=True)
     told = [(name, float(value)) for name, value in off if abs(value) > HOME_WARNING]
     for (name, value), text in zip(told, home_warnings(mechanism), strict=True):

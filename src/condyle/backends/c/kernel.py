@@ -111,6 +111,10 @@ class CompiledKernel:
         status = self._library.one(self._table.ctypes.data, given.ctypes.data, found.ctypes.data)
         return found[: self.columns], status
 
+    def single(self) -> Single:
+        """`one` with places of its own for what goes in and out: for one thread."""
+        return Single(self._library.one, self._table, self.interface.columns, self.columns, self)
+
     @property
     def address(self) -> tuple[int, int, int]:
         """Addresses of `one`, of `batch` and of the table, to call them from C."""
@@ -119,6 +123,28 @@ class CompiledKernel:
             for name in ("one", "batch")
         )
         return one, batch, self._table.ctypes.data
+
+
+class Single:
+    """One evaluation after the other, bound to buffers: what a control loop calls.
+
+    given: (columns,), to be filled;  found: (results,), lanes group by group.
+    """
+
+    def __init__(
+        self, one: Any, table: np.ndarray, columns: int, results: int, kernel: CompiledKernel
+    ) -> None:
+        self._kernel = kernel  # whose table and library have to stay
+        lanes, checks = kernel.facts["lanes"], kernel.facts["checks"]
+        given, found = _aligned(columns + lanes), _aligned(results + checks)
+        given[:] = 0.0
+        self.given, self.found = given[:columns], found[:results]
+        self._one = one
+        self._at = (table.ctypes.data, given.ctypes.data, found.ctypes.data)
+
+    def __call__(self) -> int:
+        """Evaluate `given`; returns the status."""
+        return self._one(*self._at)
 
 
 def _padded(own: np.ndarray, pad: np.ndarray, width: int) -> np.ndarray:

@@ -83,7 +83,7 @@ def _published(run: Run) -> tuple[str | None, paper.Seconds | None]:
 def _notes_1(comparison: Comparison, beside: bool) -> Iterator[str]:
     yield (
         f"Symbolic: deriving the model; numeric: torques of all {comparison.samples} samples, "
-        f"without contact forces, by CasADi's interpreter on {processor()}, Python "
+        f"without contact forces, by numpy on {processor()}, Python "
         f"{platform.python_version()}. Seconds are of processor time and vary from run to run; "
         "compiled kernels are faster by far."
     )
