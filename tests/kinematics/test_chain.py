@@ -34,11 +34,8 @@ def numeric(kind: str) -> dict[str, ca.Function]:
     c, q = ca.SX.sym("c", family.size()), ca.SX.sym("q", 3)
     M, V, A, g = (ca.SX.sym(name, 3) for name in "MVAg")
     named = family.named(c)
-    loop, law, tip = (
-        family.loop(named, M),
-        family.dynamics(named, M, V, A, g),
-        family.end_point(named, q),
-    )
+    loop, tip = family.loop(named, M), family.end_point(named, q)
+    law = family.dynamics(named, M, V, A, g)
     return {
         "loop": ca.Function("loop", [c, M], [loop.q_r, loop.J, loop.rod, loop.J_A]),
         "law": ca.Function("law", [c, M, V, A, g], [law.rate, law.acceleration, law.J]),

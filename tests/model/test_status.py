@@ -182,7 +182,8 @@ def test_near_singularities(name: str) -> None:
     kernel = models(name)[0].kernel("inverse", ())
     answer = kernel.run(near.inputs)
     single, judged = ones(kernel, near.samples)
-    assert {AGAIN} == set(answer.status[condition > 1e10]) == set(judged[condition > 1e10])
+    doubtful = condition > 3e11  # singular from 1e12 on
+    assert {AGAIN} == set(answer.status[doubtful]) == set(judged[doubtful])
     for values in (answer.values, single):
         off = np.abs(values["effort"].T - wanted).max(axis=1) / np.abs(wanted).max(axis=1)
         assert (off < 2e-15 * condition).all()

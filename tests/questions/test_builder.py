@@ -37,7 +37,7 @@ def question() -> Program:
     y = b.lane_sample("y", 2)
     z = b.lane_sample("z")
     w = b.sample("w", 1)
-    active = [b.lane(g, "mask") for g in GROUPS]
+    mask = [b.lane(g, "mask") for g in GROUPS]
     joint = [b.lane(g, "joint") for g in GROUPS]
     b.output("by_lane", [y[g] * x[0] + joint[g][0] for g in GROUPS], "")
     ragged = [None if kind == "PSS" else z[g] * x for g, kind in enumerate(STRUCTURE.families)]
@@ -47,7 +47,7 @@ def question() -> Program:
     b.output("matrices", [y[g] @ joint[g].T for g in GROUPS], "", 2, 3)
     b.output("same", [x[1] for _ in GROUPS], "")
     b.output("shared_matrix", x @ ca.horzcat(w, x[0], 1), "", 2, 3)
-    b.output("total", b.total([active[g] * ca.vertcat(y[g], 1) for g in GROUPS]), "")
+    b.output("total", b.total([mask[g] * ca.vertcat(y[g], 1) for g in GROUPS]), "")
     b.output("least", b.least([joint[g][1] * x[0] for g in GROUPS]), "")
     b.output("gravity", b.parameter("gravity") * w, "")
     b.check(x[0] + 10, 1.0, Status.unreachable)
