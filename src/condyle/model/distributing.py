@@ -64,7 +64,7 @@ class Distributor:
 
     def __init__(self, mechanism: Mechanism, policy: Policy) -> None:
         self.policy = policy
-        count = sum(contact.friction is not None for contact in mechanism.contacts)
+        count = sum(contact.friction.coefficient > 0 for contact in mechanism.contacts)
         self.friction = count > 0
         self.unsolved_friction = count > MOST  # more patterns than a kernel goes through
         both = [limits(chain) for chain in mechanism.chains]

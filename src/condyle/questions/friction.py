@@ -5,8 +5,8 @@ At the point of contact, with v the velocity of the material point of the platfo
 
     Q = J^T tau + sum lambda_k D_k,    D_k = N_k - sigma_k T_k,    T_k = mu [u; c_k x u],
 
-and a pattern sigma is consistent where sigma_k lambda_k >= 0. Of all consistent patterns, those efforts
-are wanted that have the least norm.
+and a pattern sigma is consistent where sigma_k lambda_k >= 0. Wanted are the efforts of least norm
+of all consistent patterns.
 """
 
 from __future__ import annotations

@@ -81,7 +81,7 @@ class Layout:
         for i, contact in enumerate(mechanism.contacts):
             values[f"contact_point_{i}"] = contact.point
             values[f"contact_surface_{i}"] = contact.offset_surface.constants()
-            if contact.friction is not None:
+            if i in self.structure.friction:
                 f, radius = contact.friction, contact.push * (contact.ball_radius or 0.0)
                 values[f"friction_{i}"] = (f.coefficient, f.smoothing_speed**2, radius)
         if self.structure.parallel:

@@ -63,7 +63,7 @@ def structure_of(
     loci = [c.offset_surface for c in mechanism.contacts]
     contacts = tuple((locus.form, len(locus.constants())) for locus in loci)
     planes = [locus for locus in loci if locus.form == "plane"]
-    friction = tuple(i for i, c in enumerate(mechanism.contacts) if c.friction is not None)
+    friction = tuple(i for i, c in enumerate(mechanism.contacts) if c.friction.coefficient)
     return Structure(
         formulation=formulation,
         route=route,
