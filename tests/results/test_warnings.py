@@ -91,7 +91,7 @@ def test_limits_of_every_family() -> None:
     for chain in chains:
         stated = chain.actuator.model_dump()
         effort = stated.get("torque_limit", stated.get("force_limit"))
-        effort, speed = (inf if v is None else v for v in (effort, stated["speed_limit"]))
+        effort, speed = (np.inf if v is None else v for v in (effort, stated["speed_limit"]))
         assert limits(chain) == (-effort, effort, speed)
 
 
