@@ -1,6 +1,7 @@
 """Paths and loads: from files and arrays to clean samples, and tables back to files."""
 
 from condyle.motion.load import Load, as_load
+from condyle.motion.markers import MarkerMotion, from_c3d
 from condyle.motion.path import Motion, as_motion
 from condyle.motion.points import resolve_landmark, resolve_load_point
 from condyle.motion.reference import (
@@ -22,6 +23,7 @@ __all__ = [
     "MOMENT",
     "POSE",
     "Load",
+    "MarkerMotion",
     "Motion",
     "Smoothing",
     "Table",
@@ -30,6 +32,7 @@ __all__ = [
     "as_load",
     "as_motion",
     "bundled_reference",
+    "from_c3d",
     "iter_table",
     "parse_units",
     "read_table",
