@@ -64,9 +64,7 @@ def c3d_bytes(
     return header.ljust(BLOCK, b"\0") + _parameters(groups) + _padded(data)
 
 
-def _frames(
-    points: np.ndarray, scale: float, missing: str, analog: np.ndarray | None
-) -> bytes:
+def _frames(points: np.ndarray, scale: float, missing: str, analog: np.ndarray | None) -> bytes:
     gone = ~np.isfinite(points).all(axis=-1)
     four = np.concatenate([points, np.zeros((*points.shape[:2], 1))], axis=-1)
     four[gone] = {"residual": [0, 0, 0, -1], "nan": [np.nan] * 3 + [0], "zero": [0] * 4}[missing]

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 import tomli_w
-from oracles.c3d_file import c3d_bytes
 from scipy.spatial.transform import Rotation
 
 import condyle
+from oracles.c3d_file import c3d_bytes
 
 UPPER = {
     "Upper_FL": [0.080, 0.030, 0.020],

@@ -37,10 +37,20 @@ app = typer.Typer(
 Command = Callable[..., Answer]
 
 
-def command(chapter: str, *, example: str) -> Callable[[Command], Command]:
+def group(name: str, chapter: str, help: str) -> typer.Typer:
+    """Register a family of commands: `condyle NAME COMMAND`."""
+    made = typer.Typer(no_args_is_help=True, rich_markup_mode="rich", help=help)
+    app.add_typer(made, name=name, rich_help_panel=chapter)
+    return made
+
+
+def command(
+    chapter: str, *, example: str, of: typer.Typer = app, name: str | None = None
+) -> Callable[[Command], Command]:
     """Register a function as the command of its name, with `--quiet` and `--json` as well.
 
     Args: chapter: of the help page;  example: one line to copy, shown below the options.
+          of: the family it belongs to;  name: where it is not the function's.
     """
 
     def register(work: Command) -> Command:
@@ -51,7 +61,7 @@ def command(chapter: str, *, example: str) -> Callable[[Command], Command]:
             answer.give(quiet, as_json)
 
         _take(shown, work, quiet=options.Quiet, as_json=options.Json)
-        app.command(rich_help_panel=chapter, epilog=f"Example: {example}")(shown)
+        of.command(name, rich_help_panel=chapter, epilog=f"Example: {example}")(shown)
         return work
 
     return register

@@ -11,6 +11,8 @@ from condyle.motion.markers.measured import (
 )
 from condyle.motion.markers.recording import Recording, read_c3d
 from condyle.motion.markers.registration import Registration
+from condyle.motion.markers.summary import as_data
+from condyle.motion.markers.writing import write_motion
 
 __all__ = [
     "MAX_GAP",
@@ -21,7 +23,9 @@ __all__ = [
     "MarkerResidual",
     "Recording",
     "Registration",
+    "as_data",
     "from_c3d",
     "read_c3d",
     "read_markers",
+    "write_motion",
 ]

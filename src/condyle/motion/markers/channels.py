@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from condyle.errors import InputError
@@ -18,7 +20,7 @@ def force_channels(
     recording: Recording,
     bodies: Bodies,
     registration: Registration,
-    channels: tuple[str, str, str],
+    channels: Sequence[str],
 ) -> Load:
     """The force on the platform whose components along the laboratory's axes are three channels.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,8 +22,9 @@ from condyle.motion.markers.labels import find_label
 from condyle.motion.markers.marker_file import MarkerFile, Place, read_markers
 from condyle.motion.markers.off_contacts import off_contacts
 from condyle.motion.markers.recording import Recording, read_c3d
-from condyle.motion.markers.rigid import FEWEST
 from condyle.motion.markers.registration import Registration, register
+from condyle.motion.markers.rigid import FEWEST
+from condyle.motion.markers.summary import in_words
 from condyle.motion.markers.suspects import exchanged, loose
 from condyle.motion.path import Motion
 from condyle.motion.units import POSE
@@ -78,6 +79,9 @@ class MarkerMotion:
     recording: Recording
     warnings: tuple[str, ...]
 
+    def __str__(self) -> str:
+        return in_words(self)
+
 
 def from_c3d(
     path: str | os.PathLike[str],
@@ -88,7 +92,7 @@ def from_c3d(
     max_gap: float = MAX_GAP,
     longest: bool = False,
     unit: str | None = None,
-    force: tuple[str, str, str] | None = None,
+    force: Sequence[str] | None = None,
     cutoff: float | str | None = None,
 ) -> MarkerMotion:
     """A motion from the markers of a C3D file.
