@@ -73,6 +73,7 @@ def record(
     noise: float = 0.0,
     head: float = 1.0,
     seed: int = 0,
+    push: float = 0.0,
     mechanism: str = "masticatory",
     points: Sequence[str] = ("incisor", "left_condyle", "right_condyle"),
     unit: float = 1e3,
@@ -80,6 +81,7 @@ def record(
     """A recording of a jaw that rests for half a second and then opens three times in two seconds.
 
     Args: noise: standard deviation of each coordinate [m];  head: how much the head moves, 0 to 1;
+          push: how far the condyles leave their planes downwards [m], by which the jaw opens more;
           unit: lengths of the file in a metre, for numbers of the marker file.
     """
     rng = np.random.default_rng(seed)
@@ -91,8 +93,9 @@ def record(
     open_ = rise * (1 - np.cos(w * since)) / 2
     side = rise * np.sin(w * since)
     pose = np.column_stack(
-        [0.006 * open_, 0.001 * side, -0.008 * open_, 0.02 * side, 0.25 * open_, 0.015 * side]
+        [0.003 * open_, 0.001 * side, -0.012 * open_, 0.01 * side, 0.12 * open_, 0.01 * side]
     )
+    pose[:, 2] -= push * open_
     R = Rotation.from_euler("XYZ", pose[:, 3:]).as_matrix()
     # At home the head does not stand still either, once it moves.
     turns = head * 0.2 * np.column_stack([np.sin(0.9 * t), np.sin(0.6 * t), np.sin(0.4 * t)])

@@ -100,7 +100,16 @@ def test_more_labels_than_one_parameter_holds(tmp_path: Path) -> None:
 
 
 def test_labels_are_forgiving() -> None:
-    labels = ["Anna:Upper_FL", "Anna:lower fl", "Upper_BR", "upper_br", "B:Chin", "C:Chin", "X", "X"]
+    labels = [
+        "Anna:Upper_FL",
+        "Anna:lower fl",
+        "Upper_BR",
+        "upper_br",
+        "B:Chin",
+        "C:Chin",
+        "X",
+        "X",
+    ]
     for name, place in (
         ("Upper_FL", 0),
         ("Anna:Upper_FL", 0),

@@ -25,9 +25,7 @@ def test_exact_motions_come_back() -> None:
     np.testing.assert_allclose(found.rotation, R, atol=1e-13)
     np.testing.assert_allclose(found.position, p, atol=1e-13)
     assert found.largest().max() < 1e-14 * 100
-    np.testing.assert_allclose(
-        found.back(points), np.broadcast_to(SHAPE, points.shape), atol=1e-13
-    )
+    np.testing.assert_allclose(found.back(points), np.broadcast_to(SHAPE, points.shape), atol=1e-13)
 
 
 def test_no_other_motion_fits_better() -> None:

@@ -25,7 +25,7 @@ from condyle.motion.markers.recording import Recording, read_c3d
 from condyle.motion.markers.registration import Registration, register
 from condyle.motion.markers.rigid import FEWEST
 from condyle.motion.markers.summary import in_words
-from condyle.motion.markers.suspects import exchanged, loose
+from condyle.motion.markers.suspects import exchanged, loose, outlier
 from condyle.motion.path import Motion
 from condyle.motion.units import POSE
 
@@ -191,12 +191,16 @@ def _why(bodies: Bodies, run: slice, max_residual: float) -> str:
             return f"{few} of {len(body.names)} {body.what} markers seen, not {', '.join(lost)}"
         if not body.fit.found[run].all() and lost:
             return f"without {', '.join(lost)} the {body.what} markers are on one line"
-    worst, name = max(
-        (float(np.nanmax(residual, initial=0.0)), name)
-        for body in bodies.both
-        for name, residual in zip(body.names, body.fit.residual[run].T, strict=True)
-    )
-    return f"{name} is {worst * 1e3:.3g} mm off its body, more than {max_residual * 1e3:g} mm"
+    body = max(bodies.both, key=lambda body: np.nanmax(body.fit.largest()[run]))
+    frame = run.start + int(np.nanargmax(body.fit.largest()[run]))
+    if found := outlier(body.shape, body.points[frame], max_residual):
+        name, off = body.names[found[0]], found[1]
+        said = f"{name} is {off * 1e3:.3g} mm off the place that the other {body.what} markers give"
+    else:
+        residual = body.fit.residual[frame]
+        name, off = body.names[int(np.nanargmax(residual))], float(np.nanmax(residual))
+        said = f"{name} is {off * 1e3:.3g} mm off its place in its body"
+    return f"{said}; the limit is {max_residual * 1e3:g} mm"
 
 
 def _suspects(recording: Recording, bodies: Bodies, bad: np.ndarray) -> list[str]:

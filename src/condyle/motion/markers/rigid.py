@@ -85,6 +85,8 @@ def common_shape(points: np.ndarray) -> np.ndarray:
         seen = np.isfinite(points).all(axis=-1)
         shape = _mean(points)
         there = seen.any(axis=0)
+        if there.sum() < FEWEST:
+            return shape
         for _ in range(_ROUNDS):
             body = fit(shape[there], points[:, there])
             if not body.found.any():

@@ -1,4 +1,4 @@
-"""Markers that are not what they are called: exchanged labels, and markers that came loose."""
+"""Markers that are not what they are called: exchanged labels, outliers, loose ones."""
 
 from __future__ import annotations
 
@@ -64,6 +64,23 @@ def _orders(sizes: list[int]) -> list[list[int]]:
             orders += [[*plain[:start], *p, *plain[start + size :]] for p in here]
         start += size
     return orders
+
+
+def outlier(shape: np.ndarray, points: np.ndarray, within: float) -> tuple[int, float] | None:
+    """The one marker of a frame without which the others fit, and how far it is off [m].
+
+    Args: shape: (m, 3);  points: (m, 3), NaN where not seen;  within: residual of the others [m].
+    """
+    best: tuple[float, int, float] | None = None
+    for i in np.flatnonzero(np.isfinite(points).all(axis=1)):
+        others = points.copy()
+        others[i] = np.nan
+        body = fit(shape, others[None])
+        left = float(body.largest()[0])
+        if left <= within and (best is None or left < best[0]):
+            place = body.rotation[0] @ shape[i] + body.position[0]
+            best = left, int(i), float(np.linalg.norm(points[i] - place))
+    return None if best is None else best[1:]
 
 
 def loose(names: list[str], points: np.ndarray) -> list[str]:
