@@ -7,7 +7,7 @@ work is, is the same for all and stands here.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import wraps
 from typing import Annotated, Any, get_type_hints
 
@@ -65,6 +65,15 @@ def command(
         return work
 
     return register
+
+
+def registered() -> Iterator[tuple[str, Any]]:
+    """Every command by the words that call it, "motion from-c3d", with what typer knows of it."""
+    families = [("", app)] + [(f"{g.name} ", g.typer_instance) for g in app.registered_groups]
+    for family, of in families:
+        for one in of.registered_commands if of is not None else ():
+            assert one.callback is not None
+            yield family + (one.name or one.callback.__name__), one
 
 
 def _take(shown: Callable[..., None], work: Command, **switches: Any) -> None:

@@ -94,7 +94,10 @@ def from_c3d(
     import condyle
 
     from ..errors import UnsupportedError
+    from ..extras import require
     from ..motion import markers as marked
+
+    require("c3d", "c3d")
 
     if (force is None) != (load is None):
         raise UnsupportedError("--force names channels and --load their file; give both or none")
