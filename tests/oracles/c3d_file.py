@@ -51,13 +51,17 @@ def c3d_bytes(
             "SCALE": np.ones(len(channels), np.float32),
             "OFFSET": np.zeros(len(channels), np.int16),
         }
+    last = first_frame + frames - 1
+    if last > 65535:  # two words each, the lower one first
+        ends = {"ACTUAL_START_FIELD": first_frame, "ACTUAL_END_FIELD": last}
+        words = {key: np.array([n % 65536, n // 65536], np.uint16) for key, n in ends.items()}
+        groups["TRIAL"] = words
     size = len(_parameters(groups)) // BLOCK
     start = 2 + size
     groups["POINT"]["DATA_START"] = np.int16(start)
-    last = min(first_frame + frames - 1, 65535)
     header = struct.pack(
         "<BBHHHHHfHHf",
-        *(2, 0x50, count, len(channels) * per_frame, first_frame, last, 10),
+        *(2, 0x50, count, len(channels) * per_frame, *np.minimum([first_frame, last], 65535), 10),
         *(scale, start, per_frame, rate),
     )
     data = _frames(points, scale, missing, analog)

@@ -107,6 +107,7 @@ def test_frames_that_begin_later(tmp_path: Path) -> None:
 def test_registered_by_markers(tmp_path: Path) -> None:
     """Markers that stand at points of the mechanism at home, on either body, or numbers."""
     jaw = record()
+    jaw.at("Lower_FL")[20:22] = np.nan  # not seen at all times of home
     machine = condyle.load("masticatory").set("platform.points.chin", (0.085, 0.025, -0.020))
     machine = machine.set("platform.points.brow", UPPER["Upper_BR"])
     register = {"chin": "Lower_FL", "brow": "upper br", "incisor": jaw.register["incisor"]}
@@ -193,6 +194,15 @@ def test_short_gaps_are_filled_and_listed(tmp_path: Path) -> None:
     assert len(strict.gaps) == 2
 
 
+def test_a_gap_may_be_as_long_as_it_may(tmp_path: Path) -> None:
+    jaw = record()
+    for name in PLATFORM[:2]:
+        jaw.at(name)[150:160] = np.nan
+    assert [g.frames for g in measured(jaw, tmp_path, max_gap=0.1).gaps] == [10]
+    with pytest.raises(InputError, match=r"longer than 0\.099 s: 1\.5 to 1\.59 s"):
+        measured(jaw, tmp_path, max_gap=0.099)
+
+
 def test_longer_gaps_are_errors_that_name_them(tmp_path: Path) -> None:
     jaw = record()
     for name in PLATFORM[1:]:
@@ -251,6 +261,15 @@ def test_a_marker_listed_with_the_wrong_body_is_named(tmp_path: Path) -> None:
     jaw = record()
     tables = jaw.tables(platform=[*PLATFORM, "Nasion"])
     with pytest.raises(InputError, match="Nasion moves against"):
+        measured(jaw, tmp_path, tables=tables)
+
+
+def test_markers_of_two_bodies_exchanged_in_the_file_are_named(tmp_path: Path) -> None:
+    jaw = record()
+    tables = jaw.tables(
+        fixed=["Lower_FL", *FIXED[1:]], platform=["Upper_FL", *PLATFORM[1:]], home=[0.0, 0.5]
+    )
+    with pytest.raises(InputError, match=r"Lower_FL moves against .* Upper_FL moves against"):
         measured(jaw, tmp_path, tables=tables)
 
 

@@ -69,6 +69,11 @@ def test_frames_count_from_one(tmp_path: Path) -> None:
     assert got.first_frame == 501 and got.t[0] == 5.0 and len(got.t) == 12
 
 
+def test_frames_beyond_sixteen_bits(tmp_path: Path) -> None:
+    got = read_c3d(written(tmp_path, first_frame=200_001))
+    assert got.first_frame == 200_001 and got.t[0] == 2000.0 and len(got.t) == 12
+
+
 def test_channels_are_means_of_each_frame(tmp_path: Path) -> None:
     analog = RNG.normal(0, 1, (12, 10, 2))
     got = read_c3d(written(tmp_path, channels=[("Fx", "N"), ("EMG1", "V")], analog=analog))
@@ -110,6 +115,7 @@ def test_labels_are_forgiving() -> None:
         "X",
         "X",
     ]
+    labels += ["Anna:tip", "Anna:TIP"]
     for name, place in (
         ("Upper_FL", 0),
         ("Anna:Upper_FL", 0),
@@ -118,6 +124,8 @@ def test_labels_are_forgiving() -> None:
         ("Upper_BR", 2),
         ("upper_br", 3),
         ("B:Chin", 4),
+        ("tip", 8),
+        ("TIP", 9),
     ):
         assert find_label(name, labels, "a.c3d") == place, name
     for name, said in (

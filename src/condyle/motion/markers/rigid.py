@@ -54,7 +54,7 @@ def fit(shape: np.ndarray, points: np.ndarray) -> Fit:
     x = np.where(seen[..., None], points, 0.0)
     s_mean, x_mean = (weight * shape).sum(axis=1) / count, x.sum(axis=1) / count
     s = weight * (shape - s_mean[:, None])
-    x = weight * (x - x_mean[:, None])
+    x = x - x_mean[:, None]  # of markers not seen it meets zeros in s
     U, _, Vt = np.linalg.svd(np.einsum("fmi,fmj->fij", s, x))
     V = Vt.transpose(0, 2, 1)
     V[..., 2] *= np.sign(np.linalg.det(V @ U.transpose(0, 2, 1)))[:, None]
