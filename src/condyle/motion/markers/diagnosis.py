@@ -1,4 +1,4 @@
-"""What is wrong with a recording, in words: why a frame has no pose, and which marker is suspect."""
+"""What is wrong with a recording, in words: why frames have no pose, which markers are suspect."""
 
 from __future__ import annotations
 
