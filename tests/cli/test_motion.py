@@ -130,3 +130,38 @@ def test_the_longest_stretch(call: Callable[..., Any]) -> None:
         jaw.at(name)[150:200] = np.nan
     assert call(jaw, "--out", "o.csv", "--longest").status == 0
     assert Path("o.csv").read_text().splitlines()[1].startswith("2,")
+
+
+ODD = [
+    "",
+    "nan",
+    "inf",
+    "-1",
+    "1e400",
+    "9" * 400,
+    "x" * 5000,
+    ".",
+    "\udcff",
+    "--",
+    "[]",
+    "\n",
+    "\0",
+]
+
+
+@pytest.mark.parametrize("word", ODD)
+def test_odd_words_anywhere(
+    call: Callable[..., Any], condyle_command: Callable[..., Any], word: str
+) -> None:
+    """A message and status 2, or a word that is fine: never a traceback."""
+    good = call(record(seconds=0.8), "--out", "o.csv")
+    assert good.status == 0
+    names = ("--max-gap", "--max-residual", "--units", "--markers-out", "--markers", "--out")
+    calls = [(*CALL, "--out", "o.csv", name, word) for name in (*names, "--mechanism")]
+    calls.append((*CALL, "--out", "o.csv", "--force", word, "--load", "l.csv"))
+    calls.append((*CALL, "--out", "o.csv", "--force", "a,b,c", "--load", word))
+    calls += [("motion", word), ("motion", "from-c3d", word, *CALL[3:], "--out", "o.csv")]
+    for arguments in calls:
+        outcome = condyle_command(*arguments)
+        assert outcome.status in (0, 2), (arguments, outcome)
+        assert bool(outcome.status) == (outcome.err != "") and "Traceback" not in outcome.err
