@@ -198,14 +198,15 @@ def count(program: Any) -> tuple[int, int]:
 
 def command_help() -> str:
     """Arguments and options of every command, from the functions that the terminal calls."""
-    from condyle.cli.app import app
+    from condyle.cli import commands  # noqa: F401 - registers them
+    from condyle.cli.command import registered
 
-    return "\n\n".join(_section(c.callback, c.name, c.epilog) for c in app.registered_commands)
+    return "\n\n".join(_section(c.callback, name, c.epilog) for name, c in registered())
 
 
-def _section(function: Any, name: str | None, epilog: str | None) -> str:
+def _section(function: Any, name: str, epilog: str | None) -> str:
     text = inspect.getdoc(function) or ""
-    lines = [f"## condyle {name or function.__name__}", "", text]
+    lines = [f"## condyle {name}", "", text]
     hints = get_type_hints(function, include_extras=True)
     parameters = inspect.signature(function).parameters.values()
     rows = [_row(p.name, hints[p.name], p.default) for p in parameters]

@@ -35,6 +35,9 @@ class Status(IntEnum):
         "chain or platform",
     )
     overflow = 3, "rates, accelerations or load are too large for numbers", "sample"
+    infeasible = 4, "no efforts within the limits balance the sample", "sample"
+    jammed = 5, "no pattern of friction is consistent: the mechanism jams", "sample"
+    uncertified = 6, "efforts were found that could not be certified", "sample"
 
 
 STATUS_NAMES = tuple(status.name for status in Status)

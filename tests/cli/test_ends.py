@@ -61,6 +61,7 @@ def test_a_full_stdout(tmp_path: Path) -> None:
         (("run", "--figures"), "matplotlib"),
         (("run", "--report"), "plotly"),
         (("compare",), "matplotlib"),
+        (("motion", "from-c3d", "a", "--markers", "m", "--mechanism", "x", "--out", "o"), "c3d"),
     ],
 )
 def test_a_missing_extra_is_named(
@@ -81,7 +82,12 @@ def test_extras_that_are_named_exist() -> None:
 
     text = (Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8")
     stated = tomllib.loads(text)["project"]["optional-dependencies"]
-    for package, extra in (("matplotlib", "figures"), ("plotly", "report"), ("viser", "view")):
+    for package, extra in (
+        ("matplotlib", "figures"),
+        ("plotly", "report"),
+        ("viser", "view"),
+        ("c3d", "c3d"),
+    ):
         assert any(line.startswith(package) for line in stated[extra])
         assert extra in stated["all"][0]
         assert extra in str(MissingExtraError(package, extra))

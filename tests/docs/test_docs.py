@@ -19,6 +19,7 @@ from typing import Any
 
 import pytest
 import yaml
+from oracles.recorded_jaw import record
 
 import condyle
 from condyle.mechanism import bundled_text
@@ -92,6 +93,9 @@ def registers() -> Iterator[None]:
 def put_files_of_a_reader(folder: Path) -> None:
     """Files that commands in the text name without making them."""
     (folder / "my.toml").write_text(bundled_text("masticatory"), encoding="utf-8")
+    jaw = record(noise=5e-5)
+    jaw.write(folder / "trial.c3d")
+    jaw.write_tables(folder / "markers.toml")
     q = ("X", "Y", "alpha", "beta")
     names = [prefix + name for prefix in ("", "d", "dd") for name in q]
     chains, legs = (
@@ -155,9 +159,9 @@ def test_excerpts_are_of_the_sources(sources: str) -> None:
 
 def test_inline_commands_exist() -> None:
     from condyle.cli import commands  # noqa: F401 - registers them
-    from condyle.cli.app import app
+    from condyle.cli.command import registered
 
-    known = {c.name or c.callback.__name__ for c in app.registered_commands if c.callback}
+    known = {words.split()[0] for words, _ in registered()}
     for page in PAGES:
         used = re.findall(r"`condyle ([a-z]+)", page.read_text(encoding="utf-8"))
         assert set(used) <= known, name_of(page)
@@ -319,6 +323,10 @@ JSON = {
     "condyle pose": ("pose", "my.toml", "--joints", "encoders.csv", "--out", "p.csv"),
     "condyle pose --all": (
         *("pose", "gough-stewart", "--joints", "legs.csv", "--out", "m.csv", "--all"),
+    ),
+    "condyle motion from-c3d": (
+        *("motion", "from-c3d", "trial.c3d", "--markers", "markers.toml"),
+        *("--mechanism", "masticatory", "--out", "motion.csv"),
     ),
     "condyle plot": ("plot",),
     "condyle plot SOLUTION": (

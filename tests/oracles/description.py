@@ -46,11 +46,11 @@ class Rod:
 @dataclass(frozen=True)
 class Chain:
     name: str
-    kind: str  # RSS, PSS or SPS
-    S: Array  # at home, in {S}; B for SPS
+    kind: str  # RSS, PSS, SPS or cable
+    S: Array  # at home, in {S}; B for SPS and cable
     M: Array  # in {M}
     N0: Array  # (3, 3), columns are the axes of N_i0
-    length: float  # of the rod; at home for SPS
+    length: float  # of the rod; at home for SPS and cable
     rods: tuple[Rod, ...]
     G: Array = field(default_factory=lambda: np.zeros(3))  # crank pivot (RSS)
     axis: Array = field(
@@ -115,6 +115,8 @@ def _chain(table: Raw, unit_length: float) -> Chain:
         if kind == "PSS":
             own = {"rods": (_rod(table["rod"], length),), "drive": table["slider"]["mass"]}
             own["axis"] = unit(np.array(table["axis"], float))
+        elif kind == "cable":
+            own = {"rods": ()}
         else:
             cylinder = _rod(table["cylinder"], unit_length)
             own = {"rods": (cylinder, _rod(table["piston"], unit_length, "M"))}
@@ -161,11 +163,14 @@ def joint(chain: Chain, P: Array) -> tuple[float, Array]:
     """Joint coordinate and S when the platform joint is at P, on the branch of home.
 
     RSS: theta in (-pi, pi] [rad], from d.d + l^2 - L^2 = 2 l (d.u cos + d.w sin), d = P - G;
-    PSS: travel [m], from (d - x a)^2 = L^2, d = P - S at home; SPS: length minus home length [m].
+    PSS: travel [m], from (d - x a)^2 = L^2, d = P - S at home; SPS: length minus home length [m];
+    cable: home length minus length [m].
     nan if out of reach.
     """
     if chain.kind == "SPS":
         return float(np.linalg.norm(P - chain.S)) - chain.length, chain.S
+    if chain.kind == "cable":
+        return chain.length - float(np.linalg.norm(P - chain.S)), chain.S
     if chain.kind == "PSS":
         d, d0 = P - chain.S, chain.M - chain.S
         along = d @ chain.axis

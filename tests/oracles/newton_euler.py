@@ -80,11 +80,11 @@ def drive_motion(chain: Chain, P: Path) -> tuple[Path, Array]:
     """
     x, S = joint(chain, P.x)
     e = P.x - S
-    if chain.kind == "SPS":
-        length = np.linalg.norm(e)
+    if chain.kind in ("SPS", "cable"):
+        length, sign = np.linalg.norm(e), -1 if chain.kind == "cable" else 1
         rate = e @ P.v / length
         second = (P.v @ P.v + e @ P.a - rate**2) / length
-        return Path(S, np.zeros(3), np.zeros(3)), np.array([x, rate, second])
+        return Path(S, np.zeros(3), np.zeros(3)), np.array([x, sign * rate, sign * second])
     t, curve = chain.axis, np.zeros(3)  # dS/dx, d2S/dx2
     if chain.kind == "RSS":
         t, curve = np.cross(chain.axis, S - chain.G), chain.G - S
@@ -134,6 +134,10 @@ def _rod_body(
 def _chain(chain: Chain, P: Path, gravity: Array) -> tuple[list[Body], list[Link], Array]:
     """Bodies, links and (joint coordinate, rate, acceleration) of a chain."""
     S, x = drive_motion(chain, P)
+    if chain.kind == "cable":  # nothing but a tension that pulls the platform to the base
+        pull = (S.x - P.x) / np.linalg.norm(S.x - P.x)
+        tension = Link(f"{chain.name}.tau", "platform", "base", P.x, pull[:, None], known=True)
+        return [], [tension], x
     R, omega, omega_rate, guide = rod_motion(chain, P - S)
     name, every, axis, still = chain.name, np.eye(3), R[:, 0], np.zeros(3)
     if chain.kind == "SPS":
@@ -228,7 +232,7 @@ def inverse_dynamics(
         free = np.linalg.qr(A, mode="complete")[0][:, A.shape[1] :]
         tau = np.linalg.lstsq(free.T @ A_tau, free.T @ b, rcond=1e-14)[0]
     x = np.linalg.lstsq(A, b - A_tau @ tau, rcond=None)[0]
-    gap = np.abs(A @ x + A_tau @ tau - b).max() / max(np.abs(b).max(), np.abs(x).max())
+    gap = np.abs(A @ x + A_tau @ tau - b).max() / max(np.abs(b).max(), np.abs(x).max(initial=0.0))
     forces = _named(reactions, x)
     pushes = np.array([forces[c.name][0] for c in d.contacts]).reshape(-1, 3)
     position, rate, second = np.array(joints).T

@@ -152,7 +152,9 @@ def _chain(rng: Rng, kind: str, muscle: Raw, spread: float) -> Raw:
             table[body] = _rod(rng, rng.uniform(0.004, 0.04), 0.6e-3 * length)
             table[body]["com"] = float(length * rng.uniform(0.2, 0.4))
         return table
-    raise ValueError(f'chain kind "{kind}" is not one of RSS, PSS, SPS')
+    if kind == "cable":
+        return table | {"base": _list(tip + 0.5 * (tip - M)), "platform": _list(M)}
+    raise ValueError(f'chain kind "{kind}" is not one of RSS, PSS, SPS, cable')
 
 
 def _mirrored(table: Raw) -> Raw:
@@ -299,7 +301,7 @@ def conditions(d: Description, pose: Array) -> float:
         drive = chain.axis
         if chain.kind == "RSS":
             drive = unit(np.cross(chain.axis, S - chain.G))
-        grip = 1.0 if chain.kind == "SPS" else e @ drive
+        grip = 1.0 if chain.kind in ("SPS", "cable") else e @ drive
         worst = max(worst, 6 / abs(grip), 10 / np.cos(rod_angles(chain, P - S)[1]))
         rows.append(e @ motion.jacobian(chain.M) / scale)  # rows of J, up to their sizes
     J = np.array(rows)

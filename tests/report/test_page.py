@@ -128,7 +128,7 @@ def test_every_kind_of_plot_is_there(page: str) -> None:
     expected |= {"share-Nm", "contact-force", "bound-margin", "load", "transmission", "sigma"}
     assert expected | {"ratio", "condition"} <= found
     torque = next(panel for panel in data["panels"] if panel["id"] == "torque-Nm")
-    assert [limit["value"] for limit in torque["limits"]] == [3.0]
+    assert [(limit["low"], limit["high"]) for limit in torque["limits"]] == [(-3.0, 3.0)]
     assert [t["view"] for t in data["tracks"]] == ["above", "side"] * 2
     assert data["tracks"][0]["bounds"] == [pytest.approx([-27.65, -14.65]), pytest.approx([69, 75])]
 

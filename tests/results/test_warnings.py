@@ -77,8 +77,8 @@ def test_blocks_say_what_the_whole_says(one_sided: condyle.Mechanism) -> None:
     for i, chain in enumerate(one_sided.chains):
         peak = np.abs(whole.effort[ok, i]).max()
         mine = [n for n in together.notices() if (n.kind, n.owner) == ("effort_limit", chain.name)]
-        limit = limits(chain).effort
-        assert len(mine) == (limit is not None and peak > limit)
+        limit = limits(chain).high
+        assert len(mine) == (peak > limit)
         for notice in mine:
             over = np.abs(whole.effort[:, i]) > limit
             assert (notice.value, notice.bound, notice.unit) == (peak, limit, "N m")
@@ -91,7 +91,8 @@ def test_limits_of_every_family() -> None:
     for chain in chains:
         stated = chain.actuator.model_dump()
         effort = stated.get("torque_limit", stated.get("force_limit"))
-        assert limits(chain) == (effort, stated["speed_limit"])
+        effort, speed = (np.inf if v is None else v for v in (effort, stated["speed_limit"]))
+        assert limits(chain) == (-effort, effort, speed)
 
 
 def test_strict_goes_by_kind_not_by_words() -> None:

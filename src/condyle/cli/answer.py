@@ -12,6 +12,8 @@ from typing import Any, Literal
 
 import typer
 
+from ..errors import printable
+
 FEW = 4  # files that a line names
 
 
@@ -37,9 +39,9 @@ class Answer:
             typer.echo(json.dumps(plain(self.data), indent=2, allow_nan=False))
             return
         if not quiet or self.kind != "summary":
-            typer.echo(self.text)
+            typer.echo(printable(self.text))
         if not quiet:
-            typer.echo(f"Next: {self.then}", err=self.kind == "document")
+            typer.echo(printable(f"Next: {self.then}"), err=self.kind == "document")
 
 
 def files_line(files: list[Path]) -> str:

@@ -7,7 +7,7 @@ work is, is the same for all and stands here.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import wraps
 from typing import Annotated, Any, get_type_hints
 
@@ -37,10 +37,20 @@ app = typer.Typer(
 Command = Callable[..., Answer]
 
 
-def command(chapter: str, *, example: str) -> Callable[[Command], Command]:
+def group(name: str, chapter: str, help: str) -> typer.Typer:
+    """Register a family of commands: `condyle NAME COMMAND`."""
+    made = typer.Typer(no_args_is_help=True, rich_markup_mode="rich", help=help)
+    app.add_typer(made, name=name, rich_help_panel=chapter)
+    return made
+
+
+def command(
+    chapter: str, *, example: str, of: typer.Typer = app, name: str | None = None
+) -> Callable[[Command], Command]:
     """Register a function as the command of its name, with `--quiet` and `--json` as well.
 
     Args: chapter: of the help page;  example: one line to copy, shown below the options.
+          of: the family it belongs to;  name: where it is not the function's.
     """
 
     def register(work: Command) -> Command:
@@ -51,10 +61,19 @@ def command(chapter: str, *, example: str) -> Callable[[Command], Command]:
             answer.give(quiet, as_json)
 
         _take(shown, work, quiet=options.Quiet, as_json=options.Json)
-        app.command(rich_help_panel=chapter, epilog=f"Example: {example}")(shown)
+        of.command(name, rich_help_panel=chapter, epilog=f"Example: {example}")(shown)
         return work
 
     return register
+
+
+def registered() -> Iterator[tuple[str, Any]]:
+    """Every command by the words that call it, "motion from-c3d", with what typer knows of it."""
+    families = [("", app)] + [(f"{g.name} ", g.typer_instance) for g in app.registered_groups]
+    for family, of in families:
+        for one in of.registered_commands if of is not None else ():
+            assert one.callback is not None
+            yield family + (one.name or one.callback.__name__), one
 
 
 def _take(shown: Callable[..., None], work: Command, **switches: Any) -> None:

@@ -1,7 +1,7 @@
 """Every command, in the order of the help page."""
 
 # isort: off
-from . import new, check, reference  # noqa: F401
+from . import new, check, reference, motion  # noqa: F401
 from . import run, solve, pose, compare  # noqa: F401
 from . import plot, report, view  # noqa: F401
 from . import bench, cache, schema  # noqa: F401

@@ -47,6 +47,8 @@ class JointMotion:
 
     def insert(self, s: JointState, expressions: Sequence[ca.SX]) -> list[ca.SX]:
         """Expressions in the symbols `s`, at this motion."""
+        if not expressions:  # of a family without bodies
+            return []
         symbols = [s.q, s.rate, s.acceleration]
         values = [self.loop.q_r, self.rate, self.acceleration]
         return ca.substitute(list(expressions), symbols, values)

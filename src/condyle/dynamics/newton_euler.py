@@ -41,6 +41,9 @@ class NewtonEuler:
         return state.B.T @ ca.vertcat(force, moment)
 
     def chain(self, family: Family, c: Constants, M: PointMotion, g: ca.SX) -> ChainDynamics:
+        if not family.bodies:
+            # Nothing to cut free: what the actuator puts on M is dual to the joint coordinate.
+            return joint_motion(family, c, M).dynamics({})
         s = JointState.symbols()
         bodies = free_bodies(family, c, s, g)
         motion = joint_motion(family, c, M)

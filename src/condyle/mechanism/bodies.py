@@ -1,4 +1,4 @@
-"""The bodies of chains and what drives them, as the tables of a file."""
+"""The bodies of chains, as the tables of a file."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
 
-from .quantities import Fraction, Limit, MassOrNone, Moment, MomentOrNone, NonNegativeLength
+from .quantities import Fraction, MassOrNone, Moment, MomentOrNone, NonNegativeLength
 from .table import Table
 
 
@@ -55,16 +55,6 @@ class LegBody(Table):
     @classmethod
     def _triangle(cls, axial: float, info: ValidationInfo) -> float:
         return check_rod_inertia(axial, info.data.get("transverse"))
-
-
-class RotaryActuator(Table):
-    torque_limit: Limit | None = None
-    speed_limit: Limit | None = None
-
-
-class LinearActuator(Table):
-    force_limit: Limit | None = None
-    speed_limit: Limit | None = None
 
 
 def distance(start: tuple[float, ...], end: tuple[float, ...]) -> float:

@@ -6,37 +6,19 @@ A family's mathematics is in `condyle.kinematics.chain`.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal, NamedTuple
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from .bodies import (
-    Crank,
-    LegBody,
-    LinearActuator,
-    Rod,
-    RotaryActuator,
-    Slider,
-    across,
-    check_rod_length,
-    distance,
-)
+from .actuator import CableActuator, Limits, LinearActuator, RotaryActuator
+from .bodies import Crank, LegBody, Rod, Slider, across, check_rod_length, distance
 from .quantities import Direction, Name, Point
 from .table import Table
 
 AXIS_TOLERANCE = math.radians(0.5)  # how far an axis may be off the perpendicular
 NO_BRANCH = 1e-9  # sine of the transmission angle below which home has no branch
-
-
-class Limits(NamedTuple):
-    """What an actuator can do at most, None where nothing is said.
-
-    effort: [N m or N];  speed: [rad/s or m/s].
-    """
-
-    effort: float | None
-    speed: float | None
 
 
 class ChainTable(Table):
@@ -212,12 +194,47 @@ class SPS(ChainTable):
         return joint
 
 
-Chain = Annotated[RSS | PSS | SPS, Field(discriminator="kind")]
+class Cable(ChainTable):
+    """A straight massless line between two points that can only pull: a tendon, a muscle."""
+
+    kind: Literal["cable"]
+    base: Point = Field(description="where it is held or wound up, B, in {S}")
+    platform: Point = Field(description="where it holds the platform, M, in {M}")
+    actuator: CableActuator = CableActuator()
+
+    @property
+    def lengths(self) -> dict[str, float]:
+        return {"line": distance(self.base, self.platform)}
+
+    @property
+    def fixed_points(self) -> tuple[tuple[float, ...], ...]:
+        return (self.base,)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_bodies(cls, data: Any) -> Any:
+        """All keys of other families in one line, since what is meant is another family."""
+        known = {key for family in (RSS, PSS, SPS) for key in family.model_fields}
+        foreign = known - cls.model_fields.keys()
+        if isinstance(data, Mapping) and (found := [key for key in data if key in foreign]):
+            raise ValueError(
+                f"a cable is a massless line from base to platform and has no {', '.join(found)}; "
+                "remove what it has not, or name the kind of chain that has it (RSS, PSS, SPS)"
+            )
+        return data
+
+    @field_validator("platform")
+    @classmethod
+    def _line(cls, joint: Any, info: ValidationInfo) -> Any:
+        if (base := info.data.get("base")) is not None:
+            check_rod_length(np.subtract(joint, base), "cable", "base")
+        return joint
 
 
-def limits(chain: RSS | PSS | SPS) -> Limits:
+Chain = Annotated[RSS | PSS | SPS | Cable, Field(discriminator="kind")]
+
+
+def limits(chain: RSS | PSS | SPS | Cable) -> Limits:
     """Limits of a chain's actuator, whatever its effort is called in the file."""
-    actuator = chain.actuator
-    if isinstance(actuator, RotaryActuator):
-        return Limits(actuator.torque_limit, actuator.speed_limit)
-    return Limits(actuator.force_limit, actuator.speed_limit)
+    speed = chain.actuator.speed_limit
+    return Limits(*chain.actuator.effort_range, math.inf if speed is None else speed)

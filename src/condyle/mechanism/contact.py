@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import casadi as ca
 import numpy as np
-from pydantic import Field, StrictBool, model_validator
+from pydantic import BeforeValidator, Field, StrictBool, model_validator
 
-from .quantities import Interval, Name, Point, PositiveLength
+from .actuator import SMOOTHING_SPEED
+from .quantities import Coefficient, Interval, Name, Point, PositiveLength, SmoothingSpeed
 from .schema import SIDE_OPTIONS
 from .surface import Surface, sides
 from .table import Table
@@ -26,12 +27,36 @@ class Bounds(Table):
     z: Interval | None = None
 
 
+class Friction(Table):
+    """Coulomb friction where the ball touches the surface, smooth through rest.
+
+    The surface puts -coefficient |lambda| v / sqrt(|v|^2 + smoothing_speed^2) on the platform, with
+    v the velocity of the platform's material point there.
+    """
+
+    implied: ClassVar[tuple[str, ...]] = ("smoothing_speed",)
+
+    coefficient: Coefficient
+    smoothing_speed: SmoothingSpeed = Field(
+        default=SMOOTHING_SPEED, description="below it friction fades, m/s"
+    )
+
+
+FRICTIONLESS = Friction(coefficient=0.0)
+
+
+def _none_is_frictionless(value: Any) -> Any:
+    return FRICTIONLESS if value is None else value
+
+
 class Contact(Table):
     """A platform point (the centre of a condyle ball) that stays on a surface fixed in {S}.
 
     With `ball_radius` the surface is the wall that the ball touches, and the centre keeps that
     distance from it; with `one_sided` the ball can lift off.
     """
+
+    implied: ClassVar[tuple[str, ...]] = ("friction",)
 
     name: Name
     point: Point = Field(description="centre of the ball, in {M}")
@@ -44,6 +69,7 @@ class Contact(Table):
         default=False, description="the surface can push the ball and not pull it"
     )
     bounds: Bounds = Bounds()
+    friction: Annotated[Friction, BeforeValidator(_none_is_frictionless)] = FRICTIONLESS
 
     @model_validator(mode="before")
     @classmethod

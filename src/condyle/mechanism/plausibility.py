@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import few
+from .chain import limits
 from .home import characteristic_length
 from .mechanism import Mechanism
 
@@ -19,6 +20,7 @@ LARGE, SMALL = 10.0, 1e-4  # metres
 EARTH, EARTH_SPREAD = 9.81, 0.06  # m/s^2: 9.76 at the equator's mountains, 9.83 at the poles
 DENSEST = 2e4  # kg/m^3 of a cube as large as the mechanism; nearly osmium
 SOUND = 340.0  # m/s
+ROUGHEST = 2.0  # coefficient of friction: hardly any pair has more
 POINTLIKE = 3e-3  # radius of gyration over the platform's own size
 ROUNDING = 1e-12  # metres outside a bound
 
@@ -46,6 +48,8 @@ def plausibility_warnings(mechanism: Mechanism) -> list[Implausible]:
         *_rods(mechanism),
         *_gravity(mechanism),
         *_speeds(mechanism),
+        *_losses(mechanism),
+        *_friction(mechanism),
         *_bounds(mechanism),
     ]
 
@@ -170,6 +174,46 @@ def _speeds(mechanism: Mechanism) -> Iterator[Implausible]:
         listed = few(f'chain "{name}" {speed:.4g} m/s' for name, speed in beyond.items())
         yield Implausible(
             "speed_limit", f"speed_limit: beyond the speed of sound: {listed}", {"speeds": beyond}
+        )
+
+
+def _losses(mechanism: Mechanism) -> Iterator[Implausible]:
+    """Actuators that cannot overcome their own friction, or whose friction never acts in full."""
+    stuck, fading = {}, {}
+    for chain in mechanism.chains:
+        own, limit = chain.actuator, limits(chain)
+        if own.coulomb >= limit.greatest:
+            stuck[chain.name] = [own.coulomb, limit.greatest]
+        if own.coulomb and own.smoothing_speed >= limit.speed:
+            fading[chain.name] = [own.smoothing_speed, limit.speed]
+    if stuck:
+        listed = few(f'chain "{n}" {own:g} of {most:g}' for n, (own, most) in stuck.items())
+        yield Implausible(
+            "coulomb_large",
+            f"coulomb: no less than the greatest effort: {listed}; such an actuator moves nothing",
+            {"chains": stuck},
+        )
+    if fading:
+        listed = few(f'chain "{n}" {own:g} of {most:g}' for n, (own, most) in fading.items())
+        yield Implausible(
+            "smoothing_large",
+            f"smoothing_speed: no less than the speed limit: {listed}; friction never acts in full",
+            {"chains": fading},
+        )
+
+
+def _friction(mechanism: Mechanism) -> Iterator[Implausible]:
+    large = {
+        contact.name: contact.friction.coefficient
+        for contact in mechanism.contacts
+        if contact.friction.coefficient > ROUGHEST
+    }
+    if large:
+        listed = few(f'contact "{name}" {mu:g}' for name, mu in large.items())
+        yield Implausible(
+            "friction_large",
+            f"friction: a coefficient above {ROUGHEST:g}: {listed}; is it a percentage?",
+            {"contacts": large},
         )
 
 

@@ -9,14 +9,23 @@ Beyond the bounds here no machine was ever built, and products of such numbers o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, ValidationInfo
+from pydantic import (
+    AfterValidator,
+    Field,
+    PlainValidator,
+    TypeAdapter,
+    ValidationInfo,
+    WithJsonSchema,
+)
 
 PER_METRE = {"m": 1.0, "mm": 1000.0}
 LONGEST, SHORTEST = 1e5, 1e-9  # metres; the shortest of those that must be positive
 LARGEST, SMALLEST = 1e6, 1e-18  # of all else, in SI; the smallest of what is not zero
+SLOWEST = 1e-9  # rad/s or m/s, of a speed below which friction fades
 LARGEST_LIMIT = 1e12  # N m, N, rad/s or m/s: some write a limit that is none
 NAME_CHARACTERS, NAME_BYTES = 80, 160  # with an ending it names a file and a column
 
@@ -97,6 +106,41 @@ def listed(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else value
 
 
+def _end(value: float) -> float:
+    if math.isnan(value):
+        raise ValueError("expected a number, or inf where there is no limit, got nan")
+    if math.isfinite(value):
+        _within(value, SMALLEST, LARGEST_LIMIT, "")
+    return value
+
+
+def _rising(value: tuple[float, float]) -> tuple[float, float]:
+    low, high = value
+    if not low < high or low == math.inf or high == -math.inf:
+        raise ValueError(
+            f"expected [least, greatest] with least < greatest, got [{low:g}, {high:g}]"
+        )
+    return value
+
+
+def _effort_limit(value: Any) -> Any:
+    """A number, or least and greatest; each complains of what it is meant to be."""
+    value = listed(value)
+    if not isinstance(value, list | tuple):
+        return _SIZE.validate_python(value)
+    if len(value) != 2:
+        raise ValueError(f"expected a number or [least, greatest], got {len(value)} entries")
+    return _RANGE.validate_python(value)
+
+
+def _pull_only(value: float | tuple[float, float]) -> float | tuple[float, float]:
+    if isinstance(value, tuple) and value[0] < 0:
+        raise ValueError(
+            f"a cable can only pull: its least force cannot be negative, got {value[0]:g}"
+        )
+    return value
+
+
 _number: Callable[..., Any] = Field(strict=True, allow_inf_nan=False)
 _Any = Annotated[float, _number]
 _Above = Annotated[_Any, Field(gt=0)]
@@ -111,10 +155,20 @@ Moment = Annotated[_Above, _bounded("kg m^2", SMALLEST)]
 MomentOrNone = Annotated[_NotBelow, _bounded("kg m^2", SMALLEST)]
 Product = Annotated[_Any, _bounded("kg m^2")]
 Limit = Annotated[_Above, _bounded("", SMALLEST, LARGEST_LIMIT)]
+_End = Annotated[float, Field(strict=True), AfterValidator(_end)]
+_SIZE: TypeAdapter[Any] = TypeAdapter(Limit)
+_RANGE: TypeAdapter[Any] = TypeAdapter(Annotated[tuple[_End, _End], AfterValidator(_rising)])
+_EITHER = WithJsonSchema({"anyOf": [_SIZE.json_schema(), _RANGE.json_schema()]})
 Length = Annotated[_Any, _in_metres()]
 PositiveLength = Annotated[_Above, _in_metres(SHORTEST)]
 NonNegativeLength = Annotated[_NotBelow, _in_metres()]
 Curvature = Annotated[_Any, AfterValidator(_curvature)]
+Gear = Annotated[_Above, _bounded("", SMALLEST)]
+Loss = Annotated[_NotBelow, _bounded("", SMALLEST)]
+SmoothingSpeed = Annotated[_Above, _bounded("rad/s or m/s", SLOWEST)]
+Coefficient = Annotated[_NotBelow, _bounded("", SMALLEST)]
+EffortLimit = Annotated[float | tuple[float, float], PlainValidator(_effort_limit), _EITHER]
+PullLimit = Annotated[EffortLimit, AfterValidator(_pull_only)]
 Vector = tuple[Number, Number, Number]
 Gravity = tuple[Acceleration, Acceleration, Acceleration]
 Point = tuple[Length, Length, Length]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NoReturn, Self
+from typing import Any, ClassVar, NoReturn, Self
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -21,6 +21,9 @@ class Table(BaseModel):
     model_config = ConfigDict(
         extra="forbid", frozen=True, populate_by_name=True, revalidate_instances="always"
     )
+
+    # Entries that a file does without where they are their defaults.
+    implied: ClassVar[tuple[str, ...]] = ()
 
     def entries(self) -> dict[str, Any]:
         """What stands in the table, by the keys of the file."""

@@ -9,6 +9,7 @@ from typing import Any
 from ..errors import InputError
 from .mechanism import Mechanism
 from .surface import Unknown
+from .table import Table
 
 
 def dump(mechanism: Mechanism, path: str | Path) -> None:
@@ -52,11 +53,16 @@ def _toml(mechanism: Mechanism) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Tables and lists as TOML has them, without what is None and tables that are empty."""
+    """Tables and lists as TOML has them, without what is None, implied, or an empty table."""
     if getattr(value, "kind", None) == Unknown.kind:
         return {"kind": Unknown.kind, "closed": value.closed}
-    if hasattr(value, "entries"):
-        value = value.entries()
+    if isinstance(value, Table):
+        fields, entries = type(value).model_fields, value.entries()
+        value = {
+            key: item
+            for key, item in entries.items()
+            if not (key in value.implied and item == fields[key].default)
+        }
     if isinstance(value, Mapping):
         kept = {key: _plain(item) for key, item in value.items() if item is not None}
         return {key: item for key, item in kept.items() if item != {}}

@@ -40,6 +40,10 @@ class Evaluation:
     share:         (parts, N, n): what each part needs of it.
     contact_force: (N, k) [N], along the unit normals, on the platform.
     joint_rate, joint_acceleration: (N, n).
+    slip:          (N, k, 3) [m/s]: velocity of the platform where it touches, in {S}.
+    friction_force: (N, k, 3) [N], on the platform there, in {S}.
+    shortfall:     (N,): by how much all limits would have to be multiplied at least; 1 where
+                   efforts within them were found, inf where no limits would do.
     status:        (N,), of `Status`.
     """
 
@@ -52,6 +56,9 @@ class Evaluation:
     joint_rate: np.ndarray
     joint_acceleration: np.ndarray
     configuration: Configuration
+    slip: np.ndarray
+    friction_force: np.ndarray
+    shortfall: np.ndarray
     status: np.ndarray
 
 

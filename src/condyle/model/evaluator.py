@@ -9,6 +9,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -33,7 +34,7 @@ from ..mechanism.mechanism import Mechanism
 from ..motion import Motion, resolve_landmark, resolve_load_point
 from ..progress import step
 from ..questions import Prescribed, Question
-from ..questions.equations import part_names
+from ..questions.equations import INTERNAL, part_names
 from ..questions.inverse import OUTPUTS
 from ..questions.numbers import Layout, require_closed_form, specialised
 from ..questions.structure import structure_of
@@ -41,6 +42,7 @@ from ..status import Status
 from .checks import LOAD_COLUMNS, POSE_COLUMNS, check_array, check_states
 from .closing import Closure
 from .data import Configuration, Efforts, Evaluation
+from .distributing import LEAST, Distributor, Policy
 from .robust import Robust
 
 CONDITION = "condition"
@@ -66,10 +68,17 @@ class Evaluator:
         formulation: str = "virtual_power",
         route: str = "core",
         backend: str = "auto",
+        distribution: str | None = None,
+        preload: float = 0.0,
+        contact_weight: float = 0.0,
     ) -> None:
         """Derive the equations of motion.
 
-        Args:   backend: compiled, numpy, or auto (compiled where there is a C compiler).
+        Args:   distribution: how efforts are chosen, of `condyle.distribution.OBJECTIVES`; default:
+                bounded with cables, else minimum_norm.
+                preload: least push of one-sided contacts [N].
+                contact_weight: W / N_ref^2 of `weighted` [1/N^2].
+                backend: compiled, numpy, or auto (compiled where there is a C compiler).
         Raises: InputError:       for an unknown formulation, route or backend.
                 UnsupportedError: where route `direct` has no closed form.
                 MechanismError:   if the contacts do not hold the platform at home.
@@ -84,6 +93,8 @@ class Evaluator:
         self.mechanism = mechanism
         self.formulation = formulation_named(formulation).name
         self.route = route
+        self.policy = Policy.of(mechanism, distribution, preload, contact_weight)
+        self._distributor = Distributor(mechanism, self.policy)
         self.backend = Backend(backend)
         with step("deriving the equations"):
             structure = structure_of(mechanism, self.formulation, route)
@@ -103,7 +114,14 @@ class Evaluator:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Models travel as their recipe; kernels are found again in the cache."""
-        return type(self), (self.mechanism, self.formulation, self.route, self.backend.asked)
+        policy = (self.policy.objective, self.policy.preload, self.policy.contact_weight)
+        return type(self), (
+            self.mechanism,
+            self.formulation,
+            self.route,
+            self.backend.asked,
+            *policy,
+        )
 
     # -- what it is ------------------------------------------------------------------------
 
@@ -120,7 +138,8 @@ class Evaluator:
     @property
     def parts(self) -> tuple[str, ...]:
         """Names of the parts that share the efforts."""
-        return part_names(self._structure.families)
+        internal = not self._distributor.least_norm and not self._structure.friction
+        return part_names(self._structure) + (INTERNAL,) * internal
 
     @cached_property
     def characteristic_length(self) -> float:
@@ -131,13 +150,17 @@ class Evaluator:
         """The kernel of a question; see `condyle.questions`."""
         asked = question, details
         if asked not in self._kernels:
-            q = Question.about(self._structure, question, *details)
+            structure = self._structure
+            if question == "inverse" and self._distributor.unsolved_friction:
+                structure = replace(structure, friction=())
+            q = Question.about(structure, question, *details)
             self._kernels[asked] = self.backend.kernel(q.key, q.variants, self._numbers)
         return self._kernels[asked]
 
     @cached_property
     def _robust(self) -> Robust:
-        return Robust(self._structure, self._numbers, self.independent)
+        distributor = Distributor(self.mechanism, replace(self.policy, objective=LEAST))
+        return Robust(self._structure, self._numbers, self.independent, distributor)
 
     # -- inverse dynamics ------------------------------------------------------------------
 
@@ -227,7 +250,21 @@ class Evaluator:
             **{name: _sample_first(name, values[name]) for name in ("effort", *_names(EVERYTHING))},
             configuration=self._configured(values),
             status=status,
+            shortfall=values.get("shortfall", np.ones(len(status))),
+            **self._rubbed(values),
         )
+
+    def _rubbed(self, values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Sliding velocity and friction force at the contacts, (N, k, 3) each."""
+        force = values["contact_force"]
+        if "slip" not in values:
+            none = np.zeros((force.shape[1], force.shape[0], 3))
+            return {"slip": none, "friction_force": none}
+        drag = np.moveaxis(values["drag"], -1, 0)
+        return {
+            "slip": np.moveaxis(values["slip"], -1, 0),
+            "friction_force": -np.abs(force.T)[..., None] * drag,
+        }
 
     def _solve(
         self,
@@ -239,6 +276,9 @@ class Evaluator:
         threads: int | None,
     ) -> tuple[dict[str, np.ndarray], np.ndarray]:
         """Results by name, samples last, and their statuses."""
+        choosing = not self._distributor.least_norm or self._distributor.unsolved_friction
+        if choosing:
+            wanted = {*wanted, "contact", "motion"}
         kernel = self.kernel("inverse", tuple(o for o in OUTPUTS if o in wanted))
         check_array("load", load, 9, LOAD_COLUMNS)
         load = np.asarray(load)
@@ -252,7 +292,30 @@ class Evaluator:
             better, answer.status[again] = self._robust.evaluate(few)
             for name, value in answer.values.items():
                 value[..., again] = better[name]
+        if choosing:
+            self._choose(answer.values, answer.status, inputs)
         return answer.values, answer.status
+
+    def _choose(
+        self,
+        values: dict[str, np.ndarray],
+        status: np.ndarray,
+        inputs: Mapping[str, np.ndarray],
+    ) -> None:
+        """Replace what the least norm does not serve, in place, by what the policy asks for."""
+        values["shortfall"] = np.ones(len(status))
+        if "share" in values and not self._structure.friction:
+            values["share"] = np.concatenate([values["share"], 0 * values["share"][:1]])
+        rows = self._distributor.rows(values, status)
+        if not rows.size:
+            return
+        ports = {name: values[name].T[rows] for name in RESULTS["motion"]}
+        ports |= {name: inputs[name][rows] for name in ("force", "moment", "point")}
+        better = self._distributor.solve(self.kernel("system").run(ports).values)
+        status[rows] = better.pop("status")
+        for name, value in better.items():
+            if name in values:
+                values[name][..., rows] = value
 
     # -- the configuration -----------------------------------------------------------------
 

@@ -20,6 +20,7 @@ from ..questions import Prescribed, Question
 from ..questions.numbers import characteristic
 from ..questions.structure import Structure
 from ..status import Status, judge
+from .distributing import Distributor
 from .follow import Follow
 
 Arrays = dict[str, np.ndarray]
@@ -29,10 +30,16 @@ class Robust:
     """Samples of one mechanism and formulation, one array operation after the other."""
 
     def __init__(
-        self, structure: Structure, numbers: Numbers, independent: tuple[str, ...]
+        self,
+        structure: Structure,
+        numbers: Numbers,
+        independent: tuple[str, ...],
+        distributor: Distributor,
     ) -> None:
+        """Args: distributor: of least norm, for the patterns of friction."""
         self._structure, self._numbers = structure, numbers
         self._independent = independent
+        self._distributor = distributor
         angles = [name not in ("X", "Y", "Z") for name in independent]
         self._scale = np.where(angles, characteristic(structure, numbers), 1.0)
 
@@ -76,7 +83,17 @@ class Robust:
             values["share"], values["gravity"] = (a.transpose(2, 1, 0) for a in (share, gravity))
             values["effort"] = effort.T
             values["contact_force"] = self._contact_forces(s, effort).T
+            values["slip"], values["drag"] = system["slip"], system["drag"]
             status = self._judged(reached, values, effort)
+            if self._structure.friction and (good := np.flatnonzero(status == Status.ok)).size:
+                better = self._distributor.solve({n: a[..., good] for n, a in system.items()})
+                status[good] = better.pop("status")
+                better.pop("shortfall")
+                share = better.pop("share")
+                values["share"] = np.full((*share.shape[:2], len(status)), np.nan)
+                values["share"][..., good] = share
+                for name, a in better.items():
+                    values[name][:, good] = a
         return values, status
 
     def motion(self, q: np.ndarray, q1: np.ndarray, q2: np.ndarray) -> tuple[Arrays, np.ndarray]:
@@ -104,12 +121,12 @@ class Robust:
 
     def _contact_forces(self, s: Arrays, effort: np.ndarray) -> np.ndarray:
         """lambda along the unit normals, (N, k), from what the efforts leave over."""
-        G = s["G"]
+        G = s["normal"].transpose(0, 2, 1)
         left = s["Q"] - (s["J"] @ effort[..., None])[..., 0]
         mu = np.full(G.shape[:1] + G.shape[2:], np.nan)
         good = np.isfinite(left).all(axis=1) & np.isfinite(G).all(axis=(1, 2))
         mu[good] = (np.linalg.pinv(G[good]) @ left[good][..., None])[..., 0]
-        return mu * s["n_length"]
+        return mu
 
     def _judged(self, reached: np.ndarray, values: Arrays, effort: np.ndarray) -> np.ndarray:
         least, most = values["J_A_extremes"]

@@ -2,6 +2,7 @@
 
 from condyle.motion.columns import Table
 from condyle.motion.load import Load, as_load
+from condyle.motion.markers import MarkerMotion, from_c3d
 from condyle.motion.path import Motion, as_motion
 from condyle.motion.points import resolve_landmark, resolve_load_point
 from condyle.motion.reference import (
@@ -23,6 +24,7 @@ __all__ = [
     "MOMENT",
     "POSE",
     "Load",
+    "MarkerMotion",
     "Motion",
     "Smoothing",
     "Table",
@@ -31,6 +33,7 @@ __all__ = [
     "as_load",
     "as_motion",
     "bundled_reference",
+    "from_c3d",
     "iter_table",
     "parse_units",
     "read_table",

@@ -29,8 +29,9 @@ from .platform import (
     twist_basis,
     whole_basis,
 )
+from .structure import Structure
 
-LOAD = "load"
+LOAD, ACTUATORS, FRICTION, INTERNAL = "load", "actuators", "friction", "internal"
 
 
 @dataclass(frozen=True)
@@ -53,11 +54,15 @@ class Wrench:
 
 @dataclass(frozen=True)
 class ChainTerms:
-    """What the chains of one group contribute, lane by lane, dual to the state's rates."""
+    """What the chains of one group contribute, lane by lane, dual to the state's rates.
+
+    loss: effort that the actuator takes for itself.
+    """
 
     dynamics: ChainDynamics
     forces: dict[str, ca.SX]
     row: ca.SX
+    loss: ca.SX
 
 
 @dataclass(frozen=True)
@@ -80,6 +85,11 @@ class Equations:
     @property
     def Q(self) -> ca.SX:
         return total(list(self.parts.values()))
+
+    @property
+    def across(self) -> bool:
+        """Whether there are equations across the contacts."""
+        return self.G is not None
 
     @property
     def A(self) -> Lanes:
@@ -140,16 +150,29 @@ def equations(
     ]
     parts = {"platform": method.platform(state, _body(b, lump), g)}
     parts |= _summed(b, chains, lump)
+    if s.losses:
+        # Efforts bear these too: J^T effort = J^T tau + J^T loss.
+        parts[ACTUATORS] = b.total([c.row * c.loss for c in chains])
     parts[LOAD] = -(state.B.T @ load.about_centre(state.R))
     return Equations(b, state, basis, parts, chains, G)
 
 
-def part_names(families: Sequence[str]) -> tuple[str, ...]:
-    """Parts that share the efforts: platform, the links of the chains, load."""
+def part_names(structure: Structure) -> tuple[str, ...]:
+    """Parts that share the efforts: platform, links of the chains, actuators, load, friction.
+
+    Each is what the part asks for with least norm. Where the efforts are others, because the forces
+    of friction depend on them or limits bind, what is left is internal: it balances itself.
+    """
+    actuators = (ACTUATORS,) if structure.losses else ()
+    friction = (FRICTION, INTERNAL) if structure.friction else ()
+    return ("platform", *_links(structure), *actuators, LOAD, *friction)
+
+
+def _links(structure: Structure) -> tuple[str, ...]:
     links: dict[str, None] = {}
-    for kind in families:
+    for kind in structure.families:
         links.update(dict.fromkeys(reversed(FAMILIES[kind].bodies)))
-    return ("platform", *links, LOAD)
+    return tuple(links)
 
 
 def _chain_terms(
@@ -176,7 +199,18 @@ def _chain_terms(
         forces = {name: mask * f for name, f in forces.items()}
         dynamics = replace(dynamics, J=mask * dynamics.J)
     pulled = {name: state.generalized_force(f, M.lever) for name, f in forces.items()}
-    return ChainTerms(dynamics, pulled, state.generalized_force(dynamics.J, M.lever))
+    row = state.generalized_force(dynamics.J, M.lever)
+    return ChainTerms(dynamics, pulled, row, _loss(b, group, dynamics))
+
+
+def _loss(b: Builder, group: int, motion: ChainDynamics) -> ca.SX:
+    """What an actuator takes for its rotor and its friction [N m or N]."""
+    if not b.structure.losses:
+        return ca.SX(0)
+    inertia, viscous, coulomb, square = ca.vertsplit(b.lane(group, "actuator"))
+    rate = motion.rate
+    direction = rate / ca.sqrt(rate * rate + square)
+    return inertia * motion.acceleration + viscous * rate + coulomb * direction
 
 
 def _lumped(
@@ -224,11 +258,14 @@ def _summed(b: Builder, chains: Sequence[ChainTerms], lumped: bool) -> dict[str,
     size = chains[0].row.shape[0]
     if lumped:
         return {"chains": b.total([total(list(c.forces.values())) for c in chains])}
-    names = part_names(b.structure.families)[1:-1]
+    names = _links(b.structure)
     return {n: b.total([c.forces.get(n, ca.SX.zeros(size)) for c in chains]) for n in names}
 
 
 def total(terms: Sequence[ca.SX]) -> ca.SX:
+    """The sum; 0 of nothing, as of a family without bodies."""
+    if not terms:
+        return ca.SX(0)
     found = terms[0]
     for term in terms[1:]:
         found = found + term

@@ -6,6 +6,7 @@ From the independent coordinates q, q', q'' and the load; the contacts are close
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import dataclass
 
 import casadi as ca
 
@@ -14,8 +15,9 @@ from ..dynamics.least_norm import gram_schmidt, normal_equations
 from ..graph.program import Program, Variants
 from ..status import Status
 from . import configuration
-from .builder import Builder
+from .builder import Builder, Lanes
 from .equations import Equations, Wrench, equations, total
+from .friction import Contacts, LeastNorm, contacts, least_norm_pattern
 from .platform import ANGLE_UNITS, Platform, closed, given, independent_indices
 from .structure import Structure
 
@@ -61,26 +63,18 @@ def program(
     platform, load = closed(b), Wrench.of(b)
     apart = bool({"share", "gravity"} & set(wanted))
     lump = FORMULATIONS[structure.formulation].lumps and not apart
-    eq = equations(b, platform, load, lump=lump, low_latency=low_latency)
-    parts = [eq.basis.generalized_force(part) for part in eq.parts.values()]
-    right = ca.horzcat(*parts) if apart else total(parts)
-    if "gravity" in wanted:
-        # Forces of bodies at rest: what gravity alone asks for, and the load.
-        right = ca.horzcat(right, b.at_zero(right, platform.q1, platform.q2))
+    # Friction acts across the contacts, where route `direct` has no equations.
+    route = "core" if structure.friction else structure.route
+    eq = equations(b, platform, load, route=route, lump=lump, low_latency=low_latency)
     solve = gram_schmidt if robust else normal_equations
-    found, pivots = solve(b.total, eq.A, right)
-    own = [f[:, : len(parts)] if apart else f for f in found]
-    effort = [total(ca.horzsplit(f)) for f in own]
-    b.output("effort", effort, "N m or N")
+    best = _least_norm(b, platform, load, eq, solve, apart, wanted)
+    b.output("effort", best.effort, "N m or N")
     if "share" in wanted:
-        b.output("share", own, "N m or N")
+        b.output("share", best.share, "N m or N")
     if "gravity" in wanted:
-        b.output("gravity", [f[:, len(parts) :] for f in found], "N m or N")
+        b.output("gravity", best.gravity, "N m or N")
     if "contact" in wanted:
-        core = eq if structure.route == "core" else _core(b, platform, load)
-        b.output(
-            "contact_force", core.contact_forces(platform, effort), "N", len(structure.contacts)
-        )
+        b.output("contact_force", best.force, "N", len(structure.contacts))
     if "motion" in wanted:
         _add_motion(b, platform)
     if "joint" in wanted:
@@ -88,10 +82,61 @@ def program(
         b.output("joint_acceleration", [c.dynamics.acceleration for c in eq.chains], "per s^2")
     if "configuration" in wanted:
         configuration.add(b, platform)
+        if structure.friction:
+            _add_sliding(b, contacts(b, platform))
     b.check(_feasibility(b, platform, eq), DOUBTFUL, Status.unreachable)
-    sure = (ca.fabs(b.total(effort)) < HUGE) * _every_rate_is_felt(b, eq)
-    b.check(pivots * sure, WEAK)
+    finite = ca.fabs(b.total(best.effort)) < HUGE
+    b.check(best.quality * finite * _every_rate_is_felt(b, eq), WEAK)
     return b.finish()
+
+
+@dataclass(frozen=True)
+class _Best:
+    """Efforts of least norm, what each part asks of them, and the contact forces."""
+
+    effort: Lanes
+    share: Lanes
+    gravity: Lanes
+    force: ca.SX
+    quality: ca.SX
+
+
+def _least_norm(
+    b: Builder,
+    platform: Platform,
+    load: Wrench,
+    eq: Equations,
+    solve: LeastNorm,
+    apart: bool,
+    wanted: Collection[str],
+) -> _Best:
+    parts = list(eq.parts.values())
+    chosen = None
+    if b.structure.friction:
+        touch = contacts(b, platform)
+        chosen = least_norm_pattern(b, eq, touch, solve)
+        # What friction asks for, as if it were a load.
+        parts.append(eq.state.B.T @ (touch.T @ ca.fabs(chosen.force)))
+    if chosen is not None and not apart:
+        return _Best(chosen.effort, [], [], chosen.force, chosen.sure * chosen.pivots)
+    pulled = [eq.basis.generalized_force(part) for part in parts]
+    right = ca.horzcat(*pulled) if apart else total(pulled)
+    if "gravity" in wanted:
+        # Forces of bodies at rest: what gravity alone asks for, and the load.
+        right = ca.horzcat(right, b.at_zero(right, platform.q1, platform.q2))
+    found, pivots = solve(b.total, eq.A, right)
+    share = [f[:, : len(parts)] if apart else f for f in found]
+    gravity = [f[:, len(parts) :] for f in found]
+    if chosen is not None:
+        share = [ca.horzcat(f, t - ca.sum2(f)) for f, t in zip(share, chosen.effort, strict=True)]
+        quality = chosen.sure * ca.fmin(pivots, chosen.pivots)
+        return _Best(chosen.effort, share, gravity, chosen.force, quality)
+    effort = [total(ca.horzsplit(f)) for f in share]
+    force = ca.SX(0, 1)
+    if "contact" in wanted:
+        core = eq if eq.across else _core(b, platform, load)
+        force = core.contact_forces(platform, effort)
+    return _Best(effort, share, gravity, force, pivots)
 
 
 def motion(structure: Structure) -> Program:
@@ -112,15 +157,18 @@ def system(structure: Structure) -> Program:
     platform, load = given(b), Wrench.of(b)
     eq = equations(b, platform, load, route="core")
     still = [b.at_zero(part, *_rates(eq, platform)) for part in eq.parts.values()]
-    assert eq.G is not None
     b.output("A", eq.A, "")
     for name, parts in (("b", list(eq.parts.values())), ("b_gravity", still)):
         rows = ca.horzcat(*(eq.basis.generalized_force(p) for p in parts)).T
         b.output(name, rows, "", len(parts), structure.m)
+    pulled = eq.basis.generalized_force(ca.SX.eye(eq.Q.numel()))
+    b.output("Pi", pulled, "", structure.m, 6)  # Pi^T
     b.output("Q", eq.Q, "N, N m", 6)
     b.output("J", [c.row for c in eq.chains], "")
-    b.output("G", eq.G, "", 6, len(structure.contacts))
-    b.output("n_length", platform.motion.frame.n_length, "", len(structure.contacts))
+    touch, k = contacts(b, platform), len(structure.contacts)
+    b.output("normal", (eq.state.B.T @ touch.N).T, "", k, 6)
+    b.output("friction", (eq.state.B.T @ touch.T).T, "", k, 6)
+    _add_sliding(b, touch)
     b.output("joint_rate", [c.dynamics.rate for c in eq.chains], "rad/s or m/s")
     b.output("joint_acceleration", [c.dynamics.acceleration for c in eq.chains], "per s^2")
     return b.finish()
@@ -130,6 +178,12 @@ def _add_motion(b: Builder, platform: Platform) -> None:
     b.output("pose", platform.pose, ANGLE_UNITS)
     b.output("pose_rate", platform.motion.rate, "per s")
     b.output("pose_acceleration", platform.motion.acceleration, "per s^2")
+
+
+def _add_sliding(b: Builder, touch: Contacts) -> None:
+    k = len(b.structure.contacts)
+    b.output("slip", touch.slip.T, "m/s", k, 3)
+    b.output("drag", touch.drag.T, "1", k, 3)
 
 
 def _rates(eq: Equations, platform: Platform) -> tuple[ca.SX, ca.SX]:

@@ -21,11 +21,13 @@ from ..kinematics.contact import (
     contacts_of,
     mean_and_difference,
 )
+from ..mechanism.chain import Chain
 from ..mechanism.home import characteristic_length, dependent_coordinates
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.surface import of_form
 from .structure import Structure
 
+NO_LOSSES = (0.0, 0.0, 0.0, 1.0)
 Parameter = Callable[[str], ca.SX]  # a mechanism's number by name
 Slot = tuple[int, int]  # start, count
 Vector = tuple[float, ...]
@@ -51,10 +53,12 @@ class Layout:
         sizes |= {"branch": 1, "length": 1, "landmark": 3, "middle": 3}
         for i, (_, count) in enumerate(structure.contacts):
             sizes |= {f"contact_point_{i}": 3, f"contact_surface_{i}": count}
+        sizes |= {f"friction_{i}": 3 for i in structure.friction}
         if structure.parallel:
             sizes |= {"slope": 2, "mean": 3, "mean_offset": 1, "difference": 3, "gap": 1}
+        losses = {"actuator": len(NO_LOSSES)} if structure.losses else {}
         lanes = [
-            _slots({"mask": 1, "joint": 3, "constants": FAMILIES[kind].size()})
+            _slots({"mask": 1, "joint": 3, "constants": FAMILIES[kind].size()} | losses)
             for kind in structure.families
         ]
         return Layout(structure, _slots(sizes), lanes)
@@ -77,6 +81,9 @@ class Layout:
         for i, contact in enumerate(mechanism.contacts):
             values[f"contact_point_{i}"] = contact.point
             values[f"contact_surface_{i}"] = contact.offset_surface.constants()
+            if i in self.structure.friction:
+                f, radius = contact.friction, contact.push * (contact.ball_radius or 0.0)
+                values[f"friction_{i}"] = (f.coefficient, f.smoothing_speed**2, radius)
         if self.structure.parallel:
             first, second = (np.array(c.point) for c in mechanism.contacts)
             a, b = (c.offset_surface.constants() for c in mechanism.contacts)
@@ -94,11 +101,15 @@ class Layout:
         for kind in self.structure.families:
             family = FAMILIES[kind]
             chains = [c for c in mechanism.chains if c.kind == kind]
-            rows = [[1.0, *c.platform, *family.vector(family.constants(c))] for c in chains]
+            rows = [
+                [1.0, *c.platform, *family.vector(family.constants(c)), *self._losses(c)]
+                for c in chains
+            ]
             idle = family.constants(chains[0])
             idle |= {name: np.zeros_like(idle[name]) for name in self.pads(kind)}
             lanes.append(np.array(rows, dtype=float).T.copy())
-            padding.append(np.array([0.0, *chains[0].platform, *family.vector(idle)]))
+            own = [*NO_LOSSES] if self.structure.losses else []
+            padding.append(np.array([0.0, *chains[0].platform, *family.vector(idle), *own]))
         order = tuple(
             i
             for kind in self.structure.families
@@ -106,6 +117,13 @@ class Layout:
             if chain.kind == kind
         )
         return Numbers(parameters.astype(float), tuple(lanes), tuple(padding), order)
+
+    def _losses(self, chain: Chain) -> list[float]:
+        """Rotor's inertia at the joint, viscous and Coulomb friction, squared smoothing speed."""
+        if not self.structure.losses:
+            return []
+        a = chain.actuator
+        return [a.reflected_inertia, a.viscous, a.coulomb, a.smoothing_speed**2]
 
     def pads(self, kind: str) -> tuple[str, ...]:
         """Constants of a family that, at 0, make a lane that stands for no chain do nothing."""

@@ -104,6 +104,8 @@ def chain_reactions(
     family: Family, c: Constants, M: PointMotion, tau: ca.SX, g: ca.SX
 ) -> list[tuple[ca.SX, ca.SX]]:
     """Reactions of one chain under the effort tau, and their points, (3,) each."""
+    if not family.bodies:
+        return [(family.loop(c, M.position).J * tau, M.position)]
     s = JointState.symbols()
     bodies = free_bodies(family, c, s, g)
     values, points = zip(*_quantities(bodies), strict=True)
@@ -129,7 +131,10 @@ def _quantities(bodies: FreeBodies) -> Iterator[tuple[ca.SX, ca.SX]]:
 
 
 def chain_places(family: Family, owner: str) -> Iterator[Place]:
-    """The reactions of one chain, in the order of `_quantities`."""
+    """The reactions of one chain, in the order of `_quantities`; without bodies, its pull."""
+    if not family.bodies:
+        yield Place("platform_joint", owner, "platform", family.kind, "platform joint M")
+        return
     c = family.named(ca.SX.sym("c", family.size()))
     names = [name.removesuffix("s") for name in family.bodies]
     yield Place("platform_joint", owner, "platform", names[-1], "platform joint M")

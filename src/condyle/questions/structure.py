@@ -16,6 +16,8 @@ class Structure:
     contacts:  (form of the surface, number of its constants).
     dependent: the coordinates that the contacts determine.
     parallel:  two contacts on planes of one slope, written as their mean and difference.
+    losses:    whether an actuator has a rotor or friction of its own.
+    friction:  contacts with friction, by number.
     zeros:     parameters that are zero, (-1, i), and constants that are zero in every chain of a
                group, (group, i): what they multiply is left out.
     """
@@ -26,6 +28,8 @@ class Structure:
     contacts: tuple[tuple[str, int], ...]
     dependent: tuple[str, ...]
     parallel: bool = False
+    losses: bool = False
+    friction: tuple[int, ...] = ()
     zeros: frozenset[tuple[int, int]] = frozenset()
 
     @property
@@ -59,11 +63,16 @@ def structure_of(
     loci = [c.offset_surface for c in mechanism.contacts]
     contacts = tuple((locus.form, len(locus.constants())) for locus in loci)
     planes = [locus for locus in loci if locus.form == "plane"]
+    friction = tuple(i for i, c in enumerate(mechanism.contacts) if c.friction.coefficient)
     return Structure(
         formulation=formulation,
         route=route,
         chains=tuple(counts.items()),
         contacts=contacts,
         dependent=dependent_coordinates(mechanism),
-        parallel=len(contacts) == len(planes) == 2 and planes[0].slope == planes[1].slope,
+        parallel=not friction
+        and len(contacts) == len(planes) == 2
+        and planes[0].slope == planes[1].slope,
+        losses=any(not chain.actuator.ideal for chain in mechanism.chains),
+        friction=friction,
     )

@@ -10,6 +10,8 @@ import numpy as np
 
 from ..kinematics.chain import FAMILIES
 from ..kinematics.singularity import KINDS
+from ..mechanism.actuator import Limits
+from ..mechanism.chain import limits
 from ..mechanism.home import HOME_WARNING, home_residuals
 from ..mechanism.mechanism import Contact, Mechanism
 from ..mechanism.plausibility import extent, length_text, plausibility_warnings
@@ -75,16 +77,42 @@ def _chain(chain: Mapping[str, Any]) -> str:
         said += [f"{mass:g} kg"] if mass is not None else []
         facts.append(" ".join([name, *said]))
     effort, joint = chain["effort_unit"], chain["joint_unit"]
-    limits = []
-    if chain["effort_limit"] is not None:
-        limits.append(f"{chain['effort_limit']:g} {effort}")
+    bounds = [_effort_limit(chain["effort_limit"], effort)] if chain["effort_limit"] else []
     if chain["speed_limit"] is not None:
-        limits.append(f"{chain['speed_limit']:g} {joint}/s")
-    limit = f"limits {', '.join(limits)}" if limits else "no limits"
+        bounds.append(f"{chain['speed_limit']:g} {joint}/s")
+    facts.append(f"limits {', '.join(bounds)}" if bounds else "no limits")
+    facts += _losses(chain["losses"], effort, joint)
     return (
-        f"{chain['kind']}, {', '.join(facts)}, {limit}, joint [{joint}], effort [{effort}], "
+        f"{chain['kind']}, {', '.join(facts)}, joint [{joint}], effort [{effort}], "
         f"transmission at home {chain['transmission']:+.4f}"
     )
+
+
+def _effort_limit(limit: float | list[float | None], unit: str) -> str:
+    """'3 N m' for both directions, '0 to 190.4 N', 'at least 0 N'."""
+    if not isinstance(limit, list):
+        return f"{limit:g} {unit}"
+    low, high = limit
+    return Limits(
+        -np.inf if low is None else low, np.inf if high is None else high, np.inf
+    ).effort_text(unit)
+
+
+def _losses(losses: Mapping[str, float], effort: str, joint: str) -> Iterator[str]:
+    """What the actuator keeps of its effort, as far as it keeps any."""
+    if losses["rotor_inertia"]:
+        inertia = "kg m^2" if joint == "rad" else "kg"
+        yield (
+            f"rotor {losses['rotor_inertia']:g} kg m^2 with gear {losses['gear']:g} "
+            f"({losses['reflected_inertia']:.4g} {inertia} at the joint)"
+        )
+    if losses["viscous"]:
+        yield f"viscous {losses['viscous']:g} {effort} s/{joint}"
+    if losses["coulomb"]:
+        yield (
+            f"Coulomb {losses['coulomb']:g} {effort}, fading below "
+            f"{losses['smoothing_speed']:g} {joint}/s"
+        )
 
 
 def _contact(contact: Mapping[str, Any]) -> str:
@@ -92,6 +120,11 @@ def _contact(contact: Mapping[str, Any]) -> str:
     options = [f", {contact['side']}"] if contact["side"] else []
     options += [f", ball of radius {length_text(ball)}"] if ball is not None else []
     options += [", one-sided"] if contact["one_sided"] else []
+    if (friction := contact["friction"])["coefficient"]:
+        options.append(
+            f", friction {friction['coefficient']:g} fading below "
+            f"{friction['smoothing_speed']:g} m/s"
+        )
     if abs(off) > HOME_WARNING:
         place = f"{off * 1e3:+.2g} mm off its surface at home"
     else:  # what is left is rounding
@@ -160,16 +193,19 @@ def describe(mechanism: Mechanism) -> Description:
 
 
 def _chain_data(chain: Any) -> dict[str, Any]:
-    family, actuator = FAMILIES[chain.kind], chain.actuator
-    limits = (getattr(actuator, key, None) for key in ("torque_limit", "force_limit"))
+    family, actuator, limit = FAMILIES[chain.kind], chain.actuator, limits(chain)
+    ends = [v if np.isfinite(v) else None for v in (limit.low, limit.high)]
+    losses = ("rotor_inertia", "gear", "reflected_inertia", "viscous", "coulomb", "smoothing_speed")
     return {
         "kind": chain.kind,
         "joint_unit": family.joint_unit,
         "effort_unit": family.effort_unit,
         "lengths": chain.lengths,
         "masses": chain.masses,
-        "effort_limit": next((limit for limit in limits if limit is not None), None),
+        # One number where it is the same both ways, else [least, greatest] with None for no limit.
+        "effort_limit": (limit.high if limit.symmetric else ends) if limit.limited else None,
         "speed_limit": actuator.speed_limit,
+        "losses": {name: getattr(actuator, name) for name in losses},
     }
 
 
@@ -179,5 +215,6 @@ def _contact_data(contact: Contact, residual: float) -> dict[str, Any]:
         "side": contact.side,
         "ball_radius": contact.ball_radius,
         "one_sided": contact.one_sided,
+        "friction": contact.friction.entries(),
         "residual": float(residual),
     }

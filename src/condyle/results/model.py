@@ -73,6 +73,9 @@ def derive(
     formulation: str = "virtual_power",
     route: str = "core",
     backend: str = "auto",
+    distribution: str | None = None,
+    preload: float = 0.0,
+    contact_weight: float = 0.0,
 ) -> Model:
     """Derive the equations of motion of a mechanism, or of one by its file or name; see `Model`.
 
@@ -85,4 +88,4 @@ def derive(
             f"derive takes a mechanism, the path of its file, or the name of a bundled one; got "
             f"{type(mechanism).__name__}"
         )
-    return Model(mechanism, formulation, route, backend)
+    return Model(mechanism, formulation, route, backend, distribution, preload, contact_weight)

@@ -67,7 +67,10 @@ KINDS = {
         f"ratio below {NEAR_SINGULAR:g}: torques grow, and so does the effect of every error in "
         "the geometry",
     ),
-    "effort_limit": Kind("effort above a limit", "another actuator, or another motion"),
+    "effort_limit": Kind(
+        "effort beyond a limit",
+        "another actuator, or another motion; efforts of least norm know no limits",
+    ),
     "speed_limit": Kind("speed above a limit", "another actuator, or another motion"),
     "rod_angles": Kind(
         "gamma_i near 90 degrees",
@@ -76,6 +79,7 @@ KINDS = {
     ),
 }
 
+LOW = "effort_low"  # what is tallied of efforts below a limit of their own; told as effort_limit
 STRICT = frozenset(name for name, kind in KINDS.items() if kind.strict)
 
 
@@ -159,15 +163,14 @@ class Watch:
                 tally("lift_off", i, derived.lifted[:, i], np.abs(e.contact_force[:, i]))
             tally("near_singularity", 0, derived.near != 0, -derived.ratio)
             for i, chain in enumerate(self.mechanism.chains):
-                for kind, limit, values in zip(
-                    ("effort_limit", "speed_limit"),
-                    limits(chain),
-                    (e.effort, e.joint_rate),
-                    strict=True,
-                ):
-                    if limit is not None:
-                        size = np.abs(values[:, i])
-                        tally(kind, i, size > limit, size)
+                limit, effort, speed = limits(chain), e.effort[:, i], np.abs(e.joint_rate[:, i])
+                if limit.symmetric:
+                    size = np.abs(effort)
+                    tally("effort_limit", i, size > limit.high, size)
+                else:
+                    tally("effort_limit", i, effort > limit.high, effort)
+                    tally(LOW, i, effort < limit.low, -effort)
+                tally("speed_limit", i, speed > limit.speed, speed)
             flat = np.abs(configuration.cos_gamma)
             if (flat < NEAR_SINGULAR).any():
                 for i in range(flat.shape[1]):
@@ -236,8 +239,17 @@ class Watch:
                 kind, text, chain.name, value=-size, bound=NEAR_SINGULAR, unit="1", **about
             )
         family, limit = FAMILIES[chain.kind], limits(chain)
+        if kind == LOW:
+            unit, bound = family.effort_unit, limit.low
+            text = (
+                f'chain "{chain.name}": effort falls to {-size:.4g} {unit} {worst}, below its '
+                f"least of {bound:g}"
+            )
+            return Notice(
+                "effort_limit", text, chain.name, value=-size, bound=bound, unit=unit, **about
+            )
         what, unit, bound = (
-            ("effort", family.effort_unit, limit.effort)
+            ("effort", family.effort_unit, limit.high)
             if kind == "effort_limit"
             else ("speed", f"{family.joint_unit}/s", limit.speed)
         )

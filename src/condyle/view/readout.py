@@ -55,12 +55,12 @@ def _chains(s: Snapshot) -> str:
         family = FAMILIES[chain.kind]
         angle = family.joint_unit == "rad"
         unit, scale = ("°", 180 / np.pi) if angle else ("mm", 1e3)
-        limit = limits(chain).effort
+        use = limits(chain).use(s.torque[i])
         row = [
             chain.name,
             number(s.joint[i] * scale, 2, unit),
             number(s.torque[i], 4, family.effort_unit),
-            "" if limit is None else number(100 * abs(s.torque[i]) / limit, 0, "%"),
+            "" if use is None else "slack" if np.isinf(use) else number(100 * use, 0, "%"),
         ]
         if s.rate is not None:
             row.append(number(s.rate[i], 3, "" if len(units) == 1 else f"{family.joint_unit}/s"))

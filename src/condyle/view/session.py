@@ -228,10 +228,12 @@ def state_messages(
         if up
     ]
     for i, chain in enumerate(mechanism.chains):
-        effort, speed = limits(chain)
-        if effort is not None and abs(torque[i]) > effort:
-            messages.append(f"{chain.name} is above its effort limit of {effort:g}")
-        if rate is not None and speed is not None and abs(rate[i]) > speed:
+        low, high, speed = limits(chain)
+        if torque[i] > high or (low == -high and torque[i] < low):
+            messages.append(f"{chain.name} is above its effort limit of {high:g}")
+        elif torque[i] < low:
+            messages.append(f"{chain.name} is below its least effort of {low:g}")
+        if rate is not None and abs(rate[i]) > speed:
             messages.append(f"{chain.name} is above its speed limit of {speed:g}")
     return messages
 

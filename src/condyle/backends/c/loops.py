@@ -210,6 +210,9 @@ class Loops(Printer):
         return f"load(in[{first} + {self.lane(copy)}] + at)"
 
     def reduction(self, v: Value) -> str:
-        shared = [self.repeated(v, t, count) for count, t in self.shared_terms(v)]
+        shared = []
+        for count, t in self.shared_terms(v):
+            text = self.repeated(v, t, count)
+            shared.append(f"spread({text})" if self.is_scalar(t) else text)
         terms = [f"r{v}", *shared] if self.lane_terms(v) else shared
         return " + ".join(terms) if self.g.nodes[v].op == "sum" else nested("fmin_v", terms)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -202,6 +203,8 @@ def arithmetic(op: str, args: list[str]) -> str:
 
 def number(value: object) -> str:
     assert isinstance(value, float)
+    if not math.isfinite(value):
+        return "NAN" if math.isnan(value) else "HUGE_VAL" if value > 0 else "(-HUGE_VAL)"
     text = repr(value)
     return f"({text})" if value < 0 else text
 

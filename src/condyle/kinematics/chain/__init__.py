@@ -1,12 +1,13 @@
 """Chain families: one file each, found here by the `kind` of the mechanism file."""
 
+from .cable import CableFamily
 from .family import ChainDynamics, Constants, Family, Joint, Link, Loop
 from .pss import PSSFamily
 from .rss import RSSFamily
 from .sps import SPSFamily
 
 FAMILIES: dict[str, Family] = {
-    family.kind: family for family in (RSSFamily(), PSSFamily(), SPSFamily())
+    family.kind: family for family in (RSSFamily(), PSSFamily(), SPSFamily(), CableFamily())
 }
 
 __all__ = ["FAMILIES", "ChainDynamics", "Constants", "Family", "Joint", "Link", "Loop"]

@@ -155,7 +155,8 @@ class Family(ABC):
     """One chain family. Instances hold no data; constants come in as arguments."""
 
     kind: ClassVar[str]
-    bodies: ClassVar[tuple[str, ...]]  # moving links, base to platform, in the plural of reports
+    # Moving links, base to platform, in the plural of reports; a line has none.
+    bodies: ClassVar[tuple[str, ...]]
     joint_unit: ClassVar[str]
     effort_unit: ClassVar[str]
     shapes: ClassVar[dict[str, int]]  # constant -> number of entries (1, 3 or 9)

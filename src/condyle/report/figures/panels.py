@@ -10,12 +10,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ...mechanism.chain import limits as actuator_limits
 from ..failures import failures, longest
 from .chains import readable
 from .labels import TIME
 from .style import DARK, GREY, look, narrow
 
 if TYPE_CHECKING:
+    from ...mechanism.actuator import Limits
     from ...results.solution import Solution
 
 NO_RESULT = "no result"
@@ -61,31 +63,47 @@ def finish(grid: np.ndarray, y_labels: Sequence[Sequence[str]]) -> None:
         axes.tick_params(labelbottom=False)
 
 
+def drawn_limits(solution: Solution, variable: str) -> dict[str, Limits]:
+    """Chain -> limits of its torque or force, or of its speed, as those of an effort."""
+    found = {chain.name: actuator_limits(chain) for chain in solution.mechanism.chains}
+    if variable == "torque":
+        return found
+    return {name: one.of_speed for name, one in found.items()}
+
+
 def limits(
-    axes: Axes, values: np.ndarray, bounds: Mapping[str, float], names: Sequence[str], unit: str
+    axes: Axes,
+    values: np.ndarray,
+    bounds: Mapping[str, Limits],
+    names: Sequence[str],
+    unit: str,
+    factor: float = 1.0,
 ) -> None:
     """Limits of the actuators `names` as lines, or in the title where the data stay far below.
 
-    Args: bounds: limit by name, of those that have one, in the unit of the axis.
+    Args: bounds: limits by name;  factor: from their unit to that of the axis.
     """
-    for limit in dict.fromkeys(bounds[name] for name in names if name in bounds):
-        whose = [readable(name) for name in names if bounds.get(name) == limit]
-        who = "" if len(whose) == len(names) else f" ({', '.join(whose)})"
-        draw_limit(axes, values, limit, f"limit ±{limit:.4g} {unit}{who}")
+    pairs = {name: (bounds[name].low, bounds[name].high) for name in names if bounds[name].limited}
+    for pair in dict.fromkeys(pairs.values()):
+        own = [name for name in names if pairs.get(name) == pair]
+        who = "" if len(own) == len(names) else f" ({', '.join(map(readable, own))})"
+        text = bounds[own[0]].effort_text(unit, factor)
+        draw_limit(axes, values, (pair[0] * factor, pair[1] * factor), f"limit {text}{who}")
 
 
-def draw_limit(axes: Axes, values: np.ndarray, limit: float, text: str) -> None:
-    """One limit, at plus and minus."""
+def draw_limit(axes: Axes, values: np.ndarray, bounds: tuple[float, float], text: str) -> None:
+    """One limit, at its levels; one at 0 is the axis."""
     peak = float(np.nanmax(np.abs(values), initial=0.0))
-    if limit > REACH * peak:
+    levels = [level for level in bounds if level and np.isfinite(level)]
+    if levels and min(map(abs, levels)) > REACH * peak:
         title = axes.get_title(loc="left")
         axes.set_title(f"{title + ', ' if title else ''}{text} is outside the view")
         return
-    for bound in (limit, -limit):
-        axes.axhline(bound, color=DARK, lw=1, ls=(0, (6, 3)))
-    place = axes.get_yaxis_transform()
+    for level in levels:
+        axes.axhline(level, color=DARK, lw=1, ls=(0, (6, 3)))
+    place, at = axes.get_yaxis_transform(), max(levels, default=0.0)
     axes.annotate(
-        text, (0, limit), (3, 2), xycoords=place, textcoords="offset points", fontsize=7, color=DARK
+        text, (0, at), (3, 2), xycoords=place, textcoords="offset points", fontsize=7, color=DARK
     )
 
 

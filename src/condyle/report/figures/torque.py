@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...mechanism.chain import limits as actuator_limits
 from .chains import by_unit, groups, heading, readable
 from .labels import caption
-from .panels import finish, legend, legend_beside, limits, lines, same_scale
+from .panels import drawn_limits, finish, legend, legend_beside, limits, lines, same_scale
 from .registry import plot
 from .style import house, new_figure
 
@@ -27,7 +26,7 @@ def torque(solution: Solution) -> Figure:
     panels = groups(names, units)
     figure = new_figure("Efforts of the actuators", caption(solution), 7.5, 0.9 + 1.7 * len(panels))
     grid = figure.subplots(len(panels), 1, sharex=True, squeeze=False)
-    bounds = effort_limits(solution)
+    bounds = drawn_limits(solution, "torque")
     values = solution["torque"].values
     for axes, members in zip(grid[:, 0], panels, strict=True):
         own = [names[i] for i in members]
@@ -92,16 +91,6 @@ def chains_of(solution: Solution) -> tuple[list[str], list[str]]:
 def effort_label(unit: str) -> str:
     """The label of an axis of efforts."""
     return f"{'force' if unit == 'N' else 'torque'} [{unit}]"
-
-
-def effort_limits(solution: Solution) -> dict[str, float]:
-    """Chain -> its actuator's largest effort, where it has one."""
-    found = {}
-    for chain in solution.mechanism.chains:
-        limit = actuator_limits(chain).effort
-        if limit is not None:
-            found[chain.name] = limit
-    return found
 
 
 def scale_by_unit(grid: np.ndarray, panels: list[list[int]], units: list[str]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...results.solution import BOUND_TOLERANCE
 from .columns import Columns
-from .panels import effort_limits, speed_limits
+from .panels import drawn_limits
 
 if TYPE_CHECKING:
     from ...results.solution import Solution
@@ -43,11 +43,8 @@ def _warnings(solution: Solution) -> Iterator[tuple[str, np.ndarray]]:
             margin = solution["bound_margin"].values[:, i]
             yield f"{name} is outside its bounds", margin < -BOUND_TOLERANCE
             yield f"{name} lifts off", solution["lift_off"].values[:, i]
-        limits = {"torque": effort_limits(solution), "joint_rate": speed_limits(solution)}
         for variable, word in (("torque", "effort"), ("joint_rate", "speed")):
-            values = np.abs(solution[variable].values)
+            values, limits = solution[variable].values, drawn_limits(solution, variable)
             for i, name in enumerate(solution["chain"].values):
-                limit = limits[variable][i]
-                if limit is not None:
-                    yield f"{name} is above its {word} limit", values[:, i] > limit
+                yield f"{name} is beyond its {word} limit", limits[i].beyond(values[:, i])
     yield NEAR_SINGULAR, solution["singularity"].values != 0

@@ -15,9 +15,10 @@ from ...errors import InputError
 from ...results.summary import summarize
 from ..failures import failures, longest
 from .html import Markup, table, tag
-from .panels import effort_limits, reaction_magnitudes, reaction_variables, speed_limits
+from .panels import drawn_limits, reaction_magnitudes, reaction_variables
 
 if TYPE_CHECKING:
+    from ...mechanism.actuator import Limits
     from ...results.solution import Solution
     from ..tables import Table
     from .reduce import Reduced
@@ -148,7 +149,7 @@ def _peak(values: np.ndarray) -> tuple[int, int, float] | None:
 def chain_table(solution: Solution) -> Markup:
     """Peak effort and speed of each chain beside its limits."""
     rows = []
-    efforts, speeds = effort_limits(solution), speed_limits(solution)
+    efforts, speeds = (drawn_limits(solution, v) for v in ("torque", "joint_rate"))
     for i, chain in enumerate(solution.mechanism.chains):
         effort_unit = str(solution["effort_unit"].values[i])
         speed_unit = f"{solution['joint_unit'].values[i]}/s"
@@ -165,14 +166,20 @@ def chain_table(solution: Solution) -> Markup:
 
 
 def _peak_cells(
-    solution: Solution, variable: str, chain: int, unit: str, limit: float | None
+    solution: Solution, variable: str, chain: int, unit: str, limit: Limits
 ) -> list[str]:
     peak = _peak(solution[variable].values[:, [chain]])
     if peak is None:
         return ["-", "-", "-"]
     sample, _, value = peak
-    use = "no limit" if limit is None else f"{abs(value) / limit:.0%} of {limit:g} {unit}"
-    return [f"{value:.4g} {unit}", f"{solution['time'].values[sample]:g} s", use]
+    use = limit.use(value)
+    if use is None:
+        told = "no limit"
+    elif np.isinf(use):
+        told = f"beyond {limit.effort_text(unit)}"
+    else:
+        told = f"{use:.0%} of {abs(value / use) if use else limit.greatest:g} {unit}"
+    return [f"{value:.4g} {unit}", f"{solution['time'].values[sample]:g} s", told]
 
 
 def reaction_tables(solution: Solution) -> Markup:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...mechanism.actuator import Limits
 from ...mechanism.chain import limits as actuator_limits
 from ..scene import Style, styles
 from ..words import part_word, parts_in_use
@@ -37,11 +38,17 @@ class Line:
 
 @dataclass(frozen=True)
 class Limit:
-    """A level drawn at plus and minus `value` (SI), and the lines that it holds for."""
+    """Levels `low` and `high` (SI; infinite: none), and the lines that they hold for."""
 
-    value: float
+    low: float
+    high: float
     label: str
     of: list[str]
+
+    def drawn(self, scale: float) -> dict[str, Any]:
+        """As the page has it, null for no level."""
+        low, high = (v * scale if np.isfinite(v) else None for v in (self.low, self.high))
+        return {"low": low, "high": high, "label": self.label, "of": self.of}
 
 
 def time_panels(solution: Solution, columns: Columns, every: bool = False) -> list[Panel]:
@@ -73,7 +80,7 @@ def panel(
     values = np.concatenate([line.values for lines in sets.values() for line in lines])
     finite = np.abs(values[np.isfinite(values)])
     peak = float(finite.max(initial=0.0))
-    nearest = min((limit.value for limit in limits), default=np.inf)
+    nearest = min((abs(v) for one in limits for v in (one.low, one.high) if v), default=np.inf)
     return {
         "id": name,
         "section": section,
@@ -81,9 +88,7 @@ def panel(
         "unit": unit.unit,
         "decimals": unit.decimals(values),
         "note": note,
-        "limits": [
-            {"value": one.value * unit.scale, "label": one.label, "of": one.of} for one in limits
-        ],
+        "limits": [one.drawn(unit.scale) for one in limits],
         "limitsInView": peak >= LIMITS_IN_VIEW * nearest,
         "sets": [
             {
@@ -142,7 +147,7 @@ def _chains(solution: Solution, columns: Columns) -> Iterator[Panel]:
     for variable, (rotary, sliding, suffix) in titles.items():
         kinds = solution["effort_unit" if variable == "torque" else "joint_unit"].values
         lines = variable_lines(solution, variable, "chain")
-        limits = effort_limits(solution) if variable == "torque" else speed_limits(solution)
+        limits = drawn_limits(solution, variable)
         for unit in dict.fromkeys(str(kind) for kind in kinds):
             chosen = [i for i, kind in enumerate(kinds) if kind == unit]
             people = shown(unit) if variable == "joint" else Shown(unit + suffix)
@@ -158,23 +163,22 @@ def _chains(solution: Solution, columns: Columns) -> Iterator[Panel]:
             )
 
 
-def effort_limits(solution: Solution) -> list[float | None]:
-    """Torque or force limit of each chain [N m or N]."""
-    return [actuator_limits(chain).effort for chain in solution.mechanism.chains]
+def drawn_limits(solution: Solution, variable: str) -> list[Limits]:
+    """Limits of each chain's torque or force, or of its speed, as those of an effort."""
+    found = [actuator_limits(chain) for chain in solution.mechanism.chains]
+    return found if variable == "torque" else [one.of_speed for one in found]
 
 
-def speed_limits(solution: Solution) -> list[float | None]:
-    """Speed limit of each chain [rad/s or m/s]."""
-    return [actuator_limits(chain).speed for chain in solution.mechanism.chains]
-
-
-def _distinct(limits: Sequence[float | None], names: Sequence[str], unit: Shown) -> list[Limit]:
+def _distinct(limits: Sequence[Limits], names: Sequence[str], unit: Shown) -> list[Limit]:
     """Each limit once, with the chains it is for unless it is for all."""
     found = []
-    for value in dict.fromkeys(v for v in limits if v is not None):
-        whose = [name for name, v in zip(names, limits, strict=True) if v == value]
-        who = "" if len(whose) == len(names) else f" ({', '.join(whose)})"
-        found.append(Limit(value, f"limit ±{value * unit.scale:g} {unit.unit}{who}", whose))
+    for low, high in dict.fromkeys((one.low, one.high) for one in limits if one.limited):
+        pairs = zip(names, limits, strict=True)
+        whose = [(name, one) for name, one in pairs if (one.low, one.high) == (low, high)]
+        own = [name for name, _ in whose]
+        who = "" if len(own) == len(names) else f" ({', '.join(own)})"
+        text = whose[0][1].effort_text(unit.unit, unit.scale)
+        found.append(Limit(low, high, f"limit {text}{who}", own))
     return found
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from ...kinematics.chain import FAMILIES
 
 PLATFORM_JOINT = "M"
+CABLE = 0.4  # thickness of a cable over a slender rod's
 BARREL = 0.6  # length of a telescopic leg's cylinder over the whole leg at home
 
 
@@ -92,6 +93,12 @@ def _sps(chain: Any, joint: np.ndarray, M: np.ndarray) -> ChainDrawing:
     return ChainDrawing(points, rods, ("B", "M"))
 
 
+def _cable(chain: Any, joint: np.ndarray, M: np.ndarray) -> ChainDrawing:
+    """A thin line; where it holds the platform there is no joint to be seen."""
+    points = {"B": np.asarray(chain.base, dtype=float), "M": M}
+    return ChainDrawing(points, (Rod("cable", "B", "M", CABLE),), ())
+
+
 def _unknown(chain: Any, joint: np.ndarray, M: np.ndarray) -> ChainDrawing:
     """A family without a drawing of its own: a line from its base."""
     points = {"B": np.asarray(chain.base, dtype=float), "M": M}
@@ -99,4 +106,4 @@ def _unknown(chain: Any, joint: np.ndarray, M: np.ndarray) -> ChainDrawing:
 
 
 Drawing = Callable[[Any, np.ndarray, np.ndarray], ChainDrawing]
-DRAWINGS: dict[str, Drawing] = {"RSS": _rss, "PSS": _pss, "SPS": _sps}
+DRAWINGS: dict[str, Drawing] = {"RSS": _rss, "PSS": _pss, "SPS": _sps, "cable": _cable}

@@ -105,7 +105,8 @@ class Panel {
     const look = axisLook();
     const y = { ...look, zeroline: true, fixedrange: true };
     const range = this.limits ? this.rangeWithLimits() : null;
-    const levels = this.spec.limits.flatMap(({ value, label }) => [[value, label], [-value, ""]]);
+    // One label a limit; a level of 0 is the axis.
+    const levels = this.spec.limits.flatMap(({ low, high, label }) => [[high, label], [low, high ? "" : label]]).filter(([value]) => value);
     return {
       ...sizeOf(this.plot), margin: { ...MARGIN, autoexpand: false }, showlegend: false, hovermode: false, dragmode: coarse ? false : "zoom",
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { family: "system-ui, sans-serif", color: css("--ink") },
@@ -123,8 +124,8 @@ class Panel {
   }
 
   rangeWithLimits() {
-    const edge = 1.08 * Math.max(...this.spec.limits.map((l) => l.value));
-    let low = -edge, high = edge;
+    let low = 1.08 * Math.min(0, ...this.spec.limits.map((l) => l.low ?? 0));
+    let high = 1.08 * Math.max(0, ...this.spec.limits.map((l) => l.high ?? 0));
     for (const line of this.lines) {
       for (const value of curve(line.column, line.scale).y) {
         if (value < low) low = 1.05 * value;

@@ -28,7 +28,7 @@ function readoutTable(caption, header, prefixes) {
       const limit = prefixes[n].startsWith("torque") ? line.panel.limits.find((l) => l.of.includes(name)) : null;
       const bar = limit ? element("span", { class: "use", title: limit.label }, element("i")) : null;
       if (bar) cell.append(bar);
-      readoutCells.push({ value, bar, line, limit: limit?.value });
+      readoutCells.push({ value, bar, line, limit });
     });
     body.append(row);
   }
@@ -51,8 +51,10 @@ function moveReadout(index) {
     const number = column(line.column)[index] * line.scale;
     value.textContent = shown(number, line.panel.decimals);
     if (bar) {
-      bar.firstChild.style.width = `${Math.min(100, 100 * Math.abs(number) / limit)}%`;
-      bar.classList.toggle("over", Math.abs(number) > limit);
+      const bound = (number < 0 ? limit.low : limit.high) ?? Infinity;
+      const over = number < (limit.low ?? -Infinity) || number > (limit.high ?? Infinity);
+      bar.firstChild.style.width = over ? "100%" : `${number ? Math.min(100, 100 * Math.abs(number / bound)) : 0}%`;
+      bar.classList.toggle("over", over);
     }
   }
 }

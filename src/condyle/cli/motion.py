@@ -1,0 +1,118 @@
+"""condyle motion: motions from what laboratories record."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from . import completion
+from .answer import Answer, command_line, files_line
+from .command import BEGIN, command, group
+from .inputs import warn
+
+motion = group("motion", BEGIN, "Motions from what laboratories record.")
+
+
+@command(
+    BEGIN,
+    example="condyle motion from-c3d chewing.c3d --markers markers.toml --mechanism jaw.toml "
+    "--out chewing.csv",
+    of=motion,
+    name="from-c3d",
+)
+def from_c3d(
+    recording: Annotated[Path, typer.Argument(help="Recording of markers (C3D).")],
+    markers: Annotated[
+        Path,
+        typer.Option(
+            help="Marker file (TOML): which markers are fixed and which move with the platform, "
+            "when the mechanism is at home (s), and points of it in the laboratory (register)."
+        ),
+    ],
+    mechanism: Annotated[
+        str,
+        typer.Option(
+            help="Mechanism file (TOML) or name that the points are of.",
+            autocompletion=completion.mechanisms,
+        ),
+    ],
+    out: Annotated[
+        Path,
+        typer.Option(
+            help="File for the motion (.csv or .parquet): t (s), X, Y, Z (m), alpha, beta, "
+            "gamma (rad)."
+        ),
+    ],
+    max_residual: Annotated[
+        float,
+        typer.Option(
+            min=0.0,
+            help="A frame in which a marker is farther (mm) from its place in its body is a gap.",
+        ),
+    ] = 2.0,
+    max_gap: Annotated[
+        float, typer.Option(min=0.0, help="Fill gaps up to so many seconds by a spline.")
+    ] = 0.1,
+    longest: Annotated[
+        bool,
+        typer.Option(
+            "--longest", help="Of longer gaps take the longest stretch without one, not an error."
+        ),
+    ] = False,
+    units: Annotated[
+        str | None,
+        typer.Option(
+            help="Unit of lengths (m, cm, mm, um) in place of what the recording says.",
+            autocompletion=completion.one_of("mm", "m", "cm", "um"),
+        ),
+    ] = None,
+    markers_out: Annotated[
+        Path | None,
+        typer.Option(
+            help="File for the markers in the mechanism's frame (.csv or .parquet): t (s) and "
+            "MARKER_x, MARKER_y, MARKER_z (m)."
+        ),
+    ] = None,
+    force: Annotated[
+        str | None,
+        typer.Option(
+            help="Three channels, as in Fx,Fy,Fz: a force on the platform (N, kN, mN) along the "
+            "laboratory's axes."
+        ),
+    ] = None,
+    load: Annotated[
+        Path | None, typer.Option(help="File for the load of --force (.csv or .parquet).")
+    ] = None,
+) -> Answer:
+    """Markers of a C3D file as a motion.
+
+    Fits both bodies, takes the motion of the fixed one out and gives the pose of the platform in
+    the mechanism's frame. Gaps are filled up to --max-gap and listed.
+    """
+    import condyle
+
+    from ..errors import UnsupportedError
+    from ..extras import require
+    from ..motion import markers as marked
+
+    require("c3d", "c3d")
+
+    if (force is None) != (load is None):
+        raise UnsupportedError("--force names channels and --load their file; give both or none")
+    channels = None if force is None else tuple(name.strip() for name in force.split(","))
+    found = marked.from_c3d(
+        recording,
+        markers,
+        condyle.load(mechanism),
+        max_residual=max_residual / 1e3,
+        max_gap=max_gap,
+        longest=longest,
+        unit=units,
+        force=channels,
+    )
+    files = marked.write_motion(found, out, markers_out, load)
+    warn(list(found.warnings))
+    then = command_line("run", mechanism, motion=out, load=load, smooth="auto")
+    return Answer(f"{found}\n{files_line(files)}", marked.as_data(found) | {"files": files}, then)

@@ -1,0 +1,156 @@
+"""What drives a chain: what it can do at most, and what of its effort it keeps for itself.
+
+Effort is what the actuator delivers at its joint,
+
+    effort = tau + rotor_inertia gear^2 theta'' + viscous theta'
+             + coulomb theta' / sqrt(theta'^2 + smoothing_speed^2),
+
+with tau what the mechanism takes.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from .quantities import EffortLimit, Gear, Limit, Loss, MomentOrNone, PullLimit, SmoothingSpeed
+from .table import Table
+
+SMOOTHING_SPEED = 1e-3  # rad/s or m/s: below it Coulomb friction fades, where nothing is said
+
+
+class Limits(NamedTuple):
+    """What an actuator can do: low <= effort <= high, |rate| <= speed; infinite where none is said.
+
+    low, high: [N m or N];  speed: [rad/s or m/s].
+    """
+
+    low: float
+    high: float
+    speed: float
+
+    @property
+    def limited(self) -> bool:
+        """Whether the effort has a limit at all."""
+        return math.isfinite(self.low) or math.isfinite(self.high)
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the effort has one limit for both directions."""
+        return self.low == -self.high
+
+    @property
+    def of_speed(self) -> Limits:
+        """The limit of the speed in the place of those of the effort, to show both alike."""
+        return Limits(-self.speed, self.speed, self.speed)
+
+    @property
+    def greatest(self) -> float:
+        """The larger of |limits| of the effort, which activations are measured by."""
+        return max(abs(self.low), abs(self.high))
+
+    def beyond(self, effort: np.ndarray) -> np.ndarray:
+        """Whether efforts are outside the limits, of their shape."""
+        return (effort > self.high) | (effort < self.low)
+
+    def use(self, effort: float) -> float | None:
+        """Effort over the limit on its side; None where there is none, inf beyond a limit of 0."""
+        bound = self.high if effort >= 0 else self.low
+        if bound == 0:
+            return math.inf if effort else 0.0
+        return effort / bound if math.isfinite(bound) and effort / bound >= 0 else None
+
+    def effort_text(self, unit: str, scale: float = 1.0) -> str:
+        """'±3 N m', '0 to 190.4 N', 'at least 0 N'; empty where there is no limit."""
+        low, high = self.low * scale, self.high * scale
+        if not self.limited:
+            return ""
+        if self.symmetric:
+            return f"±{high:g} {unit}"
+        if not math.isfinite(high):
+            return f"at least {low:g} {unit}"
+        if not math.isfinite(low):
+            return f"at most {high:g} {unit}"
+        return f"{low:g} to {high:g} {unit}"
+
+
+class Actuator(Table):
+    """What every actuator has. A motor stands on the base: it is not carried by its chain."""
+
+    implied: ClassVar[tuple[str, ...]] = (
+        "rotor_inertia",
+        "gear",
+        "viscous",
+        "coulomb",
+        "smoothing_speed",
+    )
+
+    speed_limit: Limit | None = Field(default=None, description="rad/s, or m/s where it slides")
+    rotor_inertia: MomentOrNone = Field(
+        default=0.0, description="of the motor about its own axis, kg m^2"
+    )
+    gear: Gear = Field(
+        default=1.0, description="turns of the motor a turn of the joint; rad/m where it slides"
+    )
+    viscous: Loss = Field(default=0.0, description="at the joint, N m s/rad or N s/m")
+    coulomb: Loss = Field(default=0.0, description="at the joint, N m or N")
+    smoothing_speed: SmoothingSpeed = Field(
+        default=SMOOTHING_SPEED, description="below it Coulomb friction fades, rad/s or m/s"
+    )
+
+    @property
+    def effort_range(self) -> tuple[float, float]:
+        """Least and greatest effort [N m or N], infinite where there is no limit."""
+        return -math.inf, math.inf
+
+    @property
+    def reflected_inertia(self) -> float:
+        """rotor_inertia gear^2 [kg m^2 or kg]: what the joint feels of the rotor."""
+        return self.rotor_inertia * self.gear**2
+
+    @property
+    def ideal(self) -> bool:
+        """Whether nothing of the effort is lost on the actuator itself."""
+        return not (self.rotor_inertia or self.viscous or self.coulomb)
+
+
+class RotaryActuator(Actuator):
+    torque_limit: EffortLimit | None = Field(
+        default=None, description="N m: |effort| is at most this, or [least, greatest]"
+    )
+
+    @property
+    def effort_range(self) -> tuple[float, float]:
+        return _range(self.torque_limit)
+
+
+class LinearActuator(Actuator):
+    force_limit: EffortLimit | None = Field(
+        default=None, description="N: |effort| is at most this, or [least, greatest]"
+    )
+
+    @property
+    def effort_range(self) -> tuple[float, float]:
+        return _range(self.force_limit)
+
+
+class CableActuator(Actuator):
+    """It winds a cable up: it can only pull."""
+
+    force_limit: PullLimit | None = Field(
+        default=None, description="N: the greatest tension, or [least, greatest]"
+    )
+
+    @property
+    def effort_range(self) -> tuple[float, float]:
+        low, high = _range(self.force_limit)
+        return max(low, 0.0), high
+
+
+def _range(limit: float | tuple[float, float] | None) -> tuple[float, float]:
+    if limit is None:
+        return -math.inf, math.inf
+    return limit if isinstance(limit, tuple) else (-limit, limit)

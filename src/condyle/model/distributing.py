@@ -1,0 +1,130 @@
+"""Efforts within limits: which samples the least norm does not serve, and what serves them.
+
+The kernels give the efforts of least norm. Where these break a limit, or another objective is asked
+for, the equations of those samples go to `condyle.distribution`, and come back certified.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..distribution import OBJECTIVES, Problem, distribute
+from ..distribution import Status as Outcome
+from ..dynamics.distribution import minimum_norm
+from ..errors import InputError, did_you_mean
+from ..kinematics.chain import FAMILIES
+from ..mechanism.chain import limits
+from ..mechanism.mechanism import Mechanism
+from ..questions.friction import MOST
+from ..status import Status
+
+LEAST = "minimum_norm"
+_STATUS = np.array([Status[outcome.name] for outcome in Outcome], dtype=np.uint8)
+
+
+@dataclass(frozen=True)
+class Policy:
+    """How efforts are chosen: objective, least push of one-sided contacts [N], and W / N_ref^2."""
+
+    objective: str
+    preload: float = 0.0
+    contact_weight: float = 0.0
+
+    @staticmethod
+    def of(
+        mechanism: Mechanism, objective: str | None, preload: float, contact_weight: float
+    ) -> Policy:
+        """Checked against a mechanism; by default `bounded` with cables, else `minimum_norm`.
+
+        Raises: InputError: for an unknown objective, or one that does not fit the mechanism.
+        """
+        if objective is None:
+            cables = any(chain.kind == "cable" for chain in mechanism.chains)
+            objective = "bounded" if cables else LEAST
+        if objective not in OBJECTIVES:
+            raise InputError(f'no distribution "{objective}".{did_you_mean(objective, OBJECTIVES)}')
+        units = {FAMILIES[chain.kind].effort_unit for chain in mechanism.chains}
+        if len(units) > 1 and not OBJECTIVES[objective].mixes_units:
+            fit = ", ".join(name for name, o in OBJECTIVES.items() if o.mixes_units)
+            raise InputError(
+                f"distribution {objective} adds the squares of efforts, and this mechanism has "
+                f"{' and '.join(sorted(units))}: take one of {fit}, which measure each by its limit"
+            )
+        for name, value in (("preload", preload), ("contact weight", contact_weight)):
+            if not (np.isfinite(value) and value >= 0):
+                raise InputError(f"{name}: expected a number of at least 0, got {value}")
+        return Policy(objective, preload, contact_weight)
+
+
+class Distributor:
+    """Chooses the efforts of one mechanism by a policy."""
+
+    def __init__(self, mechanism: Mechanism, policy: Policy) -> None:
+        self.policy = policy
+        count = sum(contact.friction.coefficient > 0 for contact in mechanism.contacts)
+        self.friction = count > 0
+        self.unsolved_friction = count > MOST  # more patterns than a kernel goes through
+        both = [limits(chain) for chain in mechanism.chains]
+        self._low, self._high = (np.array([getattr(x, n) for x in both]) for n in ("low", "high"))
+        sides = [c.push if c.one_sided else 0 for c in mechanism.contacts]
+        self._push = np.array(sides, dtype=float)
+
+    @property
+    def least_norm(self) -> bool:
+        """Whether the kernels' own efforts are those wanted."""
+        return self.policy.objective == LEAST
+
+    def rows(self, values: Mapping[str, np.ndarray], status: np.ndarray) -> np.ndarray:
+        """Good samples that the least norm does not serve."""
+        good = status == Status.ok
+        if self.least_norm and self.unsolved_friction:
+            return np.flatnonzero(good)
+        if self.least_norm:
+            return np.empty(0, dtype=int)
+        if self.policy.objective == "bounded":
+            effort = values["effort"]
+            fits = ((effort >= self._low[:, None]) & (effort <= self._high[:, None])).all(axis=0)
+            sided = self._push != 0
+            pushes = self._push[sided, None] * values["contact_force"][sided]
+            fits &= (pushes >= self.policy.preload).all(axis=0)
+            good &= ~fits
+        return np.flatnonzero(good)
+
+    def solve(self, system: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Efforts, contact forces, shares, status and shortfall by name, samples last.
+
+        Args: system: the results of that question, samples last.
+        """
+        s = {name: np.moveaxis(a, -1, 0) for name, a in system.items()}
+        J = s["J"].transpose(0, 2, 1)
+        problem = Problem(
+            s["Q"],
+            J,
+            s["normal"],
+            s["friction"],
+            self._low,
+            self._high,
+            self._push,
+            self.policy.preload,
+            contact_weight=self.policy.contact_weight,
+        )
+        found = distribute(problem, self.policy.objective)
+        # What each part asks for with least norm; the rest is internal.
+        factors = minimum_norm(s["A"].transpose(0, 2, 1), np.ones(s["A"].shape[1]))
+        with np.errstate(invalid="ignore"):
+            right = s["b"].transpose(0, 2, 1)
+            if self.friction:
+                rubbed = (np.abs(found.contact_force)[..., None] * s["friction"]).sum(axis=1)
+                right = np.concatenate([right, (s["Pi"] @ rubbed[..., None])], axis=2)
+            share = factors.torques(right)
+            share = np.concatenate([share, (found.effort - share.sum(axis=2))[..., None]], axis=2)
+        return {
+            "effort": found.effort.T,
+            "contact_force": found.contact_force.T,
+            "share": share.transpose(2, 1, 0),
+            "status": _STATUS[found.status],
+            "shortfall": found.shortfall,
+        }

@@ -1,0 +1,116 @@
+"""Gaps: frames without a pose. Short ones are filled and listed, long ones are no motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from condyle.errors import InputError
+from condyle.motion.path import MIN_ROWS
+
+_SLACK = 1e-6  # of a frame
+_NAMED = 5  # gaps that an error names
+_DEGREE = 3
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Frames without a pose of their own.
+
+    Attributes: start, end: times of the first and the last of them [s];  frames: how many.
+                reason: why;  made: "filled" by the spline, or "cut" off the motion's ends.
+    """
+
+    start: float
+    end: float
+    frames: int
+    reason: str
+    made: Literal["filled", "cut"]
+
+    def __str__(self) -> str:
+        frames = "1 frame" if self.frames == 1 else f"{self.frames} frames"
+        return f"{self.start:.4g} to {self.end:.4g} s ({frames}, {self.made}): {self.reason}"
+
+
+def close_gaps(
+    source: str,
+    t: np.ndarray,
+    values: np.ndarray,
+    longest_gap: float,
+    keep_longest: bool,
+    why: Callable[[slice], str],
+) -> tuple[slice, np.ndarray, list[Gap]]:
+    """Frames to keep, their values without gaps, and the gaps.
+
+    Args:   t: (F,) [s], evenly spaced;  values: (F, m), NaN where there is none.
+            longest_gap: to fill [s]. Frames missing at the ends are cut off, since nothing stands
+                beyond them; a longer gap there is an error like any other.
+            keep_longest: of what longer gaps leave, the longest stretch instead of an error.
+            why: the reason of a run of missing frames.
+    Raises: InputError: for gaps that are longer, or for too few frames.
+    """
+    step = (t[-1] - t[0]) / max(len(t) - 1, 1)
+    missing = ~np.isfinite(values).all(axis=1)
+    runs = _runs(missing)
+    too_long = [r for r in runs if (r.stop - r.start) * step > longest_gap + _SLACK * step]
+    if too_long and not keep_longest:
+        raise _too_long(source, t, too_long, longest_gap, why)
+    kept = _longest_between(too_long, len(t))
+    held = _runs(~missing[kept])
+    if not held or (~missing[kept]).sum() < MIN_ROWS:
+        reason = f": {why(runs[0])}" if runs else ""
+        raise InputError(
+            f"{source}: {(~missing[kept]).sum()} frames have a pose, expected at least {MIN_ROWS}"
+            f"{reason}"
+        )
+    kept = slice(kept.start + held[0].start, kept.start + held[-1].stop)
+    gaps = [
+        Gap(float(t[r.start]), float(t[r.stop - 1]), r.stop - r.start, why(r), _made(r, kept))
+        for r in runs
+    ]
+    return kept, _filled(t[kept], values[kept]), gaps
+
+
+def _made(run: slice, kept: slice) -> Literal["filled", "cut"]:
+    return "filled" if kept.start <= run.start and run.stop <= kept.stop else "cut"
+
+
+def _runs(flag: np.ndarray) -> list[slice]:
+    """Where an array of truths, (F,), is true."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flag.astype(np.int8), [0]])))
+    return [slice(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+
+
+def _longest_between(runs: list[slice], count: int) -> slice:
+    starts, stops = [0, *(r.stop for r in runs)], [*(r.start for r in runs), count]
+    return max(map(slice, starts, stops), key=lambda s: s.stop - s.start)
+
+
+def _filled(t: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """The values with a cubic spline through those there are where some are missing."""
+    known = np.isfinite(values).all(axis=1)
+    if known.all():
+        return values
+    from scipy.interpolate import make_interp_spline
+
+    spline = make_interp_spline(t[known] - t[0], values[known], k=_DEGREE)
+    return np.where(known[:, None], values, spline(t - t[0]))
+
+
+def _too_long(
+    source: str,
+    t: np.ndarray,
+    runs: list[slice],
+    longest: float,
+    why: Callable[[slice], str],
+) -> InputError:
+    told = [f"{t[r.start]:.4g} to {t[r.stop - 1]:.4g} s ({why(r)})" for r in runs[:_NAMED]]
+    more = f" and {len(runs) - _NAMED} more" if len(runs) > _NAMED else ""
+    return InputError(
+        f"{source}: no pose for longer than {longest:g} s: {'; '.join(told)}{more}.",
+        "Mend the recording, allow longer gaps with --max-gap, or take the longest stretch without "
+        "such a gap with --longest",
+    )

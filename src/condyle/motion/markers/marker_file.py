@@ -1,0 +1,172 @@
+"""The marker file: which markers move with which body, when the mechanism is at home, and where."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Self
+
+from pydantic import Field, ValidationError, field_validator, model_validator
+
+from condyle.errors import InputError, few, no_such_file, shortened
+from condyle.mechanism.messages import describe, shown
+from condyle.mechanism.table import Table
+from condyle.mechanism.toml import LARGEST_FILE, read_tables
+from condyle.motion.markers.rigid import FEWEST
+from condyle.motion.words import listed, short
+
+DIRECTIONS = ("forward", "up")
+ORIGIN = "origin"
+
+Place = str | tuple[float, float, float]
+"""In the laboratory: the label of a marker, or three numbers in the file's unit."""
+
+_Label = Annotated[str, Field(min_length=1, max_length=200)]
+_Labels = Annotated[tuple[_Label, ...], Field(min_length=FEWEST)]
+_Time = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+
+
+class MarkerFile(Table):
+    """What a marker file says.
+
+    places: of points of the mechanism at home, in the laboratory; three or more, or
+    forward, up: the laboratory's directions at home, (3,) each, and origin: the one place that is
+    known, of O_M (numbers), or of the point of the mechanism of that name.
+    """
+
+    fixed: _Labels = Field(description="markers that move with the base")
+    platform: _Labels = Field(description="markers that move with the platform")
+    home: tuple[_Time, _Time] = Field(description="when the mechanism is at home [s]")
+    places: dict[str, Any] = Field(alias="register")
+
+    @property
+    def directed(self) -> bool:
+        """Whether directions stand in the place of points."""
+        return bool(self.places.keys() & {*DIRECTIONS, ORIGIN})
+
+    @model_validator(mode="before")
+    @classmethod
+    def _directions_outside(cls, data: Any) -> Any:
+        """Directions may stand at the top, in place of [register]."""
+        names = {*DIRECTIONS, ORIGIN}
+        if not isinstance(data, Mapping) or "register" in data or not data.keys() & names:
+            return data
+        kept = {key: value for key, value in data.items() if key not in names}
+        return kept | {"register": {key: data[key] for key in data.keys() & names}}
+
+    @field_validator("home", mode="before")
+    @classmethod
+    def _one_time(cls, value: Any) -> Any:
+        return (value, value) if _is_number(value) else value
+
+    @field_validator("home")
+    @classmethod
+    def _in_order(cls, value: tuple[float, float]) -> tuple[float, float]:
+        if value[1] < value[0]:
+            raise ValueError(f"expected [from, to] or one time, got [{value[0]:g}, {value[1]:g}] s")
+        return value
+
+    @field_validator("fixed", "platform")
+    @classmethod
+    def _once(cls, value: tuple[str, ...]) -> tuple[str, ...]:
+        if twice := [name for name, count in Counter(value).items() if count > 1]:
+            raise ValueError(f"{few(twice)} stands more than once")
+        return value
+
+    @field_validator("places", mode="before")
+    @classmethod
+    def _registered(cls, value: Any) -> Any:
+        if not isinstance(value, Mapping):
+            return value
+        if problems := list(_problems(value)):
+            raise ValueError("; ".join(problems))
+        return {k: v if isinstance(v, str) else tuple(map(float, v)) for k, v in value.items()}
+
+    @model_validator(mode="after")
+    def _apart(self) -> Self:
+        if both := sorted({*self.fixed} & {*self.platform}):
+            raise ValueError(
+                f"{few(both)} stands in fixed and in platform; a marker moves with one"
+            )
+        return self
+
+
+def read_markers(source: str | os.PathLike[str] | Mapping[str, Any] | MarkerFile) -> MarkerFile:
+    """A marker file from a path, or from tables.
+
+    Raises: InputError: with every problem found, one line each.
+    """
+    if isinstance(source, MarkerFile):
+        return source
+    if isinstance(source, Mapping):
+        return _checked(source, "markers")
+    if not isinstance(source, str | os.PathLike):
+        raise InputError(f"markers: expected the path of a marker file (TOML), got {shown(source)}")
+    return _checked(read_tables(_text(source), os.fspath(source)), os.fspath(source))
+
+
+def _checked(data: Mapping[str, Any], source: str) -> MarkerFile:
+    try:
+        return MarkerFile.model_validate(dict(data))
+    except ValidationError as error:
+        problems = [shortened(p, 380) for p in describe(error, data, MarkerFile)]
+        count = "1 problem" if len(problems) == 1 else f"{len(problems)} problems"
+        lines = "".join(f"\n  - {p}" for p in problems[:8])
+        raise InputError(f"{shortened(source, 200)}: {count}{lines}") from None
+
+
+def _text(path: str | os.PathLike[str]) -> str:
+    try:
+        with open(path, "rb") as file:
+            content = file.read(LARGEST_FILE + 1)
+        return content.decode("utf-8-sig")
+    except FileNotFoundError:
+        raise no_such_file(path) from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: is no text (UTF-8 expected); a marker file is TOML") from None
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{short(os.fspath(path))}: cannot be read ({why})") from None
+
+
+def _problems(places: Mapping[str, Any]) -> Iterator[str]:
+    """What is wrong with [register]."""
+    directed = places.keys() & {*DIRECTIONS, ORIGIN}
+    for name, value in places.items():
+        words = "" if name in DIRECTIONS else "the label of a marker, or "
+        if isinstance(value, str) and words and value:
+            continue
+        if not (
+            isinstance(value, list | tuple) and len(value) == 3 and all(map(_is_number, value))
+        ):
+            yield f"{name}: expected {words}three numbers, got {shown(value)}"
+        elif name in DIRECTIONS and not any(value):
+            yield f"{name}: a direction cannot be the zero vector"
+    if not directed:
+        if len(places) < FEWEST:
+            yield (
+                f"got {len(places)} points of the mechanism, expected {FEWEST} or more; or "
+                "forward, up and origin"
+            )
+        return
+    if missing := [name for name in (*DIRECTIONS, ORIGIN) if name not in places]:
+        yield f"{listed(missing, '')} missing: directions need forward, up and origin"
+        return
+    others = places.keys() - {*DIRECTIONS, ORIGIN, places[ORIGIN] if _named(places) else ""}
+    if others:
+        yield (
+            f"{few(sorted(others))} beside forward and up; give points alone (three or more), or "
+            "directions with the one point that origin names"
+        )
+
+
+def _named(places: Mapping[str, Any]) -> bool:
+    return isinstance(places[ORIGIN], str)
+
+
+def _is_number(value: Any) -> bool:
+    return (
+        isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= 1e12
+    ) and math.isfinite(value)

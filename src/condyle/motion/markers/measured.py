@@ -1,0 +1,196 @@
+"""From markers to motion: two rigid bodies, the base taken out, the rest a pose in {S}."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from condyle.errors import InputError
+from condyle.mechanism import load as load_mechanism
+from condyle.mechanism.mechanism import Mechanism
+from condyle.motion.load import Load
+from condyle.motion.markers.bodies import Bodies, Body, find_bodies
+from condyle.motion.markers.bryant import bryant_angles
+from condyle.motion.markers.channels import force_channels
+from condyle.motion.markers.diagnosis import odd_sizes, suspects_in, why_none
+from condyle.motion.markers.gaps import Gap, close_gaps
+from condyle.motion.markers.labels import find_label
+from condyle.motion.markers.marker_file import MarkerFile, Place, read_markers
+from condyle.motion.markers.off_contacts import off_contacts
+from condyle.motion.markers.recording import Recording, read_c3d
+from condyle.motion.markers.registration import Registration, register
+from condyle.motion.markers.summary import in_words
+from condyle.motion.path import Motion
+from condyle.motion.units import POSE
+
+MAX_RESIDUAL = 2e-3  # m
+MAX_GAP = 0.1  # s
+
+
+@dataclass(frozen=True)
+class MarkerResidual:
+    """How well a marker moves with its body: distances from its place in it.
+
+    Attributes: name, body;  seen: part of the frames used, 0 to 1;  rms, largest: [m];
+                time: of the largest [s].
+    """
+
+    name: str
+    body: str
+    seen: float
+    rms: float
+    largest: float
+    time: float
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerMotion:
+    """A motion from markers, and how well they fit.
+
+    Attributes:
+        motion: X_EE in {S}, of kind "pose", without gaps.
+        measured: (N,), where it was measured; elsewhere a gap was filled.
+        residuals: of every marker, over the frames that were used.
+        gaps: filled or cut off, in their order.
+        registration: from the laboratory to {S}.
+        off_contacts: distance of each ball from its surface, root mean square and largest [m].
+        markers: the markers used, by name, in {S} with the base's motion taken out, (N, 3) [m].
+        load: from force channels, if some were named.
+        recording: what the file holds.
+        warnings: what looks wrong, or was assumed.
+    """
+
+    motion: Motion
+    measured: np.ndarray
+    residuals: tuple[MarkerResidual, ...]
+    gaps: tuple[Gap, ...]
+    registration: Registration
+    off_contacts: dict[str, tuple[float, float]]
+    markers: dict[str, np.ndarray]
+    load: Load | None
+    recording: Recording
+    warnings: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return in_words(self)
+
+
+def from_c3d(
+    path: str | os.PathLike[str],
+    markers: str | os.PathLike[str] | Mapping[str, Any] | MarkerFile,
+    mechanism: Mechanism | str,
+    *,
+    max_residual: float = MAX_RESIDUAL,
+    max_gap: float = MAX_GAP,
+    longest: bool = False,
+    unit: str | None = None,
+    force: Sequence[str] | None = None,
+    cutoff: float | str | None = None,
+) -> MarkerMotion:
+    """A motion from the markers of a C3D file.
+
+    Args:   markers: a marker file (TOML), or its tables.
+            mechanism: what registers the points, or its file or name.
+            max_residual: a frame in which a marker is farther from its place in its body [m] is a
+                gap.
+            max_gap: gaps are filled by a cubic spline up to so long [s].
+            longest: where gaps are longer, take the longest stretch without one, not an error.
+            unit: of lengths, in place of what the file says: m, cm, mm or um.
+            force: channels that are a force's components along the laboratory's axes.
+            cutoff: smooth the motion, as of `Motion.from_arrays`.
+    Raises: InputError: for files that cannot be used, and gaps that are too long.
+    """
+    for name, value in (("max_residual", max_residual), ("max_gap", max_gap)):
+        if not (math.isfinite(value) and value >= 0):
+            raise InputError(f"{name}: got {value!r}, expected a number, 0 or more")
+    machine = mechanism if isinstance(mechanism, Mechanism) else load_mechanism(mechanism)
+    file, recording = read_markers(markers), read_c3d(path, unit)
+    bodies = find_bodies(recording, file)
+
+    def place(where: Place, key: str) -> np.ndarray:
+        return _place(recording, bodies, where, key)
+
+    registration = register(file, machine, place)
+    R, p = registration.pose(bodies.platform.fit.rotation, bodies.platform.fit.position)
+    worst = np.maximum(*(body.fit.largest() for body in bodies.both))  # NaN where either is
+    used = worst <= max_residual
+    suspects = suspects_in(recording, bodies, ~used & np.isfinite(worst))
+
+    def why(run: slice) -> str:
+        return why_none(bodies, run, max_residual)
+
+    pose = np.where(used[:, None], np.hstack([p, bryant_angles(R)]), np.nan)
+    try:
+        kept, whole, gaps = close_gaps(recording.source, recording.t, pose, max_gap, longest, why)
+    except InputError as error:
+        if not suspects:
+            raise
+        raise InputError(f"{'. '.join(suspects)}. {error.message}", error.hint) from None
+    motion = Motion.from_arrays(
+        recording.t[kept], whole, POSE, cutoff=cutoff, source=recording.source
+    )
+    at = used.copy()
+    at[: kept.start] = at[kept.stop :] = False
+    off = off_contacts(machine, R[at], p[at])
+    warnings = (
+        *recording.warnings,
+        *bodies.warnings,
+        *odd_sizes(recording, bodies),
+        *registration.warnings,
+        *suspects,
+        *motion.warnings,
+    )
+    return MarkerMotion(
+        motion=replace(motion, sha256=recording.sha256, warnings=warnings),
+        measured=used[kept],
+        residuals=tuple(r for body in bodies.both for r in _residuals(recording, body, at)),
+        gaps=tuple(gaps),
+        registration=registration,
+        off_contacts={n: (_rms(d), float(np.abs(d).max())) for n, d in off.items()},
+        markers={
+            name: registration.to_base(bodies.steadied(body.points)[kept, i])
+            for body in bodies.both
+            for i, name in enumerate(body.names)
+        },
+        load=None if force is None else force_channels(recording, bodies, registration, force),
+        recording=recording,
+        warnings=warnings,
+    )
+
+
+def _place(recording: Recording, bodies: Bodies, where: Place, key: str) -> np.ndarray:
+    """Where a marker is at home on the mean, or what numbers in the file's unit say, (3,) [m]."""
+    if not isinstance(where, str):
+        return np.array(where) * recording.metres
+    label = find_label(where, recording.labels, f"register: {key}: {recording.source}")
+    there = bodies.steadied(recording.points[:, [label]])[bodies.at_home, 0]
+    there = there[np.isfinite(there).all(axis=1)]
+    if not len(there):
+        raise InputError(
+            f'register: {key}: marker "{where}" is not seen in {recording.source} while the '
+            "mechanism is at home"
+        )
+    return there.mean(axis=0)
+
+
+def _residuals(recording: Recording, body: Body, used: np.ndarray) -> list[MarkerResidual]:
+    found = []
+    for name, residual in zip(body.names, body.fit.residual.T, strict=True):
+        known = np.flatnonzero(used & np.isfinite(residual))
+        values = residual[known] if len(known) else np.full(1, np.nan)
+        worst = int(np.argmax(values))
+        when = float(recording.t[known[worst]]) if len(known) else math.nan
+        seen = len(known) / max(int(used.sum()), 1)
+        found.append(
+            MarkerResidual(name, body.what, seen, _rms(values), float(values[worst]), when)
+        )
+    return found
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,215 @@
+"""C3D files: where markers were, frame by frame, and what else was sampled with them."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from dataclasses import dataclass
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+
+from condyle.errors import CondyleError, InputError, no_such_file
+from condyle.extras import require
+from condyle.motion.digest import digest
+from condyle.motion.units import LENGTH_UNITS
+from condyle.motion.words import short
+
+ASSUMED = "mm"  # what laboratories mean that name no unit
+_WORDS = {"millimet": "mm", "centimet": "cm", "micromet": "um", "met": "m"}
+_SLOWEST, _FASTEST = 1e-3, 1e6  # Hz
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What a C3D file holds.
+
+    Attributes:
+        source: the file's name, for messages;  sha256: its hash.
+        rate: frames a second [Hz];  first_frame: its number, as the file counts, from 1.
+        t: (F,) [s]; frame 1 is at 0.
+        unit: of lengths in the file;  metres: so much it is.
+        labels: of the markers, (L,), as they stand in the file.
+        points: (F, L, 3) [m] in the laboratory's frame; NaN where a marker was not seen.
+        channels: labels of what else was sampled, (C,);  channel_units: theirs, as in the file.
+        analog: (F, C): of each frame the mean of its samples, in the channel's unit.
+        warnings: what had to be assumed.
+    """
+
+    source: str
+    sha256: str | None
+    rate: float
+    first_frame: int
+    t: np.ndarray
+    unit: str
+    metres: float
+    labels: tuple[str, ...]
+    points: np.ndarray
+    channels: tuple[str, ...]
+    channel_units: tuple[str, ...]
+    analog: np.ndarray
+    warnings: tuple[str, ...] = ()
+
+
+def read_c3d(path: str | os.PathLike[str], unit: str | None = None) -> Recording:
+    """Read a C3D file.
+
+    Args:   unit: of its lengths, in place of what it says itself: m, cm, mm or um.
+    Raises: InputError: for a file that is none, is cut short, or contradicts itself.
+            MissingExtraError: if the reader is not installed.
+    """
+    require("c3d", "c3d")
+    if unit is not None and unit not in LENGTH_UNITS:
+        raise InputError(f"units: got {short(repr(unit))}, expected {', '.join(LENGTH_UNITS)}")
+    content = _content(path)
+    try:
+        # The reader warns of parameters that nobody needs here, and casts NaN.
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            return _read(content, path, unit)
+    except CondyleError:
+        raise
+    except Exception as error:  # whatever broken bytes make of a reader
+        said = short(str(error)) or type(error).__name__
+        raise InputError(f"{path}: is broken, or no C3D file ({said})") from error
+
+
+def _content(path: str | os.PathLike[str]) -> bytes:
+    try:
+        with open(path, "rb") as file:
+            content = file.read()
+    except FileNotFoundError:
+        raise no_such_file(path) from None
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{short(os.fspath(path))}: cannot be read ({why})") from None
+    if len(content) < 1024 or content[1] != 0x50:
+        raise InputError(
+            f"{path}: is no C3D file: its second byte is not 80, or it is shorter than a header. "
+            "Export the recording as C3D"
+        )
+    return content
+
+
+def _read(content: bytes, path: str | os.PathLike[str], unit: str | None) -> Recording:
+    file = _reader()(BytesIO(content))
+    rate = float(f"{float(file.point_rate):.7g}")  # kept in single precision
+    if not _SLOWEST <= rate <= _FASTEST:
+        raise InputError(f"{path}: got a rate of {rate:g} frames a second (POINT:RATE)")
+    count = file.last_frame - file.first_frame + 1
+    if not file.point_used or count < 1:
+        raise InputError(f"{path}: holds no markers ({file.point_used}) or no frames ({count})")
+    points, analog = [], []
+    for _, found, samples in file.read_frames(check_nan=True):
+        points.append(found)
+        analog.append(samples.mean(axis=1) if samples.size else np.zeros(0))
+    if len(points) != count:
+        raise InputError(
+            f"{path}: is cut short: it says {count} frames and holds {len(points)}. Copy or export "
+            "it again"
+        )
+    known, metres, assumed = _unit(path, _text(file, "POINT:UNITS"), unit)
+    first = max(int(file.first_frame), 1)
+    channels = _labels(file, "ANALOG:LABELS", analog[0].size)
+    return Recording(
+        source=os.path.basename(os.fspath(path)),
+        sha256=digest(path),
+        rate=rate,
+        first_frame=first,
+        t=(first - 1 + np.arange(count)) / rate,
+        unit=known,
+        metres=metres,
+        labels=_labels(file, "POINT:LABELS", file.point_used),
+        points=_seen(np.array(points)) * metres,
+        channels=channels,
+        channel_units=_labels(file, "ANALOG:UNITS", len(channels)),
+        analog=np.array(analog),
+        warnings=assumed,
+    )
+
+
+def _reader() -> Any:
+    import c3d
+
+    class Reader(c3d.Reader):  # type: ignore[misc]
+        """Holds a file only to what the place of its numbers depends on."""
+
+        def _check_metadata(self) -> None:
+            header = self._header
+            for what, a, b in (
+                ("markers", header.point_count, self.point_used),
+                ("analog samples", header.analog_count, self._samples()),
+            ):
+                if a != b:
+                    raise ValueError(f"{what} a frame: {a} in the header, {b} in parameters")
+
+        def _samples(self) -> int:
+            return self.analog_used * self.analog_per_frame if self.analog_used else 0
+
+        @property
+        def first_frame(self) -> int:
+            """Mends the weight of the upper word."""
+            words = self.get("TRIAL:ACTUAL_START_FIELD")
+            upper = 0 if words is None else int(words.uint16_array[1])
+            return int(super().first_frame) + upper
+
+    return Reader
+
+
+def _seen(found: np.ndarray) -> np.ndarray:
+    """Places, (F, L, 3), of what the reader gives, (F, L, 5); NaN for markers not seen.
+
+    They are marked by a negative residual; some write zeros instead.
+    """
+    points = found[..., :3].astype(float)
+    missing = (found[..., 3] < 0) | ~np.isfinite(points).all(axis=-1) | ~points.any(axis=-1)
+    points[missing] = np.nan
+    return points
+
+
+def _unit(
+    path: str | os.PathLike[str], said: str, given: str | None
+) -> tuple[str, float, tuple[str, ...]]:
+    """The unit of lengths, in metres, and what was assumed."""
+    if given is not None:
+        return given, LENGTH_UNITS[given], ()
+    if not said:
+        assumed = f"{path}: does not say its unit of length (POINT:UNITS); {ASSUMED} was assumed"
+        return ASSUMED, LENGTH_UNITS[ASSUMED], (assumed,)
+    plain = said.replace("\u00b5", "u").casefold()
+    name = next((unit for word, unit in _WORDS.items() if plain.startswith(word)), plain)
+    if name not in LENGTH_UNITS:
+        raise InputError(
+            f'{path}: its unit of length (POINT:UNITS) is "{short(said)}", expected '
+            f"{', '.join(LENGTH_UNITS)}. If you know it, name it with --units (unit=...)"
+        )
+    return name, LENGTH_UNITS[name], ()
+
+
+def _text(file: Any, key: str) -> str:
+    param = file.get(key)
+    return "" if param is None else _plain(param.bytes)
+
+
+def _labels(file: Any, key: str, count: int) -> tuple[str, ...]:
+    """Texts of a parameter and of those that go on from it: LABELS2, LABELS3 [255 each]."""
+    found: list[str] = []
+    number = 1
+    while len(found) < count and number < 256:
+        param = file.get(key if number == 1 else f"{key}{number}")
+        number += 1
+        if param is None or not param.dimensions or not param.dimensions[0]:
+            break
+        # Texts of one length, one after the other.
+        size = param.dimensions[0]
+        found += [_plain(param.bytes[i : i + size]) for i in range(0, len(param.bytes), size)]
+    return tuple((found + [""] * count)[:count])
+
+
+def _plain(content: bytes) -> str:
+    try:
+        text = content.decode("utf-8")
+    except UnicodeDecodeError:
+        text = content.decode("latin-1")
+    return text.strip(" \0\t\r\n")

@@ -1,0 +1,69 @@
+"""What was found in a recording: for people, and as data."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from condyle.motion.markers.measured import MarkerMotion
+
+_LISTED = 12  # gaps in the text; all are in the data
+
+
+def in_words(found: MarkerMotion) -> str:
+    """Residuals, registration, gaps and distances from the contacts, some lines of text."""
+    recording, motion = found.recording, found.motion
+    lines = [
+        f"{recording.source}: {len(recording.t)} frames at {recording.rate:g} Hz from "
+        f"{recording.t[0]:.6g} to {recording.t[-1]:.6g} s, lengths in {recording.unit}",
+        f"Motion: {len(motion)} poses from {motion.t[0]:.6g} to {motion.t[-1]:.6g} s, "
+        f"{int((~found.measured).sum())} of them filled in",
+    ]
+    width = max(len(r.name) for r in found.residuals)
+    lines.append("Distance of each marker from its place in its body:")
+    lines += [
+        f"  {r.name:{width}}  {r.body:8}  {_mm(r.rms)} RMS, {_mm(r.largest)} at most "
+        f"(at {r.time:.4g} s), seen {100 * r.seen:.4g} % of the time"
+        for r in found.residuals
+    ]
+    if found.registration.residual:
+        given = found.registration.residual.items()
+        lines.append(
+            "Registration, distance of each point from its place in the mechanism: "
+            + ", ".join(f"{name} {_mm(value)}" for name, value in given)
+        )
+    if found.off_contacts:
+        given_contacts = found.off_contacts.items()
+        lines.append(
+            "Contacts will take away: "
+            + ", ".join(f"{n} {_mm(rms)} RMS, {_mm(m)} at most" for n, (rms, m) in given_contacts)
+        )
+    lines.append(f"Gaps: {len(found.gaps) or 'none'}")
+    lines += [f"  {gap}" for gap in found.gaps[:_LISTED]]
+    if len(found.gaps) > _LISTED:
+        lines.append(f"  and {len(found.gaps) - _LISTED} more")
+    return "\n".join(lines)
+
+
+def as_data(found: MarkerMotion) -> dict[str, Any]:
+    """The same in SI, as JSON has it."""
+    recording = found.recording
+    return {
+        "frames": len(recording.t),
+        "rate": recording.rate,
+        "first_frame": recording.first_frame,
+        "unit": recording.unit,
+        "poses": len(found.motion),
+        "residuals": [vars(r) for r in found.residuals],
+        "registration": found.registration.residual,
+        "off_contacts": {
+            name: {"rms": rms, "largest": largest}
+            for name, (rms, largest) in found.off_contacts.items()
+        },
+        "gaps": [vars(gap) for gap in found.gaps],
+        "warnings": list(found.warnings),
+    }
+
+
+def _mm(metres: float) -> str:
+    return f"{metres * 1e3:.3g} mm"

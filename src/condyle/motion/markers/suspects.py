@@ -1,0 +1,123 @@
+"""Markers that are not what they are called: exchanged labels, outliers, loose ones."""
+
+from __future__ import annotations
+
+from itertools import combinations, permutations
+
+import numpy as np
+
+from condyle.motion.markers.rigid import FEWEST, fit
+
+_BETTER = 1 / 3  # of the misfit, once mended, so that a suspect is named
+_LOOSE = 1e-3  # m, root mean square change of distances in a body that has a loose marker
+_SAMPLES = 12  # frames looked at of a stretch
+_ALL_ORDERS = 5  # markers of a body, of which all orders are tried
+
+
+def exchanged(
+    shapes: list[np.ndarray], names: list[list[str]], points: list[np.ndarray]
+) -> str | None:
+    """Which labels seem to be exchanged in a stretch of frames, in words; None if none.
+
+    Args: shapes: of the bodies, (m, 3) each;  names: of their markers.
+          points: (F, m, 3) each [m], in the laboratory.
+    """
+    some = np.unique(np.linspace(0, len(points[0]) - 1, _SAMPLES).astype(int))
+    cut = np.cumsum([len(shape) for shape in shapes])[:-1]
+    together = np.concatenate(points, axis=1)[some]
+    together = together[np.isfinite(together).all(axis=(1, 2))]
+    if not len(together):
+        return None
+
+    def misfit(order: list[int]) -> float:
+        parts = np.split(together[:, order], cut, axis=1)
+        residual = [fit(s, p).residual for s, p in zip(shapes, parts, strict=True)]
+        return float(np.sqrt(np.mean(np.concatenate(residual, axis=1) ** 2)))
+
+    orders = _orders([len(shape) for shape in shapes])
+    found = [misfit(order) for order in orders]
+    best = int(np.nanargmin(found))
+    if not found[best] < _BETTER * found[0]:
+        return None
+    every = [name for body in names for name in body]
+    moved = [every[i] for i, k in enumerate(orders[best]) if i != k]
+    return (
+        f"{' and '.join(moved) if len(moved) == 2 else ', '.join(moved)} look exchanged: "
+        f"{found[0] * 1e3:.3g} mm off their bodies as labelled, {found[best] * 1e3:.3g} mm "
+        "exchanged"
+    )
+
+
+def _orders(sizes: list[int]) -> list[list[int]]:
+    """Orders of all markers: as labelled; every pair exchanged; every order of a small body."""
+    total = sum(sizes)
+    plain = list(range(total))
+    orders = [plain]
+    for i, k in combinations(range(total), 2):
+        order = plain.copy()
+        order[i], order[k] = k, i
+        orders.append(order)
+    start = 0
+    for size in sizes:
+        if size <= _ALL_ORDERS:
+            here = permutations(range(start, start + size))
+            orders += [[*plain[:start], *p, *plain[start + size :]] for p in here]
+        start += size
+    return orders
+
+
+def outlier(shape: np.ndarray, points: np.ndarray, within: float) -> tuple[int, float] | None:
+    """The one marker of a frame without which the others fit, and how far it is off [m].
+
+    Args: shape: (m, 3);  points: (m, 3), NaN where not seen;  within: residual of the others [m].
+    """
+    best: tuple[float, int, float] | None = None
+    for i in np.flatnonzero(np.isfinite(points).all(axis=1)):
+        others = points.copy()
+        others[i] = np.nan
+        body = fit(shape, others[None])
+        left = float(body.largest()[0])
+        if left <= within and (best is None or left < best[0]):
+            place = body.rotation[0] @ shape[i] + body.position[0]
+            best = left, int(i), float(np.linalg.norm(points[i] - place))
+    return None if best is None else best[1:]
+
+
+def loose(names: list[str], points: np.ndarray) -> list[str]:
+    """Markers that move against their body, the most so alone: distances of the others stay.
+
+    Args: names: of the body's markers;  points: (F, m, 3) [m], in any frame.
+    """
+    change = _changes(points)
+    pairs = np.triu_indices(len(names), 1)
+    whole = _rms(change[pairs])
+    if whole < _LOOSE:
+        return []
+    rest = np.full(len(names), np.inf)
+    for i in range(len(names)):
+        others = np.delete(np.delete(change, i, 0), i, 1)
+        if len(others) >= FEWEST - 1:
+            rest[i] = _rms(others[np.triu_indices(len(others), 1)])
+    best = int(np.argmin(rest))
+    if not rest[best] < _BETTER * whole:
+        return []
+    its = _rms(np.delete(change[best], best))
+    return [
+        f"{names[best]} moves against the markers it is listed with: its distances from them vary "
+        f"by {its * 1e3:.3g} mm, theirs by {rest[best] * 1e3:.2g} mm"
+    ]
+
+
+def _changes(points: np.ndarray) -> np.ndarray:
+    """Standard deviations of the distances of all pairs, (m, m)."""
+    count = points.shape[1]
+    change = np.zeros((count, count))
+    for i, k in combinations(range(count), 2):
+        distance = np.linalg.norm(points[:, i] - points[:, k], axis=-1)
+        known = distance[np.isfinite(distance)]
+        change[i, k] = change[k, i] = known.std() if len(known) else 0.0
+    return change
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2))) if values.size else 0.0

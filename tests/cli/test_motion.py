@@ -1,0 +1,167 @@
+"""condyle motion from-c3d: files in, files out, and what is said."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from oracles.recorded_jaw import FIXED, PLATFORM, Jaw, record
+
+from condyle.motion import read_table
+
+CALL = ("motion", "from-c3d", "a.c3d", "--markers", "m.toml", "--mechanism", "masticatory")
+
+
+@pytest.fixture
+def call(condyle_command: Callable[..., Any]) -> Callable[..., Any]:
+    """Runs the command on a jaw, in the folder of its files."""
+
+    def run(jaw: Jaw, *options: object, **written: Any) -> Any:
+        jaw.write(Path("a.c3d"), **written)
+        jaw.write_tables(Path("m.toml"))
+        return condyle_command(*CALL, *options)
+
+    return run
+
+
+def test_the_motion_is_written_and_its_quality_said(call: Callable[..., Any]) -> None:
+    jaw = record()
+    for name in FIXED[:2]:
+        jaw.at(name)[200:205] = np.nan
+    outcome = call(jaw, "--out", "o.csv")
+    assert outcome.status == 0 and outcome.err == ""
+    for text in (
+        "a.c3d: 400 frames at 100 Hz from 0 to 3.99 s, lengths in mm",
+        "Motion: 400 poses from 0 to 3.99 s, 5 of them filled in",
+        "Registration, distance of each point from its place in the mechanism: incisor",
+        "Contacts will take away: left_condyle 0.0",
+        "Gaps: 1",
+        "2 to 2.04 s (5 frames, filled): 2 of 4 fixed markers seen, not Upper_FL, Upper_BL",
+        "Results: o.csv",
+        "Next: condyle run masticatory --motion o.csv --smooth auto",
+    ):
+        assert text in outcome.out
+    for name in (*FIXED, *PLATFORM):
+        assert f"  {name}  " in outcome.out
+    assert "seen 100 % of the time" in outcome.out and "mm RMS" in outcome.out
+    table = read_table("o.csv", known=("t", "X", "Y", "Z", "alpha", "beta", "gamma"))
+    pose = table.require(["X", "Y", "Z", "alpha", "beta", "gamma"])
+    np.testing.assert_allclose(pose, jaw.pose, atol=1e-4)
+    np.testing.assert_allclose(table.columns["t"], jaw.t, atol=1e-12)
+
+
+def test_markers_beside_the_mechanism(call: Callable[..., Any]) -> None:
+    jaw = record()
+    jaw.at("Lower_FL")[50] = np.nan
+    assert call(jaw, "--out", "o.csv", "--markers-out", "p.csv").status == 0
+    head, *rows = Path("p.csv").read_text().splitlines()
+    names = [f"{name}_{axis}" for name in (*FIXED, *PLATFORM) for axis in "xyz"]
+    assert head.split(",") == ["t", *names] and len(rows) == 400
+    place = dict(zip(head.split(","), rows[50].split(","), strict=True))
+    assert place["Lower_FL_x"] == "" and float(place["Upper_FL_x"]) == pytest.approx(0.08, abs=1e-6)
+
+
+def test_a_load_from_channels(call: Callable[..., Any]) -> None:
+    jaw = record(head=0.0)
+    down = -80 * np.sin(jaw.t)[:, None] * jaw.A[:, 2]
+    options = {"channels": [(n, "N") for n in ("F1", "F2", "F3")], "analog": down[:, None]}
+    given = ("--out", "o.csv", "--force", "F1,F2, F3", "--load", "l.csv")
+    outcome = call(jaw, *given, **options)
+    assert outcome.status == 0 and "--motion o.csv --load l.csv" in outcome.out
+    force = read_table("l.csv", known=("t", "Fx", "Fy", "Fz")).require(["Fx", "Fy", "Fz"])
+    want = np.column_stack([0 * jaw.t, 0 * jaw.t, -80 * np.sin(jaw.t)])
+    np.testing.assert_allclose(force, want, atol=1e-3)
+
+
+def test_as_data(call: Callable[..., Any]) -> None:
+    jaw = record()
+    jaw.at("Upper_FL")[100] += 0.02
+    data = json.loads(call(jaw, "--out", "o.csv", "--json", first_frame=1).out)
+    assert data["frames"] == data["poses"] == 400 and data["unit"] == "mm"
+    assert [r["name"] for r in data["residuals"]] == [*FIXED, *PLATFORM]
+    assert set(data["residuals"][0]) == {"name", "body", "seen", "rms", "largest", "time"}
+    assert set(data["gaps"][0]) == {"start", "end", "frames", "reason", "made"}
+    assert data["off_contacts"]["left_condyle"]["largest"] < 1e-3
+    assert data["files"] == ["o.csv"]
+
+
+def test_what_was_assumed_is_a_warning(call: Callable[..., Any]) -> None:
+    outcome = call(record(), "--out", "o.csv", units=None)
+    assert outcome.status == 0 and outcome.err.count("\n") == 1
+    assert outcome.err.startswith("condyle: warning: a.c3d: does not say its unit of length")
+    assert call(record(), "--out", "o.csv", "--units", "mm", units=None).err == ""
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--max-gap", "0.05"), "no pose for longer than 0.05 s: 2 to 2.09 s (2 of 4 fixed"),
+        (("--units", "inch"), "units: got 'inch', expected m, cm, mm, um"),
+        (("--force", "F1,F2,F3"), "give both or none"),
+        (("--load", "l.csv"), "give both or none"),
+        (("--force", "F1", "--load", "l.csv"), "got 1 channels, expected three"),
+        (("--markers-out", "o.csv"), "two files to write have one name"),
+        (("--markers-out", "no/p.csv"), "the folder"),
+        (("--max-residual", "nan"), "--max-residual"),
+        (("--max-residual", "0"), "no pose for longer than 0.1 s: 0 to 3.99 s"),
+        (("--max-gap", "-1"), "--max-gap"),
+        (("--mechanism", "mastcatory"), "Did you mean"),
+        (("--markers", "n.toml"), "n.toml: no such file"),
+    ],
+)
+def test_bad_input_writes_nothing(
+    call: Callable[..., Any], options: tuple[str, ...], said: str
+) -> None:
+    jaw = record()
+    for name in FIXED[:2]:
+        jaw.at(name)[200:210] = np.nan
+    outcome = call(jaw, "--out", "o.csv", *options)
+    assert outcome.status == 2 and said in outcome.err and outcome.out == ""
+    assert sorted(path.name for path in Path().iterdir()) == ["a.c3d", "m.toml"]
+
+
+def test_the_longest_stretch(call: Callable[..., Any]) -> None:
+    jaw = record()
+    for name in FIXED[:2]:
+        jaw.at(name)[150:200] = np.nan
+    assert call(jaw, "--out", "o.csv", "--longest").status == 0
+    assert Path("o.csv").read_text().splitlines()[1].startswith("2,")
+
+
+ODD = [
+    "",
+    "nan",
+    "inf",
+    "-1",
+    "1e400",
+    "9" * 400,
+    "x" * 5000,
+    ".",
+    "\udcff",
+    "--",
+    "[]",
+    "\n",
+    "\0",
+]
+
+
+@pytest.mark.parametrize("word", ODD)
+def test_odd_words_anywhere(
+    call: Callable[..., Any], condyle_command: Callable[..., Any], word: str
+) -> None:
+    """A message and status 2, or a word that is fine: never a traceback."""
+    good = call(record(seconds=0.8), "--out", "o.csv")
+    assert good.status == 0
+    names = ("--max-gap", "--max-residual", "--units", "--markers-out", "--markers", "--out")
+    calls = [(*CALL, "--out", "o.csv", name, word) for name in (*names, "--mechanism")]
+    calls.append((*CALL, "--out", "o.csv", "--force", word, "--load", "l.csv"))
+    calls.append((*CALL, "--out", "o.csv", "--force", "a,b,c", "--load", word))
+    calls += [("motion", word), ("motion", "from-c3d", word, *CALL[3:], "--out", "o.csv")]
+    for arguments in calls:
+        outcome = condyle_command(*arguments)
+        assert outcome.status in (0, 2), (arguments, outcome)
+        assert bool(outcome.status) == (outcome.err != "") and "Traceback" not in outcome.err

@@ -1,0 +1,49 @@
+"""Broken recordings: each gives a motion of finite numbers, or one message fit for a terminal."""
+
+from __future__ import annotations
+
+import random
+import warnings
+from pathlib import Path
+
+import numpy as np
+from oracles.recorded_jaw import record
+
+from condyle.errors import CondyleError
+from condyle.motion import from_c3d
+
+HEAD = 3 * 512  # header and parameters, where single bytes matter
+
+
+def broken(rng: random.Random, whole: bytes) -> bytes:
+    data = bytearray(whole)
+    if rng.random() < 0.3:
+        del data[rng.randrange(len(data)) :]
+    for _ in range(rng.choice((0, 1, 1, 2, 5, 40))):
+        if data:
+            reach = rng.choice((24, HEAD, HEAD, len(data)))
+            at, size = rng.randrange(min(reach, len(data))), rng.choice((1, 1, 1, 2, 4, 30))
+            new = rng.choice((b"\x00", b"\xff", b"\x7f", rng.randbytes(1)))
+            data[at : at + size] = new * rng.choice((size, size, size, 0, 200))
+    return bytes(data)
+
+
+def test_a_broken_recording(tmp_path: Path, fuzz_seeds: range) -> None:
+    jaw = record(seconds=1.2, noise=1e-4)
+    analog = np.zeros((len(jaw.t), 2, 3))
+    path = jaw.write(tmp_path / "a.c3d", analog=analog, channels=[(f"F{i}", "N") for i in range(3)])
+    whole, tables, read = path.read_bytes(), jaw.tables(), 0
+    for seed in fuzz_seeds:
+        path.write_bytes(broken(random.Random(seed), whole))
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                got = from_c3d(path, tables, "masticatory", force=("F0", "F1", "F2"))
+        except CondyleError as error:
+            message = str(error)
+            assert len(message) < 4000 and message.isprintable(), (seed, message)
+        else:
+            read += 1
+            assert np.isfinite(got.motion.acceleration).all(), seed
+            assert all(w.isprintable() for w in got.warnings), seed
+    assert 0.02 * len(fuzz_seeds) < read < 0.9 * len(fuzz_seeds)

@@ -1,0 +1,482 @@
+"""Poses from markers: the motion that was recorded comes back, or what is wrong is said."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from oracles.recorded_jaw import FIXED, LOWER, PLATFORM, UPPER, Jaw, record
+
+import condyle
+from condyle.errors import InputError
+from condyle.motion import MarkerMotion, from_c3d
+from condyle.motion.markers import read_markers
+
+# Single precision of some 1.5 m, over the least breadth of a brace, 15 mm.
+ROUNDING = np.array([1e-6] * 3 + [2e-5] * 3)
+
+
+def measured(jaw: Jaw, folder: Path, per_metre: float = 1e3, **options: Any) -> MarkerMotion:
+    tables = options.pop("tables", None) or jaw.tables()
+    mechanism = options.pop("mechanism", "masticatory")
+    write = {k: options.pop(k) for k in ("units", "first_frame", "missing") if k in options}
+    return from_c3d(jaw.write(folder / "a.c3d", per_metre, **write), tables, mechanism, **options)
+
+
+def error(got: MarkerMotion, jaw: Jaw) -> np.ndarray:
+    return np.abs(got.motion.value - jaw.pose[: len(got.motion)]).max(axis=0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_motion_comes_back(tmp_path: Path, seed: int) -> None:
+    """In laboratories of any axes, with a head that moves."""
+    jaw = record(seed=seed)
+    got = measured(jaw, tmp_path)
+    assert (error(got, jaw) < ROUNDING).all()
+    assert got.motion.kind == "pose" and got.gaps == () and got.warnings == ()
+    assert got.measured.all() and got.load is None
+    assert max(r.largest for r in got.residuals) < 1e-6
+    assert [(r.name, r.body, r.seen) for r in got.residuals] == [
+        *((name, "fixed", 1.0) for name in FIXED),
+        *((name, "platform", 1.0) for name in PLATFORM),
+    ]
+    assert max(got.registration.residual.values()) < 1e-9
+    for name, place in UPPER.items():
+        np.testing.assert_allclose(got.markers[name], np.tile(place, (len(jaw.t), 1)), atol=2e-6)
+    np.testing.assert_allclose(got.markers["Lower_FL"][0], LOWER["Lower_FL"], atol=2e-6)
+
+
+@pytest.mark.parametrize(("unit", "units"), [(1.0, "m"), (100.0, "cm"), (1e3, "mm"), (1e3, None)])
+def test_other_units(tmp_path: Path, unit: float, units: str | None) -> None:
+    jaw = record(unit=unit)
+    got = measured(jaw, tmp_path, unit, units=units)
+    assert (error(got, jaw) < ROUNDING).all()
+    assert len(got.warnings) == (units is None)
+    if units is not None:
+        assert (error(measured(jaw, tmp_path, unit, units="m", unit=units), jaw) < ROUNDING).all()
+
+
+def test_a_unit_that_cannot_be(tmp_path: Path) -> None:
+    jaw = record(unit=1.0)
+    got = measured(jaw, tmp_path, 1.0, units=None, max_residual=1.0)
+    assert "mm was assumed" in got.warnings[0]
+    assert "fixed markers are 0.0" in got.warnings[1] and "--units" in got.warnings[1]
+
+
+def test_noise_gives_the_errors_that_statistics_expect(tmp_path: Path) -> None:
+    """Variance of the turn about each axis, first order: s^2 (sum r_perp^2)^-1 for each body."""
+    noise = 2e-4
+    jaw = record(noise=noise, seconds=20, seed=3)
+    got = measured(jaw, tmp_path)
+    turn = np.zeros(3)
+    for body in (UPPER, LOWER):
+        r = np.array(list(body.values()))
+        r = r - r.mean(axis=0)
+        inertia = (r**2).sum() * np.eye(3) - r.T @ r
+        turn += noise**2 * np.diag(np.linalg.inv(inertia))
+    scatter = (got.motion.value - jaw.pose)[:, 3:].std(axis=0)
+    # 2000 frames tell a deviation to 1.6 %; angles differ from turns by the cosine of 14 degrees.
+    np.testing.assert_allclose(scatter, np.sqrt(turn), rtol=0.1)
+    # Of 12 coordinates a frame of each body 6 are left over.
+    rms = np.sqrt(np.mean([r.rms**2 for r in got.residuals]))
+    assert rms == pytest.approx(noise * np.sqrt(6 / 4), rel=0.05)
+    # Home is the mean of 51 frames: its error is that much smaller.
+    offset = np.abs((got.motion.value - jaw.pose).mean(axis=0)[3:])
+    assert (offset < 4 * np.sqrt(turn / 51)).all() and got.gaps == ()
+
+
+def test_one_time_of_home(tmp_path: Path) -> None:
+    """One frame; the numbers of the register are of that frame."""
+    jaw = record(head=0.0)
+    got = measured(jaw, tmp_path, tables=jaw.tables(home=0.204))
+    assert (error(got, jaw) < ROUNDING).all()
+
+
+def test_frames_that_begin_later(tmp_path: Path) -> None:
+    jaw = record()
+    got = measured(jaw, tmp_path, first_frame=501, tables=jaw.tables(home=[5.0, 5.5]))
+    assert (error(got, jaw) < ROUNDING).all()
+    assert got.motion.t[0] == 5.0
+    with pytest.raises(InputError, match=r"runs from 5 to 8.99 s; its first frame is number 501"):
+        measured(jaw, tmp_path, first_frame=501)
+
+
+def test_registered_by_markers(tmp_path: Path) -> None:
+    """Markers that stand at points of the mechanism at home, on either body, or numbers."""
+    jaw = record()
+    jaw.at("Lower_FL")[20:22] = np.nan  # not seen at all times of home
+    machine = condyle.load("masticatory").set("platform.points.chin", (0.085, 0.025, -0.020))
+    machine = machine.set("platform.points.brow", UPPER["Upper_BR"])
+    register = {"chin": "Lower_FL", "brow": "upper br", "incisor": jaw.register["incisor"]}
+    got = measured(jaw, tmp_path, tables=jaw.tables(register=register), mechanism=machine)
+    assert (error(got, jaw) < ROUNDING).all()
+
+
+def test_registered_by_directions(tmp_path: Path) -> None:
+    jaw = record(head=0.0)
+    forward, up = jaw.A[:, 0], jaw.A[:, 2]
+    # `forward` need not be square to `up`.
+    ways: list[dict[str, Any]] = [
+        {"origin": "incisor", "incisor": jaw.register["incisor"]},
+        {"origin": (jaw.b * 1e3).tolist()},
+    ]
+    for way in ways:
+        register = {"forward": (7 * forward + 3 * up).tolist(), "up": (2 * up).tolist()} | way
+        got = measured(jaw, tmp_path, tables=jaw.tables(register=register))
+        assert (error(got, jaw) < ROUNDING).all() and got.registration.residual == {}
+        outside = {k: v for k, v in jaw.tables().items() if k != "register"} | register
+        if "incisor" not in way:
+            assert (error(measured(jaw, tmp_path, tables=outside), jaw) < ROUNDING).all()
+    # A marker of the name of the point.
+    jaw.labels[jaw.labels.index("Lower_FR")] = "chin"
+    machine = condyle.load("masticatory").set("platform.points.chin", LOWER["Lower_FR"])
+    register = {"forward": forward.tolist(), "up": up.tolist(), "origin": "chin"}
+    platform = ["chin" if name == "Lower_FR" else name for name in PLATFORM]
+    tables = jaw.tables(register=register, platform=platform)
+    assert (error(measured(jaw, tmp_path, tables=tables, mechanism=machine), jaw) < ROUNDING).all()
+
+
+def test_a_jaw_of_another_size_is_told_by_residuals(tmp_path: Path) -> None:
+    jaw = record(head=0.0)
+    for name in jaw.register:
+        jaw.register[name] = ((np.array(jaw.register[name]) - jaw.b * 1e3) * 1.1).tolist()
+    points = np.array([[52.75, 0, 4.63], [-26.65, 72, 42.53], [-26.65, -72, 42.53]]) * 1e-3
+    got = measured(jaw, tmp_path)
+    want = 0.1 * np.linalg.norm(points - points.mean(axis=0), axis=1)
+    np.testing.assert_allclose(list(got.registration.residual.values()), want, rtol=1e-3)
+
+
+def test_places_that_are_exchanged_are_said(tmp_path: Path) -> None:
+    jaw = record()
+    r = jaw.register
+    r["incisor"], r["left_condyle"] = r["left_condyle"], r["incisor"]
+    got = measured(jaw, tmp_path)
+    assert "fit much better with their places exchanged" in got.warnings[0]
+    assert "incisor at left_condyle" in got.warnings[0]
+
+
+@pytest.mark.parametrize("missing", ["residual", "nan", "zero"])
+def test_one_marker_not_seen_is_no_gap(tmp_path: Path, missing: str) -> None:
+    jaw = record()
+    for i, name in enumerate([*FIXED, *PLATFORM]):
+        jaw.at(name)[60 + 40 * i : 90 + 40 * i] = np.nan
+    got = measured(jaw, tmp_path, missing=missing)
+    assert (error(got, jaw) < 2 * ROUNDING).all() and got.gaps == () and got.measured.all()
+    assert got.residuals[0].seen == pytest.approx(1 - 30 / 400)
+
+
+def test_short_gaps_are_filled_and_listed(tmp_path: Path) -> None:
+    jaw = record()
+    for name in PLATFORM[:2]:
+        jaw.at(name)[150:158] = np.nan
+    for name in FIXED:
+        jaw.at(name)[300:302] = np.nan
+    jaw.at("Upper_BR")[200] += 0.02
+    got = measured(jaw, tmp_path)
+    assert [(g.start, g.end, g.frames, g.made) for g in got.gaps] == [
+        (1.5, 1.57, 8, "filled"),
+        (2.0, 2.0, 1, "filled"),
+        (3.0, 3.01, 2, "filled"),
+    ]
+    for gap, said in zip(
+        got.gaps, ("2 of 4 platform", "Upper_BR is 34.6 mm", "0 of 4 fixed"), strict=True
+    ):
+        assert said in gap.reason
+    assert np.flatnonzero(~got.measured).tolist() == [*range(150, 158), 200, 300, 301]
+    assert (error(got, jaw)[:3] < 5e-5).all() and (error(got, jaw)[3:] < 1e-3).all()
+    held = got.measured
+    assert (np.abs(got.motion.value - jaw.pose)[held].max(axis=0) < 2 * ROUNDING).all()
+    assert np.isnan(got.markers["Lower_FL"][150:158]).all()
+    strict = measured(jaw, tmp_path, max_residual=0.1)  # then the bad marker is believed
+    assert len(strict.gaps) == 2
+
+
+def test_a_gap_may_be_as_long_as_it_may(tmp_path: Path) -> None:
+    jaw = record()
+    for name in PLATFORM[:2]:
+        jaw.at(name)[150:160] = np.nan
+    assert [g.frames for g in measured(jaw, tmp_path, max_gap=0.1).gaps] == [10]
+    with pytest.raises(InputError, match=r"longer than 0\.099 s: 1\.5 to 1\.59 s"):
+        measured(jaw, tmp_path, max_gap=0.099)
+
+
+def test_longer_gaps_are_errors_that_name_them(tmp_path: Path) -> None:
+    jaw = record()
+    for name in PLATFORM[1:]:
+        jaw.at(name)[100:120] = np.nan
+        jaw.at(name)[380:] = np.nan
+    jaw.at("Upper_FL")[200:203] += 0.02
+    with pytest.raises(InputError, match=r"no pose for longer than 0\.1 s") as caught:
+        measured(jaw, tmp_path)
+    assert "1 to 1.19 s (1 of 4 platform markers seen, not Lower_BL" in str(caught.value)
+    assert "3.8 to 3.99 s" in str(caught.value) and "--longest" in caught.value.hint
+    assert "2.02" not in str(caught.value)
+    got = measured(jaw, tmp_path, longest=True)
+    assert got.motion.t[0] == 1.2 and got.motion.t[-1] == 3.79
+    assert [g.made for g in got.gaps] == ["cut", "filled", "cut"]
+    assert np.abs(got.motion.value - jaw.pose[120:380])[:, 0].max() < 5e-5
+    got = measured(jaw, tmp_path, max_gap=0.2)
+    assert got.motion.t[-1] == 3.79 and [g.made for g in got.gaps] == ["filled", "filled", "cut"]
+
+
+@pytest.mark.parametrize(
+    "pair", [("Upper_FL", "Upper_BR"), ("Lower_FL", "Lower_FR"), ("Upper_FL", "Lower_FL")]
+)
+def test_exchanged_labels_are_named(tmp_path: Path, pair: tuple[str, str]) -> None:
+    jaw = record(noise=1e-4)
+    a, b = (jaw.labels.index(name) for name in pair)
+    jaw.points[120:, [a, b]] = jaw.points[120:, [b, a]]
+    with pytest.raises(InputError, match="look exchanged") as caught:
+        measured(jaw, tmp_path)
+    assert f"from 1.2 to 3.99 s {pair[0]} and {pair[1]} look exchanged" in str(caught.value)
+    jaw = record(noise=1e-4)
+    jaw.points[120:124, [a, b]] = jaw.points[120:124, [b, a]]
+    got = measured(jaw, tmp_path)
+    assert [g.frames for g in got.gaps] == [4] and len(got.warnings) == 1
+    assert f"from 1.2 to 1.23 s {pair[0]} and {pair[1]} look exchanged" in got.warnings[0]
+
+
+def test_three_labels_in_a_ring_are_named(tmp_path: Path) -> None:
+    jaw = record(noise=1e-4)
+    jaw.points[120:, [0, 1, 2]] = jaw.points[120:, [1, 2, 0]]
+    with pytest.raises(InputError, match="Upper_FL, Upper_BL, Upper_FR look exchanged"):
+        measured(jaw, tmp_path)
+
+
+@pytest.mark.parametrize("name", ["Upper_BL", "Lower_FR"])
+def test_a_marker_that_moves_against_its_body_is_named(tmp_path: Path, name: str) -> None:
+    """A brace comes loose: the marker's own distances vary, the others' do not."""
+    jaw = record(noise=1e-4)
+    jaw.at(name)[:] += 0.005 * np.sin(3 * np.clip(jaw.t - 0.6, 0, None))[:, None] * [1, 0.5, -0.3]
+    got = measured(jaw, tmp_path, max_residual=0.02)
+    assert len(got.warnings) == 1 and got.warnings[0].startswith(f"{name} moves against")
+    with pytest.raises(InputError, match=f"^{name} moves against the markers it is listed with"):
+        measured(jaw, tmp_path)
+
+
+def test_a_marker_listed_with_the_wrong_body_is_named(tmp_path: Path) -> None:
+    jaw = record()
+    tables = jaw.tables(platform=[*PLATFORM, "Nasion"])
+    with pytest.raises(InputError, match="Nasion moves against"):
+        measured(jaw, tmp_path, tables=tables)
+
+
+def test_markers_of_two_bodies_exchanged_in_the_file_are_named(tmp_path: Path) -> None:
+    jaw = record()
+    tables = jaw.tables(
+        fixed=["Lower_FL", *FIXED[1:]], platform=["Upper_FL", *PLATFORM[1:]], home=[0.0, 0.5]
+    )
+    with pytest.raises(InputError, match=r"Lower_FL moves against .* Upper_FL moves against"):
+        measured(jaw, tmp_path, tables=tables)
+
+
+def test_three_markers_are_enough(tmp_path: Path) -> None:
+    jaw = record()
+    tables = jaw.tables(fixed=FIXED[:3], platform=PLATFORM[1:])
+    assert (error(measured(jaw, tmp_path, tables=tables), jaw) < 3 * ROUNDING).all()
+
+
+def test_a_marker_not_seen_at_home_is_left_out(tmp_path: Path) -> None:
+    jaw = record()
+    jaw.at("Upper_FL")[:60] = np.nan
+    got = measured(jaw, tmp_path)
+    assert (error(got, jaw) < 3 * ROUNDING).all() and len(got.residuals) == 7
+    assert '"Upper_FL" (fixed) not seen at home and left out' in got.warnings[0]
+    for name in FIXED[1:3]:
+        jaw.at(name)[:60] = np.nan
+    with pytest.raises(InputError, match="1 of 4 fixed markers are seen while"):
+        measured(jaw, tmp_path)
+
+
+def test_a_home_that_moves_is_said(tmp_path: Path) -> None:
+    jaw = record()
+    got = measured(jaw, tmp_path, tables=jaw.tables(home=[0.0, 0.9]))
+    assert "the platform moves by" in got.warnings[0]
+
+
+def test_what_the_contacts_take_away(tmp_path: Path) -> None:
+    """The distance from the bundled planes z = -1.1 x + 13.215 mm, by school geometry."""
+    from scipy.spatial.transform import Rotation
+
+    jaw = record()
+    got = measured(jaw, tmp_path)
+    assert got.off_contacts["left_condyle"][1] < 1e-4  # nearly on the planes: tell it otherwise
+    jaw = record(push=0.002)
+    got = measured(jaw, tmp_path)
+    balls = Rotation.from_euler("XYZ", jaw.pose[:, 3:]).apply([-0.02665, 0.072, 0.04253])
+    x, _, z = (balls + jaw.pose[:, :3]).T
+    away = np.abs(z + 1.1 * x - 0.013215) / np.hypot(1, 1.1)
+    rms, largest = got.off_contacts["left_condyle"]
+    assert rms == pytest.approx(np.sqrt(np.mean(away**2)), abs=1e-6)
+    assert largest == pytest.approx(away.max(), abs=1e-6)
+    assert measured(jaw, tmp_path, tables=free(jaw), mechanism="gough-stewart").off_contacts == {}
+
+
+def free(jaw: Jaw) -> dict[str, Any]:
+    register = {"forward": [1, 0, 0], "up": [0, 0, 1], "origin": [0, 0, 0]}
+    return jaw.tables(register=register)
+
+
+def test_a_chewing_motion_is_solved(tmp_path: Path) -> None:
+    jaw = record(noise=5e-5)
+    got = measured(jaw, tmp_path, cutoff="auto")
+    assert got.motion.smoothing is not None and got.motion.sha256 is not None
+    solution = condyle.derive(condyle.load("masticatory"), backend="numpy").solve(got.motion)
+    assert np.isfinite(solution["torque"]).all()
+
+
+def test_a_force_turns_with_the_head(tmp_path: Path) -> None:
+    """A sensor in the bite, whose channels are along the laboratory's axes."""
+    jaw = record()
+    R = np.array([_turn(jaw, k) for k in range(len(jaw.t))])
+    in_base = np.column_stack([np.zeros(len(jaw.t)), 5 * np.sin(jaw.t), -50 * np.ones(len(jaw.t))])
+    lab = np.einsum("fij,fj->fi", R, in_base) / 1e3
+    analog = np.repeat(lab[:, None], 10, axis=1)
+    options = {"channels": [("Fx", "kN"), ("Fy", "kN"), ("Fz", "kN")], "analog": analog}
+    path = jaw.write(tmp_path / "a.c3d", **options)
+    got = from_c3d(path, jaw.tables(), "masticatory", force=("fx", "Fy", "Fz"))
+    assert got.load is not None
+    np.testing.assert_allclose(got.load.wrench[:, :3], in_base, atol=1e-3)
+    options["channels"] = [("Fx", "V"), ("Fy", "N"), ("Fz", "N")]
+    path = jaw.write(tmp_path / "a.c3d", **options)
+    for channels, said in (
+        (("Fx", "Fy", "Fz"), 'channel "Fx" is in V; a force is in N, kN or mN'),
+        (("Fy", "Fz", "Fq"), 'has no channel "Fq"'),
+        (("Fy", "Fz"), "got 2 channels, expected three"),
+    ):
+        with pytest.raises(InputError, match=said):
+            from_c3d(path, jaw.tables(), "masticatory", force=channels)
+
+
+def _turn(jaw: Jaw, frame: int) -> np.ndarray:
+    """From {S} to the laboratory at a frame, by the upper markers alone."""
+    from scipy.spatial.transform import Rotation
+
+    there = np.array([jaw.at(name)[frame] for name in FIXED])
+    here = np.array([UPPER[name] for name in FIXED])
+    turn, _ = Rotation.align_vectors(there - there.mean(axis=0), here - here.mean(axis=0))
+    return turn.as_matrix()
+
+
+GOOD = """
+fixed = ["A", "B", "C"]
+platform = ["D", "E", "F"]
+home = [0.0, 0.5]
+[register]
+incisor = [1, 2, 3]
+left_condyle = "TMJ_L"
+right_condyle = [4.5, 5, 6]
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('["A", "B", "C"]', '["A", "B"]', "fixed: expected at least 3 entries, got 2"),
+        ('["A", "B", "C"]', '["A", "B", "B"]', "fixed: B stands more than once"),
+        ('["A", "B", "C"]', '["A", "B", "D"]', "D stands in fixed and in platform"),
+        ('["A", "B", "C"]', '["A", "B", 3]', "fixed[2]: expected text in quotes, got 3"),
+        ('["A", "B", "C"]', '"ABC"', "fixed: expected a list"),
+        ("fixed = ", "fixd = ", "fixd: is not a key of the file format; remove it or mend its "),
+        ('platform = ["D", "E", "F"]', "", "platform: is missing"),
+        ("[0.0, 0.5]", "[0.5, 0.0]", "home: expected [from, to] or one time, got [0.5, 0]"),
+        ("[0.0, 0.5]", "[0.0, nan]", "home[1]: expected a finite number"),
+        ("[0.0, 0.5]", "true", "home: expected a list"),
+        ("[0.0, 0.5]", "[0, 1, 2]", "home: expected at most 2 entries"),
+        ("home = [0.0, 0.5]", "", "home: is missing"),
+        ("[1, 2, 3]", "[1, 2]", "incisor: expected the label of a marker, or three numbers"),
+        ("[1, 2, 3]", '""', "incisor: expected the label of a marker, or three numbers"),
+        ("[1, 2, 3]", "[1, 2, inf]", "incisor: expected the label of a marker, or three numbers"),
+        ("incisor = [1, 2, 3]", "", "got 2 points of the mechanism, expected 3 or more"),
+        ("[register]", "[registr]", "register: is missing"),
+        ("incisor =", "up =", "forward, origin missing: directions need forward, up and origin"),
+        (GOOD[GOOD.index("inc") :], "up=[0,0,0]\nforward=[1,0,0]\norigin='x'", "up: a direction"),
+        ("right_con", "forward=[1,0,0]\nup=[0,0,1]\norigin=[0,0,0]\nx", "beside forward and up"),
+        ("[register]", "[register", "is not TOML"),
+    ],
+)
+def test_marker_files_that_are_wrong(tmp_path: Path, old: str, new: str, said: str) -> None:
+    assert read_markers(tomllib.loads(GOOD)).home == (0.0, 0.5)
+    path = tmp_path / "m.toml"
+    path.write_text(GOOD.replace(old, new, 1))
+    with pytest.raises(InputError) as caught:
+        read_markers(path)
+    assert said in str(caught.value), str(caught.value)
+
+
+def test_every_problem_of_a_marker_file_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "m.toml"
+    path.write_text('fixed = ["A"]\nplatform = 3\nhome = "x"\nrate = 5\n[register]\nincisor = 1\n')
+    with pytest.raises(InputError) as caught:
+        read_markers(path)
+    head, *lines = str(caught.value).splitlines()
+    assert head.endswith("m.toml: 5 problems") and len(lines) == 5
+    with pytest.raises(InputError, match="no such file"):
+        read_markers(tmp_path / "n.toml")
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="is no text"):
+        read_markers(path)
+    with pytest.raises(InputError, match="expected the path of a marker file"):
+        read_markers(5)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"fixed": ["Upper_FL", "Upper_BL", "Uper_FR"]}, 'has no marker "Uper_FR". Did you mean'),
+        ({"fixed": ["Upper_FL", "Upper_BL", "upper fl"]}, "do not name different markers"),
+        ({"home": [3.5, 9.0]}, "home: 3.5 to 9 s is not within a.c3d, which runs from 0 to 3.99"),
+        (
+            {"register": {"a": "TMJ_L", "b": "Nasion", "c": "Cheek_L"}},
+            'has no point or contact "a"',
+        ),
+        (
+            {"register": {"incisor": "TMJ_R", "left_molar": "Nasion", "right_molar": "Cheek_L"}},
+            'register: incisor: a.c3d: has no marker "TMJ_R"',
+        ),
+        (
+            {"register": {"incisor": [0] * 3, "left_molar": [1] * 3, "right_molar": [2] * 3}},
+            "on one line in the laboratory",
+        ),
+        (
+            {"register": {"forward": [1, 0, 0], "up": [2, 0, 0.01], "origin": [0, 0, 0]}},
+            "along one line",
+        ),
+        (
+            {"register": {"forward": [1, 0, 0], "up": [0, 0, 1], "origin": "chin"}},
+            'has no point or contact "chin"',
+        ),
+        (
+            {"register": {"forward": [1, 0, 0], "up": [0, 0, 1], "origin": "incisor"}},
+            'register: origin: a.c3d: has no marker "incisor"',
+        ),
+    ],
+)
+def test_markers_and_points_that_are_not_there(
+    tmp_path: Path, changes: dict[str, Any], said: str
+) -> None:
+    jaw = record(seconds=4)
+    with pytest.raises(InputError) as caught:
+        measured(jaw, tmp_path, tables=jaw.tables(**changes))
+    assert said in str(caught.value) and "\n" not in str(caught.value), str(caught.value)
+
+
+def test_markers_on_one_line_hold_no_body(tmp_path: Path) -> None:
+    jaw = record()
+    middle = (jaw.at("Upper_FL") + jaw.at("Upper_BL")) / 2
+    jaw.at("Nasion")[:] = middle
+    tables = jaw.tables(fixed=["Upper_FL", "Upper_BL", "Nasion"])
+    with pytest.raises(InputError, match="are on one line, so a turn about it cannot be told"):
+        measured(jaw, tmp_path, tables=tables)
+
+
+def test_options_that_are_wrong(tmp_path: Path) -> None:
+    jaw = record()
+    for option in ({"max_gap": -1.0}, {"max_residual": float("nan")}):
+        with pytest.raises(InputError, match="expected a number, 0 or more"):
+            measured(jaw, tmp_path, **option)
+    with pytest.raises(InputError, match="frames have a pose, expected at least 6"):
+        measured(jaw, tmp_path, max_residual=0.0, max_gap=100.0)

@@ -1,0 +1,168 @@
+"""Reading C3D: against files made byte by byte, and against another library's."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from oracles.c3d_file import c3d_bytes
+
+from condyle.errors import InputError, MissingExtraError
+from condyle.motion.markers import read_c3d
+from condyle.motion.markers.labels import find_label
+
+RNG = np.random.default_rng(0)
+LABELS = ["Jaw:Upper FL", "Lower_FL", "*3"]
+POINTS = RNG.normal(0, 300, (12, 3, 3))
+
+
+def written(tmp_path: Path, points: np.ndarray = POINTS, **options: Any) -> Path:
+    path = tmp_path / "trial.c3d"
+    path.write_bytes(c3d_bytes(LABELS, points, **options))
+    return path
+
+
+def test_single_precision(tmp_path: Path) -> None:
+    got = read_c3d(written(tmp_path, rate=59.94))
+    assert (got.rate, got.first_frame, got.unit, got.labels) == (59.94, 1, "mm", tuple(LABELS))
+    np.testing.assert_allclose(got.points, POINTS / 1e3, atol=1e-6 * 0.1)
+    np.testing.assert_allclose(got.t, np.arange(12) / 59.94, rtol=1e-15)
+    assert got.warnings == () and got.source == "trial.c3d"
+
+
+def test_integers(tmp_path: Path) -> None:
+    got = read_c3d(written(tmp_path, scale=0.05))
+    np.testing.assert_allclose(got.points, POINTS / 1e3, atol=0.0251e-3)
+
+
+@pytest.mark.parametrize("missing", ["residual", "nan", "zero"])
+def test_markers_not_seen(tmp_path: Path, missing: str) -> None:
+    points = POINTS.copy()
+    points[3:5, 1] = np.nan
+    got = read_c3d(written(tmp_path, points, missing=missing))
+    np.testing.assert_array_equal(np.isnan(got.points), np.isnan(points))
+
+
+@pytest.mark.parametrize(
+    ("said", "metres"),
+    [("m", 1), ("cm", 1e-2), ("mm", 1e-3), ("MM", 1e-3), ("Meters", 1), ("millimetres ", 1e-3)],
+)
+def test_units(tmp_path: Path, said: str, metres: float) -> None:
+    got = read_c3d(written(tmp_path, units=said))
+    np.testing.assert_allclose(got.points, POINTS * metres, rtol=1e-6)
+    assert got.warnings == ()
+
+
+@pytest.mark.parametrize("said", [None, ""])
+def test_a_unit_that_is_missing_is_assumed_and_said(tmp_path: Path, said: str | None) -> None:
+    got = read_c3d(written(tmp_path, units=said))
+    assert got.unit == "mm" and "mm was assumed" in got.warnings[0]
+    told = read_c3d(written(tmp_path, units=said), "m")
+    assert told.unit == "m" and told.warnings == ()
+    np.testing.assert_allclose(told.points, POINTS, rtol=1e-6)
+
+
+def test_frames_count_from_one(tmp_path: Path) -> None:
+    got = read_c3d(written(tmp_path, first_frame=501))
+    assert got.first_frame == 501 and got.t[0] == 5.0 and len(got.t) == 12
+
+
+def test_frames_beyond_sixteen_bits(tmp_path: Path) -> None:
+    got = read_c3d(written(tmp_path, first_frame=200_001))
+    assert got.first_frame == 200_001 and got.t[0] == 2000.0 and len(got.t) == 12
+
+
+def test_channels_are_means_of_each_frame(tmp_path: Path) -> None:
+    analog = RNG.normal(0, 1, (12, 10, 2))
+    got = read_c3d(written(tmp_path, channels=[("Fx", "N"), ("EMG1", "V")], analog=analog))
+    assert got.channels == ("Fx", "EMG1") and got.channel_units == ("N", "V")
+    np.testing.assert_allclose(got.analog, analog.mean(axis=1), atol=1e-6)
+    np.testing.assert_allclose(got.points, POINTS / 1e3, atol=1e-7)
+
+
+def test_more_labels_than_one_parameter_holds(tmp_path: Path) -> None:
+    """Another library writes the file, with labels that go on in LABELS2."""
+    import ezc3d
+
+    count = 300
+    names = [f"M{i:03}" for i in range(count)]
+    points = np.ones((4, count, 7))
+    points[:3] = RNG.normal(0, 100, (3, count, 7))
+    points[:3, 4, 2] = np.nan
+    file = ezc3d.c3d()
+    file["parameters"]["POINT"]["RATE"]["value"] = [250.0]
+    file["parameters"]["POINT"]["UNITS"]["value"] = ["m"]
+    file["parameters"]["POINT"]["LABELS"]["value"] = names
+    file["data"]["points"] = points
+    file.write(str(tmp_path / "other.c3d"))
+    got = read_c3d(tmp_path / "other.c3d")
+    assert got.rate == 250 and got.labels == tuple(names) and got.unit == "m"
+    want = points[:3].transpose(2, 1, 0)
+    np.testing.assert_array_equal(np.isnan(got.points), np.isnan(want))
+    np.testing.assert_allclose(got.points, want, atol=1e-5, equal_nan=True)
+
+
+def test_labels_are_forgiving() -> None:
+    labels = [
+        "Anna:Upper_FL",
+        "Anna:lower fl",
+        "Upper_BR",
+        "upper_br",
+        "B:Chin",
+        "C:Chin",
+        "X",
+        "X",
+    ]
+    labels += ["Anna:tip", "Anna:TIP"]
+    for name, place in (
+        ("Upper_FL", 0),
+        ("Anna:Upper_FL", 0),
+        ("upper fl", 0),
+        ("Lower_FL", 1),
+        ("Upper_BR", 2),
+        ("upper_br", 3),
+        ("B:Chin", 4),
+        ("tip", 8),
+        ("TIP", 9),
+    ):
+        assert find_label(name, labels, "a.c3d") == place, name
+    for name, said in (
+        ("Chin", 'may be any of "B:Chin", "C:Chin"; give the whole label'),
+        ("X", "rename one of them"),
+        ("Uper_FL", 'has no marker "Uper_FL"'),
+    ):
+        with pytest.raises(InputError, match=said):
+            find_label(name, labels, "a.c3d")
+
+
+def test_files_that_cannot_be_used(tmp_path: Path) -> None:
+    whole = c3d_bytes(LABELS, POINTS)
+    path = tmp_path / "trial.c3d"
+    for content, said in (
+        (b"", "is no C3D file"),
+        (b"t,x,y\n" * 300, "is no C3D file"),
+        (whole[: len(whole) - 512], "is cut short: it says 12 frames"),
+        (whole[:1100], "is broken|holds|cut short"),
+        (c3d_bytes(LABELS, POINTS, rate=0.0), "rate of 0 frames"),
+        (c3d_bytes(LABELS, POINTS, units="furlong"), r'"furlong", expected m, cm, mm, um'),
+        (c3d_bytes([], POINTS[:, :0]), "holds no markers"),
+    ):
+        path.write_bytes(content)
+        with pytest.raises(InputError, match=said) as caught:
+            read_c3d(path)
+        assert "\n" not in str(caught.value)
+    with pytest.raises(InputError, match="no such file"):
+        read_c3d(tmp_path / "trail.c3d")
+    with pytest.raises(InputError, match="cannot be read"):
+        read_c3d(tmp_path)
+    path.write_bytes(whole)
+    with pytest.raises(InputError, match="units: got 'inch', expected m, cm, mm, um"):
+        read_c3d(path, "inch")
+
+
+def test_without_the_reader(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("condyle.extras.find_spec", lambda name: None)
+    with pytest.raises(MissingExtraError, match=r'pip install "condyle\[c3d\]"'):
+        read_c3d(written(tmp_path))
