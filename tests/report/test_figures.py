@@ -156,7 +156,7 @@ def test_no_load_no_share_of_it(solution: Solution) -> None:
     titles = [axes.get_title("left") for axes in PLOTS["share"](solution).axes[:4]]
     assert titles == ["platform", "couplers", "cranks", "load"]
     idle = solution.copy(deep=True)
-    idle["share"].values[list(solution["part"].values).index("bite")] = 0.0
+    idle["share"].values[list(solution["part"].values).index("load")] = 0.0
     text = words(PLOTS["share"](idle))
     assert "platform" in text and "load" not in text.split("Mechanism")[0] and "bite" not in text
     named = solution.assign_coords(part=["platform", "couplers", "cranks", "load"])

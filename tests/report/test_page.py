@@ -411,7 +411,7 @@ def test_causes_come_from_the_solution(long_run: Solution) -> None:
 def test_no_load_no_share_of_it(solution: Solution) -> None:
     """A machine without a load shows no share of zeros; with one it is called load."""
     idle = solution.copy(deep=True)
-    idle["share"].values[list(solution["part"].values).index("bite")] = 0.0
+    idle["share"].values[list(solution["part"].values).index("load")] = 0.0
     for one, expected in ((solution, True), (idle, False)):
         panel = next(p for p in payload(report_html(one))["panels"] if p["id"] == "share-Nm")
         labels = [line["label"] for line in panel["sets"][0]["lines"]]
