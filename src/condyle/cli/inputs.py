@@ -14,6 +14,7 @@ from ..extras import require
 if TYPE_CHECKING:
     from ..mechanism import Mechanism
     from ..motion import Load, Motion
+    from ..results.model import Model
 
 
 def motion_and_load(
@@ -63,6 +64,27 @@ def motion_and_load(
     if path.kind == "landmark":
         path = replace(path, landmark=resolve_landmark(landmark, machine.platform.points))
     return path, acting
+
+
+def chosen_model(
+    machine: Mechanism,
+    formulation: str,
+    route: str,
+    backend: str,
+    distribution: str | None,
+    preload: float,
+    contact_weight: float,
+) -> Model:
+    """A model whose efforts are chosen as the options say.
+
+    Args: contact_weight: W; the library takes W / N_ref^2.
+    """
+    import condyle
+
+    from ..model.reference_force import reference_force
+
+    weight = contact_weight / reference_force(machine) ** 2
+    return condyle.derive(machine, formulation, route, backend, distribution, preload, weight)
 
 
 def chews(machine: Mechanism, landmark: str | None = None) -> bool:
