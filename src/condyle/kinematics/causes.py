@@ -156,7 +156,7 @@ def sample_error(
             **about,
         )
     if status[i] in UNBALANCED:
-        return _unbalanced(Status(status[i]), where, more, shortfall, about)
+        return _unbalanced(int(status[i]), where, more, shortfall, about)
     text = unreachable_text(mechanism, owner, pose[i])
     if owner.kind == "chain":
         chain = mechanism.chains[mechanism.chain_names.index(owner.name)]
@@ -178,7 +178,7 @@ def shortfall_text(shortfall: float) -> str:
 
 
 def _unbalanced(
-    status: Status, where: str, more: str, shortfall: np.ndarray | None, about: dict[str, Any]
+    status: int, where: str, more: str, shortfall: np.ndarray | None, about: dict[str, Any]
 ) -> SampleError:
     """The error for samples to which no efforts, or none that are certain, were found."""
     if status == Status.jammed:

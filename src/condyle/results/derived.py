@@ -51,7 +51,9 @@ class Derived:
 
     @cached_property
     def lifted(self) -> np.ndarray:
-        """Whether a one-sided contact would have to pull, (N, k)."""
+        """Whether a one-sided contact would have to pull, (N, k): never within limits."""
+        if self.limited:  # they push, to the accuracy of the certificate
+            return np.zeros(self.evaluation.contact_force.shape, dtype=bool)
         lifted = lift_off(self.mechanism, self.evaluation.contact_force)
         return lifted if self.all_ok else lifted & self.ok[:, None]
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from .chains import readable
 from .labels import caption
-from .panels import legend
 from .style import DARK, house, look, new_figure
 
 if TYPE_CHECKING:
@@ -21,11 +21,11 @@ def tradeoff_figure(found: Tradeoff) -> Figure:
     figure = new_figure("Effort against load on the contacts", caption(found.solution), 8.5, 4.0, 2)
     left, right = figure.subplots(1, 2)
     left.plot(found.effort, found.load, marker="o", markersize=4, color=DARK)
-    decades = range(1, len(found.weights), 4)  # more labels would stand on each other
-    for p in (0, *(p for p in decades if p)):
-        text = f"W = {found.weights[p]:g}"
+    for p in apart(found):
+        text = f"W = {found.weights[p]:.3g}"
         place = found.effort[p], found.load[p]
         left.annotate(text, place, (5, 4), textcoords="offset points", fontsize=7, color=DARK)
+    left.margins(x=0.15, y=0.08)
     left.set_title("from least effort to least load")
     left.set_xlabel("effort: root of mean sum (effort/limit)² [1]")
     left.set_ylabel("load on the contacts, root mean square [N]")
@@ -36,5 +36,17 @@ def tradeoff_figure(found: Tradeoff) -> Figure:
     right.set_title("mean force at each contact")
     right.set_xlabel("weight of the contacts W [1]")
     right.set_ylabel("force [N]")
-    legend(right, 2)
+    right.legend(loc="upper right")
     return figure
+
+
+def apart(found: Tradeoff, least: float = 0.08) -> list[int]:
+    """Points of the curve whose labels do not stand on each other, the first among them."""
+    curve = np.column_stack([found.effort, found.load])
+    extent = np.ptp(curve, axis=0)
+    curve = curve / np.where(extent > 0, extent, 1.0)
+    kept = [0]
+    for p in range(1, len(curve)):
+        if np.abs(curve[p] - curve[kept[-1]]).max() > least:
+            kept.append(p)
+    return kept
