@@ -96,6 +96,7 @@ class Evaluator:
         self.mechanism = mechanism
         self.formulation = formulation_named(formulation).name
         self.route = route
+        self._asked = distribution
         self.policy = Policy.of(mechanism, distribution, preload, contact_weight)
         self._distributor = Distributor(mechanism, self.policy)
         self.backend = Backend(backend)
@@ -117,7 +118,7 @@ class Evaluator:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Models travel as their recipe; kernels are found again in the cache."""
-        policy = (self.policy.objective, self.policy.preload, self.policy.contact_weight)
+        policy = (self._asked, self.policy.preload, self.policy.contact_weight)
         return type(self), (
             self.mechanism,
             self.formulation,
@@ -159,6 +160,7 @@ class Evaluator:
     ) -> Self:
         """The same model, kernels and all, that chooses efforts otherwise; see `derive`."""
         other = copy(self)
+        other._asked = distribution
         other.policy = Policy.of(self.mechanism, distribution, preload, contact_weight)
         other._distributor = Distributor(self.mechanism, other.policy)
         return other

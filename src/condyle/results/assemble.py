@@ -70,7 +70,7 @@ def _variable(
 ) -> tuple[tuple[str, ...], np.ndarray, dict[str, str]]:
     """What xarray makes a variable of; numbers of failed samples are NaN."""
     values = variable.values(derived)
-    if values.dtype.kind == "f" and not derived.all_ok:
+    if values.dtype.kind == "f" and not (derived.all_ok or variable.failed):
         values = values.copy()
         values[(slice(None),) * variable.dims.index("time") + (~derived.ok,)] = np.nan
     return variable.dims, values, variable.attributes(derived.mechanism)

@@ -36,7 +36,7 @@ def always(_: Derived) -> bool:
 
 
 def with_friction(derived: Derived) -> bool:
-    return any(contact.friction is not None for contact in derived.mechanism.contacts)
+    return any(contact.friction.coefficient for contact in derived.mechanism.contacts)
 
 
 def with_limits(derived: Derived) -> bool:
@@ -57,6 +57,7 @@ class Variable:
             has none there.
     flags:  what its integers mean, or a rule for that: words that a blank parts.
     when:   whether a solution has it at all.
+    failed: whether failed samples may have a value too.
     sizes:  of vectors along the last dimension stand in CSV, not their components.
     """
 
@@ -68,6 +69,7 @@ class Variable:
     column: str | None = None
     flags: str | Rule = ""
     when: Callable[[Derived], bool] = always
+    failed: bool = False
     sizes: bool = False
 
     def attributes(self, mechanism: Mechanism) -> dict[str, str]:
@@ -158,7 +160,7 @@ VARIABLES = (
         "shortfall", ("time",), "1",
         "by how much all limits would have to be multiplied, where efforts were chosen within "
         "limits: 1 where they suffice, inf where no limits would do",
-        lambda d: d.shortfall, when=chosen_within_limits,
+        lambda d: d.shortfall, when=chosen_within_limits, failed=True,
     ),
     Variable(
         "pose_rate", _POSE, of_pose("{}/s"), "rate of X_EE", lambda d: d.evaluation.pose_rate
