@@ -111,10 +111,10 @@ def test_nothing_that_is_infinite_breaks_json(condyle_command: Run) -> None:
         (("--distribution", "cubik"), 'no distribution "cubik". Did you mean "cubic"'),
         (("--distribution", "cubic"), "efforts that only pull"),
         (("--preload", "1"), "minimum_norm knows none"),
-        (("--distribution", "bounded", "--preload", "-1"), "x>=0"),
+        (("--distribution", "bounded", "--preload", "-1"), "at least 0, got -1"),
         (("--distribution", "bounded", "--preload", "nan"), "at least 0, got nan"),
         (("--contact-weight", "1"), "does not weigh contact forces"),
-        (("--distribution", "weighted", "--contact-weight", "-1"), "x>=0"),
+        (("--distribution", "weighted", "--contact-weight", "-1"), "at least 0, got -1"),
     ],
 )
 def test_choices_without_meaning(
@@ -123,17 +123,13 @@ def test_choices_without_meaning(
     more = ("--states", states("s.csv"), "--out", "a.csv") if command == "solve" else SHORT
     outcome = condyle_command(command, "masticatory", *more, *options)
     assert outcome.status == 2 and said in outcome.err
-    assert "Traceback" not in outcome.err
+    assert outcome.err.splitlines()[-1].startswith("condyle: ") and "Traceback" not in outcome.err
     assert not Path("results").exists() and not Path("a.csv").exists()
 
 
 def test_mixed_units_are_not_added(condyle_command: Run) -> None:
-    slides = bundled_text("hexaglide").split("[[chain]]")[1].replace("force_limit", "force_limit")
-    text = bundled_text("masticatory").split("[[chain]]")
-    turns = "[[chain]]".join(text)
-    name = re.search(r'name *= *"(\w+)"', slides)
-    assert name is not None
-    Path("mixed.toml").write_text(turns + "\n[[chain]]" + slides)
+    slides = bundled_text("hexaglide").split("[[chain]]")[1]
+    Path("mixed.toml").write_text(bundled_text("masticatory") + "\n[[chain]]" + slides)
     outcome = condyle_command("run", "mixed.toml", *SHORT, "--distribution", "bounded")
     assert outcome.status == 2 and "N and N m: take one of" in outcome.err
 
@@ -150,7 +146,10 @@ def test_tradeoff(condyle_command: Run, read_csv: Read) -> None:
         "tradeoff.md", "tradeoff.csv", "tradeoff.png", "tradeoff.svg", "masticatory-tradeoff.nc",
     }  # fmt: skip
     header, rows = read_csv("results/tradeoff.csv")
-    table = {name: np.array(column, float) for name, column in zip(header, zip(*rows), strict=True)}
+    table = {
+        name: np.array(column, float)
+        for name, column in zip(header, np.transpose(rows), strict=True)
+    }
     assert (np.diff(table["weight"]) > 0).all() and table["weight"][0] == 0
     assert (np.diff(table["effort"]) > -1e-12).all()
     assert (np.diff(table["contact_load"]) < 1e-12).all()

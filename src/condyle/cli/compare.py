@@ -10,7 +10,7 @@ import typer
 from . import options
 from .answer import Answer, command_line, files_line
 from .command import COMPUTE, command
-from .inputs import file_stem, motion_and_load, output_folder, require_drawing, warn
+from .inputs import file_stem, motion_and_load, output_folder, require_drawing, warn, weight_of
 from .tradeoff import require_free_weight, weigh
 
 if TYPE_CHECKING:
@@ -54,7 +54,6 @@ def compare(
     import condyle
 
     from ..analysis.compare import compare as compare_models
-    from ..model.reference_force import reference_force
     from ..report.tables import save_tables, tables, with_tables
 
     machine = condyle.load(mechanism)
@@ -62,7 +61,7 @@ def compare(
     if tradeoff:
         require_free_weight(distribution, contact_weight)
         return weigh(machine, path, acting, load_point, preload, out, figures, report)
-    weight = contact_weight / reference_force(machine) ** 2
+    weight = weight_of(machine, contact_weight)
     policy: dict[str, Any] = {
         "distribution": distribution,
         "preload": preload,

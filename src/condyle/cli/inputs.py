@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 from dataclasses import replace
@@ -81,10 +82,22 @@ def chosen_model(
     """
     import condyle
 
+    weight = weight_of(machine, contact_weight)
+    return condyle.derive(machine, formulation, route, backend, distribution, preload, weight)
+
+
+def weight_of(machine: Mechanism, contact_weight: float) -> float:
+    """W / N_ref^2 [1/N^2] of W.
+
+    Raises: InputError: unless W is a number of at least 0.
+    """
     from ..model.reference_force import reference_force
 
-    weight = contact_weight / reference_force(machine) ** 2
-    return condyle.derive(machine, formulation, route, backend, distribution, preload, weight)
+    if not (math.isfinite(contact_weight) and contact_weight >= 0):
+        raise InputError(
+            f"--contact-weight: expected a number of at least 0, got {contact_weight:g}"
+        )
+    return contact_weight / reference_force(machine) ** 2
 
 
 def chews(machine: Mechanism, landmark: str | None = None) -> bool:

@@ -47,14 +47,12 @@ Distribution = Annotated[
 Preload = Annotated[
     float,
     typer.Option(
-        min=0.0,
         help="Least push of one-sided contacts (N), where efforts are chosen within limits.",
     ),
 ]
 ContactWeight = Annotated[
     float,
     typer.Option(
-        min=0.0,
         help="With weighted: adds W (force/N_ref)^2 of every contact to what is least, from least "
         "effort (0) to least load on the contacts. N_ref is the largest limit of the chains, as "
         "a force.",
