@@ -22,7 +22,9 @@ from condyle.errors import (
 )
 from condyle.mechanism import Mechanism, bundled_text, parse
 from condyle.model.judge import require_ok
+from condyle.results.derived import Derived
 from condyle.results.summary import summarize, work
+from condyle.results.warnings import Watch
 from condyle.status import STATUS_NAMES, Status
 
 MU, SMOOTHING = 0.12, 2e-3
@@ -234,6 +236,21 @@ def test_each_status_is_an_error_of_its_own(status: Status, kind: type[SampleErr
     with pytest.raises(kind, match="row 2") as caught:
         require_ok(model.mechanism, found)
     assert caught.value.samples == [1]
+
+
+@pytest.mark.parametrize("limited", [True, False])
+def test_rounding_at_a_limit_is_no_alarm(limited: bool) -> None:
+    """Efforts within limits keep them to the accuracy of the certificate, and contacts push."""
+    mechanism = machine(ONE_SIDED)
+    model = condyle.derive(mechanism, backend="numpy")
+    q = np.zeros((3, 4))
+    found = model.evaluate(q, q, q, np.zeros((3, 9)))
+    found.effort[:] = 3.0 * (1 + 1e-12)
+    found.contact_force[:] = 1e-11
+    watch = Watch(mechanism)
+    watch.see(Derived(mechanism, found, limited=limited), np.arange(3.0))
+    told = {notice.kind for notice in watch.notices()} & {"effort_limit", "lift_off"}
+    assert told == (set() if limited else {"effort_limit", "lift_off"})
 
 
 # -- summary ------------------------------------------------------------------------------------
