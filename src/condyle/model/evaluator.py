@@ -282,7 +282,9 @@ class Evaluator:
         """Sliding velocity and friction force at the contacts, (N, k, 3) each."""
         force = values["contact_force"]
         if "slip" not in values:
-            none = np.zeros((force.shape[1], force.shape[0], 3))
+            # Of friction that no kernel goes through the sliding is not known.
+            known = not self._structure.friction
+            none = np.full((force.shape[1], force.shape[0], 3), 0.0 if known else np.nan)
             return {"slip": none, "friction_force": none}
         drag = np.moveaxis(values["drag"], -1, 0)
         return {
@@ -328,8 +330,9 @@ class Evaluator:
     ) -> None:
         """Replace what the least norm does not serve, in place, by what the policy asks for."""
         values["shortfall"] = np.ones(len(status))
-        if "share" in values and not self._structure.friction:
-            values["share"] = np.concatenate([values["share"], 0 * values["share"][:1]])
+        if "share" in values:
+            more = np.zeros((len(self.parts) - len(values["share"]), *values["share"].shape[1:]))
+            values["share"] = np.concatenate([values["share"], more])
         rows = self._distributor.rows(values, status)
         if not rows.size:
             return
