@@ -17,7 +17,9 @@ __version__ = "0.1.0"
 # Heavy rooms open when they are entered: `import condyle` alone loads nothing.
 _HOMES = {
     "CondyleError": "errors",
+    "InfeasibleError": "errors",
     "InputError": "errors",
+    "JammedError": "errors",
     "MechanismError": "errors",
     "SingularError": "errors",
     "UnreachableError": "errors",
@@ -41,7 +43,9 @@ _HOMES = {
 if TYPE_CHECKING:
     from .errors import (
         CondyleError,
+        InfeasibleError,
         InputError,
+        JammedError,
         MechanismError,
         SingularError,
         UnreachableError,

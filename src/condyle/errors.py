@@ -177,6 +177,22 @@ class NumberRangeError(SingularError):
         return "overflow"
 
 
+class InfeasibleError(SampleError):
+    """A sample that no efforts within the limits balance.
+
+    Attributes: value: the least number by which all limits would have to be multiplied, inf where
+                no limits would do;  bound: 1.
+    """
+
+
+class JammedError(SampleError):
+    """A sample at which friction holds whatever the actuators do: no pattern is consistent."""
+
+
+class UncertifiedError(SampleError):
+    """Efforts that were found, but not within the accuracy that is promised."""
+
+
 class BoundsError(SampleError):
     """A contact outside its bounds, where that was asked to be an error."""
 

@@ -14,6 +14,7 @@ import pytest
 import condyle
 from condyle.backends.choose import BACKENDS
 from condyle.cli import completion
+from condyle.distribution import OBJECTIVES
 from condyle.dynamics import FORMULATIONS, ROUTES
 from condyle.mechanism import bundled_text
 from condyle.motion import parse_units
@@ -26,6 +27,7 @@ HEAVY = {"casadi", "numpy", "scipy", "xarray", "matplotlib", "plotly", "viser"}
 def test_the_names_are_those_of_the_registries() -> None:
     assert tuple(FORMULATIONS) == completion.FORMULATIONS
     assert (completion.ROUTES, completion.BACKENDS) == (ROUTES, BACKENDS)
+    assert sorted(OBJECTIVES) == sorted(completion.DISTRIBUTIONS)
     assert tuple(PLOTS) == completion.FIGURES
     assert tuple(STYLES) == completion.STYLES
     assert tuple(completion.bundled()) == condyle.bundled_mechanisms()
@@ -44,6 +46,7 @@ def test_the_names_are_those_of_the_registries() -> None:
         ("condyle run --formulation mo", {"momentum"}),
         ("condyle solve --route ", {"core", "direct"}),
         ("condyle run --backend comp", {"compiled"}),
+        ("condyle solve --distribution min", {"minimum_norm", "minimax"}),
         ("condyle run --units mm", {"mm,rad", "mm,deg"}),
         ("condyle plot x.nc --figure contact", {"contact_force", "contact_track"}),
         ("condyle run --load-point right", {"right_molar"}),

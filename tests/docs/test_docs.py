@@ -320,6 +320,7 @@ JSON = {
     "condyle reference": ("reference", "--out", "reference"),
     "condyle run": ("run", "--rate", "20", "--out", "results"),
     "condyle solve": ("solve", "my.toml", "--states", "states.csv", "--out", "t.csv"),
+    "condyle compare --tradeoff": ("compare", "--tradeoff", "--rate", "20", "--out", "curve"),
     "condyle pose": ("pose", "my.toml", "--joints", "encoders.csv", "--out", "p.csv"),
     "condyle pose --all": (
         *("pose", "gough-stewart", "--joints", "legs.csv", "--out", "m.csv", "--all"),

@@ -111,17 +111,22 @@ def compare(
     load: Load | None = None,
     load_point: str | None = None,
     formulations: Sequence[str] | None = None,
+    distribution: str | None = None,
+    preload: float = 0.0,
+    contact_weight: float = 0.0,
 ) -> Comparison:
     """Compute one motion by every formulation and route, with and without the contacts.
 
     Args:   motion, load, load_point: as in `Model.solve`.
             formulations: names; all by default.
+            distribution, preload, contact_weight: how efforts are chosen, as in `derive`.
     Raises: UnreachableError, SingularError: for samples that cannot be computed.
             InputError: for an unknown formulation, or a motion or load that does not fit.
     """
     names = [formulation_named(name).name for name in formulations or FORMULATIONS]
     # The first derivation also pays for imports, so it is not one of those that are timed.
-    model = TimedModel(mechanism, names[0], "core")
+    policy = distribution, preload, contact_weight
+    model = TimedModel(mechanism, names[0], "core", *policy)
     solution = model.solve(motion, load, load_point)
     samples = samples_of(model, solution)
     models, unavailable = [], []
@@ -129,7 +134,7 @@ def compare(
     with step("deriving every model", len(kinds)) as advance:
         for name, route in kinds:
             try:
-                models.append(TimedModel(mechanism, name, route))
+                models.append(TimedModel(mechanism, name, route, *policy))
             except UnsupportedError as error:
                 unavailable.append(Unavailable(f"{name} {route}", str(error)))
             advance(1)
@@ -139,7 +144,7 @@ def compare(
         unavailable.append(Unavailable("without contacts", reason))
     else:
         free = mechanism.replace(contacts=(), dependent=None)
-        models += [TimedModel(free, name, "core") for name in names]
+        models += [TimedModel(free, name, "core", *policy) for name in names]
         measures = models[-1].configuration(samples.pose).singularity
         condition = float(measures.condition.max())
     runs = []

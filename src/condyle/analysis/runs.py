@@ -24,10 +24,19 @@ class TimedModel(Model):
     Attributes: symbolic: seconds of the derivation: the graph of the efforts.
     """
 
-    def __init__(self, mechanism: Mechanism, formulation: str, route: str) -> None:
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        formulation: str,
+        route: str,
+        distribution: str | None = None,
+        preload: float = 0.0,
+        contact_weight: float = 0.0,
+    ) -> None:
+        policy = distribution, preload, contact_weight
         with without_collection():
             start = clock()
-            super().__init__(mechanism, formulation, route, backend="numpy")
+            super().__init__(mechanism, formulation, route, "numpy", *policy)
             self.kernel("inverse", ())
             self.symbolic = clock() - start
 

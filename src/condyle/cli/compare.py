@@ -10,7 +10,8 @@ import typer
 from . import options
 from .answer import Answer, command_line, files_line
 from .command import COMPUTE, command
-from .inputs import file_stem, motion_and_load, output_folder, require_drawing, warn
+from .inputs import file_stem, motion_and_load, output_folder, require_drawing, warn, weight_of
+from .tradeoff import require_free_weight, weigh
 
 if TYPE_CHECKING:
     from ..analysis.compare import Comparison
@@ -22,6 +23,17 @@ def compare(
     motion: options.Motion = None,
     load: options.Load = None,
     load_point: options.LoadPoint = None,
+    distribution: options.Distribution = None,
+    preload: options.Preload = 0.0,
+    contact_weight: options.ContactWeight = 0.0,
+    tradeoff: Annotated[
+        bool,
+        typer.Option(
+            "--tradeoff",
+            help="Instead of models, compare weights: the curve between least effort and least "
+            "load on the contacts.",
+        ),
+    ] = False,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("results"),
     units: options.Units = None,
     landmark: options.Landmark = None,
@@ -46,7 +58,16 @@ def compare(
 
     machine = condyle.load(mechanism)
     path, acting = motion_and_load(machine, motion, load, units, landmark, smooth, rate, trim)
-    comparison = compare_models(machine, path, acting, load_point)
+    if tradeoff:
+        require_free_weight(distribution, contact_weight)
+        return weigh(machine, path, acting, load_point, preload, out, figures, report)
+    weight = weight_of(machine, contact_weight)
+    policy: dict[str, Any] = {
+        "distribution": distribution,
+        "preload": preload,
+        "contact_weight": weight,
+    }
+    comparison = compare_models(machine, path, acting, load_point, **policy)
     output_folder(out)
     files = save_tables(comparison, out)
     solution = with_tables(comparison.solution, tables(comparison))
@@ -72,6 +93,9 @@ def compare(
             motion=motion,
             load=load,
             load_point=load_point,
+            distribution=distribution,
+            preload=preload or None,
+            contact_weight=contact_weight or None,
             out=out if out != Path("results") else None,
             units=units,
             landmark=landmark,

@@ -15,6 +15,13 @@ import typer
 
 FORMULATIONS = ("virtual_power", "momentum", "lagrange", "hessian", "newton_euler")
 ROUTES = ("core", "direct")
+DISTRIBUTIONS = {  # name -> what is least, and subject to what
+    "minimum_norm": "sum of squares; no limits",
+    "bounded": "the same within limits, where one-sided contacts push",
+    "weighted": "sum of squares of efforts over their limits, within them",
+    "cubic": "sum of their cubes: muscles, which only pull",
+    "minimax": "the largest of them, then weighted",
+}
 BACKENDS = ("auto", "compiled", "numpy")
 STYLES = ("screen", "journal", "journal-wide")
 UNITS = ("m,rad", "m,deg", "mm,rad", "mm,deg", "cm,rad", "cm,deg")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 from dataclasses import replace
@@ -14,6 +15,7 @@ from ..extras import require
 if TYPE_CHECKING:
     from ..mechanism import Mechanism
     from ..motion import Load, Motion
+    from ..results.model import Model
 
 
 def motion_and_load(
@@ -63,6 +65,39 @@ def motion_and_load(
     if path.kind == "landmark":
         path = replace(path, landmark=resolve_landmark(landmark, machine.platform.points))
     return path, acting
+
+
+def chosen_model(
+    machine: Mechanism,
+    formulation: str,
+    route: str,
+    backend: str,
+    distribution: str | None,
+    preload: float,
+    contact_weight: float,
+) -> Model:
+    """A model whose efforts are chosen as the options say.
+
+    Args: contact_weight: W; the library takes W / N_ref^2.
+    """
+    import condyle
+
+    weight = weight_of(machine, contact_weight)
+    return condyle.derive(machine, formulation, route, backend, distribution, preload, weight)
+
+
+def weight_of(machine: Mechanism, contact_weight: float) -> float:
+    """W / N_ref^2 [1/N^2] of W.
+
+    Raises: InputError: unless W is a number of at least 0.
+    """
+    from ..model.reference_force import reference_force
+
+    if not (math.isfinite(contact_weight) and contact_weight >= 0):
+        raise InputError(
+            f"--contact-weight: expected a number of at least 0, got {contact_weight:g}"
+        )
+    return contact_weight / reference_force(machine) ** 2
 
 
 def chews(machine: Mechanism, landmark: str | None = None) -> bool:

@@ -34,6 +34,30 @@ Route = Annotated[
         autocompletion=completion.one_of(*completion.ROUTES),
     ),
 ]
+Distribution = Annotated[
+    str | None,
+    typer.Option(
+        help="Which of all efforts that balance are chosen, by what is least. "
+        + "; ".join(f"{name}: {least}" for name, least in completion.DISTRIBUTIONS.items())
+        + ". Default: bounded with cables, else minimum_norm. Where N m and N mix: weighted or "
+        "minimax.",
+        autocompletion=completion.one_of(*completion.DISTRIBUTIONS),
+    ),
+]
+Preload = Annotated[
+    float,
+    typer.Option(
+        help="Least push of one-sided contacts (N), where efforts are chosen within limits.",
+    ),
+]
+ContactWeight = Annotated[
+    float,
+    typer.Option(
+        help="With weighted: adds W (force/N_ref)^2 of every contact to what is least, from least "
+        "effort (0) to least load on the contacts. N_ref is the largest limit of the chains, as "
+        "a force.",
+    ),
+]
 LoadPoint = Annotated[
     str | None,
     typer.Option(

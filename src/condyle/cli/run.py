@@ -10,7 +10,14 @@ import typer
 from . import options
 from .answer import Answer, command_line, files_line
 from .command import COMPUTE, command
-from .inputs import file_stem, motion_and_load, output_folder, require_drawing, warn
+from .inputs import (
+    chosen_model,
+    file_stem,
+    motion_and_load,
+    output_folder,
+    require_drawing,
+    warn,
+)
 
 
 @command(
@@ -24,6 +31,9 @@ def run(
     load_point: options.LoadPoint = None,
     formulation: options.Formulation = "virtual_power",
     route: options.Route = "core",
+    distribution: options.Distribution = None,
+    preload: options.Preload = 0.0,
+    contact_weight: options.ContactWeight = 0.0,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("results"),
     units: options.Units = None,
     landmark: options.Landmark = None,
@@ -52,7 +62,8 @@ def run(
 
     machine = condyle.load(mechanism)
     path, acting = motion_and_load(machine, motion, load, units, landmark, smooth, rate, trim)
-    model = condyle.derive(machine, formulation, route, backend)
+    policy = distribution, preload, contact_weight
+    model = chosen_model(machine, formulation, route, backend, *policy)
     solution = model.solve(path, acting, load_point, flag, reactions, threads)
     if strict:
         refuse(solution.notices)

@@ -10,7 +10,7 @@ import typer
 from . import options
 from .answer import Answer, command_line
 from .command import COMPUTE, command
-from .inputs import warn
+from .inputs import chosen_model, warn
 
 
 @command(COMPUTE, example="condyle solve jaw.toml --states states.csv --out torques.csv")
@@ -28,6 +28,9 @@ def solve(
     load_point: options.LoadPoint = None,
     formulation: options.Formulation = "virtual_power",
     route: options.Route = "core",
+    distribution: options.Distribution = None,
+    preload: options.Preload = 0.0,
+    contact_weight: options.ContactWeight = 0.0,
     reactions: options.Reactions = False,
     backend: options.Backend = "auto",
     threads: options.Threads = None,
@@ -42,13 +45,15 @@ def solve(
 
     from ..results.states import solve_file
 
-    model = condyle.derive(condyle.load(mechanism), formulation, route, backend)
+    machine, policy = condyle.load(mechanism), (distribution, preload, contact_weight)
+    model = chosen_model(machine, formulation, route, backend, *policy)
     rows, warnings = solve_file(model, states, out, load_point, flag, strict, reactions, threads)
     warn(warnings)
     data = {
         "mechanism": model.mechanism.name,
         "formulation": model.formulation,
         "route": model.route,
+        "distribution": model.policy.objective,
         "rows": rows,
         "warnings": warnings,
         "files": [out],

@@ -7,13 +7,22 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import NumberRangeError, SampleError, SingularError, UnreachableError
+from ..errors import (
+    InfeasibleError,
+    JammedError,
+    NumberRangeError,
+    SampleError,
+    SingularError,
+    UncertifiedError,
+    UnreachableError,
+)
 from ..mechanism.mechanism import Mechanism
 from ..status import Status
 from .chain import FAMILIES
 from .singularity import SINGULAR, Singularity
 
 FLAG = "or keep such samples with --flag (flag=True)."
+UNBALANCED = (Status.infeasible, Status.jammed, Status.uncertified)
 
 
 @dataclass(frozen=True)
@@ -108,10 +117,12 @@ def sample_error(
     singularity: Singularity,
     t: np.ndarray | None = None,
     first_row: int = 0,
+    shortfall: np.ndarray | None = None,
 ) -> SampleError | None:
     """The error for samples that could not be computed: it names the first and its cause.
 
     Args: as for `causes`;  t: their times;  without, they are rows of a file from `first_row` on.
+          shortfall: by how much limits would have to be multiplied, (N,), where that is known.
     """
     bad = np.flatnonzero(status != Status.ok)
     if not bad.size:
@@ -144,6 +155,8 @@ def sample_error(
             unit="1",
             **about,
         )
+    if status[i] in UNBALANCED:
+        return _unbalanced(int(status[i]), where, more, shortfall, about)
     text = unreachable_text(mechanism, owner, pose[i])
     if owner.kind == "chain":
         chain = mechanism.chains[mechanism.chain_names.index(owner.name)]
@@ -153,5 +166,51 @@ def sample_error(
     return UnreachableError(
         f"{text} at {where}.{more}",
         hint=f"The motion goes too far for this mechanism; scale it down, {FLAG}",
+        **about,
+    )
+
+
+def shortfall_text(shortfall: float) -> str:
+    """What limits would have to be: 'all limits would have to be 1.3 times as large'."""
+    if not np.isfinite(shortfall):
+        return "no limits would do, however large"
+    return f"all limits would have to be {shortfall:.4g} times as large"
+
+
+def _unbalanced(
+    status: int, where: str, more: str, shortfall: np.ndarray | None, about: dict[str, Any]
+) -> SampleError:
+    """The error for samples to which no efforts, or none that are certain, were found."""
+    if status == Status.jammed:
+        return JammedError(
+            f"the mechanism jams at {where}: friction at the contacts has no consistent pattern of "
+            f"signs, with any efforts.{more}",
+            hint="There is no answer with rigid bodies; less friction, another motion or contacts "
+            f"at other slopes have one, {FLAG}",
+            **about,
+        )
+    if status == Status.uncertified:
+        return UncertifiedError(
+            f"the efforts found at {where} could not be certified to 1e-9 of the largest.{more}",
+            hint=f"Loosen limits that leave hardly any room, {FLAG}",
+            **about,
+        )
+    text = f"no efforts within the limits balance the mechanism at {where}"
+    if shortfall is None:
+        return InfeasibleError(f"{text}.{more}", hint=f"Raise the limits, {FLAG}", **about)
+    least = float(shortfall[about["samples"][0]])
+    if np.isfinite(least):
+        advice = "Stronger actuators, a slower motion or a smaller load"
+    else:
+        advice = (
+            "One-sided contacts would have to pull, or cables to push: less --preload, another "
+            "motion or load, or cables that pull the other way help"
+        )
+    return InfeasibleError(
+        f"{text}: {shortfall_text(least)}.{more}",
+        hint=f"{advice}, {FLAG}",
+        value=least,
+        bound=1.0,
+        unit="1",
         **about,
     )

@@ -6,15 +6,15 @@ for, the equations of those samples go to `condyle.distribution`, and come back 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..distribution import OBJECTIVES, Problem, distribute
+from ..distribution import OBJECTIVES, Objective, Problem, distribute
 from ..distribution import Status as Outcome
 from ..dynamics.distribution import minimum_norm
-from ..errors import InputError, did_you_mean
+from ..errors import InputError, did_you_mean, few
 from ..kinematics.chain import FAMILIES
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
@@ -51,15 +51,49 @@ class Policy:
         # The default without cables is as old as the program, and stays.
         chosen = asked or objective != LEAST
         if chosen and len(units) > 1 and not OBJECTIVES[objective].mixes_units:
-            fit = ", ".join(name for name, o in OBJECTIVES.items() if o.mixes_units)
+            fit = _those(lambda o: o.mixes_units)
             raise InputError(
                 f"distribution {objective} adds the squares of efforts, and this mechanism has "
                 f"{' and '.join(sorted(units))}: take one of {fit}, which measure each by its limit"
             )
+        if OBJECTIVES[objective].mixes_units:
+            _require_limits(mechanism, objective)
         for name, value in (("preload", preload), ("contact weight", contact_weight)):
             if not (np.isfinite(value) and value >= 0):
                 raise InputError(f"{name}: expected a number of at least 0, got {value}")
+        if preload and not OBJECTIVES[objective].limits:
+            raise InputError(
+                f"preload {preload:g} N is for efforts within limits, and distribution {objective} "
+                f"knows none: take one of {_those(lambda o: o.limits)}"
+            )
+        if contact_weight and type(OBJECTIVES[objective]).weight is Objective.weight:
+            weighing = _those(lambda o: type(o).weight is not Objective.weight)
+            raise InputError(
+                f"distribution {objective} does not weigh contact forces: take {weighing}, or "
+                "leave the contact weight out"
+            )
         return Policy(objective, preload, contact_weight)
+
+
+def _those(fit: Callable[[Objective], bool]) -> str:
+    return ", ".join(name for name, objective in OBJECTIVES.items() if fit(objective))
+
+
+def _require_limits(mechanism: Mechanism, objective: str) -> None:
+    """Raises InputError where efforts would be measured by limits that there are not."""
+    without = [chain.name for chain in mechanism.chains if not np.isfinite(limits(chain).greatest)]
+    if without:
+        raise InputError(
+            f"distribution {objective} measures each effort by its limit, and {few(without)} "
+            f"{'has' if len(without) == 1 else 'have'} none: give torque_limit or force_limit in "
+            "the mechanism file, or take bounded"
+        )
+    both = [chain.name for chain in mechanism.chains if limits(chain).low < 0]
+    if objective == "cubic" and both:
+        raise InputError(
+            f"distribution cubic is for efforts that only pull, and {few(both)} may be negative: "
+            "set the lower limit to 0, or take weighted"
+        )
 
 
 class Distributor:

@@ -9,15 +9,17 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Collection, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from ..backends.c.kernel import CompiledKernel
 from ..backends.choose import Backend
 from ..backends.kernel import AGAIN, Kernel
+from ..distribution import OBJECTIVES
 from ..dynamics import ROUTES
 from ..dynamics import formulation as formulation_named
 from ..errors import InputError, MechanismError, did_you_mean
@@ -43,6 +45,7 @@ from .checks import LOAD_COLUMNS, POSE_COLUMNS, check_array, check_states
 from .closing import Closure
 from .data import Configuration, Efforts, Evaluation
 from .distributing import LEAST, Distributor, Policy
+from .reference_force import reference_force
 from .robust import Robust
 
 CONDITION = "condition"
@@ -141,6 +144,26 @@ class Evaluator:
         """Names of the parts that share the efforts."""
         internal = not self._distributor.least_norm and not self._structure.friction
         return part_names(self._structure) + (INTERNAL,) * internal
+
+    @property
+    def limited(self) -> bool:
+        """Whether efforts are chosen within limits."""
+        return OBJECTIVES[self.policy.objective].limits
+
+    @cached_property
+    def reference_force(self) -> float:
+        """N_ref, by which `weighted` measures contact forces [N]."""
+        return reference_force(self.mechanism)
+
+    def choosing(
+        self, distribution: str | None = None, preload: float = 0.0, contact_weight: float = 0.0
+    ) -> Self:
+        """The same model, kernels and all, that chooses efforts otherwise; see `derive`."""
+        other = copy(self)
+        other._asked = distribution
+        other.policy = Policy.of(self.mechanism, distribution, preload, contact_weight)
+        other._distributor = Distributor(self.mechanism, other.policy)
+        return other
 
     @cached_property
     def characteristic_length(self) -> float:
@@ -259,7 +282,9 @@ class Evaluator:
         """Sliding velocity and friction force at the contacts, (N, k, 3) each."""
         force = values["contact_force"]
         if "slip" not in values:
-            none = np.zeros((force.shape[1], force.shape[0], 3))
+            # Of friction that no kernel goes through the sliding is not known.
+            known = not self._structure.friction
+            none = np.full((force.shape[1], force.shape[0], 3), 0.0 if known else np.nan)
             return {"slip": none, "friction_force": none}
         drag = np.moveaxis(values["drag"], -1, 0)
         return {
@@ -305,8 +330,9 @@ class Evaluator:
     ) -> None:
         """Replace what the least norm does not serve, in place, by what the policy asks for."""
         values["shortfall"] = np.ones(len(status))
-        if "share" in values and not self._structure.friction:
-            values["share"] = np.concatenate([values["share"], 0 * values["share"][:1]])
+        if "share" in values:
+            more = np.zeros((len(self.parts) - len(values["share"]), *values["share"].shape[1:]))
+            values["share"] = np.concatenate([values["share"], more])
         rows = self._distributor.rows(values, status)
         if not rows.size:
             return

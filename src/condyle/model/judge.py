@@ -28,6 +28,7 @@ def require_ok(
         configuration.singularity,
         t,
         row_offset,
+        evaluation.shortfall,
     )
     if error is not None:
         raise error

@@ -19,7 +19,7 @@ from ..questions.equations import LOAD as LOAD_PART
 from .contacts import AXES
 from .derived import Derived
 from .solution import Solution
-from .variables import VARIABLES, WRENCH, Variable
+from .variables import VARIABLES, WRENCH, Variable, chosen
 from .warnings import Watch
 
 
@@ -39,11 +39,12 @@ def assemble(
     The share of the load is left out where there is no load.
     """
     mechanism = model.mechanism
-    derived = Derived(mechanism, evaluation, wrench)
+    derived = Derived(mechanism, evaluation, wrench, model.limited)
     parts = list(model.parts)
     loaded = bool(np.any(wrench))
     kept = [i for i, part in enumerate(parts) if loaded or part != LOAD_PART]
-    variables = {v.name: _variable(v, derived) for v in VARIABLES}
+    variables = {v.name: _variable(v, derived) for v in VARIABLES if v.when(derived)}
+    variables["torque"][2]["long_name"] = chosen(model.policy.objective)
     if len(kept) < len(parts):
         dims, share, attributes = variables["share"]
         variables["share"] = dims, share[kept], attributes
@@ -69,7 +70,7 @@ def _variable(
 ) -> tuple[tuple[str, ...], np.ndarray, dict[str, str]]:
     """What xarray makes a variable of; numbers of failed samples are NaN."""
     values = variable.values(derived)
-    if values.dtype.kind == "f" and not derived.all_ok:
+    if values.dtype.kind == "f" and not (derived.all_ok or variable.failed):
         values = values.copy()
         values[(slice(None),) * variable.dims.index("time") + (~derived.ok,)] = np.nan
     return variable.dims, values, variable.attributes(derived.mechanism)
@@ -105,6 +106,10 @@ def _options(
     return {
         "formulation": model.formulation,
         "route": model.route,
+        "distribution": model.policy.objective,
+        "preload": model.policy.preload,
+        "contact_weight": model.policy.contact_weight * model.reference_force**2,
+        "reference_force": model.reference_force,
         "motion": motion.source,
         "motion_sha256": motion.sha256,
         "motion_kind": motion.kind,

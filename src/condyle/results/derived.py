@@ -10,6 +10,7 @@ import numpy as np
 
 from ..kinematics.causes import causes
 from ..kinematics.singularity import NEAR_SINGULAR
+from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
 from ..status import Status
 from .contacts import bound_margins, lift_off
@@ -19,12 +20,14 @@ from .contacts import bound_margins, lift_off
 class Derived:
     """An evaluation of N samples, flat, and what follows from it.
 
-    wrench: (N, 6), load on the platform [N, N m], where that is known.
+    wrench:  (N, 6), load on the platform [N, N m], where that is known.
+    limited: whether efforts were chosen within limits.
     """
 
     mechanism: Mechanism
     evaluation: Any
     wrench: np.ndarray = field(default_factory=lambda: np.zeros((0, 6)))
+    limited: bool = False
 
     @cached_property
     def ok(self) -> np.ndarray:
@@ -48,9 +51,43 @@ class Derived:
 
     @cached_property
     def lifted(self) -> np.ndarray:
-        """Whether a one-sided contact would have to pull, (N, k)."""
+        """Whether a one-sided contact would have to pull, (N, k): never within limits."""
+        if self.limited:  # they push, to the accuracy of the certificate
+            return np.zeros(self.evaluation.contact_force.shape, dtype=bool)
         lifted = lift_off(self.mechanism, self.evaluation.contact_force)
         return lifted if self.all_ok else lifted & self.ok[:, None]
+
+    @cached_property
+    def sliding_speed(self) -> np.ndarray:
+        """Of the platform where it touches, (N, k) [m/s]."""
+        return np.linalg.norm(self.evaluation.slip, axis=2)
+
+    @cached_property
+    def friction_power(self) -> np.ndarray:
+        """Power of friction on the platform, (N, k) [W]; never positive."""
+        return np.einsum("nki,nki->nk", self.evaluation.friction_force, self.evaluation.slip)
+
+    @cached_property
+    def actuator_power(self) -> np.ndarray:
+        """Power that actuators deliver, (N, n) [W]."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return self.evaluation.effort * self.evaluation.joint_rate
+
+    @cached_property
+    def activation(self) -> np.ndarray:
+        """Effort over greatest |limit|, (N, n); NaN where there is no limit to measure it by."""
+        greatest = np.array([limits(chain).greatest for chain in self.mechanism.chains])
+        measured = np.isfinite(greatest) & (greatest > 0)
+        return self.evaluation.effort / np.where(measured, greatest, np.nan)
+
+    @cached_property
+    def shortfall(self) -> np.ndarray:
+        """Least number by which all limits would have to be multiplied, (N,).
+
+        1 where they suffice, inf where no limits would do, NaN where the sample fails otherwise.
+        """
+        known = self.ok | (self.evaluation.status == Status.infeasible)
+        return np.where(known, self.evaluation.shortfall, np.nan)
 
     @cached_property
     def inverse_ratio(self) -> np.ndarray:

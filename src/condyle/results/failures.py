@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kinematics.causes import cause_text, owners
+from ..kinematics.causes import cause_text, owners, shortfall_text
 from ..mechanism.mechanism import Mechanism
 from ..status import STATUS_NAMES, Status
 
@@ -23,6 +23,8 @@ class Failure:
     start, end: times of the first and the last [s];  first: index of the first;  count: of them.
     status:     name of the status;  cause: in words.
     owner_kind: chain, contact, platform or sample;  owner_name: of the chain or contacts.
+    shortfall:  of infeasible samples, the largest number by which limits would have to be
+                multiplied; inf where no limits would do.
     """
 
     start: float
@@ -33,11 +35,13 @@ class Failure:
     cause: str
     owner_kind: str
     owner_name: str
+    shortfall: float | None = None
 
     def __str__(self) -> str:
         when = f"{self.start:g} s" if self.count == 1 else f"{self.start:g} to {self.end:g} s"
         count = "1 sample" if self.count == 1 else f"{self.count} samples"
-        return f"t = {when} ({count}): {self.status}, {self.cause}"
+        needed = "" if self.shortfall is None else f"; {shortfall_text(self.shortfall)}"
+        return f"t = {when} ({count}): {self.status}, {self.cause}{needed}"
 
 
 def failures(solution: Solution) -> list[Failure]:
@@ -59,18 +63,34 @@ def failures(solution: Solution) -> list[Failure]:
             cause=cause_text(int(status[start]), possible[cause[start]]),
             owner_kind=possible[cause[start]].kind,
             owner_name=possible[cause[start]].name,
+            shortfall=_largest(solution, slice(start, end), int(status[start])),
         )
         for start, end in zip(starts, ends, strict=True)
         if status[start] != Status.ok
     ]
 
 
+def _largest(solution: Solution, rows: slice, status: int) -> float | None:
+    if status != Status.infeasible or "shortfall" not in solution:
+        return None
+    return float(solution["shortfall"].values[rows].max())
+
+
 def status_columns(
-    mechanism: Mechanism, status: np.ndarray, cause: np.ndarray
+    mechanism: Mechanism,
+    status: np.ndarray,
+    cause: np.ndarray,
+    shortfall: np.ndarray | None = None,
 ) -> dict[str, np.ndarray | list[str]]:
-    """Columns `status` and `cause` of a CSV; the cause of a sample that is ok is empty."""
+    """Columns `status` and `cause` of a CSV; the cause of a sample that is ok is empty.
+
+    Where efforts have limits, `shortfall` besides: see `Derived.shortfall`.
+    """
     words = [str(owner) for owner in owners(mechanism)]
-    return {"status": _words(STATUS_NAMES, status), "cause": _words(words, cause)}
+    needed: dict[str, np.ndarray | list[str]] = {}
+    if shortfall is not None:
+        needed["shortfall"] = shortfall
+    return {"status": _words(STATUS_NAMES, status), "cause": _words(words, cause)} | needed
 
 
 def _words(words: Sequence[str], index: np.ndarray) -> list[str]:

@@ -103,12 +103,13 @@ class Solution(xr.Dataset):
         """Columns of the CSV: t, and those of `VARIABLES`.
 
         Then reactions, if there are any, lift_off_<contact> (0 or 1) of one-sided contacts, and
-        status and cause, if a sample failed.
+        status, cause and, where efforts were chosen within limits, shortfall, if a sample failed.
         """
         columns: dict[str, np.ndarray | list[str]] = {"t": self["time"].values}
         for variable in VARIABLES:
-            if variable.column is not None:
+            if variable.column is not None and variable.name in self:
                 entries, values = self[variable.dims[1]].values, self[variable.name].values
+                values = np.linalg.norm(values, axis=-1) if variable.sizes else values
                 columns |= named_columns(variable.column, entries, values)
         for name in map(str, self.data_vars):
             if name.startswith("reaction_") or name == "contact_force_vector":
@@ -120,7 +121,8 @@ class Solution(xr.Dataset):
         columns |= lift_off_columns(self.mechanism, self["lift_off"].values)
         if (status := self["status"].values).any():
             cause = self["cause"].values if "cause" in self else np.zeros_like(status)
-            columns |= status_columns(self.mechanism, status, cause)
+            shortfall = self["shortfall"].values if "shortfall" in self else None
+            columns |= status_columns(self.mechanism, status, cause, shortfall)
         return columns
 
 

@@ -16,7 +16,7 @@ from .contacts import AXES, lift_off_columns
 from .derived import Derived
 from .failures import status_columns
 from .solution import named_columns
-from .variables import WRENCH
+from .variables import VARIABLES, WRENCH
 from .warnings import Watch, refuse
 
 CHUNK_ROWS = 16384
@@ -82,29 +82,33 @@ def solve_table(
     if load_point is not None or set(given) & set(WRENCH[:3]):
         point = model.load_point(load_point)
     evaluation = model.evaluate(q, q1, q2, with_point(wrench, point), threads)
-    mechanism, derived = model.mechanism, Derived(model.mechanism, evaluation, wrench)
+    mechanism = model.mechanism
+    derived = Derived(mechanism, evaluation, wrench, model.limited)
     if not flag:
         require_ok(mechanism, evaluation, row_offset=first_row)
 
     def filled(array: np.ndarray) -> np.ndarray:
         return array if derived.all_ok else np.where(derived.ok[:, None], array, np.nan)
 
-    values = {
-        "tau_": (mechanism.chain_names, evaluation.effort),
-        "contact_": (mechanism.contact_names, evaluation.contact_force),
-        "": (COORDINATES, evaluation.pose),
-        "joint_": (mechanism.chain_names, evaluation.configuration.joint),
+    labels = {
+        "chain": mechanism.chain_names,
+        "contact": mechanism.contact_names,
+        "coordinate": COORDINATES,
     }
     columns: dict[str, np.ndarray | list[str]] = {}
-    for prefix, (labels, array) in values.items():
-        columns |= named_columns(prefix, labels, filled(array))
+    for variable in VARIABLES:
+        if variable.column is not None and variable.when(derived):
+            array = variable.values(derived)
+            array = np.linalg.norm(array, axis=-1) if variable.sizes else array
+            columns |= named_columns(variable.column, labels[variable.dims[1]], filled(array))
     if reactions:
         for name, reaction in joint_reactions(model, evaluation).items():
             array = filled(reaction.array)
             columns |= {f"reaction_{name}_{axis}": array[:, i] for i, axis in enumerate(AXES)}
     columns |= lift_off_columns(mechanism, derived.lifted)
     if flag:
-        columns |= status_columns(mechanism, evaluation.status, derived.cause)
+        shortfall = derived.shortfall if derived.limited else None
+        columns |= status_columns(mechanism, evaluation.status, derived.cause, shortfall)
     return columns, derived
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..kinematics.causes import shortfall_text
 from .contacts import BOUND_TOLERANCE
 from .failures import Failure
 
@@ -28,15 +29,20 @@ class Summary:
         lines = [
             f"{d['mechanism']}: {d['samples']} samples, {d['time'][0]:g} to {d['time'][1]:g} s, "
             f"{d['formulation']}/{d['route']}, {d['seconds']:.2f} s",
-            "peak effort",
-            *(f"  {name:<{width}}  {v:10.5g} {u}" for name, (v, u) in d["peak_effort"].items()),
+            "peak effort" + (", peak power and work" if d["power"] else ""),
         ]
+        for name, (value, unit) in d["peak_effort"].items():
+            own = d["power"].get(name)
+            power = "" if own is None else f"{own['peak']:11.4g} W{own['work']:11.4g} J"
+            lines.append(f"  {name:<{width}}  {value:10.5g} {unit}{power}")
         if d["peak_contact_force"]:
             lines.append("peak contact force (negative: the surface pushes along -n)")
             lines += [
                 f"  {name:<{width}}  {v[0]:10.5g} to {v[1]:.5g} N"
                 for name, v in d["peak_contact_force"].items()
             ]
+        for name, work in d["friction_work"].items():
+            lines.append(f"work of friction: {name}, {work:.5g} J")
         near = d["closest_to_singularity"]
         if near is not None:
             lines.append(
@@ -54,6 +60,8 @@ class Summary:
             )
         if d["failed_samples"]:
             lines.append(f"samples without a result: {d['failed_samples']}")
+            if d["shortfall"] is not None:
+                lines.append(f"  {shortfall_text(d['shortfall'])}, to serve all of them")
             lines += [f"  {Failure(**one)}" for one in d["failures"][:FEW]]
             if (more := len(d["failures"]) - FEW) > 0:
                 lines.append(f"  and {more} more intervals")
@@ -95,6 +103,10 @@ def summarize(solution: Solution) -> Summary:
             }
             if some
             else {},
+            "distribution": options.get("distribution", "minimum_norm"),
+            "power": _power(solution),
+            "friction_work": _friction_work(solution),
+            "shortfall": _shortfall(solution),
             "peak_contact_force": {
                 str(name): [float(np.nanmin(contact[:, i])), float(np.nanmax(contact[:, i]))]
                 for i, name in enumerate(solution["contact"].values)
@@ -118,3 +130,40 @@ def summarize(solution: Solution) -> Summary:
             "notices": [notice.to_dict() for notice in solution.notices],
         }
     )
+
+
+def work(power: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Integral of powers (N, m) [W] by the trapezoidal rule, (m,) [J], as far as they are known."""
+    pieces = np.diff(time)[:, None] * (power[1:] + power[:-1]) / 2
+    return np.nansum(pieces, axis=0)
+
+
+def _power(solution: Solution) -> dict[str, dict[str, float]]:
+    """Peak power [W] and work [J] of every actuator; nothing where nothing moves."""
+    if "actuator_power" not in solution:  # written before there was one
+        return {}
+    power = solution["actuator_power"].values
+    peak = np.nanmax(np.abs(power), axis=0, initial=0.0)
+    done = work(power, solution["time"].values)
+    if not peak.any():
+        return {}
+    return {
+        str(name): {"peak": float(peak[i]), "work": float(done[i])}
+        for i, name in enumerate(solution["chain"].values)
+    }
+
+
+def _friction_work(solution: Solution) -> dict[str, float]:
+    """Work of friction on the platform [J] at the contacts where there is some."""
+    if "friction_power" not in solution:
+        return {}
+    power = solution["friction_power"].values
+    done = work(power, solution["time"].values)
+    names = solution["contact"].values
+    return {str(name): float(done[i]) for i, name in enumerate(names) if done[i]}
+
+
+def _shortfall(solution: Solution) -> float | None:
+    """The largest number by which limits would have to be multiplied, above 1."""
+    needed = [one.shortfall for one in solution.failures if one.shortfall is not None]
+    return max(needed) if needed else None

@@ -10,14 +10,41 @@ import numpy as np
 from ..kinematics.causes import owners
 from ..kinematics.chain import FAMILIES
 from ..kinematics.singularity import KINDS
+from ..mechanism.chain import limits
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..status import STATUS_NAMES
 from .contacts import AXES
 from .derived import Derived
 
+# How efforts were chosen, as the description of `torque` says it.
+LEAST = "minimum_norm"
+CHOICES = {
+    LEAST: "of least norm",
+    "bounded": "of least norm within limits",
+    "weighted": "of least squares over limits, within them",
+    "cubic": "of least cubes over limits, within them",
+    "minimax": "of which the largest over its limit is least",
+}
+
 WRENCH = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 
 Rule = Callable[[Mechanism], str]
+
+
+def always(_: Derived) -> bool:
+    return True
+
+
+def with_friction(derived: Derived) -> bool:
+    return any(contact.friction.coefficient for contact in derived.mechanism.contacts)
+
+
+def with_limits(derived: Derived) -> bool:
+    return any(limits(chain).limited for chain in derived.mechanism.chains)
+
+
+def chosen_within_limits(derived: Derived) -> bool:
+    return derived.limited
 
 
 @dataclass(frozen=True)
@@ -29,6 +56,9 @@ class Variable:
     column: what the names of its columns begin with in CSV, before that of the entry; None: it
             has none there.
     flags:  what its integers mean, or a rule for that: words that a blank parts.
+    when:   whether a solution has it at all.
+    failed: whether failed samples may have a value too.
+    sizes:  of vectors along the last dimension stand in CSV, not their components.
     """
 
     name: str
@@ -38,6 +68,9 @@ class Variable:
     values: Callable[[Derived], np.ndarray]
     column: str | None = None
     flags: str | Rule = ""
+    when: Callable[[Derived], bool] = always
+    failed: bool = False
+    sizes: bool = False
 
     def attributes(self, mechanism: Mechanism) -> dict[str, str]:
         """`units`, `long_name` and, where there are flags, `flag_meanings`."""
@@ -45,6 +78,11 @@ class Variable:
         flags = self.flags if isinstance(self.flags, str) else self.flags(mechanism)
         named = {"flag_meanings": flags} if flags else {}
         return {"units": units, "long_name": self.meaning, **named}
+
+
+def chosen(distribution: str) -> str:
+    """What `torque` is under a distribution; one from elsewhere is called by its name."""
+    return f"actuator effort {CHOICES.get(distribution, f'by distribution {distribution}')}"
 
 
 def of_effort(form: str = "{}") -> Rule:
@@ -78,7 +116,7 @@ _PLACE = (*_CONTACT, "axis")
 # fmt: off
 VARIABLES = (
     Variable(
-        "torque", _CHAIN, of_effort(), "actuator effort of least norm",
+        "torque", _CHAIN, of_effort(), chosen(LEAST),
         lambda d: d.evaluation.effort, column="tau_",
     ),
     Variable(
@@ -93,6 +131,36 @@ VARIABLES = (
     Variable(
         "joint", _CHAIN, of_joint(), "joint coordinate, zero at home",
         lambda d: d.evaluation.configuration.joint, column="joint_",
+    ),
+    Variable(
+        "sliding_speed", _CONTACT, "m/s",
+        "speed of the platform where it touches, where contacts have friction",
+        lambda d: d.sliding_speed, column="sliding_", when=with_friction,
+    ),
+    Variable(
+        "friction_force", _PLACE, "N",
+        "friction on the platform in {S}, where contacts have some",
+        lambda d: d.evaluation.friction_force, column="friction_", when=with_friction, sizes=True,
+    ),
+    Variable(
+        "friction_power", _CONTACT, "W",
+        "power of friction on the platform, never positive, where contacts have friction",
+        lambda d: d.friction_power, when=with_friction,
+    ),
+    Variable(
+        "actuator_power", _CHAIN, "W", "power of the actuator: effort times joint rate",
+        lambda d: d.actuator_power,
+    ),
+    Variable(
+        "activation", _CHAIN, "1",
+        "effort over the greatest |limit| of its chain, where chains have limits; nan without one",
+        lambda d: d.activation, when=with_limits,
+    ),
+    Variable(
+        "shortfall", ("time",), "1",
+        "by how much all limits would have to be multiplied, where efforts were chosen within "
+        "limits: 1 where they suffice, inf where no limits would do",
+        lambda d: d.shortfall, when=chosen_within_limits, failed=True,
     ),
     Variable(
         "pose_rate", _POSE, of_pose("{}/s"), "rate of X_EE", lambda d: d.evaluation.pose_rate

@@ -15,14 +15,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import BoundsError
-from ..kinematics.causes import cause_text, owners
+from ..kinematics.causes import cause_text, owners, shortfall_text
 from ..kinematics.chain import FAMILIES
 from ..kinematics.singularity import NEAR_SINGULAR
 from ..mechanism.chain import limits
 from ..mechanism.home import HOME_WARNING, home_residuals, home_warnings
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.plausibility import plausibility_warnings
-from ..status import STATUS_NAMES
+from ..status import STATUS_NAMES, Status
 from .contacts import BOUND_TOLERANCE
 from .derived import Derived
 
@@ -52,7 +52,8 @@ KINDS = {
     ),
     "lift_off": Kind(
         "a one-sided contact lifts off",
-        "the ball would leave the surface: the model no longer holds there",
+        "the ball would leave the surface: the model no longer holds there; "
+        "`--distribution bounded` chooses efforts that press it on, where there are some",
     ),
     "given_pose_residual": Kind(
         "poses off the contact surfaces",
@@ -69,7 +70,8 @@ KINDS = {
     ),
     "effort_limit": Kind(
         "effort beyond a limit",
-        "another actuator, or another motion; efforts of least norm know no limits",
+        "another actuator, or another motion; efforts of least norm know no limits, "
+        "`--distribution bounded` keeps them",
     ),
     "speed_limit": Kind("speed above a limit", "another actuator, or another motion"),
     "rod_angles": Kind(
@@ -164,13 +166,15 @@ class Watch:
             tally("near_singularity", 0, derived.near != 0, -derived.ratio)
             for i, chain in enumerate(self.mechanism.chains):
                 limit, effort, speed = limits(chain), e.effort[:, i], np.abs(e.joint_rate[:, i])
+                tally("speed_limit", i, speed > limit.speed, speed)
+                if derived.limited:  # kept, to the accuracy of the certificate
+                    continue
                 if limit.symmetric:
                     size = np.abs(effort)
                     tally("effort_limit", i, size > limit.high, size)
                 else:
                     tally("effort_limit", i, effort > limit.high, effort)
                     tally(LOW, i, effort < limit.low, -effort)
-                tally("speed_limit", i, speed > limit.speed, speed)
             flat = np.abs(configuration.cos_gamma)
             if (flat < NEAR_SINGULAR).any():
                 for i in range(flat.shape[1]):
@@ -180,7 +184,9 @@ class Watch:
                 mine = derived.cause == code
                 for status in np.unique(e.status[mine]):
                     of_both = mine & (e.status == status)
-                    tally("failed_samples", int(code), of_both, np.zeros(len(ok)), int(status))
+                    needed = status == Status.infeasible and derived.limited
+                    size = derived.shortfall if needed else np.zeros(len(ok))
+                    tally("failed_samples", int(code), of_both, size, int(status))
 
     def notices(self) -> list[Notice]:
         """What there is to say, in the order of `KINDS`."""
@@ -227,6 +233,10 @@ class Watch:
             owner = owners(self.mechanism)[i]
             text = f"{count} left empty, first {self._at(tally.first)}: {cause_text(status, owner)}"
             named = owner.name or None
+            if size > 0:
+                text += f"; {shortfall_text(size)} {worst}"
+                # What no limits would do for has no number: JSON knows none that is infinite.
+                about |= {"value": size if np.isfinite(size) else None, "bound": 1.0, "unit": "1"}
             return Notice(kind, text, named, status=STATUS_NAMES[status], **about)
         chain = self.mechanism.chains[i]
         if kind == "rod_angles":

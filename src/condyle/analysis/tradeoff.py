@@ -1,0 +1,112 @@
+"""From least effort to least load on the contacts: what one costs of the other.
+
+    sum (effort_i / max_i)^2 + W sum (lambda_k / N_ref)^2   is least,
+
+for weights W from 0 on. As W grows the efforts never fall and the contact forces never grow, in
+the root mean square over the motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..kinematics.contact import indices
+from ..mechanism.chain import limits
+from ..mechanism.mechanism import Mechanism
+from ..progress import step
+from ..results.model import derive
+from ..status import Status
+from .compare import samples_of
+
+if TYPE_CHECKING:
+    from ..motion import Load, Motion
+    from ..results.solution import Solution
+
+WEIGHTS = (0.0, *(float(w) for w in np.logspace(-2, 4, 13)))
+
+
+@dataclass(frozen=True)
+class Tradeoff:
+    """One motion at several weights W, (P,).
+
+    solution:   with the first weight; its motion is that of all.
+    reference_force: N_ref [N].
+    effort:     root mean square over the samples of sqrt(sum (effort_i / max_i)^2), (P,).
+    load:       the same of sqrt(sum lambda_k^2), (P,) [N].
+    activation: greatest |effort_i| / max_i of the motion, (P,).
+    mean, peak: of |lambda_k| along the motion, (P, k) [N].
+    samples:    how many are in these: those with a result at every weight.
+    """
+
+    solution: Solution
+    weights: np.ndarray
+    reference_force: float
+    effort: np.ndarray
+    load: np.ndarray
+    activation: np.ndarray
+    mean: np.ndarray
+    peak: np.ndarray
+    samples: int
+
+
+def tradeoff(
+    mechanism: Mechanism,
+    motion: Motion,
+    load: Load | None = None,
+    load_point: str | None = None,
+    weights: Sequence[float] = WEIGHTS,
+    preload: float = 0.0,
+    **model: Any,
+) -> Tradeoff:
+    """Solve one motion by `weighted` at several weights.
+
+    Args:   motion, load, load_point: as in `Model.solve`.
+            weights: W, from the least.   preload: least push of one-sided contacts [N].
+            model: formulation, route and backend of `derive`.
+    Raises: InputError: without contacts, or with chains that have no limits.
+            InfeasibleError and other errors of samples: as of `Model.solve`.
+    """
+    if not mechanism.contacts:
+        raise InputError(
+            f'"{mechanism.name}" has no contacts, so no load on them to weigh against efforts'
+        )
+    asked = np.asarray(weights, dtype=float)
+    if asked.ndim != 1 or not asked.size or (np.diff(asked) <= 0).any():
+        raise InputError(f"weights: expected numbers that rise, got {list(weights)}")
+    first = derive(mechanism, distribution="weighted", preload=preload, **model)
+    unit = first.reference_force**2
+    one = first.choosing("weighted", preload, asked[0] / unit)
+    solution = one.solve(motion, load, load_point)
+    samples = samples_of(one, solution)
+    columns = indices(one.independent)
+    states = [a[:, columns] for a in (samples.pose, samples.rate, samples.acceleration)]
+    efforts, forces, good = [], [], np.ones(len(samples.pose), dtype=bool)
+    with step("solving at every weight", len(asked)) as advance:
+        for weight in asked:
+            one = first.choosing("weighted", preload, weight / unit)
+            found = one.torques(states[0], states[1], states[2], samples.load, ("contact",))
+            efforts.append(found.effort)
+            forces.append(found["contact_force"])
+            good &= found.status == Status.ok
+            advance(1)
+    if not good.any():
+        raise InputError("no sample has a result at every weight: leave the largest out")
+    greatest = np.array([limits(chain).greatest for chain in mechanism.chains])
+    use = np.array(efforts)[:, good] / np.where(greatest > 0, greatest, 1.0)
+    force = np.abs(np.array(forces)[:, good])
+    return Tradeoff(
+        solution,
+        asked,
+        first.reference_force,
+        np.sqrt((use**2).sum(axis=2).mean(axis=1)),
+        np.sqrt((force**2).sum(axis=2).mean(axis=1)),
+        np.abs(use).max(axis=(1, 2)),
+        force.mean(axis=1),
+        force.max(axis=1),
+        int(good.sum()),
+    )

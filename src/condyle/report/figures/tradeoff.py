@@ -1,0 +1,52 @@
+"""The curve between least effort and least load on the contacts."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from .chains import readable
+from .labels import caption
+from .style import DARK, house, look, new_figure
+
+if TYPE_CHECKING:
+    from ...analysis.tradeoff import Tradeoff
+
+
+@house
+def tradeoff_figure(found: Tradeoff) -> Figure:
+    """Load on the contacts over effort, and each contact's mean force over the weight."""
+    figure = new_figure("Effort against load on the contacts", caption(found.solution), 8.5, 4.0, 2)
+    left, right = figure.subplots(1, 2)
+    left.plot(found.effort, found.load, marker="o", markersize=4, color=DARK)
+    for p in apart(found):
+        text = f"W = {found.weights[p]:.3g}"
+        place = found.effort[p], found.load[p]
+        left.annotate(text, place, (5, 4), textcoords="offset points", fontsize=7, color=DARK)
+    left.margins(x=0.15, y=0.08)
+    left.set_title("from least effort to least load")
+    left.set_xlabel("effort: root of mean sum (effort/limit)² [1]")
+    left.set_ylabel("load on the contacts, root mean square [N]")
+    names = found.solution.mechanism.contact_names
+    for k, name in enumerate(names):
+        right.plot(found.weights, found.mean[:, k], label=readable(name), **look(k))
+    right.set_xscale("symlog", linthresh=found.weights[found.weights > 0].min(initial=1.0))
+    right.set_title("mean force at each contact")
+    right.set_xlabel("weight of the contacts W [1]")
+    right.set_ylabel("force [N]")
+    right.legend(loc="upper right")
+    return figure
+
+
+def apart(found: Tradeoff, least: float = 0.08) -> list[int]:
+    """Points of the curve whose labels do not stand on each other, the first among them."""
+    curve = np.column_stack([found.effort, found.load])
+    extent = np.ptp(curve, axis=0)
+    curve = curve / np.where(extent > 0, extent, 1.0)
+    kept = [0]
+    for p in range(1, len(curve)):
+        if np.abs(curve[p] - curve[kept[-1]]).max() > least:
+            kept.append(p)
+    return kept

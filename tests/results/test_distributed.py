@@ -1,0 +1,315 @@
+"""Results of efforts that are chosen: friction, power, activation, and samples without efforts."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import re
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.errors import (
+    InfeasibleError,
+    InputError,
+    JammedError,
+    NumberRangeError,
+    SampleError,
+    UncertifiedError,
+)
+from condyle.mechanism import Mechanism, bundled_text, parse
+from condyle.model.judge import require_ok
+from condyle.results.derived import Derived
+from condyle.results.summary import summarize, work
+from condyle.results.warnings import Watch
+from condyle.status import STATUS_NAMES, Status
+
+MU, SMOOTHING = 0.12, 2e-3
+FRICTION = f"friction = {{ coefficient = {MU}, smoothing_speed = {SMOOTHING} }}\n"
+ONE_SIDED = 'one_sided = true\nside = "below"\n'
+FRICTION_VARIABLES = {"sliding_speed", "friction_force", "friction_power"}
+
+
+def machine(contact: str = "", limit: float = 3.0, chains: int = 6) -> Mechanism:
+    """The chewing robot with other contacts, torque limits [N m] and fewer chains."""
+    text = re.sub(r"(\[\[contact\]\]\n)", rf"\g<1>{contact}", bundled_text("masticatory"))
+    whole = parse(text.replace("torque_limit = 3.0", f"torque_limit = {float(limit)!r}"))
+    return whole.replace(chains=whole.chains[:chains])
+
+
+def solve(mechanism: Mechanism, flag: bool = False, **policy: object) -> condyle.Solution:
+    model = condyle.derive(mechanism, backend="numpy", **policy)  # type: ignore[arg-type]
+    return model.solve(condyle.trial_motion(mechanism, rate=40), flag=flag)
+
+
+@pytest.fixture(scope="module")
+def rubbing() -> condyle.Solution:
+    return solve(machine(FRICTION))
+
+
+def test_friction_is_the_contracts(rubbing: condyle.Solution) -> None:
+    """-mu |lambda| v / sqrt(v^2 + s^2), in the tangent plane; its power is against the motion."""
+    speed = rubbing["sliding_speed"].values
+    size = MU * np.abs(rubbing["contact_force"].values) * speed / np.hypot(speed, SMOOTHING)
+    force = rubbing["friction_force"].values
+    assert size.max() > 1e-3
+    np.testing.assert_allclose(np.linalg.norm(force, axis=2), size, rtol=1e-10, atol=1e-14)
+    normal = (force * rubbing["contact_normal"].values).sum(axis=2)
+    assert np.abs(normal).max() < 1e-10 * size.max()
+    np.testing.assert_allclose(rubbing["friction_power"], -size * speed, rtol=1e-9, atol=1e-15)
+
+
+def test_what_friction_takes_the_actuators_give(rubbing: condyle.Solution) -> None:
+    """On the same motion the power of the actuators grows by what friction takes."""
+    smooth = solve(machine())
+    more = (rubbing["actuator_power"] - smooth["actuator_power"]).sum("chain")
+    taken = -rubbing["friction_power"].sum("contact")
+    assert float(taken.max()) > 1e-5
+    np.testing.assert_allclose(more, taken, atol=1e-10 * float(abs(smooth["actuator_power"]).max()))
+
+
+def test_they_are_there_where_they_mean_something(rubbing: condyle.Solution) -> None:
+    smooth = solve(machine())
+    assert {*rubbing.data_vars} >= FRICTION_VARIABLES
+    assert not FRICTION_VARIABLES & {*smooth.data_vars}
+    assert "shortfall" not in smooth and "activation" in smooth
+    unlimited = bundled_text("masticatory").replace("torque_limit = 3.0, ", "")
+    assert "activation" not in solve(parse(unlimited))
+    bounded = solve(machine(), distribution="bounded")
+    assert (bounded["shortfall"] == 1).all()
+    assert bounded["torque"].attrs["long_name"] == "actuator effort of least norm within limits"
+
+
+def test_columns(rubbing: condyle.Solution) -> None:
+    """Sizes of friction, and nothing new where there is none."""
+    columns = rubbing.columns()
+    for k, name in enumerate(rubbing.mechanism.contact_names):
+        force = np.linalg.norm(rubbing["friction_force"].values[:, k], axis=1)
+        np.testing.assert_allclose(columns[f"friction_{name}"], force)
+        np.testing.assert_allclose(columns[f"sliding_{name}"], rubbing["sliding_speed"][:, k])
+    new = {name for name in columns if name.startswith(("friction_", "sliding_"))}
+    assert {*columns} - new == {*solve(machine()).columns()}
+
+
+def test_activation_is_of_the_greater_limit() -> None:
+    text = bundled_text("masticatory").replace("torque_limit = 3.0", "torque_limit = [-1, 2]", 1)
+    text = text.replace("torque_limit = 3.0, ", "", 1)
+    found = solve(parse(text))
+    use, effort = found["activation"].values, found["torque"].values
+    np.testing.assert_allclose(use[:, 0], effort[:, 0] / 2, rtol=1e-15)
+    assert np.isnan(use[:, 1]).all()
+    np.testing.assert_allclose(use[:, 2:], effort[:, 2:] / 3, rtol=1e-15)
+
+
+def test_options_say_how_efforts_were_chosen() -> None:
+    mechanism = machine(ONE_SIDED)
+    model = condyle.derive(mechanism, backend="numpy")
+    weight = 0.5 / model.reference_force**2
+    found = solve(mechanism, distribution="weighted", preload=0.25, contact_weight=weight)
+    assert found.options["distribution"] == "weighted" and found.options["preload"] == 0.25
+    assert found.options["contact_weight"] == pytest.approx(0.5)
+    # 3 N m at the characteristic length.
+    assert found.options["reference_force"] == pytest.approx(3 / model.characteristic_length)
+    push = -found["contact_force"].values
+    assert push.min() > 0.25 - 1e-7 and push.min() < 0.26
+    assert not found["lift_off"].any()
+    assert not {notice.kind for notice in found.notices} & {"lift_off", "effort_limit"}
+    assert solve(mechanism).options["distribution"] == "minimum_norm"
+
+
+def test_reference_force() -> None:
+    jaw = condyle.derive(condyle.load("human-jaw"), backend="numpy")
+    greatest = max(chain.actuator.force_limit[1] for chain in jaw.mechanism.chains)
+    assert jaw.reference_force == greatest
+    unlimited = parse(bundled_text("masticatory").replace("torque_limit = 3.0, ", ""))
+    assert condyle.derive(unlimited, backend="numpy").reference_force == 1.0
+
+
+# -- samples without efforts ---------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def weak() -> condyle.Solution:
+    """Limits that the motion needs more than at some of its samples."""
+    limit = float(np.median(least_peak()))
+    return solve(machine(limit=limit), flag=True, distribution="bounded")
+
+
+@cache
+def least_peak() -> np.ndarray:
+    """The largest effort of each sample, where that is least: what limits have to be."""
+    efforts = solve(machine(), distribution="minimax")["torque"].values
+    return np.abs(efforts).max(axis=1)
+
+
+def test_shortfall_is_the_least_factor(weak: condyle.Solution) -> None:
+    """With all limits so much larger the worst sample is served; with a little less it is not."""
+    failed = weak["status"].values != 0
+    assert 0 < failed.sum() < failed.size
+    assert {STATUS_NAMES[i] for i in weak["status"].values[failed]} == {"infeasible"}
+    factor, limit = weak["shortfall"].values, weak.mechanism.chains[0].actuator.torque_limit
+    assert (factor[~failed] == 1).all() and (factor[failed] > 1).all()
+    np.testing.assert_allclose(factor[failed], least_peak()[failed] / limit, rtol=1e-8)
+    more = solve(machine(limit=limit * factor.max() * 1.0001), distribution="bounded")
+    assert not more["status"].any()
+    less = solve(machine(limit=limit * factor.max() * 0.9999), flag=True, distribution="bounded")
+    assert less["status"].values[factor.argmax()] == Status.infeasible
+
+
+def test_infeasible_samples_are_told_of(weak: condyle.Solution, tmp_path: Path) -> None:
+    worst = float(weak["shortfall"].max())
+    failed = weak["status"].values != 0
+    assert np.isnan(weak["torque"].values[failed]).all()
+    assert max(f.shortfall for f in weak.failures) == worst
+    assert all(f.status == "infeasible" and f.shortfall > 1 for f in weak.failures)
+    assert "times as large" in str(weak.failures[0])
+    told = {notice.kind: notice for notice in weak.notices}
+    assert "effort_limit" not in told
+    assert (told["failed_samples"].value, told["failed_samples"].bound) == (worst, 1.0)
+    summary = summarize(weak)
+    assert summary.data["shortfall"] == worst
+    assert f"all limits would have to be {worst:.4g} times as large" in str(summary)
+    weak.save(tmp_path / "a.nc", tmp_path / "a.csv")
+    again = condyle.open_solution(tmp_path / "a.nc")
+    assert again.failures == weak.failures and again.notices == weak.notices
+    header, *rows = (tmp_path / "a.csv").read_text().splitlines()
+    assert header.endswith(",status,cause,shortfall")
+    assert float(rows[int(weak["shortfall"].values.argmax())].rpartition(",")[2]) == worst
+
+
+def test_infeasible_is_an_error() -> None:
+    with pytest.raises(InfeasibleError) as caught:
+        solve(machine(limit=1e-3), distribution="bounded")
+    error = caught.value
+    assert isinstance(error, SampleError) and error.kind == "infeasible"
+    assert error.value > 1 and error.bound == 1.0 and error.time == 0.0
+    assert "t = 0 s" in error.message
+    assert f"would have to be {error.value:.4g} times as large" in error.message
+    assert "--flag" in error.hint
+    again = pickle.loads(pickle.dumps(error))
+    assert (type(again), vars(again)) == (type(error), vars(error))
+    assert json.dumps(error.to_dict())
+
+
+def test_where_no_limits_would_do() -> None:
+    """As many efforts as freedoms leave no choice: a contact that must pull, must."""
+    mechanism = machine(ONE_SIDED, chains=4)
+    with pytest.raises(InfeasibleError, match="no limits would do") as caught:
+        solve(mechanism, distribution="bounded")
+    assert caught.value.value == np.inf and "preload" in caught.value.hint
+    found = solve(mechanism, flag=True, distribution="bounded")
+    bare = solve(machine(chains=4))
+    pulls = (bare["contact_force"].values > 1e-9).any(axis=1)
+    assert (np.isinf(found["shortfall"].values) == pulls).all() and pulls.any()
+    assert "no limits would do" in str(found.failures[0])
+    assert json.loads(json.dumps([n.to_dict() for n in found.notices], allow_nan=False))
+
+
+def test_jammed() -> None:
+    """Much friction and no redundancy: somewhere neither sign of the forces is consistent."""
+    mechanism = machine("friction = { coefficient = 0.3 }\n", chains=4)
+    found = solve(mechanism, flag=True)
+    assert {STATUS_NAMES[i] for i in found["status"].values} == {"ok", "jammed"}
+    assert found.failures[0].status == "jammed" and "jam" in found.failures[0].cause
+    assert found.failures[0].shortfall is None
+    with pytest.raises(JammedError, match="consistent pattern"):
+        solve(mechanism)
+
+
+@pytest.mark.parametrize(
+    ("status", "kind"),
+    [
+        (Status.overflow, NumberRangeError),
+        (Status.infeasible, InfeasibleError),
+        (Status.jammed, JammedError),
+        (Status.uncertified, UncertifiedError),
+    ],
+)
+def test_each_status_is_an_error_of_its_own(status: Status, kind: type[SampleError]) -> None:
+    model = condyle.derive(machine(), backend="numpy")
+    q = np.zeros((3, 4))
+    found = model.evaluate(q, q, q, np.zeros((3, 9)))
+    found.status[1] = status
+    with pytest.raises(kind, match="row 2") as caught:
+        require_ok(model.mechanism, found)
+    assert caught.value.samples == [1]
+
+
+@pytest.mark.parametrize("limited", [True, False])
+def test_rounding_at_a_limit_is_no_alarm(limited: bool) -> None:
+    """Efforts within limits keep them to the accuracy of the certificate, and contacts push."""
+    mechanism = machine(ONE_SIDED)
+    model = condyle.derive(mechanism, backend="numpy")
+    q = np.zeros((3, 4))
+    found = model.evaluate(q, q, q, np.zeros((3, 9)))
+    found.effort[:] = 3.0 * (1 + 1e-12)
+    found.contact_force[:] = 1e-11
+    watch = Watch(mechanism)
+    watch.see(Derived(mechanism, found, limited=limited), np.arange(3.0))
+    told = {notice.kind for notice in watch.notices()} & {"effort_limit", "lift_off"}
+    assert told == (set() if limited else {"effort_limit", "lift_off"})
+
+
+# -- summary ------------------------------------------------------------------------------------
+
+
+def test_work_is_the_integral_of_power() -> None:
+    time = np.linspace(0, 2, 4001)
+    power = np.column_stack([np.sin(np.pi * time) ** 2, np.full_like(time, -3.0)])
+    np.testing.assert_allclose(work(power, time), [1.0, -6.0], rtol=1e-6)
+    power[2000] = np.nan
+    np.testing.assert_allclose(work(power, time), [1.0, -6.0 + 3 * 1e-3], rtol=1e-4)
+
+
+def test_summary_of_power_and_friction(rubbing: condyle.Solution) -> None:
+    summary = summarize(rubbing)
+    power = rubbing["actuator_power"]
+    for name, one in summary.data["power"].items():
+        own = power.sel(chain=name)
+        assert one["peak"] == float(abs(own).max())
+        assert one["work"] == pytest.approx(float(own.integrate("time")), rel=1e-12)
+    for name, done in summary.data["friction_work"].items():
+        own = rubbing["friction_power"].sel(contact=name)
+        assert done == pytest.approx(float(own.integrate("time")), rel=1e-12) and done < 0
+    text = str(summary)
+    assert "peak power and work" in text and "work of friction: left_condyle" in text
+    assert summary.data["shortfall"] is None and "times as large" not in text
+
+
+def test_nothing_is_said_of_power_at_rest() -> None:
+    model = condyle.derive(machine(), backend="numpy")
+    time = np.linspace(0, 1, 9)
+    still = condyle.Motion.from_arrays(time, np.zeros((9, 4)), names=model.independent)
+    summary = summarize(model.solve(still))
+    assert not summary.data["power"] and not summary.data["friction_work"]
+    assert "peak effort\n" in str(summary)
+
+
+# -- wrong input ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("policy", "said"),
+    [
+        ({"distribution": "bounde"}, 'Did you mean "bounded"'),
+        ({"distribution": "bounded", "preload": -1.0}, "preload: expected a number of at least 0"),
+        ({"distribution": "bounded", "preload": float("nan")}, "preload: expected"),
+        ({"preload": 1.0}, "minimum_norm knows none: take one of bounded"),
+        ({"distribution": "bounded", "contact_weight": 1.0}, "does not weigh contact forces"),
+        ({"distribution": "weighted", "contact_weight": -1.0}, "contact weight: expected"),
+        ({"distribution": "cubic"}, "cubic is for efforts that only pull"),
+    ],
+)
+def test_policies_that_have_no_meaning(policy: dict[str, object], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        condyle.derive(machine(), backend="numpy", **policy)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("distribution", ["weighted", "cubic", "minimax"])
+def test_chains_without_limits_are_named(distribution: str) -> None:
+    text = bundled_text("masticatory").replace("torque_limit = 3.0, ", "", 1)
+    with pytest.raises(InputError, match="temporalis_left has none: give torque_limit"):
+        condyle.derive(parse(text), backend="numpy", distribution=distribution)
