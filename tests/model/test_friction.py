@@ -18,19 +18,27 @@ from support.rubbing import Rubbing, drawn
 import condyle
 from condyle.dynamics import FORMULATIONS
 from condyle.mechanism import parse
+from condyle.mechanism.contact import Friction
 from condyle.model.data import Evaluation
 from condyle.model.evaluator import Evaluator
 from condyle.status import Status
 
-SURFACES = ("plane", "quadratic", "sphere", "cylinder", "ellipsoid", "profile")
 CASES: dict[str, dict[str, Any]] = {
     "k1": {"contacts": 1, "seed": 1},
-    "k1 n8": {"contacts": 1, "chains": 8, "seed": 2},
-    **{f"k2 {s}": {"surface": s, "seed": i} for i, s in enumerate(SURFACES, 3)},
-    **{f"k2 ball {s}": {"surface": s, "ball_radius": 3.0, "seed": i}
-       for i, s in enumerate(SURFACES[:5], 9)},
+    "k1 n8": {"contacts": 1, "chains": 7, "seed": 2},
+    "k2 plane": {"seed": 3},
+    "k2 quadratic": {"surface": "quadratic", "seed": 4},
+    "k2 sphere, cylinder": {"surface": ("sphere", "cylinder"), "seed": 5},
+    "k2 ellipsoid, profile": {"surface": ("ellipsoid", "profile"), "seed": 6},
+    "k2 ball plane": {"ball_radius": 3.0, "seed": 7},
+    "k2 ball sphere, quadratic": {
+        "surface": ("sphere", "quadratic"), "ball_radius": 3.0, "seed": 8
+    },
+    "k2 ball cylinder, ellipsoid": {
+        "surface": ("cylinder", "ellipsoid"), "ball_radius": 3.0, "seed": 9
+    },
     "k3 mixed": {"contacts": 3, "surface": "mixed", "seed": 16},
-    "k3 ball": {"contacts": 3, "ball_radius": 3.0, "surface": "quadratic", "seed": 17},
+    "k3 ball": {"contacts": 3, "ball_radius": 3.0, "surface": "sphere", "seed": 17},
     "k4": {"contacts": 4, "seed": 18},
     "PSS": {"families": ("PSS",), "seed": 19},
     "SPS": {"families": ("SPS",), "contacts": 3, "seed": 20},
@@ -41,8 +49,13 @@ CASES: dict[str, dict[str, Any]] = {
 
 @cache
 def found(name: str) -> tuple[Rubbing, Evaluation]:
-    case = drawn(**CASES[name])
-    return case, Evaluator(case.mechanism, backend="numpy").evaluate(*case.arguments)
+    case = drawn(**{"count": 3, **CASES[name]})
+    return case, by_numpy(name).evaluate(*case.arguments)
+
+
+@cache
+def by_numpy(name: str) -> Evaluator:
+    return Evaluator(drawn(**{"count": 3, **CASES[name]}).mechanism, backend="numpy")
 
 
 def least(b: Balance) -> tuple[float, np.ndarray, np.ndarray] | None:
@@ -79,7 +92,7 @@ def test_least_of_all_patterns_and_active_sets(name: str) -> None:
         np.testing.assert_allclose(got.slip[i], b.slip, atol=1e-12)
         rubbed = -np.abs(force)[:, None] * b.drag
         np.testing.assert_allclose(got.friction_force[i], rubbed, atol=1e-8 * np.abs(force).max())
-    assert (got.status == Status.ok).sum() >= 3
+    assert (got.status == Status.ok).any()
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -91,13 +104,18 @@ def test_conditions_of_optimality(name: str) -> None:
             continue
         effort, force = got.effort[i], got.contact_force[i]
         size = np.abs(b.b).max()
-        touching = np.abs(force) < 1e-9 * np.abs(force).max()
+        touching = np.abs(force) < 1e-9 * size
         sigma = np.where(touching, 1, np.sign(force)).astype(int)
         assert np.abs(b.C @ effort + b.along(sigma) @ force - b.b).max() < 1e-10 * size
         columns = [b.C, b.along(sigma)[:, ~touching]]
         right = np.r_[effort, np.zeros((~touching).sum())]
         y = np.linalg.lstsq(np.hstack(columns).T, right, rcond=None)[0]
         assert np.abs(np.hstack(columns).T @ y - right).max() < 1e-8 * np.abs(effort).max()
+        if np.linalg.matrix_rank(b.C) == 6:  # y is the only one: no pattern would take less
+            for k in np.flatnonzero(touching):
+                slack = 1e-8 * np.abs(y).max()
+                assert (b.N[:, k] - b.T[:, k]) @ y <= slack
+                assert (b.N[:, k] + b.T[:, k]) @ y >= -slack
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -128,7 +146,7 @@ def test_free_bodies_balance_with_friction_as_a_load(name: str) -> None:
                 break
         if name == "much friction" and change > 1e-9:  # the fixed point does not attract
             force = got.contact_force[i]
-        size = np.abs(force).max()
+        size = np.abs(b.b).max()
         np.testing.assert_allclose(got.contact_force[i], force, atol=1e-8 * size)
         if change < 1e-9:
             assert cut["residual"] < 1e-9
@@ -136,34 +154,33 @@ def test_free_bodies_balance_with_friction_as_a_load(name: str) -> None:
 
 def test_quadratic_programs_by_slsqp() -> None:
     case, got = found("k2 quadratic")
-    for i, b in enumerate(case.balances()):
-        n, k = b.C.shape[1], b.N.shape[1]
-        values = []
-        for sigma in b.patterns():
-            A = np.hstack([b.C, b.along(sigma)])
-            start = np.linalg.lstsq(A, b.b, rcond=None)[0]
-            bounds = [(None, None)] * n + [(0, None) if x > 0 else (None, 0) for x in sigma]
-            done = minimize(
-                lambda z: z[:n] @ z[:n],
-                np.r_[start[:n], np.where(np.sign(start[n:]) == sigma, start[n:], 0)],
-                jac=lambda z: np.r_[2 * z[:n], np.zeros(k)],
-                bounds=bounds,
-                constraints={
-                    "type": "eq", "fun": lambda z, A=A: A @ z - b.b, "jac": lambda z, A=A: A
-                },
-                method="SLSQP",
-                options={"maxiter": 500, "ftol": 1e-14},
-            )  # fmt: skip
-            if np.abs(A @ done.x - b.b).max() < 1e-8:
-                values.append(done.fun)
-        assert got.effort[i] @ got.effort[i] == pytest.approx(min(values), rel=1e-6)
+    for effort, b in zip(got.effort, case.balances(), strict=True):
+        values = [value for sigma in b.patterns() if (value := by_slsqp(b, sigma)) is not None]
+        assert effort @ effort == pytest.approx(min(values), rel=1e-6)
 
 
-@pytest.mark.parametrize("name", ["k2 ball ellipsoid", "k3 ball", "k2 profile"])
+def by_slsqp(b: Balance, sigma: tuple[int, ...]) -> float | None:
+    """Least sum of squares under a pattern; None where none was found."""
+    A, n = np.hstack([b.C, b.along(sigma)]), b.C.shape[1]
+    start = np.linalg.lstsq(A, b.b, rcond=None)[0]
+    start[n:] = np.where(np.sign(start[n:]) == sigma, start[n:], 0)
+    done = minimize(
+        lambda z: z[:n] @ z[:n],
+        start,
+        jac=lambda z: np.r_[2 * z[:n], 0 * z[n:]],
+        bounds=[(None, None)] * n + [(0, None) if x > 0 else (None, 0) for x in sigma],
+        constraints={"type": "eq", "fun": lambda z: A @ z - b.b, "jac": lambda z: A},
+        method="SLSQP",
+        options={"maxiter": 500, "ftol": 1e-14},
+    )
+    return float(done.fun) if np.abs(A @ done.x - b.b).max() < 1e-8 else None
+
+
+@pytest.mark.parametrize("name", ["k2 ball cylinder, ellipsoid", "k2 ellipsoid, profile"])
 def test_sliding_velocity_by_differences_of_the_motion(name: str) -> None:
     """A point fixed to the platform where the ball touches moves at the velocity of sliding."""
     case, got = found(name)
-    model = Evaluator(case.mechanism, backend="numpy")
+    model = by_numpy(name)
     q, q1, q2, load = case.arguments
     h = 1e-4
     poses = [
@@ -208,10 +225,10 @@ def test_compiled() -> None:
         np.testing.assert_allclose(model.one(*sample), effort, atol=1e-11 * size)
 
 
-@pytest.mark.parametrize("name", ["k2 ball sphere", "k3 mixed", "k1 n8"])
+@pytest.mark.parametrize("name", ["k2 plane", "k3 mixed"])
 def test_torques_agree_with_evaluate_whatever_is_asked_and_on_threads(name: str) -> None:
     case, wanted = found(name)
-    model = Evaluator(case.mechanism, backend="numpy")
+    model = by_numpy(name)
     asked = ("contact", "share", "gravity", "motion", "joint", "condition")
     for outputs in ((), ("contact",), ("share",), ("gravity",), asked):
         got = model.torques(*case.arguments, outputs=outputs, threads=2)
@@ -223,10 +240,10 @@ def test_torques_agree_with_evaluate_whatever_is_asked_and_on_threads(name: str)
     np.testing.assert_allclose(one, wanted.effort, rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["k2 ball sphere", "k3 mixed", "k1"])
+@pytest.mark.parametrize("name", ["k3 mixed", "k1"])
 def test_shares_are_of_least_norm_and_add_up(name: str) -> None:
     case, got = found(name)
-    model = Evaluator(case.mechanism, backend="numpy")
+    model = by_numpy(name)
     assert model.parts[-4:] == ("actuators", "load", "friction", "internal")
     np.testing.assert_allclose(got.share.sum(axis=0), got.effort, atol=1e-12)
     share = dict(zip(model.parts, got.share, strict=True))
@@ -242,12 +259,12 @@ def test_shares_are_of_least_norm_and_add_up(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["k2 quadratic", "k3 mixed"])
 def test_at_rest_friction_vanishes(name: str) -> None:
-    case = drawn(**CASES[name]).still()
+    case = found(name)[0].still()
     raw = case.raw | {"contact": [dict(c) for c in case.raw["contact"]]}
     raw["chain"] = [{k: v for k, v in c.items() if k != "actuator"} for c in raw["chain"]]
     for contact in raw["contact"]:
         del contact["friction"]
-    got = Evaluator(case.mechanism, backend="numpy").evaluate(*case.arguments)
+    got = by_numpy(name).evaluate(*case.arguments)
     bare = Evaluator(parse(toml_text(raw)), backend="numpy").evaluate(*case.arguments)
     assert np.abs(got.friction_force).max() == 0 == np.abs(got.slip).max()
     size = np.abs(bare.effort).max()
@@ -272,7 +289,7 @@ def test_without_friction_and_losses_nothing_changes(contacts: int) -> None:
 
 
 def test_the_order_of_chains_and_contacts_does_not_matter() -> None:
-    case, wanted = found("k2 ball quadratic")
+    case, wanted = found("k2 ball plane")
     rng = np.random.default_rng(1)
     chains, contacts = rng.permutation(len(case.raw["chain"])), [1, 0]
     raw = dict(case.raw)
@@ -295,13 +312,14 @@ def test_friction_takes_work() -> None:
         assert (power <= 0).all() and power.min() < 0
 
 
-@pytest.mark.parametrize("name", ["k2 ball ellipsoid", "k3 mixed", "k1 n8", "SPS"])
+@pytest.mark.parametrize("name", ["k2 ball cylinder, ellipsoid", "k3 mixed", "k1 n8", "SPS"])
 def test_power_balance_along_a_trajectory(name: str) -> None:
     """Efforts and load, less friction and losses, change the energy; rotors have theirs."""
     case, _ = found(name)
-    model = Evaluator(case.mechanism, backend="numpy")
+    model = by_numpy(name)
     rng, m = np.random.default_rng(2), model.mechanism.degrees_of_freedom
-    unit = np.array([3e-4 if x in "XYZ" else 0.01 for x in model.independent])
+    small = 0.2 if m == 3 else 1.0
+    unit = small * np.array([3e-4 if x in "XYZ" else 0.01 for x in model.independent])
     phase, t, h = rng.uniform(0, 6, m), np.linspace(0, 0.1, 9)[:, None], 2e-4
 
     def q(t: np.ndarray, order: int) -> np.ndarray:
@@ -331,34 +349,53 @@ def test_power_balance_along_a_trajectory(name: str) -> None:
     assert min(np.abs(rubbed).max(), lost.max(), np.abs(slope).max()) > 1e-3 * size
 
 
-def reference_with_friction(mu: float = 0.2) -> condyle.Mechanism:
+def reference_with_friction(mu: float) -> condyle.Mechanism:
     robot = condyle.load("masticatory")
-    friction = {"coefficient": mu, "smoothing_speed": 0.002}
-    data = robot.model_dump() if hasattr(robot, "model_dump") else {}
-    contacts = [type(c).model_validate({**d, "friction": friction})
-                for c, d in zip(robot.contacts, data["contacts"], strict=True)]  # fmt: skip
+    friction = Friction(coefficient=mu, smoothing_speed=0.002)
+    contacts = [c.model_copy(update={"friction": friction}) for c in robot.contacts]
     return robot.replace(contacts=tuple(contacts))
 
 
 def test_efforts_are_continuous_but_where_the_least_pattern_changes() -> None:
-    """Along the reference motion every leap is one from a pattern to another, and is counted."""
-    model = Evaluator(reference_with_friction(), backend="numpy")
-    times = np.linspace(0.5, 1.5, 4001)
+    """Along the reference motion; every change of a pattern is closed in on by bisection.
+
+    Either a force passes through 0 there, and efforts do not leap, or two patterns are of one norm.
+    """
+    model = Evaluator(reference_with_friction(0.9), backend="numpy")
+    times = np.linspace(0, 5, 5001)
     motion = condyle.Motion.from_csv(condyle.motion.bundled_reference()[0], times=times)
     states, _ = model.independent_motion(motion)
     load = np.zeros((len(times), 9))
     load[:, :6], load[:, 6:] = condyle.reference_load().at(times), model.load_point("right_molar")
-    got = model.evaluate(*states, load)
-    assert (got.status == Status.ok).all()
-    size = np.abs(got.effort).max()
-    step = np.abs(np.diff(got.effort, axis=0)).max(axis=1) / size
-    sigma = np.sign(got.contact_force)
+    path = np.hstack([*states, load])
+
+    def at(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        got = model.torques(*np.split(rows, [4, 8, 12], axis=1), outputs=("contact",))
+        assert (got.status == Status.ok).all()
+        return got.effort, sides(got["contact_force"])
+
+    def sides(force: np.ndarray) -> np.ndarray:
+        return np.where(np.abs(force) < 1e-10, 0, np.sign(force))
+
+    effort, sigma = at(path)
+    size = np.abs(effort).max()
+    step = np.abs(np.diff(effort, axis=0)).max(axis=1) / size
     changes = (sigma[1:] != sigma[:-1]).any(axis=1)
-    assert step[~changes].max() < 0.01
-    assert 0 < changes.sum() < 60
-    # Where a force passes through 0 nothing leaps; the rest are changes of the least pattern.
-    leaps = step > 0.01
-    assert not (leaps & ~changes).any()
+    half = np.abs(effort[2:] - effort[:-2]).max(axis=1)[::2] / size
+    assert step[~changes].max() < 0.6 * half.max()  # half the step, half the change
+    assert changes.sum() > 5
+    low, high = path[:-1][changes], path[1:][changes]
+    start = sigma[:-1][changes]
+    for _ in range(36):
+        middle = (low + high) / 2
+        same = (at(middle)[1] == start).all(axis=1)[:, None]
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    (before, _), (after, _) = at(low), at(high)
+    leap = np.abs(after - before).max(axis=1) > 1e-6 * size
+    norms = [np.linalg.norm(x[leap], axis=1) for x in (before, after)]
+    np.testing.assert_allclose(*norms, rtol=1e-6)
+    assert leap.sum() <= changes.sum()
+    print(f"{changes.sum()} changes, {leap.sum()} leaps")
 
 
 def test_jammed() -> None:
@@ -386,20 +423,22 @@ def test_nothing_that_can_be_computed() -> None:
     """All samples out of reach: results have their shapes, and no numbers."""
     case, wanted = found("k2 quadratic")
     q, q1, q2, load = case.arguments
-    model = Evaluator(case.mechanism, backend="numpy")
+    model = by_numpy("k2 quadratic")
     got = model.evaluate(q + 10.0, q1, q2, load)
     assert (got.status == Status.unreachable).all()
     assert np.isnan(got.shortfall).all() and got.share.shape == wanted.share.shape
 
 
-@pytest.mark.parametrize("name", ["k2 plane", "k2 ball quadratic", "k3 mixed"])
+@pytest.mark.parametrize("name", ["k2 plane", "k3 mixed"])
 def test_the_robust_path_agrees(name: str) -> None:
     """Every sample looked at by singular values and active sets, as near a singularity."""
     case, wanted = found(name)
-    model = Evaluator(case.mechanism, backend="numpy")
+    model = by_numpy(name)
     q, q1, q2, load = case.arguments
     parts = np.hsplit(load, 3)
-    given = dict(zip(("q", "q1", "q2", "force", "moment", "point"), (q, q1, q2, *parts), strict=True))
+    given = dict(
+        zip(("q", "q1", "q2", "force", "moment", "point"), (q, q1, q2, *parts), strict=True)
+    )
     values, status = model._robust.evaluate(given)
     assert (status == wanted.status).all()
     np.testing.assert_allclose(values["effort"].T, wanted.effort, rtol=1e-8, atol=1e-11)

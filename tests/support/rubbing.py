@@ -88,3 +88,22 @@ def drawn(
         if own:
             chain["actuator"] = {k: v if isinstance(v, list) else float(v) for k, v in own.items()}
     return Rubbing(raw, random_state(rng, raw, count))
+
+
+def balanced(case: Rubbing, seed: int, greatest: float) -> Rubbing:
+    """The same states under loads that known efforts, all of them pulls, and pushes balance."""
+    rng, s = np.random.default_rng(seed), case.states
+    loads = np.empty_like(s["wrench"])
+    for i in range(len(loads)):
+        state = (s[name][i] for name in ("pose", "pose_rate", "pose_acceleration"))
+        pose, rate, second = state
+        none, *units = (
+            balance(case.raw, pose, rate, second, w, s["load_point"])
+            for w in (np.zeros(6), *np.eye(6))
+        )
+        slope = np.column_stack([u.b - none.b for u in units])
+        n, k = none.C.shape[1], none.N.shape[1]
+        held = none.C @ rng.uniform(0.05, 0.6, n) * greatest
+        held += none.along(np.ones(k, dtype=int)) @ rng.uniform(1, 5, k)
+        loads[i] = np.linalg.solve(slope, held - none.b)
+    return Rubbing(case.raw, s | {"wrench": loads})
