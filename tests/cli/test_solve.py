@@ -91,7 +91,7 @@ def test_rows_never_influence_each_other(
         return read_csv("out.csv")[1]
 
     together = lines(rows)
-    assert {row[-1] for row in together} == {"ok", "unreachable"}
+    assert {row[-2] for row in together} == {"ok", "unreachable"}
     assert lines(rows[order]) == [together[i] for i in order]
     for i in (0, 5, 11, 36):
         assert lines(rows[i : i + 1]) == [together[i]]
@@ -132,10 +132,11 @@ def test_flagged_rows_are_kept_and_empty(
     arguments = ("solve", "masticatory", "--states", "states.csv", "--out", "out.csv")
     assert condyle_command(*arguments, "--flag").status == 0
     columns, rows = read_csv("out.csv")
-    assert columns[-1] == "status" and len(columns) == 21 and len(rows) == 6
-    assert [row[-1] for row in rows] == ["ok", "ok", "unreachable", "ok", "unreachable", "ok"]
+    assert columns[-2:] == ["status", "cause"] and len(columns) == 22 and len(rows) == 6
+    assert [row[-2] for row in rows] == ["ok", "ok", "unreachable", "ok", "unreachable", "ok"]
     for i, row in enumerate(rows):
-        assert all((cell == "") == (i in (2, 4)) for cell in row[:-1])
+        assert all((cell == "") == (i in (2, 4)) for cell in row[:-2])
+        assert row[-1] == ("chain temporalis_left" if i in (2, 4) else "")
     Path("out.csv").unlink()
     outcome = condyle_command(*arguments)
     assert outcome.status == 2 and "at row 3" in outcome.err and not Path("out.csv").exists()
@@ -143,7 +144,7 @@ def test_flagged_rows_are_kept_and_empty(
     good = [i for i in range(6) if i not in (2, 4)]
     write_csv(header(), np.hstack([q, q1, q2])[good], "states.csv")
     assert condyle_command(*arguments).status == 0
-    assert read_csv("out.csv")[1] == [rows[i][:-1] for i in good]
+    assert read_csv("out.csv")[1] == [rows[i][:-2] for i in good]
     assert condyle_command(*arguments, "--flag").status == 0
     assert read_csv("out.csv")[1] == [rows[i] for i in good]
 
@@ -178,8 +179,8 @@ def test_a_singular_row_has_its_own_status(
     arguments = ("solve", "star.toml", "--states", "states.csv", "--out", "out.csv")
     assert condyle_command(*arguments, "--flag").status == 0
     rows = read_csv("out.csv")[1]
-    assert [row[-1] for row in rows] == ["ok", "singular", "unreachable"]
-    assert set(rows[1][:-1]) == {""} and "" not in rows[0]
+    assert [row[-2] for row in rows] == ["ok", "singular", "unreachable"]
+    assert set(rows[1][:-2]) == {""} and "" not in rows[0][:-1]
     Path("out.csv").unlink()
     outcome = condyle_command(*arguments)
     assert outcome.status == 2 and "singular at row 2" in outcome.err
@@ -240,10 +241,13 @@ def test_bounds_warn_and_strict_refuses(
     arguments = ("solve", "masticatory", "--states", "states.csv", "--out", "out.csv")
     outcome = condyle_command(*arguments)
     assert outcome.status == 0 and Path("out.csv").exists()
-    assert '"left_condyle" is outside its bounds in 2 rows, by up to 1 mm in row 3' in outcome.err
+    assert (
+        '"left_condyle" leaves its bounds in 2 rows, first in row 2, by up to 1 mm in row 3'
+        in outcome.err
+    )
     Path("out.csv").unlink()
     outcome = condyle_command(*arguments, "--strict")
-    assert outcome.status == 2 and '"left_condyle" is outside' in outcome.err
+    assert outcome.status == 2 and '"left_condyle" leaves its bounds' in outcome.err
     assert [path.name for path in Path().iterdir()] == ["states.csv"]
     states[1:, 1] = 0.0029
     write_csv(header(), states, "states.csv")

@@ -34,6 +34,11 @@ MECHANISMS: dict[str, dict[str, Any]] = {
     "mixed_k1_n7": {"families": MIXED, "chains": 7, "contacts": 1, "tilted_gravity": True},
     "mixed_k3": {"families": MIXED, "contacts": 3},
 }
+# Other engines know no cables, and the default distribution refuses mixed units with cables.
+WITH_CABLES: dict[str, dict[str, Any]] = {
+    "cable_k0": {"families": ("cable",), "contacts": 0},
+    "every_family": {"families": (*MIXED, "cable"), "chains": 8},
+}
 SCALES = (0.0, 0.05, 1.0, 1.0)  # home, near it, and far
 
 
@@ -64,8 +69,10 @@ class Case:
 
 @cache
 def case(name: str) -> Case:
-    """One of `MECHANISMS`, at home, near it and away from it."""
-    raw = random_mechanism(np.random.default_rng(sum(map(ord, name))), **MECHANISMS[name])
+    """One of `MECHANISMS` or `WITH_CABLES`, at home, near it and away from it."""
+    raw = random_mechanism(
+        np.random.default_rng(sum(map(ord, name))), **(MECHANISMS | WITH_CABLES)[name]
+    )
     return of_raw(raw)
 
 

@@ -17,6 +17,7 @@ import condyle
 from condyle.dynamics import FORMULATIONS
 from condyle.kinematics.chain import FAMILIES
 from condyle.mechanism import Mechanism, parse
+from condyle.mechanism.chain import limits
 from condyle.model.data import Evaluation
 from condyle.model.evaluator import Evaluator
 from condyle.model.reactions import reactions
@@ -29,16 +30,19 @@ CASES: dict[str, dict[str, Any]] = {
     "k2_n9": {"families": CABLES, "chains": 9, "tilted_gravity": True},
     "k3_curved": {"families": CABLES, "contacts": 3, "surface": "quadratic"},
     "along_x": {"families": CABLES, "rod_along_x": True},
-    "mixed_k1": {"families": ("RSS", "cable", "SPS", "PSS"), "contacts": 1, "chains": 8},
-    "mixed_k2": {"families": ("cable", "RSS"), "contacts": 2, "chains": 7},
+    "mixed_k1": {"families": ("cable", "SPS", "PSS"), "contacts": 1, "chains": 8},
+    "mixed_k2": {"families": ("cable", "PSS"), "contacts": 2, "chains": 7},
 }
+# Cables and motors: the default distribution refuses to add squares of N and N m.
+TWO_UNITS = {"k2_two_units": {"families": ("cable", "RSS"), "contacts": 2, "chains": 8}}
+LIMITED = {"cable": {"force_limit": 1000.0}, "RSS": {"torque_limit": 10.0}}
 NOTHING = {"mass": 0.0, "com": 0.0, "transverse": 0.0, "axial": 0.0}
 
 
 @cache
 def case(name: str) -> tuple[Raw, dict[str, Any]]:
     """A mechanism, and states of it at home, near it and away from it."""
-    raw = random_mechanism(np.random.default_rng(sum(map(ord, name))), **CASES[name])
+    raw = random_mechanism(np.random.default_rng(sum(map(ord, name))), **(CASES | TWO_UNITS)[name])
     rng = np.random.default_rng(3)
     found = [random_state(rng, raw, 1, scale) for scale in (0.0, 0.05, 1.0, 1.0, 1.0)]
     states = {
@@ -53,9 +57,10 @@ def machine(raw: Raw) -> Mechanism:
 
 
 def evaluate(
-    raw: Raw, states: dict[str, Any], formulation: str = "virtual_power", **options: str
+    raw: Raw, states: dict[str, Any], formulation: str = "virtual_power", **options: Any
 ) -> tuple[Evaluator, Evaluation]:
-    model = Evaluator(machine(raw), formulation, **({"backend": "numpy"} | options))
+    options = {"backend": "numpy", "distribution": "minimum_norm"} | options
+    model = Evaluator(machine(raw), formulation, **options)
     assert model.independent == tuple(states["names"])
     q = (states[key] for key in ("q", "qd", "qdd"))
     point = np.tile(model.load_point(states["load_point"]), (len(states["q"]), 1))
@@ -148,7 +153,7 @@ def test_a_line_has_no_share_and_no_part() -> None:
     assert model.parts == ("platform", "load")
     close(found.share.sum(axis=0), found.effort, 1e-12)
     model, _ = evaluate(*case("mixed_k2"))
-    assert model.parts == ("platform", "couplers", "cranks", "load")
+    assert model.parts == ("platform", "rods", "sliders", "load")
 
 
 @pytest.mark.parametrize("name", ["k2_n9", "mixed_k1"])
@@ -243,7 +248,7 @@ def test_it_is_drawn_as_a_thin_line() -> None:
     drawn = place(mechanism, pose, np.zeros((1, 7))).chains
     rods = {chain.kind: drawn[chain.name].rods for chain in mechanism.chains}
     (line,) = rods["cable"]
-    assert line.thickness < min(rod.thickness for rod in rods["RSS"])
+    assert line.thickness < min(rod.thickness for rod in rods["PSS"])
     for chain in mechanism.chains:
         if chain.kind == "cable":
             points = drawn[chain.name].points
@@ -254,10 +259,41 @@ def test_it_is_drawn_as_a_thin_line() -> None:
 def test_results_tell_of_slack() -> None:
     """Efforts of least norm know no limits, and each cable that pushes is told of."""
     mechanism = machine(case("k2_n9")[0])
-    solution = condyle.derive(mechanism, backend="numpy").solve(trial_motion(mechanism, rate=200))
+    model = condyle.derive(mechanism, backend="numpy", distribution="minimum_norm")
+    solution = model.solve(trial_motion(mechanism, rate=200))
     slack = {n.owner for n in solution.notices if n.kind == "effort_limit"}
     pushing = solution["torque"].values.min(axis=0) < 0
     assert slack == {name for name, p in zip(mechanism.chain_names, pushing, strict=True) if p}
     assert slack and all(
         "below its least of 0" in n.text for n in solution.notices if n.owner in slack
     )
+
+
+def test_cables_beside_motors_within_limits() -> None:
+    """N and N m, each weighed by its limit: balanced, within limits, and of least weighed norm."""
+    raw, states = case("k2_two_units")
+    tables = [c | {"actuator": LIMITED[c["kind"]]} for c in raw["chain"]]
+    raw = raw | {"chain": tables}
+    model, found = evaluate(raw, states, distribution="weighted")
+    assert model.parts[-1] == "internal"
+    close(found.share.sum(axis=0), found.effort, 1e-12)
+    assert (found.status == 0).all()
+    bounds = [limits(chain) for chain in model.mechanism.chains]
+    low, high = np.array([(b.low, b.high) for b in bounds]).T
+    jacobians = model.jacobians(states["q"])
+    for i, effort in enumerate(found.effort):
+        keys = ("pose", "pose_rate", "pose_acceleration", "wrench")
+        sample = (*(states[key][i] for key in keys), states["load_point"])
+        theirs = newton_euler.inverse_dynamics(raw, *sample)["tau"]
+        A = jacobians["J_theta"][i] @ jacobians["M_J"][i]
+        close(A.T @ effort, A.T @ theirs, 1e-9)
+        slack = 1e-9 * high
+        assert (effort >= low - slack).all() and (effort <= high + slack).all()
+        scaled = effort / high
+        # Least: nothing along the null space but what limits hold back, where it would go out.
+        free = (effort > low + slack) & (effort < high - slack)
+        multipliers = np.linalg.lstsq((A * high[:, None])[free], scaled[free], rcond=None)[0]
+        rest = scaled - high * (A @ multipliers)
+        assert np.abs(rest[free]).max() < 1e-8 * np.abs(scaled).max()
+        at_low = ~free & (effort <= low + slack)
+        assert (rest[at_low] >= -1e-8).all()

@@ -25,7 +25,7 @@ def test_quotes_are_in_the_sources() -> None:
 
 def test_the_table_names_every_family_and_its_reactions() -> None:
     rows = {row.split("`")[1]: row for row in PAGE.read_text().splitlines() if row[:3] == "| `"}
-    mechanism = case("mixed").mechanism
+    mechanism = case("every_family").mechanism
     kinds = {chain.name: chain.kind for chain in mechanism.chains}
     places = [p for p in reaction_places(mechanism) if p.owner in kinds]
     for kind, family in FAMILIES.items():

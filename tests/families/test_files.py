@@ -1,4 +1,4 @@
-"""The tables of sliding and telescopic chains: what they mean, and what is wrong with others."""
+"""The tables of rails, legs and cables: what they mean, and what is wrong with others."""
 
 from __future__ import annotations
 
@@ -14,15 +14,14 @@ from condyle.errors import MechanismError
 from condyle.kinematics.chain import FAMILIES
 from condyle.mechanism import dumps, json_schema, parse
 from condyle.mechanism.files import from_data
-from families.cases import MECHANISMS, case
+from families.cases import MECHANISMS, WITH_CABLES, case
 
 Change = Callable[[dict[str, Any]], None]
 
 
 def tables() -> dict[str, Any]:
-    """A mechanism with a chain of each family, in mm: chains 0 RSS, 1 PSS, 2 SPS."""
-    raw = copy.deepcopy(case("mixed").raw)
-    raw["chain"].sort(key=lambda chain: ("RSS", "PSS", "SPS").index(chain["kind"]))
+    """A mechanism with a chain of each family, in mm: chains 0 RSS, 1 PSS, 2 SPS, 3 cable."""
+    raw = copy.deepcopy(case("every_family").raw)
     one = {kind: next(c for c in raw["chain"] if c["kind"] == kind) for kind in FAMILIES}
     rest = [c for c in raw["chain"] if c not in one.values()]
     raw["chain"] = [*one.values(), *rest]
@@ -43,7 +42,7 @@ def test_lengths_become_metres_and_fractions_stay() -> None:
     assert leg.piston.transverse == chain(raw, "SPS")["piston"]["transverse"]
 
 
-@pytest.mark.parametrize("name", MECHANISMS)
+@pytest.mark.parametrize("name", [*MECHANISMS, *WITH_CABLES])
 def test_round_trip(name: str) -> None:
     mechanism = case(name).mechanism
     assert parse(dumps(mechanism)) == mechanism
@@ -94,6 +93,7 @@ PROBLEMS: dict[str, tuple[Change, str]] = {
     "impossible piston": (put("SPS", "piston", "axial", value=1.0), "no rigid body has such"),
     "infinite mass": (put("SPS", "cylinder", "mass", value=float("inf")), "expected a finite"),
     "axis of a leg": (put("SPS", "axis", value=[0, 0, 1]), "axis: is not a key of the file"),
+    "mass of a cable": (put("cable", "mass", value=0.1), "mass: is not a key of the file"),
     "unknown kind": (put("SPS", "kind", value="SPR"), "'SPR' is unknown. Did you mean"),
 }
 
@@ -108,7 +108,7 @@ def test_problems_are_named(problem: str) -> None:
     assert message in str(caught.value)
 
 
-@pytest.mark.parametrize("kind", ["PSS", "SPS"])
+@pytest.mark.parametrize("kind", ["PSS", "SPS", "cable"])
 def test_zero_length(kind: str) -> None:
     raw = tables()
     table = chain(raw, kind)
@@ -123,6 +123,7 @@ def test_massless_links_are_allowed() -> None:
     for kind, bodies in (("PSS", ("rod",)), ("SPS", ("cylinder", "piston"))):
         for body in bodies:
             chain(raw, kind)[body] |= nothing
+    raw["chain"] = [c for c in raw["chain"] if c["kind"] != "cable"]  # never has a mass
     mechanism = from_data(raw)
     q = np.zeros((1, 4))
     model = condyle.derive(mechanism, backend="numpy")

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from oracles.rotations import platform_motion
 
 import condyle
 from condyle.distribution import Problem, Status, distribute
 from condyle.mechanism import Mechanism
 from condyle.mechanism.chain import limits
 from condyle.model.evaluator import Evaluator
-from condyle.motion.reference import reference_motion
+from condyle.motion.reference import reference_load, reference_motion
 
 TABLE = Path(__file__).parents[1] / "distribution" / "human_jaw.csv"
 NAMES = ("human-jaw", "human-jaw-curved")
@@ -148,3 +150,38 @@ def test_it_chews(name: str) -> None:
     assert not [n for n in solution.notices if n.kind in ("bounds", "near_singularity")]
     travel = np.ptp(solution["contact_point"].values[:, :, 0], axis=0)
     assert (travel > 1e-3).all() and (travel < 12e-3).all()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_muscles_can_chew_the_bundled_load(name: str) -> None:
+    """Within their limits, both condyles pushed, at every 100th sample of the reference case.
+
+    What is to be balanced is what efforts of least norm balance, pulling condyles or not.
+    """
+    jaw = condyle.load(name)
+    solution = condyle.derive(jaw, backend="numpy").solve(reference_motion(), reference_load())
+    rows = slice(1000, 5001, 100)
+    pulls, normals = [], []
+    for i, pose in enumerate(solution["pose"].values[rows]):
+        motion = platform_motion(pose)
+        lines = [(chain.platform, np.asarray(chain.base)) for chain in jaw.chains]
+        pulls.append([wrench(motion, point, base) for point, base in lines])
+        n = solution["contact_normal"].values[rows][i]
+        at = [motion.point(np.asarray(c.point))[0] - motion.origin for c in jaw.contacts]
+        normals.append([[*v, *np.cross(r, v)] for r, v in zip(at, n, strict=True)])
+    J, N = np.array(pulls), np.array(normals)
+    effort, force = (solution[v].values[rows] for v in ("torque", "contact_force"))
+    balanced = np.einsum("nij,ni->nj", J, effort) + np.einsum("nij,ni->nj", N, force)
+    low, high = np.array([limits(chain)[:2] for chain in jaw.chains]).T
+    push = np.full(2, -1.0)
+    found = distribute(Problem(balanced, J, N, low=low, high=high, push=push), "cubic")
+    assert (found.status == Status.ok).all()
+    assert (found.contact_force < 0).all()
+    assert 0.1 < (found.effort / high).max() < 0.3
+
+
+def wrench(motion: Any, point: tuple[float, ...], base: np.ndarray) -> list[float]:
+    """Of a unit pull at a point of the platform towards the base, about O_M."""
+    M = motion.point(np.asarray(point))[0]
+    line = (base - M) / np.linalg.norm(base - M)
+    return [*line, *np.cross(M - motion.origin, line)]

@@ -20,7 +20,7 @@ from condyle.questions.numbers import INERTIA, Layout
 from condyle.questions.structure import structure_of
 from condyle.status import Status
 
-MECHANISM = case("mixed_k2_n8").mechanism  # families interleaved, groups of 3, 3 and 2
+MECHANISM = case("all_kinds").mechanism  # families interleaved, groups of 3, 3 and 2
 STRUCTURE = structure_of(MECHANISM)
 NUMBERS = Layout.of(STRUCTURE).numbers(MECHANISM)
 KINDS = np.array([chain.kind for chain in MECHANISM.chains])

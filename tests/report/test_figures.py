@@ -92,7 +92,7 @@ def test_limit_near_the_data_is_a_line(solution: Solution) -> None:
     rate = figure.axes[1]
     assert rate.get_ylabel() == "rate [°/s]"
     levels = [float(np.ravel(line.get_ydata())[0]) for line in rate.get_lines()[-2:]]
-    assert levels == pytest.approx([np.degrees(6.0), -np.degrees(6.0)])
+    assert sorted(levels) == pytest.approx([-np.degrees(6.0), np.degrees(6.0)])
     assert rate.get_ylim()[1] > levels[0]
     assert "limit ±343.8 °/s" in words(figure)
 
@@ -134,7 +134,7 @@ def test_failed_samples_are_shaded_and_explained(solution: Solution, mixed: Solu
 
     assert (shades(solution), shades(mixed)) == (0, 1)
     text = words(PLOTS["torque"](mixed))
-    assert "no result" in text and "Grey: no result (unreachable)" in text
+    assert "no result" in text and "Grey: no result (unreachable: " in text
     assert "no result" not in words(PLOTS["torque"](solution))
 
 
@@ -156,7 +156,7 @@ def test_no_load_no_share_of_it(solution: Solution) -> None:
     titles = [axes.get_title("left") for axes in PLOTS["share"](solution).axes[:4]]
     assert titles == ["platform", "couplers", "cranks", "load"]
     idle = solution.copy(deep=True)
-    idle["share"].values[list(solution["part"].values).index("bite")] = 0.0
+    idle["share"].values[list(solution["part"].values).index("load")] = 0.0
     text = words(PLOTS["share"](idle))
     assert "platform" in text and "load" not in text.split("Mechanism")[0] and "bite" not in text
     named = solution.assign_coords(part=["platform", "couplers", "cranks", "load"])

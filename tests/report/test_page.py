@@ -384,9 +384,8 @@ def test_memory_does_not_grow_with_the_run(solution: Solution, tmp_path: Path) -
 
 def test_spans_without_a_result_are_listed_and_marked(long_run: Solution) -> None:
     page = report_html(long_run)
-    assert payload(page)["failures"] == [
-        [pytest.approx(17.0), pytest.approx(17.039), "unreachable"]
-    ]
+    [[start, end, words]] = payload(page)["failures"]
+    assert (start, end) == pytest.approx((17.0, 17.039)) and words.startswith("unreachable: ")
     text = Elements(page).text
     assert "17 to 17.039 s" in text and "Without a result" in text
 
@@ -411,7 +410,7 @@ def test_causes_come_from_the_solution(long_run: Solution) -> None:
 def test_no_load_no_share_of_it(solution: Solution) -> None:
     """A machine without a load shows no share of zeros; with one it is called load."""
     idle = solution.copy(deep=True)
-    idle["share"].values[list(solution["part"].values).index("bite")] = 0.0
+    idle["share"].values[list(solution["part"].values).index("load")] = 0.0
     for one, expected in ((solution, True), (idle, False)):
         panel = next(p for p in payload(report_html(one))["panels"] if p["id"] == "share-Nm")
         labels = [line["label"] for line in panel["sets"][0]["lines"]]

@@ -16,7 +16,7 @@ from condyle.mechanism import Mechanism, load, parse
 
 Array = np.ndarray
 BUNDLED = ("masticatory", "masticatory-curved", "gough-stewart", "hexaglide")
-MIXED = ("RSS", "PSS", "SPS")
+MIXED = ("PSS", "SPS")  # efforts of one unit, which least norm asks for
 RANDOM: dict[str, dict[str, Any]] = {
     "rss_k0_n9": {"contacts": 0, "chains": 9, "tilted_gravity": True},
     "rss_k1_n8_quadratic": {"contacts": 1, "chains": 8, "surface": "quadratic"},
@@ -27,6 +27,7 @@ RANDOM: dict[str, dict[str, Any]] = {
     "sps_k2_n6_ellipsoid": {"families": ("SPS",), "surface": "ellipsoid"},
     "mixed_k0_n7": {"families": MIXED, "contacts": 0, "chains": 7},
     "mixed_k2_n8": {"families": MIXED, "chains": 8},
+    "all_kinds": {"families": ("RSS", *MIXED), "chains": 8},  # no least norm: two units
     "mixed_k3_n9_curved": {"families": MIXED, "contacts": 3, "chains": 9, "surface": "quadratic"},
     "mixed_k4_n6": {"families": MIXED, "contacts": 4},
     "mixed_k5_n6": {"families": MIXED, "contacts": 5},

@@ -31,9 +31,8 @@ def report(
     require("plotly", "report")
     from ..report.page import write_report
 
-    path = write_report(
-        solution, out or solution.with_suffix(".html"), files=[solution, *(file or ())]
-    )
+    beside = solution.parent / f"{solution.stem}.html"
+    path = write_report(solution, out or beside, files=[solution, *(file or ())])
     size = path.stat().st_size
     return Answer(
         f"Wrote {path} ({size / 1e6:.1f} MB); open it in a browser",

@@ -63,18 +63,18 @@ class Limits(NamedTuple):
             return math.inf if effort else 0.0
         return effort / bound if math.isfinite(bound) and effort / bound >= 0 else None
 
-    def effort_text(self, unit: str, scale: float = 1.0) -> str:
+    def effort_text(self, unit: str, scale: float = 1.0, digits: int = 6) -> str:
         """'±3 N m', '0 to 190.4 N', 'at least 0 N'; empty where there is no limit."""
-        low, high = self.low * scale, self.high * scale
+        low, high = (f"{v * scale:.{digits}g}" for v in (self.low, self.high))
         if not self.limited:
             return ""
         if self.symmetric:
-            return f"±{high:g} {unit}"
-        if not math.isfinite(high):
-            return f"at least {low:g} {unit}"
-        if not math.isfinite(low):
-            return f"at most {high:g} {unit}"
-        return f"{low:g} to {high:g} {unit}"
+            return f"±{high} {unit}"
+        if not math.isfinite(self.high):
+            return f"at least {low} {unit}"
+        if not math.isfinite(self.low):
+            return f"at most {high} {unit}"
+        return f"{low} to {high} {unit}"
 
 
 class Actuator(Table):

@@ -107,8 +107,6 @@ def listed(value: Any) -> Any:
 
 
 def _end(value: float) -> float:
-    if math.isnan(value):
-        raise ValueError("expected a number, or inf where there is no limit, got nan")
     if math.isfinite(value):
         _within(value, SMALLEST, LARGEST_LIMIT, "")
     return value

@@ -21,6 +21,7 @@ tip = [50, 0, 0]
 
 # A contact keeps a platform point (the centre of a ball) on a surface fixed in {{S}}.
 # "plane": z = slope[0] x + slope[1] y + offset. The point must be on it at home.
+# Optional: side = "below", one_sided = true (it can lift off), friction = {{ coefficient = 0.1 }}
 [[contact]]
 name = "left"
 point = [-20, 60, 30]
@@ -46,6 +47,9 @@ platform = [30, 40, 0]
 crank = {{ inertia = 6e-5 }}                                   # kg m^2, about the shaft
 coupler = {{ mass = 0.004, com = 0.5, transverse = 1e-6, axial = 7e-9 }}
 actuator = {{ torque_limit = 3, speed_limit = 6 }}             # optional: N m, rad/s
+# Also optional in it: rotor_inertia [kg m^2], gear, viscous [N m s/rad], coulomb [N m];
+# torque_limit = [-1, 3] for limits that differ by direction.
+# Other kinds of chain: PSS (slider on a rail), SPS (telescopic leg), cable (it only pulls).
 
 [[chain]]
 name = "front_right"

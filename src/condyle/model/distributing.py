@@ -41,13 +41,16 @@ class Policy:
 
         Raises: InputError: for an unknown objective, or one that does not fit the mechanism.
         """
+        asked = objective is not None
         if objective is None:
             cables = any(chain.kind == "cable" for chain in mechanism.chains)
             objective = "bounded" if cables else LEAST
         if objective not in OBJECTIVES:
             raise InputError(f'no distribution "{objective}".{did_you_mean(objective, OBJECTIVES)}')
         units = {FAMILIES[chain.kind].effort_unit for chain in mechanism.chains}
-        if len(units) > 1 and not OBJECTIVES[objective].mixes_units:
+        # The default without cables is as old as the program, and stays.
+        chosen = asked or objective != LEAST
+        if chosen and len(units) > 1 and not OBJECTIVES[objective].mixes_units:
             fit = ", ".join(name for name, o in OBJECTIVES.items() if o.mixes_units)
             raise InputError(
                 f"distribution {objective} adds the squares of efforts, and this mechanism has "

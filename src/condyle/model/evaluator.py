@@ -93,6 +93,7 @@ class Evaluator:
         self.mechanism = mechanism
         self.formulation = formulation_named(formulation).name
         self.route = route
+        self._asked = distribution
         self.policy = Policy.of(mechanism, distribution, preload, contact_weight)
         self._distributor = Distributor(mechanism, self.policy)
         self.backend = Backend(backend)
@@ -114,7 +115,7 @@ class Evaluator:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Models travel as their recipe; kernels are found again in the cache."""
-        policy = (self.policy.objective, self.policy.preload, self.policy.contact_weight)
+        policy = (self._asked, self.policy.preload, self.policy.contact_weight)
         return type(self), (
             self.mechanism,
             self.formulation,

@@ -93,9 +93,8 @@ def _effort_limit(limit: float | list[float | None], unit: str) -> str:
     if not isinstance(limit, list):
         return f"{limit:g} {unit}"
     low, high = limit
-    return Limits(
-        -np.inf if low is None else low, np.inf if high is None else high, np.inf
-    ).effort_text(unit)
+    known = Limits(-np.inf if low is None else low, np.inf if high is None else high, np.inf)
+    return known.effort_text(unit)
 
 
 def _losses(losses: Mapping[str, float], effort: str, joint: str) -> Iterator[str]:

@@ -26,10 +26,10 @@ static int judged(const double *check) {
 #if SINGLE
 /* One sample: INPUTS numbers, of which W more may be read; OUTPUTS + CHECKS numbers are written. */
 int one(const double *restrict table, const double *restrict in, double *restrict out) {
-    quick(table + QUICK_TABLE, in, out);
+    if (__builtin_expect(quick(table + QUICK_TABLE, in, out), 1)) return 0;
     int status = judged(out + OUTPUTS);
 #if ROBUST
-    if (__builtin_expect(status == AGAIN, 0)) {
+    if (status == AGAIN) {
         robust(table + ROBUST_TABLE, in, out);
         status = judged(out + OUTPUTS);
     }

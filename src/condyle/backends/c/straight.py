@@ -22,9 +22,13 @@ class Straight(Printer):
         super().__init__(program, width, copies, width)
 
     def function(self, name: str) -> str:
-        head = f"static void {name}(const double *restrict table, const double *restrict in, "
+        """`static int name(table, in, out)`: whether every check is met beyond doubt."""
+        head = f"static int {name}(const double *restrict table, const double *restrict in, "
         head += "double *restrict out) {"
-        return "\n".join([head, *self._body(), *self.outputs(), "}", ""])
+        checks = self.program.checks
+        met = (f"({self.name(c.value, 0)} >= {c.tolerance!r})" for c in checks)
+        sure = f"  return {' & '.join(met) or '1'};"
+        return "\n".join([head, *self._body(), *self.outputs(), sure, "}", ""])
 
     def _body(self) -> Iterator[str]:
         bundles = {bundle[0]: bundle for bundle in self._bundles()}

@@ -87,14 +87,14 @@ def limits(
     for pair in dict.fromkeys(pairs.values()):
         own = [name for name in names if pairs.get(name) == pair]
         who = "" if len(own) == len(names) else f" ({', '.join(map(readable, own))})"
-        text = bounds[own[0]].effort_text(unit, factor)
+        text = bounds[own[0]].effort_text(unit, factor, 4)
         draw_limit(axes, values, (pair[0] * factor, pair[1] * factor), f"limit {text}{who}")
 
 
 def draw_limit(axes: Axes, values: np.ndarray, bounds: tuple[float, float], text: str) -> None:
     """One limit, at its levels; one at 0 is the axis."""
     peak = float(np.nanmax(np.abs(values), initial=0.0))
-    levels = [level for level in bounds if level and np.isfinite(level)]
+    levels = [level for level in reversed(bounds) if level and np.isfinite(level)]
     if levels and min(map(abs, levels)) > REACH * peak:
         title = axes.get_title(loc="left")
         axes.set_title(f"{title + ', ' if title else ''}{text} is outside the view")

@@ -1,0 +1,108 @@
+"""Limits that differ by direction, as of cables: drawn where they are, told of on their side."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.motion import trial_motion
+from condyle.report.figures import PLOTS
+from condyle.report.page.alerts import alerts
+from condyle.report.page.columns import Columns
+from condyle.report.page.facts import chain_table
+from condyle.report.page.panels import time_panels
+from condyle.results.solution import Solution
+from condyle.view.session import state_messages
+
+LOW, HIGH = -0.0005, 0.003  # N m, of efforts from -0.001 to 0.0036
+FIRST, SECOND, THIRD = "pterygoid_left", "pterygoid_right", "masseter_left"
+
+
+@pytest.fixture(scope="module")
+def solution() -> Solution:
+    """The reference robot where one motor pushes little, and one may only pull."""
+    machine = condyle.load("masticatory").set(
+        {
+            f"chain.{FIRST}.actuator.torque_limit": [LOW, HIGH],
+            f"chain.{SECOND}.actuator.torque_limit": [0, np.inf],
+            f"chain.{THIRD}.actuator": {},
+        }
+    )
+    return condyle.derive(machine, backend="numpy").solve(trial_motion(machine, rate=100))
+
+
+def effort(solution: Solution, name: str) -> np.ndarray:
+    return solution["torque"].sel(chain=name).values
+
+
+def test_what_is_beyond_a_limit_is_told_of_on_its_side(solution: Solution) -> None:
+    told = {(n.owner, n.bound): n for n in solution.notices if n.kind == "effort_limit"}
+    first, second = effort(solution, FIRST), effort(solution, SECOND)
+    wanted = {
+        (FIRST, LOW): (first < LOW, first.min()),
+        (FIRST, HIGH): (first > HIGH, first.max()),
+        (SECOND, 0.0): (second < 0, second.min()),
+    }
+    wanted = {key: value for key, value in wanted.items() if value[0].any()}
+    assert {(FIRST, LOW), (SECOND, 0.0)} <= set(wanted) == set(told)
+    for key, (where, worst) in wanted.items():
+        assert (told[key].count, told[key].value) == (where.sum(), worst)
+        assert ("below its least" in told[key].text) == (key[1] <= 0)
+
+
+def test_panels_draw_both_levels(solution: Solution) -> None:
+    panels = {
+        panel["id"]: panel for panel in time_panels(solution, Columns(solution["time"].values))
+    }
+    found = {tuple(one["of"]): one for one in panels["torque-Nm"]["limits"]}
+    first, second = found[(FIRST,)], found[(SECOND,)]
+    assert (first["low"], first["high"]) == (LOW, HIGH)
+    assert first["label"] == f"limit -0.0005 to 0.003 N m ({FIRST})"
+    assert (second["low"], second["high"]) == (0.0, None)
+    assert second["label"] == f"limit at least 0 N m ({SECOND})"
+    assert not any(THIRD in chains for chains in found)
+
+
+def test_alerts_hold_where_limits_are_exceeded(solution: Solution) -> None:
+    columns = Columns(solution["time"].values)
+    found = {one["text"]: one for one in alerts(solution, columns)}
+    assert f"{FIRST} is beyond its effort limit" in found
+    assert f"{SECOND} is beyond its effort limit" in found
+    assert not any(text.startswith(THIRD) for text in found)
+
+
+def test_the_table_of_peaks_names_the_limit_on_its_side(solution: Solution) -> None:
+    text = str(chain_table(solution))
+    peak = effort(solution, FIRST)[np.abs(effort(solution, FIRST)).argmax()]
+    bound = HIGH if peak > 0 else LOW
+    assert f"{peak / bound:.0%} of {abs(bound):g} N m" in text
+    assert "no limit" in text
+    slack = solution.copy(deep=True)
+    slack["torque"].loc[{"chain": SECOND}] = -1.0
+    assert "beyond at least 0 N m" in str(chain_table(slack))
+
+
+def test_the_figure_draws_them(solution: Solution) -> None:
+    figure = PLOTS["torque"](solution)
+    levels = {
+        float(np.ravel(line.get_ydata())[0])
+        for axes in figure.axes
+        for line in axes.get_lines()
+        if line.get_linestyle() == "--" and len(np.unique(line.get_ydata())) == 1
+    }
+    titles = " ".join(axes.get_title("left") for axes in figure.axes)
+    drawn = {level for level in (LOW, HIGH) if level in levels}
+    assert drawn == {LOW, HIGH} or "limit -0.0005 to 0.003 N m" in titles
+    assert 0.0 not in levels
+
+
+def test_the_view_tells_of_slack(solution: Solution) -> None:
+    machine = solution.mechanism
+    torque = np.array([0.0, 3.1, 9.0, 0.0, -0.01, -0.01])
+    messages = state_messages(machine, np.full(2, np.inf), np.zeros(2), torque, None)
+    assert messages == [
+        "temporalis_right is above its effort limit of 3",
+        f"{FIRST} is below its least effort of -0.0005",
+        f"{SECOND} is below its least effort of 0",
+    ]
