@@ -19,6 +19,8 @@ import numpy as np
 
 from ..backends.c.kernel import CompiledKernel
 from ..backends.compiler import find_compiler
+from ..mechanism.chain import Chain
+from ..mechanism.contact import Friction
 from ..mechanism.mechanism import Mechanism
 from ..model.evaluator import Evaluator
 from ..motion import Motion, reference_load, reference_motion
@@ -30,6 +32,10 @@ from .rows import Probe, Row, spread
 from .straight_line import torque_function
 
 SAMPLES = 1000  # in a cache, and no power of two, which columns would have to share places for
+JAW_SAMPLES = 5001  # of a motion, as people solve it
+LEAST_NORM = "torques and contact forces of 5001"
+BOUNDED = f"{LEAST_NORM}, within limits that are inactive"
+FRICTION = f"{LEAST_NORM}, friction at two contacts"
 MANY = 100_000  # samples of what people call
 SOLVE = "solve along a landmark's path"
 
@@ -192,6 +198,50 @@ def asked_probes(mechanism: Mechanism) -> Iterator[Probe]:
     chew, bite = reference_motion(), reference_load()
     path = Motion.from_arrays(chew.t, chew.value, chew.names, landmark="incisor", times=t)
     yield _python_probe(f"{label}: {SOLVE}", lambda: model.solve(path, bite), MANY)
+
+
+def policy_probes(mechanism: Mechanism) -> Iterator[Probe]:
+    """What limits and friction cost where limits are inactive, as people call it."""
+    case, label = Case.of(mechanism), mechanism.name
+    given = case.many(JAW_SAMPLES)
+    rubbing = Friction(coefficient=0.1)
+    rough = mechanism.replace(
+        contacts=tuple(c.model_copy(update={"friction": rubbing}) for c in mechanism.contacts)
+    )
+    wide = mechanism.replace(chains=tuple(_limited(chain) for chain in mechanism.chains))
+    for name, machine, policy in (
+        (LEAST_NORM, mechanism, "minimum_norm"),
+        (BOUNDED, wide, "bounded"),
+        (FRICTION, rough, "minimum_norm"),
+    ):
+        model = Evaluator(machine, backend="compiled", distribution=policy)
+        outputs = ("contact", "motion")  # which `bounded` needs, so that all have the same
+        call = partial(model.torques, *given, outputs=outputs, threads=1)
+        yield _python_probe(f"{label}: {name}", call, JAW_SAMPLES)
+
+
+def _limited(chain: Chain) -> Chain:
+    """With limits that no effort comes near."""
+    return chain.model_copy(
+        update={"actuator": chain.actuator.model_copy(update={"torque_limit": 1e6})}
+    )
+
+
+def jaw_probes(mechanism: Mechanism) -> Iterator[Probe]:
+    """Muscles of a jaw that opens and bites, by objective."""
+    for objective in ("bounded", "cubic"):
+        model = Evaluator(mechanism, backend="compiled", distribution=objective)
+        t = np.linspace(0, 5, JAW_SAMPLES)[:, None]
+        unit = np.array([1e-3 if name in "XYZ" else 0.03 for name in model.independent])
+        turn = 2 * np.pi
+        q = unit * np.sin(turn * t)
+        q1, q2 = unit * turn * np.cos(turn * t), -(turn**2) * q
+        load = np.zeros((len(t), 9))
+        load[:, 2] = -100 * np.sin(turn / 2 * t[:, 0]) ** 2  # N, a bite
+        load[:, 6:] = model.load_point("right_molar")
+        call = partial(model.torques, q, q1, q2, load, threads=1)
+        assert (call().status == 0).all()
+        yield _python_probe(f"{mechanism.name}: {objective}", call, JAW_SAMPLES)
 
 
 def _python_probe(name: str, call: Callable[[], object], count: int) -> Probe:

@@ -24,10 +24,15 @@ from ..mechanism import bundled_text, load
 from ..model.evaluator import Evaluator
 from ..progress import step
 from .own import (
+    BOUNDED,
+    FRICTION,
+    LEAST_NORM,
     SOLVE,
     Timer,
     asked_probes,
+    jaw_probes,
     own_probes,
+    policy_probes,
     reachable_samples,
     ready_rows,
     thread_probes,
@@ -100,6 +105,7 @@ def run_benchmark(seconds: float = 1.0) -> Benchmark:
         with step("building other engines"):
             probes += _peer_probes(unavailable)
         probes += asked_probes(load(REFERENCE))
+        probes += [*policy_probes(load(REFERENCE)), *jaw_probes(load("human-jaw"))]
         probes.append(Probe(OPERATION, timer.vector_operation, 0.0))
         rows = _timed(probes, rounds)
         with step("starting afresh"):
@@ -225,6 +231,9 @@ def _ratios(rows: list[Row], lanes: int) -> dict[str, float]:
     for formulation in ("momentum", "lagrange"):
         routes = (by_name[f"{REFERENCE} {formulation}{r}: one"] for r in (", direct", ""))
         ratios[f"one evaluation, {formulation}, direct over core"] = next(routes).over(next(routes))
+    least = by_name[f"{REFERENCE}: {LEAST_NORM}"]
+    for what, name in (("bounded", BOUNDED), ("friction at two contacts", FRICTION)):
+        ratios[f"{what} over least norm"] = by_name[f"{REFERENCE}: {name}"].over(least)
     asked = by_name[f"{REFERENCE}: torques"]
     for what in ("evaluate", SOLVE):
         ratios[f"{what} over efforts alone"] = by_name[f"{REFERENCE}: {what}"].over(asked)

@@ -114,10 +114,15 @@ class Distributor:
         """Whether the kernels' own efforts are those wanted."""
         return self.policy.objective == LEAST
 
+    @property
+    def chooses(self) -> bool:
+        """Whether it has a say at all in the efforts."""
+        return not self.least_norm or self.unsolved_friction
+
     def rows(self, values: Mapping[str, np.ndarray], status: np.ndarray) -> np.ndarray:
         """Good samples that the least norm does not serve."""
         good = status == Status.ok
-        if self.least_norm and self.unsolved_friction:
+        if self.unsolved_friction:
             return np.flatnonzero(good)
         if self.least_norm:
             return np.empty(0, dtype=int)
@@ -164,4 +169,6 @@ class Distributor:
             "share": share.transpose(2, 1, 0),
             "status": _STATUS[found.status],
             "shortfall": found.shortfall,
+            "slip": system["slip"],
+            "drag": system["drag"],
         }

@@ -231,7 +231,7 @@ class Evaluator:
         Returns: efforts in the order of the chains; NaN where there are none.
         """
         kernel = self.kernel("inverse", ())
-        if not isinstance(kernel, CompiledKernel):
+        if self._distributor.chooses or not isinstance(kernel, CompiledKernel):
             return self._one_robustly(q, q1, q2, load)
         if (own := getattr(self._local, "single", None)) is None:
             own = self._local.single = kernel.single(), np.argsort(kernel.order)
@@ -274,7 +274,7 @@ class Evaluator:
             **{name: _sample_first(name, values[name]) for name in ("effort", *_names(EVERYTHING))},
             configuration=self._configured(values),
             status=status,
-            shortfall=values.get("shortfall", np.ones(len(status))),
+            shortfall=values.get("shortfall", np.where(status == Status.ok, 1.0, np.nan)),
             **self._rubbed(values),
         )
 
@@ -302,7 +302,7 @@ class Evaluator:
         threads: int | None,
     ) -> tuple[dict[str, np.ndarray], np.ndarray]:
         """Results by name, samples last, and their statuses."""
-        choosing = not self._distributor.least_norm or self._distributor.unsolved_friction
+        choosing = self._distributor.chooses
         if choosing:
             wanted = {*wanted, "contact", "motion"}
         kernel = self.kernel("inverse", tuple(o for o in OUTPUTS if o in wanted))
@@ -312,6 +312,8 @@ class Evaluator:
         inputs = {"q": q, "q1": q1, "q2": q2, **wrench}
         check_states(self.independent, q, q1, q2)
         answer = kernel.run(inputs, threads)
+        if self._distributor.unsolved_friction:
+            self._make_room(answer.values)
         again = np.flatnonzero(answer.status == AGAIN)
         if again.size:
             few = {name: np.asarray(a, dtype=float)[again] for name, a in inputs.items()}
@@ -322,6 +324,13 @@ class Evaluator:
             self._choose(answer.values, answer.status, inputs)
         return answer.values, answer.status
 
+    def _make_room(self, values: dict[str, np.ndarray]) -> None:
+        """For what friction adds to the results of a kernel that does not know of it, in place."""
+        _add_parts(values, 2)
+        if "contact_force" in values:
+            k, N = values["contact_force"].shape
+            values["slip"], values["drag"] = np.zeros((2, k, 3, N))
+
     def _choose(
         self,
         values: dict[str, np.ndarray],
@@ -329,10 +338,9 @@ class Evaluator:
         inputs: Mapping[str, np.ndarray],
     ) -> None:
         """Replace what the least norm does not serve, in place, by what the policy asks for."""
-        values["shortfall"] = np.ones(len(status))
-        if "share" in values:
-            more = np.zeros((len(self.parts) - len(values["share"]), *values["share"].shape[1:]))
-            values["share"] = np.concatenate([values["share"], more])
+        values["shortfall"] = np.where(status == Status.ok, 1.0, np.nan)
+        if not self._structure.friction:
+            _add_parts(values, 1)
         rows = self._distributor.rows(values, status)
         if not rows.size:
             return
@@ -518,6 +526,13 @@ class Evaluator:
 
 def _names(outputs: Collection[str]) -> list[str]:
     return [name for output in outputs for name in RESULTS.get(output, ())]
+
+
+def _add_parts(values: dict[str, np.ndarray], count: int) -> None:
+    """Parts more that ask for nothing, in place."""
+    for name in {"share", "gravity"} & values.keys():
+        zero = np.zeros((count, *values[name].shape[1:]))
+        values[name] = np.concatenate([values[name], zero])
 
 
 def _sample_first(name: str, value: np.ndarray) -> np.ndarray:

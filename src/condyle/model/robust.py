@@ -85,15 +85,17 @@ class Robust:
             values["contact_force"] = self._contact_forces(s, effort).T
             values["slip"], values["drag"] = system["slip"], system["drag"]
             status = self._judged(reached, values, effort)
-            if self._structure.friction and (good := np.flatnonzero(status == Status.ok)).size:
-                better = self._distributor.solve({n: a[..., good] for n, a in system.items()})
-                status[good] = better.pop("status")
-                better.pop("shortfall")
-                share = better.pop("share")
-                values["share"] = np.full((*share.shape[:2], len(status)), np.nan)
-                values["share"][..., good] = share
-                for name, a in better.items():
-                    values[name][:, good] = a
+            if self._structure.friction:
+                parts, n, N = values["share"].shape
+                values["share"] = np.full((parts + 2, n, N), np.nan)
+                still = np.zeros((2, n, N))  # nothing rubs at rest
+                values["gravity"] = np.concatenate([values["gravity"], still])
+                if (good := np.flatnonzero(status == Status.ok)).size:
+                    better = self._distributor.solve({n: a[..., good] for n, a in system.items()})
+                    status[good] = better.pop("status")
+                    better.pop("shortfall")
+                    for name, a in better.items():
+                        values[name][..., good] = a
         return values, status
 
     def motion(self, q: np.ndarray, q1: np.ndarray, q2: np.ndarray) -> tuple[Arrays, np.ndarray]:

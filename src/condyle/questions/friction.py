@@ -24,7 +24,7 @@ from .numbers import single_contacts
 from .platform import Basis, Platform, independent_indices
 
 MOST = 2  # contacts with friction whose patterns are all solved in one kernel
-SURE = 1e-9  # by which the least norm may exceed that of a pattern that is not consistent
+HUGE = 1e300
 
 LeastNorm = Callable[..., tuple[Lanes, ca.SX]]
 
@@ -89,7 +89,7 @@ def least_norm_pattern(b: Builder, eq: Equations, c: Contacts, solve: LeastNorm)
     dep, ind = indices(s.dependent), independent_indices(s.dependent)
     N, T = eq.state.B.T @ c.N, eq.state.B.T @ c.T
     best = ca.SX(float("inf"))
-    lowest = ca.SX(float("inf"))
+    tried: dict[tuple[int, ...], tuple[ca.SX, list[ca.SX]]] = {}
     pivots: ca.SX | None = None
     effort: Lanes = []
     force = ca.SX.zeros(len(dep))
@@ -103,16 +103,37 @@ def least_norm_pattern(b: Builder, eq: Equations, c: Contacts, solve: LeastNorm)
         carried = b.total([ch.row[dep] * t for ch, t in zip(eq.chains, found, strict=True)])
         lam = solve_small(D[dep, :], eq.Q[dep] - carried)
         norm = b.total([t * t for t in found])
+        kept = [sign * lam[i] >= 0 for i, sign in zip(s.friction, signs, strict=True)]
         held = ca.SX(1)
-        for i, sign in zip(s.friction, signs, strict=True):
-            held = held * (sign * lam[i] >= 0)
+        for one in kept:
+            held = held * one
+        tried[signs] = norm, kept
         better = held * (norm < best)
         best = ca.if_else(better, norm, best)
         force = ca.if_else(better, lam, force)
         effort = [
             t if not effort else ca.if_else(better, t, effort[g]) for g, t in enumerate(found)
         ]
-        lowest = ca.fmin(lowest, norm)
         pivots = quality if pivots is None else ca.fmin(pivots, quality)
     assert pivots is not None
-    return Chosen(effort, force, best <= lowest * (1 + SURE), pivots)
+    return Chosen(effort, force, _sure(tried, best), pivots)
+
+
+def _sure(tried: dict[tuple[int, ...], tuple[ca.SX, list[ca.SX]]], best: ca.SX) -> ca.SX:
+    """Whether nothing with a contact force held at 0 is less than the best pattern: 1, else 0.
+
+    Such a force belongs to both patterns that differ in its sign alone, and so is the least of
+    both. Neither is less without the constraint, and from the least of a convex function within
+    bounds the way to the least without them leaves a bound that is active: both patterns break the
+    sign of the force that is 0. With two forces 0 all four patterns do, and then there is no best.
+
+    Args: tried: norm of each pattern, and which signs its forces keep.
+    """
+    sure = best < HUGE
+    for signs, (norm, kept) in tried.items():
+        for i, sign in enumerate(signs):
+            if sign > 0:
+                other, others = tried[(*signs[:i], -1, *signs[i + 1 :])]
+                neither = (1 - kept[i]) * (1 - others[i])
+                sure = sure * (1 - neither * (ca.fmax(norm, other) < best))
+    return sure

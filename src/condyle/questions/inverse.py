@@ -123,12 +123,14 @@ def _least_norm(
     right = ca.horzcat(*pulled) if apart else total(pulled)
     if "gravity" in wanted:
         # Forces of bodies at rest: what gravity alone asks for, and the load.
-        right = ca.horzcat(right, b.at_zero(right, platform.q1, platform.q2))
+        bodies = ca.horzcat(*pulled[: len(eq.parts)])
+        right = ca.horzcat(right, b.at_zero(bodies, platform.q1, platform.q2))
     found, pivots = solve(b.total, eq.A, right)
     share = [f[:, : len(parts)] if apart else f for f in found]
     gravity = [f[:, len(parts) :] for f in found]
     if chosen is not None:
         share = [ca.horzcat(f, t - ca.sum2(f)) for f, t in zip(share, chosen.effort, strict=True)]
+        gravity = [ca.horzcat(f, 0, 0) for f in gravity]  # nothing rubs at rest
         quality = chosen.sure * ca.fmin(pivots, chosen.pivots)
         return _Best(chosen.effort, share, gravity, chosen.force, quality)
     effort = [total(ca.horzsplit(f)) for f in share]
