@@ -21,54 +21,70 @@ Edge = tuple[list[float], list[float]]
 
 @dataclass(frozen=True)
 class Duty:
-    """One actuator along a run; samples without a result do not count.
+    """What one actuator does along a run; samples without a result do not count.
 
-    effort, speed: (N,) [N m or N; rad/s or m/s].   time: (N,) [s].   unit: of the effort.
+    rms: root of the mean square of the effort over time, which heats a motor [N m or N].
+    power: largest of |effort times speed| [W].   unit: of the effort.   NaN: no result at all.
     """
 
-    effort: np.ndarray
-    speed: np.ndarray
-    time: np.ndarray
+    rms: float
+    power: float
     unit: str
-
-    @property
-    def power(self) -> np.ndarray:
-        """Delivered at the joint, (N,) [W]; negative where the actuator brakes."""
-        return self.effort * self.speed
-
-    @property
-    def rms(self) -> float:
-        """Root of the mean square of the effort over time, which heats a motor; NaN without any."""
-        good = np.isfinite(self.effort)
-        if good.sum() < 2:
-            return abs(float(self.effort[good][0])) if good.any() else np.nan
-        # Spans of time between two good samples only: a gap has no effort.
-        square, step = self.effort**2, np.diff(self.time)
-        both = good[1:] & good[:-1]
-        if not both.any():
-            return float(np.sqrt(square[good].mean()))
-        mean = 0.5 * (square[1:] + square[:-1])[both] @ step[both] / step[both].sum()
-        return float(np.sqrt(mean))
-
-    @property
-    def peak_power(self) -> float:
-        """Largest of |power| [W]; NaN where there is none."""
-        power = np.abs(self.power[np.isfinite(self.power)])
-        return float(power.max()) if power.size else np.nan
 
     @property
     def text(self) -> str:
         """'rms 0.21 N m, 0.5 W'."""
         if np.isnan(self.rms):
             return "no result"
-        return f"rms {self.rms:.3g} {self.unit}, {self.peak_power:.3g} W"
+        return f"rms {self.rms:.3g} {self.unit}, {self.power:.3g} W"
+
+
+class DutyMeter:
+    """Takes up a run piece by piece.
+
+    Between two samples the square of an effort is a straight line; spans that touch a sample
+    without a result are left out.
+    """
+
+    def __init__(self) -> None:
+        self._squares: np.ndarray | float = 0.0
+        self._spans: np.ndarray | float = 0.0
+        self._power: np.ndarray | float = -np.inf
+        self._last: Solution | None = None
+        self._units: list[str] = []
+
+    def see(self, piece: Solution) -> None:
+        """Take up the next piece of the run."""
+        effort, speed = piece["torque"].values, piece["joint_rate"].values
+        time = piece["time"].values
+        self._units = [str(unit) for unit in piece["effort_unit"].values]
+        power = np.abs(effort * speed)
+        self._power = np.fmax(self._power, np.fmax.reduce(power, axis=0, initial=-np.inf))
+        if self._last is not None:
+            effort = np.vstack([self._last["torque"].values, effort])
+            time = np.append(self._last["time"].values, time)
+        square, step = effort**2, np.diff(time)[:, None]
+        pairs = 0.5 * (square[1:] + square[:-1])
+        good = np.isfinite(pairs)
+        self._squares = self._squares + (np.where(good, pairs, 0.0) * step).sum(axis=0)
+        self._spans = self._spans + (good * step).sum(axis=0)
+        self._last = piece.isel(time=slice(-1, None))
+
+    def read(self) -> list[Duty]:
+        """The duty of every chain, in their order."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            rms = np.sqrt(np.asarray(self._squares) / self._spans)
+        power = np.where(np.isfinite(self._power), self._power, np.nan)
+        return [
+            Duty(float(a), float(b), u) for a, b, u in zip(rms, power, self._units, strict=True)
+        ]
 
 
 def duty(solution: Solution) -> list[Duty]:
     """Of every chain, in their order."""
-    effort, speed = solution["torque"].values, solution["joint_rate"].values
-    time, units = solution["time"].values, solution["effort_unit"].values
-    return [Duty(effort[:, i], speed[:, i], time, str(u)) for i, u in enumerate(units)]
+    meter = DutyMeter()
+    meter.see(solution)
+    return meter.read()
 
 
 def edges(box: Limits, speed: float, effort: float) -> list[Edge]:

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...mechanism.chain import limits as actuator_limits
-from ..actuators import Duty, duty, edges, limits_text
+from ..actuators import duty, edges, limits_text
 from .chains import groups, heading, short
 from .labels import caption
 from .registry import plot
@@ -40,7 +40,8 @@ def effort_speed(solution: Solution) -> Figure:
         unit, speed_unit = units[members[0]], f"{speed_units[members[0]]}/s"
         own = [names[i] for i in members]
         within = list(dict.fromkeys(boxes[i] for i in members))
-        draw_plane(axes, [duties[i] for i in members], within, short(own))
+        labels = [f"{name}: {duties[i].text}" for name, i in zip(short(own), members, strict=True)]
+        draw_plane(axes, solution, members, within, labels)
         told = [limits_text(box, unit, speed_unit) or "none" for box in within]
         axes.legend(
             title=f"limits: {'; '.join(told)}", loc="lower left", bbox_to_anchor=(0.0, 1.0),
@@ -53,16 +54,16 @@ def effort_speed(solution: Solution) -> Figure:
     return figure
 
 
-def draw_plane(axes: Axes, duties: list[Duty], boxes: list[Limits], names: list[str]) -> None:
+def draw_plane(
+    axes: Axes, solution: Solution, members: list[int], boxes: list[Limits], labels: list[str]
+) -> None:
     """Tracks of some chains, and their boxes as far as they are near the data."""
-    for i, (one, name) in enumerate(zip(duties, names, strict=True)):
-        axes.plot(one.speed, one.effort, label=f"{name}: {one.text}", **look(i))
-    speed, effort = (
-        float(np.nanmax(np.abs([getattr(one, what) for one in duties]), initial=0.0))
-        for what in ("speed", "effort")
-    )
+    speeds, efforts = (solution[v].values[:, members] for v in ("joint_rate", "torque"))
+    for i, label in enumerate(labels):
+        axes.plot(speeds[:, i], efforts[:, i], label=label, **look(i))
+    peaks = [float(np.nanmax(np.abs(values), initial=0.0)) for values in (speeds, efforts)]
     for box in boxes:
-        for xs, ys in edges(box, speed, effort):
+        for xs, ys in edges(box, *peaks):
             axes.plot(xs, ys, color=DARK, lw=1, ls=(0, (6, 3)))
     axes.margins(0.06)
     axes.locator_params(nbins=5)

@@ -107,7 +107,7 @@ def limits(
 def draw_limit(axes: Axes, values: np.ndarray, bounds: tuple[float, float], text: str) -> None:
     """One limit, at its levels; one at 0 is the axis."""
     peak = float(np.nanmax(np.abs(values), initial=0.0))
-    levels = [level for level in bounds if level and np.isfinite(level)]
+    levels = [level for level in reversed(bounds) if level and np.isfinite(level)]
     if levels and min(map(abs, levels)) > REACH * peak:
         title = axes.get_title(loc="left")
         axes.set_title(f"{title + ', ' if title else ''}{text} is outside the view")
