@@ -31,6 +31,7 @@ BEYOND = 1.25  # sliders go this much further than the reach, to show where it e
 STEPS = 6  # of Gauss-Newton towards a dragged pose
 MOST_INTERNAL = 6  # directions of internal efforts that have a slider
 WIDE = 25  # the sliders of actuators without limits: so many times the largest effort at home
+MOST_NAMED = 4  # cables that one message names
 NUDGE = 1e-6  # [m, rad], for differences
 
 NO_EFFORTS = {
@@ -246,7 +247,7 @@ class Session:
             return "unreachable", (*messages, *bound_messages(self.mechanism, margin))
         messages = []
         if status != Status.ok:
-            messages.append(NO_EFFORTS.get(status, NO_EFFORTS[Status.singular]))
+            messages.append(NO_EFFORTS[Status(status)])
         messages += state_messages(self.mechanism, margin, force, torque, None)
         if near != KINDS[0] and status == Status.ok:
             messages.append(
@@ -270,16 +271,20 @@ def state_messages(
         for name, up in zip(mechanism.contact_names, lifted, strict=True)
         if up
     ]
+    slack: list[str] = []
     for i, chain in enumerate(mechanism.chains):
         low, high, speed = limits(chain)
         if chain.kind == "cable" and torque[i] < 0:
-            messages.append(f"{chain.name} would have to push with {-torque[i]:.3g} N: it is slack")
+            slack.append(f"{chain.name} ({-torque[i]:.3g} N)")
         elif torque[i] > high or (low == -high and torque[i] < low):
             messages.append(f"{chain.name} is above its effort limit of {high:g}")
         elif torque[i] < low:
             messages.append(f"{chain.name} is below its least effort of {low:g}")
         if rate is not None and abs(rate[i]) > speed:
             messages.append(f"{chain.name} is above its speed limit of {speed:g}")
+    if slack:
+        more = f" and {len(slack) - MOST_NAMED} more" if len(slack) > MOST_NAMED else ""
+        messages.append(f"Slack, would have to push: {', '.join(slack[:MOST_NAMED])}{more}")
     return messages
 
 
