@@ -28,14 +28,15 @@ def effort_speed(solution: Solution) -> Figure:
     """Effort of each actuator against its speed, in the box of its limits; rms and peak power."""
     names, units = chains_of(solution)
     panels = groups(names, units)
-    columns = 2 if narrow() else min(MOST_COLUMNS, max(2, int(np.ceil(np.sqrt(len(panels))))))
+    columns = 1 if narrow() else min(MOST_COLUMNS, max(2, int(np.ceil(np.sqrt(len(panels))))))
     columns = min(columns, len(panels))
     rows = -(-len(panels) // columns)
-    title = "Efforts against speeds, with the limits of the actuators"
+    title = "Efforts against speeds, with limits"
     figure = new_figure(title, caption(solution), 0.6 + 3.1 * columns, 0.9 + 2.5 * rows)
     grid = figure.subplots(rows, columns, squeeze=False)
     boxes = [actuator_limits(chain) for chain in solution.mechanism.chains]
     duties, speed_units = duty(solution), solution["joint_unit"].values
+    place = "lower right" if narrow() else "lower left"
     for axes, members in zip(grid.ravel(), panels, strict=False):
         unit, speed_unit = units[members[0]], f"{speed_units[members[0]]}/s"
         own = [names[i] for i in members]
@@ -44,7 +45,8 @@ def effort_speed(solution: Solution) -> Figure:
         draw_plane(axes, solution, members, within, labels)
         told = [limits_text(box, unit, speed_unit) or "none" for box in within]
         axes.legend(
-            title=f"limits: {'; '.join(told)}", loc="lower left", bbox_to_anchor=(0.0, 1.0),
+            title=f"limits: {'; '.join(told)}", loc=place,
+            bbox_to_anchor=(0.0, 1.0),
             borderaxespad=0.0, borderpad=0.2, alignment="left", title_fontsize="small",
         )  # fmt: skip
         axes.set_title(heading(own), pad=13 * (1 + len(own)))
