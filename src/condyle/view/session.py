@@ -34,7 +34,7 @@ WIDE = 25  # the sliders of actuators without limits: so many times the largest 
 MOST_NAMED = 4  # cables that one message names
 NUDGE = 1e-6  # [m, rad], for differences
 
-NO_EFFORTS = {
+NO_EFFORTS: dict[int, str] = {
     Status.singular: "Singular: the efforts are not determined here",
     Status.overflow: "The load is too large for numbers",
     Status.infeasible: "Infeasible: no efforts within the limits hold this",
@@ -247,7 +247,7 @@ class Session:
             return "unreachable", (*messages, *bound_messages(self.mechanism, margin))
         messages = []
         if status != Status.ok:
-            messages.append(NO_EFFORTS[Status(status)])
+            messages.append(NO_EFFORTS[status])
         messages += state_messages(self.mechanism, margin, force, torque, None)
         if near != KINDS[0] and status == Status.ok:
             messages.append(
