@@ -458,3 +458,30 @@ def test_other_families_are_drawn(open_tab: Callable[..., Tab], name: str, tmp_p
     tab.page.keyboard.press("ArrowRight")
     scrub(tab, 12)
     assert np.abs(tab.picture("#stage") - before).max() > 50
+
+
+def test_a_jaw_draws_activations_and_planes_of_all_its_muscles(
+    open_tab: Callable[..., Tab], tmp_path: Path
+) -> None:
+    motion = Motion.from_csv(condyle.motion.bundled_reference()[0], rate=20)
+    model = condyle.derive("human-jaw", backend="numpy")
+    solution = model.solve(motion, condyle.reference_load())
+    tab = ready(open_tab(write_report(solution, tmp_path / "jaw.html").as_uri()))
+    z = tab.page.evaluate(
+        "() => document.querySelector('#panel-activation .plot').firstChild._fullData[0].z"
+    )
+    assert np.shape(z) == (24, solution.sizes["time"]) and 0.2 < np.max(z) < 1
+    assert tab.page.locator(".plane .dot:visible").count() == 24
+    sample = int(np.argmax(np.max(z, axis=0)))
+    scrub(tab, sample)
+    read = tab.page.locator("#panel-activation .value").all_inner_texts()
+    assert float(max(read)) == pytest.approx(np.max(z), abs=1e-3)
+    at = tab.page.evaluate(
+        """() => [...document.querySelectorAll('.plane')].map((card) => {
+            const layout = card.querySelector('.plot').firstChild._fullLayout;
+            const dot = card.querySelector('.dot');
+            return layout.yaxis.p2d(parseFloat(dot.style.top) - layout.yaxis._offset);
+        })"""
+    )
+    expected = solution["torque"].values[sample, ::2]
+    assert np.allclose(at, expected, atol=0.02 * np.nanmax(expected))

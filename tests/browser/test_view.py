@@ -208,3 +208,24 @@ def test_arrow_keys_on_a_slider_leave_the_camera_alone(tab: Tab, view: View) -> 
     tab.page.keyboard.down("ArrowRight")
     tab.until(lambda: not np.allclose(client.camera.position, before, atol=1e-3), "it turns")
     tab.page.keyboard.up("ArrowRight")
+
+
+def test_internal_efforts_move_numbers_and_nothing_else(
+    open_tab: Callable[..., Tab], tab: Tab, view: View
+) -> None:
+    before = view.snapshot
+    tab.page.get_by_role("tab", name="Preload").click()
+    tab.page.get_by_text("2 directions of efforts that balance each other").wait_for()
+    fill(tab, "direction 1 [N m]", 0.5)
+    tab.until(lambda: bool(view.session.internal[0]), "the slider is heard")
+    tab.until(lambda: view.snapshot is not before, "it is drawn")
+    tab.page.locator('[data-table="internal"]').wait_for()
+    now, directions = view.snapshot, view.session.directions()
+    amount = view.session.internal[0]
+    assert amount == pytest.approx(0.5, abs=0.01)
+    added = now.torque - before.torque
+    assert np.allclose(added, amount * directions.effort[:, 0], atol=1e-12)
+    assert np.array_equal(now.pose, before.pose)
+    tab.page.get_by_role("button", name="No internal efforts").click()
+    tab.until(lambda: not view.session.internal.any(), "the efforts are taken off")
+    tab.until(lambda: np.allclose(view.snapshot.torque, before.torque), "they are gone")

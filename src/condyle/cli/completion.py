@@ -26,8 +26,10 @@ BACKENDS = ("auto", "compiled", "numpy")
 STYLES = ("screen", "journal", "journal-wide")
 UNITS = ("m,rad", "m,deg", "mm,rad", "mm,deg", "cm,rad", "cm,deg")
 FIGURES = (
+    "activation",
     "contact_force",
     "contact_track",
+    "effort_speed",
     "jacobian",
     "joint",
     "load",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,20 @@ if TYPE_CHECKING:
     from ..results.solution import Solution
 
 LOAD = "load"
+_SIDE = re.compile(r"(?<![a-zA-Z])(left|right|l|r)(?![a-zA-Z])", re.IGNORECASE)
 LOAD_PARTS = ("bite", LOAD)
+MAY_BE_IDLE = (*LOAD_PARTS, "friction", "internal")
+
+
+def stem(name: str) -> str:
+    """The name without its side: the same for masseter_left and masseter_right."""
+    return _SIDE.sub("", name)
+
+
+def side(name: str) -> str:
+    """'left' of masseter_left; empty where a name has no side."""
+    found = _SIDE.search(name)
+    return found[0] if found else ""
 
 
 def part_word(part: object) -> str:
@@ -20,8 +34,10 @@ def part_word(part: object) -> str:
 
 
 def parts_in_use(solution: Solution) -> list[str]:
-    """The parts, without the load where there is none."""
+    """The parts, without load, friction and internal efforts that are 0."""
     parts = [str(part) for part in solution["part"].values]
-    loads = [part for part in parts if part in LOAD_PARTS]
-    idle = [p for p in loads if not np.nan_to_num(solution["share"].sel(part=p).values).any()]
+    share = solution["share"].values
+    idle = [
+        p for i, p in enumerate(parts) if p in MAY_BE_IDLE and not np.nan_to_num(share[i]).any()
+    ]
     return [part for part in parts if part not in idle]

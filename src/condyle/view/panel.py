@@ -13,11 +13,12 @@ import numpy as np
 import viser
 
 from ..errors import InputError
+from ..kinematics.chain import FAMILIES
 from ..mechanism import Mechanism, bundled_mechanisms, load, parse
 from ..results.solution import Solution, open_solution
 from .playback import Playback
-from .readout import COLOURS, status_html, tables_html
-from .session import Session
+from .readout import COLOURS, effects_html, internal_text, status_html, tables_html
+from .session import MOST_INTERNAL, Session
 from .snapshot import Snapshot
 from .stage import VIEWS, Stage
 
@@ -56,6 +57,8 @@ class Panel:
         with tabs.add_tab("Move"):
             self._add_pose()
             self._add_load()
+        with tabs.add_tab("Preload"):
+            self._add_internal()
         with tabs.add_tab("Play"):
             self._add_player()
         with tabs.add_tab("Open"):
@@ -108,6 +111,32 @@ class Panel:
             at = self._gui.add_dropdown("at", points, initial_value=here)
             self._hear("at", at, lambda point: session.set_load(session.load, point))
 
+    def _add_internal(self) -> None:
+        """One slider for each direction of internal efforts, as many as a panel can hold."""
+        session = self._view.session
+        count, most = len(session.internal), session.internal_reach()
+        shown = min(count, MOST_INTERNAL)
+        self._gui.add_markdown(internal_text(count, shown))
+        self._internal: list[Any] = []
+        for i in range(shown):
+            unit = FAMILIES[session.mechanism.chains[0].kind].effort_unit
+            high = round_outwards(0.0, most)[1]
+            slider = self._gui.add_slider(
+                f"direction {i + 1} [{unit}]", -high, high, high / 500, 0.0
+            )
+            self._hear(f"internal {i}", slider, partial(session.set_internal, i))
+            self._internal.append(slider)
+        if shown:
+            self._press("No internal efforts", self.release)
+        self._effects = self._gui.add_html("")
+
+    def release(self) -> None:
+        """Take all internal efforts off."""
+        session = self._view.session
+        session.internal[:] = 0.0
+        for slider in self._internal:
+            slider.value = 0.0
+
     def _add_player(self) -> None:
         self._player_note = self._gui.add_markdown("No solution is open. Open one (.nc) here:")
         upload = self._gui.add_upload_button("Open a solution", mime_type=".nc")
@@ -140,6 +169,10 @@ class Panel:
         self._status.content = status_html(snapshot)
         self._tables.content = tables_html(snapshot)
         session = self._view.session
+        if self._internal:
+            self._effects.content = effects_html(
+                session.mechanism, session.directions(), session.internal, MOST_INTERNAL
+            )
         for name, before, value in zip(
             session.model.independent, self._known, session.q, strict=True
         ):

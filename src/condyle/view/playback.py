@@ -8,7 +8,7 @@ from ..kinematics.singularity import KINDS
 from ..report.failures import Failure, at_sample, failures
 from ..report.scene import place
 from ..results.solution import Solution
-from .session import force_vectors, state_messages
+from .session import force_vectors, over_limits, state_messages
 from .snapshot import Level, Snapshot
 
 
@@ -107,6 +107,7 @@ class Playback:
             messages=messages,
             time=self.now,
             stale=failed is not None,
+            over=over_limits(self.mechanism, here["torque"]),
         )
 
     def _good_before(self, sample: int) -> int:

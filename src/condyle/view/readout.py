@@ -8,7 +8,9 @@ from html import escape
 import numpy as np
 
 from ..kinematics.chain import FAMILIES
+from ..mechanism import Mechanism
 from ..mechanism.chain import limits
+from .internal import Directions
 from .snapshot import Snapshot
 
 COLOURS = {"calm": "#2b8a3e", "warning": "#b35c00", "unreachable": "#c92a2a"}
@@ -42,6 +44,40 @@ def tables_html(snapshot: Snapshot) -> str:
     return f'<div style="margin:4px 10px;font-size:12px;overflow-x:auto">{body}</div>'
 
 
+def internal_text(count: int, shown: int) -> str:
+    """What the sliders of internal efforts are, and how many there are besides."""
+    if not count:
+        return "As many actuators as freedoms: no effort can be changed without moving something."
+    many = "1 direction" if count == 1 else f"{count} directions"
+    more = (
+        f", of which the {shown} that load the contacts the most have a slider"
+        if shown < count
+        else ""
+    )
+    return (
+        f"{many} of efforts that balance each other{more}. They move nothing; they add to efforts "
+        "and contact forces. Each is given by its largest effort."
+    )
+
+
+def effects_html(
+    mechanism: Mechanism, directions: Directions, amount: np.ndarray, shown: int
+) -> str:
+    """What each direction does by one unit to the contacts, and by now to the efforts."""
+    heads = ["Direction", "now", *(f"{name}, N per unit" for name in mechanism.contact_names)]
+    rows = [
+        [str(i + 1), number(amount[i], 3), *(number(v, 3) for v in directions.contact[:, i])]
+        for i in range(min(directions.count, shown))
+    ]
+    added = directions.effort @ amount
+    names = mechanism.chain_names
+    changed = [[name, number(v, 3)] for name, v in zip(names, added, strict=True) if v]
+    tables = _table(heads, rows, "directions")
+    if changed:
+        tables += _table(["Chain", "added effort"], changed, "internal")
+    return f'<div style="margin:4px 10px;font-size:12px;overflow-x:auto">{tables}</div>'
+
+
 def _pose(s: Snapshot) -> str:
     values = [*s.pose[:3] * 1e3, *np.degrees(s.pose[3:])]
     heads = ["X mm", "Y mm", "Z mm", "alpha °", "beta °", "gamma °"]
@@ -60,7 +96,8 @@ def _chains(s: Snapshot) -> str:
             chain.name,
             number(s.joint[i] * scale, 2, unit),
             number(s.torque[i], 4, family.effort_unit),
-            "" if use is None else "slack" if np.isinf(use) else number(100 * use, 0, "%"),
+            _mark(chain.name in s.over)
+            + ("" if use is None else "slack" if np.isinf(use) else number(100 * use, 0, "%")),
         ]
         if s.rate is not None:
             row.append(number(s.rate[i], 3, "" if len(units) == 1 else f"{family.joint_unit}/s"))
@@ -70,6 +107,10 @@ def _chains(s: Snapshot) -> str:
     speed = f"{units.pop()}/s" if len(units) == 1 else "speed"
     last = speed if s.reach is None else "reach"
     return _table(["Chain", "joint", "effort", "of limit", last], rows, "chains")
+
+
+def _mark(over: bool) -> str:
+    return f"{SIGNS['warning']} " if over else ""
 
 
 def _contacts(s: Snapshot) -> str:

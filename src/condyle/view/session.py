@@ -21,6 +21,7 @@ from ..motion.points import DEFAULT_LOAD_POINT
 from ..report.scene import contact_normals, place
 from ..results.solution import BOUND_TOLERANCE, bound_margins, lift_off
 from ..status import Status
+from .internal import Directions, Internal
 from .snapshot import Level, Snapshot
 
 CENTRE = "mass centre"  # where the load acts besides the platform's points
@@ -28,7 +29,18 @@ SPAN_ANGLE = np.radians(60)  # how far from home the reach is looked for
 SCAN = 121
 BEYOND = 1.25  # sliders go this much further than the reach, to show where it ends
 STEPS = 6  # of Gauss-Newton towards a dragged pose
+MOST_INTERNAL = 6  # directions of internal efforts that have a slider
+WIDE = 25  # the sliders of actuators without limits: so many times the largest effort at home
+MOST_NAMED = 4  # cables that one message names
 NUDGE = 1e-6  # [m, rad], for differences
+
+NO_EFFORTS: dict[int, str] = {
+    Status.singular: "Singular: the efforts are not determined here",
+    Status.overflow: "The load is too large for numbers",
+    Status.infeasible: "Infeasible: no efforts within the limits hold this",
+    Status.jammed: "Jammed: no pattern of friction is consistent here",
+    Status.uncertified: "Efforts were found here that could not be certified",
+}
 
 
 @dataclass(frozen=True)
@@ -46,7 +58,8 @@ class Session:
     """A mechanism at one pose under one load, both free to change.
 
     Attributes: q: independent coordinates, (m,) [m, rad];  load: force in {S}, (3,) [N];
-                load_point: a platform point, or `CENTRE`.
+                load_point: a platform point, or `CENTRE`;  internal: efforts that balance each
+                other, (r,) [N m or N], r = n - m, added to those that hold the platform.
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -58,6 +71,8 @@ class Session:
         self.load = np.zeros(3)
         points = mechanism.platform.points
         self.load_point = DEFAULT_LOAD_POINT if DEFAULT_LOAD_POINT in points else CENTRE
+        self._internal = Internal(self.model)
+        self.internal = np.zeros(self._internal.at(np.zeros(6)).count)
         self._pose = np.zeros(6)
         self._joint = np.zeros(len(mechanism.chains))
 
@@ -94,6 +109,28 @@ class Session:
         if point is not None and point not in self.load_points:
             raise InputError(f'no load point "{point}".{did_you_mean(point, self.load_points)}')
         self.load_point = point or self.load_point
+
+    def set_internal(self, number: int, value: float) -> None:
+        """Put on so much of one direction of internal efforts: its largest effort [N m or N]."""
+        if not 0 <= number < len(self.internal):
+            raise InputError(
+                f"there is no direction {number} of internal efforts: this mechanism has "
+                f"{len(self.internal)}, counted from 0"
+            )
+        self.internal[number] = value
+
+    def directions(self) -> Directions:
+        """Directions of internal efforts at the last good pose."""
+        return self._internal.at(self._pose)
+
+    def internal_reach(self) -> float:
+        """How far a slider of internal efforts goes [N m or N]."""
+        greatest = [limits(chain).greatest for chain in self.mechanism.chains]
+        finite = [value for value in greatest if np.isfinite(value) and value > 0]
+        if finite:
+            return max(finite)
+        found = self._evaluate(np.zeros((1, len(self.q)))).effort
+        return WIDE * float(np.nanmax(np.abs(found), initial=0.0)) or 1.0
 
     def take_pose(self, pose: np.ndarray) -> None:
         """Go on from X_EE, (6,) [m, rad], which the contacts meet."""
@@ -143,11 +180,16 @@ class Session:
             self._joint = np.where(in_reach, joint, self._joint)
         scene = place(self.mechanism, self._pose[None], self._joint[None])
         force = _or_nan(found.contact_force, len(self.mechanism.contacts), status == Status.ok)
+        torque = _or_nan(found.effort, len(in_reach), status == Status.ok)
+        if met and self.internal.any():
+            directions = self.directions()
+            torque = torque + directions.effort @ self.internal
+            force = force + directions.contact @ self.internal
         measures = found.configuration.singularity
         ratio = float(measures.ratio[0])
         near = KINDS[int(measures.kind()[0])] if np.isfinite(ratio) else KINDS[0]
         margin = bound_margins(self.mechanism, found.configuration.contact_point)[0]
-        level, messages = self._messages(found, met, broken, margin, force, near)
+        level, messages = self._messages(found, met, broken, margin, torque, force, near)
         return Snapshot(
             mechanism=self.mechanism,
             pose=self._pose,
@@ -156,7 +198,8 @@ class Session:
             broken=tuple(broken) if met else (),
             joint=np.where(in_reach, joint, np.nan),
             rate=None,
-            torque=_or_nan(found.effort, len(in_reach), status == Status.ok),
+            torque=torque,
+            over=over_limits(self.mechanism, torque),
             reach=reach,
             contact_force=force,
             force_vector=force_vectors(self.mechanism, scene.contacts, force),
@@ -190,6 +233,7 @@ class Session:
         met: bool,
         broken: list[str],
         margin: np.ndarray,
+        torque: np.ndarray,
         force: np.ndarray,
         near: str,
     ) -> tuple[Level, tuple[str, ...]]:
@@ -203,8 +247,8 @@ class Session:
             return "unreachable", (*messages, *bound_messages(self.mechanism, margin))
         messages = []
         if status != Status.ok:
-            messages.append("Singular: the efforts are not determined here")
-        messages += state_messages(self.mechanism, margin, force, found.effort[0], None)
+            messages.append(NO_EFFORTS[status])
+        messages += state_messages(self.mechanism, margin, force, torque, None)
         if near != KINDS[0] and status == Status.ok:
             messages.append(
                 f"Near a singularity of the kind {near} (ratio below {NEAR_SINGULAR:g})"
@@ -227,15 +271,31 @@ def state_messages(
         for name, up in zip(mechanism.contact_names, lifted, strict=True)
         if up
     ]
+    slack: list[str] = []
     for i, chain in enumerate(mechanism.chains):
         low, high, speed = limits(chain)
-        if torque[i] > high or (low == -high and torque[i] < low):
+        if chain.kind == "cable" and torque[i] < 0:
+            slack.append(f"{chain.name} ({-torque[i]:.3g} N)")
+        elif torque[i] > high or (low == -high and torque[i] < low):
             messages.append(f"{chain.name} is above its effort limit of {high:g}")
         elif torque[i] < low:
             messages.append(f"{chain.name} is below its least effort of {low:g}")
         if rate is not None and abs(rate[i]) > speed:
             messages.append(f"{chain.name} is above its speed limit of {speed:g}")
+    if slack:
+        more = f" and {len(slack) - MOST_NAMED} more" if len(slack) > MOST_NAMED else ""
+        messages.append(f"Slack, would have to push: {', '.join(slack[:MOST_NAMED])}{more}")
     return messages
+
+
+def over_limits(mechanism: Mechanism, torque: np.ndarray) -> tuple[str, ...]:
+    """Chains whose effort, of (n,), is outside its limits."""
+    with np.errstate(invalid="ignore"):
+        return tuple(
+            chain.name
+            for chain, effort in zip(mechanism.chains, torque, strict=True)
+            if limits(chain).beyond(effort)
+        )
 
 
 def bound_messages(mechanism: Mechanism, margin: np.ndarray) -> list[str]:

@@ -30,6 +30,7 @@ class Snapshot:
     level, messages: what a reader should know, the worst first.
     time:           of a solution that is played [s], or None.
     stale:          there is no result, and `pose` is that of another time.
+    over:           chains whose effort is outside its limits.
     """
 
     mechanism: Mechanism
@@ -53,3 +54,4 @@ class Snapshot:
     messages: tuple[str, ...]
     time: float | None = None
     stale: bool = False
+    over: tuple[str, ...] = ()

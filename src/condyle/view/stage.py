@@ -184,7 +184,7 @@ class Stage:
                 tint = self._colours[chain.name, rod.body]
                 if snapshot.stale:
                     tint = NEUTRAL
-                elif chain.name in snapshot.broken and rod.moving:
+                elif rod.moving and chain.name in (*snapshot.broken, *snapshot.over):
                     tint = ALARM
                 self._lay(chain.name, rod, points, tint)
             for name in drawing.balls:

@@ -10,6 +10,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..actuators import activations
 from .accessor import SolutionPlots
 from .files import save, save_each
 from .load import load as figure_7
@@ -62,8 +63,9 @@ def save_figures(
 def save_solution_figures(solution: Solution, folder: str | os.PathLike[str]) -> list[Path]:
     """Write the plots of `PLOTS` as PNG and SVG into a folder that exists; returns the paths.
 
-    Without contacts there are no plots of them.
+    Without contacts there are no plots of them, and without limits none of activations.
     """
-    held = solution.sizes["contact"] > 0
-    plots = {name: draw for name, draw in PLOTS.items() if held or not name.startswith("contact")}
+    missing = [] if solution.sizes["contact"] else [n for n in PLOTS if n.startswith("contact")]
+    missing += [] if activations(solution) else ["activation"]
+    plots = {name: draw for name, draw in PLOTS.items() if name not in missing}
     return save_each(plots, solution, folder)

@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from typing import Any
 
+from ..words import side, stem
 from .style import look
-
-_SIDE = re.compile(r"(?<![a-zA-Z])(left|right|l|r)(?![a-zA-Z])", re.IGNORECASE)
-
-
-def stem(name: str) -> str:
-    """The name without its side: the same for masseter_left and masseter_right."""
-    return _SIDE.sub("", name)
 
 
 def groups(names: Sequence[str], units: Sequence[str]) -> list[list[int]]:
@@ -55,3 +48,10 @@ def heading(names: Sequence[str]) -> str:
     if len(names) > 1 and len(stems) == 1:
         return readable(stems.pop()).strip() or ", ".join(map(readable, names))
     return ", ".join(map(readable, names))
+
+
+def short(names: Sequence[str]) -> list[str]:
+    """What tells the chains of one panel apart where `heading` says the rest."""
+    if len(names) > 1 and len({stem(name) for name in names}) == 1:
+        return [side(name) for name in names]
+    return list(map(readable, names))

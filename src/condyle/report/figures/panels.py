@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...mechanism.chain import limits as actuator_limits
+from ..actuators import REACH
 from ..failures import failures, longest
 from .chains import readable
 from .labels import TIME
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from ...results.solution import Solution
 
 NO_RESULT = "no result"
-REACH = 2.5  # a limit beyond this many times the data would flatten them
 
 
 def lines(
@@ -61,6 +61,19 @@ def finish(grid: np.ndarray, y_labels: Sequence[Sequence[str]]) -> None:
         axes.set_xlabel(TIME)
     for axes in grid[:-1].ravel():
         axes.tick_params(labelbottom=False)
+
+
+def finish_grid(grid: np.ndarray, count: int) -> None:
+    """Label time below the last panel of each column of a grid with `count` panels, row by row."""
+    for k, axes in enumerate(grid.ravel()):
+        if k >= count:
+            axes.remove()
+        elif k + grid.shape[1] >= count:
+            axes.set_xlabel(TIME)
+            axes.tick_params(labelbottom=True)
+        else:
+            axes.tick_params(labelbottom=False)
+    grid[0, 0].figure.align_ylabels(list(grid.ravel()[:count]))
 
 
 def drawn_limits(solution: Solution, variable: str) -> dict[str, Limits]:

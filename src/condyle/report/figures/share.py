@@ -14,7 +14,7 @@ from .labels import caption
 from .panels import finish, legend_beside, lines
 from .registry import plot
 from .style import new_figure
-from .torque import chains_of, effort_label, scale_by_unit
+from .torque import MOST_ROWS, chains_of, effort_label, scale_by_unit
 
 if TYPE_CHECKING:
     from ...results.solution import Solution
@@ -35,7 +35,7 @@ def share(solution: Solution, parts: Sequence[str] | None = None) -> Figure:
         "Efforts by the part of the mechanism that needs them",
         caption(solution),
         max(6.0, 1.8 + 2.7 * len(parts)),
-        1.1 + 1.7 * len(panels),
+        1.1 + (1.7 if len(panels) <= MOST_ROWS else 1.0) * len(panels),
         len(parts),
     )
     grid = figure.subplots(len(panels), len(parts), sharex=True, squeeze=False)

@@ -7,16 +7,27 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from .chains import by_unit, groups, heading, readable
+from .chains import by_unit, groups, heading, readable, short
 from .labels import caption
-from .panels import drawn_limits, finish, legend, legend_beside, limits, lines, same_scale
+from .panels import (
+    drawn_limits,
+    finish,
+    finish_grid,
+    legend,
+    legend_beside,
+    limits,
+    lines,
+    same_scale,
+)
 from .registry import plot
-from .style import house, new_figure
+from .style import house, narrow, new_figure
 
 if TYPE_CHECKING:
     from ...analysis.compare import Comparison
     from ...analysis.runs import Run
     from ...results.solution import Solution
+
+MOST_ROWS = 6  # of panels one above the other
 
 
 @plot()
@@ -24,19 +35,25 @@ def torque(solution: Solution) -> Figure:
     """Effort of each chain over time, with its actuator's limit."""
     names, units = chains_of(solution)
     panels = groups(names, units)
-    figure = new_figure("Efforts of the actuators", caption(solution), 7.5, 0.9 + 1.7 * len(panels))
-    grid = figure.subplots(len(panels), 1, sharex=True, squeeze=False)
+    many = len(panels) > MOST_ROWS and not narrow()
+    columns = 2 if many else 1
+    rows = -(-len(panels) // columns)
+    width, height = (12.0, 1.45) if many else (7.5, 1.7)
+    figure = new_figure("Efforts of the actuators", caption(solution), width, 0.9 + height * rows)
+    grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
     bounds = drawn_limits(solution, "torque")
     values = solution["torque"].values
-    for axes, members in zip(grid[:, 0], panels, strict=True):
+    used = list(grid.ravel())[: len(panels)]
+    for axes, members in zip(used, panels, strict=True):
         own = [names[i] for i in members]
-        lines(axes, solution, values[:, members], list(map(readable, own)))
+        lines(axes, solution, values[:, members], short(own) if many else list(map(readable, own)))
         legend(axes, 2)
         axes.set_title(heading(own))
         unit = units[members[0]]
         limits(axes, values[:, by_unit(units)[unit]], bounds, own, unit)
-    scale_by_unit(grid, panels, units)
-    finish(grid, [[effort_label(units[members[0]])] for members in panels])
+        axes.set_ylabel(effort_label(unit))
+    scale_by_unit(np.array(used)[:, None], panels, units)
+    finish_grid(grid, len(panels))
     return figure
 
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 # The third with gaps, through which one that it lies on can be seen, as gamma on alpha in chewing.
 COMPONENTS = [Style(0, "solid"), Style(1, "dot"), Style(2, "dash")]
+MOST_LIMITS = 4  # lines in one plot; more would hide the curves
 LIMITS_IN_VIEW = 0.25  # of a limit: peaks above this bring the limit into view
 MAX_BOUND = 1e9  # metres; a margin without a bound is infinite
 
@@ -88,8 +89,9 @@ def panel(
         "unit": unit.unit,
         "decimals": unit.decimals(values),
         "note": note,
+        "limitsDrawn": len(limits) <= MOST_LIMITS,
         "limits": [one.drawn(unit.scale) for one in limits],
-        "limitsInView": peak >= LIMITS_IN_VIEW * nearest,
+        "limitsInView": len(limits) <= MOST_LIMITS and peak >= LIMITS_IN_VIEW * nearest,
         "sets": [
             {
                 "label": label,
@@ -152,6 +154,7 @@ def _chains(solution: Solution, columns: Columns) -> Iterator[Panel]:
             chosen = [i for i, kind in enumerate(kinds) if kind == unit]
             people = shown(unit) if variable == "joint" else Shown(unit + suffix)
             bounds = [] if variable == "joint" else [limits[i] for i in chosen]
+            drawn = _distinct(bounds, [lines[i].label for i in chosen], people)
             yield panel(
                 columns,
                 "chains",
@@ -159,7 +162,7 @@ def _chains(solution: Solution, columns: Columns) -> Iterator[Panel]:
                 rotary if unit in ("rad", "N m") else sliding,
                 people,
                 {"": [lines[i] for i in chosen]},
-                limits=_distinct(bounds, [lines[i].label for i in chosen], people),
+                limits=drawn,
             )
 
 

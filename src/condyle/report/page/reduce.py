@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..actuators import Duty, DutyMeter, duty
 from .columns import Columns
+from .duty import activation_panels
 from .envelope import Envelope
 from .panels import time_panels
 from .tracks import track_panels
@@ -33,7 +35,7 @@ class Reduced:
 
     solution: with `samples` (K,) of the run's `total`;  envelope: of its curves, or None if the
     page has every sample.   status, time: of every sample, (N,), [s];  near: how many of them are
-    near a singularity.
+    near a singularity.   duties: what each actuator does, of every sample too.
     """
 
     solution: Solution
@@ -42,6 +44,7 @@ class Reduced:
     status: np.ndarray
     time: np.ndarray
     near: int
+    duties: list[Duty]
 
     @property
     def total(self) -> int:
@@ -62,15 +65,18 @@ def reduced(solution: Solution) -> Reduced:
     if count <= affordable:
         whole = solution.load()
         near = int((whole["singularity"].values != 0).sum())
-        return Reduced(whole, np.arange(count), None, status, time, near)
+        return Reduced(whole, np.arange(count), None, status, time, near, duty(whole))
     # An envelope takes 12 bytes a curve and span, a sample 4 bytes a column.
-    spare = affordable - 3 * BUCKETS * len(lines) // columns
-    starts = np.linspace(0, count, BUCKETS + 1).astype(int)
+    # It gets half of the room at most, so that the samples still draw tracks and planes.
+    buckets = min(BUCKETS, affordable * columns // (6 * len(lines)))
+    spare = affordable - 3 * buckets * len(lines) // columns
+    starts = np.linspace(0, count, buckets + 1).astype(int)
     envelope = Envelope(np.append(time[starts[:-1]], time[-1]))
-    extremes, near = {0, count - 1}, 0
+    extremes, near, meter = {0, count - 1}, 0, DutyMeter()
     for first, last in pieces(starts):
         piece = solution.isel(time=slice(starts[first], starts[last])).load()
         near += int((piece["singularity"].values != 0).sum())
+        meter.see(piece)
         for name, values in curve_values(piece).items():
             _take(envelope, name, values, time, starts, first, last)
     for name in envelope.low:
@@ -85,13 +91,14 @@ def reduced(solution: Solution) -> Reduced:
     extremes |= set(_edges(status).tolist())
     steps = np.linspace(0, count - 1, max(spare - len(extremes), 2)).astype(int)
     samples = np.unique([*steps, *extremes])
-    return Reduced(_at(solution, samples), samples, envelope, status, time, near)
+    return Reduced(_at(solution, samples), samples, envelope, status, time, near, meter.read())
 
 
 def curve_values(solution: Solution) -> dict[str, np.ndarray]:
     """Every curve of the page, (N,) by name, and the tracks, whose extremes count too."""
     columns = Columns(solution["time"].values)
     time_panels(solution, columns, every=True)
+    list(activation_panels(solution, columns))
     for number in {n for panel in track_panels(solution, columns) for n in panel["columns"]}:
         name = list(columns.values)[number]
         columns.lines[name] = number

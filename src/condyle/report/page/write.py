@@ -16,6 +16,7 @@ from ..failures import failures, longest
 from ..scene import DARK, LIGHT
 from .alerts import alerts
 from .columns import Columns
+from .duty import activation_panels, plane_panels
 from .facts import (
     chain_table,
     fact_cards,
@@ -45,6 +46,8 @@ _SCRIPTS = (
     "geometry",
     "stage",
     "panels",
+    "field",
+    "planes",
     "tracks",
     "readout",
     "controls",
@@ -126,13 +129,15 @@ def _payload(page: Reduced) -> dict[str, Any]:
     solution = page.solution
     columns = Columns(solution["time"].values)
     drawn = machine(solution, columns)
-    panels = time_panels(solution, columns)
+    panels = [*time_panels(solution, columns), *activation_panels(solution, columns)]
+    planes = plane_panels(solution, columns, page.duties)
     tracks = track_panels(solution, columns)
     told = alerts(solution, columns)
     failed = failures(solution, page.time, page.status)
     return {
         "machine": drawn,
         "panels": panels,
+        "planes": planes,
         "tracks": tracks,
         "alerts": told,
         "failures": [[one.start, one.end, str(one)] for one in longest(failed)],

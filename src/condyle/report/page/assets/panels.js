@@ -54,7 +54,7 @@ class Panel {
     const unit = spec.unit ? ` [${spec.unit}]` : "";
     const head = element("div", { class: "card-head" }, element("h3", {}, spec.title, element("span", {}, unit)));
     if (spec.sets.length > 1) head.append(this.chooser());
-    if (spec.limits.length) head.append(this.limitButton());
+    if (spec.limits.length && spec.limitsDrawn) head.append(this.limitButton());
     this.card = element("article", { class: "card", id: `panel-${spec.id}` }, head, this.plot, this.legend);
     if (spec.note) this.card.append(element("p", { class: "note" }, spec.note));
     this.listen();
@@ -106,7 +106,7 @@ class Panel {
     const y = { ...look, zeroline: true, fixedrange: true };
     const range = this.limits ? this.rangeWithLimits() : null;
     // One label a limit; a level of 0 is the axis.
-    const levels = this.spec.limits.flatMap(({ low, high, label }) => [[high, label], [low, high ? "" : label]]).filter(([value]) => value);
+    const levels = !this.spec.limitsDrawn ? [] : this.spec.limits.flatMap(({ low, high, label }) => [[high, label], [low, high ? "" : label]]).filter(([value]) => value);
     return {
       ...sizeOf(this.plot), margin: { ...MARGIN, autoexpand: false }, showlegend: false, hovermode: false, dragmode: coarse ? false : "zoom",
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { family: "system-ui, sans-serif", color: css("--ink") },
