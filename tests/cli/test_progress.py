@@ -220,7 +220,7 @@ def test_steps_of_a_comparison(
     save_figures(comparison.solution, comparison, tmp_path)
     assert watcher.steps["drawing figures"] == [5, 5]
     save_solution_figures(comparison.solution, tmp_path)
-    assert watcher.steps["drawing figures"] == [10, 10]
+    assert watcher.steps["drawing figures"] == [12, 12]
 
 
 def test_building_a_kernel(

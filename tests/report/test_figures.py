@@ -94,7 +94,7 @@ def test_limit_near_the_data_is_a_line(solution: Solution) -> None:
     levels = [float(np.ravel(line.get_ydata())[0]) for line in rate.get_lines()[-2:]]
     assert sorted(levels) == pytest.approx([-np.degrees(6.0), np.degrees(6.0)])
     assert rate.get_ylim()[1] > levels[0]
-    assert "limit ±343.775 °/s" in words(figure)
+    assert "limit ±343.8 °/s" in words(figure)
 
 
 def test_units_on_the_axes(solution: Solution, mixed: Solution) -> None:

@@ -133,9 +133,12 @@ def summarize(solution: Solution) -> Summary:
 
 
 def work(power: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Integral of powers (N, m) [W] by the trapezoidal rule, (m,) [J], as far as they are known."""
+    """Integral of powers (N, m) [W] by the trapezoidal rule, (m,) [J], as far as they are known.
+
+    The sum does not depend on how the numbers lie in memory, which differs once a file is opened.
+    """
     pieces = np.diff(time)[:, None] * (power[1:] + power[:-1]) / 2
-    return np.nansum(pieces, axis=0)
+    return np.nansum(np.ascontiguousarray(pieces), axis=0)
 
 
 def _power(solution: Solution) -> dict[str, dict[str, float]]:

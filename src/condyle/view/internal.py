@@ -78,16 +78,23 @@ class Internal:
     def __init__(self, model: Evaluator) -> None:
         self._model = model
         self._home: Directions | None = None
+        self._last = Directions(np.empty((0, 0)), np.empty((0, 0)))
 
     def at(self, pose: np.ndarray) -> Directions:
-        """Directions at X_EE, (6,) [m, rad], at rest."""
+        """Directions at X_EE, (6,) [m, rad], at rest; those before where chains cannot reach it."""
         if self._home is None:
-            self._home = ordered(self._space(np.zeros(6)))
-        return scaled(aligned(self._space(pose), self._home))
+            J, normal = self._balance(np.zeros(6))
+            self._home = ordered(null_space(J, normal))
+            self._last = scaled(self._home)
+        J, normal = self._balance(pose)
+        if np.isfinite(J).all() and np.isfinite(normal).all():
+            self._last = scaled(aligned(null_space(J, normal), self._home))
+        return self._last
 
-    def _space(self, pose: np.ndarray) -> Directions:
+    def _balance(self, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Actuator Jacobian (n, 6) and wrenches of unit contact forces (k, 6)."""
         still, none = np.zeros((1, 6)), np.zeros((1, 3))
         ports = {"pose": pose[None], "pose_rate": still, "pose_acceleration": still}
         ports |= {"force": none, "moment": none, "point": none}
         s = self._model.kernel("system").run(ports).values
-        return null_space(s["J"][..., 0].T, s["normal"][..., 0])
+        return s["J"][..., 0].T, s["normal"][..., 0]
