@@ -53,11 +53,12 @@ def test_formulas_are_set(site: Path, open_tab: Callable) -> None:
 def test_search_answers_from_a_folder(site: Path, open_tab: Callable) -> None:
     tab = open_tab((site / "theory" / "kernels.html").as_uri())
     found = tab.page.locator(".md-search-result__item a")
+    box = tab.page.locator("input[name=query]")
 
     def answered() -> bool:
-        # The page may not listen yet. Each question begins the search anew, so leave it time.
-        for text in ("", "transmission"):
-            tab.page.fill("input[name=query]", text)
+        # The page listens to keys, and may not yet: ask again, and leave each question its time.
+        box.fill("")
+        box.press_sequentially("transmission")
         tab.page.wait_for_timeout(5000)
         return found.count() > 0
 
