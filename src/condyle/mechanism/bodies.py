@@ -11,6 +11,17 @@ from .quantities import Fraction, MassOrNone, Moment, MomentOrNone, NonNegativeL
 from .table import Table
 
 
+def check_axial(axial: float, info: ValidationInfo) -> float:
+    """The triangle inequality on the principal moments (transverse, transverse, axial)."""
+    transverse = info.data.get("transverse")
+    if transverse is not None and axial > 2 * transverse * (1 + 1e-12):
+        raise ValueError(
+            f"inertia breaks the triangle inequality: axial {axial:g} kg m^2 is more than "
+            f"twice transverse {transverse:g} kg m^2; no rigid body has such moments"
+        )
+    return axial
+
+
 class Rod(Table):
     """A rod with two ball ends, symmetric about its line."""
 
@@ -19,20 +30,7 @@ class Rod(Table):
     transverse: MomentOrNone = Field(description="central moment of inertia across the rod")
     axial: MomentOrNone = Field(description="moment of inertia along the rod")
 
-    @field_validator("axial")
-    @classmethod
-    def _triangle(cls, axial: float, info: ValidationInfo) -> float:
-        return check_rod_inertia(axial, info.data.get("transverse"))
-
-
-def check_rod_inertia(axial: float, transverse: float | None) -> float:
-    """The triangle inequality on the principal moments (transverse, transverse, axial)."""
-    if transverse is not None and axial > 2 * transverse * (1 + 1e-12):
-        raise ValueError(
-            f"inertia breaks the triangle inequality: axial {axial:g} kg m^2 is more than "
-            f"twice transverse {transverse:g} kg m^2; no rigid body has such moments"
-        )
-    return axial
+    _triangle = field_validator("axial")(check_axial)
 
 
 class Crank(Table):
@@ -51,10 +49,7 @@ class LegBody(Table):
     transverse: MomentOrNone = Field(description="central moment of inertia across the leg")
     axial: MomentOrNone = Field(description="moment of inertia along the leg")
 
-    @field_validator("axial")
-    @classmethod
-    def _triangle(cls, axial: float, info: ValidationInfo) -> float:
-        return check_rod_inertia(axial, info.data.get("transverse"))
+    _triangle = field_validator("axial")(check_axial)
 
 
 def distance(start: tuple[float, ...], end: tuple[float, ...]) -> float:
