@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
+
+import numpy as np
 import pytest
 
+from condyle.bench import own
 from condyle.bench.own import own_probes, thread_probes
 from condyle.bench.rows import TOLERANCE, Probe, Row, spread, timed
 from condyle.bench.run import Benchmark
@@ -20,6 +25,22 @@ def test_every_row_is_right() -> None:
     for row in rows:
         assert row.error < TOLERANCE, row.name
         assert row.seconds > 0
+
+
+def test_what_a_batch_reads_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A row is timed long after it was made: C must not read columns that are gone."""
+    made: list[weakref.ref[np.ndarray]] = []
+
+    def columns(a: np.ndarray) -> np.ndarray:
+        found = np.array(a, order="F")
+        made.append(weakref.ref(found))
+        return found
+
+    monkeypatch.setattr(own.np, "asfortranarray", columns)
+    probes = list(own_probes(load("gough-stewart"), ["virtual_power"]))
+    gc.collect()
+    assert made and all(ref() is not None for ref in made)
+    del probes
 
 
 def test_a_wrong_row_says_so() -> None:

@@ -158,11 +158,12 @@ def _kernel_probes(
 
         yield Probe(f"{label}: {what}", run, wrong, operations)
     count = columns.shape[1]
-    pointers = (ctypes.c_void_p * count)(*(columns[:, j].ctypes.data for j in range(count)))
     strides = (ctypes.c_ssize_t * count)(*[1] * count)
 
     def blocks() -> float:
         _, batch, table = _addresses(kernel)
+        # Taken here, so that the columns stay as long as what reads them.
+        pointers = (ctypes.c_void_p * count)(*(columns[:, j].ctypes.data for j in range(count)))
         return timer.library.time_batch(
             batch, table, pointers, strides, ctypes.c_size_t(SAMPLES), _at(out), _at(status)
         )

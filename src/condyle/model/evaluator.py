@@ -129,12 +129,12 @@ class Evaluator:
 
     # -- what it is ------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def independent(self) -> tuple[str, ...]:
         """Names of the independent coordinates q_EE, in order."""
         return independent_coordinates(self.mechanism)
 
-    @property
+    @cached_property
     def dependent(self) -> tuple[str, ...]:
         """Names of the coordinates that the contacts determine."""
         return dependent_coordinates(self.mechanism)
