@@ -47,7 +47,11 @@ class CompiledKernel:
         Raises: CompilerError: where no kernel can be built.
         """
         compiler = find_compiler()
-        entry, self._library = _loaded(key, build, compiler)
+
+        def make(folder: Path) -> tuple[Path, dict[str, Any]]:
+            return _make(folder, build(), compiler)
+
+        entry, self._library = loaded(_recipe(key, compiler), make)
         self.facts, self.cached = entry.facts, entry.cached
         self.interface = Interface.of(self.facts["interface"])
         self.columns = sum(self.interface.width(r) for r in self.interface.results)
@@ -160,18 +164,11 @@ def _readable(column: np.ndarray) -> np.ndarray:
     return column
 
 
-def _loaded(
-    key: str, build: Callable[[], Variants], compiler: Compiler
-) -> tuple[cache.Entry, ctypes.CDLL]:
-    """The kernel of a question, built if need be.
+def loaded(recipe: str, make: cache.Make) -> tuple[cache.Entry, ctypes.CDLL]:
+    """The library of a recipe, built if need be.
 
     Raises: CompilerError: where it cannot be built, or loaded once it is.
     """
-    recipe = _recipe(key, compiler)
-
-    def make(folder: Path) -> tuple[Path, dict[str, Any]]:
-        return _make(folder, build(), compiler)
-
     ways = (
         lambda: cache.find(recipe),
         lambda: cache.build(recipe, make, notice),
@@ -182,7 +179,7 @@ def _loaded(
         for way in ways:
             if (entry := way()) is not None:
                 try:
-                    return entry, _load(str(entry.library))
+                    return entry, opened(str(entry.library))
                 except OSError as error:  # built with another C library, or cleared just now
                     problem = error
     except (OSError, AttributeError, UnsupportedError) as error:
@@ -192,8 +189,12 @@ def _loaded(
 
 def _recipe(key: str, compiler: Compiler) -> str:
     """Name of everything that shapes a kernel."""
-    tool = repr((compiler.command, compiler.flags, compiler.lanes))
-    return cache.digest(key, _generator(), tool, compiler.identity)
+    return cache.digest(key, _generator(), *tool(compiler))
+
+
+def tool(compiler: Compiler) -> tuple[str, str]:
+    """What of a compiler shapes its libraries."""
+    return repr((compiler.command, compiler.flags, compiler.lanes)), compiler.identity
 
 
 @lru_cache(maxsize=1)
@@ -210,7 +211,7 @@ def _make(folder: Path, variants: Variants, compiler: Compiler) -> tuple[Path, d
         text, library = folder / "kernel.c", folder / "kernel.so"
         text.write_text(source.text, encoding="utf-8")
         compiler.build(text, library)
-    _load(str(library))  # only what can be loaded is kept
+    opened(str(library))  # only what can be loaded is kept
     facts = {
         "graph": variants.digest,
         "interface": source.interface.data(),
@@ -225,9 +226,14 @@ def _make(folder: Path, variants: Variants, compiler: Compiler) -> tuple[Path, d
 
 
 @lru_cache(maxsize=64)
-def _load(path: str) -> ctypes.CDLL:
+def opened(path: str) -> ctypes.CDLL:
+    """A library, with the arguments of those of its functions that Python calls."""
     library = ctypes.CDLL(path)
     pointer, size = ctypes.c_void_p, ctypes.c_size_t
+    if hasattr(library, "within_limits_batch"):
+        library.within_limits_batch.argtypes = [size, *[pointer] * 9]
+        library.within_limits_batch.restype = None
+        return library
     library.batch.argtypes = [pointer, pointer, pointer, size, pointer, size, pointer]
     library.batch.restype = None
     library.prepare.restype = None
