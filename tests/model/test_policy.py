@@ -227,6 +227,20 @@ def test_compiled_limits_and_shortfalls_are_those_of_numpy(objective: str) -> No
     assert np.isnan(quick.effort[~good]).all()
 
 
+def test_a_preload_without_one_sided_contacts_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    machine = condyle.load("masticatory").replace(name="two-sided")
+    for _ in range(2):
+        condyle.derive(machine, backend="numpy", distribution="bounded", preload=3.0)
+    said = capsys.readouterr().err
+    assert said.count("condyle: preload 3 N presses on nothing") == 1
+    assert '"two-sided"' in said and "one_sided = true" in said
+    chosen = condyle.load("masticatory")
+    one = chosen.contacts[0].model_copy(update={"one_sided": True, "side": "below"})
+    pushed = chosen.replace(contacts=(one, *chosen.contacts[1:]))
+    condyle.derive(pushed, backend="numpy", distribution="bounded", preload=3.0)
+    assert capsys.readouterr().err == ""
+
+
 def test_a_pickled_model_keeps_its_policy() -> None:
     case, model, wanted = found("bounded k2 one-sided")
     back = pickle.loads(pickle.dumps(model))

@@ -14,6 +14,7 @@ import numpy as np
 from ..backends.c.limits import WithinLimits
 from ..backends.choose import Backend
 from ..backends.compiler import CompilerError
+from ..backends.notice import notice
 from ..distribution import OBJECTIVES, Objective, Problem, Quadratic, distribute
 from ..distribution import Status as Outcome
 from ..dynamics.distribution import minimum_norm
@@ -74,6 +75,11 @@ class Policy:
             raise InputError(
                 f"distribution {objective} does not weigh contact forces: take {weighing}, or "
                 "leave the contact weight out"
+            )
+        if preload and not any(contact.one_sided for contact in mechanism.contacts):
+            notice(
+                f'preload {preload:g} N presses on nothing: no contact of "{mechanism.name}" is '
+                "one-sided. Set one_sided = true at those that only push"
             )
         return Policy(objective, preload, contact_weight)
 
