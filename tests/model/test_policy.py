@@ -34,6 +34,9 @@ CASES: dict[str, dict[str, Any]] = {
     "minimax mixed k1": {
         "families": MIXED[:3], "contacts": 1, "chains": 7, "limit": 8.0, "seed": 12
     },
+    "minimax cables beside motors": {
+        "families": ("RSS", "cable"), "chains": 8, "limit": 8.0, "seed": 21
+    },
     "cubic cables": {"families": ("cable",), "chains": 8, "limit": 5.0, "seed": 6},
 }  # fmt: skip
 TIGHTER = 1e-8
