@@ -31,12 +31,14 @@ from .own import (
     Timer,
     asked_probes,
     jaw_probes,
+    limit_probes,
     own_probes,
     policy_probes,
     reachable_samples,
     ready_rows,
     thread_probes,
 )
+from .programs import BINDING
 from .rows import Probe, Row, timed
 
 REFERENCE = "masticatory"
@@ -106,6 +108,7 @@ def run_benchmark(seconds: float = 1.0) -> Benchmark:
             probes += _peer_probes(unavailable)
         probes += asked_probes(load(REFERENCE))
         probes += [*policy_probes(load(REFERENCE)), *jaw_probes(load("human-jaw"))]
+        probes += limit_probes(load(REFERENCE), load("human-jaw"), unavailable)
         probes.append(Probe(OPERATION, timer.vector_operation, 0.0))
         rows = _timed(probes, rounds)
         with step("starting afresh"):
@@ -234,6 +237,11 @@ def _ratios(rows: list[Row], lanes: int) -> dict[str, float]:
     least = by_name[f"{REFERENCE}: {LEAST_NORM}"]
     for what, name in (("bounded", BOUNDED), ("friction at two contacts", FRICTION)):
         ratios[f"{what} over least norm"] = by_name[f"{REFERENCE}: {name}"].over(least)
+    for label in (REFERENCE, "human-jaw"):
+        ours = by_name[f"{label}: {BINDING}"]
+        for solver in ("DAQP", "quadprog", "HiGHS", "OSQP"):
+            if theirs := by_name.get(f"{ours.name}, {solver}"):
+                ratios[f"{label}, bounded, times faster than {solver}"] = theirs.over(ours)
     asked = by_name[f"{REFERENCE}: torques"]
     for what in ("evaluate", SOLVE):
         ratios[f"{what} over efforts alone"] = by_name[f"{REFERENCE}: {what}"].over(asked)

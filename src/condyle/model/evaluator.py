@@ -98,8 +98,8 @@ class Evaluator:
         self.route = route
         self._asked = distribution
         self.policy = Policy.of(mechanism, distribution, preload, contact_weight)
-        self._distributor = Distributor(mechanism, self.policy)
         self.backend = Backend(backend)
+        self._distributor = Distributor(mechanism, self.policy, self.backend)
         with step("deriving the equations"):
             structure = structure_of(mechanism, self.formulation, route)
             self._numbers = Layout.of(structure).numbers(mechanism)
@@ -129,12 +129,12 @@ class Evaluator:
 
     # -- what it is ------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def independent(self) -> tuple[str, ...]:
         """Names of the independent coordinates q_EE, in order."""
         return independent_coordinates(self.mechanism)
 
-    @property
+    @cached_property
     def dependent(self) -> tuple[str, ...]:
         """Names of the coordinates that the contacts determine."""
         return dependent_coordinates(self.mechanism)
@@ -162,7 +162,7 @@ class Evaluator:
         other = copy(self)
         other._asked = distribution
         other.policy = Policy.of(self.mechanism, distribution, preload, contact_weight)
-        other._distributor = Distributor(self.mechanism, other.policy)
+        other._distributor = Distributor(self.mechanism, other.policy, self.backend)
         return other
 
     @cached_property
@@ -346,7 +346,9 @@ class Evaluator:
             return
         ports = {name: values[name].T[rows] for name in RESULTS["motion"]}
         ports |= {name: inputs[name][rows] for name in ("force", "moment", "point")}
-        better = self._distributor.solve(self.kernel("system").run(ports).values)
+        # Shares cost more than all the rest.
+        question = "system" if {"share", "slip"} & values.keys() else "balance"
+        better = self._distributor.solve(self.kernel(question).run(ports).values)
         status[rows] = better.pop("status")
         for name, value in better.items():
             if name in values:

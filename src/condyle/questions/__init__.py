@@ -19,7 +19,7 @@ from ..graph.program import Program, Variants
 from .closure import Prescribed, closure, conditions
 from .configuration import configuration
 from .encoders import encoders
-from .inverse import inverse, motion, system
+from .inverse import balance, inverse, motion, system
 from .matrices import jacobians, matrices
 from .reactions import reactions
 from .structure import Structure
@@ -27,6 +27,7 @@ from .structure import Structure
 QUESTIONS: dict[str, Callable[..., Program | Variants]] = {
     "inverse": inverse,
     "motion": motion,
+    "balance": balance,
     "system": system,
     "closure": closure,
     "conditions": conditions,

@@ -16,14 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import UnsupportedError
 from ...graph.program import Numbers, Variants
 from ...progress import step
 from .. import cache
-from ..compiler import Compiler, CompilerError, find_compiler, rivals
-from ..notice import notice
+from ..compiler import Compiler, find_compiler, rivals
 from .emit import Source, emit
-from .library import aligned, load, prepared
+from .library import aligned, load, obtained, prepared, tool
 
 SAMPLES, ROUNDS = 512, 15  # of a measurement, which takes a millisecond
 
@@ -42,28 +40,12 @@ def loaded(
     def make(folder: Path) -> tuple[Path, dict[str, Any]]:
         return _make(folder, build(), compilers, numbers)
 
-    ways = (
-        lambda: cache.find(recipe),
-        lambda: cache.build(recipe, make, notice),
-        lambda: cache.build_apart(recipe, make),
-    )
-    problem: Exception | None = None
-    try:
-        for way in ways:
-            if (entry := way()) is not None:
-                try:
-                    return entry, load(str(entry.library))
-                except OSError as error:  # built with another C library, or cleared just now
-                    problem = error
-    except (OSError, AttributeError, UnsupportedError) as error:
-        problem = error
-    raise CompilerError(f"no kernel could be built and loaded: {problem}") from problem
+    return obtained(recipe, make, load)
 
 
 def _recipe(key: str, *compilers: Compiler) -> str:
     """Name of everything that shapes a kernel."""
-    tools = [repr((c.command, c.flags, c.lanes, c.identity)) for c in compilers]
-    return cache.digest(key, _generator(), *tools)
+    return cache.digest(key, _generator(), *map(tool, compilers))
 
 
 @lru_cache(maxsize=1)

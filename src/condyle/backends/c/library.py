@@ -1,22 +1,56 @@
-"""A kernel's shared library: loaded, and given a mechanism's numbers."""
+"""Shared libraries: found in the cache or built, loaded; kernels get a mechanism's numbers."""
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
+from ...errors import UnsupportedError
 from ...graph.program import Numbers
+from .. import cache
+from ..compiler import Compiler, CompilerError
+from ..notice import notice
 
 _doubles = ctypes.POINTER(ctypes.c_double)
 
 
+def obtained(
+    recipe: str, make: cache.Make, opened: Callable[[str], ctypes.CDLL]
+) -> tuple[cache.Entry, ctypes.CDLL]:
+    """The library of a recipe, built if need be, and opened.
+
+    Raises: CompilerError: where it cannot be built, or opened once it is.
+    """
+    ways = (
+        lambda: cache.find(recipe),
+        lambda: cache.build(recipe, make, notice),
+        lambda: cache.build_apart(recipe, make),
+    )
+    problem: Exception | None = None
+    try:
+        for way in ways:
+            if (entry := way()) is not None:
+                try:
+                    return entry, opened(str(entry.library))
+                except OSError as error:  # built with another C library, or cleared just now
+                    problem = error
+    except (OSError, AttributeError, UnsupportedError) as error:
+        problem = error
+    raise CompilerError(f"no kernel could be built and loaded: {problem}") from problem
+
+
+def tool(compiler: Compiler) -> str:
+    """What of a compiler shapes its libraries."""
+    return repr((compiler.command, compiler.flags, compiler.lanes, compiler.identity))
+
+
 @lru_cache(maxsize=64)
 def load(path: str) -> ctypes.CDLL:
-    """The library, its functions typed.
+    """A kernel, its functions typed.
 
     Raises: OSError, AttributeError: if it cannot be loaded, or is no kernel.
     """
