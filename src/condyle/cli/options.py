@@ -81,6 +81,13 @@ Load = Annotated[
         "(N m). Default: the bundled load (synthetic) with the bundled motion, else none."
     ),
 ]
+Measured = Annotated[
+    Path | None,
+    typer.Option(
+        help="What was measured beside the motion (.csv or .parquet), to be shown with the "
+        "results: markers and EMG, as condyle motion from-c3d --measured writes them."
+    ),
+]
 Units = Annotated[
     str | None,
     typer.Option(

@@ -14,6 +14,7 @@ from condyle.errors import InputError, few, no_such_file, shortened
 from condyle.mechanism.messages import describe, shown
 from condyle.mechanism.table import Table
 from condyle.mechanism.toml import LARGEST_FILE, read_tables
+from condyle.motion.markers.channel_tables import Emg, Forces
 from condyle.motion.markers.rigid import FEWEST
 from condyle.motion.words import listed, short
 
@@ -40,6 +41,8 @@ class MarkerFile(Table):
     platform: _Labels = Field(description="markers that move with the platform")
     home: tuple[_Time, _Time] = Field(description="when the mechanism is at home [s]")
     places: dict[str, Any] = Field(alias="register")
+    forces: Forces | None = Field(None, description="channels of the load")
+    emg: Emg | None = Field(None, description="channels of the muscles")
 
     @property
     def directed(self) -> bool:
