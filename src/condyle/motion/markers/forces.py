@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -56,7 +57,7 @@ def measured_load(
         force = _about_zero(table, recording, force.mean(axis=1))
         in_base = _turned(table, force, bodies) @ registration.rotation.T
         return _load(table, recording, recording.t, in_base, table.point)
-    plate = _plate(recording, table.plate)
+    plate, assumed = _plate(recording, table.plate)
     force, moment = (w.mean(axis=1) @ plate.axes.T for w in _wrench(recording, plate))
     both = _about_zero(table, recording, np.hstack([force, moment]))
     base = bodies.fixed.fit
@@ -64,7 +65,7 @@ def measured_load(
         _back(base.rotation, v) @ registration.rotation.T for v in np.split(both, 2, 1)
     )
     if table.point is not None:
-        return _load(table, recording, recording.t, force, table.point)
+        return _load(table, recording, recording.t, force, table.point, assumed)
     kept, X = pose
     # About any point the wrench is the same one; that of `condyle run` needs no option there.
     name = DEFAULT_LOAD_POINT if DEFAULT_LOAD_POINT in points else next(iter(points), None)
@@ -74,17 +75,23 @@ def measured_load(
     )
     arm = middle[kept, 0] - at
     wrench = np.hstack([force[kept], moment[kept] + np.cross(arm, force[kept])])
-    return _load(table, recording, recording.t[kept], wrench, name)
+    return _load(table, recording, recording.t[kept], wrench, name, assumed)
 
 
 def _load(
-    table: Forces, recording: Recording, t: np.ndarray, wrench: np.ndarray, point: str | None
+    table: Forces,
+    recording: Recording,
+    t: np.ndarray,
+    wrench: np.ndarray,
+    point: str | None,
+    assumed: tuple[str, ...] = (),
 ) -> Load:
     known = np.isfinite(wrench).all(axis=1)
     if not known.any():
         raise InputError(f"{recording.source}: forces: the fixed markers are never seen with them")
-    wrench = -wrench if table.reverse else wrench
-    return Load.from_arrays(t[known], wrench[known], point=point, source=recording.source)
+    signed = -wrench[known] if table.reverse else wrench[known]
+    load = Load.from_arrays(t[known], signed, point=point, source=recording.source)
+    return replace(load, warnings=(*assumed, *load.warnings))
 
 
 def _turned(table: Forces, force: np.ndarray, bodies: Bodies) -> np.ndarray:
@@ -114,8 +121,8 @@ def _about_zero(table: Forces, recording: Recording, values: np.ndarray) -> np.n
     return values - values[within].mean(axis=0)
 
 
-def _plate(recording: Recording, number: int) -> Plate:
-    """The plate of that number.
+def _plate(recording: Recording, number: int) -> tuple[Plate, tuple[str, ...]]:
+    """The plate of that number, and what had to be assumed of it.
 
     Raises: InputError: if there is none, or the file does not say enough of it.
     """
@@ -142,7 +149,17 @@ def _plate(recording: Recording, number: int) -> Plate:
         raise InputError(f"{where}: its corners (FORCE_PLATFORM:CORNERS) span no surface")
     if plate.type == 4 and not plate.matrix.any():
         raise InputError(f"{where} is of type 4 and has no FORCE_PLATFORM:CAL_MATRIX")
-    return plate
+    assumed = []
+    if plate.type in (2, 4) and plate.origin[2] > 0:
+        assumed.append(
+            f"{where}: FORCE_PLATFORM:ORIGIN has z above 0, as if the sensor were above the "
+            "surface; its sign was turned over"
+        )
+        plate = replace(plate, origin=-plate.origin)
+    moments = [] if plate.type == 3 else plate.channels[-1 if plate.type == 1 else 3 :]
+    if plate.type != 4 and not all(recording.channel_units[c] for c in moments):
+        assumed.append(f"{where}: moments without a unit; N {recording.unit} was assumed")
+    return plate, tuple(assumed)
 
 
 def _wrench(recording: Recording, plate: Plate) -> tuple[np.ndarray, np.ndarray]:
@@ -152,8 +169,7 @@ def _wrench(recording: Recording, plate: Plate) -> tuple[np.ndarray, np.ndarray]
     if kinds is None:  # the matrix gives newtons, and moments in the file's length
         signals = _finite(recording, recording.samples[..., list(plate.channels)], names)
         scale = np.repeat([1.0, recording.metres], 3)[:, None]
-        plate = Plate(plate.type, plate.channels, plate.corners, plate.origin, plate.matrix * scale)
-        return plate.wrench(signals)
+        return replace(plate, matrix=plate.matrix * scale).wrench(signals)
     columns = [_values(recording, c, kind) for c, kind in zip(plate.channels, kinds, strict=True)]
     return plate.wrench(np.stack(columns, axis=-1))
 

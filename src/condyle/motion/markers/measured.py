@@ -149,6 +149,10 @@ def from_c3d(
     at = used.copy()
     at[: kept.start] = at[kept.stop :] = False
     off = off_contacts(machine, R[at], p[at])
+    load = None
+    if forces is not None:
+        pose_kept = kept, motion.value
+        load = measured_load(forces, recording, bodies, registration, machine, pose_kept)
     warnings = (
         *recording.warnings,
         *bodies.warnings,
@@ -156,6 +160,7 @@ def from_c3d(
         *registration.warnings,
         *suspects,
         *motion.warnings,
+        *(() if load is None else load.warnings),
     )
     return MarkerMotion(
         motion=replace(motion, sha256=recording.sha256, warnings=warnings),
@@ -175,9 +180,7 @@ def from_c3d(
             emg={chain: values[kept] for chain, values in activity.items()},
             source=recording.source,
         ),
-        load=None
-        if forces is None
-        else measured_load(forces, recording, bodies, registration, machine, (kept, motion.value)),
+        load=load,
         recording=recording,
         warnings=warnings,
     )
