@@ -92,7 +92,7 @@ Units = Annotated[
     str | None,
     typer.Option(
         help="Units of the motion's times (s, ms, us, min), lengths (m, cm, mm, um) and angles "
-        "(rad, deg, mrad), as in ms,mm,deg. A header such as x [mm] says so too.",
+        "(rad, deg, mrad), as in ms,mm,deg. A header such as x (mm) says so too.",
         autocompletion=completion.one_of(*completion.UNITS),
     ),
 ]
