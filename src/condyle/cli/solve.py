@@ -62,7 +62,6 @@ def solve(
     }
     text = f"{rows} rows solved: {out}"
     if greatest is not None:
-        text += (
-            f"\nGreatest activation: {greatest.value:.4g} ({greatest.chain}, row {greatest.row})"
-        )
+        value, chain, row = greatest
+        text += f"\nGreatest activation (effort over its limit): {value:.4g}, {chain} in row {row}"
     return Answer(text, data, command_line("view", mechanism))
