@@ -193,8 +193,10 @@ class Stage:
             for name in drawing.balls:
                 self._joints[chain.name, name].position = points[name]
         self._show_forces(snapshot)
-        places = np.empty((0, 3)) if snapshot.markers is None else snapshot.markers
-        for handle, at in zip(self._markers, self.scale * places, strict=False):
+        places = np.full((len(self._markers), 3), np.nan)
+        if snapshot.markers is not None:
+            places = self.scale * snapshot.markers
+        for handle, at in zip(self._markers, places, strict=True):
             handle.visible = bool(np.isfinite(at).all())
             if handle.visible:
                 handle.position = at

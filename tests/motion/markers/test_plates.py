@@ -208,3 +208,23 @@ def test_what_cannot_be(tmp_path: Path, forces: Any, plates: Any, said: str) -> 
     with pytest.raises(InputError, match=said) as caught:
         from_c3d(tmp_path / "a.c3d", jaw.tables(forces=forces), "masticatory")
     assert len(str(caught.value).splitlines()) <= 2
+
+
+def test_samples_that_are_no_numbers(tmp_path: Path) -> None:
+    jaw = record(seconds=0.8)
+    analog = np.ones((len(jaw.t), 1, 3))
+    analog[40] = np.nan
+    jaw.write(tmp_path / "a.c3d", channels=[(f"F{i}", "N") for i in range(3)], analog=analog)
+    with pytest.raises(InputError, match='channel "F0" has samples that are no numbers'):
+        from_c3d(tmp_path / "a.c3d", jaw.tables(), "masticatory", force=("F0", "F1", "F2"))
+
+
+def test_where_the_head_is_not_seen_a_load_is_between_its_neighbours(tmp_path: Path) -> None:
+    jaw = record(seconds=0.8)
+    for name in ("Upper_FL", "Upper_BL"):
+        jaw.at(name)[40:44] = np.nan
+    analog = np.arange(3.0 * len(jaw.t)).reshape(-1, 1, 3)
+    jaw.write(tmp_path / "a.c3d", channels=[(f"F{i}", "N") for i in range(3)], analog=analog)
+    load = from_c3d(tmp_path / "a.c3d", jaw.tables(), "masticatory", force=("F0", "F1", "F2")).load
+    assert load is not None and len(load.t) == len(jaw.t) - 4
+    assert not set(np.round(load.t * 100)) & {40, 41, 42, 43}

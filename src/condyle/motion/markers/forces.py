@@ -86,9 +86,7 @@ def _load(
     point: str | None,
     assumed: tuple[str, ...] = (),
 ) -> Load:
-    known = np.isfinite(wrench).all(axis=1)
-    if not known.any():
-        raise InputError(f"{recording.source}: forces: the fixed markers are never seen with them")
+    known = np.isfinite(wrench).all(axis=1)  # not where the base is not seen
     signed = -wrench[known] if table.reverse else wrench[known]
     load = Load.from_arrays(t[known], signed, point=point, source=recording.source)
     return replace(load, warnings=(*assumed, *load.warnings))
