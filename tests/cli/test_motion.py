@@ -150,6 +150,8 @@ def test_what_was_assumed_is_a_warning(call: Callable[..., Any]) -> None:
         (("--force", "F1,F2,F3"), "--load names the file"),
         (("--load", "l.csv"), "load: no channels were named for it"),
         (("--force", "F1", "--load", "l.csv"), "got 1 channels, expected three"),
+        (("--force", "F1,F1,F2", "--load", "l.csv"), "expected the labels of three channels"),
+        (("--force", "F1,,F2", "--load", "l.csv"), "expected the labels of three channels"),
         (("--measured", "o.csv"), "two files to write have one name"),
         (("--measured", "no/p.csv"), "the folder"),
         (("--max-residual", "nan"), "--max-residual"),

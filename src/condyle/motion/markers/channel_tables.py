@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from condyle.mechanism.messages import shown
 from condyle.mechanism.table import Table
 
 _Label = Annotated[str, Field(min_length=1, max_length=200)]
@@ -20,9 +21,7 @@ class Forces(Table):
     """The load on the platform, from three channels or from a force plate."""
 
     channels: tuple[_Label, _Label, _Label] | None = Field(None, description="along x, y, z")
-    plate: Annotated[int, Field(strict=True, ge=1)] | None = Field(
-        None, description="number of a force plate, from 1"
-    )
+    plate: int | None = Field(None, description="number of a force plate, from 1")
     point: _Label | None = Field(None, description="point of the platform where it acts")
     axes: Literal["laboratory", "fixed", "platform"] = Field(
         "laboratory", description="what the sensor's axes, the laboratory's at home, turn with"
@@ -31,6 +30,21 @@ class Forces(Table):
         False, description="the channels hold what the platform does to the sensor"
     )
     zero: tuple[_Time, _Time] | None = Field(None, description="when there is no load [s]")
+
+    @field_validator("channels", mode="before")
+    @classmethod
+    def _three_labels(cls, value: Any) -> Any:
+        labels = value if isinstance(value, list | tuple) else ()
+        if len({*map(str, labels)}) != 3 or len(labels) != 3:
+            raise ValueError(f"expected the labels of three channels, got {shown(value)}")
+        return value
+
+    @field_validator("plate", mode="before")
+    @classmethod
+    def _number(cls, value: Any) -> Any:
+        if not isinstance(value, int) or isinstance(value, bool) or value < 1:
+            raise ValueError(f"expected the number of a force plate, from 1, got {shown(value)}")
+        return value
 
     @model_validator(mode="after")
     def _one_of_two(self) -> Self:

@@ -71,6 +71,13 @@ class MarkerFile(Table):
             raise ValueError(f"expected [from, to] or one time, got [{value[0]:g}, {value[1]:g}] s")
         return value
 
+    @field_validator("fixed", "platform", mode="before")
+    @classmethod
+    def _labels(cls, value: Any) -> Any:
+        if not isinstance(value, list | tuple):
+            raise ValueError(f"expected a list of markers' labels, got {shown(value)}")
+        return value
+
     @field_validator("fixed", "platform")
     @classmethod
     def _once(cls, value: tuple[str, ...]) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from condyle.errors import InputError
 from condyle.mechanism import load as load_mechanism
@@ -30,6 +31,7 @@ from condyle.motion.markers.registration import Registration, register
 from condyle.motion.markers.summary import in_words
 from condyle.motion.path import Motion
 from condyle.motion.units import POSE
+from condyle.motion.words import listed
 
 MAX_RESIDUAL = 2e-3  # m
 MAX_GAP = 0.1  # s
@@ -187,9 +189,14 @@ def from_c3d(
 
 
 def _three(channels: Sequence[str]) -> Forces:
-    if len(channels) != 3 or not all(isinstance(name, str) and name for name in channels):
+    if len(channels) != 3:
         raise InputError(f"force: got {len(channels)} channels, expected three: along X, Y, Z")
-    return Forces.model_validate({"channels": tuple(channels)})
+    try:
+        return Forces.model_validate({"channels": tuple(channels)})
+    except ValidationError:
+        raise InputError(
+            f"force: got {listed(map(str, channels))}, expected the labels of three channels"
+        ) from None
 
 
 def _place(recording: Recording, bodies: Bodies, where: Place, key: str) -> np.ndarray:
