@@ -16,6 +16,8 @@ def test_every_row_is_right() -> None:
     names = [row.name for row in rows]
     for what in ("one", "one, dependent", "batch", "batch, two threads"):
         assert f"gough-stewart virtual_power: {what}" in names
+    for what in ("one", "batch"):
+        assert f"gough-stewart forward dynamics: {what}" in names
     assert any("straight-line C" in name for name in names)
     for row in rows:
         assert row.error < TOLERANCE, row.name

@@ -25,6 +25,7 @@ from ..model.evaluator import Evaluator
 from ..progress import step
 from .own import (
     BOUNDED,
+    FORWARD,
     FRICTION,
     LEAST_NORM,
     SOLVE,
@@ -222,6 +223,8 @@ def _ratios(rows: list[Row], lanes: int) -> dict[str, float]:
     ratios["batch over as many fused multiply-adds"] = batch.over(by_name[OPERATION]) / (2 * cycles)
     for what, row in (("one evaluation", one), ("batch", batch)):
         shape = row.name.rsplit(": ", 1)[1]
+        forward = by_name[f"{REFERENCE} {FORWARD}: {shape}"]
+        ratios[f"{what}, forward over inverse dynamics"] = forward.over(row)
         with_forces = by_name[f"{own} + contact forces: {shape}"]
         ratios[f"{what} with contact forces over without"] = with_forces.over(row)
         ratios[f"{what}, curved over planar"] = by_name[f"{curved}: {shape}"].over(row)
