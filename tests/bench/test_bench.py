@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from condyle.bench.motion import motion_rows
 from condyle.bench.own import own_probes, thread_probes
 from condyle.bench.rows import TOLERANCE, Probe, Row, spread, timed
 from condyle.bench.run import Benchmark
@@ -22,6 +23,16 @@ def test_every_row_is_right() -> None:
     for row in rows:
         assert row.error < TOLERANCE, row.name
         assert row.seconds > 0
+
+
+def test_a_second_of_motion_is_right() -> None:
+    """Of fourth order, against an integration in steps of a fiftieth."""
+    unavailable: dict[str, str] = {}
+    rows = list(motion_rows("masticatory", None, unavailable))
+    assert [row.name.rsplit(", ", 1)[1] for row in rows] == ["2 ms", "1 ms"]
+    assert rows[0].error < 1e-6
+    assert rows[1].error < rows[0].error / 10
+    assert not unavailable
 
 
 def test_a_wrong_row_says_so() -> None:

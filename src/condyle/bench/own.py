@@ -50,7 +50,8 @@ class Timer:
         library = Path(tempfile.mkdtemp(prefix="condyle-bench-")) / "timer.so"
         find_compiler().build(Path(str(source)), library)
         self.library = ctypes.CDLL(str(library))
-        for name in ("time_one", "time_batch", "time_casadi", "clock_rate", "vector_operation"):
+        names = ("time_one", "time_batch", "time_casadi", "time_springs")
+        for name in (*names, "clock_rate", "vector_operation"):
             getattr(self.library, name).restype = ctypes.c_double
 
     def clock_rate(self) -> float:
