@@ -12,6 +12,7 @@ import pytest
 from distribution.cases import random_problem
 
 from condyle.bench import own
+from condyle.bench.motion import motion_rows
 from condyle.bench.own import Case, own_probes, thread_probes
 from condyle.bench.programs import Bites, _arguments, _solvers, program_probes, tight
 from condyle.bench.rows import TOLERANCE, Probe, Row, spread, timed
@@ -28,6 +29,8 @@ def test_every_row_is_right() -> None:
     names = [row.name for row in rows]
     for what in ("one", "one, dependent", "batch", "batch, two threads"):
         assert f"gough-stewart virtual_power: {what}" in names
+    for what in ("one", "batch"):
+        assert f"gough-stewart forward dynamics: {what}" in names
     assert any("straight-line C" in name for name in names)
     for row in rows:
         assert row.error < TOLERANCE, row.name
@@ -48,6 +51,16 @@ def test_what_a_batch_reads_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     gc.collect()
     assert made and all(ref() is not None for ref in made)
     del probes
+
+
+def test_a_second_of_motion_is_right() -> None:
+    """Of fourth order, against an integration in steps of a fiftieth."""
+    unavailable: dict[str, str] = {}
+    rows = list(motion_rows("masticatory", None, unavailable))
+    assert [row.name.rsplit(", ", 1)[1] for row in rows] == ["2 ms", "1 ms"]
+    assert rows[0].error < 1e-6
+    assert rows[1].error < rows[0].error / 10
+    assert not unavailable
 
 
 def test_a_wrong_row_says_so() -> None:

@@ -19,6 +19,7 @@ import numpy as np
 
 from ..backends.c.kernel import CompiledKernel
 from ..backends.compiler import find_compiler
+from ..backends.kernel import Kernel
 from ..mechanism.contact import Friction
 from ..mechanism.mechanism import Mechanism
 from ..model.evaluator import Evaluator
@@ -36,6 +37,7 @@ JAW_SAMPLES = 5001  # of a motion, as people solve it
 LEAST_NORM = "torques and contact forces of 5001"
 BOUNDED = f"{LEAST_NORM}, within limits that are inactive"
 FRICTION = f"{LEAST_NORM}, friction at two contacts"
+FORWARD = "forward dynamics"
 MANY = 100_000  # samples of what people call
 SOLVE = "solve along a landmark's path"
 
@@ -48,7 +50,8 @@ class Timer:
         library = Path(tempfile.mkdtemp(prefix="condyle-bench-")) / "timer.so"
         find_compiler().build(library, Path(str(source)))
         self.library = ctypes.CDLL(str(library))
-        for name in ("time_one", "time_batch", "time_casadi", "clock_rate", "vector_operation"):
+        names = ("time_one", "time_batch", "time_casadi", "time_springs")
+        for name in (*names, "clock_rate", "vector_operation"):
             getattr(self.library, name).restype = ctypes.c_double
 
     def clock_rate(self) -> float:
@@ -127,7 +130,10 @@ def own_probes(mechanism: Mechanism, formulations: list[str]) -> Iterator[Probe]
             variants.append((", direct", "direct", ()))
         for what, route, outputs in variants:
             model = Evaluator(mechanism, formulation, route, "compiled")
-            yield from _kernel_probes(label + what, model, outputs, timer, case)
+            kernel = model.kernel("inverse", outputs)
+            found = model.torques(*case.states, case.load, outputs).effort
+            yield from _kernel_probes(label + what, kernel, case.columns, case.right, found, timer)
+    yield from _forward_probes(f"{name} {FORWARD}", case, timer)
     numpy = Evaluator(mechanism, backend="numpy")
     yield _python_probe(
         f"{name} numpy: batch", lambda: numpy.torques(*case.states, case.load), SAMPLES
@@ -136,17 +142,37 @@ def own_probes(mechanism: Mechanism, formulations: list[str]) -> Iterator[Probe]
         yield from _straight_probes(f"{name} CasADi straight-line C, gcc", timer, case)
 
 
-def _kernel_probes(
-    label: str, model: Evaluator, outputs: tuple[str, ...], timer: Timer, case: Case
-) -> Iterator[Probe]:
-    kernel = model.kernel("inverse", outputs)
+def _forward_probes(label: str, case: Case, timer: Timer) -> Iterator[Probe]:
+    """Accelerations and contact forces, from the efforts that inverse dynamics finds."""
+    model = Evaluator(case.mechanism, backend="compiled")
+    kernel = model.kernel("forward", ("contact",))
+    q, q1, q2 = case.states
     assert isinstance(kernel, CompiledKernel)
-    packed, columns = np.ascontiguousarray(case.columns), np.asfortranarray(case.columns)
+    given = np.hstack([q, q1, case.right[:, list(kernel.order)], case.load])
+    found = model.forward(q, q1, case.right, case.load).acceleration
+    yield from _kernel_probes(label, kernel, given, q2, found, timer)
+
+
+def _kernel_probes(
+    label: str,
+    kernel: Kernel,
+    given: np.ndarray,
+    right: np.ndarray,
+    found: np.ndarray,
+    timer: Timer,
+) -> Iterator[Probe]:
+    """One kernel in C.
+
+    Args: given: its columns;  right: its first result, (SAMPLES, size);  found: that by batches.
+    """
+    assert isinstance(kernel, CompiledKernel)
+    packed, columns = np.ascontiguousarray(given), np.asfortranarray(given)
     out, status = np.empty(96 * SAMPLES), np.empty(SAMPLES, dtype=np.uint8)
-    n = case.right.shape[1]
-    got = np.array([kernel.one(s)[0] for s in packed[:256]])[:, :n]
-    # Lanes stand family by family in what C returns.
-    wrong = _error(got[:, np.argsort(kernel.order)], case.right[:256])
+    got = np.array([kernel.one(s)[0] for s in packed[:256]])[:, : right.shape[1]]
+    if kernel.interface.results[0].lanes:
+        # Lanes stand family by family in what C returns.
+        got = got[:, np.argsort(kernel.order)]
+    wrong = _error(got, right[:256])
     operations = kernel.facts["operations"]
     for dependent, what in ((0, "one"), (1, "one, dependent")):
 
@@ -168,8 +194,7 @@ def _kernel_probes(
             batch, table, pointers, strides, ctypes.c_size_t(SAMPLES), _at(out), _at(status)
         )
 
-    wrong = _error(model.torques(*case.states, case.load, outputs).effort, case.right)
-    yield Probe(f"{label}: batch", blocks, wrong, operations)
+    yield Probe(f"{label}: batch", blocks, _error(found, right), operations)
 
 
 def _addresses(kernel: CompiledKernel) -> list[ctypes.c_void_p]:

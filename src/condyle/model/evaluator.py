@@ -41,14 +41,16 @@ from ..questions.inverse import OUTPUTS
 from ..questions.numbers import Layout, require_closed_form, specialised
 from ..questions.structure import structure_of
 from ..status import Status
+from .accelerating import Accelerator
 from .checks import LOAD_COLUMNS, POSE_COLUMNS, check_array, check_states
 from .closing import Closure
-from .data import Configuration, Efforts, Evaluation
+from .data import Accelerations, Configuration, Efforts, Evaluation
 from .distributing import LEAST, Distributor, Policy
 from .reference_force import reference_force
 from .robust import Robust
 
 CONDITION = "condition"
+DEFAULT = (None, 0.0, 0.0)  # distribution, preload and contact weight
 EVERYTHING = ("contact", "share", "motion", "joint", "configuration")
 # Names of results, by what is asked for.
 RESULTS = {
@@ -96,10 +98,10 @@ class Evaluator:
         self.mechanism = mechanism
         self.formulation = formulation_named(formulation).name
         self.route = route
-        self._asked = distribution
-        self.policy = Policy.of(mechanism, distribution, preload, contact_weight)
+        self._asked = distribution, preload, contact_weight
+        if self._asked != DEFAULT:
+            _ = self.policy  # what is asked for has to fit, now
         self.backend = Backend(backend)
-        self._distributor = Distributor(mechanism, self.policy, self.backend)
         with step("deriving the equations"):
             structure = structure_of(mechanism, self.formulation, route)
             self._numbers = Layout.of(structure).numbers(mechanism)
@@ -118,13 +120,12 @@ class Evaluator:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Models travel as their recipe; kernels are found again in the cache."""
-        policy = (self._asked, self.policy.preload, self.policy.contact_weight)
         return type(self), (
             self.mechanism,
             self.formulation,
             self.route,
             self.backend.asked,
-            *policy,
+            *self._asked,
         )
 
     # -- what it is ------------------------------------------------------------------------
@@ -160,10 +161,23 @@ class Evaluator:
     ) -> Self:
         """The same model, kernels and all, that chooses efforts otherwise; see `derive`."""
         other = copy(self)
-        other._asked = distribution
-        other.policy = Policy.of(self.mechanism, distribution, preload, contact_weight)
-        other._distributor = Distributor(self.mechanism, other.policy, self.backend)
+        for name in ("policy", "_distributor"):
+            other.__dict__.pop(name, None)
+        other._asked = distribution, preload, contact_weight
+        _ = other.policy  # has to fit, now
         return other
+
+    @cached_property
+    def policy(self) -> Policy:
+        """How efforts are chosen; forward dynamics has no need of it.
+
+        Raises: InputError: where the default does not fit the mechanism.
+        """
+        return Policy.of(self.mechanism, *self._asked)
+
+    @cached_property
+    def _distributor(self) -> Distributor:
+        return Distributor(self.mechanism, self.policy, self.backend)
 
     @cached_property
     def characteristic_length(self) -> float:
@@ -183,7 +197,7 @@ class Evaluator:
 
     @cached_property
     def _robust(self) -> Robust:
-        distributor = Distributor(self.mechanism, replace(self.policy, objective=LEAST))
+        distributor = Distributor(self.mechanism, Policy(LEAST))
         return Robust(self._structure, self._numbers, self.independent, distributor)
 
     # -- inverse dynamics ------------------------------------------------------------------
@@ -353,6 +367,53 @@ class Evaluator:
         for name, value in better.items():
             if name in values:
                 values[name][..., rows] = value
+
+    # -- forward dynamics ------------------------------------------------------------------
+
+    @cached_property
+    def _accelerator(self) -> Accelerator:
+        return Accelerator(self.mechanism, self.kernel, lambda: self._robust)
+
+    def forward(
+        self,
+        q: np.ndarray,
+        q1: np.ndarray,
+        effort: np.ndarray,
+        load: np.ndarray,
+        outputs: Collection[str] = (),
+        threads: int | None = None,
+    ) -> Accelerations:
+        """Forward dynamics: the accelerations that efforts and loads make.
+
+        Limits of efforts, and that cables cannot push, are the caller's concern.
+
+        Args:    q, q1: (N, m) each, in the order of `independent` [m, rad; per s].
+                 effort: (N, n) [N m or N], in the order of the chains.
+                 load: (N, 9), as of `evaluate`.
+                 outputs: what is wanted besides, of motion, joint and sliding; threads: at most so
+                 many.
+        Raises:  InputError: for an output that is none of these, or arrays that do not fit.
+        """
+        return self._accelerator(q, q1, effort, load, outputs, threads)
+
+    def forward_one(
+        self, q: np.ndarray, q1: np.ndarray, effort: np.ndarray, load: np.ndarray
+    ) -> np.ndarray:
+        """Accelerations of one sample, (m,), at least latency; NaN where there are none.
+
+        Args: q, q1: (m,) each;  effort: (n,);  load: (9,); as of `forward`.
+        """
+        return self._accelerator.one(q, q1, effort, load)
+
+    def linearised(
+        self, q: np.ndarray, q1: np.ndarray, effort: np.ndarray, load: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """x' = A x + B effort about states x = (q, q'), exact; arguments as of `forward`.
+
+        The load stays as it is in {S}. Returns: A, (N, 2 m, 2 m), and B, (N, 2 m, n); NaN where
+        there are no accelerations.
+        """
+        return self._accelerator.linearised(q, q1, effort, load)
 
     # -- the configuration -----------------------------------------------------------------
 

@@ -19,16 +19,21 @@ from ..graph.program import Program, Variants
 from .closure import Prescribed, closure, conditions
 from .configuration import configuration
 from .encoders import encoders
+from .forward import forward, forward_system
 from .inverse import balance, inverse, motion, system
+from .linear import linear
 from .matrices import jacobians, matrices
 from .reactions import reactions
 from .structure import Structure
 
 QUESTIONS: dict[str, Callable[..., Program | Variants]] = {
     "inverse": inverse,
+    "forward": forward,
+    "forward_system": forward_system,
     "motion": motion,
     "balance": balance,
     "system": system,
+    "linear": linear,
     "closure": closure,
     "conditions": conditions,
     "configuration": configuration,
@@ -48,6 +53,7 @@ GEOMETRY = (
     "encoders",
     "jacobians",
     "reactions",
+    "linear",
 )
 
 
