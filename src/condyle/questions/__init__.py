@@ -19,6 +19,7 @@ from ..graph.program import Program, Variants
 from .closure import Prescribed, closure, conditions
 from .configuration import configuration
 from .encoders import encoders
+from .instant import energy, instant
 from .inverse import inverse, motion, system
 from .matrices import jacobians, matrices
 from .reactions import reactions
@@ -32,6 +33,8 @@ QUESTIONS: dict[str, Callable[..., Program | Variants]] = {
     "conditions": conditions,
     "configuration": configuration,
     "encoders": encoders,
+    "instant": instant,
+    "energy": energy,
     "matrices": matrices,
     "jacobians": jacobians,
     "reactions": reactions,
@@ -45,6 +48,8 @@ GEOMETRY = (
     "conditions",
     "configuration",
     "encoders",
+    "instant",
+    "energy",
     "jacobians",
     "reactions",
 )
