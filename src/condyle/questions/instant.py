@@ -32,7 +32,7 @@ def instant(structure: Structure, inertia: bool = False) -> Variants:
     Args: inertia: M_r of `matrices` too, (m, m).
     """
     b = Builder(structure)
-    platform = closed(b)
+    platform = closed(b, still=True)
     motion, s = platform.motion, structure
     T = motion.E @ motion.M_J
     b.output("pose", platform.pose, ANGLE_UNITS)
@@ -75,7 +75,7 @@ def instant(structure: Structure, inertia: bool = False) -> Variants:
 def energy(structure: Structure) -> Program:
     """Kinetic and potential energy [J], from q and q'; the potential is 0 at the origin of {S}."""
     b = Builder(structure)
-    platform = closed(b)
+    platform = closed(b, still=True)
     motion, g = platform.motion, b.parameter("gravity")
     i = b.parameter("inertia")
     body = ca.vertcat(*(ca.horzcat(*(i[k] for k in row)) for row in ((0, 3, 4), (3, 1, 5), (4, 5, 2))))

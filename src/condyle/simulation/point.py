@@ -13,11 +13,10 @@ class Instant:
 
     def __init__(self, model: Evaluator, inertia: bool = False) -> None:
         self.found = Single(model.kernel("instant", *([True] if inertia else [])))
-        self._still = np.zeros(len(model.independent))
 
     def __call__(self, q: np.ndarray, q1: np.ndarray) -> int:
         """Look at a state; returns its status. Results by name, valid until the next call."""
-        return self.found(q, q1, self._still)
+        return self.found(q, q1)
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.found[name]
