@@ -154,15 +154,7 @@ class Distributor:
             contact_weight=self.policy.contact_weight,
         )
         found = distribute(problem, self.policy.objective)
-        # What each part asks for with least norm; the rest is internal.
-        factors = minimum_norm(s["A"].transpose(0, 2, 1), np.ones(s["A"].shape[1]))
-        with np.errstate(invalid="ignore"):
-            right = s["b"].transpose(0, 2, 1)
-            if self.friction:
-                rubbed = (np.abs(found.contact_force)[..., None] * s["friction"]).sum(axis=1)
-                right = np.concatenate([right, (s["Pi"] @ rubbed[..., None])], axis=2)
-            share = factors.torques(right)
-            share = np.concatenate([share, (found.effort - share.sum(axis=2))[..., None]], axis=2)
+        share = shares(s, found.effort, found.contact_force if self.friction else None)
         return {
             "effort": found.effort.T,
             "contact_force": found.contact_force.T,
@@ -172,3 +164,22 @@ class Distributor:
             "slip": system["slip"],
             "drag": system["drag"],
         }
+
+
+def shares(
+    system: Mapping[str, np.ndarray], effort: np.ndarray, contact_force: np.ndarray | None
+) -> np.ndarray:
+    """What each part asks for with least norm; the rest of the efforts is internal, and last.
+
+    Args:    system: results of that question, samples first;  effort: (N, n).
+             contact_force: (N, k) [N] where friction is a part of its own, before the last.
+    Returns: (N, n, parts).
+    """
+    factors = minimum_norm(system["A"].transpose(0, 2, 1), np.ones(system["A"].shape[1]))
+    with np.errstate(invalid="ignore"):
+        right = system["b"].transpose(0, 2, 1)
+        if contact_force is not None:
+            rubbed = (np.abs(contact_force)[..., None] * system["friction"]).sum(axis=1)
+            right = np.concatenate([right, (system["Pi"] @ rubbed[..., None])], axis=2)
+        share = factors.torques(right)
+        return np.concatenate([share, (effort - share.sum(axis=2))[..., None]], axis=2)

@@ -19,8 +19,8 @@ from ..graph.program import Program, Variants
 from .closure import Prescribed, closure, conditions
 from .configuration import configuration
 from .encoders import encoders
-from .instant import energy, instant
 from .forward import forward, forward_system
+from .instant import energy, instant
 from .inverse import inverse, motion, system
 from .linear import linear
 from .matrices import jacobians, matrices

@@ -11,11 +11,13 @@ import casadi as ca
 from ..dynamics.joint_space import chain_jacobians
 from ..graph.program import Program, Variants
 from ..kinematics.chain import FAMILIES
-from ..kinematics.state import pose_state
+from ..kinematics.contact import contact_frame
 from ..status import Status
 from .builder import Builder
-from .equations import Wrench, equations
+from .equations import Wrench, platform_body
 from .friction import contacts
+from .inertia import affine
+from .numbers import single_contacts
 from .platform import ANGLE_UNITS, Platform, closed
 from .structure import Structure
 
@@ -58,7 +60,9 @@ def instant(structure: Structure, inertia: bool = False) -> Variants:
     b.output("A", rows, "", s.m)
     b.output("loss", losses, "W")
     touch, k = contacts(b, platform), len(s.contacts)
-    points = [platform.placement.position + r for r in motion.frame.levers]
+    position = platform.placement.position
+    frame = contact_frame(single_contacts(s, b.parameter), position, platform.R)
+    points = [position + r for r in frame.levers]
     b.output("contact_point", ca.horzcat(ca.SX(3, 0), *points).T, "m", k, 3)
     rubs = [ca.dot(touch.slip[:, i], touch.drag[:, i]) for i in range(k)]
     b.output("rub", ca.vertcat(ca.SX(0, 1), *rubs), "m/s", k)
@@ -77,12 +81,11 @@ def energy(structure: Structure) -> Program:
     b = Builder(structure)
     platform = closed(b, still=True)
     motion, g = platform.motion, b.parameter("gravity")
-    i = b.parameter("inertia")
-    body = ca.vertcat(*(ca.horzcat(*(i[k] for k in row)) for row in ((0, 3, 4), (3, 1, 5), (4, 5, 2))))
+    body = platform_body(b, lumped=False)
     V, omega = motion.twist[:3], motion.twist[3:]
-    spin, mass = platform.R.T @ omega, b.parameter("mass")
-    kinetic = mass * ca.dot(V, V) / 2 + ca.dot(spin, body @ spin) / 2
-    potential = -mass * ca.dot(g, platform.placement.position)
+    spin = platform.R.T @ omega
+    kinetic = body.mass * ca.dot(V, V) / 2 + ca.dot(spin, body.inertia @ spin) / 2
+    potential = -body.mass * ca.dot(g, platform.placement.position)
     moving, held = [], []
     for group, kind in enumerate(structure.families):
         family, c = FAMILIES[kind], FAMILIES[kind].named(b.lane(group, "constants"))
@@ -118,10 +121,9 @@ def _loss(b: Builder, group: int, rate: ca.SX) -> ca.SX:
 
 def _inertia(b: Builder, platform: Platform) -> ca.SX:
     zero = ca.SX.zeros(3)
-    X = platform.placement.pose()
-    X1, X2 = platform.motion.rate, b.cut(platform.motion.acceleration)
-    state = pose_state(b.cut(X), b.cut(X1), X2)
-    eq = equations(b, platform, Wrench(zero, zero, zero), route="core", state=state)
-    M = b.jacobian(b.cut(eq.Q), X2)
-    M_J = platform.motion.M_J
-    return M_J.T @ M @ M_J
+    no_effort = [ca.SX(0) for _ in b.structure.families]
+    eq = affine(b, platform, Wrench(zero, zero, zero), no_effort)
+    upper = ca.triu(eq.H)
+    H = upper + ca.triu(eq.H, False).T
+    pulled = eq.basis.generalized_force(H)  # Pi^T H
+    return eq.S.T @ eq.basis.generalized_force(pulled.T) @ eq.S

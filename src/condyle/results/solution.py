@@ -39,7 +39,7 @@ __all__ = [
 
 
 class Solution(xr.Dataset):
-    """Inverse dynamics along a motion: an `xarray.Dataset` that knows its mechanism.
+    """Inverse dynamics along a motion, or a simulation: an `xarray.Dataset` that knows its mechanism.
 
     Dimensions time, chain, contact, coordinate, part, axis. The variables and their units are in
     the documentation's table of results; each has the attributes `units` and `long_name`.
@@ -78,6 +78,11 @@ class Solution(xr.Dataset):
         return json.loads(self.attrs["options"])
 
     @property
+    def events(self) -> list[dict[str, Any]]:
+        """What happened in a simulation: time, kind, owner, text, state, ends; else nothing."""
+        return json.loads(self.attrs.get("events", "[]"))
+
+    @property
     def plot(self) -> Any:  # type: ignore[override]
         """Figures: `solution.plot.torque()` and friends; xarray's own are there too."""
         require("matplotlib", "figures")
@@ -108,6 +113,9 @@ class Solution(xr.Dataset):
         columns: dict[str, np.ndarray | list[str]] = {"t": self["time"].values}
         for variable in VARIABLES:
             if variable.column is not None and variable.name in self:
+                if len(variable.dims) == 1:
+                    columns[variable.column] = self[variable.name].values
+                    continue
                 entries, values = self[variable.dims[1]].values, self[variable.name].values
                 values = np.linalg.norm(values, axis=-1) if variable.sizes else values
                 columns |= named_columns(variable.column, entries, values)

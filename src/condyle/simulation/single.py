@@ -44,7 +44,9 @@ class Single:
         }
         answer = self._kernel.run(rows)
         self._values = {
-            name: np.moveaxis(a[..., 0], -1, 0) if _lanes(self._kernel.interface, name) else a[..., 0]
+            name: np.moveaxis(a[..., 0], -1, 0)
+            if _lanes(self._kernel.interface, name)
+            else a[..., 0]
             for name, a in answer.values.items()
         }
         return int(answer.status[0])

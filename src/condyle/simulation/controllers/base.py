@@ -70,9 +70,7 @@ class Law:
         """Memory to begin with."""
         return NOTHING
 
-    def __call__(
-        self, now: Measured, aim: Reference, memory: Memory
-    ) -> tuple[np.ndarray, Memory]:
+    def __call__(self, now: Measured, aim: Reference, memory: Memory) -> tuple[np.ndarray, Memory]:
         """Efforts (n,) [N m or N], before any limit, and the memory of the next period."""
         raise NotImplementedError
 

@@ -30,9 +30,8 @@ from ...motion import resolve_load_point
 from ..loads.spring import unit
 from ..point import Instant
 from ..table import Direction, File, Gain, Gains, Name, Positive
-from .base import Measured, Memory, Reference
+from .base import ControllerTable, Law, Measured, Memory, Reference
 from .computed_torque import ComputedTorqueLaw, motion_gains
-from .base import ControllerTable, Law
 
 
 class BiteForce(ControllerTable):
@@ -95,9 +94,7 @@ class BiteForceLaw(ComputedTorqueLaw):
     def begin(self) -> Memory:
         return np.zeros(2)
 
-    def __call__(
-        self, now: Measured, aim: Reference, memory: Memory
-    ) -> tuple[np.ndarray, Memory]:
+    def __call__(self, now: Measured, aim: Reference, memory: Memory) -> tuple[np.ndarray, Memory]:
         at, u, point = self.instant, self.direction, self.point
         assert point is not None
         at(now.q, now.q1)

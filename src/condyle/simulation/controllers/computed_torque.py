@@ -45,13 +45,9 @@ class ComputedTorqueLaw(Law):
 
     def acceleration(self, now: Measured, aim: Reference) -> np.ndarray:
         """q_c'', (m,)."""
-        return (
-            aim.q2 + self.damping * (aim.q1 - now.q1) + self.stiffness * (aim.q - now.q)
-        )
+        return aim.q2 + self.damping * (aim.q1 - now.q1) + self.stiffness * (aim.q - now.q)
 
-    def __call__(
-        self, now: Measured, aim: Reference, memory: Memory
-    ) -> tuple[np.ndarray, Memory]:
+    def __call__(self, now: Measured, aim: Reference, memory: Memory) -> tuple[np.ndarray, Memory]:
         return self.model.one(now.q, now.q1, self.acceleration(now, aim), np.zeros(9)), memory
 
 

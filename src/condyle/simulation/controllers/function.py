@@ -18,9 +18,7 @@ class FunctionLaw(Law):
 
     function: Callable[[Measured, Reference], Any]
 
-    def __call__(
-        self, now: Measured, aim: Reference, memory: Memory
-    ) -> tuple[np.ndarray, Memory]:
+    def __call__(self, now: Measured, aim: Reference, memory: Memory) -> tuple[np.ndarray, Memory]:
         effort = np.asarray(self.function(now, aim), dtype=float)
         n = len(self.model.mechanism.chains)
         if effort.shape != (n,) or not np.isfinite(effort).all():

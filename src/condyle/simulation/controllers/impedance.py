@@ -61,9 +61,7 @@ class ImpedanceLaw(Law):
     posture_damping: float
     instant: Instant
 
-    def __call__(
-        self, now: Measured, aim: Reference, memory: Memory
-    ) -> tuple[np.ndarray, Memory]:
+    def __call__(self, now: Measured, aim: Reference, memory: Memory) -> tuple[np.ndarray, Memory]:
         at, point = self.instant, self.point
         assert point is not None
         at(aim.q, aim.q1)

@@ -47,9 +47,7 @@ class JointPDLaw(Law):
     damping: np.ndarray
     gravity: bool
 
-    def __call__(
-        self, now: Measured, aim: Reference, memory: Memory
-    ) -> tuple[np.ndarray, Memory]:
+    def __call__(self, now: Measured, aim: Reference, memory: Memory) -> tuple[np.ndarray, Memory]:
         effort = self.stiffness * (aim.joint - now.joint)
         effort += self.damping * (aim.joint_rate - now.joint_rate)
         if self.gravity:

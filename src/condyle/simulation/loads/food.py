@@ -172,7 +172,5 @@ class BoundFood(BoundLoad):
         return (
             Jump(APART, "food_left", "the teeth leave the food"),
             Jump(BROKEN, "food_broken", f"the food breaks at {self.break_force:g} N"),
-            Jump(
-                BROKEN, "food_broken", f"the food is bitten to {self.break_thickness * 1e3:g} mm"
-            ),
+            Jump(BROKEN, "food_broken", f"the food is bitten to {self.break_thickness * 1e3:g} mm"),
         )
