@@ -99,7 +99,9 @@ class Watch:
         t, first = min((self._when(step, int(i), modes, acting), int(i)) for i in passed)
         if first < len(self._own):
             self._past[first] = True
-        return self._crossing(self._guards(modes)[first], t, step.y1 if t == step.t1 else step.at(t))
+        return self._crossing(
+            self._guards(modes)[first], t, step.y1 if t == step.t1 else step.at(t)
+        )
 
     @staticmethod
     def _crossing(g: _Guard, t: float, y: np.ndarray) -> Crossing:
@@ -116,15 +118,16 @@ class Watch:
         ends = value(step.t0), value(step.t1)
         if not ends[0] < 0 < ends[1]:
             return step.t0 if ends[0] >= 0 else step.t1
-        return float(brentq(value, step.t0, step.t1, xtol=TOLERANCE, rtol=1e-15))
+        t, on = float(brentq(value, step.t0, step.t1, xtol=TOLERANCE, rtol=1e-15)), TOLERANCE
+        while t < step.t1 and value(t) <= 0:  # the event has happened: it is not met again
+            t, on = min(t + on, step.t1), 2 * on
+        return t
 
     def _guards(self, modes: Sequence[int]) -> list[_Guard]:
         found = list(self._own)
         for i, (load, mode) in enumerate(zip(self._loads, modes, strict=True)):
             for jump in load.jumps(mode):
-                found.append(
-                    _Guard(jump.kind, jump.text, load.name, load=i, mode=jump.mode)
-                )
+                found.append(_Guard(jump.kind, jump.text, load.name, load=i, mode=jump.mode))
         return found
 
     def _values(
