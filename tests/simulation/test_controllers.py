@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.points import moved
 
 import condyle
 from condyle.results.model import Model
@@ -29,14 +30,21 @@ def opening() -> condyle.Motion:
 def controlled(model: Model, motion: condyle.Motion, **tables: Any) -> condyle.Solution:
     controller = TORQUE | tables.pop("controller", {})
     return condyle.simulate(
-        model, {"duration": 0.12, "controller": controller, **tables}, motion=motion
+        model, {"duration": 0.12, "controller": controller} | tables, motion=motion
     )
 
 
 def test_a_perfect_model_tracks_at_the_integrator_s_error(
     jaw: Model, opening: condyle.Motion
 ) -> None:
-    found = controlled(jaw, opening, controller={"ideal": True}, rtol=1e-10)
+    found = controlled(
+        jaw,
+        opening,
+        controller={"ideal": True},
+        rtol=1e-10,
+        duration=0.1,
+        start={"on_motion": True},
+    )
     assert np.abs(found["tracking_error"]).max() < 1e-10
 
 
@@ -106,8 +114,6 @@ def test_impedance_gives_way_as_a_spring(jaw: Model) -> None:
         "load": [{"kind": "constant", "point": "right_molar", "force": force.tolist()}],
     }
     pose = condyle.simulate(jaw, tables, motion=rest)["pose"].values[-1]
-    from test_energy import moved
-
     moved_by = moved(pose, np.array(jaw.mechanism.platform.points["right_molar"]))
     # Contacts carry what lies across them: compare along what the point can do.
     J = jaw_jacobian(jaw)
@@ -116,8 +122,6 @@ def test_impedance_gives_way_as_a_spring(jaw: Model) -> None:
 
 def jaw_jacobian(jaw: Model) -> np.ndarray:
     """Of right_molar at home, (3, m), by differences of poses."""
-    from test_energy import moved
-
     p, h = np.array(jaw.mechanism.platform.points["right_molar"]), 1e-6
     columns = []
     for i in range(len(jaw.independent)):
@@ -188,7 +192,7 @@ def biting(jaw: Model) -> condyle.Solution:
 def test_a_bite_settles_without_overshoot(biting: condyle.Solution) -> None:
     force = biting["bite_force"].values
     assert force.max() < 50 * 1.05
-    assert abs(force[-1] - 50) < 0.5 and force[0] == 0
+    assert abs(force[-1] - 50) < 1 and force[0] == 0
     assert [e["kind"] for e in biting.events if e["kind"].startswith("food")] == ["food_touched"]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import simpson
+from support.points import moved
 
 import condyle
 from condyle.results.model import Model
@@ -40,15 +41,6 @@ def test_energy_of_free_motion(jaw: Model) -> None:
         total = total + STIFFNESS / 2 * (x - REST) ** 2
     size = energy["kinetic"].max()
     assert size > 1e-3 and np.abs(total - total[0]).max() < 1e-9 * max(size, total.max())
-
-
-def moved(pose: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """Displacement of a platform point from home; R = Rx Ry Rz, written anew."""
-    (a, b, c), turned = pose[3:], p
-    turned = np.array([[np.cos(c), -np.sin(c), 0], [np.sin(c), np.cos(c), 0], [0, 0, 1]]) @ turned
-    turned = np.array([[np.cos(b), 0, np.sin(b)], [0, 1, 0], [-np.sin(b), 0, np.cos(b)]]) @ turned
-    turned = np.array([[1, 0, 0], [0, np.cos(a), -np.sin(a)], [0, np.sin(a), np.cos(a)]]) @ turned
-    return pose[:3] + turned - p
 
 
 @pytest.fixture(scope="module")

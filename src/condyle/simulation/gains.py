@@ -15,12 +15,12 @@ Skogestad and Postlethwaite, Multivariable Feedback Control, 2005, section 4.9).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from ..errors import UnsupportedError
-from ..model.evaluator import Evaluator
 from .controllers import Law, Measured, Reference
 from .plan import ClosedLoop, Plan
 from .point import Instant
@@ -127,17 +127,13 @@ def check_gains(plan: Plan) -> GainReport:
     home = drive.path.references(np.zeros(1))[0]
     at = Instant(drive.law.model)
     at(still, still)
-    home = Reference(still, still, still, at["joint"].copy(), still_of(plan), home.force)
+    rest = np.zeros(len(plan.low))
+    home = Reference(still, still, still, at["joint"].copy(), rest, home.force)
     end = min(plan.duration, float(drive.path.times[-1]))
     times = np.linspace(0.0, end, POINTS)
     places = [(None, home), *zip(times.tolist(), drive.path.references(times), strict=True)]
     found = tuple(_point(plan, drive, time, aim) for time, aim in places)
     return GainReport(found, drive.period, drive.delay)
-
-
-def still_of(plan: Plan) -> np.ndarray:
-    """Joints at rest, (n,)."""
-    return np.zeros(len(plan.low))
 
 
 def _point(plan: Plan, drive: ClosedLoop, time: float | None, aim: Reference) -> Point:
@@ -150,7 +146,7 @@ def _point(plan: Plan, drive: ClosedLoop, time: float | None, aim: Reference) ->
         s = np.linalg.eigvals(A - B @ K)
         worst = 1.0 + float(s.real.max())
         return Point(time, s, worst, _damping(s), _phase_continuous(A, B, K))
-    step = _Sampled(A, B, K, drive, m)
+    step = Sampled(A, B, K, drive, m)
     z = np.linalg.eigvals(step.closed())
     lasting = z[np.abs(z) > FAST]
     s = np.log(lasting.astype(complex)) / drive.period
@@ -175,8 +171,11 @@ def _law(law: Law, aim: Reference) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class _Sampled:
-    """The sampled loop; its state: x, the last q and rate that the controller saw, late efforts."""
+class Sampled:
+    """The sampled loop of x' = A x + B u, u = -K x.
+
+    Its state: x, the last q and rate that the controller saw, and efforts that are on their way.
+    """
 
     A: np.ndarray
     B: np.ndarray
@@ -251,11 +250,12 @@ def _margin(loops: list[np.ndarray]) -> float:
     """Least angle between -1 and where an eigenvalue's modulus passes 1 [degrees]."""
     least = np.inf
     ordered = [one[np.argsort(-np.abs(one))] for one in loops]
-    for before, after in zip(ordered[:-1], ordered[1:], strict=True):
-        a, b = np.abs(before), np.abs(after)
-        for i in np.flatnonzero((a - 1) * (b - 1) < 0):
-            part = (1 - a[i]) / (b[i] - a[i])
-            value = before[i] + part * (after[i] - before[i])
+    for before, after in pairwise(ordered):
+        with np.errstate(divide="ignore"):
+            a, b = np.log(np.abs(before)), np.log(np.abs(after))
+        for i in np.flatnonzero(a * b < 0):
+            turned = a[i] / (a[i] - b[i]) * np.angle(after[i] / before[i])
+            value = before[i] * np.exp(1j * turned)
             least = min(least, abs(np.degrees(np.angle(-value))))
     return float(least)
 

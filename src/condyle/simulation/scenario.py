@@ -47,7 +47,7 @@ class Start(Table):
     @model_validator(mode="after")
     def _one(self) -> Self:
         if self.on_motion and self.given:
-            raise ValueError(f"on_motion says where to begin already; remove {list(self.given)[0]}")
+            raise ValueError(f"on_motion says where to begin; remove {next(iter(self.given))}")
         return self
 
     @property

@@ -48,7 +48,7 @@ class _Guard:
 
 
 class Watch:
-    """The guards of one run: bounds, pulls of one-sided contacts, speeds, and those of the loads."""
+    """The guards of one run: bounds, pulls of one-sided contacts, speeds, and the loads' own."""
 
     def __init__(self, plan: Plan, plant: Plant) -> None:
         self._plant, self._loads = plant, plan.loads

@@ -49,7 +49,7 @@ class BiteForce(ControllerTable):
     force: Gain | None = Field(default=None, description="f_d, N")
     force_file: File | None = Field(default=None, description="CSV of t [s], force [N], instead")
     proportional: Gain = Field(default=0.0, description="1")
-    integral: Gain = Field(default=20.0, description="1/s")
+    integral: Gain = Field(default=5.0, description="1/s")
     bite_damping: Gain = Field(default=300.0, description="1/s")
     threshold: Positive = Field(default=2.0, description="force that means contact, N")
 

@@ -5,8 +5,8 @@
     q_c'' = q_d'' + N (Kv (q_d' - q') + Kp (q_d - q)),    N = 1 - J^# J,
     J^# = M^-1 J^T (J M^-1 J^T)^-1,
 
-with p, v the point's position and velocity in {S} and J (3, m) its Jacobian. The apparent inertia is
-the mechanism's own, so no force has to be measured (Hogan, J. Dyn. Sys. Meas. Control 107 (1985)
+with p, v the point's position and velocity in {S} and J (3, m) its Jacobian. The apparent inertia
+is the mechanism's own, so no force has to be measured (Hogan, J. Dyn. Sys. Meas. Control 107 (1985)
 1-24). The freedoms that the point leaves are held by `posture`, without a force at the point: N is
 dynamically consistent (Khatib, IEEE J. Robotics and Automation 3 (1987) 43-53).
 """

@@ -5,8 +5,8 @@
 the proportional-derivative law of every servo drive; that it is stable for any positive gains once
 gravity is compensated is shown by Takegaki and Arimoto, J. Dyn. Sys. Meas. Control 103 (1981)
 119-125. With `gravity`, what holds the reference at rest is added, from the controller's model and
-by its distribution. With more actuators than freedoms, joints that disagree work against each other:
-gains should be alike. A cable takes no push: it slackens where the law asks for one.
+by its distribution. With more actuators than freedoms, joints that disagree work against each
+other: gains should be alike. A cable takes no push: it slackens where the law asks for one.
 """
 
 from __future__ import annotations

@@ -7,8 +7,8 @@ with u the direction in which the point bites. It only pushes, since the damper 
 close. It breaks at a force or at a thickness left over, and then does nothing until the teeth have
 parted by its thickness: the tongue has put a new one between them.
 
-The law and the numbers of `bolus` are those of the ArtiSynth jaw models (FoodBolus of dynjaw), where
-stiffness is the force at full compression over the diameter.
+The law and the numbers of `bolus` are those of the ArtiSynth jaw models (FoodBolus of dynjaw),
+where stiffness is the force at full compression over the diameter.
 """
 
 from __future__ import annotations
