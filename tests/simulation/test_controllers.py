@@ -41,7 +41,7 @@ def test_a_perfect_model_tracks_at_the_integrator_s_error(
         jaw,
         opening,
         controller={"ideal": True},
-        rtol=1e-10,
+        rtol=1e-12,
         duration=0.1,
         start={"on_motion": True},
     )

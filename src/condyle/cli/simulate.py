@@ -59,7 +59,7 @@ def simulate(
     from ..simulation import simulate as run
     from ..simulation.bind import bind
     from ..simulation.gains import check_gains as check
-    from ..simulation.simulate import as_scenario
+    from ..simulation.simulating import as_scenario
     from ..simulation.starter import default_scenario
 
     machine = condyle.load(mechanism)

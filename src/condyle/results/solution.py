@@ -39,9 +39,9 @@ __all__ = [
 
 
 class Solution(xr.Dataset):
-    """Inverse dynamics along a motion, or a simulation: an `xarray.Dataset` that knows its mechanism.
+    """Inverse dynamics along a motion, or a simulation; it knows its mechanism.
 
-    Dimensions time, chain, contact, coordinate, part, axis. The variables and their units are in
+    An `xarray.Dataset`. Dimensions time, chain, contact, coordinate, part, axis. The variables and their units are in
     the documentation's table of results; each has the attributes `units` and `long_name`.
     """
 

@@ -5,7 +5,7 @@ from .events import Event
 from .integrators import INTEGRATORS
 from .loads import FOODS, LOADS
 from .scenario import Scenario, load_scenario, scenario_schema
-from .simulate import simulate
+from .simulating import simulate
 
 __all__ = [
     "CONTROLLERS",

@@ -56,7 +56,7 @@ class Plant:
         x = self._instant["pose"].tolist()
         R = self._instant["R"].tolist()
         V = self._twist
-        found = []
+        found: list[tuple[Floats, Floats, Floats]] = []
         for p in self._points:
             r = [row[0] * p[0] + row[1] * p[1] + row[2] * p[2] for row in R]
             s = (x[0] + r[0] - p[0], x[1] + r[1] - p[1], x[2] + r[2] - p[2])

@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from ..progress import step as progress
-from ..status import Status
+from ..status import STATUS_NAMES, Status
 from .controllers import Measured
 from .events import KINDS, Event
 from .integrators import INTEGRATORS, Stuck
@@ -145,7 +145,7 @@ class Run:
                         self._begin(integrator, t, until, y)
         except Stuck as stuck:
             self._keep_end(t, y)
-            kind = "stiff" if stuck.status is None else Status(stuck.status).name
+            kind = "stiff" if stuck.status is None else STATUS_NAMES[stuck.status]
             kind = kind if kind in KINDS else "stiff"
             self._end(t, y, kind, KINDS[kind])
         return y

@@ -168,6 +168,9 @@ def scenario_from(
         unit = "m"
     if isinstance(data.get("controller"), Mapping) and data["controller"].get("kind") == "none":
         data.pop("controller")
+    if "loads" in data:  # a name that Python has for a key of the file
+        problems.append('loads: is not a key of the file format. Did you mean "load"?')
+        del data["loads"]
     root = whole()
     try:
         found = root.model_validate(data, context={"per_metre": PER_METRE[unit], "folder": folder})
@@ -194,13 +197,15 @@ def whole() -> type[Scenario]:
 
 @lru_cache(maxsize=8)
 def _whole(controllers: tuple[type[Table], ...], loads: tuple[type[Table], ...]) -> type[Scenario]:
-    controller = Annotated[reduce(or_, controllers), Field(discriminator="kind")]
-    load = Annotated[reduce(or_, loads), Field(discriminator="kind")]
-    # pydantic reads types that are made while the program runs.
-    made: Any = create_model(
+    # Types that are made while the program runs: pydantic can read them, type checkers cannot.
+    made: Any = create_model
+    kind = Field(discriminator="kind")
+    controller: Any = Annotated[reduce(or_, controllers), kind]  # type: ignore[valid-type]
+    load: Any = Annotated[reduce(or_, loads), kind]  # type: ignore[valid-type]
+    found: type[Scenario] = made(
         "Scenario",
         __base__=Scenario,
         controller=(controller | None, None),
         loads=(tuple[load, ...], Field(default=(), alias="load", max_length=100)),
     )
-    return made
+    return found
