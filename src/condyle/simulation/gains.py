@@ -138,7 +138,8 @@ def check_gains(plan: Plan) -> GainReport:
 
 def _point(plan: Plan, drive: ClosedLoop, time: float | None, aim: Reference) -> Point:
     model, m = plan.model, len(plan.q)
-    effort = model.one(aim.q, aim.q1, aim.q2, np.zeros(9))
+    on_path = Measured(0.0, aim.q, aim.q1, aim.joint, aim.joint_rate, np.zeros(3))
+    effort, _ = drive.law(on_path, aim, drive.law.begin())
     rows = (a[None] for a in (aim.q, aim.q1, effort, np.zeros(9)))
     A, B = (a[0] for a in model.linearised(*rows))
     K = _law(drive.law, aim)
