@@ -46,5 +46,5 @@ for controller in ("chew", "bite"):
 axes[0].set_ylabel("error of the opening [deg]")
 axes[1].set_ylabel("force on the food [N]")
 axes[2].set(ylabel="larger joint load [N]", xlabel="time [s]")
-axes[0].legend(fontsize="small", loc="upper left")
+figure.legend(loc="outside upper center", ncols=2, fontsize="small")
 figure.savefig("chew.png", dpi=120)

@@ -1,7 +1,7 @@
 """Bite force: motion in the free directions, force along the bite, switched by contact.
 
-Until the teeth touch food this is computed torque. In contact, with u the direction of the bite, J
-(1, m) the Jacobian of the point's velocity along it, and f the measured force on the food,
+Free, this is computed torque that bears the measured force f on the food as well. Biting, with u
+the direction of the bite and J (1, m) the Jacobian of the point's velocity along it,
 
     F     = f_d + proportional (f_d - f) + integral int (f_d - f) dt,
     q_c'' = N (q_d'' + Kv (q_d' - q') + Kp (q_d - q)) - J^# bite_damping J q',
@@ -13,8 +13,10 @@ hybrid control of position and force (Raibert and Craig, J. Dyn. Sys. Meas. Cont
 (1987) 43-53. Along u the jaw then is a mass 1 / (J M^-1 J^T) on the food's spring, which
 `bite_damping` has to calm: critical damping is 2 sqrt((1 + proportional) stiffness / mass).
 
-Contact begins where f passes `threshold` while the path leads further into the food, and ends where
-f falls below half of it or the path opens again. So `motion` says when to bite, and `force` how.
+A bite begins where f passes `threshold` while the path closes. It ends where f falls below half of
+that, or where the path has opened by `release` beyond where the point is; then the jaw follows the
+path, and bites no more until it has left the food. So `motion` says when to bite, and `force` how
+hard. Since f is borne all the time, efforts do not jump where one law follows the other.
 """
 
 from __future__ import annotations
@@ -29,9 +31,11 @@ from ...model.evaluator import Evaluator
 from ...motion import resolve_load_point
 from ..loads.spring import unit
 from ..point import Instant
-from ..table import Direction, File, Gain, Gains, Name, Positive
+from ..table import Direction, File, Gain, Gains, Name, NonNegativeLength, Positive
 from .base import ControllerTable, Law, Measured, Memory, Reference
 from .computed_torque import ComputedTorqueLaw, motion_gains
+
+FREE, BITING, LEAVING = 0.0, 1.0, 2.0
 
 
 class BiteForce(ControllerTable):
@@ -52,6 +56,9 @@ class BiteForce(ControllerTable):
     integral: Gain = Field(default=5.0, description="1/s")
     bite_damping: Gain = Field(default=300.0, description="1/s")
     threshold: Positive = Field(default=2.0, description="force that means contact, N")
+    release: NonNegativeLength = Field(
+        default=2e-4, description="how far the path opens beyond the point before it lets go"
+    )
 
     @model_validator(mode="after")
     def _one_force(self) -> BiteForce:
@@ -69,6 +76,7 @@ class BiteForce(ControllerTable):
             self.integral,
             self.bite_damping,
             self.threshold,
+            self.release,
             1.0 / (self.rate or 1.0),
             Instant(model, inertia=True),
             point=model.load_point(name),
@@ -78,7 +86,7 @@ class BiteForce(ControllerTable):
 
 @dataclass(frozen=True)
 class BiteForceLaw(ComputedTorqueLaw):
-    """Memory: whether in contact (0 or 1), and the integral of the error [N s].
+    """Memory: FREE, BITING or LEAVING, and the integral of the error [N s].
 
     period: [s], over which the integral grows at a call.
     """
@@ -88,6 +96,7 @@ class BiteForceLaw(ComputedTorqueLaw):
     integral: float
     bite_damping: float
     threshold: float
+    release: float
     period: float
     instant: Instant
 
@@ -100,17 +109,32 @@ class BiteForceLaw(ComputedTorqueLaw):
         at(now.q, now.q1)
         J = u @ at.jacobian(point)
         felt = -float(u @ now.force)
-        biting, total = memory.tolist()
-        least = self.threshold / 2 if biting else self.threshold
-        acceleration = self.acceleration(now, aim)
-        if felt < least or J @ (aim.q - now.q) <= 0:
-            effort = self.model.one(now.q, now.q1, acceleration, np.zeros(9))
-            return effort, np.zeros(2)
-        by = np.linalg.solve(at["inertia_matrix"], J)
-        by /= J @ by
-        acceleration = acceleration - by * (J @ acceleration + self.bite_damping * (J @ now.q1))
-        error = aim.force - felt
-        push = aim.force + self.proportional * error + self.integral * total
+        mode, total = memory.tolist()
+        mode = self._mode(mode, felt, J @ (aim.q - now.q), J @ aim.q1)
+        acceleration, push = self.acceleration(now, aim), felt
+        if mode == BITING:
+            by = np.linalg.solve(at["inertia_matrix"], J)
+            by /= J @ by
+            acceleration -= by * (J @ acceleration + self.bite_damping * (J @ now.q1))
+            error = aim.force - felt
+            push = aim.force + self.proportional * error + self.integral * total
+            total += error * self.period
+        else:
+            total = 0.0
         load = np.concatenate([-push * u, np.zeros(3), point])
         effort = self.model.one(now.q, now.q1, acceleration, load)
-        return effort, np.array([1.0, total + error * self.period])
+        return effort, np.array([mode, total])
+
+    def _mode(self, mode: float, felt: float, ahead: float, closing: float) -> float:
+        """Which law is next.
+
+        Args: felt: force on the food [N];  ahead: how much further the path is into it [m];
+              closing: how fast the path goes that way [m/s].
+        """
+        if felt < self.threshold / 2:
+            return FREE
+        if mode == BITING:
+            return LEAVING if ahead < -self.release and closing < 0 else BITING
+        if mode == FREE and felt > self.threshold and closing > 0:
+            return BITING
+        return mode
