@@ -182,7 +182,8 @@ class Distributor:
             for name, value in others.items():
                 found[name][..., left] = value
         if "A" in system:
-            found["share"] = self._shares(s, found["effort"].T, found["contact_force"].T)
+            rubbing = found["contact_force"].T if self.friction else None
+            found["share"] = shares(s, found["effort"].T, rubbing).transpose(2, 1, 0)
             found |= {name: system[name] for name in ("slip", "drag")}
         return found
 
@@ -223,16 +224,21 @@ class Distributor:
             "unsure": found.unsure,
         }
 
-    def _shares(
-        self, s: Mapping[str, np.ndarray], effort: np.ndarray, force: np.ndarray
-    ) -> np.ndarray:
-        """What each part asks for with least norm, and the rest, which is internal."""
-        factors = minimum_norm(s["A"].transpose(0, 2, 1), np.ones(s["A"].shape[1]))
-        with np.errstate(invalid="ignore"):
-            right = s["b"].transpose(0, 2, 1)
-            if self.friction:
-                rubbed = (np.abs(force)[..., None] * s["friction"]).sum(axis=1)
-                right = np.concatenate([right, (s["Pi"] @ rubbed[..., None])], axis=2)
-            share = factors.torques(right)
-            share = np.concatenate([share, (effort - share.sum(axis=2))[..., None]], axis=2)
-        return share.transpose(2, 1, 0)
+
+def shares(
+    system: Mapping[str, np.ndarray], effort: np.ndarray, contact_force: np.ndarray | None
+) -> np.ndarray:
+    """What each part asks for with least norm; the rest of the efforts is internal, and last.
+
+    Args:    system: results of that question, samples first;  effort: (N, n).
+             contact_force: (N, k) [N] where friction is a part of its own, before the last.
+    Returns: (N, n, parts).
+    """
+    factors = minimum_norm(system["A"].transpose(0, 2, 1), np.ones(system["A"].shape[1]))
+    with np.errstate(invalid="ignore"):
+        right = system["b"].transpose(0, 2, 1)
+        if contact_force is not None:
+            rubbed = (np.abs(contact_force)[..., None] * system["friction"]).sum(axis=1)
+            right = np.concatenate([right, (system["Pi"] @ rubbed[..., None])], axis=2)
+        share = factors.torques(right)
+        return np.concatenate([share, (effort - share.sum(axis=2))[..., None]], axis=2)

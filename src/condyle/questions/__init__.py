@@ -20,6 +20,7 @@ from .closure import Prescribed, closure, conditions
 from .configuration import configuration
 from .encoders import encoders
 from .forward import forward, forward_system
+from .instant import energy, instant
 from .inverse import balance, inverse, motion, system
 from .linear import linear
 from .matrices import jacobians, matrices
@@ -38,6 +39,8 @@ QUESTIONS: dict[str, Callable[..., Program | Variants]] = {
     "conditions": conditions,
     "configuration": configuration,
     "encoders": encoders,
+    "instant": instant,
+    "energy": energy,
     "matrices": matrices,
     "jacobians": jacobians,
     "reactions": reactions,
@@ -51,6 +54,8 @@ GEOMETRY = (
     "conditions",
     "configuration",
     "encoders",
+    "instant",
+    "energy",
     "jacobians",
     "reactions",
     "linear",

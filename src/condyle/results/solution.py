@@ -40,10 +40,11 @@ __all__ = [
 
 
 class Solution(xr.Dataset):
-    """Inverse dynamics along a motion: an `xarray.Dataset` that knows its mechanism.
+    """Inverse dynamics along a motion, or a simulation; it knows its mechanism.
 
-    Dimensions time, chain, contact, coordinate, part, axis. The variables and their units are in
-    the documentation's table of results; each has the attributes `units` and `long_name`.
+    An `xarray.Dataset`. Dimensions time, chain, contact, coordinate, part, axis. The variables and
+    their units are in the documentation's table of results; each has the attributes `units` and
+    `long_name`.
     """
 
     __slots__ = ()
@@ -77,6 +78,11 @@ class Solution(xr.Dataset):
     def options(self) -> dict[str, Any]:
         """How the solution was made: formulation, route, sources, seconds."""
         return json.loads(self.attrs["options"])
+
+    @property
+    def events(self) -> list[dict[str, Any]]:
+        """What happened in a simulation: time, kind, owner, text, state, ends; else nothing."""
+        return json.loads(self.attrs.get("events", "[]"))
 
     @property
     def plot(self) -> Any:  # type: ignore[override]
@@ -119,6 +125,9 @@ class Solution(xr.Dataset):
         columns: dict[str, np.ndarray | list[str]] = {"t": self["time"].values}
         for variable in VARIABLES:
             if variable.column is not None and variable.name in self:
+                if len(variable.dims) == 1:
+                    columns[variable.column] = self[variable.name].values
+                    continue
                 entries, values = self[variable.dims[1]].values, self[variable.name].values
                 values = np.linalg.norm(values, axis=-1) if variable.sizes else values
                 columns |= named_columns(variable.column, entries, values)

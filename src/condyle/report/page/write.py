@@ -112,13 +112,14 @@ def report_html(
     solution = page.solution
     scripts = [_lines(get_plotlyjs()), _script()]
     name, options = solution.attrs["mechanism_name"], solution.options
+    what = "Simulation" if options.get("motion_kind") == "simulation" else "Inverse dynamics"
     parts = {
         "policy": text(_policy(scripts)),
         "style": Markup(_asset("page.css")),
         "title": text(f"{name} - condyle report"),
         "name": text(name),
         "subtitle": text(
-            f"Inverse dynamics by {options['formulation']}, route {options['route']}; motion: "
+            f"{what} by {options['formulation']}, route {options['route']}; motion: "
             f"{PurePath(options['motion']).name}; load: {PurePath(options['load']).name}"
         ),
         "version": text(solution.attrs.get("source", "condyle")),
