@@ -146,6 +146,11 @@ class Single:
         """Evaluate `given`; returns the status."""
         return self._one(*self._at)
 
+    @property
+    def addresses(self) -> tuple[int, int, int, int]:
+        """Of the C function and of what it is called with, for other C: table, `given`, `found`."""
+        return ctypes.cast(self._one, ctypes.c_void_p).value or 0, *self._at
+
 
 def _padded(own: np.ndarray, pad: np.ndarray, width: int) -> np.ndarray:
     """Constants (size, lanes), filled up to whole vectors."""
