@@ -46,7 +46,7 @@ class Timer:
     def __init__(self) -> None:
         source = files(__package__) / "timer.c"
         library = Path(tempfile.mkdtemp(prefix="condyle-bench-")) / "timer.so"
-        find_compiler().build(Path(str(source)), library)
+        find_compiler().build(library, Path(str(source)))
         self.library = ctypes.CDLL(str(library))
         for name in ("time_one", "time_batch", "time_casadi", "clock_rate", "vector_operation"):
             getattr(self.library, name).restype = ctypes.c_double
@@ -265,7 +265,7 @@ def _straight_probes(label: str, timer: Timer, case: Case) -> Iterator[Probe]:
     folder = Path(tempfile.mkdtemp(prefix="condyle-bench-"))
     (folder / "straight.c").write_text(_generated(function), encoding="utf-8")
     library = folder / "straight.so"
-    find_compiler().build(folder / "straight.c", library)
+    find_compiler().build(library, folder / "straight.c")
     call = ctypes.CDLL(str(library)).straight_line
     w, iw = np.empty(function.sz_w() + 1), np.empty(function.sz_iw() + 1, dtype=np.int64)
     packed, out = np.ascontiguousarray(case.samples), np.empty(16)
