@@ -104,7 +104,7 @@ class Accelerator:
         ports = {name: inputs[name] for name in ("q1", "effort", "force", "moment", "point")}
         ports |= {"pose": about["pose"], "q2": about.acceleration}
         ports["contact_force"] = about.contact_force
-        found = self._kernel("linear").run(ports).values
+        found = self._robust().linear(ports)
         s = {name: np.moveaxis(a, -1, 0) for name, a in found.items()}
         count, m = about.acceleration.shape
         A, B = np.zeros((count, 2 * m, 2 * m)), np.zeros((count, 2 * m, len(self._chains)))
@@ -136,4 +136,3 @@ class Accelerator:
     ) -> np.ndarray:
         rows = [np.asarray(a, dtype=float)[None] for a in (q, q1, effort, load)]
         return self(rows[0], rows[1], rows[2], rows[3]).acceleration[0]
-

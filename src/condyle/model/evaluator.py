@@ -50,6 +50,7 @@ from .reference_force import reference_force
 from .robust import Robust
 
 CONDITION = "condition"
+DEFAULT = (None, 0.0, 0.0)  # distribution, preload and contact weight
 EVERYTHING = ("contact", "share", "motion", "joint", "configuration")
 # Names of results, by what is asked for.
 RESULTS = {
@@ -97,9 +98,9 @@ class Evaluator:
         self.mechanism = mechanism
         self.formulation = formulation_named(formulation).name
         self.route = route
-        self._asked = distribution
-        self.policy = Policy.of(mechanism, distribution, preload, contact_weight)
-        self._distributor = Distributor(mechanism, self.policy)
+        self._asked = distribution, preload, contact_weight
+        if self._asked != DEFAULT:
+            _ = self.policy  # what is asked for has to fit, now
         self.backend = Backend(backend)
         with step("deriving the equations"):
             structure = structure_of(mechanism, self.formulation, route)
@@ -119,13 +120,12 @@ class Evaluator:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Models travel as their recipe; kernels are found again in the cache."""
-        policy = (self._asked, self.policy.preload, self.policy.contact_weight)
         return type(self), (
             self.mechanism,
             self.formulation,
             self.route,
             self.backend.asked,
-            *policy,
+            *self._asked,
         )
 
     # -- what it is ------------------------------------------------------------------------
@@ -166,10 +166,23 @@ class Evaluator:
     ) -> Self:
         """The same model, kernels and all, that chooses efforts otherwise; see `derive`."""
         other = copy(self)
-        other._asked = distribution
-        other.policy = Policy.of(self.mechanism, distribution, preload, contact_weight)
-        other._distributor = Distributor(self.mechanism, other.policy)
+        for name in ("policy", "_distributor"):
+            other.__dict__.pop(name, None)
+        other._asked = distribution, preload, contact_weight
+        _ = other.policy  # has to fit, now
         return other
+
+    @cached_property
+    def policy(self) -> Policy:
+        """How efforts are chosen; forward dynamics has no need of it.
+
+        Raises: InputError: where the default does not fit the mechanism.
+        """
+        return Policy.of(self.mechanism, *self._asked)
+
+    @cached_property
+    def _distributor(self) -> Distributor:
+        return Distributor(self.mechanism, self.policy)
 
     @cached_property
     def characteristic_length(self) -> float:
@@ -189,7 +202,7 @@ class Evaluator:
 
     @cached_property
     def _robust(self) -> Robust:
-        distributor = Distributor(self.mechanism, replace(self.policy, objective=LEAST))
+        distributor = Distributor(self.mechanism, Policy(LEAST))
         return Robust(self._structure, self._numbers, self.independent, distributor)
 
     # -- inverse dynamics ------------------------------------------------------------------

@@ -19,7 +19,7 @@ SAME = 1e-9  # how far apart, over their size, solutions are one
 
 @dataclass(frozen=True)
 class Balanced:
-    """w, (N, m), and lambda, (N, k); where the equations are regular, and one pattern serves."""
+    """w, (N, m), and lambda, (N, k); where equations are regular, and where one pattern serves."""
 
     w: np.ndarray
     force: np.ndarray
@@ -55,22 +55,23 @@ def balanced(system: Mapping[str, np.ndarray], rubbing: Sequence[int]) -> Balanc
 
 
 def _solved(A: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A^-1 right, (N, 6), and where A is regular; rows and columns are first made of one size."""
+    """A^-1 right, (N, s), and where A is regular; rows and columns are first made of one size."""
     x = np.full(right.shape, np.nan)
-    good = np.isfinite(A).all(axis=(1, 2)) & np.isfinite(right).all(axis=1)
-    A, right = A[good], right[good]
+    regular = np.isfinite(A).all(axis=(1, 2))
+    A = A[regular]
     columns = np.abs(A).max(axis=1, keepdims=True)
     A = A / columns
     rows = np.abs(A).max(axis=2, keepdims=True)
-    A, right = A / rows, right[..., None] / rows
+    A = A / rows
     sure = np.isfinite(A).all(axis=(1, 2))
     A[~sure] = 0.0
     U, sigma, Vt = np.linalg.svd(A)
     sure &= sigma[:, -1] >= SINGULAR * sigma[:, 0]
-    y = Vt.transpose(0, 2, 1) @ ((U.transpose(0, 2, 1) @ right) / sigma[..., None])
-    x[good] = np.where(sure[:, None], y[..., 0] / columns[:, 0], np.nan)
-    good[good] = sure
-    return x, good
+    y = U.transpose(0, 2, 1) @ (right[regular][..., None] / rows)
+    y = Vt.transpose(0, 2, 1) @ (y / sigma[..., None])
+    x[regular] = np.where(sure[:, None], y[..., 0] / columns[:, 0], np.nan)
+    regular[regular] = sure
+    return x, regular
 
 
 def solved_rows(A: np.ndarray, right: np.ndarray) -> np.ndarray:

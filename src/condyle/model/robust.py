@@ -60,6 +60,10 @@ class Robust:
         return self._kernel("forward_system")
 
     @cached_property
+    def _linear(self) -> NumpyKernel:
+        return self._kernel("linear")
+
+    @cached_property
     def _configuration(self) -> NumpyKernel:
         return self._kernel("configuration")
 
@@ -119,7 +123,9 @@ class Robust:
             least, most = configuration["J_A_extremes"]
             assembled = reached & (configuration["discriminant"] >= 0).all(axis=0)
             regular = found.regular & (ratio(least, most) >= SINGULAR)
-            status = judge(assembled, regular, np.isfinite(q2).all(axis=1) | ~found.single)
+            finite = np.isfinite(system["F"]).all(axis=0)
+            finite &= np.isfinite(q2).all(axis=1) | ~found.single
+            status = judge(assembled, regular, finite)
             status[(status == Status.ok) & ~found.single] = Status.jammed
         return {
             "acceleration": q2.T,
@@ -133,6 +139,10 @@ class Robust:
             "slip": system["slip"],
             "drag": system["drag"],
         }, status
+
+    def linear(self, ports: Mapping[str, np.ndarray]) -> Arrays:
+        """Results of the question of that name: asked for too seldom to be worth a compiler."""
+        return self._linear.run(ports).values
 
     def motion(self, q: np.ndarray, q1: np.ndarray, q2: np.ndarray) -> tuple[Arrays, np.ndarray]:
         """X_EE and its rates, (N, 6) each, and where the contacts can be met."""

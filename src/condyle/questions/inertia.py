@@ -123,8 +123,11 @@ def _by_derivatives(b: Builder, platform: Platform, load: Wrench, effort: Lanes)
     s, motion = b.structure, platform.motion
     twists = FORMULATIONS[s.formulation].uses_twist
     unknown = b.unknown("acceleration", 6)
-    name = "twist_rate" if twists else "acceleration"
-    moved = replace(platform, motion=replace(motion, **{name: unknown}))
+    start = motion.twist_rate if twists else motion.acceleration
+    turning = (
+        replace(motion, twist_rate=unknown) if twists else replace(motion, acceleration=unknown)
+    )
+    moved = replace(platform, motion=turning)
     eq = equations(b, moved, load, route="core")
     assert eq.G is not None
     carried = b.total([c.row * t for c, t in zip(eq.chains, effort, strict=True)])
@@ -133,7 +136,7 @@ def _by_derivatives(b: Builder, platform: Platform, load: Wrench, effort: Lanes)
     return Affine(
         b.jacobian(Q, unknown),
         b.at_zero(Q, unknown),
-        getattr(motion, name),
+        start,
         eq.basis,
         (motion.E @ motion.M_J)[ind, :] if twists else ca.SX.eye(s.m),
         eq.state.B,

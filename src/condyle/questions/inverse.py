@@ -84,7 +84,11 @@ def program(
         configuration.add(b, platform)
         if structure.friction:
             add_sliding(b, contacts(b, platform))
-    b.check(feasibility(b, platform, [c.dynamics.discriminant for c in eq.chains]), DOUBTFUL, Status.unreachable)
+    b.check(
+        feasibility(b, platform, [c.dynamics.discriminant for c in eq.chains]),
+        DOUBTFUL,
+        Status.unreachable,
+    )
     finite = ca.fabs(b.total(best.effort)) < HUGE
     b.check(best.quality * finite * _every_rate_is_felt(b, eq), WEAK)
     return b.finish()
@@ -159,7 +163,7 @@ def system(structure: Structure) -> Program:
     platform, load = given(b), Wrench.of(b)
     eq = equations(b, platform, load, route="core")
     still = [b.at_zero(part, *_rates(eq, platform)) for part in eq.parts.values()]
-    b.output("A", eq.A, "")
+    b.output("A", eq.A, "", structure.m)
     for name, parts in (("b", list(eq.parts.values())), ("b_gravity", still)):
         rows = ca.horzcat(*(eq.basis.generalized_force(p) for p in parts)).T
         b.output(name, rows, "", len(parts), structure.m)

@@ -36,15 +36,13 @@ def consistent(K: ca.SX, force: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 def _solutions(A: ca.SX, right: ca.SX) -> list[list[ca.SX]]:
     """Solutions of (sigma + A) y = right for every pattern; eliminations are shared."""
-    if right.numel() == 0:
-        return [[]]
+    inverses = [1 / (A[0, 0] + sign) for sign in (1, -1)]
+    if right.numel() == 1:
+        return [[right * inverse] for inverse in inverses]
     found = []
-    for sign in (1, -1):
-        inverse = 1 / (sign + A[0, 0])
+    for inverse in inverses:
         ratio = A[1:, 0] * inverse
         for rest in _solutions(A[1:, 1:] - ratio @ A[0, 1:], right[1:] - ratio * right[0]):
-            first = right[0]
-            for entry, y in zip(ca.horzsplit(A[0, 1:]), rest, strict=True):
-                first = first - entry * y
+            first = right[0] - A[0, 1:] @ ca.vertcat(*rest)
             found.append([first * inverse, *rest])
     return found

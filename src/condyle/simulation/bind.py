@@ -265,5 +265,3 @@ def _moved(model: Evaluator, q: np.ndarray, load: BoundLoad) -> list[float]:
     at = Instant(model)
     at(q, np.zeros_like(q))
     return (at.position(load.point) - load.point).tolist()
-
-

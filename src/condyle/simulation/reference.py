@@ -60,9 +60,7 @@ class Path:
             )
         joint, rate = answer.values["joint"].T, answer.values["joint_rate"].T
         force = np.interp(t, self.force_times, self.force)
-        return [
-            Reference(*row) for row in zip(q, q1, q2, joint, rate, force.tolist(), strict=True)
-        ]
+        return [Reference(*row) for row in zip(q, q1, q2, joint, rate, force.tolist(), strict=True)]
 
     def at(self, t: float) -> Reference:
         """At one time [s]."""

@@ -27,6 +27,7 @@ def simulate(
     loads: Sequence[Any] = (),
     motion: Motion | None = None,
     stop_at_bounds: bool = False,
+    source: str | None = None,
 ) -> Solution:
     """Forward in time: what a mechanism does under efforts or a controller, and under loads.
 
@@ -38,11 +39,13 @@ def simulate(
             displacement from home and v its velocity, (3,) each.
             motion: to follow, in the place of the controller's.
             stop_at_bounds: end where a contact reaches the end of its surface.
+            source: what messages call the scenario; default: its file.
     Returns: a solution at `rate`, up to what ended the run; `events` says what happened.
     Raises: ScenarioError: for a scenario with anything wrong, or that does not fit.
     """
     start = time.perf_counter()
-    source = os.fspath(scenario) if isinstance(scenario, str | os.PathLike) else "scenario"
+    if source is None:
+        source = os.fspath(scenario) if isinstance(scenario, str | os.PathLike) else "scenario"
     told = as_scenario(scenario)
     if not isinstance(model, Evaluator):
         model = derive(model)

@@ -23,9 +23,7 @@ from .plant import Plant
 from .scenario import Scenario
 
 
-def solved(
-    plan: Plan, trace: Trace, scenario: Scenario, source: str, started: float
-) -> Solution:
+def solved(plan: Plan, trace: Trace, scenario: Scenario, source: str, started: float) -> Solution:
     """The solution of a run; `started`: of the clock `perf_counter`."""
     if not len(trace.t):
         end = trace.ended
