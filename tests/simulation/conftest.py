@@ -15,8 +15,8 @@ from support.building import (  # noqa: F401 - fixtures
 import condyle
 from condyle.results.model import Model
 
-FRICTION = {"coefficient": 0.1, "smoothing_speed": 0.01}
-LOSSES = {"torque_limit": 3.0, "viscous": 2e-3, "coulomb": 5e-3, "smoothing_speed": 0.05}
+FRICTION = {"coefficient": 0.1, "smoothing_speed": 0.1}
+LOSSES = {"torque_limit": 3.0, "viscous": 2e-3, "coulomb": 5e-3, "smoothing_speed": 1.0}
 
 
 @pytest.fixture(scope="session")
