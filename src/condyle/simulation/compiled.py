@@ -197,6 +197,11 @@ class Loop:
         """Between which corner and the next it is."""
         return self._run.corner
 
+    @property
+    def at_a_look(self) -> bool:
+        """Whether the controller is to look before it goes on."""
+        return bool(self._run.fresh and self._is_tick[self._run.corner])
+
     @corner.setter
     def corner(self, value: int) -> None:
         self._run.corner = value
@@ -221,7 +226,7 @@ class Loop:
 
     def _time(self, plan: Plan) -> None:
         run, corners, ticks = self._run, plan.corners(), plan.ticks()
-        is_tick = np.zeros(len(corners), dtype=np.uint8)
+        is_tick = self._is_tick = np.zeros(len(corners), dtype=np.uint8)
         if len(ticks):
             nearest = np.clip(np.searchsorted(corners, ticks - 1e-12), 0, len(corners) - 1)
             is_tick[nearest] = 1

@@ -59,7 +59,7 @@ class Run:
         y[: 2 * len(plan.q)] = np.concatenate([plan.q, plan.q1])
         integrator = INTEGRATORS[plan.method](self._rate, plan.settings)
         with suppress(_Ended):
-            if (quick := self._quick()) is not None:
+            if (quick := self.quick()) is not None:
                 y = self._by_compiled_code(quick, integrator, y)
             else:
                 y = self._by_steps(integrator, y)
@@ -80,7 +80,8 @@ class Run:
                 said = until
         return y
 
-    def _quick(self) -> Loop | None:
+    def quick(self) -> Loop | None:
+        """The run in compiled code, where there is such a loop for its plan."""
         if self._plan.method != "rk4":
             return None
         results = (self._state, self._kept_effort, self._kept_modes, self._kept_tick)
@@ -276,7 +277,7 @@ class _Loop:
         ticks = plan.ticks()
         self.aims = drive.path.references(ticks) if len(ticks) else []
         self.command, self.count = (np.empty((len(ticks), n)) for _ in range(2))
-        self.estimate, self.force = np.empty((len(ticks), 2 * m)), np.empty(len(ticks))
+        self.estimate, self.force = np.empty((len(ticks), 2 * m)), np.zeros(len(ticks))
         self._observer = None
         if drive.sensing is not None and drive.period is not None:
             self._observer = Observer(drive.law.model, drive.sensing, drive.period)
