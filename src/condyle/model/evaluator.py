@@ -151,6 +151,11 @@ class Evaluator:
         """Whether efforts are chosen within limits."""
         return OBJECTIVES[self.policy.objective].limits
 
+    @property
+    def chooses_efforts(self) -> bool:
+        """Whether efforts may be others than those of least norm."""
+        return self._distributor.chooses
+
     @cached_property
     def reference_force(self) -> float:
         """N_ref, by which `weighted` measures contact forces [N]."""

@@ -131,6 +131,11 @@ class Single:
         """Evaluate `given`; returns the status."""
         return self._one(*self._at)
 
+    @property
+    def addresses(self) -> tuple[int, int, int, int]:
+        """Of the C function and of what it is called with, for other C: table, `given`, `found`."""
+        return ctypes.cast(self._one, ctypes.c_void_p).value or 0, *self._at
+
 
 def _readable(column: np.ndarray) -> np.ndarray:
     """A column that C can read: aligned, whole numbers of doubles apart."""
