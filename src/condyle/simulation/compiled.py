@@ -18,8 +18,8 @@ import numpy as np
 
 from ..backends import cache
 from ..backends.c.kernel import CompiledKernel, Single
+from ..backends.c.library import obtained, tool
 from ..backends.compiler import CompilerError, find_compiler
-from ..backends.notice import notice
 from ..model.evaluator import Evaluator
 from .controllers.computed_torque import ComputedTorqueLaw
 from .controllers.joint_pd import JointPDLaw
@@ -87,15 +87,16 @@ def _library() -> Any:
     """
     source = Path(str(files(__package__) / "loop.c"))
     compiler = find_compiler()
-    tool = repr((compiler.command, compiler.flags, compiler.identity))
-    recipe = cache.digest(source.read_bytes(), tool)
 
     def make(folder: Path) -> tuple[Path, dict[str, Any]]:
         compiler.build(folder / "loop.so", source)
         return folder / "loop.so", {"flags": list(compiler.flags)}
 
-    entry = cache.find(recipe) or cache.build(recipe, make, notice)
-    library = ctypes.CDLL(str(entry.library))
+    return obtained(cache.digest(source.read_bytes(), tool(compiler)), make, _opened)[1]
+
+
+def _opened(path: str) -> ctypes.CDLL:
+    library = ctypes.CDLL(path)
     library.advance.argtypes = [c_void_p]
     return library
 
@@ -113,7 +114,7 @@ def loop_of(plan: Plan, *shared: Any) -> Loop | None:
         return None
     try:
         return Loop(plan, _library(), *shared)
-    except (CompilerError, OSError):
+    except CompilerError:
         return None
 
 
@@ -134,10 +135,13 @@ class Loop:
         looks: tuple[np.ndarray, ...],
         aims: np.ndarray,
     ) -> None:
-        """Args:
-        guards: kind (0 bound, 1 lift off, 2 speed), contact or chain, and sign of the push or limit;
-        past: (guards,) of bool.  results: state, effort, modes, tick;  looks: command, counts,
-        estimate.  aims: (K, 3 m + 2 n) q, q', q'', joint, joint rate at every tick.
+        """The loop.
+
+        Args:
+            guards: kind (0 bound, 1 lift off, 2 speed), contact or chain, and sign of the push or
+            limit;  past: (guards,) of bool.
+            results: state, effort, modes, tick;  looks: command, counts, estimate.
+            aims: (K, 3 m + 2 n) q, q', q'', joint, joint rate at every tick.
         """
         self._library, self._keep = library, [plan, aims, *results, *looks]
         self._run = run = _Run()
@@ -197,14 +201,14 @@ class Loop:
         """Between which corner and the next it is."""
         return self._run.corner
 
+    @corner.setter
+    def corner(self, value: int) -> None:
+        self._run.corner = value
+
     @property
     def at_a_look(self) -> bool:
         """Whether the controller is to look before it goes on."""
         return bool(self._run.fresh and self._is_tick[self._run.corner])
-
-    @corner.setter
-    def corner(self, value: int) -> None:
-        self._run.corner = value
 
     def advance(self) -> int:
         """Go on; returns DONE, PAUSE (nothing happened yet), or what the caller has to see to."""
