@@ -43,6 +43,7 @@ from .own import (
 )
 from .programs import BINDING
 from .rows import Probe, Row, timed
+from .simulating import LOOP, simulation_probes
 
 REFERENCE = "masticatory"
 CYCLE = "one cycle of the clock"
@@ -112,6 +113,7 @@ def run_benchmark(seconds: float = 1.0) -> Benchmark:
         probes += asked_probes(load(REFERENCE))
         probes += [*policy_probes(load(REFERENCE)), *jaw_probes(load("human-jaw"))]
         probes += limit_probes(load(REFERENCE), load("human-jaw"), unavailable)
+        probes += simulation_probes(load(REFERENCE))
         probes.append(Probe(OPERATION, timer.vector_operation, 0.0))
         rows = _timed(probes, rounds)
         with step("swinging for a second"):
@@ -266,6 +268,8 @@ def _ratios(rows: list[Row], lanes: int) -> dict[str, float]:
     asked = by_name[f"{REFERENCE}: torques"]
     for what in ("evaluate", SOLVE):
         ratios[f"{what} over efforts alone"] = by_name[f"{REFERENCE}: {what}"].over(asked)
+    loop = by_name[f"{REFERENCE}: {LOOP}"]
+    ratios["control at 1 kHz, plant at 10 kHz, times real time"] = 1 / loop.seconds
     for size in ("100", "5000"):
         few = [by_name.get(f"{own}: batch of {size}, {t}") for t in ("one thread", "two threads")]
         if few[0] and few[1]:
