@@ -117,7 +117,7 @@ def run_page(page: Path, command: Callable[..., Any], sources: str) -> int:
     for block in blocks(page):
         if block.kind == "python" and not block.skipped and block.text not in sources:
             code = "\n" * (block.line - 1) + block.text
-            exec(compile(code, str(page), "exec"), namespace)
+            exec(compile(code, str(page), "exec", dont_inherit=True), namespace)
             count += 1
         if block.kind == "console" and not block.skipped:
             for line in block.text.splitlines():
