@@ -38,6 +38,10 @@ _HOMES = {
     "trial_motion": "motion",
     "Solution": "results.solution",
     "open_solution": "results.solution",
+    "Scenario": "simulation",
+    "load_scenario": "simulation",
+    "simulate": "simulation",
+    "ScenarioError": "errors",
 }
 
 if TYPE_CHECKING:
@@ -47,6 +51,7 @@ if TYPE_CHECKING:
         InputError,
         JammedError,
         MechanismError,
+        ScenarioError,
         SingularError,
         UnreachableError,
         UnsupportedError,
@@ -55,6 +60,7 @@ if TYPE_CHECKING:
     from .motion import Load, Motion, reference_load, reference_motion, trial_motion
     from .results.model import Model, derive
     from .results.solution import Solution, open_solution
+    from .simulation import Scenario, load_scenario, simulate
 
 # What the report gives to results and comparisons, which do not know it.
 register("solution.plot", "condyle.report.figures:SolutionPlots")

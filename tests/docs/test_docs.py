@@ -98,6 +98,7 @@ def put_files_of_a_reader(folder: Path) -> None:
     jaw.write_tables(folder / "markers.toml")
     q = ("X", "Y", "alpha", "beta")
     names = [prefix + name for prefix in ("", "d", "dd") for name in q]
+    (folder / "bite.csv").write_text("X,Y,alpha,beta,Fz\n0,0,0,0,-100\n")
     chains, legs = (
         [f"joint_{chain}" for chain in condyle.load(name).chain_names]
         for name in ("masticatory", "gough-stewart")

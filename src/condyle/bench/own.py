@@ -20,7 +20,6 @@ import numpy as np
 from ..backends.c.kernel import CompiledKernel
 from ..backends.compiler import find_compiler
 from ..backends.kernel import Kernel
-from ..mechanism.chain import Chain
 from ..mechanism.contact import Friction
 from ..mechanism.mechanism import Mechanism
 from ..model.evaluator import Evaluator
@@ -29,6 +28,7 @@ from ..questions.inverse import inverse
 from ..questions.numbers import Layout, has_closed_form, specialised
 from ..questions.structure import structure_of
 from ..results.model import Model
+from .programs import Bites, program_probes, tight
 from .rows import Probe, Row, spread
 from .straight_line import torque_function
 
@@ -48,7 +48,7 @@ class Timer:
     def __init__(self) -> None:
         source = files(__package__) / "timer.c"
         library = Path(tempfile.mkdtemp(prefix="condyle-bench-")) / "timer.so"
-        find_compiler().build(Path(str(source)), library)
+        find_compiler().build(library, Path(str(source)))
         self.library = ctypes.CDLL(str(library))
         names = ("time_one", "time_batch", "time_casadi", "time_springs")
         for name in (*names, "clock_rate", "vector_operation"):
@@ -184,11 +184,12 @@ def _kernel_probes(
 
         yield Probe(f"{label}: {what}", run, wrong, operations)
     count = columns.shape[1]
-    pointers = (ctypes.c_void_p * count)(*(columns[:, j].ctypes.data for j in range(count)))
     strides = (ctypes.c_ssize_t * count)(*[1] * count)
 
     def blocks() -> float:
         _, batch, table = _addresses(kernel)
+        # Taken here, so that the columns stay as long as what reads them.
+        pointers = (ctypes.c_void_p * count)(*(columns[:, j].ctypes.data for j in range(count)))
         return timer.library.time_batch(
             batch, table, pointers, strides, ctypes.c_size_t(SAMPLES), _at(out), _at(status)
         )
@@ -233,7 +234,7 @@ def policy_probes(mechanism: Mechanism) -> Iterator[Probe]:
     rough = mechanism.replace(
         contacts=tuple(c.model_copy(update={"friction": rubbing}) for c in mechanism.contacts)
     )
-    wide = mechanism.replace(chains=tuple(_limited(chain) for chain in mechanism.chains))
+    wide = tight(mechanism, 1e6)  # which no effort comes near
     for name, machine, policy in (
         (LEAST_NORM, mechanism, "minimum_norm"),
         (BOUNDED, wide, "bounded"),
@@ -245,11 +246,22 @@ def policy_probes(mechanism: Mechanism) -> Iterator[Probe]:
         yield _python_probe(f"{label}: {name}", call, JAW_SAMPLES)
 
 
-def _limited(chain: Chain) -> Chain:
-    """With limits that no effort comes near."""
-    return chain.model_copy(
-        update={"actuator": chain.actuator.model_copy(update={"torque_limit": 1e6})}
-    )
+def limit_probes(
+    mechanism: Mechanism, jaw: Mechanism, unavailable: dict[str, str]
+) -> Iterator[Probe]:
+    """Limits that bind at one sample in three, and bites of a jaw, beside other solvers."""
+    given = Case.of(mechanism).many(JAW_SAMPLES)
+    free = Evaluator(mechanism, backend="compiled").torques(*given).effort
+    greatest = float(np.quantile(np.abs(free).max(axis=1), 2 / 3))
+    model = Evaluator(tight(mechanism, greatest), backend="compiled", distribution="bounded")
+    fits = model.torques(*given).status == 0
+    q, q1, q2, acting = (a[fits] for a in given)
+    yield from program_probes(Bites(mechanism.name, model, (q, q1, q2, acting)), unavailable)
+    model = Evaluator(jaw, backend="compiled", distribution="bounded")
+    still = np.zeros((JAW_SAMPLES, jaw.degrees_of_freedom))
+    bite = np.zeros((JAW_SAMPLES, 9))
+    bite[:, 2], bite[:, 6:] = np.linspace(0, -600, JAW_SAMPLES), model.load_point("right_molar")
+    yield from program_probes(Bites(jaw.name, model, (still, still, still, bite)), unavailable)
 
 
 def jaw_probes(mechanism: Mechanism) -> Iterator[Probe]:
@@ -290,7 +302,7 @@ def _straight_probes(label: str, timer: Timer, case: Case) -> Iterator[Probe]:
     folder = Path(tempfile.mkdtemp(prefix="condyle-bench-"))
     (folder / "straight.c").write_text(_generated(function), encoding="utf-8")
     library = folder / "straight.so"
-    find_compiler().build(folder / "straight.c", library)
+    find_compiler().build(library, folder / "straight.c")
     call = ctypes.CDLL(str(library)).straight_line
     w, iw = np.empty(function.sz_w() + 1), np.empty(function.sz_iw() + 1, dtype=np.int64)
     packed, out = np.ascontiguousarray(case.samples), np.empty(16)

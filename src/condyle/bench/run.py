@@ -34,12 +34,14 @@ from .own import (
     Timer,
     asked_probes,
     jaw_probes,
+    limit_probes,
     own_probes,
     policy_probes,
     reachable_samples,
     ready_rows,
     thread_probes,
 )
+from .programs import BINDING
 from .rows import Probe, Row, timed
 
 REFERENCE = "masticatory"
@@ -109,6 +111,7 @@ def run_benchmark(seconds: float = 1.0) -> Benchmark:
             probes += _peer_probes(unavailable)
         probes += asked_probes(load(REFERENCE))
         probes += [*policy_probes(load(REFERENCE)), *jaw_probes(load("human-jaw"))]
+        probes += limit_probes(load(REFERENCE), load("human-jaw"), unavailable)
         probes.append(Probe(OPERATION, timer.vector_operation, 0.0))
         rows = _timed(probes, rounds)
         with step("swinging for a second"):
@@ -240,8 +243,8 @@ def _ratios(rows: list[Row], lanes: int) -> dict[str, float]:
         ratios[f"{what} with contact forces over without"] = with_forces.over(row)
         ratios[f"{what}, curved over planar"] = by_name[f"{curved}: {shape}"].over(row)
         for formulation in ("momentum", "lagrange"):
-            other = by_name[f"{REFERENCE} {formulation}: {shape}"]
-            ratios[f"{what}, {formulation} over virtual_power"] = other.over(row)
+            slower = by_name[f"{REFERENCE} {formulation}: {shape}"]
+            ratios[f"{what}, {formulation} over virtual_power"] = slower.over(row)
     for formulation in ("momentum", "lagrange"):
         routes = (by_name[f"{REFERENCE} {formulation}{r}: one"] for r in (", direct", ""))
         ratios[f"one evaluation, {formulation}, direct over core"] = next(routes).over(next(routes))
@@ -255,6 +258,11 @@ def _ratios(rows: list[Row], lanes: int) -> dict[str, float]:
     least = by_name[f"{REFERENCE}: {LEAST_NORM}"]
     for what, name in (("bounded", BOUNDED), ("friction at two contacts", FRICTION)):
         ratios[f"{what} over least norm"] = by_name[f"{REFERENCE}: {name}"].over(least)
+    for label in (REFERENCE, "human-jaw"):
+        limited = by_name[f"{label}: {BINDING}"]
+        for solver in ("DAQP", "quadprog", "HiGHS", "OSQP"):
+            if other := by_name.get(f"{limited.name}, {solver}"):
+                ratios[f"{label}, bounded, times faster than {solver}"] = other.over(limited)
     asked = by_name[f"{REFERENCE}: torques"]
     for what in ("evaluate", SOLVE):
         ratios[f"{what} over efforts alone"] = by_name[f"{REFERENCE}: {what}"].over(asked)
