@@ -28,6 +28,7 @@ from .solution import named_columns
 from .states import CHUNK_ROWS, loads
 from .variables import WRENCH
 
+AT_REST = "no rates (dX ...) are given: the states are at rest"
 KINDS = {"N m": "moment", "N": "force"}
 
 
@@ -62,7 +63,9 @@ def forward_file(
             pulled += lifted.sum(axis=0)
             unused = list(table.warnings)
             if _at_rest(table):
-                unused.append(f"{table.source}: no rates (dX ...) are given: the states are at rest")
+                unused.append(
+                    f"{table.source}: no rates (dX ...) are given: the states are at rest"
+                )
     names = model.mechanism.contact_names
     return rows, [
         *unused,
