@@ -38,9 +38,11 @@ _HOMES = {
     "trial_motion": "motion",
     "Solution": "results.solution",
     "open_solution": "results.solution",
+    "workspace_map": "analysis.map",
 }
 
 if TYPE_CHECKING:
+    from .analysis.map import workspace_map
     from .errors import (
         CondyleError,
         InfeasibleError,

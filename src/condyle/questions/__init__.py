@@ -23,6 +23,7 @@ from .inverse import inverse, motion, system
 from .matrices import jacobians, matrices
 from .reactions import reactions
 from .structure import Structure
+from .survey import survey
 
 QUESTIONS: dict[str, Callable[..., Program | Variants]] = {
     "inverse": inverse,
@@ -31,6 +32,7 @@ QUESTIONS: dict[str, Callable[..., Program | Variants]] = {
     "closure": closure,
     "conditions": conditions,
     "configuration": configuration,
+    "survey": survey,
     "encoders": encoders,
     "matrices": matrices,
     "jacobians": jacobians,
@@ -44,6 +46,7 @@ GEOMETRY = (
     "closure",
     "conditions",
     "configuration",
+    "survey",
     "encoders",
     "jacobians",
     "reactions",

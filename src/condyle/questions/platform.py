@@ -45,10 +45,14 @@ class Platform:
         return self.motion.R
 
 
-def closed(b: Builder) -> Platform:
-    """From the independent coordinates, ports q, q1 and q2: the contacts give the rest."""
+def closed(b: Builder, still: bool = False) -> Platform:
+    """From the independent coordinates, ports q, q1 and q2: the contacts give the rest.
+
+    Args: still: without the rates, which are zero.
+    """
     s = b.structure
-    q, q1, q2 = (b.sample(name, s.m) for name in ("q", "q1", "q2"))
+    q, zero = b.sample("q", s.m), ca.SX.zeros(s.m)
+    q1, q2 = (zero, zero) if still else (b.sample("q1", s.m), b.sample("q2", s.m))
     contacts = contact_symbols(s, b.parameter)
     if closed_form_available([form for form, _ in s.contacts], s.dependent):
         placement = closed_form(contacts, s.dependent, q, b.parameter("branch"))
