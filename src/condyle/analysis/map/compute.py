@@ -138,6 +138,16 @@ def mapped(
     return xr.open_zarr(Path(store), chunks=None, consolidated=False)
 
 
+def size_of(asked: Asked, grid: Grid, quantities: tuple[Quantity, ...]) -> int:
+    """Bytes that a map takes."""
+    entries = {dim: len(names) for dim, names in _entries(asked).items()}
+    each = [
+        np.dtype(v.dtype).itemsize * int(np.prod([entries[dim] for dim in v.dims]))
+        for v in variables(quantities)
+    ]
+    return grid.size * sum(each)
+
+
 def fill(
     asked: Asked, grid: Grid, quantities: tuple[Quantity, ...], sink: Sink, block: int
 ) -> None:

@@ -75,7 +75,8 @@ class Free:
             found[(found == 0) & ~(ratio >= self.margin)] = count
             outside = block.bounds < 0
         beyond = (found == 0) & outside.any(axis=1)
-        found[beyond] = count + 1 + outside[beyond].argmax(axis=1)
+        if beyond.any():
+            found[beyond] = count + 1 + outside[beyond].argmax(axis=1)
         if self.limits and limited(model.mechanism) and (some := np.flatnonzero(found == 0)).size:
             held = self.asked.ability.holds(block.pose[some], self.asked.load)
             found[some[~held]] = len(self.reasons) - 1
