@@ -35,7 +35,7 @@ QUANTITIES = (
     "transmission",
     "effort",
     "contact_force",
-    "load",
+    "load_limit",
     "speed",
     "stiffness",
 )

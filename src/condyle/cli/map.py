@@ -53,7 +53,7 @@ def map_(
     load: Annotated[str, typer.Option(help='On the platform at rest, "Fz=-50 N,My=2 N m".')] = "",
     load_point: options.LoadPoint = None,
     direction: Annotated[
-        str | None, typer.Option(help="Of the further load for quantity load, in {S}: 0,0,-1.")
+        str | None, typer.Option(help="Of the further load for load_limit, in {S}: 0,0,-1.")
     ] = None,
     stiffness: Annotated[
         float | None, typer.Option(help="Of every actuator (N m/rad or N/m), for that quantity.")

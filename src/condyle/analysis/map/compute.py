@@ -54,7 +54,7 @@ def workspace_map(
             hold: the other coordinates, "Y=1 mm,alpha=2 deg" or {"Y": 1e-3}; by default 0.
             load: on the platform, "Fz=-50 N" or {"Fz": -50.0} [N, N m], in {S}.
             load_point: where it acts; by default as for `solve`.
-            direction: of the further load that quantity `load` looks for, in {S}: "0,0,-1".
+            direction: of the further load that quantity `load_limit` looks for, in {S}: "0,0,-1".
             stiffness: of every actuator, or by chain [N m/rad or N/m].
             strokes: "leg_*=-200:300 mm": ranges of joint coordinates that count as reach.
             store: a folder (.zarr) to stream to, for more than memory holds; it appears whole or

@@ -135,9 +135,9 @@ def _one_way(
         if (found[0] < 0).any() or (found[0] > 1).any():
             points.append(_at_the_edge(f, x, found[0]))
             return points, False
-        near = np.linalg.norm(found[0] - start)
-        if len(points) > 2 and near < 1.01 * step and onward @ first > TURN:
-            return points, True
+        rest = start - found[0]
+        if len(points) > 2 and np.linalg.norm(rest) < 1.01 * step and onward @ first > TURN:
+            return points + [found[0]] * bool(rest @ onward > 0), True
         x, tangent = found[0], onward
         points.append(x)
         step = min(1.5 * step, longest)

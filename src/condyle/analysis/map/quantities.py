@@ -197,9 +197,9 @@ QUANTITIES: dict[str, Quantity] = {
                 lambda b: b.held["contact_force"]),),
         _no_contacts,
     ),
-    "load": Quantity(
+    "load_limit": Quantity(
         "largest further load in a direction that limits allow", ("pose",),
-        (Mapped("load", (), "N", "largest further load in the direction; -inf: none is held",
+        (Mapped("load_limit", (), "N", "largest further load in the direction; -inf: none is held",
                 _load),),
         _no_limits,
     ),

@@ -146,10 +146,10 @@ def _refined(
             bad = here > 0
             low, high = np.where(bad, low, middle), np.where(bad, middle, high)
             found = np.where(bad, here, found)
-        best = int(np.argmin(high))
-        if high[best] < radius:
-            radius, stops = float(high[best]), free.reasons[found[best]]
-            nearest = radius * rays[best]
+        best = int(np.argmin(low))
+        if low[best] < radius:
+            radius, stops = float(low[best]), free.reasons[found[best]]
+            nearest = high[best] * rays[best]
     return radius, stops
 
 
