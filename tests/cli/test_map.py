@@ -42,7 +42,7 @@ def test_a_map_with_its_pictures(condyle_command: Callable[..., Any], tmp_path: 
 def test_three_coordinates_and_zarr(condyle_command: Callable[..., Any], tmp_path: Path) -> None:
     done = condyle_command(
         "map", "gough-stewart", "--over", "X=-2:2:5 m", "--over", "Y=-2:2:4 m", "--over",
-        "Z=-1:1:3 m", "--stroke", "*=-600:500 mm", "--format", "zarr", "--backend", "numpy",
+        "Z=-1:1:3 m", "--stroke", "*=-900:900 mm", "--format", "zarr", "--backend", "numpy",
         "--quantity", "condition", "--no-figures",
     )  # fmt: skip
     assert done.status == 0, done.err

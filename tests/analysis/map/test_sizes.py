@@ -79,31 +79,37 @@ def test_boxes_against_brute_force(shape: tuple[int, ...]) -> None:
         assert size == pytest.approx(best, abs=1e-12)
 
 
-def known(bad: Any, d: int) -> Any:
-    """In the place of a mechanism, a set of poses that are not free."""
+def known(d: int, *margins: Any) -> Any:
+    """In the place of a mechanism, margins that are negative where poses are not free."""
     model = SimpleNamespace(characteristic_length=1.0)
     return SimpleNamespace(
-        why_not=lambda q: bad(q).astype(int), reasons=["", "it"], asked=SimpleNamespace(model=model)
+        margins=lambda q: np.array([margin(q) for margin in margins]),
+        reasons=["plane", "blob"],
+        asked=SimpleNamespace(model=model),
     )
 
 
 @pytest.mark.parametrize("d", [1, 2, 3])
 def test_ball_in_a_known_set(d: int) -> None:
-    """Free but beyond a slanted plane 0.4 away, and in a blob 0.6 away."""
+    """Free but beyond a slanted plane 0.4 away, and in a blob 0.6 away, which has no slope."""
     way = np.array([0.48, 0.6, 0.64])[:d]
     way /= np.linalg.norm(way)
     far = -np.eye(3)[0, :d]
 
-    def bad(q: np.ndarray) -> np.ndarray:
-        return (q @ way > 0.4) | (np.linalg.norm(q - 0.7 * far, axis=1) < 0.1)
+    def plane(q: np.ndarray) -> np.ndarray:
+        return 0.4 - q @ way
 
-    found = greatest_ball(known(bad, d), grid(d), points=4000)
-    assert found.radius == pytest.approx(0.4, rel=1e-4)
-    assert found.radius <= 0.4 * (1 + 1e-6) and found.stops == "it"
-    blob = greatest_ball(known(lambda q: bad(q) & (q @ way < 0.4), d), grid(d), points=4000)
-    assert blob.radius == pytest.approx(0.6, rel=1e-3)
-    free = greatest_ball(known(lambda q: q[:, 0] > 9, d), grid(d), points=100)
-    assert (free.radius, free.stops) == (1.0, "the range")
+    def blob(q: np.ndarray) -> np.ndarray:
+        return np.where(np.linalg.norm(q - 0.7 * far, axis=1) < 0.1, -1.0, 1.0)
+
+    found = greatest_ball(known(d, plane, blob), grid(d), points=4000)
+    assert found.radius == pytest.approx(0.4, rel=1e-7) and found.stops == "plane"
+    found = greatest_ball(known(d, lambda q: plane(q) + 1, blob), grid(d), points=4000)
+    assert found.radius == pytest.approx(0.6, rel=2e-3)
+    found = greatest_ball(known(d, lambda q: 9 - q[:, 0]), grid(d), points=100)
+    assert (found.radius, found.stops) == (1.0, "the range")
+    none = greatest_ball(known(d, lambda q: np.full(len(q), np.nan)), grid(d), points=100)
+    assert none.radius == 0.0
 
 
 def test_room_of_a_mechanism(model_of: Models) -> None:

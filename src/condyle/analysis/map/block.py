@@ -9,9 +9,9 @@ import numpy as np
 
 from ...kinematics.singularity import SINGULAR
 from ...model.data import Efforts
+from ...model.evaluator import Evaluator
 from ...model.survey import Survey
-from ...results.model import Model
-from ...results.solution import bound_margins
+from ...results.contacts import bound_margins
 from ...status import Status
 from .ability import Ability
 from .reach import Reach
@@ -26,7 +26,7 @@ class Asked:
     stiffness: of the actuators, (n,) [N m/rad or N/m]; None if it was not given.
     """
 
-    model: Model
+    model: Evaluator
     reach: Reach
     load: np.ndarray
     direction: np.ndarray | None = None

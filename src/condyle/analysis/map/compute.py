@@ -16,9 +16,9 @@ from ...errors import InputError, did_you_mean
 from ...extras import require
 from ...mechanism import dumps
 from ...mechanism.mechanism import COORDINATES, Mechanism
+from ...model.evaluator import Evaluator
 from ...motion.units import FORCE, MOMENT
 from ...progress import step
-from ...results.model import Model
 from .axes import Grid, Over, Values, grid_of, number, values_of
 from .block import Asked, Block
 from .quantities import Mapped, Quantity, chosen, variables
@@ -32,7 +32,7 @@ BLOCK = 1 << 16  # poses at a time
 
 
 def workspace_map(
-    model: Model,
+    model: Evaluator,
     over: Over,
     quantity: str | Sequence[str] = "ratio",
     hold: Values = "",
@@ -69,7 +69,7 @@ def workspace_map(
 
 
 def asked_of(
-    model: Model,
+    model: Evaluator,
     load: Values = "",
     load_point: str | None = None,
     direction: str | Sequence[float] | None = None,
@@ -202,7 +202,7 @@ def _attributes(asked: Asked, grid: Grid) -> dict[str, Any]:
     }
 
 
-def _point(model: Model, name: str | None) -> np.ndarray:
+def _point(model: Evaluator, name: str | None) -> np.ndarray:
     """Where a load acts; O_M in a mechanism without points."""
     if name is None and not model.mechanism.platform.points:
         return np.zeros(3)

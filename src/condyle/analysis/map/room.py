@@ -9,26 +9,30 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import gamma, pi
 
 import numpy as np
 
 from ...errors import InputError
-from ...kinematics.causes import owners
 from ...kinematics.singularity import NEAR_SINGULAR
 from ...mechanism.mechanism import COORDINATES
+from ...model.evaluator import Evaluator
 from .ability import limited
-from .axes import Grid
+from .axes import Axis, Grid
 from .block import Asked, Block
+from .reach import Reach
 
-POINTS = 20_000  # in the ball
-CONES = (0.5, 0.25, 0.12, 0.06, 0.03, 0.01)  # half widths around the nearest pose that is not free
-RAYS, HALVINGS = 200, 24
+POINTS, FEW = 20_000, 500  # in the ball; where it has to be quick
+CONES = (0.5, 0.15, 0.05)  # half widths around the nearest pose that is not free
+RAYS, HALVINGS = 60, 24
+GROWTH = 2.0  # of the ball until it meets something
+STEPS, NUDGE = 12, 1e-6  # along the border
 ROUNDING = 1e-9  # of the radius, by which rays go further
 BOX = {1: 2001, 2: 201, 3: 41}  # points along each axis
 RANGE = "the range"
 
-Why = Callable[[np.ndarray], np.ndarray]
+Margins = Callable[[np.ndarray], np.ndarray]  # of points (N, d) -> (reasons, N)
 
 
 @dataclass(frozen=True)
@@ -64,30 +68,32 @@ class Free:
     margin: float = NEAR_SINGULAR
     limits: bool = True
 
-    def why_not(self, q: np.ndarray) -> np.ndarray:
-        """Index into `reasons` for each of q, (N, m); 0 where it is free."""
+    def margins(self, q: np.ndarray) -> np.ndarray:
+        """(reasons, N): negative, or no number, where not free; all but the last continuous."""
         model = self.asked.model
         block = Block(self.asked, q, frozenset({"ratio", "transmission", "points", "pose"}))
-        found = block.cause.astype(int)
-        count = len(owners(model.mechanism))
-        with np.errstate(invalid="ignore"):
-            ratio = np.fmin(block.survey.inverse_ratio, block.survey.direct_ratio)
-            found[(found == 0) & ~(ratio >= self.margin)] = count
-            outside = block.bounds < 0
-        beyond = (found == 0) & outside.any(axis=1)
-        if beyond.any():
-            found[beyond] = count + 1 + outside[beyond].argmax(axis=1)
-        if self.limits and limited(model.mechanism) and (some := np.flatnonzero(found == 0)).size:
+        survey = block.survey
+        ratio = np.fmin(survey.inverse_ratio, survey.direct_ratio)
+        rows = [survey.closing, *block.margin, ratio - self.margin, *block.bounds.T]
+        found = np.vstack([*rows, np.ones(len(q))])
+        if self.limits and limited(model.mechanism):
+            some = np.flatnonzero((found >= 0).all(axis=0))
             held = self.asked.ability.holds(block.pose[some], self.asked.load)
-            found[some[~held]] = len(self.reasons) - 1
+            found[-1, some[~held]] = -1.0
         return found
 
-    @property
+    @cached_property
     def reasons(self) -> list[str]:
+        """What a negative margin is the end of."""
         mechanism = self.asked.model.mechanism
-        named = [f"the reach of {owner}" for owner in owners(mechanism)]
-        bounds = [f"the bounds of contact {name}" for name in mechanism.contact_names]
-        return [*named, "a singularity", *bounds, "the limits of efforts"]
+        contacts = mechanism.contact_names
+        return [
+            f"the reach of contacts {' & '.join(contacts)}",
+            *(f"the reach of chain {name}" for name in mechanism.chain_names),
+            "a singularity",
+            *(f"the bounds of contact {name}" for name in contacts),
+            "the limits of efforts",
+        ]
 
 
 def scale_of(grid: Grid, length: float) -> np.ndarray:
@@ -98,6 +104,8 @@ def scale_of(grid: Grid, length: float) -> np.ndarray:
 def greatest_ball(free: Free, grid: Grid, points: int = POINTS) -> Ball:
     """Around home, within the range of the axes; the other coordinates are held.
 
+    The nearest pose that is not free is looked for among many, and from there along the border.
+
     Raises: InputError: if home is outside the range.
     """
     scale, d = scale_of(grid, free.asked.model.characteristic_length), len(grid.axes)
@@ -107,50 +115,87 @@ def greatest_ball(free: Free, grid: Grid, points: int = POINTS) -> Ball:
     way *= (rng.random((points, 1)) ** (1 / d)) / np.linalg.norm(way, axis=1, keepdims=True)
     way[0] = 0.0
 
-    def why(x: np.ndarray) -> np.ndarray:
-        return free.why_not(grid.states(x * scale))
+    def margins(x: np.ndarray) -> np.ndarray:
+        return free.margins(grid.states(x * scale))
 
-    stops = RANGE
-    while (bad := np.flatnonzero(found := why(radius * way))).size:
-        distance = radius * np.linalg.norm(way[bad], axis=1)
-        first = bad[np.argmin(distance)]
-        nearest, stops = radius * way[first], free.reasons[found[first]]
-        radius = float(distance.min())
-        radius, stops = _refined(free, why, radius, nearest, stops, rng)
+    stops, whole = RANGE, radius
+    radius = whole / GROWTH**6  # far poses cost most
+    while radius < whole and free_of(margins(radius * way)).all():
+        radius = min(GROWTH * radius, whole)
+    while (bad := np.flatnonzero(~free_of(found := margins(radius * way)))).size:
+        first = bad[np.argmin(np.linalg.norm(way[bad], axis=1))]
+        row = int(np.argmax(~(found[:, first] >= 0)))
+        nearest = radius * way[first]
+        nearest, row = _along_rays(margins, nearest, row, rng)
+        nearest = _on_the_border(margins, nearest, row)
+        radius, stops = float(np.linalg.norm(nearest)), free.reasons[row]
         if radius == 0.0:
             return Ball(0.0, stops, points, 0.0)
-    spacing = radius * float(_ball_volume(d) / points) ** (1 / d)
-    return Ball(radius, stops, points, spacing)
+    return Ball(radius, stops, points, radius * (_ball_volume(d) / points) ** (1 / d))
 
 
-def _refined(
-    free: Free, why: Why, radius: float, nearest: np.ndarray, stops: str, rng: np.random.Generator
-) -> tuple[float, str]:
-    """The nearest pose that is not free around one that is not: along rays near it."""
+def ball_around_home(model: Evaluator, points: int = FEW) -> Ball:
+    """In all independent coordinates, no further than the characteristic length and a radian.
+
+    Without limits of efforts; quick, for one look at a mechanism.
+    """
+    length = model.characteristic_length
+    ends = [length if name in COORDINATES[:3] else 1.0 for name in model.independent]
+    axes = tuple(Axis(n, -end, end, 2) for n, end in zip(model.independent, ends, strict=True))
+    reach = Reach.of(model)
+    free = Free(Asked(model, reach, np.zeros(9)), limits=False)
+    return greatest_ball(free, Grid(model.independent, axes, (0.0,) * len(axes)), points)
+
+
+def free_of(margins: np.ndarray) -> np.ndarray:
+    """Whether all margins, (reasons, N), are numbers and not negative, (N,)."""
+    return np.asarray((margins >= 0).all(axis=0))
+
+
+def _along_rays(
+    margins: Margins, nearest: np.ndarray, row: int, rng: np.random.Generator
+) -> tuple[np.ndarray, int]:
+    """A pose where the rays near one that is not free end, and what ends the shortest."""
     for cone in CONES:
-        size = np.linalg.norm(nearest)
+        size = float(np.linalg.norm(nearest))
         if size == 0.0:
-            return 0.0, stops
+            break
         rays = nearest / size + cone * rng.normal(size=(RAYS, len(nearest)))
         rays = np.vstack([nearest / size, rays / np.linalg.norm(rays, axis=1, keepdims=True)])
-        out = radius * (1 + ROUNDING)
-        found = why(out * rays)
-        some = np.flatnonzero(found)
-        if not some.size:
-            continue
-        rays, found = rays[some], found[some]
-        low, high = np.zeros(some.size), np.full(some.size, out)
-        for _ in range(HALVINGS):
+        out = size * (1 + ROUNDING)
+        rays = rays[~free_of(margins(out * rays))]
+        low, high = np.zeros(len(rays)), np.full(len(rays), out)
+        for _ in range(HALVINGS if len(rays) else 0):
             middle = (low + high) / 2
-            here = why(middle[:, None] * rays)
-            bad = here > 0
-            low, high = np.where(bad, low, middle), np.where(bad, middle, high)
-            found = np.where(bad, here, found)
-        best = int(np.argmin(low))
-        if low[best] < radius:
-            radius, stops = float(low[best]), free.reasons[found[best]]
-            nearest = high[best] * rays[best]
-    return radius, stops
+            fine = free_of(margins(middle[:, None] * rays))
+            low, high = np.where(fine, middle, low), np.where(fine, high, middle)
+        if len(rays) and low.min() < size:
+            best = int(np.argmin(low))
+            row = int(np.argmax(~(margins(high[best] * rays[best : best + 1])[:, 0] >= 0)))
+            nearest = low[best] * rays[best]
+    return nearest, row
+
+
+def _on_the_border(margins: Margins, nearest: np.ndarray, row: int) -> np.ndarray:
+    """The pose of least size at which a smooth margin vanishes, from one that is near it.
+
+    Each step goes to the foot of the perpendicular on the margin's tangent plane.
+    """
+    d, x = len(nearest), nearest
+    h = NUDGE * float(np.linalg.norm(nearest))
+    around = h * np.vstack([np.zeros(d), np.eye(d), -np.eye(d)])
+    for _ in range(STEPS if h else 0):
+        v = margins(x + around)[row]
+        slope = (v[1 : d + 1] - v[d + 1 :]) / (2 * h)
+        square = float(slope @ slope)
+        if not (np.isfinite(square) and square > 0 and np.isfinite(v[0])):
+            break
+        x = (slope @ x - v[0]) * slope / square
+        size = float(np.linalg.norm(x))
+        out = x * (1 + NUDGE)
+        if size < np.linalg.norm(nearest) and not free_of(margins(out[None]))[0]:
+            nearest = x
+    return nearest
 
 
 def _ball_volume(d: int) -> float:
@@ -182,7 +227,7 @@ def greatest_box(free: Free, grid: Grid) -> Box | None:
         )
         homes.append(below)
     points = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1)
-    good = free.why_not(grid.states(points.reshape(-1, len(sides)))) == 0
+    good = free_of(free.margins(grid.states(points.reshape(-1, len(sides)))))
     ends = best_box(good.reshape(points.shape[:-1]), homes, sides)
     if ends is None:
         return None
