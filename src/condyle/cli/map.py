@@ -95,6 +95,7 @@ def map_(
 
     from ..analysis.map.axes import grid_of
     from ..analysis.map.compute import asked_of, mapped, size_of
+    from ..analysis.map.files import save_map
     from ..analysis.map.numbers import numbers_of
     from ..analysis.map.quantities import chosen
     from ..report.maps import numbers_text
@@ -113,7 +114,7 @@ def map_(
     file = stem.with_suffix(".zarr" if streamed else ".nc")
     dataset = mapped(asked, grid, quantities, file if streamed else None)
     if not streamed:
-        _save(dataset, file)
+        save_map(dataset, file)
     numbers = numbers_of(asked, grid, margin)
     files = [file]
     if figures:
@@ -126,7 +127,9 @@ def map_(
         "files": files,
     }
     text = f"{numbers_text(numbers)}\n\n{files_line(files)}"
-    return Answer(text, data, command_line("view", mechanism, map=file))
+    turned = len(grid.axes) > 1
+    then = command_line("view", map=file) if turned else command_line("check", mechanism)
+    return Answer(text, data, then)
 
 
 def default_over(machine: Any) -> list[str]:
@@ -136,14 +139,6 @@ def default_over(machine: Any) -> list[str]:
     length, names = characteristic_length(machine), independent_coordinates(machine)
     spans = {name: (length / 2 if name in "XYZ" else 0.5) for name in names[:2]}
     return [f"{name}={-span!r}:{span!r}:100" for name, span in spans.items()]
-
-
-def _save(dataset: xr.Dataset, file: Path) -> None:
-    from ..atomic import replacing
-    from ..results.netcdf import write_netcdf
-
-    with replacing(file) as temporary:
-        write_netcdf(dataset, temporary)
 
 
 def _run_path(run: Path, grid: Grid) -> Any:

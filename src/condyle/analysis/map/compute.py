@@ -197,6 +197,8 @@ def _attributes(asked: Asked, grid: Grid) -> dict[str, Any]:
         "mechanism_name": model.mechanism.name,
         "held": json.dumps(held),
         "load": asked.load.tolist(),
+        "stroke_low": asked.reach.low.tolist(),
+        "stroke_high": asked.reach.high.tolist(),
         "distribution": model.policy.objective,
         "condyle": __version__,
     }
