@@ -26,7 +26,8 @@ FINE = 41  # points along each axis of a cube
 SIDE = 1.6  # of the cube, in scene units
 BESIDE = (-0.4, 2.8, 0.3)  # of the mechanism's centre
 SKIN, EDGES, BALL = (86, 180, 233), (120, 120, 120), (194, 24, 91)
-LOW, HIGH = np.array([68.0, 1, 84]), np.array([253.0, 231, 37])
+SHADES = 12
+RAMP = ((68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37))  # viridis
 INWARD = np.array([0.0, 1e-3, 3e-3, 1e-2, 2e-2, 4e-2, 8e-2])  # of the cube, along a hand's ray
 
 
@@ -45,36 +46,33 @@ class MapLayer:
         # Directions of the cube that the axes are along.
         self._along = [0, 2] if len(self.grid.axes) == 2 else [0, 1, 2]
         self._corner = centre + np.array(BESIDE) - SIDE / 2
-        self.vertices, self.faces, colours = self._shape(dataset)
-        placed = self._corner + SIDE * self.vertices
+        self.vertices, self.faces, shades = self._shape(dataset)
         self.handles: list[Any] = self._frame(scene)
-        self.surface: Any = None
-        if len(self.faces):
-            self.surface = self._surface(scene, placed, colours)
-            self.handles.append(self.surface)
+        self.surfaces = [
+            scene.add_mesh_simple(
+                f"/map/surface{i}",
+                (self._corner + SIDE * self.vertices).astype(np.float32),
+                self.faces[shades == i].astype(np.uint32),
+                color=SKIN if len(self.grid.axes) == 3 else colour(i),
+                opacity=0.75 if len(self.grid.axes) == 3 else None,
+                flat_shading=True,
+                side="double",
+            )
+            for i in np.unique(shades)
+        ]
         self._ball = scene.add_icosphere("/map/here", 0.04, BALL, visible=False)
-        self.handles.append(self._ball)
+        self.handles += [*self.surfaces, self._ball]
 
-    def _shape(self, dataset: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    def _shape(self, dataset: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Vertices, faces, and the shade of each face."""
         if len(self.grid.axes) == 3:
             axes = tuple(Axis(a.name, a.low, a.high, FINE) for a in self.grid.axes)
             fine = Grid(self.grid.names, axes, self.grid.held)
             margin = self._reach.margin(fine.block(0, fine.size)).reshape(fine.shape)
-            return *skin(margin), None
-        good = dataset["cause"].values == 0
-        return *sheet(good), colours_of(dataset)
-
-    def _surface(self, scene: viser.SceneApi, at: np.ndarray, colours: np.ndarray | None) -> Any:
-        if colours is None:
-            return scene.add_mesh_simple(
-                "/map/skin", at.astype(np.float32), self.faces.astype(np.uint32),
-                color=SKIN, opacity=0.75, flat_shading=True, side="double",
-            )  # fmt: skip
-        import trimesh
-
-        both = np.vstack([self.faces, self.faces[:, ::-1]])  # to be seen from either side
-        mesh = trimesh.Trimesh(at, both, process=False, vertex_colors=colours)
-        return scene.add_mesh_trimesh("/map/sheet", mesh)
+            vertices, faces = skin(margin)
+            return vertices, faces, np.zeros(len(faces), dtype=int)
+        vertices, faces = sheet(dataset["cause"].values == 0)
+        return vertices, faces, shades_of(dataset)[faces[:, 0]]
 
     def _frame(self, scene: viser.SceneApi) -> list[Any]:
         """Edges of the range, and what it is a range of."""
@@ -101,8 +99,6 @@ class MapLayer:
 
     def on_click(self, take: Callable[[np.ndarray], None]) -> None:
         """Call `take` with q, (m,), where a hand clicks on the surface."""
-        if self.surface is None:
-            return
 
         # On viser's own thread, as the panel does.
         async def clicked(event: Any) -> None:
@@ -110,7 +106,8 @@ class MapLayer:
             if found is not None:
                 take(found)
 
-        self.surface.on_click(clicked)
+        for surface in self.surfaces:
+            surface.on_click(clicked)
 
     def state_at(self, origin: np.ndarray, direction: np.ndarray) -> np.ndarray | None:
         """q, (m,), where a ray of the scene meets the surface, or a little further inside."""
@@ -137,18 +134,24 @@ class MapLayer:
             self._ball.position = self._corner + SIDE * place
 
 
-def colours_of(dataset: xr.Dataset) -> np.ndarray:
-    """Of a map over two coordinates, (n1 n2, 4): from dark to bright by its first quantity."""
+def shades_of(dataset: xr.Dataset) -> np.ndarray:
+    """Of a map over two coordinates, (n1 n2,), 0 to SHADES - 1 by its first quantity."""
     names = [n for n in dataset.data_vars if n not in ("status", "cause", "kind")]
     shown = [n for n in names if dataset[n].ndim == 2]
-    part = np.zeros(dataset["cause"].shape)
-    if shown:
-        values = dataset[shown[0]].values
-        good = values[np.isfinite(values)]
-        low, high = (good.min(), good.max()) if good.size else (0.0, 1.0)
-        part = np.nan_to_num((values - low) / (high - low or 1.0))
-    mixed = LOW + np.clip(part, 0, 1).reshape(-1, 1) * (HIGH - LOW)
-    return np.column_stack([mixed, np.full(len(mixed), 255.0)]).astype(np.uint8)
+    if not shown:
+        return np.zeros(dataset["cause"].size, dtype=int)
+    values = dataset[shown[0]].values.ravel()
+    good = values[np.isfinite(values)]
+    low, high = (good.min(), good.max()) if good.size else (0.0, 1.0)
+    part = np.nan_to_num((values - low) / (high - low or 1.0))
+    return np.clip(part * SHADES, 0, SHADES - 1).astype(int)
+
+
+def colour(shade: int) -> tuple[int, int, int]:
+    """From dark to bright."""
+    at = shade / (SHADES - 1) * (len(RAMP) - 1)
+    red, green, blue = (np.interp(at, range(len(RAMP)), [c[i] for c in RAMP]) for i in range(3))
+    return int(red), int(green), int(blue)
 
 
 def axis_text(axis: Axis) -> str:
