@@ -14,7 +14,6 @@ import viser
 from ..analysis.map.axes import Axis, Grid
 from ..analysis.map.files import grid_and_reach
 from ..analysis.map.surface import first_hit, sheet, skin
-from ..errors import InputError
 from ..kinematics.contact import indices
 from ..mechanism import COORDINATES
 from ..model.evaluator import Evaluator
@@ -37,12 +36,8 @@ class MapLayer:
     def __init__(
         self, scene: viser.SceneApi, centre: np.ndarray, model: Evaluator, dataset: xr.Dataset
     ) -> None:
-        """Raises: InputError: for a map over one coordinate."""
+        """Args: dataset: a map over two or three coordinates."""
         self.grid, self._reach = grid_and_reach(dataset, model)
-        if len(self.grid.axes) == 1:
-            raise InputError(
-                "this map goes over one coordinate; the view shows those of two or three"
-            )
         # Directions of the cube that the axes are along.
         self._along = [0, 2] if len(self.grid.axes) == 2 else [0, 1, 2]
         self._corner = centre + np.array(BESIDE) - SIDE / 2

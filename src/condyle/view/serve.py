@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import viser
 
 from ..analysis.map.files import mechanism_of, open_map
-from ..errors import CondyleError
+from ..errors import CondyleError, InputError
 from ..mechanism import Mechanism, load
 from ..results.solution import Solution, open_solution
 from .gate import Gate, guarded
@@ -213,6 +213,8 @@ def open_view(
     """Start the page and return at once; see `serve`."""
     if isinstance(map, str | Path):
         map = open_map(map)
+    if map is not None and map["status"].ndim == 1:
+        raise InputError("this map goes over one coordinate; the view shows those of two or three")
     if map is not None and solution is None:
         mechanism = mechanism_of(map)
     if isinstance(solution, str | Path):
