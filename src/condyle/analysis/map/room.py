@@ -120,17 +120,18 @@ def greatest_ball(free: Free, grid: Grid, points: int = POINTS) -> Ball:
 
     stops, whole = RANGE, radius
     radius = whole / GROWTH**6  # far poses cost most
-    while radius < whole and free_of(margins(radius * way)).all():
+    few = way[:FEW]
+    while radius < whole and free_of(margins(radius * few)).all():
         radius = min(GROWTH * radius, whole)
-    while (bad := np.flatnonzero(~free_of(found := margins(radius * way)))).size:
-        first = bad[np.argmin(np.linalg.norm(way[bad], axis=1))]
-        row = int(np.argmax(~(found[:, first] >= 0)))
-        nearest = radius * way[first]
-        nearest, row = _along_rays(margins, nearest, row, rng)
-        nearest = _on_the_border(margins, nearest, row)
-        radius, stops = float(np.linalg.norm(nearest)), free.reasons[row]
-        if radius == 0.0:
-            return Ball(0.0, stops, points, 0.0)
+    for some in (few, way):
+        while (bad := np.flatnonzero(~free_of(found := margins(radius * some)))).size:
+            first = bad[np.argmin(np.linalg.norm(some[bad], axis=1))]
+            row = int(np.argmax(~(found[:, first] >= 0)))
+            nearest, row = _along_rays(margins, radius * some[first], row, rng)
+            nearest = _on_the_border(margins, nearest, row)
+            radius, stops = float(np.linalg.norm(nearest)), free.reasons[row]
+            if radius == 0.0:
+                return Ball(0.0, stops, points, 0.0)
     return Ball(radius, stops, points, radius * (_ball_volume(d) / points) ** (1 / d))
 
 
