@@ -32,18 +32,18 @@ def test_efforts_are_those_of_inverse_dynamics(model_of: Models) -> None:
     np.testing.assert_allclose(force, right["contact_force"], rtol=1e-13)
 
 
-@pytest.mark.parametrize("sided", [False, True])
+@pytest.mark.parametrize("side", ["", "below", "above"])
 @pytest.mark.parametrize("program", [False, True])
 def test_largest_load_is_that_of_a_linear_program(
-    model_of: Models, monkeypatch: pytest.MonkeyPatch, sided: bool, program: bool
+    model_of: Models, monkeypatch: pytest.MonkeyPatch, side: str, program: bool
 ) -> None:
     """max s: J^T tau + N lambda = Q_0 - s w, limits of tau, and of lambda where it is one-sided.
 
     Q_0 and w come from inverse dynamics in the whole pose, which knows nothing of zonotopes.
     """
     mechanism = condyle.load("masticatory")
-    if sided:
-        changes = {f"contact.{n}.side": "below" for n in mechanism.contact_names}
+    if side:
+        changes: dict[str, object] = {f"contact.{n}.side": side for n in mechanism.contact_names}
         changes |= {f"contact.{n}.one_sided": True for n in mechanism.contact_names}
         mechanism = mechanism.set(changes)
     if program:
@@ -56,12 +56,12 @@ def test_largest_load_is_that_of_a_linear_program(
     good = np.isfinite(poses).all(axis=1)
     assert good.any() and np.isnan(loads[~good]).all()
     poses, loads = poses[good], loads[good]
-    expected = [by_program(model, pose, direction, sided) for pose in poses]
+    expected = [by_program(model, pose, direction, side) for pose in poses]
     np.testing.assert_allclose(loads, expected, rtol=1e-7)
     assert len(set(np.round(expected, 6))) > 1
 
 
-def by_program(model: condyle.Model, pose: np.ndarray, direction: np.ndarray, sided: bool) -> float:
+def by_program(model: condyle.Model, pose: np.ndarray, direction: np.ndarray, side: str) -> float:
     q = pose[None, [0, 1, 3, 4]]
     J = model.jacobians(q)["J_theta"][0]  # (n, 6)
     gravity = model.gravity(q, space="X")[0]
@@ -74,7 +74,7 @@ def by_program(model: condyle.Model, pose: np.ndarray, direction: np.ndarray, si
         normals.append(np.concatenate([n, E[1].T @ np.cross(E[0] @ contact.point, n)]))
     A = np.column_stack([J.T, np.array(normals).T, force])
     own = [limits(chain) for chain in model.mechanism.chains]
-    push = (None, 0) if sided else (None, None)
+    push = {"": (None, None), "below": (None, 0), "above": (0, None)}[side]
     bounds = [*((x.low, x.high) for x in own), push, push, (0, None)]
     cost = np.r_[np.zeros(8), -1.0]
     result = linprog(cost, A_eq=A * 1e2, b_eq=gravity * 1e2, bounds=bounds)

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 
 BISECTIONS = 54
-POLE = 1e-6  # |f| at a change of sign, over its larger end, above which it is a pole
 NUDGE = 1e-6  # of the range, for differences
 CLOSE = 1e-11  # of the range: how near to the curve points are brought
 TURN = np.cos(np.radians(12.0))  # of the tangent in one step, at the most
@@ -33,13 +32,14 @@ class Curve:
     closed: bool
 
 
-def trace(f: Function, values: np.ndarray, tolerance: float = POLE) -> list[Curve]:
+def trace(f: Function, values: np.ndarray) -> list[Curve]:
     """All curves f = 0 that a grid sees.
 
+    Where it changes its sign at a pole Newton's steps find no curve.
+
     Args: values: of f on a grid over the unit square, (n1, n2), no number where f has none.
-          tolerance: what |f| may be at a zero, over its value at the grid's points beside.
     """
-    starts = crossings(f, values, tolerance)
+    starts = crossings(f, values)
     longest = 1.0 / (max(values.shape) - 1)
     found: list[Curve] = []
     while len(starts):
@@ -53,8 +53,8 @@ def trace(f: Function, values: np.ndarray, tolerance: float = POLE) -> list[Curv
     return found
 
 
-def crossings(f: Function, values: np.ndarray, tolerance: float = POLE) -> np.ndarray:
-    """Points on edges of the grid where f vanishes, (N, 2), to rounding."""
+def crossings(f: Function, values: np.ndarray) -> np.ndarray:
+    """Points on edges of the grid where f changes its sign, (N, 2), to rounding."""
     n1, n2 = values.shape
     u = np.stack(np.meshgrid(np.linspace(0, 1, n1), np.linspace(0, 1, n2), indexing="ij"), axis=-1)
     ends = []
@@ -62,25 +62,23 @@ def crossings(f: Function, values: np.ndarray, tolerance: float = POLE) -> np.nd
         a, b = values[first], values[second]
         with np.errstate(invalid="ignore"):
             change = (np.sign(a) * np.sign(b) < 0) | ((a == 0) & (b != 0) & np.isfinite(b))
-        size = np.maximum(np.abs(a[change]), np.abs(b[change]))
-        ends.append((u[first][change], u[second][change], np.sign(b[change]), size))
-    low, high, sign, size = (np.concatenate(part) for part in zip(*ends, strict=True))
+        ends.append((u[first][change], u[second][change], np.sign(b[change])))
+    low, high, sign = (np.concatenate(part) for part in zip(*ends, strict=True))
     if not len(low):
         return low
     for _ in range(BISECTIONS):
         middle = (low + high) / 2
         after = f(middle) * sign >= 0
         low, high = np.where(after[:, None], low, middle), np.where(after[:, None], middle, high)
-    with np.errstate(invalid="ignore"):
-        real = np.abs(f(high)) <= tolerance * size
-    return high[real]
+    return high
 
 
 def _slope(f: Function, x: np.ndarray) -> tuple[float, np.ndarray]:
     """f and its gradient, (2,), at one point."""
     around = x + NUDGE * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
     v = f(around)
-    return float(v[0]), np.array([v[1] - v[2], v[3] - v[4]]) / (2 * NUDGE)
+    with np.errstate(invalid="ignore"):
+        return float(v[0]), np.array([v[1] - v[2], v[3] - v[4]]) / (2 * NUDGE)
 
 
 def corrected(f: Function, x: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
