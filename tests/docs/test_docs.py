@@ -346,6 +346,9 @@ JSON = {
         *("motion", "from-c3d", "trial.c3d", "--markers", "markers.toml"),
         *("--mechanism", "masticatory", "--out", "motion.csv"),
     ),
+    "condyle map": (
+        *("map", "masticatory", "--over", "X=0:3:3 mm", "--quantity", "joint", "--no-figures"),
+    ),
     "condyle plot": ("plot",),
     "condyle plot SOLUTION": (
         *("plot", "results/masticatory.nc", "--figure", "torque", "--out", "figures"),

@@ -30,11 +30,13 @@ from .own import (
     FORWARD,
     FRICTION,
     LEAST_NORM,
+    MAP,
     SOLVE,
     Timer,
     asked_probes,
     jaw_probes,
     limit_probes,
+    map_probes,
     own_probes,
     policy_probes,
     reachable_samples,
@@ -110,7 +112,7 @@ def run_benchmark(seconds: float = 1.0) -> Benchmark:
                 probes += own_probes(load(name), ["virtual_power"])
         with step("building other engines"):
             probes += _peer_probes(unavailable)
-        probes += asked_probes(load(REFERENCE))
+        probes += [*asked_probes(load(REFERENCE)), *map_probes(load(REFERENCE))]
         probes += [*policy_probes(load(REFERENCE)), *jaw_probes(load("human-jaw"))]
         probes += limit_probes(load(REFERENCE), load("human-jaw"), unavailable)
         probes += simulation_probes(load(REFERENCE))
@@ -274,6 +276,8 @@ def _ratios(rows: list[Row], lanes: int) -> dict[str, float]:
         few = [by_name.get(f"{own}: batch of {size}, {t}") for t in ("one thread", "two threads")]
         if few[0] and few[1]:
             ratios[f"two threads over one, {size} samples"] = few[1].over(few[0])
+    mapped = by_name[f"{REFERENCE}: {MAP}"].seconds
+    ratios["map of 1e6 poses, reach and ratio, one core [s]"] = 1e6 * mapped
     threads = [by_name.get(f"{own}: batch, {what}") for what in ("one thread", "two threads")]
     if threads[0] and threads[1]:
         ratios["two threads, times faster than one"] = threads[0].over(threads[1])

@@ -25,6 +25,20 @@ DISTRIBUTIONS = {  # name -> what is least, and subject to what
 BACKENDS = ("auto", "compiled", "numpy")
 STYLES = ("screen", "journal", "journal-wide")
 UNITS = ("m,rad", "m,deg", "mm,rad", "mm,deg", "cm,rad", "cm,deg")
+QUANTITIES = (
+    "reachable",
+    "pose",
+    "bounds",
+    "joint",
+    "ratio",
+    "condition",
+    "transmission",
+    "effort",
+    "contact_force",
+    "load_limit",
+    "speed",
+    "stiffness",
+)
 FIGURES = (
     "activation",
     "contact_force",
