@@ -1,0 +1,9 @@
+typedef float real;
+#define F(name) name##f
+#define R(number) number##f
+#define ANGLES 4096.0f
+#define QUARTER_1 1.5703125f
+#define QUARTER_2 4.837512969970703125e-4f
+#define QUARTER_3 7.5497899548918821e-8f
+#define SINE(z) (-1.6666654611e-1f + z * (8.3321608736e-3f - z * 1.9515295891e-4f))
+#define COSINE(z) (4.166664568298827e-2f + z * (-1.388731625493765e-3f + z * 2.443315711809948e-5f))

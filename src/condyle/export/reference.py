@@ -1,0 +1,92 @@
+"""What exported functions should answer: the same questions by the library itself, in numpy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..mechanism.mechanism import Mechanism
+from ..model.closing import Closure
+from ..model.evaluator import Evaluator
+from ..model.forward import ForwardKinematics
+from ..status import Status
+from .catalogue import Wish
+
+Arrays = dict[str, np.ndarray]
+Given = Mapping[str, np.ndarray]  # argument -> (N, size)
+
+
+@dataclass
+class Reference:
+    """The library's own answers about one mechanism."""
+
+    model: Evaluator
+    wish: Wish
+
+    @staticmethod
+    def of(mechanism: Mechanism, formulation: str, route: str, wish: Wish) -> Reference:
+        """By numpy: no code is shared with what prints C."""
+        return Reference(Evaluator(mechanism, formulation, route, backend="numpy"), wish)
+
+    def __call__(self, question: str, given: Given) -> tuple[Arrays, np.ndarray]:
+        """Results by argument, (N, size) each, and statuses, (N,)."""
+        with np.errstate(all="ignore"):
+            return _ANSWERS[question](self, given)
+
+
+def _inverse(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
+    load = np.hstack([given[name] for name in ("force", "moment", "point")])
+    states = (given[name] for name in ("q", "q1", "q2"))
+    wanted = r.model.choosing("minimum_norm")
+    found = wanted.torques(*states, load, outputs=("contact",))
+    return {"effort": found.effort, "contact_force": found["contact_force"]}, found.status
+
+
+def _motion(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
+    poses, reached = r.model._poses(given["q"], given["q1"], given["q2"])
+    return poses, _reached(reached)
+
+
+def _closure(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
+    closure = Closure(
+        r.model.mechanism, r.wish.coordinates, r.wish.landmark, backend=r.model.backend
+    )
+    # The C function takes coordinates in the order asked for, the closure in that of X_EE.
+    order = list(range(3))
+    if closure.names:
+        order = [r.wish.coordinates.index(name) for name in closure.names]
+    rest = np.zeros((len(given["s"]), int(not closure.names)))
+    s, s1, s2 = (np.hstack([given[name][:, order], rest]) for name in ("s", "s1", "s2"))
+    found = closure.solve(s, s1, s2)
+    return dict(found.named()), _reached(found.reached)
+
+
+def _pose(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
+    found = ForwardKinematics(r.model.mechanism).solve(given["joint"])
+    # A residual beyond the tolerance is infeasible in C.
+    codes = np.array([Status.ok, Status.unreachable, Status.unreachable, Status.infeasible])
+    return {"pose": found.pose, "residual": found.residual}, codes[found.status]
+
+
+def _computed_torque(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
+    g = given
+    q2 = g["q2_d"] + g["kd"] * (g["q1_d"] - g["q1"]) + g["kp"] * (g["q_d"] - g["q"])
+    return _inverse(r, {**given, "q2": q2})
+
+
+def _reached(reached: np.ndarray) -> np.ndarray:
+    return np.where(reached, Status.ok, Status.unreachable)
+
+
+_ANSWERS: dict[str, Callable[[Reference, Given], tuple[Arrays, np.ndarray]]] = {
+    "inverse": _inverse,
+    "contact": _inverse,
+    "motion": _motion,
+    "closure": _closure,
+    "pose": _pose,
+    "computed_torque": _computed_torque,
+}
+
+

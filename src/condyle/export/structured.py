@@ -1,0 +1,1 @@
+"""Constants in a structure."""
