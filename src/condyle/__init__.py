@@ -56,9 +56,10 @@ if TYPE_CHECKING:
     from .results.model import Model, derive
     from .results.solution import Solution, open_solution
 
-# What the report gives to results and comparisons, which do not know it.
+# What the report gives to results, comparisons and exports, which do not know it.
 register("solution.plot", "condyle.report.figures:SolutionPlots")
 register("comparison.text", "condyle.report.tables:comparison_text")
+register("mechanism.look", "condyle.report.scene.look:Look")
 
 __all__ = [*_HOMES, "__version__"]
 

@@ -41,6 +41,7 @@ CALLS: dict[str, tuple[str, ...]] = {
         *("motion", "from-c3d", "a trial.c3d", "--markers", "markers.toml"),
         *("--mechanism", "my jaw.toml", "--out", "a motion.csv"),
     ),
+    "export mjcf": ("export", "mjcf", "my jaw.toml", "--out", "for mujoco"),
     "plot": ("plot",),
     "plot SOLUTION": ("plot", "a run.nc", "--figure", "load", "--out", "my figures"),
     "report": ("report", "a run.nc"),
