@@ -192,7 +192,6 @@ class ChainWriter:
         if math.isfinite(speed):
             name = f"speed_limit_{chain.name}"
             element(child(self.root, "custom"), "numeric", name=name, data=[speed])
-            self._note("MuJoCo has no limits of speed: they stand as numbers speed_limit_CHAIN")
         if chain.actuator.coulomb:
             self._note(
                 "Coulomb friction of actuators is MuJoCo's frictionloss, which holds at rest; "
