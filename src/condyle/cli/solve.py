@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ..errors import InputError
 from . import options
 from .answer import Answer, command_line
 from .command import COMPUTE, command
@@ -32,6 +33,7 @@ def solve(
     preload: options.Preload = 0.0,
     contact_weight: options.ContactWeight = 0.0,
     reactions: options.Reactions = False,
+    mat: options.Mat = False,
     backend: options.Backend = "auto",
     threads: options.Threads = None,
     strict: options.Strict = False,
@@ -45,9 +47,13 @@ def solve(
 
     from ..results.states import solve_file
 
+    if mat and out.suffix.lower() == ".mat":
+        raise InputError(f"--out {out}: --mat writes that file; give the table another name")
     machine, policy = condyle.load(mechanism), (distribution, preload, contact_weight)
     model = chosen_model(machine, formulation, route, backend, *policy)
-    rows, warnings = solve_file(model, states, out, load_point, flag, strict, reactions, threads)
+    files = [out, out.with_suffix(".mat")] if mat else [out]
+    how = load_point, flag, strict, reactions, threads
+    rows, warnings = solve_file(model, states, out, *how, mat=files[1] if mat else None)
     warn(warnings)
     data = {
         "mechanism": model.mechanism.name,
@@ -56,6 +62,8 @@ def solve(
         "distribution": model.policy.objective,
         "rows": rows,
         "warnings": warnings,
-        "files": [out],
+        "files": files,
     }
-    return Answer(f"{rows} rows solved: {out}", data, command_line("view", mechanism))
+    return Answer(
+        f"{rows} rows solved: {', '.join(map(str, files))}", data, command_line("view", mechanism)
+    )
