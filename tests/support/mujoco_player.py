@@ -14,10 +14,10 @@ Array = np.ndarray
 class Player:
     """A model, its data, and its platform."""
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text: str, platform: str = "platform") -> None:
         self.model = mujoco.MjModel.from_xml_string(text)
         self.data = mujoco.MjData(self.model)
-        self.platform = self.model.body("platform").id
+        self.platform = self.model.body(platform).id
 
     def position(self) -> Array:
         """O_M, (3,)."""
