@@ -24,7 +24,15 @@ DISTRIBUTIONS = {  # name -> what is least, and subject to what
 }
 BACKENDS = ("auto", "compiled", "numpy")
 STYLES = ("screen", "journal", "journal-wide")
-EXPORTS = ("inverse", "contact", "motion", "closure", "pose", "computed_torque")
+EXPORTS = (
+    "inverse",
+    "contact",
+    "forward",
+    "motion",
+    "closure",
+    "pose",
+    "computed_torque",
+)
 UNITS = ("m,rad", "m,deg", "mm,rad", "mm,deg", "cm,rad", "cm,deg")
 FIGURES = (
     "activation",

@@ -6,10 +6,9 @@ A new one is an entry of `CATALOGUE`.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from ..errors import UnsupportedError
-from ..mechanism.mechanism import COORDINATES
+from ..errors import InputError, UnsupportedError, did_you_mean
 from ..questions import Prescribed
 from ..questions.friction import MOST
 from . import encoders
@@ -78,6 +77,19 @@ def _efforts(c: Context, name: str, wanted: tuple[str, ...], own: list[Argument]
     program = found.robust or found.main
     quick = found.latency or (found.main if found.robust else None)
     return function(c, name, program, own, ("UNREACHABLE", weak), quick)
+
+
+def _forward_arguments(c: Context, wish: Wish) -> list[Argument]:
+    a = c.arguments
+    found = replace(a.states()[2], name="acceleration", given=False, port="acceleration")
+    return [*a.states()[:2], a.effort(given=True), *a.load(), found, *a.contact_force()]
+
+
+def _forward(c: Context, wish: Wish) -> Body:
+    program = c.variants("forward", ("contact",)).main
+    weak = "JAMMED" if c.structure.friction else "SINGULAR"
+    own = _forward_arguments(c, wish)
+    return function(c, "forward", program, own, ("UNREACHABLE", weak), program)
 
 
 def _motion_arguments(c: Context, wish: Wish) -> list[Argument]:
@@ -161,6 +173,10 @@ CATALOGUE: dict[str, Entry] = {
         "Efforts of least norm that make a motion under a load, and the contact forces.",
         _contact_arguments, _contact, _EFFORTS,
     ),
+    "forward": Entry(
+        "Accelerations that efforts and a load make, and the contact forces.",
+        _forward_arguments, _forward, _EFFORTS,
+    ),
     "motion": Entry(
         "The whole pose and its rates, from the independent coordinates.",
         _motion_arguments, _motion, ("UNREACHABLE",),
@@ -179,16 +195,11 @@ CATALOGUE: dict[str, Entry] = {
         _torque_arguments, _torque, _EFFORTS, needs=("inverse",),
     ),
 }  # fmt: skip
-DEFAULT = ("inverse", "contact", "motion", "pose", "computed_torque")
+DEFAULT = ("inverse", "contact", "forward", "motion", "pose", "computed_torque")
 
 
 def require_question(name: str) -> Entry:
     """Raises InputError for what cannot be exported."""
-    from ..errors import InputError, did_you_mean
-
     if name not in CATALOGUE:
         raise InputError(f'no question "{name}" to export.{did_you_mean(name, CATALOGUE)}')
     return CATALOGUE[name]
-
-
-__all__ = ["CATALOGUE", "COORDINATES", "DEFAULT", "Entry", "Wish", "require_question"]

@@ -100,30 +100,36 @@ class Context:
 
         return fused(rescaled(program, self.precision))
 
-    def judged(self, body: Scalar | Wide, doubts: Sequence[str], given: Sequence[Argument]) -> str:
-        """The status of a sample: what is out of bounds first, then check by check.
+    def judged(
+        self, body: Scalar | Wide, doubts: Sequence[str], given: Sequence[Argument]
+    ) -> list[tuple[str, str, str]]:
+        """What decides on a sample, in turn: a value, what it must not break, and the status else.
 
         Args: doubts: what a check that is not certain means, one a check.
         """
         p = self.prefix.upper()
-        lines = []
-        checks = zip(body.program.checks, doubts, strict=True)
-        for i, (check, doubt) in enumerate(checks):
+        found = [(size, f"<= {limit}", f"{p}_OUT_OF_BOUNDS") for size, limit in _sizes(body, given)]
+        for i, (check, doubt) in enumerate(zip(body.program.checks, doubts, strict=True)):
             limit = body.number(threshold(check.tolerance, self.precision))
-            lines.append(f"!({body.check(i)} >= {limit}) ? {p}_{doubt} :")
-        chain = "\n        ".join([*lines, f"{p}_OK;"])
-        bounds = " || ".join(f"!({size} <= {limit})" for size, limit in _sizes(body, given))
-        return f"    const int status = {bounds} ? {p}_OUT_OF_BOUNDS :\n        {chain}"
+            found.append((body.check(i), f">= {limit}", f"{p}_{doubt}"))
+        return found
 
 
 def _sizes(body: Scalar | Wide, given: Sequence[Argument]) -> list[tuple[str, str]]:
     """Sums of sizes, and what they must not exceed: false for what is no number."""
-    call = "fabs_s"
-    terms = [f"{call}({a.name}[{i}])" for a in given for i in range(a.size)]
+    every = [_sum([f"fabs_s({a.name}[{i}])" for i in range(a.size)]) for a in given]
     angles = [
-        f"{call}({a.name}[{i}])" for a in given for i, unit in enumerate(a.units) if unit == "rad"
+        f"fabs_s({a.name}[{i}])" for a in given for i, unit in enumerate(a.units) if unit == "rad"
     ]
-    found = [(" + ".join(terms), body.number(LARGEST[body.precision]))]
-    if angles:
-        found.append((" + ".join(angles), body.number(ANGLES[body.precision])))
+    found = [(_sum(every), body.number(LARGEST[body.precision]))]
+    if angles and isinstance(body, Scalar):  # vector code takes far angles from the library
+        found.append((_sum(angles), body.number(ANGLES[body.precision])))
     return found
+
+
+def _sum(terms: Sequence[str]) -> str:
+    """Two halves side by side, which wait less for each other."""
+    if len(terms) == 1:
+        return terms[0]
+    half = len(terms) // 2
+    return f"({_sum(terms[:half])} + {_sum(terms[half:])})"

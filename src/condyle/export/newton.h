@@ -53,7 +53,7 @@ static void step_at(CONTEXT const real *at, const real *joint, newton_step *s)
     s->size = s->error = R(0.0);
     for (int i = 0; i < N; i++) {
         real left = joint[i] - found[i];
-        left -= turn[i] * F(floor)(left * TURN + R(0.5));
+        left -= turn[i] * (real)(long)(left * TURN + (left < R(0.0) ? R(-0.5) : R(0.5)));
         s->residual[i] = left;
         s->error += left * weight[i] * LENGTH * (left * weight[i] * LENGTH);
         for (int r = 0; r < 6; r++) left -= J_theta[r * N + i] * correction[r];

@@ -44,6 +44,13 @@ def _inverse(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
     return {"effort": found.effort, "contact_force": found["contact_force"]}, found.status
 
 
+def _forward(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
+    load = np.hstack([given[name] for name in ("force", "moment", "point")])
+    found = r.model.forward(given["q"], given["q1"], given["effort"], load)
+    results = {"acceleration": found.acceleration, "contact_force": found.contact_force}
+    return results, found.status
+
+
 def _motion(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
     poses, reached = r.model._poses(given["q"], given["q1"], given["q2"])
     return poses, _reached(reached)
@@ -83,10 +90,9 @@ def _reached(reached: np.ndarray) -> np.ndarray:
 _ANSWERS: dict[str, Callable[[Reference, Given], tuple[Arrays, np.ndarray]]] = {
     "inverse": _inverse,
     "contact": _inverse,
+    "forward": _forward,
     "motion": _motion,
     "closure": _closure,
     "pose": _pose,
     "computed_torque": _computed_torque,
 }
-
-

@@ -27,18 +27,19 @@ def function(
                   for go to `program`.
           zero:   inputs that are 0, as a column's C is written.
     """
-    given = [a for a in arguments if a.given]
+    given, results = ([a for a in arguments if a.given is way] for way in (True, False))
     parameters, p = c.parameters(arguments), c.prefix.upper()
     public = f"int {c.prefix}_{name}({parameters})"
     scalar = Scalar(c.floats(program), _places(c, program, arguments, zero), c.precision)
     judged = c.judged(scalar, doubts, given)
     if quick is None or not c.lanes:
-        return Body(_text(c, scalar, public, name, judged), operations(scalar))
+        return Body(_text(c, scalar, public, name, judged, results), operations(scalar))
     plain = f"static int {c.prefix}_{name}_plain({parameters})"
-    code = _text(c, scalar, plain, name, judged)
+    code = _text(c, scalar, plain, name, judged, results)
     vector = Wide(c.floats(quick), _places(c, quick, arguments, zero), c.lanes)
     head = f"static int {c.prefix}_{name}_quick({parameters})"
-    wide = _text(c, vector, head, f"{name}_quick", c.judged(vector, doubts, given))
+    judged = c.judged(vector, doubts, given)
+    wide = _text(c, vector, head, f"{name}_quick", judged, results)
     words = [a.name for a in arguments]
     sure, slow = (c.call(f"{c.prefix}_{name}_{how}", words) for how in ("quick", "plain"))
     dispatch = f"""{public}
@@ -76,8 +77,36 @@ def _places(
     return Places(columns, results, places.order)
 
 
-def _text(c: Context, body: Scalar | Wide, head: str, table: str, judged: str) -> str:
-    p = c.prefix.upper()
-    lines = [head, "{", c.table(table, body), *(f"    {line}" for line in body.lines()), judged]
-    lines += [f"    if (status == {p}_OK) {{", *(f"        {line}" for line in body.stores())]
-    return "\n".join([*(line for line in lines if line), "    }", "    return status;", "}", ""])
+def _text(
+    c: Context,
+    body: Scalar | Wide,
+    head: str,
+    table: str,
+    judged: Sequence[tuple[str, str, str]],
+    results: Sequence[Argument],
+) -> str:
+    """Values wait in volatile places, so that no compiler moves work behind the status, and what is
+    not wanted is written aside: bad samples take the time of good ones. Vector code, for least
+    latency, does without."""
+    ok, stores = f"{c.prefix.upper()}_OK", list(body.stores())
+    lines = [head, "{", c.table(table, body), *(f"    {line}" for line in body.lines())]
+    values = [value for value, _, _ in judged]
+    if isinstance(body, Scalar):
+        kept = [*(store.rstrip(";").split(" = ", 1)[1] for store in stores), *values]
+        lines.append(f"    volatile {c.precision} found[{len(kept)}];")
+        lines += [f"    found[{i}] = {value};" for i, value in enumerate(kept)]
+        values = [f"found[{len(stores) + i}]" for i in range(len(judged))]
+    lines.append("    const int status =")
+    for value, (_, bound, status) in zip(values, judged, strict=True):
+        lines.append(f"        !({value} {bound}) ? {status} :")
+    lines += [f"        {ok};"]
+    if isinstance(body, Scalar):
+        lines.append(f"    {c.precision} aside[{len(stores)}];")
+        for a in results:
+            lines.append(f"    {c.precision} *const {a.name}_ = status == {ok} ? {a.name} : aside;")
+        for i, store in enumerate(stores):
+            name, at = store.split(" = ", 1)[0].split("[")
+            lines.append(f"    {name}_[{at} = found[{i}];")
+    else:
+        lines += [f"    if (status == {ok}) {{", *(f"        {store}" for store in stores), "    }"]
+    return "\n".join(line for line in [*lines, "    return status;", "}"] if line) + "\n\n"

@@ -41,9 +41,10 @@ from ..questions.inverse import OUTPUTS
 from ..questions.numbers import Layout, require_closed_form, specialised
 from ..questions.structure import structure_of
 from ..status import Status
+from .accelerating import Accelerator
 from .checks import LOAD_COLUMNS, POSE_COLUMNS, check_array, check_states
 from .closing import Closure
-from .data import Configuration, Efforts, Evaluation
+from .data import Accelerations, Configuration, Efforts, Evaluation
 from .distributing import LEAST, Distributor, Policy
 from .reference_force import reference_force
 from .robust import Robust
@@ -351,6 +352,53 @@ class Evaluator:
         for name, value in better.items():
             if name in values:
                 values[name][..., rows] = value
+
+    # -- forward dynamics ------------------------------------------------------------------
+
+    @cached_property
+    def _accelerator(self) -> Accelerator:
+        return Accelerator(self.mechanism, self.kernel, lambda: self._robust)
+
+    def forward(
+        self,
+        q: np.ndarray,
+        q1: np.ndarray,
+        effort: np.ndarray,
+        load: np.ndarray,
+        outputs: Collection[str] = (),
+        threads: int | None = None,
+    ) -> Accelerations:
+        """Forward dynamics: the accelerations that efforts and loads make.
+
+        Limits of efforts, and that cables cannot push, are the caller's concern.
+
+        Args:    q, q1: (N, m) each, in the order of `independent` [m, rad; per s].
+                 effort: (N, n) [N m or N], in the order of the chains.
+                 load: (N, 9), as of `evaluate`.
+                 outputs: what is wanted besides, of motion, joint and sliding; threads: at most so
+                 many.
+        Raises:  InputError: for an output that is none of these, or arrays that do not fit.
+        """
+        return self._accelerator(q, q1, effort, load, outputs, threads)
+
+    def forward_one(
+        self, q: np.ndarray, q1: np.ndarray, effort: np.ndarray, load: np.ndarray
+    ) -> np.ndarray:
+        """Accelerations of one sample, (m,), at least latency; NaN where there are none.
+
+        Args: q, q1: (m,) each;  effort: (n,);  load: (9,); as of `forward`.
+        """
+        return self._accelerator.one(q, q1, effort, load)
+
+    def linearised(
+        self, q: np.ndarray, q1: np.ndarray, effort: np.ndarray, load: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """x' = A x + B effort about states x = (q, q'), exact; arguments as of `forward`.
+
+        The load stays as it is in {S}. Returns: A, (N, 2 m, 2 m), and B, (N, 2 m, n); NaN where
+        there are no accelerations.
+        """
+        return self._accelerator.linearised(q, q1, effort, load)
 
     # -- the configuration -----------------------------------------------------------------
 

@@ -19,15 +19,20 @@ from ..graph.program import Program, Variants
 from .closure import Prescribed, closure, conditions
 from .configuration import configuration
 from .encoders import encoders
+from .forward import forward, forward_system
 from .inverse import inverse, motion, system
+from .linear import linear
 from .matrices import jacobians, matrices
 from .reactions import reactions
 from .structure import Structure
 
 QUESTIONS: dict[str, Callable[..., Program | Variants]] = {
     "inverse": inverse,
+    "forward": forward,
+    "forward_system": forward_system,
     "motion": motion,
     "system": system,
+    "linear": linear,
     "closure": closure,
     "conditions": conditions,
     "configuration": configuration,
@@ -47,6 +52,7 @@ GEOMETRY = (
     "encoders",
     "jacobians",
     "reactions",
+    "linear",
 )
 
 

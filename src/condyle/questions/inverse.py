@@ -83,8 +83,12 @@ def program(
     if "configuration" in wanted:
         configuration.add(b, platform)
         if structure.friction:
-            _add_sliding(b, contacts(b, platform))
-    b.check(_feasibility(b, platform, eq), DOUBTFUL, Status.unreachable)
+            add_sliding(b, contacts(b, platform))
+    b.check(
+        feasibility(b, platform, [c.dynamics.discriminant for c in eq.chains]),
+        DOUBTFUL,
+        Status.unreachable,
+    )
     finite = ca.fabs(b.total(best.effort)) < HUGE
     b.check(best.quality * finite * _every_rate_is_felt(b, eq), WEAK)
     return b.finish()
@@ -159,7 +163,7 @@ def system(structure: Structure) -> Program:
     platform, load = given(b), Wrench.of(b)
     eq = equations(b, platform, load, route="core")
     still = [b.at_zero(part, *_rates(eq, platform)) for part in eq.parts.values()]
-    b.output("A", eq.A, "")
+    b.output("A", eq.A, "", structure.m)
     for name, parts in (("b", list(eq.parts.values())), ("b_gravity", still)):
         rows = ca.horzcat(*(eq.basis.generalized_force(p) for p in parts)).T
         b.output(name, rows, "", len(parts), structure.m)
@@ -170,7 +174,7 @@ def system(structure: Structure) -> Program:
     touch, k = contacts(b, platform), len(structure.contacts)
     b.output("normal", (eq.state.B.T @ touch.N).T, "", k, 6)
     b.output("friction", (eq.state.B.T @ touch.T).T, "", k, 6)
-    _add_sliding(b, touch)
+    add_sliding(b, touch)
     b.output("joint_rate", [c.dynamics.rate for c in eq.chains], "rad/s or m/s")
     b.output("joint_acceleration", [c.dynamics.acceleration for c in eq.chains], "per s^2")
     return b.finish()
@@ -182,7 +186,7 @@ def _add_motion(b: Builder, platform: Platform) -> None:
     b.output("pose_acceleration", platform.motion.acceleration, "per s^2")
 
 
-def _add_sliding(b: Builder, touch: Contacts) -> None:
+def add_sliding(b: Builder, touch: Contacts) -> None:
     k = len(b.structure.contacts)
     b.output("slip", touch.slip.T, "m/s", k, 3)
     b.output("drag", touch.drag.T, "1", k, 3)
@@ -213,9 +217,12 @@ def _every_rate_is_felt(b: Builder, eq: Equations) -> ca.SX:
     return least >= WEAK * ca.sum1(sizes)
 
 
-def _feasibility(b: Builder, platform: Platform, eq: Equations) -> ca.SX:
-    """Least of the dimensionless discriminants: not negative where the pose can be reached."""
-    least, placement = b.least([c.dynamics.discriminant for c in eq.chains]), platform.placement
+def feasibility(b: Builder, platform: Platform, chains: Lanes) -> ca.SX:
+    """Least of the dimensionless discriminants: not negative where the pose can be reached.
+
+    Args: chains: their discriminants.
+    """
+    least, placement = b.least(chains), platform.placement
     if placement.discriminant is None:
         return least
     # A pose that Newton did not find is not unreachable but unknown: 0, to be looked at again.

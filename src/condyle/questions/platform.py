@@ -45,10 +45,14 @@ class Platform:
         return self.motion.R
 
 
-def closed(b: Builder) -> Platform:
-    """From the independent coordinates, ports q, q1 and q2: the contacts give the rest."""
+def closed(b: Builder, still: bool = False) -> Platform:
+    """From the independent coordinates, ports q, q1 and q2: the contacts give the rest.
+
+    Args: still: without q2, which is zero.
+    """
     s = b.structure
-    q, q1, q2 = (b.sample(name, s.m) for name in ("q", "q1", "q2"))
+    q, q1 = (b.sample(name, s.m) for name in ("q", "q1"))
+    q2 = ca.SX.zeros(s.m) if still else b.sample("q2", s.m)
     contacts = contact_symbols(s, b.parameter)
     if closed_form_available([form for form, _ in s.contacts], s.dependent):
         placement = closed_form(contacts, s.dependent, q, b.parameter("branch"))
@@ -105,6 +109,14 @@ class Basis:
         """Pi^T f, with a column for each of f."""
         own = f[list(self.identity), :]
         return own + self.rest.T @ f[list(self.others), :] if len(self.others) else own
+
+    def rates(self, w: ca.SX) -> ca.SX:
+        """Pi w, with a column for each of w."""
+        found = ca.SX(len(self.identity) + len(self.others), w.shape[1])
+        found[list(self.identity), :] = w
+        if len(self.others):
+            found[list(self.others), :] = self.rest @ w
+        return found
 
 
 def twist_basis(motion: WholeMotion, dependent: Sequence[str]) -> Basis:
