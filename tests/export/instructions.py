@@ -47,7 +47,10 @@ def _program(e: Exported, asked: list[Function], count: int) -> str:
             at, to = (at + a.size, to) if a.given else (at, to + a.size)
         calls.append(f"status += {f.name}({', '.join(words)});")
     lines.append(f"#define CALLS(i) {' '.join(calls)}")
-    lines += [f"static void state_{i}(void) {{ CALLS({i}) }}".replace("[i]", f"[{i}]") for i in range(count)]
+    lines += [
+        f"static void state_{i}(void) {{ CALLS({i}) }}".replace("[i]", f"[{i}]")
+        for i in range(count)
+    ]
     lines += ["int main(void) {", '    FILE *f = fopen("states.bin", "rb");']
     lines += ["    if (fread(in, sizeof in, 1, f) != 1) return 1;"]
     lines += [f"    state_{i}();" for i in range(count)]

@@ -1,5 +1,4 @@
-"""The arguments of exported functions: what the ports and results of questions are, entry by entry.
-"""
+"""The arguments of exported functions: what ports and results are, entry by entry."""
 
 from __future__ import annotations
 

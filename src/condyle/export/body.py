@@ -71,7 +71,7 @@ class _Body(Straight):
         assert isinstance(value, float)
         huge = HUGE[self.precision]
         text = number(max(-huge, min(huge, value)) if abs(value) < float("inf") else value)
-        if self.precision == "double" or "(" not in text and not text[0].isdigit():
+        if self.precision == "double" or ("(" not in text and not text[0].isdigit()):
             return text
         return f"{text[:-1]}f)" if text.endswith(")") and text[1] == "-" else f"{text}f"
 

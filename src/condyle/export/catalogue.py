@@ -125,7 +125,11 @@ def _closure(c: Context, wish: Wish) -> Body:
 
 
 def _placed(
-    c: Context, name: str, details: tuple[object, ...], own: list[Argument], rest: tuple[str, ...] = ()
+    c: Context,
+    name: str,
+    details: tuple[object, ...],
+    own: list[Argument],
+    rest: tuple[str, ...] = (),
 ) -> Body:
     program = c.variants(name, *details).main
     return function(c, name, program, own, ("UNREACHABLE",) * len(program.checks), zero=rest)
@@ -191,7 +195,8 @@ CATALOGUE: dict[str, Entry] = {
         ("UNREACHABLE", "SINGULAR", "INFEASIBLE"), iterations=encoders.ITERATIONS,
     ),
     "computed_torque": Entry(
-        "A controller: efforts that follow a wanted motion, q'' = q2_d + kd (q1_d - q1) + kp (q_d - q).",
+        "A controller: efforts that follow a wanted motion, by "
+        "q'' = q2_d + kd (q1_d - q1) + kp (q_d - q).",
         _torque_arguments, _torque, _EFFORTS, needs=("inverse",),
     ),
 }  # fmt: skip

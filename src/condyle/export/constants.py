@@ -25,9 +25,9 @@ def table(printer: Printer, numbers: Numbers) -> np.ndarray:
             if op == "const":
                 values[v] = np.float64(data[0])  # type: ignore[arg-type]
             elif op == "parameter":
-                values[v] = numbers.parameters[data[0]]  # type: ignore[index]
+                values[v] = numbers.parameters[int(data[0])]  # type: ignore[call-overload]
             elif op == "lane":
-                values[v] = lanes[data[0]][data[1]]  # type: ignore[index, call-overload]
+                values[v] = lanes[int(data[0])][int(data[1])]  # type: ignore[call-overload]
             elif op in REDUCTIONS:
                 values[v] = _reduced(printer, v, values)
             else:

@@ -17,8 +17,10 @@ from ..questions.structure import Structure
 from ..status import Status
 from .arguments import Arguments
 from .body import Scalar, Wide
+from .constants import table as constants_table
 from .exported import Argument, Precision
 from .precision import ANGLES, LARGEST, threshold
+from .rescale import rescaled
 
 # Statuses in C, and where they come from.
 CODES = {
@@ -84,20 +86,16 @@ class Context:
 
     def table(self, name: str, printer: Printer) -> str:
         """The statement by which a body finds its constants."""
-        from .constants import table
-
-        self.tables[name] = table(printer, self.numbers)
+        self.tables[name] = constants_table(printer, self.numbers)
         self.printers[name] = printer
         if not printer.table_size:
-            return ""
+            return "    (void)constants;" if self.struct else ""
         real = self.precision
         where = f"constants->{name}" if self.struct else f"{self.prefix}_{name}_table"
         return f"    const {real} *const table = {where};"
 
     def floats(self, program: Program) -> Program:
         """A program with its sums fused, and the thresholds of this precision."""
-        from .rescale import rescaled
-
         return fused(rescaled(program, self.precision))
 
     def judged(

@@ -1,7 +1,7 @@
 """`pose`: the pose that joint coordinates belong to, by a bounded number of Gauss-Newton steps.
 
-As `model.forward.follow` with fewer pieces: a start that is too far off is unreachable, never another
-assembly mode without a word.
+As `model.forward.follow` with fewer pieces: a start that is too far off is unreachable, never
+another assembly mode without a word.
 """
 
 from __future__ import annotations
@@ -31,7 +31,9 @@ _SINGULAR = {"double": 1e-10, "float": 1e-4}
 def arguments(c: Context) -> list[Argument]:
     """Joints and a start; the pose and what is left of the joints."""
     a = c.arguments
-    start = a.coordinates("start", "where to start: the last pose; at first home, zeros", COORDINATES)
+    start = a.coordinates(
+        "start", "where to start: the last pose; at first home, zeros", COORDINATES
+    )
     left = "joint less joint coordinates of the pose"
     residual = Argument("residual", left, a.chains, a.joint_units, False)
     pose = a.coordinates("pose", "the platform's pose X_EE", COORDINATES, given=False)

@@ -64,9 +64,7 @@ def _measured(e: Exported, folder: Path) -> tuple[dict[str, dict[str, Any]], str
     return found, how
 
 
-def _code(
-    e: Exported, command: list[str], folder: Path, place: Path
-) -> dict[str, dict[str, Any]]:
+def _code(e: Exported, command: list[str], folder: Path, place: Path) -> dict[str, dict[str, Any]]:
     """Bytes of machine code and of stack of each function, with those that it alone calls."""
     source = folder / f"{e.prefix}.c"
     call = [*command, *FLAGS, "-c", str(source), "-o", str(place / "code.o")]
@@ -135,7 +133,13 @@ def _errors(
 
 def _run(call: list[str], place: Path) -> str:
     done = subprocess.run(
-        call, capture_output=True, text=True, errors="replace", timeout=SECONDS, cwd=place, check=True
+        call,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        timeout=SECONDS,
+        cwd=place,
+        check=True,
     )
     return done.stdout
 

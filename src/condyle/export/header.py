@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 from .. import __version__
 from ..mechanism.coordinates import COORDINATES
@@ -49,13 +49,13 @@ def _about(exported: Exported, mechanism: Mechanism) -> str:
         "",
         f"Independent coordinates: {', '.join(independent_coordinates(mechanism))}; the contacts "
         f"determine {', '.join(dependent_coordinates(mechanism)) or 'nothing'}.",
-        "Units: m, rad, s, kg, N. Frames: {S} of the base, {M} of the platform; they agree at home. "
-        "Angles are Bryant angles alpha, beta, gamma.",
+        "Units: m, rad, s, kg, N. Frames: {S} of the base, {M} of the platform; they agree at "
+        "home. Angles are Bryant angles alpha, beta, gamma.",
         "",
         "Functions return a status and write their results only where it is "
-        f"{exported.prefix.upper()}_OK. They keep nothing: no heap, no globals, no input or output, "
-        "no recursion; any thread or interrupt may call them. Arrays that go in and out must not "
-        "overlap.",
+        f"{exported.prefix.upper()}_OK. They keep nothing: no heap, no globals, no input or "
+        "output, no recursion; any thread or interrupt may call them. Arrays that go in and out "
+        "must not overlap.",
     ]
     if exported.names and (mapped := {k: v for k, v in exported.names.items() if k != v}):
         lines += ["", "Names that C does not take:"]
@@ -107,12 +107,8 @@ def _declared(exported: Exported, f: Function) -> str:
 
 def _argument(a: Argument) -> Iterator[str]:
     way = "in" if a.given else "out"
-    yield f"  {a.name}[{a.size}]  {way}: {a.text} [{_units(a)}]"
+    yield f"  {a.name}[{a.size}]  {way}: {a.text} [{a.unit}]"
     yield f"      order: {', '.join(a.labels)}"
-
-
-def _units(a: Argument) -> str:
-    return a.unit
 
 
 def _comment(lines: Sequence[str]) -> str:
@@ -124,9 +120,4 @@ def _comment(lines: Sequence[str]) -> str:
         )
         out += wrapped or [""]
     text = "\n".join(f" * {line}".rstrip() for line in out)
-    return f"/*\n{text.replace('*/', '* /') if False else text}\n */\n"
-
-
-def mapped_names(names: Mapping[str, str]) -> dict[str, str]:
-    """Names that had to be changed."""
-    return {name: ours for name, ours in names.items() if name != ours}
+    return f"/*\n{text}\n */\n"

@@ -9,12 +9,14 @@ from collections.abc import Iterable
 from ..errors import InputError
 
 # Words of C and C++ that no variable can be called.
-_C = """auto break case char const continue default do double else enum extern float for goto if
-inline int long register restrict return short signed sizeof static struct switch typedef union
-unsigned void volatile while and asm bool catch class delete explicit export false friend mutable
-namespace new not operator or private protected public template this throw true try typename using
-virtual xor""".split()
-RESERVED = frozenset(_C) | frozenset(word.lower() for word in keyword.kwlist)
+_C = """
+auto break case char const continue default do double else enum extern float for goto if inline
+int long register restrict return short signed sizeof static struct switch typedef union
+unsigned void volatile while and asm bool catch class delete explicit export false friend
+mutable namespace new not operator or private protected public template this throw true try
+typename using virtual xor
+"""
+RESERVED = frozenset(_C.split()) | frozenset(word.lower() for word in keyword.kwlist)
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 

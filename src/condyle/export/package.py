@@ -86,7 +86,10 @@ def example(e: Exported) -> str:
 
 def recorded(e: Exported, made: list[Vectors]) -> str:
     """Arguments and answers as arrays."""
-    lines = [f"/* Samples for {e.prefix}.c, and what condyle answers to them. */", "#include <math.h>"]
+    lines = [
+        f"/* Samples for {e.prefix}.c, and what condyle answers to them. */",
+        "#include <math.h>",
+    ]
     for v in made:
         f, count = v.function, len(v.status)
         lines += ["", f"#define {f.name.upper()}_SAMPLES {count}"]

@@ -1,4 +1,4 @@
-"""What changes with the precision: thresholds that rounding decides, and how numbers are written."""
+"""What changes with the precision: thresholds that rounding decides, and sizes."""
 
 from __future__ import annotations
 

@@ -38,9 +38,8 @@ class Reference:
 
 def _inverse(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
     load = np.hstack([given[name] for name in ("force", "moment", "point")])
-    states = (given[name] for name in ("q", "q1", "q2"))
     wanted = r.model.choosing("minimum_norm")
-    found = wanted.torques(*states, load, outputs=("contact",))
+    found = wanted.torques(given["q"], given["q1"], given["q2"], load, outputs=("contact",))
     return {"effort": found.effort, "contact_force": found["contact_force"]}, found.status
 
 

@@ -198,4 +198,3 @@ def _symbols(c: Context, source: str) -> tuple[str, ...]:
 
 def _text(name: str) -> str:
     return (files(__package__) / name).read_text(encoding="utf-8")
-

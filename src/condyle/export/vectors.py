@@ -134,4 +134,3 @@ class Samples:
         question = Question.about(specialised(structure, numbers), "encoders")
         kernel = NumpyKernel(question.variants(), numbers)
         return kernel.run({"pose": near["pose"]}).values["joint"].T.copy()
-
