@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,16 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.io import loadmat
+from support.octave import needs_octave, octave
 
 import condyle
 from condyle.motion import bundled_reference
 from condyle.results.matlab import matlab_name
-
-OCTAVE = shutil.which("octave-cli")
-needs_octave = pytest.mark.skipif(
-    OCTAVE is None and os.environ.get("CONDYLE_OCTAVE") != "required",
-    reason="Octave is not installed",
-)
 
 
 @pytest.fixture(scope="module")
@@ -58,12 +50,7 @@ def test_octave_reads_it(solution: condyle.Solution, saved: Path) -> None:
         'printf("%.17g\\n", s.torque.values(3, 2));',
         'printf("%s|%s|%s\\n", s.torque.units, s.chain{2}, s.torque.dims{1});',
     )
-    assert OCTAVE is not None
-    said = subprocess.run(
-        [OCTAVE, "--quiet", "--eval", "\n".join(lines)], capture_output=True, text=True, timeout=60
-    )
-    assert said.returncode == 0, said.stderr
-    size, value, words = said.stdout.split("\n")[:3]
+    size, value, words = octave("\n".join(lines), saved.parent).split("\n")[:3]
     assert size.split() == [str(n) for n in solution["torque"].shape]
     assert float(value) == float(solution["torque"].values[2, 1])
     assert words == f"N m|{solution.mechanism.chain_names[1]}|time"

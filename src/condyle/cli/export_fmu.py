@@ -44,5 +44,7 @@ def fmu(
         files.append(path)
     if bare:
         warn(["no binary for this machine: the files hold sources alone, to be compiled elsewhere"])
+    if set(kind or completion.FMUS) - {"plant"} and any(c.kind == "cable" for c in machine.chains):
+        warn(["efforts in FMUs are of least norm, without limits: a cable may be asked to push"])
     data = {"mechanism": machine.name, "fmi": fmi, "binary": not bare, "files": files}
     return Answer(files_line(files), data, command_line("check", mechanism))

@@ -7,6 +7,7 @@
 #endif
 
 enum { OK, WARNING, DISCARD, ERROR, FATAL, PENDING };
+typedef const char *Text;
 
 typedef struct {
     void (*logger)(void *, const char *, int, const char *, const char *, ...);
@@ -102,7 +103,7 @@ EXPORT int fmi2SetReal(Instance *me, const uint32_t *which, size_t n, const doub
     }
 NONE(Integer, int)
 NONE(Boolean, int)
-NONE(String, const char *)
+NONE(String, Text)
 
 EXPORT int fmi2GetFMUstate(Instance *me, Instance **state)
 {

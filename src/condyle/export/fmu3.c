@@ -8,6 +8,7 @@
 
 enum { OK, WARNING, DISCARD, ERROR, FATAL };
 typedef uint32_t Reference;
+typedef const char *Text;
 typedef void (*Logger)(void *, int, const char *, const char *);
 
 static int told(Instance *me, int status, const char *message)
@@ -141,7 +142,7 @@ NONE(UInt32, uint32_t)
 NONE(Int64, int64_t)
 NONE(UInt64, uint64_t)
 NONE(Boolean, bool)
-NONE(String, const char *)
+NONE(String, Text)
 
 /* And what there is not: clocks, binaries, variable structure, derivatives by direction. */
 #define REFUSED(name, ...)                                                                          \
