@@ -71,7 +71,7 @@ def command(
     """Runs commands where the files of `CALLS` are."""
     monkeypatch.setenv("CONDYLE_BACKEND", "numpy")
     monkeypatch.setenv("CONDYLE_CACHE", str(tmp_path / "kernels"))
-    monkeypatch.setattr("condyle.export.fmu._built", lambda sources: b"")  # a compiler takes seconds
+    monkeypatch.setattr("condyle.export.fmu._built", lambda sources: b"")  # it takes seconds
     text = bundled_text("masticatory")
     Path("my jaw.toml").write_text(text)
     Path("off.toml").write_text(text.replace("offset = 13.215", "offset = 13.5", 1))

@@ -24,7 +24,8 @@ VERSIONS = (2, 3)
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")
 LONG_AGO = (1980, 1, 1, 0, 0, 0)  # so that the same model is the same file
 ENDINGS = {"linux": ".so", "darwin": ".dylib", "win32": ".dll"}
-FOLDERS = {  # platform -> folder in FMI 2.0 and 3.0
+# Platform -> folder in FMI 2.0 and 3.0.
+FOLDERS: dict[str, dict[str, tuple[str | None, str]]] = {
     "linux": {"x86_64": ("linux64", "x86_64-linux"), "aarch64": (None, "aarch64-linux")},
     "darwin": {"x86_64": ("darwin64", "x86_64-darwin"), "arm64": (None, "aarch64-darwin")},
     "win32": {"amd64": ("win64", "x86_64-windows")},

@@ -69,7 +69,8 @@ def solve_file(
         if strict:
             refuse(notices)
         if matlab is not None:
-            whole = {name: np.concatenate([part[name] for part in kept]) for name in kept[0]} if kept else {}
+            names = kept[0] if kept else {}
+            whole = {name: np.concatenate([part[name] for part in kept]) for name in names}
             write_mat(matlab, table_variables(model.mechanism, whole))
     return rows, [*unused, *(notice.text for notice in notices)]
 
