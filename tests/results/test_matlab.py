@@ -9,11 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.io import loadmat
-from support.octave import needs_octave, octave
+from support.tools import run
 
 import condyle
 from condyle.motion import bundled_reference
 from condyle.results.matlab import matlab_name
+
+
+OCTAVE = ("octave-cli", "--quiet", "--no-init-file", "--eval")
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +45,6 @@ def test_every_variable_comes_back(solution: condyle.Solution, saved: Path) -> N
     assert read["torque"]["values"].shape == solution["torque"].shape
 
 
-@needs_octave
 def test_octave_reads_it(solution: condyle.Solution, saved: Path) -> None:
     lines = (
         f's = load("{saved}");',
@@ -50,7 +52,7 @@ def test_octave_reads_it(solution: condyle.Solution, saved: Path) -> None:
         'printf("%.17g\\n", s.torque.values(3, 2));',
         'printf("%s|%s|%s\\n", s.torque.units, s.chain{2}, s.torque.dims{1});',
     )
-    size, value, words = octave("\n".join(lines), saved.parent).split("\n")[:3]
+    size, value, words = run(*OCTAVE, "\n".join(lines), folder=saved.parent).split("\n")[:3]
     assert size.split() == [str(n) for n in solution["torque"].shape]
     assert float(value) == float(solution["torque"].values[2, 1])
     assert words == f"N m|{solution.mechanism.chain_names[1]}|time"

@@ -9,6 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from ..errors import InputError, UnsupportedError, did_you_mean
+from ..mechanism.mechanism import Mechanism
+from ..model.distributing import LEAST
 from ..questions import Prescribed
 from ..questions.friction import MOST
 from . import encoders
@@ -48,6 +50,12 @@ class Entry:
     statuses: tuple[str, ...]
     needs: tuple[str, ...] = ()
     iterations: int = 0
+
+
+def least_norm(mechanism: Mechanism) -> str | None:
+    """The distribution of exported efforts, as models take it: least norm, limits not regarded."""
+    cables = any(chain.kind == "cable" for chain in mechanism.chains)
+    return LEAST if cables else None
 
 
 def _inverse_arguments(c: Context, wish: Wish) -> list[Argument]:

@@ -106,31 +106,31 @@ static real unlikeness(const newton_step *start, const newton_step *end)
  * invert each other, so that no singularity is leapt over. Others are halved. */
 static int followed(CONTEXT const real *joint, const real *start, real *pose, real *residual)
 {
-    newton_step here, next;
+    newton_step steps[2], *here = &steps[0], *next = &steps[1], *last;
     real piece = R(1.0);
     int reached = 0, going = 1;
     for (int r = 0; r < 6; r++) pose[r] = start[r];
-    step_at(ARGUMENTS pose, joint, &here);
-    going = here.finite;
+    step_at(ARGUMENTS pose, joint, here);
+    going = here->finite;
     for (int i = 1; i < ITERATIONS && going; i++) {
-        const real whole = here.size > R(1.0) ? R(1.0) / here.size : R(1.0);
+        const real whole = here->size > R(1.0) ? R(1.0) / here->size : R(1.0);
         const real part = piece < whole ? piece : whole;
         real x[6];
         int nearer, taken;
-        for (int r = 0; r < 6; r++) x[r] = pose[r] + part * here.move[r];
-        step_at(ARGUMENTS x, joint, &next);
-        nearer = part < R(1.0) && part * here.size <= R(0.25) && next.error < here.error;
-        taken = next.finite && (next.size <= R(0.25) * here.size || nearer);
-        taken = taken && unlikeness(&here, &next) <= R(0.25);
-        reached = here.size <= CONVERGED || (here.settled && !taken);
+        for (int r = 0; r < 6; r++) x[r] = pose[r] + part * here->move[r];
+        step_at(ARGUMENTS x, joint, next);
+        nearer = part < R(1.0) && part * here->size <= R(0.25) && next->error < here->error;
+        taken = next->finite && (next->size <= R(0.25) * here->size || nearer);
+        taken = taken && unlikeness(here, next) <= R(0.25);
+        reached = here->size <= CONVERGED || (here->settled && !taken);
         if (taken) {
             for (int r = 0; r < 6; r++) pose[r] = x[r];
-            here = next;
+            last = here, here = next, next = last;
         }
         piece = taken ? R(2.0) * part : R(0.5) * part;
         going = !reached && piece >= R(0.0009765625);
     }
-    for (int i = 0; i < N; i++) residual[i] = here.residual[i];
-    if (here.finite && !(here.regular >= REGULAR)) return P_SINGULAR;
+    for (int i = 0; i < N; i++) residual[i] = here->residual[i];
+    if (here->finite && !(here->regular >= REGULAR)) return P_SINGULAR;
     return reached ? P_OK : P_UNREACHABLE;
 }

@@ -156,8 +156,6 @@ def _checked(e: Exported, f: Function) -> Iterator[str]:
 
 
 def _number(x: float, kind: str) -> str:
-    if np.isnan(x):
-        return "NAN"
-    if np.isinf(x):
-        return "INFINITY"
+    if not np.isfinite(x):
+        return f"({kind}){'NAN' if np.isnan(x) else 'INFINITY'}"
     return repr(float(x)) if kind == "double" else f"{float(np.float32(x))!r}f"

@@ -12,7 +12,7 @@ from ..model.closing import Closure
 from ..model.evaluator import Evaluator
 from ..model.forward import ForwardKinematics
 from ..status import Status
-from .catalogue import Wish
+from .catalogue import Wish, least_norm
 
 Arrays = dict[str, np.ndarray]
 Given = Mapping[str, np.ndarray]  # argument -> (N, size)
@@ -28,18 +28,28 @@ class Reference:
     @staticmethod
     def of(mechanism: Mechanism, formulation: str, route: str, wish: Wish) -> Reference:
         """By numpy: no code is shared with what prints C."""
-        return Reference(Evaluator(mechanism, formulation, route, backend="numpy"), wish)
+        least = least_norm(mechanism)
+        return Reference(Evaluator(mechanism, formulation, route, "numpy", least), wish)
 
     def __call__(self, question: str, given: Given) -> tuple[Arrays, np.ndarray]:
-        """Results by argument, (N, size) each, and statuses, (N,)."""
+        """Results by argument, (N, size) each, and statuses, (N,): out of bounds is `overflow`.
+
+        Results of samples that are not ok mean nothing.
+        """
+        good = np.isfinite(np.hstack(list(given.values()))).all(axis=1)
         with np.errstate(all="ignore"):
-            return _ANSWERS[question](self, given)
+            found, own = _ANSWERS[question](self, {name: a[good] for name, a in given.items()})
+        status = np.full(len(good), Status.overflow)
+        status[good] = own
+        results = {name: np.full((len(good), *a.shape[1:]), np.nan) for name, a in found.items()}
+        for name, a in found.items():
+            results[name][good] = a
+        return results, status
 
 
 def _inverse(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
     load = np.hstack([given[name] for name in ("force", "moment", "point")])
-    wanted = r.model.choosing("minimum_norm")
-    found = wanted.torques(given["q"], given["q1"], given["q2"], load, outputs=("contact",))
+    found = r.model.torques(given["q"], given["q1"], given["q2"], load, outputs=("contact",))
     return {"effort": found.effort, "contact_force": found["contact_force"]}, found.status
 
 

@@ -46,8 +46,8 @@ static void sincos_s(real x, real *sine, real *cosine) {
     const real n = (real)turns;
     const real r = ((a0 - n * QUARTER_1) - n * QUARTER_2) - n * QUARTER_3;
     const real z = r * r;
-    const real s = r + r * z * SINE(z) + missing;
-    const real c = R(1.0) - R(0.5) * z + z * z * COSINE(z) + missing;
+    const real s = r + r * z * sine_terms(z) + missing;
+    const real c = R(1.0) - R(0.5) * z + z * z * cosine_terms(z) + missing;
     const real a = (turns & 1) ? c : s;
     const real b = (turns & 1) ? s : c;
     *sine = (turns & 2) ? -a : a;
@@ -64,7 +64,7 @@ static real atan2_s(real y, real x) {
     const real over = wide ? least - most : least, under = wide ? least + most : most;
     const real t = over / (under > R(0.0) ? under : R(1.0));
     const real z = t * t;
-    const real part = t + t * z * ARC(z);
+    const real part = t + t * z * arc_terms(z);
     const real first = wide ? R(1.0) : R(0.0);
     const real second = steep ? R(2.0) - first : first;
     const real eighths = back ? R(4.0) - second : second;

@@ -18,7 +18,7 @@ from ..model.evaluator import Evaluator
 from ..questions.numbers import Layout, specialised
 from ..questions.structure import structure_of
 from . import structured
-from .catalogue import DEFAULT, Entry, Wish, require_question
+from .catalogue import DEFAULT, Entry, Wish, least_norm, require_question
 from .context import Body, Context
 from .exported import Exported, Function
 from .header import WHY, header_text
@@ -57,7 +57,7 @@ def export(
             MechanismError: if the contacts do not hold the platform at home.
     """
     # What a model checks of a mechanism is checked here as well.
-    model = Evaluator(mechanism, formulation, route, backend="numpy")
+    model = Evaluator(mechanism, formulation, route, "numpy", least_norm(mechanism))
     entries = _entries(mechanism, questions, coordinates, landmark)
     structure = structure_of(mechanism, formulation_named(formulation).name, route)
     numbers = Layout.of(structure).numbers(mechanism, landmark)
@@ -169,7 +169,10 @@ def _vector(p: str, lanes: int, code: str) -> str:
     text = (files("condyle.backends.c") / "vector.h").read_text(encoding="utf-8")
     text = picked(text, code)
     both = re.sub(r"\b([a-z]\w*)_s\b", r"\1_w", f"{text}\n{code}")
-    return f"#if defined({p}_VECTOR)\n#define W {lanes}\n{both}\n#endif /* {p}_VECTOR */\n"
+    # Vectors stay within this file: how they are passed between others does not matter.
+    quiet = '#pragma GCC diagnostic ignored "-Wpsabi"'
+    head = f"#if defined({p}_VECTOR)\n{quiet}\n#define W {lanes}"
+    return f"{head}\n{both}\n#endif /* {p}_VECTOR */\n"
 
 
 def _table(c: Context, name: str) -> str:
@@ -184,7 +187,8 @@ def _table(c: Context, name: str) -> str:
 
 def _number(x: float, precision: str) -> str:
     if not np.isfinite(x):
-        return "NAN" if np.isnan(x) else "HUGE_VAL" if x > 0 else "-HUGE_VAL"
+        name = "NAN" if np.isnan(x) else "INFINITY" if x > 0 else "-INFINITY"
+        return f"({precision}){name}"
     if precision == "double":
         return repr(float(x))
     return f"{float(np.float32(x))!r}f"
