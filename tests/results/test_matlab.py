@@ -15,7 +15,6 @@ import condyle
 from condyle.motion import bundled_reference
 from condyle.results.matlab import matlab_name
 
-
 OCTAVE = ("octave-cli", "--quiet", "--no-init-file", "--eval")
 
 
