@@ -197,9 +197,9 @@ def test_the_seat_keeps_the_platform_on_a_curved_surface(
     first, second = mechanism.contacts
     turned = 0.0
     for k, value in enumerate(np.linspace(-0.1, 0.1, 5)):
-        for contact in mechanism.contacts:
+        for one in mechanism.contacts:
             for letter in "ab":
-                joint = m.joint(f"{contact.name}_1{letter}")
+                joint = m.joint(f"{one.name}_1{letter}")
                 d.qpos[joint.qposadr[0]] = value * (0.01 if joint.type == 2 else 1) * (1 + k)
         mujoco.mj_kinematics(m, d)
         ball = d.site(f"{first.name}_contact").xpos
