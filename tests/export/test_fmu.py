@@ -203,6 +203,53 @@ def test_what_cannot_be_reached_is_said(fmus: dict[tuple[str, int], Path], versi
     assert asked(fmus["inverse", version], far, ["status"], "ModelExchange") == [1]
 
 
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_state_can_be_kept_and_brought_back(
+    fmus: dict[tuple[str, int], Path], version: int, tmp_path: Path
+) -> None:
+    """In memory and as bytes; a step from it is the same step again, and reset is the beginning."""
+    path = fmus["plant", version]
+    description = fmpy.read_model_description(str(path))
+    numbers = {v.name: v.valueReference for v in description.modelVariables}
+    folder = fmpy.extract(str(path), unzipdir=str(tmp_path))
+    kind = fmpy.fmi2.FMU2Slave if version == 2 else fmpy.fmi3.FMU3Slave
+    unit = kind(
+        guid=description.guid,
+        unzipDirectory=folder,
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        instanceName="x",
+    )
+    get = unit.getReal if version == 2 else unit.getFloat64
+    keep, back = (
+        (unit.getFMUstate, unit.setFMUstate)
+        if version == 2
+        else (unit.getFMUState, unit.setFMUState)
+    )
+    unpack = unit.deSerializeFMUstate if version == 2 else unit.deserializeFMUState
+    pack = unit.serializeFMUstate if version == 2 else unit.serializeFMUState
+    unit.instantiate()
+    if version == 2:
+        unit.setupExperiment(startTime=0.0)
+    unit.enterInitializationMode()
+    unit.exitInitializationMode()
+
+    def step(now: float) -> float:
+        unit.doStep(currentCommunicationPoint=now, communicationStepSize=0.01)
+        return get([numbers["q.X"]])[0]
+
+    first = step(0.0)
+    state = keep()
+    packed = pack(state)
+    second = step(0.01)
+    back(state)
+    assert step(0.01) == second != first
+    back(unpack(packed))
+    assert step(0.01) == second
+    unit.reset()
+    assert get([numbers["q.X"]])[0] == 0.0
+    unit.freeInstance()
+
+
 def test_units_are_powers_of_base_units() -> None:
     assert exponents("N m") == {"kg": 1, "m": 2, "s": -2}
     assert exponents("rad/s^2") == {"rad": 1, "s": -2}

@@ -64,7 +64,8 @@ def fmu_sources(fmu: Fmu, version: int) -> dict[str, str]:
     room = files(__package__)
     parts = ["fmu_core.c", f"fmu{version}.c"]
     includes = "math.h", "stdbool.h", "stddef.h", "stdint.h", "stdlib.h", "string.h"
-    text = f"/* {fmu.text}: an FMU, written by condyle. Compile this file alone. */\n"
+    about = fmu.text.replace("*/", "* /")
+    text = f"/* {about}: an FMU, written by condyle. Compile this file alone. */\n"
     text += "".join(f"#include <{name}>\n" for name in includes)
     text += f'{fmu.head}\n#define MODEL_TOKEN "{fmu.token}"\n\n'
     text += "\n".join((room / part).read_text(encoding="utf-8") for part in parts)

@@ -262,17 +262,23 @@ EXPORT int fmi3GetNumberOfContinuousStates(Instance *me, size_t *n)
 #if MODEL_ORDER
 EXPORT int fmi3SetContinuousStates(Instance *me, const double *x, size_t n)
 {
+    if (n != MODEL_ORDER)
+        return told(me, ERROR, "that is not the number of states");
     memcpy(me->v + MODEL_STATES, x, n * sizeof *x);
     me->dirty = 1;
     return OK;
 }
 EXPORT int fmi3GetContinuousStates(Instance *me, double *x, size_t n)
 {
+    if (n != MODEL_ORDER)
+        return told(me, ERROR, "that is not the number of states");
     memcpy(x, me->v + MODEL_STATES, n * sizeof *x);
     return OK;
 }
 EXPORT int fmi3GetContinuousStateDerivatives(Instance *me, double *rates, size_t n)
 {
+    if (n != MODEL_ORDER)
+        return told(me, ERROR, "that is not the number of states");
     if (instance_update(me))
         return answered(me, 2);
     memcpy(rates, me->v + MODEL_DERIVATIVES, n * sizeof *rates);

@@ -96,7 +96,7 @@ def fmu_model(mechanism: Mechanism, kind: str) -> Fmu:
 
     def add(role: str, names: Iterable[str]) -> None:
         for name in names:
-            found = list(_scalars(arrays[name], role, len(variables)))
+            found = list(_scalars(e, arrays[name], role, len(variables)))
             rows[name] = found
             variables.extend(found)
 
@@ -166,10 +166,10 @@ _INSTANCE = """typedef struct {
 """
 
 
-def _scalars(a: Argument, role: str, first: int) -> Iterable[Scalar]:
+def _scalars(e: Exported, a: Argument, role: str, first: int) -> Iterable[Scalar]:
     for i, (label, unit) in enumerate(zip(a.labels, a.units, strict=True)):
         start = STARTS.get(a.name, 0.0) if role in ("input", "parameter", "state") else None
-        name = f"{a.name}.{identifier(label)}"
+        name = f"{a.name}.{e.names.get(label) or identifier(label)}"
         yield Scalar(name, role, unit, f"{a.text}: {label}", first + i, start)
 
 

@@ -62,8 +62,8 @@ def mjcf(mechanism: Mechanism) -> Mjcf:
         element(root, tag)
     sky = {"type": "skybox", "builtin": "gradient", "width": 64, "height": 64}
     element(child(root, "asset"), "texture", rgb1=rgba(PAPER)[:3], rgb2=rgba(GROUND)[:3], **sky)
-    light = {"pos": [0, 0, 4 * size], "dir": [0, 0, -1], "directional": "true"}
-    element(child(root, "worldbody"), "light", **light)
+    light = {"pos": [0, 0, 4 * size], "dir": [0, 0, -1], "diffuse": [0.3] * 3}
+    element(child(root, "worldbody"), "light", directional=True, **light)
     platform = PlatformWriter(root, mechanism, look, size)
     platform.write()
     chains = ChainWriter(root, mechanism, look.colours, size)
@@ -94,10 +94,10 @@ def _settings(root: Element, mechanism: Mechanism, cloud: np.ndarray, size: floa
     )
     low, high = cloud.min(axis=0), cloud.max(axis=0)
     extent = float(np.linalg.norm(high - low))
-    element(root, "statistic", center=(low + high) / 2, extent=extent, meansize=0.1 * size)
+    element(root, "statistic", center=(low + high) / 2, extent=0.75 * extent, meansize=0.1 * size)
     visual = element(root, "visual")
     element(visual, "global", azimuth=130, elevation=-15)
-    element(visual, "headlight", ambient=[0.45] * 3, diffuse=[0.5] * 3, specular=[0.1] * 3)
+    element(visual, "headlight", ambient=[0.45] * 3, diffuse=[0.4] * 3, specular=[0.1] * 3)
     default = element(root, "default")
     element(default, "equality", solref=SOLREF, solimp=SOLIMP)
     element(default, "pair", solref=SOLREF, solimp=SOLIMP)
