@@ -123,5 +123,5 @@ def test_the_example(folder: Folders) -> None:
     of = folder("jaw")
     run("make", "-s", "all", "CC=gcc", "CFLAGS=-O0 -Werror", folder=of.path)
     told = run("./example", folder=of.path).splitlines()
-    chains = [a for a in of.exported["inverse"].outputs if a.name == "effort"][0].labels
-    assert [line.split(":")[0].removeprefix("effort ") for line in told] == list(chains)
+    (effort,) = of.exported["inverse"].outputs
+    assert [line.split(":")[0].removeprefix("effort ") for line in told] == list(effort.labels)

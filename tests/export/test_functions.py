@@ -151,7 +151,7 @@ def test_forward_undoes_inverse(jaw: Library) -> None:
 
 
 def test_numbers_that_change_are_another_mechanism(tmp_path: Path) -> None:
-    """A calibrated mechanism's numbers in the code of the one before: the same code, its efforts."""
+    """A calibrated mechanism's numbers in the same code: its efforts."""
     nominal = condyle.load("gough-stewart")
     chains = list(nominal.chains)
     chains[2] = chains[2].model_copy(update={"platform": tuple(np.add(chains[2].platform, 1e-3))})

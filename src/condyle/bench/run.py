@@ -23,6 +23,7 @@ from ..dynamics import FORMULATIONS
 from ..mechanism import bundled_text, load
 from ..model.evaluator import Evaluator
 from ..progress import step
+from .exported import PORTABLE, WIDE, exported_probes
 from .own import (
     BOUNDED,
     FRICTION,
@@ -105,6 +106,8 @@ def run_benchmark(seconds: float = 1.0) -> Benchmark:
         with step("building other engines"):
             probes += _peer_probes(unavailable)
         probes += asked_probes(load(REFERENCE))
+        with step("building exported C"):
+            probes += exported_probes(load(REFERENCE))
         probes += [*policy_probes(load(REFERENCE)), *jaw_probes(load("human-jaw"))]
         probes.append(Probe(OPERATION, timer.vector_operation, 0.0))
         rows = _timed(probes, rounds)
@@ -231,6 +234,8 @@ def _ratios(rows: list[Row], lanes: int) -> dict[str, float]:
     for formulation in ("momentum", "lagrange"):
         routes = (by_name[f"{REFERENCE} {formulation}{r}: one"] for r in (", direct", ""))
         ratios[f"one evaluation, {formulation}, direct over core"] = next(routes).over(next(routes))
+    for what in (WIDE, PORTABLE):
+        ratios[f"one evaluation, {what} over the kernel"] = by_name[f"{REFERENCE} {what}"].over(one)
     least = by_name[f"{REFERENCE}: {LEAST_NORM}"]
     for what, name in (("bounded", BOUNDED), ("friction at two contacts", FRICTION)):
         ratios[f"{what} over least norm"] = by_name[f"{REFERENCE}: {name}"].over(least)
