@@ -38,6 +38,11 @@ _HOMES = {
     "trial_motion": "motion",
     "Solution": "results.solution",
     "open_solution": "results.solution",
+    "Scenario": "simulation",
+    "load_scenario": "simulation",
+    "simulate": "simulation",
+    "simulate_all": "simulation",
+    "ScenarioError": "errors",
 }
 
 if TYPE_CHECKING:
@@ -47,6 +52,7 @@ if TYPE_CHECKING:
         InputError,
         JammedError,
         MechanismError,
+        ScenarioError,
         SingularError,
         UnreachableError,
         UnsupportedError,
@@ -55,6 +61,7 @@ if TYPE_CHECKING:
     from .motion import Load, Motion, reference_load, reference_motion, trial_motion
     from .results.model import Model, derive
     from .results.solution import Solution, open_solution
+    from .simulation import Scenario, load_scenario, simulate, simulate_all
 
 # What the report gives to results, comparisons and exports, which do not know it.
 register("solution.plot", "condyle.report.figures:SolutionPlots")

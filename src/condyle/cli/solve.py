@@ -21,8 +21,8 @@ def solve(
         Path,
         typer.Option(
             help="States to solve (CSV or Parquet), one a row: pose coordinates such as X, Y (m), "
-            "alpha, beta (rad), their rates dX ... (per s) and accelerations ddX ... (per s^2), "
-            "and if you like some of Fx, Fy, Fz (N), Mx, My, Mz (N m)."
+            "alpha, beta (rad), their rates dX ... (per s) and accelerations ddX ... (per s^2; "
+            "without both: at rest), and if you like some of Fx, Fy, Fz (N), Mx, My, Mz (N m)."
         ),
     ],
     out: Annotated[Path, typer.Option(help="File for the results (.csv or .parquet).")],
@@ -53,7 +53,8 @@ def solve(
     model = chosen_model(machine, formulation, route, backend, *policy)
     files = [out, out.with_suffix(".mat")] if mat else [out]
     how = load_point, flag, strict, reactions, threads
-    rows, warnings = solve_file(model, states, out, *how, mat=files[1] if mat else None)
+    solved = solve_file(model, states, out, *how, mat=files[1] if mat else None)
+    rows, warnings, greatest = solved
     warn(warnings)
     data = {
         "mechanism": model.mechanism.name,
@@ -61,9 +62,12 @@ def solve(
         "route": model.route,
         "distribution": model.policy.objective,
         "rows": rows,
+        "greatest_activation": None if greatest is None else greatest._asdict(),
         "warnings": warnings,
         "files": files,
     }
-    return Answer(
-        f"{rows} rows solved: {', '.join(map(str, files))}", data, command_line("view", mechanism)
-    )
+    text = f"{rows} rows solved: {', '.join(map(str, files))}"
+    if greatest is not None:
+        value, chain, row = greatest
+        text += f"\nGreatest activation (effort over its limit): {value:.4g}, {chain} in row {row}"
+    return Answer(text, data, command_line("view", mechanism))

@@ -50,6 +50,7 @@ from .reference_force import reference_force
 from .robust import Robust
 
 CONDITION = "condition"
+DEFAULT = (None, 0.0, 0.0)  # distribution, preload and contact weight
 EVERYTHING = ("contact", "share", "motion", "joint", "configuration")
 # Names of results, by what is asked for.
 RESULTS = {
@@ -97,9 +98,9 @@ class Evaluator:
         self.mechanism = mechanism
         self.formulation = formulation_named(formulation).name
         self.route = route
-        self._asked = distribution
-        self.policy = Policy.of(mechanism, distribution, preload, contact_weight)
-        self._distributor = Distributor(mechanism, self.policy)
+        self._asked = distribution, preload, contact_weight
+        if self._asked != DEFAULT:
+            _ = self.policy  # what is asked for has to fit, now
         self.backend = Backend(backend)
         with step("deriving the equations"):
             structure = structure_of(mechanism, self.formulation, route)
@@ -119,23 +120,22 @@ class Evaluator:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Models travel as their recipe; kernels are found again in the cache."""
-        policy = (self._asked, self.policy.preload, self.policy.contact_weight)
         return type(self), (
             self.mechanism,
             self.formulation,
             self.route,
             self.backend.asked,
-            *policy,
+            *self._asked,
         )
 
     # -- what it is ------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def independent(self) -> tuple[str, ...]:
         """Names of the independent coordinates q_EE, in order."""
         return independent_coordinates(self.mechanism)
 
-    @property
+    @cached_property
     def dependent(self) -> tuple[str, ...]:
         """Names of the coordinates that the contacts determine."""
         return dependent_coordinates(self.mechanism)
@@ -151,6 +151,11 @@ class Evaluator:
         """Whether efforts are chosen within limits."""
         return OBJECTIVES[self.policy.objective].limits
 
+    @property
+    def chooses_efforts(self) -> bool:
+        """Whether efforts may be others than those of least norm."""
+        return self._distributor.chooses
+
     @cached_property
     def reference_force(self) -> float:
         """N_ref, by which `weighted` measures contact forces [N]."""
@@ -161,10 +166,23 @@ class Evaluator:
     ) -> Self:
         """The same model, kernels and all, that chooses efforts otherwise; see `derive`."""
         other = copy(self)
-        other._asked = distribution
-        other.policy = Policy.of(self.mechanism, distribution, preload, contact_weight)
-        other._distributor = Distributor(self.mechanism, other.policy)
+        for name in ("policy", "_distributor"):
+            other.__dict__.pop(name, None)
+        other._asked = distribution, preload, contact_weight
+        _ = other.policy  # has to fit, now
         return other
+
+    @cached_property
+    def policy(self) -> Policy:
+        """How efforts are chosen; forward dynamics has no need of it.
+
+        Raises: InputError: where the default does not fit the mechanism.
+        """
+        return Policy.of(self.mechanism, *self._asked)
+
+    @cached_property
+    def _distributor(self) -> Distributor:
+        return Distributor(self.mechanism, self.policy, self.backend)
 
     @cached_property
     def characteristic_length(self) -> float:
@@ -184,7 +202,7 @@ class Evaluator:
 
     @cached_property
     def _robust(self) -> Robust:
-        distributor = Distributor(self.mechanism, replace(self.policy, objective=LEAST))
+        distributor = Distributor(self.mechanism, Policy(LEAST))
         return Robust(self._structure, self._numbers, self.independent, distributor)
 
     # -- inverse dynamics ------------------------------------------------------------------
@@ -347,7 +365,9 @@ class Evaluator:
             return
         ports = {name: values[name].T[rows] for name in RESULTS["motion"]}
         ports |= {name: inputs[name][rows] for name in ("force", "moment", "point")}
-        better = self._distributor.solve(self.kernel("system").run(ports).values)
+        # Shares cost more than all the rest.
+        question = "system" if {"share", "slip"} & values.keys() else "balance"
+        better = self._distributor.solve(self.kernel(question).run(ports).values)
         status[rows] = better.pop("status")
         for name, value in better.items():
             if name in values:

@@ -20,7 +20,8 @@ from .closure import Prescribed, closure, conditions
 from .configuration import configuration
 from .encoders import encoders
 from .forward import forward, forward_system
-from .inverse import inverse, motion, system
+from .instant import energy, instant
+from .inverse import balance, inverse, motion, system
 from .linear import linear
 from .matrices import jacobians, matrices
 from .reactions import reactions
@@ -31,12 +32,15 @@ QUESTIONS: dict[str, Callable[..., Program | Variants]] = {
     "forward": forward,
     "forward_system": forward_system,
     "motion": motion,
+    "balance": balance,
     "system": system,
     "linear": linear,
     "closure": closure,
     "conditions": conditions,
     "configuration": configuration,
     "encoders": encoders,
+    "instant": instant,
+    "energy": energy,
     "matrices": matrices,
     "jacobians": jacobians,
     "reactions": reactions,
@@ -50,6 +54,8 @@ GEOMETRY = (
     "conditions",
     "configuration",
     "encoders",
+    "instant",
+    "energy",
     "jacobians",
     "reactions",
     "linear",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,6 +24,23 @@ from .variables import VARIABLES, WRENCH
 from .warnings import Watch, refuse
 
 CHUNK_ROWS = 16384
+AT_REST = "no rates (dX ...) and no accelerations (ddX ...) are given: the states are at rest"
+
+
+class Activation(NamedTuple):
+    """The largest effort over its limit: how much, of which chain, in which row (from 1)."""
+
+    value: float
+    chain: str
+    row: int
+
+
+class Solved(NamedTuple):
+    """What came of a file of states; `greatest` is None without limits of efforts."""
+
+    rows: int
+    warnings: list[str]
+    greatest: Activation | None
 
 
 def solve_file(
@@ -35,24 +53,25 @@ def solve_file(
     reactions: bool = False,
     threads: int | None = None,
     mat: str | Path | None = None,
-) -> tuple[int, list[str]]:
+) -> Solved:
     """Solve every row of a states file; the output appears whole or not at all.
 
     Rows never influence each other.
 
     Args:    states: CSV, or Parquet if its name ends in .parquet, with 6 - k pose coordinates,
-             their rates dX... and accelerations ddX..., and optionally some of Fx, Fy, Fz, Mx,
-             My, Mz. Other columns are named in a warning, or refused if they look misspelt.
+             their rates dX... and accelerations ddX... (without any of both the states are at
+             rest), and optionally some of Fx, Fy, Fz, Mx, My, Mz. Other columns are named in a
+             warning, or refused if they look misspelt.
              out: likewise CSV or Parquet.
              reactions: columns reaction_<joint>_<chain>_x, _y, _z ... too.
              threads: at most so many; the file does not depend on it.
              mat: file for MATLAB to write as well; it takes the memory of the whole table.
-    Returns: number of rows, and warnings.
+    Returns: number of rows, warnings, and the greatest activation.
     Raises:  InputError, UnreachableError, SingularError, BoundsError: nothing is written then.
     """
     known = [p + name for p in ("", "d", "dd") for name in COORDINATES] + list(WRENCH)
     watch = Watch(model.mechanism, rows=True)
-    rows, unused = 0, list[str]()
+    rows, unused, greatest = 0, list[str](), None
     kept: list[dict[str, np.ndarray | list[str]]] = []
     with ExitStack() as stack:
         matlab = None if mat is None else stack.enter_context(replacing(mat))
@@ -63,8 +82,11 @@ def solve_file(
             writer.write(columns)
             if matlab is not None:
                 kept.append(columns)
+            greatest = _greater(greatest, derived, rows)
             rows += table.rows
             unused = list(table.warnings)
+            if at_rest(table):
+                unused.append(f"{table.source}: {AT_REST}")
         notices = watch.notices()
         if strict:
             refuse(notices)
@@ -72,7 +94,23 @@ def solve_file(
             names = kept[0] if kept else {}
             whole = {name: np.concatenate([part[name] for part in kept]) for name in names}
             write_mat(matlab, table_variables(model.mechanism, whole))
-    return rows, [*unused, *(notice.text for notice in notices)]
+    return Solved(rows, [*unused, *(notice.text for notice in notices)], greatest)
+
+
+def at_rest(table: Table) -> bool:
+    """Whether a states file has neither rates nor accelerations."""
+    return not any(p + name in table.columns for p in ("d", "dd") for name in COORDINATES)
+
+
+def _greater(before: Activation | None, derived: Derived, first_row: int) -> Activation | None:
+    """The greatest activation so far."""
+    size = np.abs(np.where(derived.ok[:, None], derived.activation, np.nan))
+    if not np.isfinite(size).any():
+        return before
+    row, chain = np.unravel_index(np.nanargmax(size), size.shape)
+    name = derived.mechanism.chain_names[chain]
+    here = Activation(float(size[row, chain]), name, first_row + int(row) + 1)
+    return here if before is None or here.value > before.value else before
 
 
 def solve_table(
@@ -86,7 +124,11 @@ def solve_table(
 ) -> tuple[dict[str, np.ndarray | list[str]], Derived]:
     """Output columns for the rows of one table, and what follows from its evaluation."""
     names = state_coordinates(model, table)
-    q, q1, q2 = (table.require([p + name for name in names]) for p in ("", "d", "dd"))
+    q = table.require(names)
+    if at_rest(table):
+        q1 = q2 = np.zeros_like(q)
+    else:
+        q1, q2 = (table.require([p + name for name in names]) for p in ("d", "dd"))
     q, q1, q2 = model.independent_states(names, q, q1, q2, threads=threads)
     wrench = np.zeros((table.rows, 6))
     point = np.zeros(3)
