@@ -100,11 +100,14 @@ def put_files_of_a_reader(folder: Path) -> None:
     jaw.write_tables(folder / "markers.toml")
     q = ("X", "Y", "alpha", "beta")
     names = [prefix + name for prefix in ("", "d", "dd") for name in q]
+    (folder / "bite.csv").write_text("X,Y,alpha,beta,Fz\n0,0,0,0,-100\n")
     chains, legs = (
         [f"joint_{chain}" for chain in condyle.load(name).chain_names]
         for name in ("masticatory", "gough-stewart")
     )
-    for name, columns in (("states.csv", names), ("encoders.csv", chains), ("legs.csv", legs)):
+    driven = [*names[:8], *(chain.replace("joint_", "tau_") for chain in chains)]
+    tables = (("efforts.csv", driven), ("states.csv", names))
+    for name, columns in (*tables, ("encoders.csv", chains), ("legs.csv", legs)):
         rows = [",".join(columns), *[",".join(["0"] * len(columns))] * 2]
         (folder / name).write_text("\n".join(rows), encoding="utf-8")
 
@@ -333,6 +336,7 @@ JSON = {
     "condyle reference": ("reference", "--out", "reference"),
     "condyle run": ("run", "--rate", "20", "--out", "results"),
     "condyle solve": ("solve", "my.toml", "--states", "states.csv", "--out", "t.csv"),
+    "condyle forward": ("forward", "my.toml", "--states", "efforts.csv", "--out", "a.csv"),
     "condyle compare --tradeoff": ("compare", "--tradeoff", "--rate", "20", "--out", "curve"),
     "condyle pose": ("pose", "my.toml", "--joints", "encoders.csv", "--out", "p.csv"),
     "condyle pose --all": (

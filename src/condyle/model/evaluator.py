@@ -130,12 +130,12 @@ class Evaluator:
 
     # -- what it is ------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def independent(self) -> tuple[str, ...]:
         """Names of the independent coordinates q_EE, in order."""
         return independent_coordinates(self.mechanism)
 
-    @property
+    @cached_property
     def dependent(self) -> tuple[str, ...]:
         """Names of the coordinates that the contacts determine."""
         return dependent_coordinates(self.mechanism)
@@ -150,6 +150,11 @@ class Evaluator:
     def limited(self) -> bool:
         """Whether efforts are chosen within limits."""
         return OBJECTIVES[self.policy.objective].limits
+
+    @property
+    def chooses_efforts(self) -> bool:
+        """Whether efforts may be others than those of least norm."""
+        return self._distributor.chooses
 
     @cached_property
     def reference_force(self) -> float:
@@ -177,7 +182,7 @@ class Evaluator:
 
     @cached_property
     def _distributor(self) -> Distributor:
-        return Distributor(self.mechanism, self.policy)
+        return Distributor(self.mechanism, self.policy, self.backend)
 
     @cached_property
     def characteristic_length(self) -> float:
@@ -360,7 +365,9 @@ class Evaluator:
             return
         ports = {name: values[name].T[rows] for name in RESULTS["motion"]}
         ports |= {name: inputs[name][rows] for name in ("force", "moment", "point")}
-        better = self._distributor.solve(self.kernel("system").run(ports).values)
+        # Shares cost more than all the rest.
+        question = "system" if {"share", "slip"} & values.keys() else "balance"
+        better = self._distributor.solve(self.kernel(question).run(ports).values)
         status[rows] = better.pop("status")
         for name, value in better.items():
             if name in values:

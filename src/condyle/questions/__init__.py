@@ -21,7 +21,7 @@ from .configuration import configuration
 from .encoders import encoders
 from .forward import forward, forward_system
 from .instant import energy, instant
-from .inverse import inverse, motion, system
+from .inverse import balance, inverse, motion, system
 from .linear import linear
 from .matrices import jacobians, matrices
 from .reactions import reactions
@@ -32,6 +32,7 @@ QUESTIONS: dict[str, Callable[..., Program | Variants]] = {
     "forward": forward,
     "forward_system": forward_system,
     "motion": motion,
+    "balance": balance,
     "system": system,
     "linear": linear,
     "closure": closure,

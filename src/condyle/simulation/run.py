@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, NoReturn
@@ -11,6 +10,7 @@ import numpy as np
 
 from ..progress import step as progress
 from ..status import STATUS_NAMES, Status
+from .compiled import DONE, LOOK, STEP, Loop, loop_of
 from .controllers import Measured
 from .events import KINDS, Event
 from .integrators import INTEGRATORS, Stuck
@@ -47,7 +47,7 @@ class Run:
         self._state = np.empty((count, plan.size))
         self._kept_modes = np.zeros((count, len(plan.loads)), dtype=np.int8)
         self._kept_effort = np.empty((count, n))
-        self._kept_tick = np.empty(count, dtype=int)
+        self._kept_tick = np.empty(count, dtype=np.int64)
         self._drive = plan.drive
         self._loop = _Loop(plan, self._plant) if isinstance(plan.drive, ClosedLoop) else None
         self._cut = np.zeros(n, dtype=bool)
@@ -57,19 +57,64 @@ class Run:
         plan = self._plan
         y = np.zeros(plan.size)
         y[: 2 * len(plan.q)] = np.concatenate([plan.q, plan.q1])
-        corners, ticks, said = plan.corners(), plan.ticks(), 0.0
         integrator = INTEGRATORS[plan.method](self._rate, plan.settings)
         with suppress(_Ended):
-            for t, until in zip(corners[:-1].tolist(), corners[1:].tolist(), strict=True):
-                due = self._tick + 1
-                if due < len(ticks) and ticks[due] <= t + ROUNDING:
-                    self._look(t, y, due)
-                y = self._between(integrator, t, until, y)
-                if until - said >= SAY:
-                    self._advance(until - said)
-                    said = until
+            if (quick := self.quick()) is not None:
+                y = self._by_compiled_code(quick, integrator, y)
+            else:
+                y = self._by_steps(integrator, y)
             self._keep_end(plan.duration, y)
         return self._trace()
+
+    def _by_steps(self, integrator: Any, y: np.ndarray) -> np.ndarray:
+        """From corner to corner; returns the last state."""
+        plan = self._plan
+        corners, ticks, said = plan.corners(), plan.ticks(), 0.0
+        for t, until in zip(corners[:-1].tolist(), corners[1:].tolist(), strict=True):
+            due = self._tick + 1
+            if due < len(ticks) and ticks[due] <= t + ROUNDING:
+                self._look(t, y, due)
+            _, y = self._between(integrator, t, until, y)
+            if until - said >= SAY:
+                self._advance(until - said)
+                said = until
+        return y
+
+    def quick(self) -> Loop | None:
+        """The run in compiled code, where there is such a loop for its plan."""
+        if self._plan.method != "rk4":
+            return None
+        results = (self._state, self._kept_effort, self._kept_modes, self._kept_tick)
+        loop, m, n = self._loop, len(self._plan.q), len(self._effort)
+        looks, aims = (np.empty((0, n)), np.empty((0, n)), np.empty((0, 2 * m))), np.empty(0)
+        if loop is not None:
+            looks = (loop.command, loop.count, loop.estimate)
+            aims = np.array([np.concatenate([*a.state, a.joint, a.joint_rate]) for a in loop.aims])
+        return loop_of(self._plan, self._watch.told, self._watch.past, results, looks, aims)
+
+    def _by_compiled_code(self, quick: Loop, integrator: Any, y: np.ndarray) -> np.ndarray:
+        """The same by `loop.c`, but for what it hands back; returns the last state."""
+        corners, said = self._plan.corners(), 0.0
+        quick.y[:] = y
+        while True:
+            quick.set_modes(self._modes)
+            code = quick.advance()
+            t, self._next, self._tick = quick.t, quick.next, quick.tick
+            self._effort, y, fresh = quick.effort.copy(), quick.y.copy(), False
+            self._advance(t - said)
+            said = t
+            if code == DONE:
+                return y
+            if code == LOOK:
+                self._look(t, y, self._tick + 1)
+            elif code == STEP:
+                until = float(corners[quick.corner + 1])
+                t, y = self._between(integrator, t, until, y, once=True)
+                if t >= until - ROUNDING:
+                    quick.corner += 1
+                    fresh = True
+            quick.y[:], quick.effort[:], quick.cut[:] = y, self._effort, self._cut
+            quick.go_on(t, self._next, self._tick, fresh)
 
     def _trace(self) -> Trace:
         done, looked, loop = self._next, self._tick + 1, self._loop
@@ -128,8 +173,10 @@ class Run:
 
     # -- between two corners ------------------------------------------------------------------
 
-    def _between(self, integrator: Any, t: float, until: float, y: np.ndarray) -> np.ndarray:
-        """Integrate to `until`; raises _Ended where the run is over before."""
+    def _between(
+        self, integrator: Any, t: float, until: float, y: np.ndarray, once: bool = False
+    ) -> tuple[float, np.ndarray]:
+        """Integrate to `until`, or one step; raises _Ended where the run is over before."""
         try:
             self._begin(integrator, t, until, y)
             while t < until - ROUNDING:
@@ -141,14 +188,16 @@ class Run:
                 if crossing is not None:
                     y = crossing.state
                     self._happened(crossing)
-                    if t < until - ROUNDING:
+                    if t < until - ROUNDING and not once:
                         self._begin(integrator, t, until, y)
+                if once:
+                    break
         except Stuck as stuck:
             self._keep_end(t, y)
             kind = "stiff" if stuck.status is None else STATUS_NAMES[stuck.status]
             kind = kind if kind in KINDS else "stiff"
             self._end(t, y, kind, KINDS[kind])
-        return y
+        return t, y
 
     def _begin(self, integrator: Any, t: float, until: float, y: np.ndarray) -> None:
         integrator.restart(t, y, until)
@@ -226,10 +275,9 @@ class _Loop:
         self._m = m
         self._memory = drive.law.begin()
         ticks = plan.ticks()
-        self._aims = drive.path.references(ticks) if len(ticks) else []
+        self.aims = drive.path.references(ticks) if len(ticks) else []
         self.command, self.count = (np.empty((len(ticks), n)) for _ in range(2))
-        self.estimate, self.force = np.empty((len(ticks), 2 * m)), np.empty(len(ticks))
-        self._queue: deque[np.ndarray] = deque()
+        self.estimate, self.force = np.empty((len(ticks), 2 * m)), np.zeros(len(ticks))
         self._observer = None
         if drive.sensing is not None and drive.period is not None:
             self._observer = Observer(drive.law.model, drive.sensing, drive.period)
@@ -247,13 +295,11 @@ class _Loop:
         if self._observer is not None:
             joint, rate, q, q1 = self._observer.see(joint, rate)
         now = Measured(t, q, q1, joint, rate, force)
-        asked, self._memory = law(now, self._aims[k], self._memory)
+        asked, self._memory = law(now, self.aims[k], self._memory)
         self.command[k], self.count[k] = asked, joint
         self.estimate[k], self.force[k] = np.concatenate([q, q1]), np.linalg.norm(force)
-        if k == 0:  # until the first efforts come, the drives hold what they will be
-            self._queue.extend([asked] * self._drive.delay)
-        self._queue.append(asked)
-        return self._queue.popleft()
+        # Until the first efforts come, the drives hold what they will be.
+        return self.command[max(k - self._drive.delay, 0)]
 
     def at_once(self, t: float, y: np.ndarray, modes: list[int]) -> np.ndarray:
         """Efforts of an ideal controller at the state that was looked at last, (n,)."""

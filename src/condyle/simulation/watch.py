@@ -74,7 +74,17 @@ class Watch:
             unit = FAMILIES[chain.kind].joint_unit
             text = f"faster than its limit of {plan.speed[i]:g} {unit}/s"
             self._own.append(_Guard("speed", text, chain.name))
-        self._past = np.zeros(len(self._own), dtype=bool)
+        self.past = np.zeros(len(self._own), dtype=bool)
+
+    @property
+    def told(self) -> list[tuple[int, int, float]]:
+        """Guards but those of loads, as numbers: kind (bound, lift off, speed), contact or chain,
+        and sign of the push or limit."""
+        found = [(0, i, 0.0) for i in self._bounded]
+        found += [(1, i, p) for i, p in zip(self._sided, self._push.tolist(), strict=True)]
+        return found + [
+            (2, int(i), v) for i, v in zip(self._quick, self._speed.tolist(), strict=True)
+        ]
 
     def begin(
         self, t: float, y: np.ndarray, modes: Sequence[int], effort: np.ndarray
@@ -82,8 +92,8 @@ class Watch:
         """The guards' values to begin with, and what efforts that jumped did at once."""
         self._before = values = self._values(t, y, modes, effort)
         own = values[: len(self._own)]
-        sudden = np.flatnonzero((own > SUDDEN) & ~self._past)
-        self._past = (own > 0) | (self._past & (own > -SUDDEN))
+        sudden = np.flatnonzero((own > SUDDEN) & ~self.past)
+        self.past[:] = (own > 0) | (self.past & (own > -SUDDEN))
         return [self._crossing(self._own[i], t, y) for i in sudden]
 
     def crossing(self, step: Step, modes: Sequence[int], acting: Acting) -> Crossing | None:
@@ -91,14 +101,14 @@ class Watch:
         after = self._values(step.t1, step.y1, modes, acting(step.t1, step.y1))
         before, self._before = self._before, after
         new = (after > 0) & (before <= 0)
-        new[: len(self._own)] &= ~self._past
+        new[: len(self._own)] &= ~self.past
         passed = np.flatnonzero(new)
         if not passed.size:
-            self._past = after[: len(self._own)] > 0
+            self.past[:] = after[: len(self._own)] > 0
             return None
         t, first = min((self._when(step, int(i), modes, acting), int(i)) for i in passed)
         if first < len(self._own):
-            self._past[first] = True
+            self.past[first] = True
         return self._crossing(
             self._guards(modes)[first], t, step.y1 if t == step.t1 else step.at(t)
         )

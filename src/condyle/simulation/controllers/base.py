@@ -49,6 +49,11 @@ class Reference:
     joint_rate: np.ndarray
     force: float = 0.0
 
+    @property
+    def state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """q, q1, q2."""
+        return self.q, self.q1, self.q2
+
 
 Memory = np.ndarray
 NOTHING = np.zeros(0)
