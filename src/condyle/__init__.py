@@ -41,6 +41,7 @@ _HOMES = {
     "Scenario": "simulation",
     "load_scenario": "simulation",
     "simulate": "simulation",
+    "simulate_all": "simulation",
     "ScenarioError": "errors",
 }
 
@@ -60,7 +61,7 @@ if TYPE_CHECKING:
     from .motion import Load, Motion, reference_load, reference_motion, trial_motion
     from .results.model import Model, derive
     from .results.solution import Solution, open_solution
-    from .simulation import Scenario, load_scenario, simulate
+    from .simulation import Scenario, load_scenario, simulate, simulate_all
 
 # What the report gives to results and comparisons, which do not know it.
 register("solution.plot", "condyle.report.figures:SolutionPlots")

@@ -154,3 +154,16 @@ def test_what_it_is_not_for(model: condyle.Model) -> None:
     assert running.Run(plan).quick() is None
     plan = bind(condyle.derive("masticatory", backend="numpy"), scenario_from(BASE))
     assert running.Run(plan).quick() is None
+
+
+def test_side_by_side(model: condyle.Model) -> None:
+    """Many runs on threads are the runs alone, bit by bit."""
+    told = [{**BASE, "duration": 0.02, "start": {"dbeta": 0.02 * i}} for i in range(5)]
+    alone = [condyle.simulate(model, one) for one in told]
+    for threads in (1, 3):
+        found = condyle.simulate_all(model, told, threads=threads)
+        for one, other in zip(found, alone, strict=True):
+            np.testing.assert_array_equal(one["pose"], other["pose"])
+    told[3]["start"] = {"dZ": 1.0}
+    with pytest.raises(condyle.CondyleError, match=r"scenario 4: start"):
+        condyle.simulate_all(model, told)

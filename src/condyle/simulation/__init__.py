@@ -5,7 +5,7 @@ from .events import Event
 from .integrators import INTEGRATORS
 from .loads import FOODS, LOADS
 from .scenario import Scenario, load_scenario, scenario_schema
-from .simulating import simulate
+from .simulating import simulate, simulate_all
 
 __all__ = [
     "CONTROLLERS",
@@ -17,4 +17,5 @@ __all__ = [
     "load_scenario",
     "scenario_schema",
     "simulate",
+    "simulate_all",
 ]

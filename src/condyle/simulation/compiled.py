@@ -135,7 +135,7 @@ class Loop:
         aims: np.ndarray,
     ) -> None:
         """Args:
-        guards: kind (0 bound, 1 lift off, 2 speed), contact or chain, and sign of the push or limit;
+        guards: kind (0 bound, 1 lift off, 2 speed), contact or chain, sign of the push or limit;
         past: (guards,) of bool.  results: state, effort, modes, tick;  looks: command, counts,
         estimate.  aims: (K, 3 m + 2 n) q, q', q'', joint, joint rate at every tick.
         """
@@ -197,14 +197,14 @@ class Loop:
         """Between which corner and the next it is."""
         return self._run.corner
 
+    @corner.setter
+    def corner(self, value: int) -> None:
+        self._run.corner = value
+
     @property
     def at_a_look(self) -> bool:
         """Whether the controller is to look before it goes on."""
         return bool(self._run.fresh and self._is_tick[self._run.corner])
-
-    @corner.setter
-    def corner(self, value: int) -> None:
-        self._run.corner = value
 
     def advance(self) -> int:
         """Go on; returns DONE, PAUSE (nothing happened yet), or what the caller has to see to."""
