@@ -43,9 +43,11 @@ _HOMES = {
     "simulate": "simulation",
     "simulate_all": "simulation",
     "ScenarioError": "errors",
+    "workspace_map": "analysis.map",
 }
 
 if TYPE_CHECKING:
+    from .analysis.map import workspace_map
     from .errors import (
         CondyleError,
         InfeasibleError,

@@ -37,6 +37,10 @@ CALLS: dict[str, tuple[str, ...]] = {
     "pose": ("pose", "masticatory", "--joints", "joints.csv", "--out", "poses.csv"),
     "pose --flag": ("pose", "masticatory", "--joints", "far.csv", "--out", "poses.csv", "--flag"),
     "pose --all": ("pose", "masticatory", "--joints", "joints.csv", "--out", "modes.csv", "--all"),
+    "map": (
+        *("map", "my jaw.toml", "--over", "X=-1:4:4 mm", "--no-figures"),
+        *("--quantity", "joint", "--out", "my maps"),
+    ),
     "compare": ("compare", *QUICK, "--motion", "my path.csv", "--no-figures", "--out", "x y"),
     "motion from-c3d": (
         *("motion", "from-c3d", "a trial.c3d", "--markers", "markers.toml"),

@@ -10,7 +10,7 @@ import typer
 from . import completion, options
 from .answer import Answer
 from .command import COMPUTE, command, group
-from .inputs import output_folder
+from .inputs import output_folder, warn
 
 export = group("export", COMPUTE, "A mechanism for controllers and other programs.")
 
@@ -70,17 +70,18 @@ def c(
     """
     import condyle
 
-    from ..export import DEFAULT, Wish
+    from ..export import Wish, in_order, usual
     from ..export import export as exported_of
     from ..export.facts import write_facts
     from ..export.package import write_package
 
     machine = condyle.load(mechanism)
-    names = tuple(one.strip() for one in coordinates.split(",")) if coordinates else ()
+    given = (one.strip() for one in coordinates.split(",")) if coordinates else ()
+    names = in_order(tuple(given))
     closing = ("closure",) if coordinates or landmark else ()
     made = exported_of(
         machine,
-        question or (*DEFAULT, *closing),
+        question or (*usual(machine), *closing),
         formulation=formulation,
         route=route,
         precision=precision,
@@ -93,6 +94,7 @@ def c(
     files = write_package(made, machine, Wish(names, landmark), output_folder(out))
     facts = write_facts(made, out)
     files["facts"] = facts.path
+    warn(facts.warnings)
     mapped = {name: ours for name, ours in made.names.items() if name != ours}
     lines = [f'"{machine.name}" in C: {", ".join(f.name for f in made.functions)}']
     lines += [f"  {name} is {ours}" for name, ours in mapped.items()]

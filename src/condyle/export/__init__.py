@@ -6,8 +6,18 @@
 A target is a file that writes what it is for from an `Exported`.
 """
 
-from .catalogue import CATALOGUE, DEFAULT, Wish
+from .catalogue import CATALOGUE, DEFAULT, Wish, in_order, usual
 from .exported import Argument, Exported, Function
 from .source import export
 
-__all__ = ["CATALOGUE", "DEFAULT", "Argument", "Exported", "Function", "Wish", "export"]
+__all__ = [
+    "CATALOGUE",
+    "DEFAULT",
+    "Argument",
+    "Exported",
+    "Function",
+    "Wish",
+    "export",
+    "in_order",
+    "usual",
+]

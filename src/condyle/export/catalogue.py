@@ -5,11 +5,11 @@ A new one is an entry of `CATALOGUE`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from ..errors import InputError, UnsupportedError, did_you_mean
-from ..mechanism.mechanism import Mechanism
+from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..model.distributing import LEAST
 from ..questions import Prescribed
 from ..questions.friction import MOST
@@ -23,12 +23,24 @@ from .straight import function
 class Wish:
     """What is asked for besides the question's name.
 
-    coordinates: names of 6 - k pose coordinates that `closure` starts from, or
+    coordinates: names of 6 - k pose coordinates that `closure` starts from, in the order of X_EE,
+                 or
     landmark:    the platform's point whose path it starts from.
     """
 
     coordinates: tuple[str, ...] = ()
     landmark: str | None = None
+
+
+def in_order(coordinates: Sequence[str]) -> tuple[str, ...]:
+    """Pose coordinates in the order of X_EE, in which functions take them.
+
+    Raises: InputError: for what is none.
+    """
+    for name in coordinates:
+        if name not in COORDINATES:
+            raise InputError(f'no coordinate "{name}".{did_you_mean(name, COORDINATES)}')
+    return tuple(sorted(coordinates, key=COORDINATES.index))
 
 
 Arguments = Callable[[Context, Wish], list[Argument]]
@@ -209,6 +221,11 @@ CATALOGUE: dict[str, Entry] = {
     ),
 }  # fmt: skip
 DEFAULT = ("inverse", "contact", "forward", "motion", "pose", "computed_torque")
+
+
+def usual(mechanism: Mechanism) -> tuple[str, ...]:
+    """The questions that need nothing more to be said, and that the mechanism has answers to."""
+    return tuple(q for q in DEFAULT if mechanism.contacts or q != "contact")
 
 
 def require_question(name: str) -> Entry:

@@ -71,6 +71,11 @@ class Context:
     def __post_init__(self) -> None:
         self.arguments = Arguments(self.mechanism)
 
+    @property
+    def pulls(self) -> bool:
+        """Whether some chains can only pull."""
+        return any(chain.kind == "cable" for chain in self.mechanism.chains)
+
     def variants(self, question: str, *details: Any) -> Variants:
         """The graph of a question about this mechanism."""
         return Question.about(self.structure, question, *details).variants()

@@ -14,18 +14,24 @@ from typing import Any
 from ..atomic import write_text
 from ..backends.compiler import CompilerError, find_compiler
 from .exported import Exported
+from .package import TOLERANCE
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=fast", "-fno-math-errno")
 SECONDS = 300
+NOTHING: dict[str, Any] = {"code": None, "stack": None, "error": None, "wrong": None}
 _TOLD = re.compile(r"^(\w+): (\d+) samples, worst error (\S+), (\d+) wrong", re.MULTILINE)
 
 
 @dataclass(frozen=True)
 class Facts:
-    """Where they stand, and the same as data: function -> name -> number, None if not measured."""
+    """Where they stand, and the same as data: function -> name -> number, None if not measured.
+
+    warnings: functions that do not answer as recorded where they were compiled.
+    """
 
     path: Path
     data: dict[str, Any]
+    warnings: list[str]
 
 
 def write_facts(exported: Exported, folder: Path) -> Facts:
@@ -35,13 +41,19 @@ def write_facts(exported: Exported, folder: Path) -> Facts:
         f.name: {
             "operations": f.operations,
             "iterations": f.iterations,
-            **measured.get(f.name, {"code": None, "stack": None, "error": None}),
+            **measured.get(f.name, NOTHING),
         }
         for f in exported.functions
     }
     path = folder / "FACTS.md"
     write_text(path, _page(exported, rows, how))
-    return Facts(path, {"functions": rows, "measured_by": how})
+    warnings = [
+        f"{name} does not answer as recorded: worst error {row['error']:.1e}, {row['wrong']} wrong "
+        "statuses; look at it with make check"
+        for name, row in rows.items()
+        if row["wrong"] or (row["error"] or 0.0) > TOLERANCE[exported.precision]
+    ]
+    return Facts(path, {"functions": rows, "measured_by": how}, warnings)
 
 
 def _measured(e: Exported, folder: Path) -> tuple[dict[str, dict[str, Any]], str]:
@@ -58,7 +70,7 @@ def _measured(e: Exported, folder: Path) -> tuple[dict[str, dict[str, Any]], str
             return {}, ""
     version = _run([*command, "--version"], folder).splitlines()[0]
     how = f"{version}, {' '.join(FLAGS)}, {platform.machine()}"
-    found = {f.name: {"code": None, "stack": None, "error": None} for f in e.functions}
+    found = {f.name: dict(NOTHING) for f in e.functions}
     for name in found:
         found[name] |= code.get(name, {}) | errors.get(name, {})
     return found, how
@@ -128,7 +140,10 @@ def _errors(
     sources = [str(folder / "check.c"), str(folder / f"{e.prefix}.c")]
     _run([*command, *FLAGS, *sources, "-o", str(program), "-lm"], place)
     told = subprocess.run([str(program)], capture_output=True, text=True, timeout=SECONDS).stdout
-    return {name: {"error": float(error)} for name, _, error, _ in _TOLD.findall(told)}
+    return {
+        name: {"error": float(error), "wrong": int(wrong)}
+        for name, _, error, wrong in _TOLD.findall(told)
+    }
 
 
 def _run(call: list[str], place: Path) -> str:

@@ -69,12 +69,8 @@ def _closure(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
     closure = Closure(
         r.model.mechanism, r.wish.coordinates, r.wish.landmark, backend=r.model.backend
     )
-    # The C function takes coordinates in the order asked for, the closure in that of X_EE.
-    order = list(range(3))
-    if closure.names:
-        order = [r.wish.coordinates.index(name) for name in closure.names]
     rest = np.zeros((len(given["s"]), int(not closure.names)))
-    s, s1, s2 = (np.hstack([given[name][:, order], rest]) for name in ("s", "s1", "s2"))
+    s, s1, s2 = (np.hstack([given[name], rest]) for name in ("s", "s1", "s2"))
     found = closure.solve(s, s1, s2)
     return dict(found.named()), _reached(found.reached)
 

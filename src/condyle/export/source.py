@@ -18,7 +18,7 @@ from ..model.evaluator import Evaluator
 from ..questions.numbers import Layout, specialised
 from ..questions.structure import structure_of
 from . import structured
-from .catalogue import DEFAULT, Entry, Wish, least_norm, require_question
+from .catalogue import Entry, Wish, in_order, least_norm, require_question, usual
 from .context import Body, Context
 from .exported import Exported, Function
 from .header import WHY, header_text
@@ -33,7 +33,7 @@ atan sinh cosh tanh asinh acosh atanh erf copysign sin cos"""
 
 def export(
     mechanism: Mechanism,
-    questions: Sequence[str] = DEFAULT,
+    questions: Sequence[str] | None = None,
     *,
     formulation: str = "virtual_power",
     route: str = "core",
@@ -46,7 +46,7 @@ def export(
 ) -> Exported:
     """A mechanism in C: source, header, and what a caller must know.
 
-    Args:   questions: of `CATALOGUE`.
+    Args:   questions: of `CATALOGUE`; default: all that need nothing more to be said.
             precision: double or float.
             prefix:    what every name begins with; default: the mechanism's name.
             constants: inside, or struct: in a structure that can be filled at run time.
@@ -58,7 +58,8 @@ def export(
     """
     # What a model checks of a mechanism is checked here as well.
     model = Evaluator(mechanism, formulation, route, "numpy", least_norm(mechanism))
-    entries = _entries(mechanism, questions, coordinates, landmark)
+    asked = usual(mechanism) if questions is None else questions
+    entries = _entries(mechanism, asked, coordinates, landmark)
     structure = structure_of(mechanism, formulation_named(formulation).name, route)
     numbers = Layout.of(structure).numbers(mechanism, landmark)
     struct = _is_struct(constants)
@@ -70,7 +71,7 @@ def export(
     plain = struct or real != "double"
     name = require_prefix(prefix or identifier(mechanism.name).lower())
     c = Context(mechanism, structure, numbers, name, real, 0 if plain else lanes, struct)
-    wish = Wish(tuple(coordinates), landmark)
+    wish = Wish(in_order(coordinates), landmark)
     functions, bodies = [], []
     for question, entry in entries.items():
         body = entry.body(c, wish)
@@ -110,7 +111,7 @@ def _entries(
         if landmark is not None:
             require_landmark(mechanism, landmark)
         else:
-            require_independent(mechanism, coordinates)
+            require_independent(mechanism, in_order(coordinates))
     return found
 
 
@@ -124,10 +125,13 @@ def _function(c: Context, question: str, entry: Entry, body: Body, wish: Wish) -
     codes = (*entry.statuses, "OUT_OF_BOUNDS")
     if c.structure.friction and "SINGULAR" in codes:
         codes = (*codes, "UNCERTIFIED")
+    text = entry.text
+    if "effort" in {a.name for a in entry.arguments(c, wish) if not a.given} and c.pulls:
+        text += " Limits are not regarded: a cable's effort may be negative."
     return Function(
         f"{c.prefix}_{question}",
         question,
-        entry.text,
+        text,
         tuple(entry.arguments(c, wish)),
         entry.iterations,
         body.operations,

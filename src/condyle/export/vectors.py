@@ -18,7 +18,7 @@ from .exported import Exported, Function
 from .reference import Reference
 
 COUNT = 40
-WIDTH = 0.25  # of states about home, in characteristic lengths and radians, halved until most reach
+WIDTH = 0.1  # of states about home, in characteristic lengths and radians, halved until most reach
 
 
 @dataclass(frozen=True)

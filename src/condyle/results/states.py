@@ -130,13 +130,7 @@ def solve_table(
     else:
         q1, q2 = (table.require([p + name for name in names]) for p in ("d", "dd"))
     q, q1, q2 = model.independent_states(names, q, q1, q2, threads=threads)
-    wrench = np.zeros((table.rows, 6))
-    point = np.zeros(3)
-    given = [name for name in WRENCH if name in table.columns]
-    for name in given:
-        wrench[:, WRENCH.index(name)] = table.columns[name]
-    if load_point is not None or set(given) & set(WRENCH[:3]):
-        point = model.load_point(load_point)
+    wrench, point = loads(model, table, load_point)
     evaluation = model.evaluate(q, q1, q2, with_point(wrench, point), threads)
     mechanism = model.mechanism
     derived = Derived(mechanism, evaluation, wrench, model.limited)
@@ -166,6 +160,17 @@ def solve_table(
         shortfall = derived.shortfall if derived.limited else None
         columns |= status_columns(mechanism, evaluation.status, derived.cause, shortfall)
     return columns, derived
+
+
+def loads(model: Evaluator, table: Table, load_point: str | None) -> tuple[np.ndarray, np.ndarray]:
+    """Wrenches of a table, (N, 6), zero where it has none, and where they act, (3,)."""
+    wrench, point = np.zeros((table.rows, 6)), np.zeros(3)
+    given = [name for name in WRENCH if name in table.columns]
+    for name in given:
+        wrench[:, WRENCH.index(name)] = table.columns[name]
+    if load_point is not None or set(given) & set(WRENCH[:3]):
+        point = model.load_point(load_point)
+    return wrench, point
 
 
 def state_coordinates(model: Evaluator, table: Table) -> list[str]:
