@@ -26,9 +26,14 @@ class NumpyKernel:
 
     def __init__(self, variants: Variants, numbers: Numbers) -> None:
         self.interface = variants.main.interface
+        self._variants = variants
         self._order = numbers.order
         self._main = _Runner(variants.main, numbers)
         self._robust = None if variants.robust is None else _Runner(variants.robust, numbers)
+
+    def renumbered(self, numbers: Numbers) -> NumpyKernel:
+        """The same program on the numbers of another mechanism of its structure."""
+        return NumpyKernel(self._variants, numbers)
 
     def run(self, inputs: Mapping[str, np.ndarray], threads: int | None = None) -> Answer:
         workers(threads)

@@ -4,6 +4,7 @@ the contacts hold at all."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from functools import lru_cache
 from itertools import combinations
 from typing import Protocol
 
@@ -13,7 +14,7 @@ import numpy as np
 from .chain import Chain
 from .contact import Contact
 from .coordinates import COORDINATES
-from .surface import Parallel
+from .surface import Parallel, of_form
 
 DEPENDENT_ORDER = ("Z", "gamma", "alpha", "beta", "Y", "X")
 MAX_CONDITION = 1e4
@@ -44,10 +45,24 @@ def characteristic_length(mechanism: Parts) -> float:
 
 def contact_gradient(contact: Contact) -> tuple[float, np.ndarray]:
     """phi [m] and its gradient, (3,) [1], of one contact at home."""
-    p = ca.SX.sym("p", 3)
-    phi = contact.offset_surface.phi(p)
-    value, gradient = ca.Function("phi", [p], [phi, ca.gradient(phi, p)])(contact.point)
-    return float(value), np.asarray(gradient).ravel()
+    locus = contact.offset_surface
+    value, *gradient = _at(locus.form, (*contact.point, *locus.constants()))
+    return value, np.array(gradient)
+
+
+@lru_cache(maxsize=256)
+def _at(form: str, numbers: tuple[float, ...]) -> tuple[float, ...]:
+    """phi and the entries of its gradient, from a point and the constants of a surface."""
+    return tuple(map(float, _equation(form, len(numbers) - 3)(*numbers)))
+
+
+@lru_cache(maxsize=256)
+def _equation(form: str, count: int) -> ca.Function:
+    """phi and the entries of its gradient, from the entries of a point and `count` constants."""
+    p, c = ca.SX.sym("p", 3), ca.SX.sym("c", count)
+    phi = of_form(form).phi(p, c)
+    found = [phi, *ca.vertsplit(ca.gradient(phi, p))]
+    return ca.Function("phi", [*ca.vertsplit(p), *ca.vertsplit(c)], found)
 
 
 def home_residuals(mechanism: Parts) -> np.ndarray:

@@ -74,6 +74,7 @@ class Evaluator:
         distribution: str | None = None,
         preload: float = 0.0,
         contact_weight: float = 0.0,
+        general: bool = False,
     ) -> None:
         """Derive the equations of motion.
 
@@ -82,6 +83,8 @@ class Evaluator:
                 preload: least push of one-sided contacts [N].
                 contact_weight: W / N_ref^2 of `weighted` [1/N^2].
                 backend: compiled, numpy, or auto (compiled where there is a C compiler).
+                general: for `renumbered`: kernels that serve every mechanism of the structure,
+                by leaving out nothing that happens to be zero in this one.
         Raises: InputError:       for an unknown formulation, route or backend.
                 UnsupportedError: where route `direct` has no closed form.
                 MechanismError:   if the contacts do not hold the platform at home.
@@ -103,7 +106,8 @@ class Evaluator:
         with step("deriving the equations"):
             structure = structure_of(mechanism, self.formulation, route)
             self._numbers = Layout.of(structure).numbers(mechanism)
-            self._structure = specialised(structure, self._numbers)
+            self._structure = structure if general else specialised(structure, self._numbers)
+        self._general: Self | None = self if general else None
         self._kernels: dict[Any, Kernel] = {}
         self._closures: dict[Any, Closure] = {}
         self._local = threading.local()  # what belongs to one thread
@@ -118,7 +122,10 @@ class Evaluator:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Models travel as their recipe; kernels are found again in the cache."""
+        policy: tuple[Any, ...]
         policy = (self._asked, self.policy.preload, self.policy.contact_weight)
+        if self._general is not None:
+            policy = (*policy, True)
         return type(self), (
             self.mechanism,
             self.formulation,
@@ -165,6 +172,28 @@ class Evaluator:
         other._distributor = Distributor(self.mechanism, other.policy)
         return other
 
+    def renumbered(self, mechanism: Mechanism) -> Self:
+        """The same model, if it is general, of another mechanism of the same structure.
+
+        It shares the kernels, so that it costs a thousandth of a new one. The mechanism must have
+        been checked, as one from a file or from `Mechanism.set` is.
+
+        Raises: InputError: if the distribution does not fit the mechanism.
+        """
+        assert self._general is not None
+        other = copy(self._general)
+        for name in ("characteristic_length", "reference_force", "_robust"):
+            other.__dict__.pop(name, None)
+        other.mechanism = mechanism
+        other.policy = Policy.of(
+            mechanism, self._asked, self.policy.preload, self.policy.contact_weight
+        )
+        other._distributor = Distributor(mechanism, other.policy)
+        other._numbers = Layout.of(self._structure).numbers(mechanism)
+        other._kernels, other._closures = {}, {}
+        other._local = threading.local()
+        return other
+
     @cached_property
     def characteristic_length(self) -> float:
         """What angles are multiplied by where they meet lengths [m]."""
@@ -173,6 +202,9 @@ class Evaluator:
     def kernel(self, question: str, *details: Any) -> Kernel:
         """The kernel of a question; see `condyle.questions`."""
         asked = question, details
+        if asked not in self._kernels and self._general not in (None, self):
+            shared = self._general.kernel(question, *details)
+            self._kernels[asked] = shared.renumbered(self._numbers)
         if asked not in self._kernels:
             structure = self._structure
             if question == "inverse" and self._distributor.unsolved_friction:
@@ -519,8 +551,12 @@ class Evaluator:
 
     def _closure(self, names: tuple[str, ...], landmark: str | None) -> Closure:
         key = ("closure", names, landmark)
+        if key not in self._closures and self._general not in (None, self):
+            shared = self._general._closure(names, landmark)
+            self._closures[key] = shared.renumbered(self.mechanism)
         if key not in self._closures:
-            self._closures[key] = Closure(self.mechanism, names, landmark, self.backend)
+            general = self._general is not None
+            self._closures[key] = Closure(self.mechanism, names, landmark, self.backend, general)
         return self._closures[key]
 
 
