@@ -11,6 +11,7 @@ from typing import Protocol
 import casadi as ca
 import numpy as np
 
+from .bodies import cross
 from .chain import Chain
 from .contact import Contact
 from .coordinates import COORDINATES
@@ -83,7 +84,7 @@ def constraint_jacobian(mechanism: Parts) -> np.ndarray:
     for contact in mechanism.contacts:
         _, gradient = contact_gradient(contact)
         # At home R_omega is the identity, so angles act as rotations about the axes of {S}.
-        rows.append(np.concatenate([gradient, np.cross(contact.point, gradient) / length]))
+        rows.append(np.concatenate([gradient, cross(contact.point, gradient) / length]))
     return np.array(rows).reshape(-1, 6)
 
 
@@ -116,7 +117,8 @@ def dependent_coordinates(mechanism: Parts) -> tuple[str, ...]:
     """
     if not mechanism.contacts:
         return ()
-    return mechanism.dependent or next(usable_sets(mechanism))
+    known = getattr(mechanism, "first_usable", None)  # a mechanism looks for them once
+    return mechanism.dependent or known or next(usable_sets(mechanism))
 
 
 def independent_coordinates(mechanism: Parts) -> tuple[str, ...]:

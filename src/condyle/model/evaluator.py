@@ -120,6 +120,11 @@ class Evaluator:
             f"  {len(self.mechanism.chains)} efforts from q = ({', '.join(self.independent)})"
         )
 
+    def __copy__(self) -> Self:
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
+        return other
+
     def __reduce__(self) -> tuple[Any, ...]:
         """Models travel as their recipe; kernels are found again in the cache."""
         policy: tuple[Any, ...]

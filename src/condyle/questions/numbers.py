@@ -205,7 +205,7 @@ def closed_branch(mechanism: Mechanism) -> float:
 
 @lru_cache(maxsize=32)
 def _angle_sine(forms: tuple[tuple[str, int], ...], dependent: tuple[str, ...]) -> ca.Function:
-    """B of the angle equation at home, from every contact's point and the constants of its plane."""
+    """B of the angle equation at home, from each contact's point and the constants of its plane."""
     symbols = [(ca.SX.sym("p", 3), ca.SX.sym("c", count)) for _, count in forms]
     contacts = [
         ContactSymbols(of_form(form), p, c)
