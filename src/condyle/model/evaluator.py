@@ -107,7 +107,7 @@ class Evaluator:
             structure = structure_of(mechanism, self.formulation, route)
             self._numbers = Layout.of(structure).numbers(mechanism)
             self._structure = structure if general else specialised(structure, self._numbers)
-        self._general: Self | None = self if general else None
+        self._general: Any = self if general else None  # who lends kernels
         self._kernels: dict[Any, Kernel] = {}
         self._closures: dict[Any, Closure] = {}
         self._local = threading.local()  # what belongs to one thread
