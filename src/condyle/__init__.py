@@ -38,9 +38,12 @@ _HOMES = {
     "trial_motion": "motion",
     "Solution": "results.solution",
     "open_solution": "results.solution",
+    "Study": "analysis.sweep",
+    "sweep": "analysis.sweep",
 }
 
 if TYPE_CHECKING:
+    from .analysis.sweep import Study, sweep
     from .errors import (
         CondyleError,
         InfeasibleError,

@@ -2,6 +2,6 @@
 
 # isort: off
 from . import new, check, reference, motion  # noqa: F401
-from . import run, solve, pose, compare  # noqa: F401
+from . import run, solve, pose, compare, sweep  # noqa: F401
 from . import plot, report, view  # noqa: F401
 from . import bench, cache, schema  # noqa: F401

@@ -30,7 +30,8 @@ from .study import NONE, REFERENCE, TRIAL, MotionFile, Study
 
 VARIANT, MOTION, STATUS, REASON, SECONDS = "variant", "motion", "status", "reason", "seconds"
 OWN = (VARIANT, MOTION, STATUS, REASON, SECONDS)  # columns beside parameters and measures
-PARTS, LARGEST_PART = 256, 4096  # of a study at least, if it has so many rows; rows of a part
+PARTS = 128  # of a study, if it has enough variants for so many
+LEAST_PART, LARGEST_PART = 4, 4096  # variants
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class Job:
     @cached_property
     def part(self) -> int:
         """Variants of a part: it belongs to the study alone, not to who does it."""
-        return min(max(1, -(-self.design.count // PARTS)), LARGEST_PART)
+        return min(max(LEAST_PART, -(-self.design.count // PARTS)), LARGEST_PART)
 
     @property
     def parts(self) -> int:

@@ -40,7 +40,7 @@ class LostWorkerError(CondyleError):
 
 
 def check_scheduler(workers: int | None, scheduler: str) -> None:
-    """Raises InputError for what cannot be a scheduler or a number of workers."""
+    """Raises InputError for what cannot be a scheduler, or does not answer as one."""
     if workers is not None and workers < 1:
         raise InputError(f"workers: expected 1 or more, got {workers}")
     if scheduler in (PROCESSES, THREADS):
@@ -53,6 +53,9 @@ def check_scheduler(workers: int | None, scheduler: str) -> None:
     if scheduler != DASK and workers is not None:
         raise InputError("workers: a cluster that runs already has its own; leave it out")
     require("distributed", "cluster")
+    if scheduler != DASK:
+        with _client(None, scheduler):
+            pass
 
 
 def done(

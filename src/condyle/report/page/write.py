@@ -31,9 +31,12 @@ from .machine import machine
 from .panels import time_panels
 from .reduce import Reduced, reduced
 from .source import opened
+from .sweep import sweep_section
 from .tracks import track_panels
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from ...results.solution import Solution
     from ..tables import Table
 
@@ -62,6 +65,7 @@ def write_report(
     *,
     tables: Sequence[Table] | None = None,
     files: Sequence[str | os.PathLike[str]] | None = None,
+    sweep: xr.Dataset | None = None,
 ) -> Path:
     """Write the report, whole or not at all.
 
@@ -72,15 +76,16 @@ def write_report(
             tables: of `condyle.report.tables`, to print on it; default: those that the solution
                 keeps, which `condyle compare` puts there.
             files: inputs of the run, to be named with their hashes.
+            sweep: of `condyle.sweep`, to be shown too.
     Returns: the path.
     Raises: InputError: if a file cannot be read or the report cannot be written.
     """
     with step("writing the report"):
         if isinstance(solution, str | os.PathLike):
             with opened(solution) as found:
-                page = report_html(found, tables=tables, files=files)
+                page = report_html(found, tables=tables, files=files, sweep=sweep)
         else:
-            page = report_html(solution, tables=tables, files=files)
+            page = report_html(solution, tables=tables, files=files, sweep=sweep)
         write_text(path, page)
     return Path(path)
 
@@ -90,6 +95,7 @@ def report_html(
     *,
     tables: Sequence[Table] | None = None,
     files: Sequence[str | os.PathLike[str]] | None = None,
+    sweep: xr.Dataset | None = None,
 ) -> str:
     """The report as text; see `write_report`."""
     from plotly.offline import get_plotlyjs
@@ -116,6 +122,7 @@ def report_html(
         "chains": chain_table(solution),
         "reactions": reaction_tables(solution),
         "tables": given_tables(kept_tables(solution) if tables is None else tables),
+        "sweep": sweep_section(sweep),
         "run": provenance(solution, [Path(file) for file in files or ()]),
         "payload": json_for_script(_payload(page)),
         "plotly": tag("script", Markup(scripts[0])),
