@@ -16,6 +16,7 @@ from .inputs import (
     motion_and_load,
     output_folder,
     require_drawing,
+    study_for,
     warn,
 )
 
@@ -49,6 +50,12 @@ def run(
     threads: options.Threads = None,
     strict: options.Strict = False,
     flag: options.Flag = False,
+    vary: Annotated[
+        Path | None,
+        typer.Option(
+            help="Study (TOML) whose numbers vary: quantiles of efforts and contact forces too."
+        ),
+    ] = None,
 ) -> Answer:
     """Torques and contact forces along a motion.
 
@@ -61,12 +68,17 @@ def run(
     from ..results.warnings import refuse
 
     machine = condyle.load(mechanism)
+    study = None if vary is None else study_for(vary, machine)
     path, acting = motion_and_load(machine, motion, load, units, landmark, smooth, rate, trim)
     policy = distribution, preload, contact_weight
     model = chosen_model(machine, formulation, route, backend, *policy)
     solution = model.solve(path, acting, load_point, flag, reactions, threads)
     if strict:
         refuse(solution.notices)
+    if study is not None:
+        from ..analysis.sweep import with_bands
+
+        solution = with_bands(solution, study, path, acting, mechanism=machine, workers=threads)
     folder, stem = output_folder(out), file_stem(machine.name)
     files = [folder / f"{stem}.nc", folder / f"{stem}.csv"]
     solution.save(*files)
@@ -77,7 +89,7 @@ def run(
     if report:
         from ..report.page import write_report
 
-        inputs = [file for file in (motion, load) if file is not None]
+        inputs = [file for file in (motion, load, vary) if file is not None]
         inputs += [Path(mechanism)] if Path(mechanism).is_file() else []
         files.append(write_report(solution, folder / f"{stem}.html", files=inputs))
     warn([*path.warnings, *acting.warnings, *solution.warnings])

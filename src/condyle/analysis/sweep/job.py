@@ -29,6 +29,7 @@ from .sampling import Design
 from .study import NONE, REFERENCE, TRIAL, MotionFile, Study
 
 VARIANT, MOTION, STATUS, REASON, SECONDS = "variant", "motion", "status", "reason", "seconds"
+DEFAULT = "masticatory"  # mechanism
 OWN = (VARIANT, MOTION, STATUS, REASON, SECONDS)  # columns beside parameters and measures
 PARTS = 128  # of a study, if it has enough variants for so many
 LEAST_PART, LARGEST_PART = 4, 4096  # variants
@@ -104,7 +105,7 @@ def prepared(
     Args:   mechanism, motions, load: in the place of those that the study names.
     Raises: InputError and others of the library, before any variant is solved.
     """
-    machine = mechanism or load_mechanism(study.mechanism)
+    machine = mechanism or load_mechanism(study.mechanism or DEFAULT)
     base = tuple(_numbers(study, machine))
     design = Design(study.vary, study.sampling, base)
     design.check()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -160,7 +160,9 @@ DEFAULT_MEASURES = {
 class Study(Table):
     """Many variants of one mechanism along one or several motions, and what is measured."""
 
-    mechanism: str = Field(default="masticatory", description="a file, or a bundled mechanism")
+    mechanism: str | None = Field(
+        default=None, description="a file, or a bundled mechanism; default: masticatory"
+    )
     motion: Annotated[tuple[MotionFile, ...], BeforeValidator(_motions), Field(min_length=1)] = (
         Field(default=(MotionFile(file=REFERENCE),), description="a file or several")
     )
@@ -229,18 +231,17 @@ def read_study(source: str | Path | Mapping[str, Any] | Study) -> Study:
     text = _text(Path(source))
     study = Study.checked(read_tables(text, str(source)), str(source))
     folder = Path(source).parent
-    named = {
-        "mechanism": study.mechanism
-        if study.mechanism in bundled_mechanisms()
-        else str(folder / study.mechanism),
-        "motion": [
-            one
-            if one.file in (REFERENCE, TRIAL)
-            else one.model_copy(update={"file": str(folder / one.file)})
-            for one in study.motion
-        ],
-        "load": study.load if study.load in (REFERENCE, NONE) else str(folder / study.load),
-    }
+
+    def beside(name: str, words: Iterable[str]) -> str:
+        return name if name in words else str(folder / name)
+
+    named: dict[str, Any] = {"load": beside(study.load, (REFERENCE, NONE))}
+    if study.mechanism is not None:
+        named["mechanism"] = beside(study.mechanism, bundled_mechanisms())
+    named["motion"] = [
+        one.model_copy(update={"file": beside(one.file, (REFERENCE, TRIAL))})
+        for one in study.motion
+    ]
     return study.model_copy(update=named)
 
 

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+    from ...results.solution import Solution
+
 DPI = 110
 
 
@@ -30,6 +32,18 @@ def sweep_section(found: xr.Dataset | None) -> Markup:
     ]
     tables = [table(t.columns, t.rows, t.title, t.notes) for t in sweep_tables(found)]
     return tag("section", tag("h2", "Sweep"), *pictures, *tables, id="sweep")
+
+
+def bands_section(solution: Solution) -> Markup:
+    """Efforts and contact forces with their bands, where the solution has some."""
+    if "bands" not in solution.attrs:
+        return Markup("")
+    require("matplotlib", "figures")
+    from ..figures import PLOTS
+
+    names = ["torque"] + ["contact_force"] * bool(solution.sizes["contact"])
+    pictures = [tag("p", _image(PLOTS[n](solution), f"Bands of {n}")) for n in names]
+    return tag("section", tag("h2", "Bands over variants"), *pictures, id="bands")
 
 
 def _image(figure: Figure, meaning: str) -> Markup:

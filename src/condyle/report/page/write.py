@@ -31,7 +31,7 @@ from .machine import machine
 from .panels import time_panels
 from .reduce import Reduced, reduced
 from .source import opened
-from .sweep import sweep_section
+from .sweep import bands_section, sweep_section
 from .tracks import track_panels
 
 if TYPE_CHECKING:
@@ -102,6 +102,7 @@ def report_html(
 
     from ..tables import kept_tables
 
+    bands = bands_section(solution)
     page = reduced(solution)
     solution = page.solution
     scripts = [_lines(get_plotlyjs()), _script()]
@@ -122,6 +123,7 @@ def report_html(
         "chains": chain_table(solution),
         "reactions": reaction_tables(solution),
         "tables": given_tables(kept_tables(solution) if tables is None else tables),
+        "bands": bands,
         "sweep": sweep_section(sweep),
         "run": provenance(solution, [Path(file) for file in files or ()]),
         "payload": json_for_script(_payload(page)),
