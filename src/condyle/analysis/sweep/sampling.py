@@ -13,7 +13,6 @@ from functools import lru_cache
 
 import numpy as np
 from scipy.special import ndtri
-from scipy.stats import qmc
 
 from ...errors import InputError
 from .study import Sampling, Vary
@@ -97,6 +96,8 @@ class Design:
 
 
 def _sobol(d: int, seed: int, start: int, stop: int) -> np.ndarray:
+    from scipy.stats import qmc  # which takes half a second, where it is needed
+
     sequence = qmc.Sobol(d, scramble=True, seed=np.random.default_rng(seed))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # that a count is no power of two
@@ -107,6 +108,8 @@ def _sobol(d: int, seed: int, start: int, stop: int) -> np.ndarray:
 
 @lru_cache(maxsize=1)
 def _latin(d: int, count: int, seed: int) -> np.ndarray:
+    from scipy.stats import qmc
+
     return qmc.LatinHypercube(d, seed=np.random.default_rng(seed)).random(count)
 
 

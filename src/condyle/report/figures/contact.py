@@ -39,7 +39,9 @@ def contact_force(solution: Solution) -> Figure:
     axes = figure.subplots()
     values = solution["contact_force"].values
     bands = bands_of(solution, "contact_force", range(len(names)))
-    lines(axes, solution, values, list(map(readable, names)), styles(names), bands)
+    # Bands of one colour would not be told apart.
+    looks = styles(names) if bands is None else None
+    lines(axes, solution, values, list(map(readable, names)), looks, bands)
     axes.axhline(0, color=GREY, lw=0.8)
     axes.set_title("negative: against the normal")
     legend(axes, min(3, len(names)))
