@@ -41,6 +41,7 @@ CALLS: dict[str, tuple[str, ...]] = {
         *("motion", "from-c3d", "a trial.c3d", "--markers", "markers.toml"),
         *("--mechanism", "my jaw.toml", "--out", "a motion.csv"),
     ),
+    "sweep": ("sweep", "my study.toml", "--out", "my rows", "--workers", "1"),
     "plot": ("plot",),
     "plot SOLUTION": ("plot", "a run.nc", "--figure", "load", "--out", "my figures"),
     "report": ("report", "a run.nc"),
@@ -48,6 +49,13 @@ CALLS: dict[str, tuple[str, ...]] = {
     "cache --clear": ("cache", "--clear"),
     "schema": ("schema",),
 }
+STUDY = """
+motion = { file = "trial", rate = 4 }
+load = "none"
+[[vary]]
+what = "platform.mass"
+values = [0.2, 0.3]
+"""
 RESULTS = {"check", "check of another", "check --project", "plot", "cache", "cache --clear"}
 
 
@@ -70,6 +78,7 @@ def command(
     monkeypatch.setenv("CONDYLE_CACHE", str(tmp_path / "kernels"))
     text = bundled_text("masticatory")
     Path("my jaw.toml").write_text(text)
+    Path("my study.toml").write_text(STUDY)
     Path("off.toml").write_text(text.replace("offset = 13.215", "offset = 13.5", 1))
     Path("my path.csv").write_bytes(bundled_reference()[0].read_bytes())
     states = [prefix + name for prefix in ("", "d", "dd") for name in ("X", "Y", "alpha", "beta")]

@@ -88,6 +88,7 @@ def _shown(table: xr.Dataset, folder: Path, figures: bool) -> Answer:
         "asked": int(table.attrs["rows"]),
         "parameters": list(table.attrs["parameters"]),
         "measures": list(table.attrs["measures"]),
+        **dict.fromkeys(("outcomes", "best", "main_effects", "sobol", "pareto"), ()),
         **{one.name.replace("-", "_"): one.records for one in tables},
         "folder": folder,
         "files": files,

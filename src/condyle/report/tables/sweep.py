@@ -39,7 +39,7 @@ def sweep_tables(table: xr.Dataset) -> list[Table]:
             notes.append(f"{error}.")
     if len(directions(table)) >= 2:
         found.append(front_table(table))
-    return found
+    return [one for one in found if one.records]
 
 
 def outcome_table(table: xr.Dataset) -> Table:
