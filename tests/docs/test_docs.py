@@ -32,6 +32,13 @@ PAGES = [page for page in PAGES if "generated" not in page.parts]
 LONG = {"view", "bench", "compare"}
 BLOCK = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```", re.MULTILINE | re.DOTALL)
 EQUATIONS = 67
+MASSES = """
+motion = { file = "trial", rate = 4 }
+load = "none"
+[[vary]]
+what = "platform.mass"
+values = [0.2, 0.3]
+"""
 # Blocks and commands of some pages, so that a test that finds none of them fails.
 RUN = {"tutorial.md": 10, "forward-kinematics.md": 5}
 
@@ -93,6 +100,7 @@ def registers() -> Iterator[None]:
 def put_files_of_a_reader(folder: Path) -> None:
     """Files that commands in the text name without making them."""
     (folder / "my.toml").write_text(bundled_text("masticatory"), encoding="utf-8")
+    (folder / "masses.toml").write_text(MASSES, encoding="utf-8")
     jaw = record(noise=5e-5)
     jaw.write(folder / "trial.c3d")
     jaw.write_tables(folder / "markers.toml")
@@ -334,6 +342,7 @@ JSON = {
         *("plot", "results/masticatory.nc", "--figure", "torque", "--out", "figures"),
     ),
     "condyle report": ("report", "results/masticatory.nc"),
+    "condyle sweep": ("sweep", "masses.toml", "--out", "rows", "--workers", "1"),
     "condyle cache": ("cache",),
 }
 
