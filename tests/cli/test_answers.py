@@ -51,6 +51,7 @@ CALLS: dict[str, tuple[str, ...]] = {
     "export fmu": ("export", "fmu", "my jaw.toml", "--out", "units", "--kind", "inverse"),
     "export matlab": ("export", "matlab", "my jaw.toml", "--out", "for matlab"),
     "export mjcf": ("export", "mjcf", "my jaw.toml", "--out", "for mujoco"),
+    "sweep": ("sweep", "my study.toml", "--out", "my rows", "--workers", "1"),
     "plot": ("plot",),
     "plot SOLUTION": ("plot", "a run.nc", "--figure", "load", "--out", "my figures"),
     "report": ("report", "a run.nc"),
@@ -67,6 +68,13 @@ RESULTS = {
     "cache",
     "cache --clear",
 }
+STUDY = """
+motion = { file = "trial", rate = 4 }
+load = "none"
+[[vary]]
+what = "platform.mass"
+values = [0.2, 0.3]
+"""
 
 
 @pytest.fixture(scope="module")
@@ -89,6 +97,7 @@ def command(
     monkeypatch.setattr("condyle.export.fmu._built", lambda sources: b"")  # it takes seconds
     text = bundled_text("masticatory")
     Path("my jaw.toml").write_text(text)
+    Path("my study.toml").write_text(STUDY)
     Path("off.toml").write_text(text.replace("offset = 13.215", "offset = 13.5", 1))
     Path("a fall.toml").write_text("duration = 0.004")
     drives = 'duration = 0.002\n[controller]\nkind = "joint_pd"\nstiffness = 5\ndamping = 0.03\n'
