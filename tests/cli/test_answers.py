@@ -33,9 +33,14 @@ CALLS: dict[str, tuple[str, ...]] = {
     "run": ("run", "my jaw.toml", *QUICK, "--out", "the results"),
     "run --report": ("run", *QUICK, "--report"),
     "solve": ("solve", "my jaw.toml", "--states", "states.csv", "--out", "torques.csv"),
+    "forward": ("forward", "my jaw.toml", "--states", "efforts.csv", "--out", "found.csv"),
     "pose": ("pose", "masticatory", "--joints", "joints.csv", "--out", "poses.csv"),
     "pose --flag": ("pose", "masticatory", "--joints", "far.csv", "--out", "poses.csv", "--flag"),
     "pose --all": ("pose", "masticatory", "--joints", "joints.csv", "--out", "modes.csv", "--all"),
+    "map": (
+        *("map", "my jaw.toml", "--over", "X=-1:4:4 mm", "--no-figures"),
+        *("--quantity", "joint", "--out", "my maps"),
+    ),
     "compare": ("compare", *QUICK, "--motion", "my path.csv", "--no-figures", "--out", "x y"),
     "motion from-c3d": (
         *("motion", "from-c3d", "a trial.c3d", "--markers", "markers.toml"),
@@ -74,7 +79,13 @@ def command(
     Path("my path.csv").write_bytes(bundled_reference()[0].read_bytes())
     states = [prefix + name for prefix in ("", "d", "dd") for name in ("X", "Y", "alpha", "beta")]
     joints = [f"joint_{name}" for name in condyle.load("masticatory").chain_names]
-    tables = {"states": (states, 0), "joints": (joints, 0), "far": (joints, 3)}
+    efforts = [*states[:8], *(name.replace("joint_", "tau_") for name in joints)]
+    tables = {
+        "states": (states, 0),
+        "efforts": (efforts, 0),
+        "joints": (joints, 0),
+        "far": (joints, 3),
+    }
     for name, (columns, value) in tables.items():
         row = ",".join([str(value)] * len(columns))
         Path(f"{name}.csv").write_text(f"{','.join(columns)}\n{row}\n")

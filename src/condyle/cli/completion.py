@@ -34,6 +34,20 @@ EXPORTS = (
     "computed_torque",
 )
 UNITS = ("m,rad", "m,deg", "mm,rad", "mm,deg", "cm,rad", "cm,deg")
+QUANTITIES = (
+    "reachable",
+    "pose",
+    "bounds",
+    "joint",
+    "ratio",
+    "condition",
+    "transmission",
+    "effort",
+    "contact_force",
+    "load_limit",
+    "speed",
+    "stiffness",
+)
 FIGURES = (
     "activation",
     "contact_force",

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from ..extras import require
+from . import options
 from .answer import Answer, command_line
 from .command import LOOK, command
 
@@ -18,6 +19,7 @@ def report(
     out: Annotated[
         Path | None, typer.Option(help="HTML file. Default: beside the results.")
     ] = None,
+    measured: options.Measured = None,
     file: Annotated[
         list[Path] | None,
         typer.Option(help="Input of the run to name with its hash; repeat for more."),
@@ -32,7 +34,8 @@ def report(
     from ..report.page import write_report
 
     beside = solution.parent / f"{solution.stem}.html"
-    path = write_report(solution, out or beside, files=[solution, *(file or ())])
+    inputs = [solution, *([measured] if measured else []), *(file or ())]
+    path = write_report(solution, out or beside, files=inputs, measured=measured)
     size = path.stat().st_size
     return Answer(
         f"Wrote {path} ({size / 1e6:.1f} MB); open it in a browser",

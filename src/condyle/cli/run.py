@@ -47,6 +47,7 @@ def run(
     ] = False,
     backend: options.Backend = "auto",
     threads: options.Threads = None,
+    measured: options.Measured = None,
     strict: options.Strict = False,
     flag: options.Flag = False,
 ) -> Answer:
@@ -65,6 +66,8 @@ def run(
     policy = distribution, preload, contact_weight
     model = chosen_model(machine, formulation, route, backend, *policy)
     solution = model.solve(path, acting, load_point, flag, reactions, threads)
+    if measured is not None:
+        solution = solution.with_measured(measured)
     if strict:
         refuse(solution.notices)
     folder, stem = output_folder(out), file_stem(machine.name)
@@ -77,7 +80,7 @@ def run(
     if report:
         from ..report.page import write_report
 
-        inputs = [file for file in (motion, load) if file is not None]
+        inputs = [file for file in (motion, load, measured) if file is not None]
         inputs += [Path(mechanism)] if Path(mechanism).is_file() else []
         files.append(write_report(solution, folder / f"{stem}.html", files=inputs))
     warn([*path.warnings, *acting.warnings, *solution.warnings])

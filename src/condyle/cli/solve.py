@@ -20,8 +20,8 @@ def solve(
         Path,
         typer.Option(
             help="States to solve (CSV or Parquet), one a row: pose coordinates such as X, Y (m), "
-            "alpha, beta (rad), their rates dX ... (per s) and accelerations ddX ... (per s^2), "
-            "and if you like some of Fx, Fy, Fz (N), Mx, My, Mz (N m)."
+            "alpha, beta (rad), their rates dX ... (per s) and accelerations ddX ... (per s^2; "
+            "without both: at rest), and if you like some of Fx, Fy, Fz (N), Mx, My, Mz (N m)."
         ),
     ],
     out: Annotated[Path, typer.Option(help="File for the results (.csv or .parquet).")],
@@ -47,7 +47,8 @@ def solve(
 
     machine, policy = condyle.load(mechanism), (distribution, preload, contact_weight)
     model = chosen_model(machine, formulation, route, backend, *policy)
-    rows, warnings = solve_file(model, states, out, load_point, flag, strict, reactions, threads)
+    solved = solve_file(model, states, out, load_point, flag, strict, reactions, threads)
+    rows, warnings, greatest = solved
     warn(warnings)
     data = {
         "mechanism": model.mechanism.name,
@@ -55,7 +56,12 @@ def solve(
         "route": model.route,
         "distribution": model.policy.objective,
         "rows": rows,
+        "greatest_activation": None if greatest is None else greatest._asdict(),
         "warnings": warnings,
         "files": [out],
     }
-    return Answer(f"{rows} rows solved: {out}", data, command_line("view", mechanism))
+    text = f"{rows} rows solved: {out}"
+    if greatest is not None:
+        value, chain, row = greatest
+        text += f"\nGreatest activation (effort over its limit): {value:.4g}, {chain} in row {row}"
+    return Answer(text, data, command_line("view", mechanism))

@@ -19,6 +19,13 @@ def view(
     solution: Annotated[
         Path | None, typer.Option(help="Results (.nc) to play back; they bring their mechanism.")
     ] = None,
+    map: Annotated[
+        Path | None,
+        typer.Option(
+            help="A map over two or three coordinates (.nc or .zarr) to turn and to click; it "
+            "brings its mechanism."
+        ),
+    ] = None,
     port: Annotated[int, typer.Option(help="Port on 127.0.0.1.", min=1, max=65535)] = 8080,
     browser: Annotated[bool, typer.Option(help="Open the page in a browser.")] = True,
     quiet: options.Quiet = False,
@@ -31,7 +38,8 @@ def view(
     require("viser", "view")
     from ..view import serve
 
-    serve(None if solution else mechanism, solution, port=port, open_browser=browser)
+    own = solution is None and map is None
+    serve(mechanism if own else None, solution, port=port, open_browser=browser, map=map)
     if not quiet:
         then = ("report", solution) if solution else ("check", mechanism)
         typer.echo(f"Next: {command_line(*then)}")

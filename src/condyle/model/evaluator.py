@@ -11,7 +11,7 @@ import time
 from collections.abc import Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Self
 
 import numpy as np
@@ -23,7 +23,7 @@ from ..distribution import OBJECTIVES
 from ..dynamics import ROUTES
 from ..dynamics import formulation as formulation_named
 from ..errors import InputError, MechanismError, did_you_mean
-from ..kinematics.contact import indices
+from ..kinematics.contact import closed_form_available, indices
 from ..kinematics.singularity import Singularity
 from ..mechanism.home import (
     characteristic_length,
@@ -48,8 +48,10 @@ from .data import Accelerations, Configuration, Efforts, Evaluation
 from .distributing import LEAST, Distributor, Policy
 from .reference_force import reference_force
 from .robust import Robust
+from .survey import SURVEYED, Survey, judged
 
 CONDITION = "condition"
+DEFAULT = (None, 0.0, 0.0)  # distribution, preload and contact weight
 EVERYTHING = ("contact", "share", "motion", "joint", "configuration")
 # Names of results, by what is asked for.
 RESULTS = {
@@ -97,9 +99,9 @@ class Evaluator:
         self.mechanism = mechanism
         self.formulation = formulation_named(formulation).name
         self.route = route
-        self._asked = distribution
-        self.policy = Policy.of(mechanism, distribution, preload, contact_weight)
-        self._distributor = Distributor(mechanism, self.policy)
+        self._asked = distribution, preload, contact_weight
+        if self._asked != DEFAULT:
+            _ = self.policy  # what is asked for has to fit, now
         self.backend = Backend(backend)
         with step("deriving the equations"):
             structure = structure_of(mechanism, self.formulation, route)
@@ -119,23 +121,22 @@ class Evaluator:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Models travel as their recipe; kernels are found again in the cache."""
-        policy = (self._asked, self.policy.preload, self.policy.contact_weight)
         return type(self), (
             self.mechanism,
             self.formulation,
             self.route,
             self.backend.asked,
-            *policy,
+            *self._asked,
         )
 
     # -- what it is ------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def independent(self) -> tuple[str, ...]:
         """Names of the independent coordinates q_EE, in order."""
         return independent_coordinates(self.mechanism)
 
-    @property
+    @cached_property
     def dependent(self) -> tuple[str, ...]:
         """Names of the coordinates that the contacts determine."""
         return dependent_coordinates(self.mechanism)
@@ -151,6 +152,11 @@ class Evaluator:
         """Whether efforts are chosen within limits."""
         return OBJECTIVES[self.policy.objective].limits
 
+    @property
+    def chooses_efforts(self) -> bool:
+        """Whether efforts may be others than those of least norm."""
+        return self._distributor.chooses
+
     @cached_property
     def reference_force(self) -> float:
         """N_ref, by which `weighted` measures contact forces [N]."""
@@ -161,10 +167,23 @@ class Evaluator:
     ) -> Self:
         """The same model, kernels and all, that chooses efforts otherwise; see `derive`."""
         other = copy(self)
-        other._asked = distribution
-        other.policy = Policy.of(self.mechanism, distribution, preload, contact_weight)
-        other._distributor = Distributor(self.mechanism, other.policy)
+        for name in ("policy", "_distributor"):
+            other.__dict__.pop(name, None)
+        other._asked = distribution, preload, contact_weight
+        _ = other.policy  # has to fit, now
         return other
+
+    @cached_property
+    def policy(self) -> Policy:
+        """How efforts are chosen; forward dynamics has no need of it.
+
+        Raises: InputError: where the default does not fit the mechanism.
+        """
+        return Policy.of(self.mechanism, *self._asked)
+
+    @cached_property
+    def _distributor(self) -> Distributor:
+        return Distributor(self.mechanism, self.policy, self.backend)
 
     @cached_property
     def characteristic_length(self) -> float:
@@ -184,7 +203,7 @@ class Evaluator:
 
     @cached_property
     def _robust(self) -> Robust:
-        distributor = Distributor(self.mechanism, replace(self.policy, objective=LEAST))
+        distributor = Distributor(self.mechanism, Policy(LEAST))
         return Robust(self._structure, self._numbers, self.independent, distributor)
 
     # -- inverse dynamics ------------------------------------------------------------------
@@ -347,7 +366,9 @@ class Evaluator:
             return
         ports = {name: values[name].T[rows] for name in RESULTS["motion"]}
         ports |= {name: inputs[name][rows] for name in ("force", "moment", "point")}
-        better = self._distributor.solve(self.kernel("system").run(ports).values)
+        # Shares cost more than all the rest.
+        question = "system" if {"share", "slip"} & values.keys() else "balance"
+        better = self._distributor.solve(self.kernel(question).run(ports).values)
         status[rows] = better.pop("status")
         for name, value in better.items():
             if name in values:
@@ -435,6 +456,37 @@ class Evaluator:
         J_A, transmission, sigma = (values[name].T for name in ("J_A", "transmission", "J_W_sigma"))
         extremes = values["J_A_extremes"]
         return Singularity.of(J_A, transmission, sigma, extremes, self.characteristic_length)
+
+    def survey(
+        self, q: np.ndarray, wanted: Collection[str] = (), threads: int | None = None
+    ) -> Survey:
+        """What poses are like, each judged, as fast as the machine: for maps.
+
+        Args:    q: (N, m), in the order of `independent`.  wanted: of `SURVEYED`: pose, joint,
+                 transmission, rates (of the joints on q', lanes last but one), rows (of the
+                 dimensionless J_W), ratio, points (of the contacts).
+        Raises:  InputError: for a name that is none of these.
+        """
+        for name in wanted:
+            if name not in SURVEYED:
+                raise InputError(f'no output "{name}".{did_you_mean(name, SURVEYED)}')
+        check_states(self.independent, q)
+        wanted = tuple(name for name in SURVEYED if name in wanted)
+        answer = self.kernel("survey", wanted).run({"q": q}, threads)
+
+        def follow(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            some = np.asarray(q, dtype=float)[rows]
+            poses, reached = self._robust.motion(some, 0 * some, 0 * some)
+            return poses["pose"], reached
+
+        at_poses = partial(self._robust.survey, wanted)
+        return judged(answer, self._iterated, follow, at_poses)
+
+    @cached_property
+    def _iterated(self) -> bool:
+        """Whether contacts are closed in a fixed number of steps, which may be too few."""
+        forms = [form for form, _ in self._structure.contacts]
+        return not closed_form_available(forms, self._structure.dependent)
 
     # -- the matrices of the equations of motion ---------------------------------------------
 

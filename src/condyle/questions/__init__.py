@@ -20,23 +20,29 @@ from .closure import Prescribed, closure, conditions
 from .configuration import configuration
 from .encoders import encoders
 from .forward import forward, forward_system
-from .inverse import inverse, motion, system
+from .instant import energy, instant
+from .inverse import balance, inverse, motion, system
 from .linear import linear
 from .matrices import jacobians, matrices
 from .reactions import reactions
 from .structure import Structure
+from .survey import survey
 
 QUESTIONS: dict[str, Callable[..., Program | Variants]] = {
     "inverse": inverse,
     "forward": forward,
     "forward_system": forward_system,
     "motion": motion,
+    "balance": balance,
     "system": system,
     "linear": linear,
     "closure": closure,
     "conditions": conditions,
     "configuration": configuration,
+    "survey": survey,
     "encoders": encoders,
+    "instant": instant,
+    "energy": energy,
     "matrices": matrices,
     "jacobians": jacobians,
     "reactions": reactions,
@@ -49,7 +55,10 @@ GEOMETRY = (
     "closure",
     "conditions",
     "configuration",
+    "survey",
     "encoders",
+    "instant",
+    "energy",
     "jacobians",
     "reactions",
     "linear",

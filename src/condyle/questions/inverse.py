@@ -157,6 +157,15 @@ def motion(structure: Structure) -> Program:
     return b.finish()
 
 
+def balance(structure: Structure) -> Program:
+    """What efforts and contacts have to balance, at whole poses that meet the contacts."""
+    b = Builder(structure)
+    platform, load = given(b), Wrench.of(b)
+    lump = FORMULATIONS[structure.formulation].lumps
+    _add_balance(b, platform, equations(b, platform, load, route="core", lump=lump))
+    return b.finish()
+
+
 def system(structure: Structure) -> Program:
     """The equations themselves, at whole poses that meet the contacts, for the robust path."""
     b = Builder(structure)
@@ -169,12 +178,7 @@ def system(structure: Structure) -> Program:
         b.output(name, rows, "", len(parts), structure.m)
     pulled = eq.basis.generalized_force(ca.SX.eye(eq.Q.numel()))
     b.output("Pi", pulled, "", structure.m, 6)  # Pi^T
-    b.output("Q", eq.Q, "N, N m", 6)
-    b.output("J", [c.row for c in eq.chains], "")
-    touch, k = contacts(b, platform), len(structure.contacts)
-    b.output("normal", (eq.state.B.T @ touch.N).T, "", k, 6)
-    b.output("friction", (eq.state.B.T @ touch.T).T, "", k, 6)
-    add_sliding(b, touch)
+    add_sliding(b, _add_balance(b, platform, eq))
     b.output("joint_rate", [c.dynamics.rate for c in eq.chains], "rad/s or m/s")
     b.output("joint_acceleration", [c.dynamics.acceleration for c in eq.chains], "per s^2")
     return b.finish()
@@ -184,6 +188,16 @@ def _add_motion(b: Builder, platform: Platform) -> None:
     b.output("pose", platform.pose, ANGLE_UNITS)
     b.output("pose_rate", platform.motion.rate, "per s")
     b.output("pose_acceleration", platform.motion.acceleration, "per s^2")
+
+
+def _add_balance(b: Builder, platform: Platform, eq: Equations) -> Contacts:
+    """Q = J^T tau + sum_k lambda_k (N_k - sigma_k T_k), sample by sample."""
+    b.output("Q", eq.Q, "N, N m", 6)
+    b.output("J", [c.row for c in eq.chains], "")
+    touch, k = contacts(b, platform), len(b.structure.contacts)
+    b.output("normal", (eq.state.B.T @ touch.N).T, "", k, 6)
+    b.output("friction", (eq.state.B.T @ touch.T).T, "", k, 6)
+    return touch
 
 
 def add_sliding(b: Builder, touch: Contacts) -> None:

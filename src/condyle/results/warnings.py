@@ -73,6 +73,9 @@ KINDS = {
         "another actuator, or another motion; efforts of least norm know no limits, "
         "`--distribution bounded` keeps them",
     ),
+    "ended": Kind(
+        "a simulation that ended before its time", "`solution.events` says why, in which state"
+    ),
     "speed_limit": Kind("speed above a limit", "another actuator, or another motion"),
     "rod_angles": Kind(
         "gamma_i near 90 degrees",

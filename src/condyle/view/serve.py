@@ -11,19 +11,26 @@ import io
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import viser
 
-from ..errors import CondyleError
+from ..analysis.map.files import mechanism_of, open_map
+from ..errors import CondyleError, InputError
 from ..mechanism import Mechanism, load
 from ..results.solution import Solution, open_solution
 from .gate import Gate, guarded
+from .maps import MapLayer
 from .panel import Panel
 from .playback import Playback
 from .session import Session
 from .snapshot import Snapshot
 from .stage import Stage
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 DEFAULT = "masticatory"
 BRAND = (16, 93, 202)
@@ -48,6 +55,7 @@ class View:
         solution: Solution | None = None,
         host: str = "127.0.0.1",
         port: int = 8080,
+        dataset: xr.Dataset | None = None,
     ) -> None:
         """Start serving. Raises: MechanismError: if the contacts do not hold the platform."""
         session = Session(mechanism)
@@ -66,9 +74,12 @@ class View:
         self._closed = False
         self.dragging = False
         self.playback: Playback | None = None
+        self.map: MapLayer | None = None
         self._enter(session)
         if solution is not None:
             self.play_solution(solution)
+        if dataset is not None:
+            self.show_map(dataset)
         self._worker = threading.Thread(target=self._work, name="condyle-view", daemon=True)
         self._worker.start()
         self._wake.set()
@@ -108,7 +119,17 @@ class View:
         guides = list(points.values())[:1] or [(0.0, 0.0, 0.0)]
         guides += [contact.point for contact in self.session.mechanism.contacts]
         self.stage.show_paths([playback.path(point) for point in guides])
+        has = "marker_body" in solution.coords
+        self.stage.show_markers([str(b) for b in solution["marker_body"].values] if has else [])
         self.panel.show_playback(playback)
+
+    def show_map(self, dataset: xr.Dataset) -> None:
+        """Show a map beside its mechanism, which goes where the map is clicked; for the worker."""
+        mechanism = mechanism_of(dataset)
+        if mechanism != self.session.mechanism:
+            self._enter(Session(mechanism))
+        self.map = MapLayer(self._server.scene, self.stage.centre, self.session.model, dataset)
+        self.map.on_click(lambda q: self.wish("map", partial(self.panel.take, q)))
 
     def set_dark(self, dark: bool) -> None:
         """Draw the page dark or light."""
@@ -140,6 +161,7 @@ class View:
             self.stage.remove()
             self._server.gui.reset()
         self.session = session
+        self.map = None
         self.stage = Stage(self._server, session.mechanism)
         self.stage.look_from(self._server.initial_camera, "Oblique")
         for client in self._server.get_clients().values():
@@ -179,6 +201,8 @@ class View:
         with self._server.atomic():
             self.stage.show(self.snapshot, self.dragging)
             self.panel.show(self.snapshot)
+            if self.map is not None:
+                self.map.show(self.snapshot.pose)
 
 
 def open_view(
@@ -186,14 +210,21 @@ def open_view(
     solution: Solution | str | Path | None = None,
     host: str = "127.0.0.1",
     port: int = 8080,
+    map: xr.Dataset | str | Path | None = None,
 ) -> View:
     """Start the page and return at once; see `serve`."""
+    if isinstance(map, str | Path):
+        map = open_map(map)
+    if map is not None and map["status"].ndim == 1:
+        raise InputError("this map goes over one coordinate; the view shows those of two or three")
+    if map is not None and solution is None:
+        mechanism = mechanism_of(map)
     if isinstance(solution, str | Path):
         solution = open_solution(solution)
     if not isinstance(mechanism, Mechanism):
         solved = solution.mechanism if solution is not None else None
         mechanism = load(mechanism) if mechanism is not None else solved or load(DEFAULT)
-    return View(mechanism, solution, host, port)
+    return View(mechanism, solution, host, port, map)
 
 
 def serve(
@@ -202,6 +233,7 @@ def serve(
     host: str = "127.0.0.1",
     port: int = 8080,
     open_browser: bool = False,
+    map: xr.Dataset | str | Path | None = None,
 ) -> None:
     """Serve the live page until interrupted.
 
@@ -210,9 +242,11 @@ def serve(
             solution: to play back, or the path of its NetCDF file; its own mechanism is shown.
             host, port: where to listen; the next free port is taken if `port` is not.
             open_browser: show the page at once.
+            map: of `workspace_map`, or the path of its file: shown beside its mechanism, which
+                goes where the map is clicked.
     Raises: CondyleError: if mechanism or solution cannot be used.
     """
-    view = open_view(mechanism, solution, host, port)
+    view = open_view(mechanism, solution, host, port, map)
     if view.port != port and port:
         print(f"condyle view: port {port} is in use; took {view.port}", flush=True)
     print(f"condyle view: {view.url} (stop with Ctrl-C)", flush=True)
