@@ -46,6 +46,9 @@ CALLS: dict[str, tuple[str, ...]] = {
         *("motion", "from-c3d", "a trial.c3d", "--markers", "markers.toml"),
         *("--mechanism", "my jaw.toml", "--out", "a motion.csv"),
     ),
+    "export fmu": ("export", "fmu", "my jaw.toml", "--out", "units", "--kind", "inverse"),
+    "export matlab": ("export", "matlab", "my jaw.toml", "--out", "for matlab"),
+    "export mjcf": ("export", "mjcf", "my jaw.toml", "--out", "for mujoco"),
     "plot": ("plot",),
     "plot SOLUTION": ("plot", "a run.nc", "--figure", "load", "--out", "my figures"),
     "report": ("report", "a run.nc"),
@@ -73,6 +76,7 @@ def command(
     """Runs commands where the files of `CALLS` are."""
     monkeypatch.setenv("CONDYLE_BACKEND", "numpy")
     monkeypatch.setenv("CONDYLE_CACHE", str(tmp_path / "kernels"))
+    monkeypatch.setattr("condyle.export.fmu._built", lambda sources: b"")  # it takes seconds
     text = bundled_text("masticatory")
     Path("my jaw.toml").write_text(text)
     Path("off.toml").write_text(text.replace("offset = 13.215", "offset = 13.5", 1))

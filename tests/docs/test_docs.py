@@ -346,10 +346,10 @@ JSON = {
         *("motion", "from-c3d", "trial.c3d", "--markers", "markers.toml"),
         *("--mechanism", "masticatory", "--out", "motion.csv"),
     ),
-    "condyle export c": ("export", "c", "gough-stewart", "--question", "motion", "--out", "c"),
     "condyle map": (
         *("map", "masticatory", "--over", "X=0:3:3 mm", "--quantity", "joint", "--no-figures"),
     ),
+    "condyle export c": ("export", "c", "gough-stewart", "--question", "motion", "--out", "c"),
     "condyle plot": ("plot",),
     "condyle plot SOLUTION": (
         *("plot", "results/masticatory.nc", "--figure", "torque", "--out", "figures"),

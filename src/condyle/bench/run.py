@@ -24,6 +24,7 @@ from ..dynamics import FORMULATIONS
 from ..mechanism import bundled_text, load
 from ..model.evaluator import Evaluator
 from ..progress import step
+from .exported import PORTABLE, WIDE, exported_probes
 from .motion import SECOND, motion_rows
 from .own import (
     BOUNDED,
@@ -113,6 +114,8 @@ def run_benchmark(seconds: float = 1.0) -> Benchmark:
         with step("building other engines"):
             probes += _peer_probes(unavailable)
         probes += [*asked_probes(load(REFERENCE)), *map_probes(load(REFERENCE))]
+        with step("building exported C"):
+            probes += exported_probes(load(REFERENCE))
         probes += [*policy_probes(load(REFERENCE)), *jaw_probes(load("human-jaw"))]
         probes += limit_probes(load(REFERENCE), load("human-jaw"), unavailable)
         probes += simulation_probes(load(REFERENCE))
@@ -259,6 +262,8 @@ def _ratios(rows: list[Row], lanes: int) -> dict[str, float]:
         if ours and theirs and ours.error <= min(row.error for row in theirs):
             least_time = min(row.seconds for row in theirs)
             ratios[f"{SECOND}, times faster than {engine}, and nearer"] = least_time / ours.seconds
+    for what in (WIDE, PORTABLE):
+        ratios[f"one evaluation, {what} over the kernel"] = by_name[f"{REFERENCE} {what}"].over(one)
     least = by_name[f"{REFERENCE}: {LEAST_NORM}"]
     for what, name in (("bounded", BOUNDED), ("friction at two contacts", FRICTION)):
         ratios[f"{what} over least norm"] = by_name[f"{REFERENCE}: {name}"].over(least)

@@ -23,6 +23,7 @@ DISTRIBUTIONS = {  # name -> what is least, and subject to what
     "minimax": "the largest of them, then weighted",
 }
 BACKENDS = ("auto", "compiled", "numpy")
+FMUS = ("plant", "inverse", "controller")
 STYLES = ("screen", "journal", "journal-wide")
 EXPORTS = (
     "inverse",
