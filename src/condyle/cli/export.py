@@ -24,7 +24,8 @@ def c(
         typer.Option(
             help="What to export; repeat for more: inverse, contact (with contact forces), bounded "
             "(within limits), forward (accelerations), motion, closure, pose (from encoders), "
-            "computed_torque. Default: all but bounded, and closure, which needs --from or --landmark.",
+            "computed_torque. Default: all but bounded, and but closure, which needs --from or "
+            "--landmark.",
             autocompletion=completion.one_of(*completion.EXPORTS),
         ),
     ] = None,
