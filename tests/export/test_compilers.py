@@ -128,3 +128,13 @@ def test_the_example(folder: Folders) -> None:
     told = run("./example", folder=of.path).splitlines()
     (effort,) = of.exported["inverse"].outputs
     assert [line.split(":")[0].removeprefix("effort ") for line in told] == list(effort.labels)
+
+
+def test_the_tick_of_the_page(folder: Folders, tmp_path: Path) -> None:
+    """The controller that docs/how-to/controller.md shows, on the functions of the header."""
+    page = Path(__file__).parents[2] / "docs" / "how-to" / "controller.md"
+    shown = page.read_text(encoding="utf-8").split("```c\n")[1].split("```")[0]
+    text = shown.replace("masticatory", "jaw").replace("MASTICATORY", "JAW")
+    (tmp_path / "tick.c").write_text(text)
+    paths = f"-I{folder('jaw').path}"
+    run("gcc", "-std=c99", "-Wall", "-Werror", paths, "-fsyntax-only", "tick.c", folder=tmp_path)
