@@ -144,3 +144,13 @@ def test_facts_are_measured_wherever_the_folder_is(
         assert row["code"] > 8 * row["operations"] or "computed" in name, name
         assert row["stack"] > 100 and row["error"] < 1e-12 and not row["wrong"]
     assert rows["jaw_computed_torque"]["code"] > rows["jaw_inverse"]["code"]
+
+
+def test_the_tick_of_the_page(folder: Folders, tmp_path: Path) -> None:
+    """The controller that docs/how-to/controller.md shows, on the functions of the header."""
+    page = Path(__file__).parents[2] / "docs" / "how-to" / "controller.md"
+    shown = page.read_text(encoding="utf-8").split("```c\n")[1].split("```")[0]
+    text = shown.replace("masticatory", "jaw").replace("MASTICATORY", "JAW")
+    (tmp_path / "tick.c").write_text(text)
+    paths = f"-I{folder('jaw').path}"
+    run("gcc", "-std=c99", "-Wall", "-Werror", paths, "-fsyntax-only", "tick.c", folder=tmp_path)
