@@ -37,13 +37,13 @@ def checked(of: Folder, flags: str, **variables: str) -> str:
     return told
 
 
-@pytest.mark.parametrize("name", ["jaw", "single", "curved", "struct", "mixed"])
+@pytest.mark.parametrize("name", ["jaw", "single", "curved", "struct", "mixed", "limited"])
 def test_the_recorded_samples(folder: Folders, name: str) -> None:
     need("gcc", "make")
     checked(folder(name), "-O1", CC="gcc")
 
 
-@pytest.mark.parametrize("name", ["jaw", "struct"])
+@pytest.mark.parametrize("name", ["struct", "limited"])
 def test_clang_has_nothing_to_say(folder: Folders, name: str) -> None:
     need("clang", "make")
     checked(folder(name), "-O1", CC="clang")
@@ -55,7 +55,7 @@ def test_vector_types(folder: Folders) -> None:
     checked(folder("jaw"), "-O1", CC="clang", VECTOR="1", VECTOR_FLAGS=flags)
 
 
-@pytest.mark.parametrize("name", ["struct", "mixed"])
+@pytest.mark.parametrize("name", ["struct", "limited"])
 def test_sanitizers(folder: Folders, name: str) -> None:
     need("gcc", "make")
     checked(folder(name), f"-O1 -g {SANITIZED}", CC="gcc")
