@@ -38,17 +38,26 @@ _HOMES = {
     "trial_motion": "motion",
     "Solution": "results.solution",
     "open_solution": "results.solution",
+    "Scenario": "simulation",
+    "load_scenario": "simulation",
+    "simulate": "simulation",
+    "simulate_all": "simulation",
+    "ScenarioError": "errors",
     "workspace_map": "analysis.map",
+    "Study": "analysis.sweep",
+    "sweep": "analysis.sweep",
 }
 
 if TYPE_CHECKING:
     from .analysis.map import workspace_map
+    from .analysis.sweep import Study, sweep
     from .errors import (
         CondyleError,
         InfeasibleError,
         InputError,
         JammedError,
         MechanismError,
+        ScenarioError,
         SingularError,
         UnreachableError,
         UnsupportedError,
@@ -57,10 +66,12 @@ if TYPE_CHECKING:
     from .motion import Load, Motion, reference_load, reference_motion, trial_motion
     from .results.model import Model, derive
     from .results.solution import Solution, open_solution
+    from .simulation import Scenario, load_scenario, simulate, simulate_all
 
-# What the report gives to results and comparisons, which do not know it.
+# What the report gives to results, comparisons and exports, which do not know it.
 register("solution.plot", "condyle.report.figures:SolutionPlots")
 register("comparison.text", "condyle.report.tables:comparison_text")
+register("mechanism.look", "condyle.report.scene.look:Look")
 
 __all__ = [*_HOMES, "__version__"]
 

@@ -61,8 +61,8 @@ class InputError(CondyleError):
     """A file, column, option or argument that cannot be used as given."""
 
 
-class MechanismError(InputError):
-    """A mechanism that breaks the rules of the file format.
+class ProblemsError(InputError):
+    """A file that breaks the rules of its format.
 
     Attributes: source: the file;  problems: one line each, all that were found; the message shows
                 as many as a person reads.
@@ -86,6 +86,14 @@ class MechanismError(InputError):
                 return [*lines, f"  - and {len(self.problems) - k} more"]
             lines.append(f"  - {problem}")
         return lines
+
+
+class MechanismError(ProblemsError):
+    """A mechanism that breaks the rules of the file format."""
+
+
+class ScenarioError(ProblemsError):
+    """A scenario that breaks the rules of the file format, or does not fit its mechanism."""
 
 
 class UnsupportedError(CondyleError):

@@ -19,8 +19,8 @@ from support.cases import case
 
 from condyle import questions
 from condyle.backends import cache, compiler
-from condyle.backends.c import kernel
-from condyle.backends.c.kernel import _recipe
+from condyle.backends.c import build
+from condyle.backends.c.build import _recipe
 from condyle.backends.compiler import Compiler, find_compiler
 from condyle.errors import CondyleError
 from condyle.questions import Prescribed, Question
@@ -215,7 +215,7 @@ def test_everything_that_matters_is_in_the_recipe(monkeypatch: pytest.MonkeyPatc
         recipes.append(_recipe(question.key, tool))
         patch.setattr(questions, "_sources", lambda: "other sources")
         recipes.append(_recipe(question.key, tool))
-        patch.setattr(kernel, "_generator", lambda: "another generator")
+        patch.setattr(build, "_generator", lambda: "another generator")
         recipes.append(_recipe(question.key, tool))
     assert len(set(recipes)) == len(recipes)
     again = Question.about(dataclasses.replace(structure), "inverse", ("contact",))
@@ -366,9 +366,9 @@ def test_a_build_that_stops_leaves_nothing(
     folder: Path, temporary: Path, error: BaseException
 ) -> None:
     maker = Maker(lambda place: error)
-    for build in (lambda: cache.build(RECIPE, maker, quiet), lambda: cache.build_apart("x", maker)):
+    for way in (lambda: cache.build(RECIPE, maker, quiet), lambda: cache.build_apart("x", maker)):
         with pytest.raises(type(error)):
-            build()
+            way()
     assert names(folder) == names(temporary) == []
 
 

@@ -16,7 +16,8 @@ from support.cases import case, error
 from support.children import PATIENCE, end, start, wait_for
 
 from condyle.backends import cache
-from condyle.backends.c.kernel import CompiledKernel, _recipe
+from condyle.backends.c.build import _recipe
+from condyle.backends.c.kernel import CompiledKernel
 from condyle.backends.compiler import find_compiler
 from condyle.model.evaluator import Evaluator
 from condyle.questions import Question
@@ -214,7 +215,7 @@ def test_a_library_put_in_place_of_ours_is_never_loaded(folder: Path, tmp_path: 
         "#include <stdio.h>\n__attribute__((constructor)) void evil(void) {"
         f' FILE *f = fopen("{mark}", "w"); if (f) fclose(f); }}\n'
     )
-    find_compiler().build(source, tmp_path / "evil.so")
+    find_compiler().build(tmp_path / "evil.so", source)
     os.replace(tmp_path / "evil.so", library)
     child = start(SOLVE + RUN)
     out, err = child.communicate("\n", timeout=PATIENCE)

@@ -79,7 +79,7 @@ def vector(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     source, library = folder / "vector.c", folder / "vector.so"
     header = (Path(emit.__file__).parent / "vector.h").read_text(encoding="utf-8")
     source.write_text(f"#define W {request.param}\n{header}\n{FUNCTIONS}", encoding="utf-8")
-    find_compiler().build(source, library)
+    find_compiler().build(library, source)
     return Functions(ctypes.CDLL(str(library)), request.param)
 
 

@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
-import pytest
+import gc
+import weakref
+from collections.abc import Callable
+from pathlib import Path
 
-from condyle.bench.own import own_probes, thread_probes
+import numpy as np
+import pytest
+from distribution.cases import random_problem
+
+from condyle.bench import own
+from condyle.bench.motion import motion_rows
+from condyle.bench.own import Case, own_probes, thread_probes
+from condyle.bench.programs import Bites, _arguments, _solvers, program_probes, tight
 from condyle.bench.rows import TOLERANCE, Probe, Row, spread, timed
 from condyle.bench.run import Benchmark
+from condyle.distribution import distribute
+from condyle.distribution.reduced import reduce
 from condyle.mechanism import load
+from condyle.model.evaluator import Evaluator
 
 
 def test_every_row_is_right() -> None:
@@ -16,10 +29,38 @@ def test_every_row_is_right() -> None:
     names = [row.name for row in rows]
     for what in ("one", "one, dependent", "batch", "batch, two threads"):
         assert f"gough-stewart virtual_power: {what}" in names
+    for what in ("one", "batch"):
+        assert f"gough-stewart forward dynamics: {what}" in names
     assert any("straight-line C" in name for name in names)
     for row in rows:
         assert row.error < TOLERANCE, row.name
         assert row.seconds > 0
+
+
+def test_what_a_batch_reads_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A row is timed long after it was made: C must not read columns that are gone."""
+    made: list[weakref.ref[np.ndarray]] = []
+
+    def columns(a: np.ndarray) -> np.ndarray:
+        found = np.array(a, order="F")
+        made.append(weakref.ref(found))
+        return found
+
+    monkeypatch.setattr(own.np, "asfortranarray", columns)
+    probes = list(own_probes(load("gough-stewart"), ["virtual_power"]))
+    gc.collect()
+    assert made and all(ref() is not None for ref in made)
+    del probes
+
+
+def test_a_second_of_motion_is_right() -> None:
+    """Of fourth order, against an integration in steps of a fiftieth."""
+    unavailable: dict[str, str] = {}
+    rows = list(motion_rows("masticatory", None, unavailable))
+    assert [row.name.rsplit(", ", 1)[1] for row in rows] == ["2 ms", "1 ms"]
+    assert rows[0].error < 1e-6
+    assert rows[1].error < rows[0].error / 10
+    assert not unavailable
 
 
 def test_a_wrong_row_says_so() -> None:
@@ -49,3 +90,46 @@ def test_table_names_what_did_not_run() -> None:
     }
     text = str(Benchmark([Row("a row", 2e-7, 1e-8, 0.0, None)], {}, facts, {"peer": "no pip"}))
     assert "200.0 ns" in text and "not run: peer (no pip)" in text
+
+
+@pytest.fixture
+def solvers(monkeypatch: pytest.MonkeyPatch) -> dict[str, Callable[..., np.ndarray]]:
+    """Those of `benchmarks`, which is found from the repository's root."""
+    monkeypatch.chdir(Path(__file__).parents[2])
+    return _solvers()
+
+
+@pytest.mark.parametrize("name", ["DAQP", "quadprog", "HiGHS", "OSQP"])
+def test_other_solvers_are_given_the_same_program(
+    name: str, solvers: dict[str, Callable[..., np.ndarray]]
+) -> None:
+    problem = random_problem(np.random.default_rng(3), 6, 2, 4, one_sided=True, tight=0.8)
+    wanted = distribute(problem, "bounded")
+    programs = reduce(problem, np.zeros((4, 2)), np.ones(6), 0.0, True)
+    for i in np.flatnonzero(wanted.status == 0):
+        try:
+            got = solvers[name](*_arguments(programs, i))
+        except ImportError as missing:
+            pytest.skip(f"{missing.name} is not installed")
+        size = np.abs(wanted.effort[i]).max()
+        np.testing.assert_allclose(got, wanted.effort[i], atol=1e-5 * size)
+    assert (wanted.status == 0).any()
+
+
+def test_solvers_that_are_missing_are_named(
+    monkeypatch: pytest.MonkeyPatch, solvers: dict[str, Callable[..., np.ndarray]]
+) -> None:
+    """Rows beside others, where some are missing; ours is always there."""
+
+    def missing(*_: object) -> None:
+        raise ImportError("no solver here")
+
+    some = {"DAQP": solvers["DAQP"], "none": missing}
+    monkeypatch.setattr("condyle.bench.programs._solvers", lambda: some)
+    model = Evaluator(tight(load("masticatory"), 0.2), backend="numpy", distribution="bounded")
+    given = Case.of(model.mechanism).many(40)
+    unavailable: dict[str, str] = {}
+    probes = list(program_probes(Bites("some", model, given), unavailable))
+    assert [p.name.rpartition(", ")[2] for p in probes[1:]] == ["DAQP"]
+    assert unavailable == {"none": "no solver here"}
+    assert all(p.error < p.tolerance and p.run() > 0 for p in probes)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.motion import Motion
+from condyle.motion import Beside, Motion
 from condyle.report.page import write_report
 from condyle.results.solution import Solution
 
@@ -466,15 +466,44 @@ def test_a_jaw_draws_activations_and_planes_of_all_its_muscles(
     motion = Motion.from_csv(condyle.motion.bundled_reference()[0], rate=20)
     model = condyle.derive("human-jaw", backend="numpy")
     solution = model.solve(motion, condyle.reference_load())
-    tab = ready(open_tab(write_report(solution, tmp_path / "jaw.html").as_uri()))
+    t = solution["time"].values
+    wave = np.column_stack([0.09 + 0 * t, 0 * t, -0.02 + 0.01 * np.sin(t)])
+    wave[7] = np.nan  # not seen
+    measured = Beside(
+        t,
+        ("Upper", "Lower"),
+        ("fixed", "platform"),
+        np.stack([np.full_like(wave, 0.08), wave], axis=1),
+        np.full((len(t), 2), 1e-4),
+        {"deep_masseter_left": np.abs(np.sin(t))},
+    )
+    report = write_report(solution, tmp_path / "jaw.html", measured=measured)
+    tab = ready(open_tab(report.as_uri()))
+    markers = "() => { const t = document.getElementById('stage').data[6]; return %s; }"
+    assert tab.page.evaluate(markers % "[t.name, ...t.marker.symbol]") == [
+        "markers",
+        "square",
+        "diamond",
+    ]
+    scrub(tab, 40)
+    assert tab.page.evaluate(markers % "t.z") == pytest.approx([80, 1e3 * wave[40, 2]], rel=1e-6)
+    scrub(tab, 7)
+    assert tab.page.evaluate(markers % "t.z[1]") is None
+    assert "on the platform" in tab.page.locator("#marker-legend").inner_text()
+    tab.page.get_by_role("button", name="Markers").click()
+    tab.wait("() => document.getElementById('stage').data[6].visible === false")
+    assert tab.page.locator("#panel-marker-residual select option").count() == 4
     z = tab.page.evaluate(
         "() => document.querySelector('#panel-activation .plot').firstChild._fullData[0].z"
     )
-    assert np.shape(z) == (24, solution.sizes["time"]) and 0.2 < np.max(z) < 1
+    assert np.shape(z) == (25, solution.sizes["time"])
+    emg = 9  # under the muscle it is of
+    assert np.allclose(z.pop(emg), np.abs(np.sin(t)), atol=1e-6) and 0.2 < np.max(z) < 1
     assert tab.page.locator(".plane .dot:visible").count() == 24
     sample = int(np.argmax(np.max(z, axis=0)))
     scrub(tab, sample)
     read = tab.page.locator("#panel-activation .value").all_inner_texts()
+    assert float(read.pop(emg)) == pytest.approx(abs(np.sin(t[sample])), abs=1e-3)
     assert float(max(read)) == pytest.approx(np.max(z), abs=1e-3)
     at = tab.page.evaluate(
         """() => [...document.querySelectorAll('.plane')].map((card) => {

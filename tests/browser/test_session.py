@@ -9,7 +9,7 @@ import pytest
 
 import condyle
 from condyle.errors import InputError
-from condyle.motion import Load, Motion
+from condyle.motion import Beside, Load, Motion
 from condyle.report.scene import contact_patch, place, platform_hull, rotations
 from condyle.results.solution import Solution
 from condyle.view import open_view
@@ -242,6 +242,29 @@ def test_a_stale_pose_is_drawn_grey_and_without_arrows(reference: condyle.Mechan
             arrows = [arrow.visible for arrow in view.stage._arrows.values()]
             assert any(arrows) == (when == 0.02)
         assert len(tints[0.02]) > 3 and len(tints[0.3]) == 1
+    finally:
+        view.close()
+
+
+def test_measured_markers_are_where_they_were_measured(chewing: Solution) -> None:
+    t = chewing["time"].values
+    places = np.stack([np.full((len(t), 3), 0.08), np.outer(t, [1e-3, 0, 0])], axis=1)
+    places[50, 1] = np.nan
+    nothing = np.full((len(t), 2), np.nan)
+    measured = Beside(t, ("Upper", "Lower"), ("fixed", "platform"), places, nothing)
+    view = open_view(solution=chewing.with_measured(measured), port=0)
+    try:
+        assert view.playback is not None
+        upper, lower = view.stage._markers
+        assert tuple(upper.color) != tuple(lower.color)
+        for sample in (20, 50):
+            view.playback.seek(t[sample])
+            view.stage.show(view.playback.snapshot())
+            assert np.allclose(upper.position, view.stage.scale * 0.08)
+            assert lower.visible == (sample == 20)
+        assert np.allclose(lower.position, view.stage.scale * places[20, 1])
+        view.stage.show(view.session.snapshot())
+        assert not upper.visible, "moved by hand, there is no measurement"
     finally:
         view.close()
 

@@ -12,6 +12,7 @@ import pytest
 from oracles.recorded_jaw import FIXED, PLATFORM, Jaw, record
 
 from condyle.motion import read_table
+from condyle.results.solution import open_solution
 
 CALL = ("motion", "from-c3d", "a.c3d", "--markers", "m.toml", "--mechanism", "masticatory")
 
@@ -57,9 +58,15 @@ def test_the_motion_is_written_and_its_quality_said(call: Callable[..., Any]) ->
 def test_markers_beside_the_mechanism(call: Callable[..., Any]) -> None:
     jaw = record()
     jaw.at("Lower_FL")[50] = np.nan
-    assert call(jaw, "--out", "o.csv", "--markers-out", "p.csv").status == 0
+    assert call(jaw, "--out", "o.csv", "--measured", "p.csv").status == 0
     head, *rows = Path("p.csv").read_text().splitlines()
-    names = [f"{name}_{axis}" for name in (*FIXED, *PLATFORM) for axis in "xyz"]
+    bodies = {"fixed": FIXED, "platform": PLATFORM}
+    names = [
+        f"{name}_{column}"
+        for body, markers in bodies.items()
+        for name in markers
+        for column in ("x", "y", "z", f"residual_{body}")
+    ]
     assert head.split(",") == ["t", *names] and len(rows) == 400
     place = dict(zip(head.split(","), rows[50].split(","), strict=True))
     assert place["Lower_FL_x"] == "" and float(place["Upper_FL_x"]) == pytest.approx(0.08, abs=1e-6)
@@ -75,6 +82,45 @@ def test_a_load_from_channels(call: Callable[..., Any]) -> None:
     force = read_table("l.csv", known=("t", "Fx", "Fy", "Fz")).require(["Fx", "Fy", "Fz"])
     want = np.column_stack([0 * jaw.t, 0 * jaw.t, -80 * np.sin(jaw.t)])
     np.testing.assert_allclose(force, want, atol=1e-3)
+
+
+def test_measured_channels_reach_the_report(
+    call: Callable[..., Any], condyle_command: Callable[..., Any]
+) -> None:
+    jaw = record(head=0.0, seconds=2.0)
+    emg = np.repeat(np.abs(np.sin(9 * jaw.t)), 5).reshape(-1, 5, 1)
+    force = np.repeat((-20 * jaw.A[:, 2])[None], 5 * len(jaw.t), 0).reshape(-1, 5, 3)
+    options = {
+        "channels": [(n, u) for n, u in (("F1", "N"), ("F2", "N"), ("F3", "N"), ("E", "V"))],
+        "analog": np.concatenate([force, emg], axis=2),
+    }
+    jaw.write(Path("a.c3d"), **options)
+    chain = "superficial_masseter_left"
+    tables = {
+        "forces": {"channels": ["F1", "F2", "F3"], "point": "incisor"},
+        "emg": {"channels": {chain: "E"}, "high_pass": 0.0},
+    }
+    jaw.write_tables(Path("m.toml"), **tables)
+    human = [*CALL[:-1], "human-jaw", "--out", "o.csv"]
+    forgotten = condyle_command(*human)
+    assert forgotten.status == 0 and forgotten.err.count("warning") == 2
+    assert "--load no file for it" in forgotten.err and "--measured no file" in forgotten.err
+    outcome = condyle_command(*human, "--measured", "p.csv", "--load", "l.csv")
+    assert outcome.status == 0 and outcome.err == ""
+    assert "Load: force up to 20 N at incisor" in outcome.out
+    assert f"EMG, largest of each: {chain} 1 at " in outcome.out
+    told = "--load l.csv --load-point incisor --smooth auto --measured p.csv --report"
+    assert f"Next: condyle run human-jaw --motion o.csv {told}" in outcome.out
+    run = ("run", "human-jaw", "--motion", "o.csv", "--load", "l.csv", "--backend", "numpy")
+    ran = condyle_command(*run, "--load-point", "incisor", "--rate", "20", "--measured", "p.csv")
+    assert ran.status == 0
+    solution = open_solution("results/human-jaw.nc")
+    assert solution["marker_place"].shape == (len(solution["time"]), 8, 3)
+    assert np.isfinite(solution["emg"].sel(chain=chain)).all()
+    wrong = condyle_command(*run, "--measured", "l.csv")
+    assert wrong.status == 2 and 'columns "Fx", "Fy", "Fz" are neither of a marker' in wrong.err
+    page = condyle_command("report", "results/human-jaw.nc", "--measured", "p.csv")
+    assert page.status == 0 and "marker-residual" in Path("results/human-jaw.html").read_text()
 
 
 def test_as_data(call: Callable[..., Any]) -> None:
@@ -101,11 +147,13 @@ def test_what_was_assumed_is_a_warning(call: Callable[..., Any]) -> None:
     [
         (("--max-gap", "0.05"), "no pose for longer than 0.05 s: 2 to 2.09 s (2 of 4 fixed"),
         (("--units", "inch"), "units: got 'inch', expected m, cm, mm, um"),
-        (("--force", "F1,F2,F3"), "give both or none"),
-        (("--load", "l.csv"), "give both or none"),
+        (("--force", "F1,F2,F3"), "--load names the file"),
+        (("--load", "l.csv"), "load: no channels were named for it"),
         (("--force", "F1", "--load", "l.csv"), "got 1 channels, expected three"),
-        (("--markers-out", "o.csv"), "two files to write have one name"),
-        (("--markers-out", "no/p.csv"), "the folder"),
+        (("--force", "F1,F1,F2", "--load", "l.csv"), "expected the labels of three channels"),
+        (("--force", "F1,,F2", "--load", "l.csv"), "expected the labels of three channels"),
+        (("--measured", "o.csv"), "two files to write have one name"),
+        (("--measured", "no/p.csv"), "the folder"),
         (("--max-residual", "nan"), "--max-residual"),
         (("--max-residual", "0"), "no pose for longer than 0.1 s: 0 to 3.99 s"),
         (("--max-gap", "-1"), "--max-gap"),
@@ -156,7 +204,7 @@ def test_odd_words_anywhere(
     """A message and status 2, or a word that is fine: never a traceback."""
     good = call(record(seconds=0.8), "--out", "o.csv")
     assert good.status == 0
-    names = ("--max-gap", "--max-residual", "--units", "--markers-out", "--markers", "--out")
+    names = ("--max-gap", "--max-residual", "--units", "--measured", "--markers", "--out")
     calls = [(*CALL, "--out", "o.csv", name, word) for name in (*names, "--mechanism")]
     calls.append((*CALL, "--out", "o.csv", "--force", word, "--load", "l.csv"))
     calls.append((*CALL, "--out", "o.csv", "--force", "a,b,c", "--load", word))

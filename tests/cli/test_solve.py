@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from condyle.backends.c.kernel import CompiledKernel
 from condyle.backends.compiler import CompilerError, find_compiler
 from condyle.mechanism import COORDINATES
 from condyle.model.evaluator import with_point
+from condyle.motion import read_table
 from condyle.results.model import Model
 
 NAMES = ("X", "Y", "alpha", "beta")
@@ -287,3 +289,35 @@ def test_threads(
         outcome = condyle_command(*command, "--threads", 0)
         assert outcome.status == 2 and "--threads" in outcome.err
     assert condyle_command("run", "--threads", 2).status == 0 and asked[3:] == [2]
+
+
+def test_a_static_bite_in_two_lines(condyle_command: Callable[..., Any]) -> None:
+    """Numbers found independently with the same muscles, by sum of cubes."""
+    Path("bite.csv").write_text("X,Y,alpha,beta,Fz\n0,0,0,0,-10\n0,0,0,0,-100\n")
+    call = (
+        "solve",
+        "human-jaw",
+        "--states",
+        "bite.csv",
+        "--out",
+        "o.csv",
+        "--distribution",
+        "cubic",
+    )
+    outcome = condyle_command(*call, "--backend", "numpy")
+    assert outcome.status == 0 and "at rest" in outcome.err and outcome.err.count("\n") == 1
+    assert "Greatest activation (effort over its limit): 0.178, " in outcome.out
+    assert " in row 2" in outcome.out
+    joints = ["contact_left_condyle", "contact_right_condyle"]
+    loads = read_table("o.csv").require(joints)[1]
+    np.testing.assert_allclose(loads, [-25.2, -18.5], atol=0.05)
+    incisor = condyle_command(*call, "--load-point", "incisor", "--json")
+    assert json.loads(incisor.out)["greatest_activation"]["row"] == 2
+    np.testing.assert_allclose(read_table("o.csv").require(joints)[1], [-92.9] * 2, atol=0.05)
+
+
+def test_rates_without_accelerations_are_no_rest(condyle_command: Callable[..., Any]) -> None:
+    Path("s.csv").write_text("X,Y,alpha,beta,dX\n0,0,0,0,0\n")
+    outcome = condyle_command("solve", "human-jaw", "--states", "s.csv", "--out", "o.csv")
+    assert outcome.status == 2 and '"dY", "dalpha", "dbeta" are missing' in outcome.err
+    assert not Path("o.csv").exists()

@@ -1,4 +1,4 @@
-"""Laws of energy, with kinetic and potential energy written here by hand."""
+"""Laws of energy, with kinetic and potential energy written by hand."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from oracles.description import Description, joint, read, rod_angles, swing_axes
+from oracles.description import read
+from oracles.energy import energy
 from oracles.random_mechanism import random_mechanism, random_state, toml_text
-from oracles.rotations import Motion, platform_motion
+from oracles.rotations import platform_motion
 
 import condyle
 from condyle.dynamics import FORMULATIONS
@@ -27,32 +28,6 @@ def drawn(case: str) -> tuple[dict[str, Any], Model]:
     if case == "k3":  # three contacts nearly fix the roll by Y: turn that round
         raw["dependent"] = ["Z", "gamma", "Y"]
     return raw, condyle.derive(parse(toml_text(raw)), backend="numpy")
-
-
-def rod_energy(d: Description, chain: Any, P: np.ndarray, V: np.ndarray) -> tuple[float, float]:
-    """Kinetic and potential energy of crank and coupler, from the motion of M."""
-    _, S = joint(chain, P)
-    e, t = P - S, np.cross(chain.axis, S - chain.G)
-    rate = e @ V / (e @ t)  # the rod keeps its length
-    S_rate = t * rate
-    axes = np.column_stack(swing_axes(chain, rod_angles(chain, e)[0]))
-    angles = np.linalg.lstsq(np.cross(axes.T, e).T, V - S_rate, rcond=None)[0]
-    omega, n, rod = axes @ angles, e / chain.length, chain.rods[0]
-    part = rod.com / chain.length
-    v, spin = S_rate + part * (V - S_rate), (omega @ n) ** 2
-    kinetic = chain.drive * rate**2 + rod.mass * v @ v
-    kinetic += rod.transverse * (omega @ omega - spin) + rod.axial * spin
-    return kinetic / 2, -rod.mass * d.gravity @ (S + part * e)
-
-
-def energy(d: Description, motion: Motion) -> tuple[float, float]:
-    spin = motion.R.T @ motion.omega
-    kinetic = (d.mass * motion.velocity @ motion.velocity + spin @ d.inertia @ spin) / 2
-    potential = -d.mass * d.gravity @ motion.origin
-    for chain in d.chains:
-        more = rod_energy(d, chain, *motion.point(chain.M)[:2])
-        kinetic, potential = kinetic + more[0], potential + more[1]
-    return kinetic, potential
 
 
 @pytest.mark.parametrize("case", CASES)

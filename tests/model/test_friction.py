@@ -203,6 +203,32 @@ def test_sliding_velocity_by_differences_of_the_motion(name: str) -> None:
             assert abs(normal @ got.slip[i, k]) < 1e-10  # it slides and does not leave
 
 
+HELD: dict[str, dict[str, Any]] = {
+    "k1": {"contacts": 1, "mu": 0.7, "seed": 26},
+    "one effort to spare": {"chains": 5, "seed": 23},
+    "two": {"mu": 0.9, "surface": "quadratic", "seed": 22},
+}
+
+
+@pytest.mark.parametrize("name", HELD)
+def test_a_kernel_is_sure_of_forces_that_are_held_at_zero(name: str) -> None:
+    """All candidates in one graph against Newton's method on the dual, pattern by pattern."""
+    case = drawn(count=20, **HELD[name])
+    model = Evaluator(case.mechanism, backend="numpy")
+    q, q1, q2, load = case.arguments
+    wrench = {"force": load[:, :3], "moment": load[:, 3:6], "point": load[:, 6:]}
+    given = {"q": q, "q1": q1, "q2": q2, **wrench}
+    answer = model.kernel("inverse", ("contact",)).run(given)
+    wanted, status = model._robust.evaluate(given)
+    assert not answer.status.any() and not status.any()
+    for part in ("effort", "contact_force"):
+        a, b = answer.values[part], wanted[part]
+        np.testing.assert_allclose(a, b, atol=1e-9 * np.abs(b).max())
+    held = (answer.values["contact_force"] == 0).sum(axis=0)
+    assert (held == 1).any()
+    assert (held == 2).any() == (name == "two")
+
+
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("route", ["core", "direct"])
 def test_every_formulation_and_route(formulation: str, route: str) -> None:

@@ -78,3 +78,19 @@ def test_an_unknown_output_is_named() -> None:
     c = case("masticatory")
     with pytest.raises(InputError, match='no output "contacts"'):
         Evaluator(c.mechanism, backend="numpy").torques(*c.arguments, outputs=("contacts",))
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_call_derives_nothing_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the mechanism alone decides is found once: a call of few samples would pay for it."""
+    c = case("masticatory")
+    model = Evaluator(c.mechanism)
+    model.torques(*c.arguments)
+
+    def again(_: object) -> None:
+        raise AssertionError("derived again")
+
+    for name in ("independent_coordinates", "dependent_coordinates"):
+        monkeypatch.setattr(f"condyle.model.evaluator.{name}", again)
+    model.torques(*c.arguments)
+    assert len(model.independent) == 4

@@ -34,6 +34,9 @@ CASES: dict[str, dict[str, Any]] = {
     "minimax mixed k1": {
         "families": MIXED[:3], "contacts": 1, "chains": 7, "limit": 8.0, "seed": 12
     },
+    "minimax cables beside motors": {
+        "families": ("RSS", "cable"), "chains": 8, "limit": 8.0, "seed": 21
+    },
     "cubic cables": {"families": ("cable",), "chains": 8, "limit": 5.0, "seed": 6},
 }  # fmt: skip
 TIGHTER = 1e-8
@@ -201,6 +204,44 @@ def test_one_sample_of_a_compiled_model_keeps_the_policy() -> None:
     model = Evaluator(case.mechanism, backend="compiled", distribution="bounded", preload=0.5)
     rows = [model.one(*row) for row in zip(*case.arguments, strict=True)]
     np.testing.assert_allclose(rows, wanted.effort, rtol=1e-8, atol=1e-9)
+
+
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize("objective", ["bounded", "weighted"])
+def test_compiled_limits_and_shortfalls_are_those_of_numpy(objective: str) -> None:
+    """With and without shares, which take other equations; where limits are met and where not."""
+    case, model, _ = found("bounded k2 one-sided")
+    q, q1, q2, load = (np.repeat(a, 4, axis=0) for a in case.arguments)
+    load[:, :6] *= np.tile([0.5, 1, 4, 16], len(load) // 4)[:, None]
+    wanted = model.choosing(objective, 0.5).evaluate(q, q1, q2, load)
+    assert set(wanted.status) == {Status.ok, Status.infeasible}
+    compiled = Evaluator(case.mechanism, backend="compiled", distribution=objective, preload=0.5)
+    got = compiled.evaluate(q, q1, q2, load)
+    assert (got.status == wanted.status).all()
+    good = wanted.status == Status.ok
+    for name in ("effort", "contact_force", "friction_force"):
+        a, b = getattr(got, name)[good], getattr(wanted, name)[good]
+        np.testing.assert_allclose(a, b, atol=1e-9 * np.abs(b).max())
+    size = np.abs(wanted.effort[good]).max()
+    np.testing.assert_allclose(got.share[:, good], wanted.share[:, good], atol=1e-9 * size)
+    np.testing.assert_allclose(got.shortfall, wanted.shortfall, rtol=1e-9)
+    quick = compiled.torques(q, q1, q2, load)
+    np.testing.assert_allclose(quick.effort[good], got.effort[good], atol=1e-9 * size)
+    assert np.isnan(quick.effort[~good]).all()
+
+
+def test_a_preload_without_one_sided_contacts_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    machine = condyle.load("masticatory").replace(name="two-sided")
+    for _ in range(2):
+        condyle.derive(machine, backend="numpy", distribution="bounded", preload=3.0)
+    said = capsys.readouterr().err
+    assert said.count("condyle: preload 3 N presses on nothing") == 1
+    assert '"two-sided"' in said and "one_sided = true" in said
+    chosen = condyle.load("masticatory")
+    one = chosen.contacts[0].model_copy(update={"one_sided": True, "side": "below"})
+    pushed = chosen.replace(contacts=(one, *chosen.contacts[1:]))
+    condyle.derive(pushed, backend="numpy", distribution="bounded", preload=3.0)
+    assert capsys.readouterr().err == ""
 
 
 def test_a_pickled_model_keeps_its_policy() -> None:

@@ -21,6 +21,7 @@ def c3d_bytes(
     missing: str = "residual",
     channels: Sequence[tuple[str, str]] = (),
     analog: np.ndarray | None = None,
+    plates: dict[str, Any] | None = None,
 ) -> bytes:
     """A recording of markers, in Intel's order of bytes.
 
@@ -28,6 +29,7 @@ def c3d_bytes(
               0 for 16-bit integers, each worth so much.
           missing: "residual" (-1), "nan" or "zero".
           channels: (label, unit);  analog: (F, samples a frame, C).
+          plates: parameters of the group FORCE_PLATFORM; arrays by their dimensions in the file.
     """
     frames, count = points.shape[:2]
     per_frame = 0 if analog is None else analog.shape[1]
@@ -51,6 +53,8 @@ def c3d_bytes(
             "SCALE": np.ones(len(channels), np.float32),
             "OFFSET": np.zeros(len(channels), np.int16),
         }
+    if plates is not None:
+        groups["FORCE_PLATFORM"] = plates
     last = first_frame + frames - 1
     if last > 65535:  # two words each, the lower one first
         ends = {"ACTUAL_START_FIELD": first_frame, "ACTUAL_END_FIELD": last}
@@ -102,7 +106,7 @@ def _value(value: Any) -> bytes:
         joined = b"".join(text.ljust(width) for text in texts)
         return struct.pack("<bBBB", -1, 2, width, len(texts)) + joined
     array = np.asarray(value)
-    return struct.pack("<bB", array.itemsize, array.ndim) + bytes(array.shape) + array.tobytes()
+    return struct.pack("<bB", array.itemsize, array.ndim) + bytes(array.shape) + array.tobytes("F")
 
 
 def _padded(content: bytes) -> bytes:

@@ -318,12 +318,12 @@ def test_accessor_has_every_plot_and_xarrays_own(solution: Solution) -> None:
 
 
 def test_callers_settings_are_left_alone(solution: Solution) -> None:
-    before = dict(mpl.rcParams)
+    before, kept = dict(mpl.rcParams), dict(Gcf.figs)
     with mpl.rc_context({"font.size": 30}):
         figure = PLOTS["load"](solution)
         assert figure.axes[0].xaxis.label.get_size() == 9
     assert dict(mpl.rcParams) == before
-    assert not Gcf.figs  # what pyplot would keep
+    assert Gcf.figs == kept  # what pyplot would keep
 
 
 def test_papers_figures_as_files(comparison: Comparison, tmp_path: Path) -> None:

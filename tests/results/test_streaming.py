@@ -134,7 +134,7 @@ def test_bad_rows_late_that_are_kept(model: Evaluator, tmp_path: Path) -> None:
 
 def test_warnings_count_rows_of_the_file(model: Evaluator, tmp_path: Path) -> None:
     path = write(tmp_path / "states.csv", 900, row_733="0,0.004" + ",0" * 10)
-    _, warnings = solve_file(model, path, tmp_path / "out.csv")
+    _, warnings, _ = solve_file(model, path, tmp_path / "out.csv")
     assert any("in 1 rows" in text and "in row 733" in text for text in warnings)
 
 

@@ -18,9 +18,10 @@ import shutil
 import stat
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -62,11 +63,13 @@ class Contents:
 
     kernels: those that are whole.
     size:    of all that is there [bytes], also of what is broken or half built.
+    choices: compiler -> kernels whose batch it compiled because that was measured to be quickest.
     """
 
     folder: Path
     kernels: int
     size: int
+    choices: dict[str, int] = field(default_factory=dict)
 
 
 def cache_folder() -> Path:
@@ -149,7 +152,13 @@ def contents() -> Contents:
     """How many kernels there are and what they take [bytes]."""
     folder = cache_folder()
     entries = _entries(folder)
-    kernels = sum(p.suffix == ".json" and _whole(folder, p.stem) is not None for p in entries)
+    kernels = [
+        entry
+        for path in entries
+        if path.suffix == ".json" and (entry := _whole(folder, path.stem)) is not None
+    ]
+    measured = (entry.facts["compiler"][0] for entry in kernels if "nanoseconds" in entry.facts)
+    choices = dict(sorted(Counter(measured).items()))
     half_built = [
         Path(top, name)
         for place in folder.glob(f"{BUILD}*")
@@ -160,7 +169,7 @@ def contents() -> Contents:
     for path in entries + half_built:
         with suppress(OSError):  # gone meanwhile
             size += path.stat().st_size
-    return Contents(folder, kernels, size)
+    return Contents(folder, len(kernels), size, choices)
 
 
 def clear() -> Contents:

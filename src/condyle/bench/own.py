@@ -20,7 +20,7 @@ import numpy as np
 from ..analysis.map import workspace_map
 from ..backends.c.kernel import CompiledKernel
 from ..backends.compiler import find_compiler
-from ..mechanism.chain import Chain
+from ..backends.kernel import Kernel
 from ..mechanism.contact import Friction
 from ..mechanism.mechanism import Mechanism
 from ..model.evaluator import Evaluator
@@ -29,6 +29,7 @@ from ..questions.inverse import inverse
 from ..questions.numbers import Layout, has_closed_form, specialised
 from ..questions.structure import structure_of
 from ..results.model import Model
+from .programs import Bites, program_probes, tight
 from .rows import Probe, Row, spread
 from .straight_line import torque_function
 
@@ -37,6 +38,7 @@ JAW_SAMPLES = 5001  # of a motion, as people solve it
 LEAST_NORM = "torques and contact forces of 5001"
 BOUNDED = f"{LEAST_NORM}, within limits that are inactive"
 FRICTION = f"{LEAST_NORM}, friction at two contacts"
+FORWARD = "forward dynamics"
 MANY = 100_000  # samples of what people call
 MAPPED = 200_000
 MAP = "map of reach and ratio, a pose"
@@ -49,9 +51,10 @@ class Timer:
     def __init__(self) -> None:
         source = files(__package__) / "timer.c"
         library = Path(tempfile.mkdtemp(prefix="condyle-bench-")) / "timer.so"
-        find_compiler().build(Path(str(source)), library)
+        find_compiler().build(library, Path(str(source)))
         self.library = ctypes.CDLL(str(library))
-        for name in ("time_one", "time_batch", "time_casadi", "clock_rate", "vector_operation"):
+        names = ("time_one", "time_batch", "time_casadi", "time_springs")
+        for name in (*names, "clock_rate", "vector_operation"):
             getattr(self.library, name).restype = ctypes.c_double
 
     def clock_rate(self) -> float:
@@ -130,7 +133,10 @@ def own_probes(mechanism: Mechanism, formulations: list[str]) -> Iterator[Probe]
             variants.append((", direct", "direct", ()))
         for what, route, outputs in variants:
             model = Evaluator(mechanism, formulation, route, "compiled")
-            yield from _kernel_probes(label + what, model, outputs, timer, case)
+            kernel = model.kernel("inverse", outputs)
+            found = model.torques(*case.states, case.load, outputs).effort
+            yield from _kernel_probes(label + what, kernel, case.columns, case.right, found, timer)
+    yield from _forward_probes(f"{name} {FORWARD}", case, timer)
     numpy = Evaluator(mechanism, backend="numpy")
     yield _python_probe(
         f"{name} numpy: batch", lambda: numpy.torques(*case.states, case.load), SAMPLES
@@ -139,17 +145,37 @@ def own_probes(mechanism: Mechanism, formulations: list[str]) -> Iterator[Probe]
         yield from _straight_probes(f"{name} CasADi straight-line C, gcc", timer, case)
 
 
-def _kernel_probes(
-    label: str, model: Evaluator, outputs: tuple[str, ...], timer: Timer, case: Case
-) -> Iterator[Probe]:
-    kernel = model.kernel("inverse", outputs)
+def _forward_probes(label: str, case: Case, timer: Timer) -> Iterator[Probe]:
+    """Accelerations and contact forces, from the efforts that inverse dynamics finds."""
+    model = Evaluator(case.mechanism, backend="compiled")
+    kernel = model.kernel("forward", ("contact",))
+    q, q1, q2 = case.states
     assert isinstance(kernel, CompiledKernel)
-    packed, columns = np.ascontiguousarray(case.columns), np.asfortranarray(case.columns)
+    given = np.hstack([q, q1, case.right[:, list(kernel.order)], case.load])
+    found = model.forward(q, q1, case.right, case.load).acceleration
+    yield from _kernel_probes(label, kernel, given, q2, found, timer)
+
+
+def _kernel_probes(
+    label: str,
+    kernel: Kernel,
+    given: np.ndarray,
+    right: np.ndarray,
+    found: np.ndarray,
+    timer: Timer,
+) -> Iterator[Probe]:
+    """One kernel in C.
+
+    Args: given: its columns;  right: its first result, (SAMPLES, size);  found: that by batches.
+    """
+    assert isinstance(kernel, CompiledKernel)
+    packed, columns = np.ascontiguousarray(given), np.asfortranarray(given)
     out, status = np.empty(96 * SAMPLES), np.empty(SAMPLES, dtype=np.uint8)
-    n = case.right.shape[1]
-    got = np.array([kernel.one(s)[0] for s in packed[:256]])[:, :n]
-    # Lanes stand family by family in what C returns.
-    wrong = _error(got[:, np.argsort(kernel.order)], case.right[:256])
+    got = np.array([kernel.one(s)[0] for s in packed[:256]])[:, : right.shape[1]]
+    if kernel.interface.results[0].lanes:
+        # Lanes stand family by family in what C returns.
+        got = got[:, np.argsort(kernel.order)]
+    wrong = _error(got, right[:256])
     operations = kernel.facts["operations"]
     for dependent, what in ((0, "one"), (1, "one, dependent")):
 
@@ -161,17 +187,17 @@ def _kernel_probes(
 
         yield Probe(f"{label}: {what}", run, wrong, operations)
     count = columns.shape[1]
-    pointers = (ctypes.c_void_p * count)(*(columns[:, j].ctypes.data for j in range(count)))
     strides = (ctypes.c_ssize_t * count)(*[1] * count)
 
     def blocks() -> float:
         _, batch, table = _addresses(kernel)
+        # Taken here, so that the columns stay as long as what reads them.
+        pointers = (ctypes.c_void_p * count)(*(columns[:, j].ctypes.data for j in range(count)))
         return timer.library.time_batch(
             batch, table, pointers, strides, ctypes.c_size_t(SAMPLES), _at(out), _at(status)
         )
 
-    wrong = _error(model.torques(*case.states, case.load, outputs).effort, case.right)
-    yield Probe(f"{label}: batch", blocks, wrong, operations)
+    yield Probe(f"{label}: batch", blocks, _error(found, right), operations)
 
 
 def _addresses(kernel: CompiledKernel) -> list[ctypes.c_void_p]:
@@ -219,7 +245,7 @@ def policy_probes(mechanism: Mechanism) -> Iterator[Probe]:
     rough = mechanism.replace(
         contacts=tuple(c.model_copy(update={"friction": rubbing}) for c in mechanism.contacts)
     )
-    wide = mechanism.replace(chains=tuple(_limited(chain) for chain in mechanism.chains))
+    wide = tight(mechanism, 1e6)  # which no effort comes near
     for name, machine, policy in (
         (LEAST_NORM, mechanism, "minimum_norm"),
         (BOUNDED, wide, "bounded"),
@@ -231,11 +257,22 @@ def policy_probes(mechanism: Mechanism) -> Iterator[Probe]:
         yield _python_probe(f"{label}: {name}", call, JAW_SAMPLES)
 
 
-def _limited(chain: Chain) -> Chain:
-    """With limits that no effort comes near."""
-    return chain.model_copy(
-        update={"actuator": chain.actuator.model_copy(update={"torque_limit": 1e6})}
-    )
+def limit_probes(
+    mechanism: Mechanism, jaw: Mechanism, unavailable: dict[str, str]
+) -> Iterator[Probe]:
+    """Limits that bind at one sample in three, and bites of a jaw, beside other solvers."""
+    given = Case.of(mechanism).many(JAW_SAMPLES)
+    free = Evaluator(mechanism, backend="compiled").torques(*given).effort
+    greatest = float(np.quantile(np.abs(free).max(axis=1), 2 / 3))
+    model = Evaluator(tight(mechanism, greatest), backend="compiled", distribution="bounded")
+    fits = model.torques(*given).status == 0
+    q, q1, q2, acting = (a[fits] for a in given)
+    yield from program_probes(Bites(mechanism.name, model, (q, q1, q2, acting)), unavailable)
+    model = Evaluator(jaw, backend="compiled", distribution="bounded")
+    still = np.zeros((JAW_SAMPLES, jaw.degrees_of_freedom))
+    bite = np.zeros((JAW_SAMPLES, 9))
+    bite[:, 2], bite[:, 6:] = np.linspace(0, -600, JAW_SAMPLES), model.load_point("right_molar")
+    yield from program_probes(Bites(jaw.name, model, (still, still, still, bite)), unavailable)
 
 
 def jaw_probes(mechanism: Mechanism) -> Iterator[Probe]:
@@ -276,7 +313,7 @@ def _straight_probes(label: str, timer: Timer, case: Case) -> Iterator[Probe]:
     folder = Path(tempfile.mkdtemp(prefix="condyle-bench-"))
     (folder / "straight.c").write_text(_generated(function), encoding="utf-8")
     library = folder / "straight.so"
-    find_compiler().build(folder / "straight.c", library)
+    find_compiler().build(library, folder / "straight.c")
     call = ctypes.CDLL(str(library)).straight_line
     w, iw = np.empty(function.sz_w() + 1), np.empty(function.sz_iw() + 1, dtype=np.int64)
     packed, out = np.ascontiguousarray(case.samples), np.empty(16)

@@ -15,6 +15,7 @@ class Probe:
 
     run:        does some milliseconds of work; seconds an evaluation.
     error:      largest difference from numpy's torques, relative to the largest.
+    tolerance:  of the error: more, and the time means nothing.
     operations: vector operations of a batch step, a fused multiply-add counting one.
     """
 
@@ -23,6 +24,7 @@ class Probe:
     error: float
     operations: int | None = None
     note: str = ""
+    tolerance: float = TOLERANCE
 
 
 @dataclass
@@ -64,7 +66,7 @@ def timed(
             probe.run()  # brings its code and data into the caches
             own.append(probe.run())
     for probe, own in zip(probes, times, strict=True):
-        wrong = probe.error > TOLERANCE
+        wrong = probe.error > probe.tolerance
         note = f"WRONG by {probe.error:.1e}; its time means nothing" if wrong else probe.note
         yield Row(probe.name, *spread(own), probe.error, probe.operations, note, own)
 

@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from statistics import median
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -23,8 +24,11 @@ from ..dynamics import FORMULATIONS
 from ..mechanism import bundled_text, load
 from ..model.evaluator import Evaluator
 from ..progress import step
+from .exported import PORTABLE, WIDE, exported_probes
+from .motion import SECOND, motion_rows
 from .own import (
     BOUNDED,
+    FORWARD,
     FRICTION,
     LEAST_NORM,
     MAP,
@@ -32,6 +36,7 @@ from .own import (
     Timer,
     asked_probes,
     jaw_probes,
+    limit_probes,
     map_probes,
     own_probes,
     policy_probes,
@@ -39,7 +44,10 @@ from .own import (
     ready_rows,
     thread_probes,
 )
+from .programs import BINDING
 from .rows import Probe, Row, timed
+from .simulating import LOOP, simulation_probes
+from .sweeps import ALL, sweep_ratios, sweep_rows
 
 REFERENCE = "masticatory"
 CYCLE = "one cycle of the clock"
@@ -107,13 +115,21 @@ def run_benchmark(seconds: float = 1.0) -> Benchmark:
         with step("building other engines"):
             probes += _peer_probes(unavailable)
         probes += [*asked_probes(load(REFERENCE)), *map_probes(load(REFERENCE))]
+        with step("building exported C"):
+            probes += exported_probes(load(REFERENCE))
         probes += [*policy_probes(load(REFERENCE)), *jaw_probes(load("human-jaw"))]
+        probes += limit_probes(load(REFERENCE), load("human-jaw"), unavailable)
+        probes += simulation_probes(load(REFERENCE))
         probes.append(Probe(OPERATION, timer.vector_operation, 0.0))
         rows = _timed(probes, rounds)
+        with step("swinging for a second"):
+            rows += motion_rows(REFERENCE, _benchmarks("peers.closed_loops"), unavailable)
         with step("starting afresh"):
             rows += ready_rows(REFERENCE)
     if processors > 1:
         rows += _timed(list(thread_probes(load(REFERENCE))), rounds)
+        with step("solving studies"):
+            rows += sweep_rows()
     compiler = find_compiler()
     facts = {
         "processor": _processor(),
@@ -160,16 +176,23 @@ def _heat(probe: Probe) -> int:
     return 0 if probe.name == CYCLE or probe.name.startswith("peer") else 1
 
 
-def _peer_probes(unavailable: dict[str, str]) -> Iterator[Probe]:
-    """The other engines, where the repository's `benchmarks` is at hand."""
+def _benchmarks(name: str) -> ModuleType | None:
+    """A module of the repository's `benchmarks`, where that is at hand."""
     sys.path.insert(0, str(Path.cwd()))
     try:
-        peers = importlib.import_module("benchmarks.peers")
+        return importlib.import_module(f"benchmarks.{name}")
     except ImportError:
-        unavailable["peers"] = "run from the root of the repository"
-        return
+        return None
     finally:
         sys.path.pop(0)
+
+
+def _peer_probes(unavailable: dict[str, str]) -> Iterator[Probe]:
+    """The other engines, where the repository's `benchmarks` is at hand."""
+    peers = _benchmarks("peers")
+    if peers is None:
+        unavailable["peers"] = "run from the root of the repository"
+        return
     raw = tomllib.loads(bundled_text(REFERENCE))
     mechanism = load(REFERENCE)
     model = Evaluator(mechanism, backend="numpy")
@@ -224,21 +247,39 @@ def _ratios(rows: list[Row], lanes: int) -> dict[str, float]:
     ratios["batch over as many fused multiply-adds"] = batch.over(by_name[OPERATION]) / (2 * cycles)
     for what, row in (("one evaluation", one), ("batch", batch)):
         shape = row.name.rsplit(": ", 1)[1]
+        forward = by_name[f"{REFERENCE} {FORWARD}: {shape}"]
+        ratios[f"{what}, forward over inverse dynamics"] = forward.over(row)
         with_forces = by_name[f"{own} + contact forces: {shape}"]
         ratios[f"{what} with contact forces over without"] = with_forces.over(row)
         ratios[f"{what}, curved over planar"] = by_name[f"{curved}: {shape}"].over(row)
         for formulation in ("momentum", "lagrange"):
-            other = by_name[f"{REFERENCE} {formulation}: {shape}"]
-            ratios[f"{what}, {formulation} over virtual_power"] = other.over(row)
+            slower = by_name[f"{REFERENCE} {formulation}: {shape}"]
+            ratios[f"{what}, {formulation} over virtual_power"] = slower.over(row)
     for formulation in ("momentum", "lagrange"):
         routes = (by_name[f"{REFERENCE} {formulation}{r}: one"] for r in (", direct", ""))
         ratios[f"one evaluation, {formulation}, direct over core"] = next(routes).over(next(routes))
+    swings = [row for row in rows if SECOND in row.name]
+    ours = next((row for row in swings if not row.name.startswith("peer")), None)
+    for engine in ("mujoco", "pinocchio"):
+        theirs = [row for row in swings if row.name.startswith(f"peer {engine}")]
+        if ours and theirs and ours.error <= min(row.error for row in theirs):
+            least_time = min(row.seconds for row in theirs)
+            ratios[f"{SECOND}, times faster than {engine}, and nearer"] = least_time / ours.seconds
+    for what in (WIDE, PORTABLE):
+        ratios[f"one evaluation, {what} over the kernel"] = by_name[f"{REFERENCE} {what}"].over(one)
     least = by_name[f"{REFERENCE}: {LEAST_NORM}"]
     for what, name in (("bounded", BOUNDED), ("friction at two contacts", FRICTION)):
         ratios[f"{what} over least norm"] = by_name[f"{REFERENCE}: {name}"].over(least)
+    for label in (REFERENCE, "human-jaw"):
+        limited = by_name[f"{label}: {BINDING}"]
+        for solver in ("DAQP", "quadprog", "HiGHS", "OSQP"):
+            if other := by_name.get(f"{limited.name}, {solver}"):
+                ratios[f"{label}, bounded, times faster than {solver}"] = other.over(limited)
     asked = by_name[f"{REFERENCE}: torques"]
     for what in ("evaluate", SOLVE):
         ratios[f"{what} over efforts alone"] = by_name[f"{REFERENCE}: {what}"].over(asked)
+    loop = by_name[f"{REFERENCE}: {LOOP}"]
+    ratios["control at 1 kHz, plant at 10 kHz, times real time"] = 1 / loop.seconds
     for size in ("100", "5000"):
         few = [by_name.get(f"{own}: batch of {size}, {t}") for t in ("one thread", "two threads")]
         if few[0] and few[1]:
@@ -248,6 +289,7 @@ def _ratios(rows: list[Row], lanes: int) -> dict[str, float]:
     threads = [by_name.get(f"{own}: batch, {what}") for what in ("one thread", "two threads")]
     if threads[0] and threads[1]:
         ratios["two threads, times faster than one"] = threads[0].over(threads[1])
+    ratios |= sweep_ratios(by_name) if ALL in by_name else {}
     ready = f"{REFERENCE}: file to ready kernel"
     ratios["file to ready kernel, cold [s]"] = by_name[f"{ready}, cold"].seconds
     ratios["file to ready kernel, cached [s]"] = by_name[f"{ready}, cached"].seconds

@@ -81,3 +81,42 @@ double vector_operation(long count) {
     (void)used;
     return seconds / (double)count;
 }
+
+/* q'' of X, Y, alpha, beta under springs and dampers on these, `one` from state to accelerations.
+ *
+ * in: q, q', efforts, force, moment, point. The springs' wrench has no part along Z and gamma. */
+static void sprung(One f, const double *table, double *in, int n, double *out, const double *x,
+                   const double *stiffness, const double *damping) {
+    double pull[4], *load = in + 8 + n;
+    for (int i = 0; i < 8; i++) in[i] = x[i];
+    for (int i = 0; i < 4; i++) pull[i] = -stiffness[i] * x[i] - damping[i] * x[4 + i];
+    double c = cos(x[2]), s = sin(x[2]), lean = tan(x[3]) * pull[2];
+    load[0] = pull[0];
+    load[1] = pull[1];
+    load[3] = pull[2];
+    load[4] = c * pull[3] + s * lean;
+    load[5] = s * pull[3] - c * lean;
+    f(table, in, out);
+}
+
+/* Seconds that a motion takes by Runge and Kutta's method of fourth order; x: q and q'. */
+double time_springs(One f, const double *table, double *in, int n, double *out, double *x,
+                    const double *stiffness, const double *damping, double step, long steps) {
+    const double part[4] = {0.5, 0.5, 1.0, 0.0}, weight[4] = {1 / 6., 1 / 3., 1 / 3., 1 / 6.};
+    double start = now();
+    for (long k = 0; k < steps; k++) {
+        double at[8], next[8];
+        for (int i = 0; i < 8; i++) at[i] = next[i] = x[i];
+        for (int stage = 0; stage < 4; stage++) {
+            sprung(f, table, in, n, out, at, stiffness, damping);
+            double slope[8];
+            for (int i = 0; i < 4; i++) slope[i] = at[4 + i], slope[4 + i] = out[i];
+            for (int i = 0; i < 8; i++) {
+                next[i] += step * weight[stage] * slope[i];
+                at[i] = x[i] + step * part[stage] * slope[i];
+            }
+        }
+        for (int i = 0; i < 8; i++) x[i] = next[i];
+    }
+    return now() - start;
+}

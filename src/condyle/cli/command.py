@@ -60,6 +60,9 @@ def command(
                 answer = work(**given)
             answer.give(quiet, as_json)
 
+        # The help page breaks lines where the terminal ends, not where the source does.
+        paragraphs = inspect.cleandoc(work.__doc__ or "").split("\n\n")
+        shown.__doc__ = "\n\n".join(" ".join(text.split()) for text in paragraphs)
         _take(shown, work, quiet=options.Quiet, as_json=options.Json)
         of.command(name, rich_help_panel=chapter, epilog=f"Example: {example}")(shown)
         return work

@@ -28,7 +28,8 @@ def from_c3d(
         Path,
         typer.Option(
             help="Marker file (TOML): which markers are fixed and which move with the platform, "
-            "when the mechanism is at home (s), and points of it in the laboratory (register)."
+            "when the mechanism is at home (s), points of it in the laboratory (register), and "
+            "channels of force (forces) and muscles (emg)."
         ),
     ],
     mechanism: Annotated[
@@ -68,22 +69,23 @@ def from_c3d(
             autocompletion=completion.one_of("mm", "m", "cm", "um"),
         ),
     ] = None,
-    markers_out: Annotated[
+    measured: Annotated[
         Path | None,
         typer.Option(
-            help="File for the markers in the mechanism's frame (.csv or .parquet): t (s) and "
-            "MARKER_x, MARKER_y, MARKER_z (m)."
+            help="File for what was measured beside it (.csv or .parquet), to be shown by run "
+            "--measured: markers in the mechanism's frame, their residuals (m), EMG (emg)."
         ),
+    ] = None,
+    load: Annotated[
+        Path | None,
+        typer.Option(help="File for the load that the marker file names (forces), or --force."),
     ] = None,
     force: Annotated[
         str | None,
         typer.Option(
             help="Three channels, as in Fx,Fy,Fz: a force on the platform (N, kN, mN) along the "
-            "laboratory's axes."
+            "laboratory's axes, in place of what the marker file names."
         ),
-    ] = None,
-    load: Annotated[
-        Path | None, typer.Option(help="File for the load of --force (.csv or .parquet).")
     ] = None,
 ) -> Answer:
     """Markers of a C3D file as a motion.
@@ -99,8 +101,8 @@ def from_c3d(
 
     require("c3d", "c3d")
 
-    if (force is None) != (load is None):
-        raise UnsupportedError("--force names channels and --load their file; give both or none")
+    if force is not None and load is None:
+        raise UnsupportedError("--force names channels; --load names the file for their load")
     channels = None if force is None else tuple(name.strip() for name in force.split(","))
     found = marked.from_c3d(
         recording,
@@ -112,7 +114,16 @@ def from_c3d(
         unit=units,
         force=channels,
     )
-    files = marked.write_motion(found, out, markers_out, load)
-    warn(list(found.warnings))
-    then = command_line("run", mechanism, motion=out, load=load, smooth="auto")
+    files = marked.write_motion(found, out, measured, load)
+    forgotten = []
+    if found.load is not None and load is None:
+        forgotten.append("the marker file names a load (forces), and --load no file for it")
+    if found.beside.emg and measured is None:
+        forgotten.append("the marker file names EMG (emg), and --measured no file for it")
+    warn([*found.warnings, *forgotten])
+    point = found.load.point if found.load is not None and load is not None else None
+    beside = {"measured": measured, "report": True} if measured is not None else {}
+    then = command_line(
+        "run", mechanism, motion=out, load=load, load_point=point, smooth="auto", **beside
+    )
     return Answer(f"{found}\n{files_line(files)}", marked.as_data(found) | {"files": files}, then)

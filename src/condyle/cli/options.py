@@ -81,11 +81,18 @@ Load = Annotated[
         "(N m). Default: the bundled load (synthetic) with the bundled motion, else none."
     ),
 ]
+Measured = Annotated[
+    Path | None,
+    typer.Option(
+        help="What was measured beside the motion (.csv or .parquet), to be shown with the "
+        "results: markers and EMG, as condyle motion from-c3d --measured writes them."
+    ),
+]
 Units = Annotated[
     str | None,
     typer.Option(
         help="Units of the motion's times (s, ms, us, min), lengths (m, cm, mm, um) and angles "
-        "(rad, deg, mrad), as in ms,mm,deg. A header such as x [mm] says so too.",
+        "(rad, deg, mrad), as in ms,mm,deg. A header such as x (mm) says so too.",
         autocompletion=completion.one_of(*completion.UNITS),
     ),
 ]
@@ -119,6 +126,7 @@ Trim = Annotated[
 Reactions = Annotated[
     bool, typer.Option("--reactions", help="Forces and moments in every joint too.")
 ]
+Mat = Annotated[bool, typer.Option("--mat", help="Write results for MATLAB (.mat) too.")]
 Backend = Annotated[
     str,
     typer.Option(

@@ -8,6 +8,7 @@ from . import bounded, cubic, minimax, minimum_norm, weighted  # each registers 
 from .limits import within
 from .objective import OBJECTIVES, Objective, register
 from .problem import Problem
+from .quadratic import Quadratic
 from .result import CERTIFIED, Result, Status
 from .solve import distribute
 
@@ -16,6 +17,7 @@ __all__ = [
     "OBJECTIVES",
     "Objective",
     "Problem",
+    "Quadratic",
     "Result",
     "Status",
     "bounded",

@@ -43,7 +43,7 @@ def normal_equations(total: Total, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
     for (j, k), product in zip(pairs, ca.vertsplit(products), strict=True):
         G[j, k] = G[k, j] = product
     lengths = ca.diag(G)
-    y, excess = _definite_solve(G, b, lengths)
+    y, excess = definite_solve(G, b, lengths)
     terms = ca.dot(lengths, ca.sum2(y * y))
     spare = CANCELLATION**2 / m * ca.sum2(ca.sum1(y * b)) - terms
     least = excess[0]
@@ -53,32 +53,37 @@ def normal_equations(total: Total, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
     return [a.T @ y for a in A], 2 * (least >= 0) * (spare >= 0) - 1
 
 
-def _definite_solve(G: ca.SX, b: ca.SX, lengths: ca.SX) -> tuple[ca.SX, list[ca.SX]]:
+def definite_solve(
+    G: ca.SX, b: ca.SX, lengths: ca.SX, least: float = CONDITIONED
+) -> tuple[ca.SX, list[ca.SX]]:
     """G^-1 b for a symmetric, positive definite G, eliminating two rows at a time.
 
-    Half as many divisions as row by row, and they are what the rest waits for.
+    Half as many divisions as row by row, and they are what the rest waits for. Of G the upper
+    triangle counts.
 
     Args:    lengths: (m,), what the pivots were before anything was eliminated.
-    Returns: the solution, and how much the pivots exceed `CONDITIONED` times `lengths`, each
+             least: what pivots should be of `lengths`.
+    Returns: the solution, and how much the pivots exceed `least` times `lengths`, each
              times a positive number.
     """
     m = G.shape[0]
     if m == 0:
         return ca.SX(0, b.shape[1]), []
     if m == 1:
-        return b * (1 / G), [G - CONDITIONED * lengths]
+        return b * (1 / G), [G - least * lengths]
     u, v, w = G[0, 0], G[0, 1], G[1, 1]
     determinant = u * w - v * v
     scale = 1 / determinant
     u, v, w = u * scale, v * scale, w * scale
     inverse = ca.vertcat(ca.horzcat(w, -v), ca.horzcat(-v, u))
     excess = [
-        G[0, 0] - CONDITIONED * lengths[0],
-        determinant - CONDITIONED * (G[0, 0] * lengths[1]),
+        G[0, 0] - least * lengths[0],
+        determinant - least * (G[0, 0] * lengths[1]),
     ]
     B = G[:2, 2:]
     gain = inverse @ B
-    rest, more = _definite_solve(G[2:, 2:] - B.T @ gain, b[2:, :] - gain.T @ b[:2, :], lengths[2:])
+    below = G[2:, 2:] - B.T @ gain
+    rest, more = definite_solve(below, b[2:, :] - gain.T @ b[:2, :], lengths[2:], least)
     return ca.vertcat(inverse @ b[:2, :] - gain @ rest, rest), excess + more
 
 

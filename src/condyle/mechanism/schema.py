@@ -51,6 +51,7 @@ def _inside(here: Mapping[str, Any], part: str) -> Any:
 
 def _followed(here: Mapping[str, Any], schema: Mapping[str, Any]) -> Any:
     """A schema with its reference, if it is one, looked up."""
-    here = next((one for one in here.get("anyOf", ()) if "$ref" in one), here)
+    tables = ("$ref", "discriminator")
+    here = next((one for one in here.get("anyOf", ()) if any(k in one for k in tables)), here)
     name = str(here.get("$ref", "")).rpartition("/")[2]
     return schema["$defs"][name] if name else here

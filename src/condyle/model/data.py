@@ -77,3 +77,23 @@ class Efforts:
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.others[name]
+
+
+@dataclass(frozen=True)
+class Accelerations:
+    """What efforts do at N samples, and what was asked for besides.
+
+    acceleration:  (N, m), q'' in the order of `independent` [m/s^2, rad/s^2].
+    contact_force: (N, k) [N], along the unit normals, on the platform.
+    others: by name: pose, pose_rate, pose_acceleration (N, 6); joint, joint_rate,
+            joint_acceleration (N, n); slip, friction_force (N, k, 3).
+    status: (N,), of `Status`; accelerations and forces of other samples than good ones are NaN.
+    """
+
+    acceleration: np.ndarray
+    contact_force: np.ndarray
+    others: Mapping[str, np.ndarray]
+    status: np.ndarray
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self.others[name]

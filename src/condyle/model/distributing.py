@@ -11,7 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..distribution import OBJECTIVES, Objective, Problem, distribute
+from ..backends.c.limits import WithinLimits
+from ..backends.choose import Backend
+from ..backends.compiler import CompilerError
+from ..backends.notice import notice
+from ..distribution import OBJECTIVES, Objective, Problem, Quadratic, distribute
 from ..distribution import Status as Outcome
 from ..dynamics.distribution import minimum_norm
 from ..errors import InputError, did_you_mean, few
@@ -72,6 +76,11 @@ class Policy:
                 f"distribution {objective} does not weigh contact forces: take {weighing}, or "
                 "leave the contact weight out"
             )
+        if preload and not any(contact.one_sided for contact in mechanism.contacts):
+            notice(
+                f'preload {preload:g} N presses on nothing: no contact of "{mechanism.name}" is '
+                "one-sided. Set one_sided = true at those that only push"
+            )
         return Policy(objective, preload, contact_weight)
 
 
@@ -99,11 +108,15 @@ def _require_limits(mechanism: Mechanism, objective: str) -> None:
 class Distributor:
     """Chooses the efforts of one mechanism by a policy."""
 
-    def __init__(self, mechanism: Mechanism, policy: Policy) -> None:
+    def __init__(
+        self, mechanism: Mechanism, policy: Policy, backend: Backend | None = None
+    ) -> None:
+        """Args: backend: whose compiler serves where few efforts are free; else numpy does all."""
         self.policy = policy
-        count = sum(contact.friction.coefficient > 0 for contact in mechanism.contacts)
-        self.friction = count > 0
-        self.unsolved_friction = count > MOST  # more patterns than a kernel goes through
+        self._backend = backend
+        self._rubs = [contact.friction.coefficient > 0 for contact in mechanism.contacts]
+        self.friction = any(self._rubs)
+        self.unsolved_friction = sum(self._rubs) > MOST  # more patterns than a kernel goes through
         both = [limits(chain) for chain in mechanism.chains]
         self._low, self._high = (np.array([getattr(x, n) for x in both]) for n in ("low", "high"))
         sides = [c.push if c.one_sided else 0 for c in mechanism.contacts]
@@ -136,15 +149,16 @@ class Distributor:
         return np.flatnonzero(good)
 
     def solve(self, system: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Efforts, contact forces, shares, status and shortfall by name, samples last.
+        """Efforts, contact forces, status and shortfall by name, samples last.
 
-        Args: system: the results of that question, samples last.
+        With what of `system` the shares need, these as well, and how contacts slide.
+
+        Args: system: the results of that question or of `balance`, samples last.
         """
         s = {name: np.moveaxis(a, -1, 0) for name, a in system.items()}
-        J = s["J"].transpose(0, 2, 1)
         problem = Problem(
             s["Q"],
-            J,
+            s["J"].transpose(0, 2, 1),
             s["normal"],
             s["friction"],
             self._low,
@@ -153,22 +167,78 @@ class Distributor:
             self.policy.preload,
             contact_weight=self.policy.contact_weight,
         )
-        found = distribute(problem, self.policy.objective)
-        # What each part asks for with least norm; the rest is internal.
-        factors = minimum_norm(s["A"].transpose(0, 2, 1), np.ones(s["A"].shape[1]))
-        with np.errstate(invalid="ignore"):
-            right = s["b"].transpose(0, 2, 1)
-            if self.friction:
-                rubbed = (np.abs(found.contact_force)[..., None] * s["friction"]).sum(axis=1)
-                right = np.concatenate([right, (s["Pi"] @ rubbed[..., None])], axis=2)
-            share = factors.torques(right)
-            share = np.concatenate([share, (found.effort - share.sum(axis=2))[..., None]], axis=2)
+        found = self._compiled(system, problem)
+        left = np.arange(problem.count) if found is None else np.flatnonzero(found.pop("unsure"))
+        if found is None or left.size:
+            part = problem if found is None else problem.take(left)
+            result = distribute(part, self.policy.objective)
+            others = {
+                "effort": result.effort.T,
+                "contact_force": result.contact_force.T,
+                "status": _STATUS[result.status],
+                "shortfall": result.shortfall,
+            }
+            found = others if found is None else found
+            for name, value in others.items():
+                found[name][..., left] = value
+        if "A" in system:
+            rubbing = found["contact_force"].T if self.friction else None
+            found["share"] = shares(s, found["effort"].T, rubbing).transpose(2, 1, 0)
+            found |= {name: system[name] for name in ("slip", "drag")}
+        return found
+
+    def _compiled(
+        self, system: Mapping[str, np.ndarray], problem: Problem
+    ) -> dict[str, np.ndarray] | None:
+        """What compiled code finds, with `unsure` samples; None where it cannot be asked."""
+        objective = OBJECTIVES[self.policy.objective]
+        asked = self._backend is not None and self._backend.name == "compiled"
+        if not (asked and isinstance(objective, Quadratic)):
+            return None
+        if not WithinLimits.fits(problem.n, problem.k):
+            return None
+        low, high, push = self._low, self._high, self._push
+        if not objective.limits:
+            low, high, push = np.full_like(low, -np.inf), np.full_like(high, np.inf), 0 * push
+        contact_low = np.where(push > 0, self.policy.preload, -np.inf)
+        contact_high = np.where(push < 0, -self.policy.preload, np.inf)
+        try:
+            solver = WithinLimits(problem.n, problem.k)
+        except CompilerError:
+            return None
+        found = solver.solve(
+            system["Q"],
+            system["J"],
+            system["normal"],
+            system["friction"],
+            self._rubs,
+            (low, high, objective.scale(problem), contact_low, contact_high),
+            objective.weight(problem),
+        )
+        status = np.where(found.infeasible, Status.infeasible, Status.ok).astype(np.uint8)
         return {
-            "effort": found.effort.T,
-            "contact_force": found.contact_force.T,
-            "share": share.transpose(2, 1, 0),
-            "status": _STATUS[found.status],
+            "effort": found.effort,
+            "contact_force": found.force,
             "shortfall": found.shortfall,
-            "slip": system["slip"],
-            "drag": system["drag"],
+            "status": status,
+            "unsure": found.unsure,
         }
+
+
+def shares(
+    system: Mapping[str, np.ndarray], effort: np.ndarray, contact_force: np.ndarray | None
+) -> np.ndarray:
+    """What each part asks for with least norm; the rest of the efforts is internal, and last.
+
+    Args:    system: results of that question, samples first;  effort: (N, n).
+             contact_force: (N, k) [N] where friction is a part of its own, before the last.
+    Returns: (N, n, parts).
+    """
+    factors = minimum_norm(system["A"].transpose(0, 2, 1), np.ones(system["A"].shape[1]))
+    with np.errstate(invalid="ignore"):
+        right = system["b"].transpose(0, 2, 1)
+        if contact_force is not None:
+            rubbed = (np.abs(contact_force)[..., None] * system["friction"]).sum(axis=1)
+            right = np.concatenate([right, (system["Pi"] @ rubbed[..., None])], axis=2)
+        share = factors.torques(right)
+        return np.concatenate([share, (effort - share.sum(axis=2))[..., None]], axis=2)

@@ -41,15 +41,17 @@ from ..questions.inverse import OUTPUTS
 from ..questions.numbers import Layout, require_closed_form, specialised
 from ..questions.structure import structure_of
 from ..status import Status
+from .accelerating import Accelerator
 from .checks import LOAD_COLUMNS, POSE_COLUMNS, check_array, check_states
 from .closing import Closure
-from .data import Configuration, Efforts, Evaluation
+from .data import Accelerations, Configuration, Efforts, Evaluation
 from .distributing import LEAST, Distributor, Policy
 from .reference_force import reference_force
 from .robust import Robust
 from .survey import SURVEYED, Survey, judged
 
 CONDITION = "condition"
+DEFAULT = (None, 0.0, 0.0)  # distribution, preload and contact weight
 EVERYTHING = ("contact", "share", "motion", "joint", "configuration")
 # Names of results, by what is asked for.
 RESULTS = {
@@ -75,6 +77,7 @@ class Evaluator:
         distribution: str | None = None,
         preload: float = 0.0,
         contact_weight: float = 0.0,
+        general: bool = False,
     ) -> None:
         """Derive the equations of motion.
 
@@ -83,6 +86,8 @@ class Evaluator:
                 preload: least push of one-sided contacts [N].
                 contact_weight: W / N_ref^2 of `weighted` [1/N^2].
                 backend: compiled, numpy, or auto (compiled where there is a C compiler).
+                general: for `renumbered`: kernels that serve every mechanism of the structure,
+                by leaving out nothing that happens to be zero in this one.
         Raises: InputError:       for an unknown formulation, route or backend.
                 UnsupportedError: where route `direct` has no closed form.
                 MechanismError:   if the contacts do not hold the platform at home.
@@ -97,14 +102,15 @@ class Evaluator:
         self.mechanism = mechanism
         self.formulation = formulation_named(formulation).name
         self.route = route
-        self._asked = distribution
-        self.policy = Policy.of(mechanism, distribution, preload, contact_weight)
-        self._distributor = Distributor(mechanism, self.policy)
+        self._asked = distribution, preload, contact_weight
+        if self._asked != DEFAULT:
+            _ = self.policy  # what is asked for has to fit, now
         self.backend = Backend(backend)
         with step("deriving the equations"):
             structure = structure_of(mechanism, self.formulation, route)
             self._numbers = Layout.of(structure).numbers(mechanism)
-            self._structure = specialised(structure, self._numbers)
+            self._structure = structure if general else specialised(structure, self._numbers)
+        self._general: Any = self if general else None  # who lends kernels
         self._kernels: dict[Any, Kernel] = {}
         self._closures: dict[Any, Closure] = {}
         self._local = threading.local()  # what belongs to one thread
@@ -117,15 +123,20 @@ class Evaluator:
             f"  {len(self.mechanism.chains)} efforts from q = ({', '.join(self.independent)})"
         )
 
+    def __copy__(self) -> Self:
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
+        return other
+
     def __reduce__(self) -> tuple[Any, ...]:
         """Models travel as their recipe; kernels are found again in the cache."""
-        policy = (self._asked, self.policy.preload, self.policy.contact_weight)
         return type(self), (
             self.mechanism,
             self.formulation,
             self.route,
             self.backend.asked,
-            *policy,
+            *self._asked,
+            *((True,) if self._general is not None else ()),
         )
 
     # -- what it is ------------------------------------------------------------------------
@@ -151,6 +162,11 @@ class Evaluator:
         """Whether efforts are chosen within limits."""
         return OBJECTIVES[self.policy.objective].limits
 
+    @property
+    def chooses_efforts(self) -> bool:
+        """Whether efforts may be others than those of least norm."""
+        return self._distributor.chooses
+
     @cached_property
     def reference_force(self) -> float:
         """N_ref, by which `weighted` measures contact forces [N]."""
@@ -161,10 +177,43 @@ class Evaluator:
     ) -> Self:
         """The same model, kernels and all, that chooses efforts otherwise; see `derive`."""
         other = copy(self)
-        other._asked = distribution
-        other.policy = Policy.of(self.mechanism, distribution, preload, contact_weight)
-        other._distributor = Distributor(self.mechanism, other.policy)
+        for name in ("policy", "_distributor"):
+            other.__dict__.pop(name, None)
+        other._asked = distribution, preload, contact_weight
+        _ = other.policy  # has to fit, now
         return other
+
+    def renumbered(self, mechanism: Mechanism) -> Self:
+        """The same model, if it is general, of another mechanism of the same structure.
+
+        It shares the kernels, so that it costs a thousandth of a new one. The mechanism must have
+        been checked, as one from a file or from `Mechanism.set` is.
+
+        Raises: InputError: if the distribution does not fit the mechanism.
+        """
+        assert self._general is not None
+        other = copy(self._general)
+        own = ("characteristic_length", "reference_force", "policy", "_distributor", "_robust")
+        for name in own:
+            other.__dict__.pop(name, None)
+        other.mechanism = mechanism
+        _ = other.policy  # has to fit, now
+        other._numbers = Layout.of(self._structure).numbers(mechanism)
+        other._kernels, other._closures = {}, {}
+        other._local = threading.local()
+        return other
+
+    @cached_property
+    def policy(self) -> Policy:
+        """How efforts are chosen; forward dynamics has no need of it.
+
+        Raises: InputError: where the default does not fit the mechanism.
+        """
+        return Policy.of(self.mechanism, *self._asked)
+
+    @cached_property
+    def _distributor(self) -> Distributor:
+        return Distributor(self.mechanism, self.policy, self.backend)
 
     @cached_property
     def characteristic_length(self) -> float:
@@ -174,6 +223,9 @@ class Evaluator:
     def kernel(self, question: str, *details: Any) -> Kernel:
         """The kernel of a question; see `condyle.questions`."""
         asked = question, details
+        if asked not in self._kernels and self._general not in (None, self):
+            shared = self._general.kernel(question, *details)
+            self._kernels[asked] = shared.renumbered(self._numbers)
         if asked not in self._kernels:
             structure = self._structure
             if question == "inverse" and self._distributor.unsolved_friction:
@@ -184,7 +236,7 @@ class Evaluator:
 
     @cached_property
     def _robust(self) -> Robust:
-        distributor = Distributor(self.mechanism, replace(self.policy, objective=LEAST))
+        distributor = Distributor(self.mechanism, Policy(LEAST))
         return Robust(self._structure, self._numbers, self.independent, distributor)
 
     # -- inverse dynamics ------------------------------------------------------------------
@@ -347,11 +399,60 @@ class Evaluator:
             return
         ports = {name: values[name].T[rows] for name in RESULTS["motion"]}
         ports |= {name: inputs[name][rows] for name in ("force", "moment", "point")}
-        better = self._distributor.solve(self.kernel("system").run(ports).values)
+        # Shares cost more than all the rest.
+        question = "system" if {"share", "slip"} & values.keys() else "balance"
+        better = self._distributor.solve(self.kernel(question).run(ports).values)
         status[rows] = better.pop("status")
         for name, value in better.items():
             if name in values:
                 values[name][..., rows] = value
+
+    # -- forward dynamics ------------------------------------------------------------------
+
+    @cached_property
+    def _accelerator(self) -> Accelerator:
+        return Accelerator(self.mechanism, self.kernel, lambda: self._robust)
+
+    def forward(
+        self,
+        q: np.ndarray,
+        q1: np.ndarray,
+        effort: np.ndarray,
+        load: np.ndarray,
+        outputs: Collection[str] = (),
+        threads: int | None = None,
+    ) -> Accelerations:
+        """Forward dynamics: the accelerations that efforts and loads make.
+
+        Limits of efforts, and that cables cannot push, are the caller's concern.
+
+        Args:    q, q1: (N, m) each, in the order of `independent` [m, rad; per s].
+                 effort: (N, n) [N m or N], in the order of the chains.
+                 load: (N, 9), as of `evaluate`.
+                 outputs: what is wanted besides, of motion, joint and sliding; threads: at most so
+                 many.
+        Raises:  InputError: for an output that is none of these, or arrays that do not fit.
+        """
+        return self._accelerator(q, q1, effort, load, outputs, threads)
+
+    def forward_one(
+        self, q: np.ndarray, q1: np.ndarray, effort: np.ndarray, load: np.ndarray
+    ) -> np.ndarray:
+        """Accelerations of one sample, (m,), at least latency; NaN where there are none.
+
+        Args: q, q1: (m,) each;  effort: (n,);  load: (9,); as of `forward`.
+        """
+        return self._accelerator.one(q, q1, effort, load)
+
+    def linearised(
+        self, q: np.ndarray, q1: np.ndarray, effort: np.ndarray, load: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """x' = A x + B effort about states x = (q, q'), exact; arguments as of `forward`.
+
+        The load stays as it is in {S}. Returns: A, (N, 2 m, 2 m), and B, (N, 2 m, n); NaN where
+        there are no accelerations.
+        """
+        return self._accelerator.linearised(q, q1, effort, load)
 
     # -- the configuration -----------------------------------------------------------------
 
@@ -551,8 +652,12 @@ class Evaluator:
 
     def _closure(self, names: tuple[str, ...], landmark: str | None) -> Closure:
         key = ("closure", names, landmark)
+        if key not in self._closures and self._general not in (None, self):
+            shared = self._general._closure(names, landmark)
+            self._closures[key] = shared.renumbered(self.mechanism)
         if key not in self._closures:
-            self._closures[key] = Closure(self.mechanism, names, landmark, self.backend)
+            general = self._general is not None
+            self._closures[key] = Closure(self.mechanism, names, landmark, self.backend, general)
         return self._closures[key]
 
 

@@ -22,6 +22,7 @@ from ..questions.structure import Structure
 from ..status import Status, judge
 from .distributing import Distributor
 from .follow import Follow
+from .jamming import balanced, solved_rows
 
 Arrays = dict[str, np.ndarray]
 
@@ -54,6 +55,14 @@ class Robust:
     @cached_property
     def _system(self) -> NumpyKernel:
         return self._kernel("system")
+
+    @cached_property
+    def _forward_system(self) -> NumpyKernel:
+        return self._kernel("forward_system")
+
+    @cached_property
+    def _linear(self) -> NumpyKernel:
+        return self._kernel("linear")
 
     @cached_property
     def _configuration(self) -> NumpyKernel:
@@ -98,6 +107,43 @@ class Robust:
                     for name, a in better.items():
                         values[name][..., good] = a
         return values, status
+
+    def forward(self, inputs: Mapping[str, np.ndarray]) -> tuple[Arrays, np.ndarray]:
+        """All results of forward dynamics by name, samples last, and their statuses."""
+        q, q1 = inputs["q"], inputs["q1"]
+        poses, reached = self.motion(q, q1, np.zeros_like(q))
+        others = {name: inputs[name] for name in ("effort", "force", "moment", "point")}
+        with np.errstate(all="ignore"):
+            configuration = self.configuration(poses["pose"])
+            system = self._forward_system.run(poses | others).values
+            s = {name: np.moveaxis(a, -1, 0) for name, a in system.items()}
+            found = balanced(s, self._structure.friction)
+            q2 = solved_rows(s["S"], found.w)
+            moved = poses["pose_acceleration"] + (s["M_J"] @ q2[..., None])[..., 0]
+            turned = s["bias"] + (s["J"].transpose(0, 2, 1) @ found.w[..., None])[..., 0]
+            least, most = configuration["J_A_extremes"]
+            assembled = reached & (configuration["discriminant"] >= 0).all(axis=0)
+            regular = found.regular & (ratio(least, most) >= SINGULAR)
+            finite = np.isfinite(system["F"]).all(axis=0)
+            finite &= np.isfinite(q2).all(axis=1) | ~found.single
+            status = judge(assembled, regular, finite)
+            status[(status == Status.ok) & ~found.single] = Status.jammed
+        return {
+            "acceleration": q2.T,
+            "contact_force": found.force.T,
+            "pose": poses["pose"].T,
+            "pose_rate": poses["pose_rate"].T,
+            "pose_acceleration": moved.T,
+            "joint": configuration["joint"],
+            "joint_rate": system["joint_rate"],
+            "joint_acceleration": turned.T,
+            "slip": system["slip"],
+            "drag": system["drag"],
+        }, status
+
+    def linear(self, ports: Mapping[str, np.ndarray]) -> Arrays:
+        """Results of the question of that name: asked for too seldom to be worth a compiler."""
+        return self._linear.run(ports).values
 
     def motion(self, q: np.ndarray, q1: np.ndarray, q2: np.ndarray) -> tuple[Arrays, np.ndarray]:
         """X_EE and its rates, (N, 6) each, and where the contacts can be met."""

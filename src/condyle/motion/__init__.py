@@ -2,7 +2,7 @@
 
 from condyle.motion.columns import Table
 from condyle.motion.load import Load, as_load
-from condyle.motion.markers import MarkerMotion, from_c3d
+from condyle.motion.markers import Beside, MarkerMotion, from_c3d, read_beside
 from condyle.motion.path import Motion, as_motion
 from condyle.motion.points import resolve_landmark, resolve_load_point
 from condyle.motion.reference import (
@@ -23,6 +23,7 @@ __all__ = [
     "LANDMARK",
     "MOMENT",
     "POSE",
+    "Beside",
     "Load",
     "MarkerMotion",
     "Motion",
@@ -36,6 +37,7 @@ __all__ = [
     "from_c3d",
     "iter_table",
     "parse_units",
+    "read_beside",
     "read_table",
     "reference_load",
     "reference_motion",

@@ -34,14 +34,17 @@ _NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)|n/?a|#\S+", re.IGNORECASE)
 
 
 def iter_csv(
-    path: str | os.PathLike[str], chunk_rows: int, known: Known | None
+    path: str | os.PathLike[str], chunk_rows: int, known: Known | None, gaps: bool = False
 ) -> Iterator[tuple[Table, int]]:
-    """Tables of up to `chunk_rows` rows, and how many bytes of the file each of them took."""
+    """Tables of up to `chunk_rows` rows, and how many bytes of the file each of them took.
+
+    Args: gaps: empty cells are NaN, and no error.
+    """
     source = printable(os.fspath(path))
     with opened(path) as file:
         head = read_head(source, file)
         header = read_header(f"{source}, line {head.line}", head.names, known)
-        parser = _Parser(source, head, header)
+        parser = _Parser(source, head, header, gaps)
         line, block, found = head.first_line, head.rows, False
         while block := block + _block(file, chunk_rows * len(head.names) * _CELL, source):
             values, lines, count = parser.parse(block, line)
@@ -71,8 +74,9 @@ def _block(file: Source, size: int, source: str) -> bytes:
 class _Parser:
     """From lines to numbers, for one file. Remembers its separator and its decimal sign."""
 
-    def __init__(self, source: str, head: Head, header: Header) -> None:
+    def __init__(self, source: str, head: Head, header: Header, gaps: bool) -> None:
         self.source, self.names, self.separator = source, head.names, head.separator
+        self.gaps = gaps
         self.wanted = {i: name for name, i in header.index.items()}
         self.nameless = [i for i, name in enumerate(head.names) if not name]
         self.blank = head.separator + ' "\n\t\r\f'
@@ -119,7 +123,7 @@ class _Parser:
                 arrow_csv.ConvertOptions(
                     column_types=types,
                     include_columns=list(types),
-                    null_values=[],
+                    null_values=[""] if self.gaps else [],
                     check_utf8=False,
                     decimal_point=sign,
                 ),
@@ -131,7 +135,7 @@ class _Parser:
         if any(pc.max(pc.binary_length(table[str(i)])).as_py() for i in self.nameless):
             return None
         columns = [table[str(i)].to_numpy() for i in self.wanted]
-        if not all(np.isfinite(column).all() for column in columns):
+        if not self.gaps and not all(np.isfinite(column).all() for column in columns):
             return None
         self.decimal = self.decimal or (sign if sign.encode() in body else "")
         return columns
@@ -188,6 +192,8 @@ class _Parser:
         ]
 
     def _number(self, cell: str, where: str) -> float:
+        if not cell and self.gaps:
+            return math.nan
         if not cell:
             raise InputError(f"{where}: the cell is empty; every cell needs a number")
         sign = "," if "," in cell else "." if "." in cell else ""

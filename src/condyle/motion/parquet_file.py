@@ -17,9 +17,12 @@ _BUFFER = 1 << 20  # bytes of a column at once; the library's own choice keeps w
 
 
 def iter_parquet(
-    path: str | os.PathLike[str], chunk_rows: int, known: Known | None
+    path: str | os.PathLike[str], chunk_rows: int, known: Known | None, gaps: bool = False
 ) -> Iterator[tuple[Table, int]]:
-    """Tables of up to `chunk_rows` rows, and how many bytes of the file each of them took."""
+    """Tables of up to `chunk_rows` rows, and how many bytes of the file each of them took.
+
+    Args: gaps: empty cells are NaN, and no error.
+    """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -38,14 +41,15 @@ def iter_parquet(
             for batch in file.iter_batches(chunk_rows, columns=wanted, use_threads=False):
                 rows = batch.num_rows
                 columns = {
-                    name: _numbers(batch.column(text), f'{source}, column "{short(text)}"', first)
+                    name: _numbers(
+                        batch.column(text), f'{source}, column "{short(text)}"', first, gaps
+                    )
                     * header.scale.get(name, 1.0)
                     for name, text in zip(header.index, wanted, strict=True)
                 }
                 lines = np.arange(first, first + rows)
                 table = Table(source, columns, lines, header.scale, header.ignored, "row")
-                checked_columns(table)
-                yield table, size * rows // total
+                yield table if gaps else checked_columns(table), size * rows // total
                 first += rows
             if first != total + 1:
                 raise InputError(f"{source}: says it has {total} rows, but {first - 1} came")
@@ -53,13 +57,13 @@ def iter_parquet(
         raise InputError(f"{source}: cannot be read as Parquet ({short(str(error))})") from error
 
 
-def _numbers(column: Any, where: str, first: int) -> np.ndarray:
+def _numbers(column: Any, where: str, first: int, gaps: bool) -> np.ndarray:
     import pyarrow as pa
 
-    if column.null_count:
+    if column.null_count and not gaps:
         row = first + int(np.argmax(column.is_null().to_numpy(zero_copy_only=False)))
         raise InputError(f"{where}, row {row}: the cell is empty; every cell needs a number")
     kind = column.type
     if not (pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind)):
         raise InputError(f"{where}: holds {short(str(kind))}, expected numbers")
-    return column.cast(pa.float64(), safe=False).to_numpy()
+    return column.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False)

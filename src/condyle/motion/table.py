@@ -18,9 +18,11 @@ CHUNK_ROWS = 16_384
 T = TypeVar("T")
 
 
-def read_table(path: str | os.PathLike[str], *, known: Known | None = None) -> Table:
+def read_table(
+    path: str | os.PathLike[str], *, known: Known | None = None, gaps: bool = False
+) -> Table:
     """Read a whole file of numbers; see `iter_table`."""
-    chunks = list(iter_table(path, known=known))
+    chunks = list(iter_table(path, known=known, gaps=gaps))
     first = chunks[0]
     if len(chunks) == 1:
         return first
@@ -34,6 +36,7 @@ def iter_table(
     chunk_rows: int = CHUNK_ROWS,
     *,
     known: Known | None = None,
+    gaps: bool = False,
     doing: str = "reading",
 ) -> Iterator[Table]:
     """Read a file of numbers, of any length, in tables of up to `chunk_rows` rows.
@@ -42,6 +45,7 @@ def iter_table(
     one is worked on.
 
     Args:   known: names of the columns to read, see `read_header`. None: all of them.
+            gaps: empty cells are NaN, and no error.
             doing: what is done with the rows, to be shown as progress through the file.
     Yields: Table: at least one, none of them empty, all with the same columns.
     Raises: InputError: for whatever is not a table of finite numbers, with line and column. Chunks
@@ -52,7 +56,7 @@ def iter_table(
     else:
         from condyle.motion.csv_file import iter_csv as read
     with step(f"{doing} {Path(path).name}", _size(path)) as advance:
-        chunks = read(path, chunk_rows, known)
+        chunks = read(path, chunk_rows, known, gaps)
         # A pipe may keep us waiting, and a thread that waits cannot be interrupted.
         for table, size in _ahead(chunks) if os.path.isfile(path) else chunks:
             yield table

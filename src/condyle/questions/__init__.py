@@ -19,7 +19,10 @@ from ..graph.program import Program, Variants
 from .closure import Prescribed, closure, conditions
 from .configuration import configuration
 from .encoders import encoders
-from .inverse import inverse, motion, system
+from .forward import forward, forward_system
+from .instant import energy, instant
+from .inverse import balance, inverse, motion, system
+from .linear import linear
 from .matrices import jacobians, matrices
 from .reactions import reactions
 from .structure import Structure
@@ -27,13 +30,19 @@ from .survey import survey
 
 QUESTIONS: dict[str, Callable[..., Program | Variants]] = {
     "inverse": inverse,
+    "forward": forward,
+    "forward_system": forward_system,
     "motion": motion,
+    "balance": balance,
     "system": system,
+    "linear": linear,
     "closure": closure,
     "conditions": conditions,
     "configuration": configuration,
     "survey": survey,
     "encoders": encoders,
+    "instant": instant,
+    "energy": energy,
     "matrices": matrices,
     "jacobians": jacobians,
     "reactions": reactions,
@@ -48,8 +57,11 @@ GEOMETRY = (
     "configuration",
     "survey",
     "encoders",
+    "instant",
+    "energy",
     "jacobians",
     "reactions",
+    "linear",
 )
 
 

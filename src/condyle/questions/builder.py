@@ -29,6 +29,7 @@ class Builder:
         self.graph = Graph()
         self._ports: list[Port] = []
         self._columns = 0
+        self._unknowns = 0
         self._outputs: list[tuple[str, tuple[int, ...], str, bool, list[ca.SX | None]]] = []
         self._checks: list[tuple[ca.SX, float, int | None]] = []
         self._symbols: list[ca.SX] = []
@@ -77,6 +78,12 @@ class Builder:
         if group < 0:
             return self.graph.leaf("parameter", i)
         return self.graph.leaf("lane", group, i, group=group)
+
+    def unknown(self, name: str, size: int) -> ca.SX:
+        """Symbols that stand for nothing: to differentiate by, and to be replaced."""
+        self._unknowns += size
+        first = -self._unknowns
+        return self.symbols(name, [self.graph.leaf("input", first + i) for i in range(size)])
 
     # -- on the way ------------------------------------------------------------------------
 

@@ -25,7 +25,7 @@ def configuration(structure: Structure) -> Program:
     """The configuration at whole poses that meet the contacts."""
     b = Builder(structure)
     rows = add(b, given(b, still=True))
-    b.output("J_W", rows, "1")
+    b.output("J_W", rows, "1", structure.m)
     return b.finish()
 
 

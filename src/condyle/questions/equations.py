@@ -148,7 +148,7 @@ def equations(
         _chain_terms(b, group, method, state, g, lump, low_latency)
         for group in range(len(s.chains))
     ]
-    parts = {"platform": method.platform(state, _body(b, lump), g)}
+    parts = {"platform": method.platform(state, platform_body(b, lump), g)}
     parts |= _summed(b, chains, lump)
     if s.losses:
         # Efforts bear these too: J^T effort = J^T tau + J^T loss.
@@ -200,10 +200,10 @@ def _chain_terms(
         dynamics = replace(dynamics, J=mask * dynamics.J)
     pulled = {name: state.generalized_force(f, M.lever) for name, f in forces.items()}
     row = state.generalized_force(dynamics.J, M.lever)
-    return ChainTerms(dynamics, pulled, row, _loss(b, group, dynamics))
+    return ChainTerms(dynamics, pulled, row, loss(b, group, dynamics))
 
 
-def _loss(b: Builder, group: int, motion: ChainDynamics) -> ca.SX:
+def loss(b: Builder, group: int, motion: ChainDynamics) -> ca.SX:
     """What an actuator takes for its rotor and its friction [N m or N]."""
     if not b.structure.losses:
         return ca.SX(0)
@@ -240,17 +240,21 @@ def _lumped(
     return dynamics, force
 
 
-def _body(b: Builder, lumped: bool) -> Body:
+def platform_body(b: Builder, lumped: bool) -> Body:
     """The platform, alone or with the end masses of the chains as part of it."""
     mass, first, i = (
         b.parameter(f"{'lumped_' if lumped else ''}{name}")
         for name in ("mass", "first_moment", "inertia")
     )
-    inertia = ca.vertcat(*(ca.horzcat(*(i[k] for k in row)) for row in _SYMMETRIC))
-    return Body(mass, first, inertia)
+    return Body(mass, first, symmetric(ca.vertsplit(i)))
 
 
-_SYMMETRIC = ((0, 3, 4), (3, 1, 5), (4, 5, 2))  # entries xx, yy, zz, xy, xz, yz
+def symmetric(entries: Sequence[ca.SX]) -> ca.SX:
+    """The matrix, (3, 3), of entries xx, yy, zz, xy, xz, yz."""
+    return ca.vertcat(*(ca.horzcat(*(entries[k] for k in row)) for row in _SYMMETRIC))
+
+
+_SYMMETRIC = ((0, 3, 4), (3, 1, 5), (4, 5, 2))
 
 
 def _summed(b: Builder, chains: Sequence[ChainTerms], lumped: bool) -> dict[str, ca.SX]:

@@ -11,7 +11,7 @@ of all consistent patterns.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -25,6 +25,7 @@ from .platform import Basis, Platform, independent_indices
 
 MOST = 2  # contacts with friction whose patterns are all solved in one kernel
 HUGE = 1e300
+FLAT = 1e-3  # part of a square below which what is left of it has lost too many digits
 
 LeastNorm = Callable[..., tuple[Lanes, ca.SX]]
 
@@ -83,57 +84,181 @@ class Chosen:
     pivots: ca.SX
 
 
+@dataclass(frozen=True)
+class _Candidate:
+    """Least norm with given signs, or with some forces held at 0: `steps` of `_Pattern.free`.
+
+    norm: sum of squares;  kept: whether the other forces have their signs: 1, else 0.
+    """
+
+    norm: ca.SX
+    kept: ca.SX
+    steps: dict[int, ca.SX]
+
+
+@dataclass(frozen=True)
+class _Pattern:
+    """The least norm under given signs, and the ways from there to forces that are 0.
+
+    effort: lanes;  force: (k,);  broken: by contact, whether its force has the wrong sign.
+    B:      lanes of d lambda = -B d effort, (k,).
+    free:   by contact, what of B_i the equations leave free, lanes: along it lambda_i changes.
+    flat:   by contact, 1 where so little of B_i is left that it is not known, else 0.
+    """
+
+    effort: Lanes
+    force: ca.SX
+    norm: ca.SX
+    broken: dict[int, ca.SX]
+    B: Lanes
+    free: dict[int, Lanes]
+    flat: dict[int, ca.SX]
+    candidates: list[_Candidate]
+    pivots: ca.SX
+
+    def least(self, b: Builder) -> tuple[ca.SX, Lanes, ca.SX]:
+        """Norm, efforts and contact forces of the best candidate."""
+        norm = ca.SX(float("inf"))
+        steps = {i: ca.SX(0) for i in self.free}
+        held = dict(steps)
+        for one in self.candidates:
+            better = one.kept * (one.norm < norm)
+            norm = ca.if_else(better, one.norm, norm)
+            for i in self.free:
+                steps[i] = ca.if_else(better, one.steps.get(i, 0), steps[i])
+                held[i] = ca.if_else(better, int(i in one.steps), held[i])
+        if not steps:
+            return norm, self.effort, self.force
+        change = [sum(steps[i] * self.free[i][g] for i in steps) for g in range(len(self.effort))]
+        effort = [t + d for t, d in zip(self.effort, change, strict=True)]
+        force = self.force - b.total([a * d for a, d in zip(self.B, change, strict=True)])
+        for i in held:
+            force[i] *= 1 - held[i]
+        return norm, effort, force
+
+
 def least_norm_pattern(b: Builder, eq: Equations, c: Contacts, solve: LeastNorm) -> Chosen:
-    """Every pattern's least norm; the least that is consistent."""
+    """Of every pattern the least norm, forces of 0 among them; the least that is consistent.
+
+    The least norm under sigma_k lambda_k >= 0 has some of these forces at 0 and the others as the
+    equations leave them. So the least of all patterns is the least of the consistent candidates:
+    every force with one sign, with the other, or 0.
+    """
     s = b.structure
-    dep, ind = indices(s.dependent), independent_indices(s.dependent)
-    N, T = eq.state.B.T @ c.N, eq.state.B.T @ c.T
     best = ca.SX(float("inf"))
-    tried: dict[tuple[int, ...], tuple[ca.SX, list[ca.SX]]] = {}
-    pivots: ca.SX | None = None
+    pivots = ca.SX(1.0)
     effort: Lanes = []
-    force = ca.SX.zeros(len(dep))
+    force = ca.SX.zeros(len(s.contacts))
+    tried: dict[tuple[int, ...], _Pattern] = {}
     for signs in product((1, -1), repeat=len(s.friction)):
-        D = ca.SX(N)
-        for i, sign in zip(s.friction, signs, strict=True):
-            D[:, i] = N[:, i] - sign * T[:, i]
-        basis = Basis(ind, dep, -solve_small(D[dep, :].T, D[ind, :].T))
-        rows = [basis.generalized_force(chain.row) for chain in eq.chains]
-        found, quality = solve(b.total, rows, basis.generalized_force(eq.Q))
-        carried = b.total([ch.row[dep] * t for ch, t in zip(eq.chains, found, strict=True)])
-        lam = solve_small(D[dep, :], eq.Q[dep] - carried)
-        norm = b.total([t * t for t in found])
-        kept = [sign * lam[i] >= 0 for i, sign in zip(s.friction, signs, strict=True)]
-        held = ca.SX(1)
-        for one in kept:
-            held = held * one
-        tried[signs] = norm, kept
-        better = held * (norm < best)
+        pattern = tried[signs] = _pattern(b, eq, c, solve, signs)
+        pivots = ca.fmin(pivots, pattern.pivots)
+        norm, found, carried = pattern.least(b)
+        better = norm < best
         best = ca.if_else(better, norm, best)
-        force = ca.if_else(better, lam, force)
+        force = ca.if_else(better, carried, force)
         effort = [
             t if not effort else ca.if_else(better, t, effort[g]) for g, t in enumerate(found)
         ]
-        pivots = quality if pivots is None else ca.fmin(pivots, quality)
-    assert pivots is not None
-    return Chosen(effort, force, _sure(tried, best), pivots)
+    return Chosen(effort, force, _sure(s.friction, tried, best), pivots)
 
 
-def _sure(tried: dict[tuple[int, ...], tuple[ca.SX, list[ca.SX]]], best: ca.SX) -> ca.SX:
-    """Whether nothing with a contact force held at 0 is less than the best pattern: 1, else 0.
+def _pattern(
+    b: Builder, eq: Equations, c: Contacts, solve: LeastNorm, signs: tuple[int, ...]
+) -> _Pattern:
+    s = b.structure
+    dep, ind = indices(s.dependent), independent_indices(s.dependent)
+    N, T = eq.state.B.T @ c.N, eq.state.B.T @ c.T
+    D = ca.SX(N)
+    sign = dict(zip(s.friction, signs, strict=True))
+    for i in s.friction:
+        D[:, i] = N[:, i] - sign[i] * T[:, i]
+    basis = Basis(ind, dep, -solve_small(D[dep, :].T, D[ind, :].T))
+    rows = [basis.generalized_force(chain.row) for chain in eq.chains]
+    found, pivots = solve(b.total, rows, basis.generalized_force(eq.Q))
+    carried = b.total([ch.row[dep] * t for ch, t in zip(eq.chains, found, strict=True)])
+    force = solve_small(D[dep, :], eq.Q[dep] - carried)
+    norm = b.total([t * t for t in found])
+    broken = {i: 1 - (sign[i] * force[i] >= 0) for i in s.friction}
+    candidates = [_Candidate(norm, _none(broken.values()), {})]
+    free: dict[int, Lanes] = {}
+    flat: dict[int, ca.SX] = {}
+    B: Lanes = []
+    # A force held at 0 has both signs: from these patterns all signs of the others are in reach.
+    if s.n > s.m and signs in ((1,), (1, 1), (-1, -1)):
+        B = [solve_small(D[dep, :], chain.row[dep]) for chain in eq.chains]
+        for i in s.friction:
+            own = [a[i] for a in B]
+            taken = b.total([row * a for row, a in zip(rows, own, strict=True)])
+            known, quality = solve(b.total, rows, taken)
+            pivots = ca.fmin(pivots, quality)
+            free[i] = [a - p for a, p in zip(own, known, strict=True)]
+            flat[i] = b.total([x * x for x in free[i]]) < FLAT * b.total([a * a for a in own])
+        candidates += _held(b, force, norm, sign, free, flat, s.n - s.m)
+    return _Pattern(found, force, norm, broken, B, free, flat, candidates, pivots)
 
-    Such a force belongs to both patterns that differ in its sign alone, and so is the least of
-    both. Neither is less without the constraint, and from the least of a convex function within
-    bounds the way to the least without them leaves a bound that is active: both patterns break the
-    sign of the force that is 0. With two forces 0 all four patterns do, and then there is no best.
 
-    Args: tried: norm of each pattern, and which signs its forces keep.
+def _held(
+    b: Builder,
+    force: ca.SX,
+    norm: ca.SX,
+    sign: dict[int, int],
+    free: dict[int, Lanes],
+    flat: dict[int, ca.SX],
+    most: int,
+) -> list[_Candidate]:
+    """Candidates with one force held at 0, and with both; at most as many as there is freedom."""
+    overlap = {
+        (i, j): b.total([x * y for x, y in zip(free[i], free[j], strict=True)])
+        for i in free
+        for j in free
+    }
+    found = []
+    for i in free:
+        step = force[i] / overlap[i, i]
+        left = [force[j] - overlap[j, i] * step for j in free if j != i]
+        signs = [sign[j] for j in free if j != i]
+        broken = [flat[i], *(1 - (s * x >= 0) for s, x in zip(signs, left, strict=True))]
+        found.append(_Candidate(norm + step * force[i], _none(broken), {i: step}))
+    if len(free) == 2 and most >= 2 and all(s > 0 for s in sign.values()):
+        i, j = free
+        a, c, d = overlap[i, i], overlap[i, j], overlap[j, j]
+        determinant = a * d - c * c
+        both = {
+            i: (d * force[i] - c * force[j]) / determinant,
+            j: (a * force[j] - c * force[i]) / determinant,
+        }
+        broken = [flat[i], flat[j], determinant < FLAT * a * d]
+        price = both[i] * force[i] + both[j] * force[j]
+        found.append(_Candidate(norm + price, _none(broken), both))
+    return found
+
+
+def _none(broken: Iterable[ca.SX]) -> ca.SX:
+    """1 where nothing is broken, else 0."""
+    kept = ca.SX(1)
+    for one in broken:
+        kept = kept * (1 - one)
+    return kept
+
+
+def _sure(friction: Sequence[int], tried: dict[tuple[int, ...], _Pattern], best: ca.SX) -> ca.SX:
+    """Whether nothing that was not tried is less than the best candidate: 1, else 0.
+
+    Not tried are forces held at 0 that the equations leave no freedom for, to rounding. Such a
+    force belongs to both patterns that differ in its sign alone, and so is the least of both.
+    Neither is less without the constraint, and from the least of a convex function within bounds
+    the way to the least without them leaves a bound that is active: both patterns break the sign
+    of the force that is 0. With two forces 0 all candidates but that one are broken, and where it
+    was not tried there is no best.
     """
     sure = best < HUGE
-    for signs, (norm, kept) in tried.items():
-        for i, sign in enumerate(signs):
-            if sign > 0:
-                other, others = tried[(*signs[:i], -1, *signs[i + 1 :])]
-                neither = (1 - kept[i]) * (1 - others[i])
-                sure = sure * (1 - neither * (ca.fmax(norm, other) < best))
+    for signs, one in tried.items():
+        for at, i in enumerate(friction):
+            if signs[at] < 0:
+                continue
+            other = tried[(*signs[:at], -1, *signs[at + 1 :])]
+            neither = one.broken[i] * other.broken[i]
+            untried = next((p.flat[i] for p in (one, other) if i in p.flat), 1)
+            sure = sure * (1 - neither * untried * (ca.fmax(one.norm, other.norm) < best))
     return sure

@@ -83,8 +83,12 @@ def program(
     if "configuration" in wanted:
         configuration.add(b, platform)
         if structure.friction:
-            _add_sliding(b, contacts(b, platform))
-    b.check(_feasibility(b, platform, eq), DOUBTFUL, Status.unreachable)
+            add_sliding(b, contacts(b, platform))
+    b.check(
+        feasibility(b, platform, [c.dynamics.discriminant for c in eq.chains]),
+        DOUBTFUL,
+        Status.unreachable,
+    )
     finite = ca.fabs(b.total(best.effort)) < HUGE
     b.check(best.quality * finite * _every_rate_is_felt(b, eq), WEAK)
     return b.finish()
@@ -153,24 +157,28 @@ def motion(structure: Structure) -> Program:
     return b.finish()
 
 
+def balance(structure: Structure) -> Program:
+    """What efforts and contacts have to balance, at whole poses that meet the contacts."""
+    b = Builder(structure)
+    platform, load = given(b), Wrench.of(b)
+    lump = FORMULATIONS[structure.formulation].lumps
+    _add_balance(b, platform, equations(b, platform, load, route="core", lump=lump))
+    return b.finish()
+
+
 def system(structure: Structure) -> Program:
     """The equations themselves, at whole poses that meet the contacts, for the robust path."""
     b = Builder(structure)
     platform, load = given(b), Wrench.of(b)
     eq = equations(b, platform, load, route="core")
     still = [b.at_zero(part, *_rates(eq, platform)) for part in eq.parts.values()]
-    b.output("A", eq.A, "")
+    b.output("A", eq.A, "", structure.m)
     for name, parts in (("b", list(eq.parts.values())), ("b_gravity", still)):
         rows = ca.horzcat(*(eq.basis.generalized_force(p) for p in parts)).T
         b.output(name, rows, "", len(parts), structure.m)
     pulled = eq.basis.generalized_force(ca.SX.eye(eq.Q.numel()))
     b.output("Pi", pulled, "", structure.m, 6)  # Pi^T
-    b.output("Q", eq.Q, "N, N m", 6)
-    b.output("J", [c.row for c in eq.chains], "")
-    touch, k = contacts(b, platform), len(structure.contacts)
-    b.output("normal", (eq.state.B.T @ touch.N).T, "", k, 6)
-    b.output("friction", (eq.state.B.T @ touch.T).T, "", k, 6)
-    _add_sliding(b, touch)
+    add_sliding(b, _add_balance(b, platform, eq))
     b.output("joint_rate", [c.dynamics.rate for c in eq.chains], "rad/s or m/s")
     b.output("joint_acceleration", [c.dynamics.acceleration for c in eq.chains], "per s^2")
     return b.finish()
@@ -182,7 +190,17 @@ def _add_motion(b: Builder, platform: Platform) -> None:
     b.output("pose_acceleration", platform.motion.acceleration, "per s^2")
 
 
-def _add_sliding(b: Builder, touch: Contacts) -> None:
+def _add_balance(b: Builder, platform: Platform, eq: Equations) -> Contacts:
+    """Q = J^T tau + sum_k lambda_k (N_k - sigma_k T_k), sample by sample."""
+    b.output("Q", eq.Q, "N, N m", 6)
+    b.output("J", [c.row for c in eq.chains], "")
+    touch, k = contacts(b, platform), len(b.structure.contacts)
+    b.output("normal", (eq.state.B.T @ touch.N).T, "", k, 6)
+    b.output("friction", (eq.state.B.T @ touch.T).T, "", k, 6)
+    return touch
+
+
+def add_sliding(b: Builder, touch: Contacts) -> None:
     k = len(b.structure.contacts)
     b.output("slip", touch.slip.T, "m/s", k, 3)
     b.output("drag", touch.drag.T, "1", k, 3)
@@ -213,9 +231,12 @@ def _every_rate_is_felt(b: Builder, eq: Equations) -> ca.SX:
     return least >= WEAK * ca.sum1(sizes)
 
 
-def _feasibility(b: Builder, platform: Platform, eq: Equations) -> ca.SX:
-    """Least of the dimensionless discriminants: not negative where the pose can be reached."""
-    least, placement = b.least([c.dynamics.discriminant for c in eq.chains]), platform.placement
+def feasibility(b: Builder, platform: Platform, chains: Lanes) -> ca.SX:
+    """Least of the dimensionless discriminants: not negative where the pose can be reached.
+
+    Args: chains: their discriminants.
+    """
+    least, placement = b.least(chains), platform.placement
     if placement.discriminant is None:
         return least
     # A pose that Newton did not find is not unreachable but unknown: 0, to be looked at again.

@@ -45,14 +45,14 @@ class Platform:
         return self.motion.R
 
 
-def closed(b: Builder, still: bool = False) -> Platform:
+def closed(b: Builder, rates: int = 2) -> Platform:
     """From the independent coordinates, ports q, q1 and q2: the contacts give the rest.
 
-    Args: still: without the rates, which are zero.
+    Args: rates: how many of q' and q'' are ports; others are zero.
     """
     s = b.structure
-    q, zero = b.sample("q", s.m), ca.SX.zeros(s.m)
-    q1, q2 = (zero, zero) if still else (b.sample("q1", s.m), b.sample("q2", s.m))
+    zero = ca.SX.zeros(s.m)
+    q, q1, q2 = (b.sample(n, s.m) if i <= rates else zero for i, n in enumerate(("q", "q1", "q2")))
     contacts = contact_symbols(s, b.parameter)
     if closed_form_available([form for form, _ in s.contacts], s.dependent):
         placement = closed_form(contacts, s.dependent, q, b.parameter("branch"))
@@ -109,6 +109,14 @@ class Basis:
         """Pi^T f, with a column for each of f."""
         own = f[list(self.identity), :]
         return own + self.rest.T @ f[list(self.others), :] if len(self.others) else own
+
+    def rates(self, w: ca.SX) -> ca.SX:
+        """Pi w, with a column for each of w."""
+        found = ca.SX(len(self.identity) + len(self.others), w.shape[1])
+        found[list(self.identity), :] = w
+        if len(self.others):
+            found[list(self.others), :] = self.rest @ w
+        return found
 
 
 def twist_basis(motion: WholeMotion, dependent: Sequence[str]) -> Basis:

@@ -31,7 +31,7 @@ def survey(structure: Structure, wanted: Collection[str] = (), at_pose: bool = F
     Args: at_pose: from whole poses that meet the contacts; else from q_EE, which closes them.
     """
     b = Builder(structure)
-    platform = given(b, still=True) if at_pose else closed(b, still=True)
+    platform = given(b, still=True) if at_pose else closed(b, rates=0)
     placement = platform.placement
     met = ca.SX(1) if placement.discriminant is None else placement.discriminant
     b.output("met", met, "1")

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from ..mechanism.actuator import Limits
     from ..results.solution import Solution
 
+EMG_ROW = " EMG"  # after a chain's name, where its measured activity has a row
 REACH = 2.5  # a limit beyond this many times the data would flatten them
 
 Edge = tuple[list[float], list[float]]
@@ -128,6 +129,16 @@ def activations(solution: Solution) -> dict[str, np.ndarray]:
         if np.isfinite(greatest) and greatest > 0:
             found[chains[i].name] = np.abs(effort[:, i]) / greatest
     return found
+
+
+def emg(solution: Solution) -> dict[str, np.ndarray]:
+    """Chain -> envelope of its EMG, (N,), of chains that have some; measured, not computed."""
+    if "emg" not in solution:
+        return {}
+    names, values = solution["chain"].values, solution["emg"].values
+    return {
+        str(name): values[:, i] for i, name in enumerate(names) if np.isfinite(values[:, i]).any()
+    }
 
 
 def joint_loads(solution: Solution) -> dict[str, np.ndarray]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from .contacts import AXES
 from .derived import Derived
 from .solution import Solution
 from .variables import VARIABLES, WRENCH, Variable, chosen
-from .warnings import Watch
+from .warnings import Notice, Watch
 
 
 def assemble(
@@ -38,27 +38,41 @@ def assemble(
     Arrays of the evaluation become those of the solution, without a copy where no sample failed.
     The share of the load is left out where there is no load.
     """
+    derived = Derived(model.mechanism, evaluation, wrench, model.limited)
+    watch = Watch(model.mechanism, residual=residual)
+    watch.see(derived, motion.t)
+    options = _options(model, motion, load, load_point, residual, seconds)
+    title = f"Inverse dynamics of {model.mechanism.name}"
+    solution = labelled(model, derived, motion.t, model.parts, title, options, watch.notices())
+    solution["torque"].attrs["long_name"] = chosen(model.policy.objective)
+    return solution
+
+
+def labelled(
+    model: Evaluator,
+    derived: Derived,
+    times: np.ndarray,
+    parts: Sequence[str],
+    title: str,
+    options: Mapping[str, Any],
+    notices: Sequence[Notice],
+) -> Solution:
+    """The dataset of samples at times (N,) [s]; `parts` are those of `share`."""
     mechanism = model.mechanism
-    derived = Derived(mechanism, evaluation, wrench, model.limited)
-    parts = list(model.parts)
-    loaded = bool(np.any(wrench))
+    loaded = bool(np.any(derived.wrench))
     kept = [i for i, part in enumerate(parts) if loaded or part != LOAD_PART]
     variables = {v.name: _variable(v, derived) for v in VARIABLES if v.when(derived)}
-    variables["torque"][2]["long_name"] = chosen(model.policy.objective)
     if len(kept) < len(parts):
         dims, share, attributes = variables["share"]
         variables["share"] = dims, share[kept], attributes
-    watch = Watch(mechanism, residual=residual)
-    watch.see(derived, motion.t)
-    notices = watch.notices()
-    solution = Solution(variables, _coordinates(model, motion, [parts[i] for i in kept]))
+    solution = Solution(variables, _coordinates(model, times, [parts[i] for i in kept]))
     solution.attrs = {
-        "title": f"Inverse dynamics of {mechanism.name}",
+        "title": title,
         "source": f"condyle {__version__}",
         "condyle_version": __version__,
         "mechanism_name": mechanism.name,
         "mechanism": record(mechanism),
-        "options": json.dumps(_options(model, motion, load, load_point, residual, seconds)),
+        "options": json.dumps(options),
         "warnings": json.dumps([notice.text for notice in notices]),
         "notices": json.dumps([notice.to_dict() for notice in notices]),
     }
@@ -76,12 +90,12 @@ def _variable(
     return variable.dims, values, variable.attributes(derived.mechanism)
 
 
-def _coordinates(model: Evaluator, motion: Motion, parts: Sequence[str]) -> dict[str, Any]:
+def _coordinates(model: Evaluator, times: np.ndarray, parts: Sequence[str]) -> dict[str, Any]:
     """Labels along every dimension of `DIMENSIONS`, and the units of each chain."""
     mechanism = model.mechanism
     families = [FAMILIES[chain.kind] for chain in mechanism.chains]
     return {
-        "time": ("time", motion.t, {"units": "s", "long_name": "time"}),
+        "time": ("time", times, {"units": "s", "long_name": "time"}),
         "chain": list(mechanism.chain_names),
         "contact": np.array(mechanism.contact_names, dtype=object),
         "coordinate": list(COORDINATES),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -22,12 +23,14 @@ class Derived:
 
     wrench:  (N, 6), load on the platform [N, N m], where that is known.
     limited: whether efforts were chosen within limits.
+    simulated: what only a simulation has, by the names of its variables.
     """
 
     mechanism: Mechanism
     evaluation: Any
     wrench: np.ndarray = field(default_factory=lambda: np.zeros((0, 6)))
     limited: bool = False
+    simulated: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @cached_property
     def ok(self) -> np.ndarray:

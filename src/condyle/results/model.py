@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import time
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,9 +20,9 @@ from ..model.judge import require_ok
 from ..model.reactions import reactions as joint_reactions
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
 from ..progress import step
-from .assemble import assemble
-from .reactions import reaction_variables
-from .solution import Solution
+
+if TYPE_CHECKING:
+    from .solution import Solution
 
 
 class Model(Evaluator):
@@ -47,6 +48,10 @@ class Model(Evaluator):
         Raises: UnreachableError, SingularError: for such samples, unless `flag`.
                 InputError: if motion or load do not fit the mechanism.
         """
+        # xarray and pandas wait until something is labelled: kernels alone start without them.
+        from .assemble import assemble
+        from .reactions import reaction_variables
+
         start = time.perf_counter()
         motion, load = as_motion(motion), as_load(load)
         wrench = load.at(motion.t)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterable
 from contextlib import ExitStack
 from pathlib import Path
@@ -16,11 +17,12 @@ from ..errors import InputError, no_such_file
 from ..extras import require
 from ..mechanism.files import recall
 from ..mechanism.mechanism import Mechanism
-from ..motion import write_table
+from ..motion import Beside, write_table
 from ..progress import step
 from .accessors import extend
 from .contacts import AXES, BOUND_TOLERANCE, bound_margins, lift_off, lift_off_columns
 from .failures import Failure, failures, status_columns
+from .matlab import dataset_variables, write_mat
 from .netcdf import write_netcdf
 from .variables import VARIABLES, WRENCH
 from .warnings import Notice
@@ -39,10 +41,11 @@ __all__ = [
 
 
 class Solution(xr.Dataset):
-    """Inverse dynamics along a motion: an `xarray.Dataset` that knows its mechanism.
+    """Inverse dynamics along a motion, or a simulation; it knows its mechanism.
 
-    Dimensions time, chain, contact, coordinate, part, axis. The variables and their units are in
-    the documentation's table of results; each has the attributes `units` and `long_name`.
+    An `xarray.Dataset`. Dimensions time, chain, contact, coordinate, part, axis. The variables and
+    their units are in the documentation's table of results; each has the attributes `units` and
+    `long_name`.
     """
 
     __slots__ = ()
@@ -78,24 +81,41 @@ class Solution(xr.Dataset):
         return json.loads(self.attrs["options"])
 
     @property
+    def events(self) -> list[dict[str, Any]]:
+        """What happened in a simulation: time, kind, owner, text, state, ends; else nothing."""
+        return json.loads(self.attrs.get("events", "[]"))
+
+    @property
     def plot(self) -> Any:  # type: ignore[override]
         """Figures: `solution.plot.torque()` and friends; xarray's own are there too."""
         require("matplotlib", "figures")
         return extend("solution.plot", self)
 
+    def with_measured(self, measured: Beside | str | os.PathLike[str]) -> Solution:
+        """The solution with what was measured beside the motion, for report, figures and view.
+
+        Args:   measured: markers and EMG (`from_c3d(...).beside`), or their table's file.
+        Raises: InputError: for other columns, chains that are not there, or other times.
+        """
+        from .measured import with_measured
+
+        return with_measured(self, measured)
+
     def save(self, *paths: str | Path) -> None:
-        """Write as NetCDF (.nc), CSV (.csv) or Parquet (.parquet): every file whole, or none."""
+        """Write as NetCDF (.nc), CSV, Parquet or MATLAB (.mat): every file whole, or none."""
         with step("writing results"), ExitStack() as stack:
             for path in paths:
                 suffix = Path(path).suffix.lower()
-                if suffix not in (".nc", ".csv", ".parquet"):
+                if suffix not in (".nc", ".csv", ".parquet", ".mat"):
                     raise InputError(
-                        f"{path}: expected a name that ends in .nc, .csv or .parquet, got "
+                        f"{path}: expected a name that ends in .nc, .csv, .parquet or .mat, got "
                         f'"{suffix}"'
                     )
                 temporary = stack.enter_context(replacing(path))
                 if suffix == ".nc":
                     write_netcdf(self, temporary)
+                elif suffix == ".mat":
+                    write_mat(temporary, dataset_variables(self))
                 else:
                     write_table(temporary, self.columns(), parquet=suffix == ".parquet")
 
@@ -108,6 +128,9 @@ class Solution(xr.Dataset):
         columns: dict[str, np.ndarray | list[str]] = {"t": self["time"].values}
         for variable in VARIABLES:
             if variable.column is not None and variable.name in self:
+                if len(variable.dims) == 1:
+                    columns[variable.column] = self[variable.name].values
+                    continue
                 entries, values = self[variable.dims[1]].values, self[variable.name].values
                 values = np.linalg.norm(values, axis=-1) if variable.sizes else values
                 columns |= named_columns(variable.column, entries, values)

@@ -35,6 +35,11 @@ class Summary:
             own = d["power"].get(name)
             power = "" if own is None else f"{own['peak']:11.4g} W{own['work']:11.4g} J"
             lines.append(f"  {name:<{width}}  {value:10.5g} {unit}{power}")
+        if (most := d["greatest_activation"]) is not None:
+            lines.append(
+                f"greatest activation (effort over its limit): {most['value']:.4g}, "
+                f"{most['chain']} at t = {most['time']:g} s"
+            )
         if d["peak_contact_force"]:
             lines.append("peak contact force (negative: the surface pushes along -n)")
             lines += [
@@ -103,6 +108,7 @@ def summarize(solution: Solution) -> Summary:
             }
             if some
             else {},
+            "greatest_activation": _greatest_activation(solution),
             "distribution": options.get("distribution", "minimum_norm"),
             "power": _power(solution),
             "friction_work": _friction_work(solution),
@@ -130,6 +136,21 @@ def summarize(solution: Solution) -> Summary:
             "notices": [notice.to_dict() for notice in solution.notices],
         }
     )
+
+
+def _greatest_activation(solution: Solution) -> dict[str, Any] | None:
+    """The largest |effort| over its limit: how much, whose and when; None without limits."""
+    if "activation" not in solution:
+        return None
+    size = np.abs(solution["activation"].values)
+    if not np.isfinite(size).any():
+        return None
+    sample, chain = np.unravel_index(np.nanargmax(size), size.shape)
+    return {
+        "value": float(size[sample, chain]),
+        "chain": str(solution["chain"].values[chain]),
+        "time": float(solution["time"].values[sample]),
+    }
 
 
 def work(power: np.ndarray, time: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ from ..kinematics.causes import owners
 from ..kinematics.chain import FAMILIES
 from ..kinematics.singularity import KINDS
 from ..mechanism.chain import limits
+from ..mechanism.home import independent_coordinates
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..status import STATUS_NAMES
 from .contacts import AXES
@@ -26,6 +27,10 @@ CHOICES = {
     "minimax": "of which the largest over its limit is least",
 }
 
+# What the energy of a simulation went to.
+ACCOUNTS = (
+    "kinetic", "potential", "actuators", "load", "actuator_losses", "contact_friction"
+)  # fmt: skip
 WRENCH = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 
 Rule = Callable[[Mechanism], str]
@@ -59,6 +64,7 @@ class Variable:
     when:   whether a solution has it at all.
     failed: whether failed samples may have a value too.
     sizes:  of vectors along the last dimension stand in CSV, not their components.
+    simulated: whether only a simulation has it.
     """
 
     name: str
@@ -71,6 +77,7 @@ class Variable:
     when: Callable[[Derived], bool] = always
     failed: bool = False
     sizes: bool = False
+    simulated: bool = False
 
     def attributes(self, mechanism: Mechanism) -> dict[str, str]:
         """`units`, `long_name` and, where there are flags, `flag_meanings`."""
@@ -78,6 +85,35 @@ class Variable:
         flags = self.flags if isinstance(self.flags, str) else self.flags(mechanism)
         named = {"flag_meanings": flags} if flags else {}
         return {"units": units, "long_name": self.meaning, **named}
+
+
+def _simulated(
+    name: str,
+    dims: tuple[str, ...],
+    units: str | Rule,
+    meaning: str,
+    column: str | None = None,
+    sizes: bool = False,
+) -> Variable:
+    """A variable of simulations, whose values come with them."""
+    return Variable(
+        name,
+        dims,
+        units,
+        meaning,
+        lambda d: d.simulated[name],
+        column=column,
+        when=lambda d: name in d.simulated,
+        sizes=sizes,
+        simulated=True,
+    )
+
+
+def of_independent(form: str) -> Rule:
+    """Units of q_EE: metres and radians by its coordinates."""
+    return lambda mechanism: _each(
+        ("m" if n in "XYZ" else "rad" for n in independent_coordinates(mechanism)), form
+    )
 
 
 def chosen(distribution: str) -> str:
@@ -111,6 +147,7 @@ def _each(units: Iterable[str], form: str) -> str:
 
 _CHAIN, _POSE, _CONTACT = ("time", "chain"), ("time", "coordinate"), ("time", "contact")
 _PLACE = (*_CONTACT, "axis")
+_FREE = ("time", "independent")
 
 # Those with columns come first, in the order of the columns.
 # fmt: off
@@ -147,6 +184,32 @@ VARIABLES = (
         "power of friction on the platform, never positive, where contacts have friction",
         lambda d: d.friction_power, when=with_friction,
     ),
+    _simulated("command", _CHAIN, of_effort(), "effort that the controller asks for", "command_"),
+    _simulated("measured_joint", _CHAIN, of_joint(), "joint as its encoder reads", "measured_"),
+    _simulated(
+        "estimate", _FREE, of_independent("{}"), "state as the controller takes it", "estimate_"
+    ),
+    _simulated("estimate_rate", _FREE, of_independent("{}/s"), "rate as the controller takes it"),
+    _simulated("reference", _FREE, of_independent("{}"), "state to follow", "reference_"),
+    _simulated("reference_rate", _FREE, of_independent("{}/s"), "rate to follow"),
+    _simulated(
+        "tracking_error", _FREE, of_independent("{}"), "reference less state", "error_"
+    ),
+    _simulated("bite_force", ("time",), "N", "force that the controller measures", "bite_force"),
+    _simulated("bite_reference", ("time",), "N", "force to bite with", "bite_reference"),
+    _simulated(
+        "load_force", ("time", "source", "axis"), "N",
+        "force of each load on the platform in {S}", "load_", sizes=True,
+    ),
+    _simulated(
+        "load_mode", ("time", "source"), "1",
+        "mode of each load: of food 0 apart, 1 between the teeth, 2 broken",
+    ),
+    _simulated(
+        "energy", ("time", "account"), "J",
+        "kinetic and potential energy, work of actuators and loads, losses since the start",
+    ),
+    _simulated("actuator_loss", _CHAIN, "W", "power that the actuator's own friction takes"),
     Variable(
         "actuator_power", _CHAIN, "W", "power of the actuator: effort times joint rate",
         lambda d: d.actuator_power,
@@ -253,4 +316,6 @@ DIMENSIONS = {
     "the torque",
     "axis": f"{', '.join(AXES)} in {{S}}",
     "component": ", ".join(WRENCH),
+    "source": "loads of a scenario, by name",
+    "account": ", ".join(ACCOUNTS),
 }

@@ -63,6 +63,10 @@ KINDS = {
         "samples that could not be computed (`--flag`)",
         "see their intervals and causes; scale the motion",
     ),
+    "failed_variants": Kind(
+        "variants that have samples without a result (`--vary`)",
+        "the bands leave them out; a study of the same numbers by `condyle sweep` has the reasons",
+    ),
     "near_singularity": Kind(
         "samples near a singularity",
         f"ratio below {NEAR_SINGULAR:g}: torques grow, and so does the effect of every error in "
@@ -72,6 +76,9 @@ KINDS = {
         "effort beyond a limit",
         "another actuator, or another motion; efforts of least norm know no limits, "
         "`--distribution bounded` keeps them",
+    ),
+    "ended": Kind(
+        "a simulation that ended before its time", "`solution.events` says why, in which state"
     ),
     "speed_limit": Kind("speed above a limit", "another actuator, or another motion"),
     "rod_angles": Kind(

@@ -108,6 +108,7 @@ class Playback:
             time=self.now,
             stale=failed is not None,
             over=over_limits(self.mechanism, here["torque"]),
+            markers=s["marker_place"].values[i] if "marker_place" in s else None,
         )
 
     def _good_before(self, sample: int) -> int:

@@ -119,6 +119,8 @@ class View:
         guides = list(points.values())[:1] or [(0.0, 0.0, 0.0)]
         guides += [contact.point for contact in self.session.mechanism.contacts]
         self.stage.show_paths([playback.path(point) for point in guides])
+        has = "marker_body" in solution.coords
+        self.stage.show_markers([str(b) for b in solution["marker_body"].values] if has else [])
         self.panel.show_playback(playback)
 
     def show_map(self, dataset: xr.Dataset) -> None:

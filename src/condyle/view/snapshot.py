@@ -31,6 +31,7 @@ class Snapshot:
     time:           of a solution that is played [s], or None.
     stale:          there is no result, and `pose` is that of another time.
     over:           chains whose effort is outside its limits.
+    markers:        of a solution with measured ones, (m, 3) [m] in {S}, NaN where not seen.
     """
 
     mechanism: Mechanism
@@ -55,3 +56,4 @@ class Snapshot:
     time: float | None = None
     stale: bool = False
     over: tuple[str, ...] = ()
+    markers: np.ndarray | None = None

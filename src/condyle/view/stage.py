@@ -25,6 +25,8 @@ BALL: RGB = (194, 24, 91)
 ALARM: RGB = (201, 42, 42)
 WARNING: RGB = (224, 160, 74)
 LOAD: RGB = (70, 80, 92)
+MARKERS: dict[str, RGB] = {"fixed": (7, 169, 115), "platform": (16, 93, 202), "": (116, 95, 138)}
+MARKER = 2.4  # radius of a measured marker, over that of a rod
 BODY = {"calm": PLATFORM, "warning": WARNING, "unreachable": ALARM}
 VIEWS = {
     "Front": ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
@@ -74,6 +76,7 @@ class Stage:
             for name, colour, count in self._arrow_kinds()
         }
         self._paths: list[Any] = []
+        self._markers: list[Any] = []
         self.control = self._scene.add_transform_controls(
             "/drag", scale=0.55, line_width=3.0, depth_test=False
         )
@@ -190,6 +193,13 @@ class Stage:
             for name in drawing.balls:
                 self._joints[chain.name, name].position = points[name]
         self._show_forces(snapshot)
+        places = np.full((len(self._markers), 3), np.nan)
+        if snapshot.markers is not None:
+            places = self.scale * snapshot.markers
+        for handle, at in zip(self._markers, places, strict=True):
+            handle.visible = bool(np.isfinite(at).all())
+            if handle.visible:
+                handle.position = at
 
     def _lay(self, chain: str, rod: Rod, points: dict[str, np.ndarray], tint: RGB) -> None:
         handle = self._rods[chain, rod.body]
@@ -234,6 +244,17 @@ class Stage:
             )
             for i, path in enumerate(paths)
             if len(path) > 1
+        ]
+
+    def show_markers(self, bodies: list[str]) -> None:
+        """Make measured markers of these bodies, in place of those before; `show` moves them."""
+        for handle in self._markers:
+            handle.remove()
+        self._markers = [
+            self._scene.add_icosphere(
+                f"/markers/{i}", MARKER * self._radius, MARKERS[body], visible=False
+            )
+            for i, body in enumerate(bodies)
         ]
 
     def held_pose(self) -> np.ndarray:

@@ -5,10 +5,12 @@
     batch(table, in, strides, ...)   most throughput: all values vectors over W samples
 
 All shapes are printed from the same graph: `straight` for one evaluation, `loops` for a batch.
+The two are texts of their own, since compilers do best by each with other flags.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import files
 
@@ -17,6 +19,7 @@ from ...graph.program import Interface, Program, Variants
 from ..kernel import AGAIN
 from .loops import Loops
 from .prepare import prepare
+from .printer import Printer
 from .straight import Straight
 
 CHAIN = 5  # terms above which a sum becomes two that run side by side
@@ -26,12 +29,15 @@ CHAIN = 5  # terms above which a sum becomes two that run side by side
 class Source:
     """Generated C and what a caller must know of it.
 
+    single:     text of one evaluation, for the batch to be linked with; None where there is none.
+    batch:      text of the batch, by how many chains stand abreast in it.
     table_size: numbers that `prepare` computes.
     checks:     numbers that `one` writes after the results.
     operations: vector operations of one batch step; a fused multiply-add counts one.
     """
 
-    text: str
+    single: str | None
+    batch: Callable[[int], str]
     interface: Interface
     table_size: int
     checks: int
@@ -41,13 +47,13 @@ class Source:
 def emit(variants: Variants, width: int) -> Source:
     """The kernel's C for `width` lanes."""
     main = fused(variants.main)
-    batch = Loops(main, width)
-    functions: dict[str, Straight | Loops] = {"step": batch}
+    step = Loops(main, width)
+    apart: dict[str, Straight] = {}
     if variants.single:
         one = main if variants.latency is None else fused(variants.latency)
-        functions["quick"] = Straight(one, width)
+        apart["quick"] = Straight(one, width)
     if variants.robust is not None:
-        functions["robust"] = Straight(fused(variants.robust), width)
+        apart["robust"] = Straight(fused(variants.robust), width)
     face, checks = main.interface, main.checks
     macros = {
         "W": width,
@@ -55,23 +61,37 @@ def emit(variants: Variants, width: int) -> Source:
         "OUTPUTS": sum(face.width(r) for r in face.results),
         "CHECKS": len(checks),
         "AGAIN": AGAIN,
-        "ROBUST": int("robust" in functions),
+        "ROBUST": int("robust" in apart),
         "SINGLE": int(variants.single),
     }
-    size, code = 0, []
-    for name, printer in functions.items():
+    printers: dict[str, Printer] = {"step": step, **apart}
+    size = 0
+    for name, printer in printers.items():
         macros[f"{name.upper()}_TABLE"] = size
         size += -(-printer.table_size // width) * width
-        code += [prepare(printer, f"prepare_{name}"), printer.function(name)]
-    below = ", ".join(str(AGAIN if c.below is None else int(c.below)) for c in checks)
     tolerances = ", ".join(repr(c.tolerance) for c in checks)
-    judged = [
+    below = ", ".join(str(AGAIN if c.below is None else int(c.below)) for c in checks)
+    head = [
+        *(f"#define {name} {value}" for name, value in macros.items()),
+        _text("vector.h"),
         f"static const double tolerance[CHECKS + 1] = {{{tolerances}}};",
         f"static const int below[CHECKS + 1] = {{{below}}};",
+        _text("judge.h"),
     ]
-    defines = [f"#define {name} {value}" for name, value in macros.items()]
-    text = "\n".join([*defines, _text("vector.h"), *judged, *code, _text("driver.h")])
-    return Source(text, face, size, len(checks), batch.operations())
+
+    def batch(abreast: int) -> str:
+        shared = prepare(step, "prepare_step")
+        return "\n".join([*head, shared, step.function("step", abreast), _text("batch.h")])
+
+    single = None
+    if apart:
+        code = [
+            text
+            for name, printer in apart.items()
+            for text in (prepare(printer, f"prepare_{name}"), printer.function(name))
+        ]
+        single = "\n".join([*head, *code, _text("single.h")])
+    return Source(single, batch, face, size, len(checks), step.operations())
 
 
 def _text(name: str) -> str:

@@ -8,35 +8,28 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Mapping
-from functools import lru_cache
-from importlib.resources import files
-from pathlib import Path
+from copy import copy
 from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, UnsupportedError
+from ...errors import InputError
 from ...graph.program import Interface, Numbers, Variants
-from ...progress import step
-from .. import cache
-from ..compiler import Compiler, CompilerError, find_compiler
 from ..kernel import Answer, arranged, columns_of
-from ..notice import notice
 from ..threads import shared_out, workers
-from .emit import emit
+from .build import loaded
+from .library import aligned, prepared
 
 # Vector operations that are worth a thread of their own: some 0.3 ms.
 WORTH_A_THREAD = 1_000_000
 UNIT = 64  # samples of which pieces are multiples: whole vectors at any width
-
-_doubles = ctypes.POINTER(ctypes.c_double)
 
 
 class CompiledKernel:
     """One mechanism's numbers in a compiled question.
 
     Attributes: order: where each lane stands among the callers'.
-                facts: flags, compiler, operation count, where the library is.
+                facts: compilers, flags, operation count, where the library is.
                 cached: whether it was there already.
     """
 
@@ -46,19 +39,21 @@ class CompiledKernel:
         """Args:   key: of everything that shapes what `build` returns.
         Raises: CompilerError: where no kernel can be built.
         """
-        compiler = find_compiler()
-        entry, self._library = _loaded(key, build, compiler)
+        entry, self._library = loaded(key, build, numbers)
         self.facts, self.cached = entry.facts, entry.cached
         self.interface = Interface.of(self.facts["interface"])
         self.columns = sum(self.interface.width(r) for r in self.interface.results)
+        self._prepare(numbers)
+
+    def renumbered(self, numbers: Numbers) -> CompiledKernel:
+        """The same kernel on the numbers of another mechanism of its structure."""
+        other = copy(self)
+        other._prepare(numbers)
+        return other
+
+    def _prepare(self, numbers: Numbers) -> None:
         self.order = numbers.order
-        self._table = _aligned(self.facts["table_size"])
-        blocks = [
-            np.ascontiguousarray(_padded(own, pad, self.facts["lanes"]))
-            for own, pad in zip(numbers.lanes, numbers.padding, strict=True)
-        ]
-        pointers = (_doubles * len(blocks))(*(_pointer(block) for block in blocks))
-        self._library.prepare(_pointer(numbers.parameters), pointers, _pointer(self._table))
+        self._table = prepared(self._library, self.facts, numbers)
 
     def run(self, inputs: Mapping[str, np.ndarray], threads: int | None = None) -> Answer:
         """Evaluate samples; columns that are contiguous or constant are fastest."""
@@ -66,7 +61,7 @@ class CompiledKernel:
         columns = [_readable(column) for column in columns]
         status = np.empty(count, dtype=np.uint8)
         rows = -(-count // UNIT) * UNIT
-        results = _aligned(self.columns * rows).reshape(self.columns, rows)
+        results = aligned(self.columns * rows).reshape(self.columns, rows)
         strides = [column.strides[0] // 8 for column in columns]
         starts = [column.ctypes.data for column in columns]
         steps = (ctypes.c_ssize_t * len(columns))(*strides)
@@ -136,7 +131,7 @@ class Single:
     ) -> None:
         self._kernel = kernel  # whose table and library have to stay
         lanes, checks = kernel.facts["lanes"], kernel.facts["checks"]
-        given, found = _aligned(columns + lanes), _aligned(results + checks)
+        given, found = aligned(columns + lanes), aligned(results + checks)
         given[:] = 0.0
         self.given, self.found = given[:columns], found[:results]
         self._one = one
@@ -146,11 +141,10 @@ class Single:
         """Evaluate `given`; returns the status."""
         return self._one(*self._at)
 
-
-def _padded(own: np.ndarray, pad: np.ndarray, width: int) -> np.ndarray:
-    """Constants (size, lanes), filled up to whole vectors."""
-    extra = -own.shape[1] % width
-    return np.hstack([own, np.repeat(pad[:, None], extra, axis=1)])
+    @property
+    def addresses(self) -> tuple[int, int, int, int]:
+        """Of the C function and of what it is called with, for other C: table, `given`, `found`."""
+        return ctypes.cast(self._one, ctypes.c_void_p).value or 0, *self._at
 
 
 def _readable(column: np.ndarray) -> np.ndarray:
@@ -158,90 +152,3 @@ def _readable(column: np.ndarray) -> np.ndarray:
     if column.strides[0] % 8 or not column.flags.aligned:  # a view into a record, say
         return column.copy()
     return column
-
-
-def _loaded(
-    key: str, build: Callable[[], Variants], compiler: Compiler
-) -> tuple[cache.Entry, ctypes.CDLL]:
-    """The kernel of a question, built if need be.
-
-    Raises: CompilerError: where it cannot be built, or loaded once it is.
-    """
-    recipe = _recipe(key, compiler)
-
-    def make(folder: Path) -> tuple[Path, dict[str, Any]]:
-        return _make(folder, build(), compiler)
-
-    ways = (
-        lambda: cache.find(recipe),
-        lambda: cache.build(recipe, make, notice),
-        lambda: cache.build_apart(recipe, make),
-    )
-    problem: Exception | None = None
-    try:
-        for way in ways:
-            if (entry := way()) is not None:
-                try:
-                    return entry, _load(str(entry.library))
-                except OSError as error:  # built with another C library, or cleared just now
-                    problem = error
-    except (OSError, AttributeError, UnsupportedError) as error:
-        problem = error
-    raise CompilerError(f"no kernel could be built and loaded: {problem}") from problem
-
-
-def _recipe(key: str, compiler: Compiler) -> str:
-    """Name of everything that shapes a kernel."""
-    tool = repr((compiler.command, compiler.flags, compiler.lanes))
-    return cache.digest(key, _generator(), tool, compiler.identity)
-
-
-@lru_cache(maxsize=1)
-def _generator() -> str:
-    """A hash of the code that turns graphs into C."""
-    room = Path(str(files(__package__)))
-    sources = sorted(path for path in room.iterdir() if path.suffix in (".py", ".h"))
-    return cache.digest(*(path.read_bytes() for path in sources))
-
-
-def _make(folder: Path, variants: Variants, compiler: Compiler) -> tuple[Path, dict[str, Any]]:
-    with step("building a kernel"):
-        source = emit(variants, compiler.lanes)
-        text, library = folder / "kernel.c", folder / "kernel.so"
-        text.write_text(source.text, encoding="utf-8")
-        compiler.build(text, library)
-    _load(str(library))  # only what can be loaded is kept
-    facts = {
-        "graph": variants.digest,
-        "interface": source.interface.data(),
-        "checks": source.checks,
-        "table_size": source.table_size,
-        "operations": source.operations,
-        "lanes": compiler.lanes,
-        "compiler": list(compiler.command),
-        "flags": list(compiler.flags),
-    }
-    return library, facts
-
-
-@lru_cache(maxsize=64)
-def _load(path: str) -> ctypes.CDLL:
-    library = ctypes.CDLL(path)
-    pointer, size = ctypes.c_void_p, ctypes.c_size_t
-    library.batch.argtypes = [pointer, pointer, pointer, size, pointer, size, pointer]
-    library.batch.restype = None
-    library.prepare.restype = None
-    if hasattr(library, "one"):
-        library.one.argtypes = [pointer] * 3
-    return library
-
-
-def _aligned(count: int) -> np.ndarray:
-    """An array that starts on a cache line, as vector loads like it."""
-    raw = np.empty(count + 8)
-    offset = (-raw.ctypes.data // 8) % 8
-    return raw[offset : offset + count]
-
-
-def _pointer(a: np.ndarray) -> Any:
-    return a.ctypes.data_as(_doubles)

@@ -16,7 +16,6 @@ from ...graph.operations import REDUCTIONS
 from ...graph.program import Program
 from .printer import Printer, nested
 
-ABREAST = 2  # chains whose statements alternate, to keep both arithmetic ports busy
 LONG = 700  # statements of a chain above which one at a time is enough
 TRIGONOMETRY = 12  # operations of half a sine and cosine
 
@@ -43,9 +42,14 @@ class Loops(Printer):
         self.rolled = per_chain > LONG
         self.kept = self._kept() if self.rolled else set()
         self.here: Part = (0, None)
+        self.abreast = 1
 
-    def function(self, name: str) -> str:
-        """`static void name(table, in, at, out)`, for the samples from `at` on."""
+    def function(self, name: str, abreast: int) -> str:
+        """`static void name(table, in, at, out)`, for the samples from `at` on.
+
+        Args: abreast: chains whose statements alternate, to keep all arithmetic ports busy.
+        """
+        self.abreast = 1 if self.rolled else abreast
         lines = [
             f"static void {name}(const double *restrict table, const double *const *in, size_t at,",
             "    vec *restrict out) {",
@@ -137,7 +141,7 @@ class Loops(Printer):
             if self._part(t) == part
         ]
         plain = [v for v in values if v not in self.absorbed]
-        count, abreast = self.counts[group], 1 if self.rolled else ABREAST
+        count, abreast = self.counts[group], self.abreast
         yield from (f"vec r{v} = {start};" for v, start in self._started(sums, group))
         if self.rolled:
             yield f"for (int c = 0; c < {count}; c++) {{"

@@ -8,9 +8,9 @@ from .printer import INFIX, Printer, arithmetic, nested, number
 
 
 def prepare(printer: Printer, name: str) -> str:
-    """`static void name(par, lane, table)`: shared values once, lane ones for each chain."""
+    """`void name(par, lane, table)`: shared values once, lane ones for each chain."""
     g, padded = printer.g, printer.padded
-    head = f"static void {name}(const double *par, const double *const *lane, double *table) {{"
+    head = f"HIDDEN void {name}(const double *par, const double *const *lane, double *table) {{"
     lines = [head]
     for v in printer.fixed:
         group = g.nodes[v].group

@@ -22,8 +22,8 @@ class Straight(Printer):
         super().__init__(program, width, copies, width)
 
     def function(self, name: str) -> str:
-        """`static int name(table, in, out)`: whether every check is met beyond doubt."""
-        head = f"static int {name}(const double *restrict table, const double *restrict in, "
+        """`int name(table, in, out)`: whether every check is met beyond doubt."""
+        head = f"HIDDEN int {name}(const double *restrict table, const double *restrict in, "
         head += "double *restrict out) {"
         checks = self.program.checks
         met = (f"({self.name(c.value, 0)} >= {c.tolerance!r})" for c in checks)

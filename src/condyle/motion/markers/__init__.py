@@ -1,5 +1,6 @@
 """Measured motion as laboratories have it: markers of a C3D file, and the pose they give."""
 
+from condyle.motion.markers.beside import Beside, read_beside
 from condyle.motion.markers.gaps import Gap
 from condyle.motion.markers.marker_file import MarkerFile, read_markers
 from condyle.motion.markers.measured import (
@@ -17,6 +18,7 @@ from condyle.motion.markers.writing import write_motion
 __all__ = [
     "MAX_GAP",
     "MAX_RESIDUAL",
+    "Beside",
     "Gap",
     "MarkerFile",
     "MarkerMotion",
@@ -25,6 +27,7 @@ __all__ = [
     "Registration",
     "as_data",
     "from_c3d",
+    "read_beside",
     "read_c3d",
     "read_markers",
     "write_motion",

@@ -1,4 +1,4 @@
-"""Bryant angles of rotation matrices: R = Rx(alpha) Ry(beta) Rz(gamma)."""
+"""Bryant angles and rotation matrices: R = Rx(alpha) Ry(beta) Rz(gamma)."""
 
 from __future__ import annotations
 
@@ -18,3 +18,14 @@ def bryant_angles(rotation: np.ndarray) -> np.ndarray:
     known = np.isfinite(angles).all(axis=1)
     angles[known] = np.unwrap(angles[known], axis=0)
     return angles
+
+
+def rotations(angles: np.ndarray) -> np.ndarray:
+    """R = Rx(alpha) Ry(beta) Rz(gamma) of angles [rad], (F, 3): (F, 3, 3)."""
+    (ca, cb, cg), (sa, sb, sg) = np.cos(angles.T), np.sin(angles.T)
+    rows = [
+        [cb * cg, -cb * sg, sb],
+        [ca * sg + sa * sb * cg, ca * cg - sa * sb * sg, -sa * cb],
+        [sa * sg - ca * sb * cg, sa * cg + ca * sb * sg, ca * cb],
+    ]
+    return np.moveaxis(np.array(rows), -1, 0)

@@ -14,6 +14,7 @@ from condyle.errors import InputError, few, no_such_file, shortened
 from condyle.mechanism.messages import describe, shown
 from condyle.mechanism.table import Table
 from condyle.mechanism.toml import LARGEST_FILE, read_tables
+from condyle.motion.markers.channel_tables import Emg, Forces
 from condyle.motion.markers.rigid import FEWEST
 from condyle.motion.words import listed, short
 
@@ -40,6 +41,8 @@ class MarkerFile(Table):
     platform: _Labels = Field(description="markers that move with the platform")
     home: tuple[_Time, _Time] = Field(description="when the mechanism is at home [s]")
     places: dict[str, Any] = Field(alias="register")
+    forces: Forces | None = Field(None, description="channels of the load")
+    emg: Emg | None = Field(None, description="channels of the muscles")
 
     @property
     def directed(self) -> bool:
@@ -66,6 +69,13 @@ class MarkerFile(Table):
     def _in_order(cls, value: tuple[float, float]) -> tuple[float, float]:
         if value[1] < value[0]:
             raise ValueError(f"expected [from, to] or one time, got [{value[0]:g}, {value[1]:g}] s")
+        return value
+
+    @field_validator("fixed", "platform", mode="before")
+    @classmethod
+    def _labels(cls, value: Any) -> Any:
+        if not isinstance(value, list | tuple):
+            raise ValueError(f"expected a list of markers' labels, got {shown(value)}")
         return value
 
     @field_validator("fixed", "platform")

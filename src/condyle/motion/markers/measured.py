@@ -9,15 +9,19 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from condyle.errors import InputError
 from condyle.mechanism import load as load_mechanism
 from condyle.mechanism.mechanism import Mechanism
 from condyle.motion.load import Load
+from condyle.motion.markers.beside import Beside
 from condyle.motion.markers.bodies import Bodies, Body, find_bodies
 from condyle.motion.markers.bryant import bryant_angles
-from condyle.motion.markers.channels import force_channels
+from condyle.motion.markers.channel_tables import Forces
 from condyle.motion.markers.diagnosis import odd_sizes, suspects_in, why_none
+from condyle.motion.markers.emg import envelopes
+from condyle.motion.markers.forces import measured_load
 from condyle.motion.markers.gaps import Gap, close_gaps
 from condyle.motion.markers.labels import find_label
 from condyle.motion.markers.marker_file import MarkerFile, Place, read_markers
@@ -27,6 +31,7 @@ from condyle.motion.markers.registration import Registration, register
 from condyle.motion.markers.summary import in_words
 from condyle.motion.path import Motion
 from condyle.motion.units import POSE
+from condyle.motion.words import listed
 
 MAX_RESIDUAL = 2e-3  # m
 MAX_GAP = 0.1  # s
@@ -59,8 +64,9 @@ class MarkerMotion:
         gaps: filled or cut off, in their order.
         registration: from the laboratory to {S}.
         off_contacts: distance of each ball from its surface, root mean square and largest [m].
-        markers: the markers used, by name, in {S} with the base's motion taken out, (N, 3) [m].
-        load: from force channels, if some were named.
+        beside: what was measured beside it, at its times: markers in {S} with the base's motion
+            taken out, their residuals, and EMG, where the marker file names channels.
+        load: from force channels or a force plate, where some were named.
         recording: what the file holds.
         warnings: what looks wrong, or was assumed.
     """
@@ -71,10 +77,15 @@ class MarkerMotion:
     gaps: tuple[Gap, ...]
     registration: Registration
     off_contacts: dict[str, tuple[float, float]]
-    markers: dict[str, np.ndarray]
+    beside: Beside
     load: Load | None
     recording: Recording
     warnings: tuple[str, ...]
+
+    @property
+    def markers(self) -> dict[str, np.ndarray]:
+        """The markers used, by name, in {S}, (N, 3) [m]; NaN where not seen."""
+        return dict(zip(self.beside.names, self.beside.points.transpose(1, 0, 2), strict=True))
 
     def __str__(self) -> str:
         return in_words(self)
@@ -101,7 +112,8 @@ def from_c3d(
             max_gap: gaps are filled by a cubic spline up to so long [s].
             longest: where gaps are longer, take the longest stretch without one, not an error.
             unit: of lengths, in place of what the file says: m, cm, mm or um.
-            force: channels that are a force's components along the laboratory's axes.
+            force: channels that are a force's components along the laboratory's axes, in place
+                of [forces] of the marker file.
             cutoff: smooth the motion, as of `Motion.from_arrays`.
     Raises: InputError: for files that cannot be used, and gaps that are too long.
     """
@@ -110,6 +122,8 @@ def from_c3d(
             raise InputError(f"{name}: got {value!r}, expected a number, 0 or more")
     machine = mechanism if isinstance(mechanism, Mechanism) else load_mechanism(mechanism)
     file, recording = read_markers(markers), read_c3d(path, unit)
+    forces = file.forces if force is None else _three(force)
+    activity = {} if file.emg is None else envelopes(file.emg, recording, machine)
     bodies = find_bodies(recording, file)
 
     def place(where: Place, key: str) -> np.ndarray:
@@ -137,6 +151,10 @@ def from_c3d(
     at = used.copy()
     at[: kept.start] = at[kept.stop :] = False
     off = off_contacts(machine, R[at], p[at])
+    load = None
+    if forces is not None:
+        pose_kept = kept, motion.value
+        load = measured_load(forces, recording, bodies, registration, machine, pose_kept)
     warnings = (
         *recording.warnings,
         *bodies.warnings,
@@ -144,6 +162,7 @@ def from_c3d(
         *registration.warnings,
         *suspects,
         *motion.warnings,
+        *(() if load is None else load.warnings),
     )
     return MarkerMotion(
         motion=replace(motion, sha256=recording.sha256, warnings=warnings),
@@ -152,15 +171,32 @@ def from_c3d(
         gaps=tuple(gaps),
         registration=registration,
         off_contacts={n: (_rms(d), float(np.abs(d).max())) for n, d in off.items()},
-        markers={
-            name: registration.to_base(bodies.steadied(body.points)[kept, i])
-            for body in bodies.both
-            for i, name in enumerate(body.names)
-        },
-        load=None if force is None else force_channels(recording, bodies, registration, force),
+        beside=Beside(
+            t=motion.t,
+            names=tuple(name for body in bodies.both for name in body.names),
+            bodies=tuple(body.what for body in bodies.both for _ in body.names),
+            points=registration.to_base(
+                bodies.steadied(np.concatenate([body.points for body in bodies.both], axis=1))[kept]
+            ),
+            residual=np.hstack([body.fit.residual for body in bodies.both])[kept],
+            emg={chain: values[kept] for chain, values in activity.items()},
+            source=recording.source,
+        ),
+        load=load,
         recording=recording,
         warnings=warnings,
     )
+
+
+def _three(channels: Sequence[str]) -> Forces:
+    if len(channels) != 3:
+        raise InputError(f"force: got {len(channels)} channels, expected three: along X, Y, Z")
+    try:
+        return Forces.model_validate({"channels": tuple(channels)})
+    except ValidationError:
+        raise InputError(
+            f"force: got {listed(map(str, channels))}, expected the labels of three channels"
+        ) from None
 
 
 def _place(recording: Recording, bodies: Bodies, where: Place, key: str) -> np.ndarray:

@@ -13,6 +13,7 @@ import numpy as np
 from condyle.errors import CondyleError, InputError, no_such_file
 from condyle.extras import require
 from condyle.motion.digest import digest
+from condyle.motion.markers.plates import Plate, read_plates
 from condyle.motion.units import LENGTH_UNITS
 from condyle.motion.words import short
 
@@ -33,7 +34,8 @@ class Recording:
         labels: of the markers, (L,), as they stand in the file.
         points: (F, L, 3) [m] in the laboratory's frame; NaN where a marker was not seen.
         channels: labels of what else was sampled, (C,);  channel_units: theirs, as in the file.
-        analog: (F, C): of each frame the mean of its samples, in the channel's unit.
+        samples: (F, n, C), n samples a frame, in the channel's unit.
+        plates: force plates, in the file's order.
         warnings: what had to be assumed.
     """
 
@@ -48,8 +50,19 @@ class Recording:
     points: np.ndarray
     channels: tuple[str, ...]
     channel_units: tuple[str, ...]
-    analog: np.ndarray
+    samples: np.ndarray
+    plates: tuple[Plate, ...] = ()
     warnings: tuple[str, ...] = ()
+
+    @property
+    def analog(self) -> np.ndarray:
+        """Of each frame the mean of its samples, (F, C)."""
+        return self.samples.mean(axis=1)
+
+    @property
+    def channel_rate(self) -> float:
+        """Samples a second of a channel [Hz]."""
+        return self.rate * self.samples.shape[1]
 
 
 def read_c3d(path: str | os.PathLike[str], unit: str | None = None) -> Recording:
@@ -103,7 +116,7 @@ def _read(content: bytes, path: str | os.PathLike[str], unit: str | None) -> Rec
     points, analog = [], []
     for _, found, samples in file.read_frames(check_nan=True):
         points.append(found)
-        analog.append(samples.mean(axis=1) if samples.size else np.zeros(0))
+        analog.append(samples.T if samples.size else np.zeros((1, 0)))
     if len(points) != count:
         raise InputError(
             f"{path}: is cut short: it says {count} frames and holds {len(points)}. Copy or export "
@@ -111,7 +124,7 @@ def _read(content: bytes, path: str | os.PathLike[str], unit: str | None) -> Rec
         )
     known, metres, assumed = _unit(path, _text(file, "POINT:UNITS"), unit)
     first = max(int(file.first_frame), 1)
-    channels = _labels(file, "ANALOG:LABELS", analog[0].size)
+    channels = _labels(file, "ANALOG:LABELS", analog[0].shape[1])
     return Recording(
         source=os.path.basename(os.fspath(path)),
         sha256=digest(path),
@@ -124,7 +137,8 @@ def _read(content: bytes, path: str | os.PathLike[str], unit: str | None) -> Rec
         points=_seen(np.array(points)) * metres,
         channels=channels,
         channel_units=_labels(file, "ANALOG:UNITS", len(channels)),
-        analog=np.array(analog),
+        samples=np.array(analog),
+        plates=read_plates(file, metres),
         warnings=assumed,
     )
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 if TYPE_CHECKING:
     from condyle.motion.markers.measured import MarkerMotion
 
@@ -38,11 +40,29 @@ def in_words(found: MarkerMotion) -> str:
             "Contacts will take away: "
             + ", ".join(f"{n} {_mm(rms)} RMS, {_mm(m)} at most" for n, (rms, m) in given_contacts)
         )
+    lines += _channels(found)
     lines.append(f"Gaps: {len(found.gaps) or 'none'}")
     lines += [f"  {gap}" for gap in found.gaps[:_LISTED]]
     if len(found.gaps) > _LISTED:
         lines.append(f"  and {len(found.gaps) - _LISTED} more")
     return "\n".join(lines)
+
+
+def _channels(found: MarkerMotion) -> list[str]:
+    """What came of the other channels."""
+    lines = []
+    if (load := found.load) is not None:
+        force, moment = (np.linalg.norm(part, axis=1).max() for part in np.split(load.wrench, 2, 1))
+        at = f" at {load.point}" if load.point else ""
+        about = f", moment up to {moment:.4g} N m there" if moment else ""
+        lines.append(f"Load: force up to {force:.4g} N{at}{about}")
+    if emg := found.beside.emg:
+        peaks = ", ".join(
+            f"{chain} {values.max():.3g} at {found.motion.t[values.argmax()]:.4g} s"
+            for chain, values in emg.items()
+        )
+        lines.append(f"EMG, largest of each: {peaks}")
+    return lines
 
 
 def as_data(found: MarkerMotion) -> dict[str, Any]:
@@ -61,6 +81,10 @@ def as_data(found: MarkerMotion) -> dict[str, Any]:
             for name, (rms, largest) in found.off_contacts.items()
         },
         "gaps": [vars(gap) for gap in found.gaps],
+        "load": None
+        if found.load is None
+        else {"point": found.load.point, "largest": np.abs(found.load.wrench).max(axis=0).tolist()},
+        "emg": {chain: float(values.max()) for chain, values in found.beside.emg.items()},
         "warnings": list(found.warnings),
     }
 

@@ -9,7 +9,8 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..actuators import activations, joint_loads
+from ..actuators import EMG_ROW, activations, emg, joint_loads
+from ..words import stem
 from .chains import readable
 from .labels import TIME, caption
 from .panels import legend, lines
@@ -25,9 +26,13 @@ COLOURS = "YlGnBu"
 
 @plot()
 def activation(solution: Solution) -> Figure:
-    """Activation, effort over greatest effort, of each actuator or muscle; joint loads below."""
+    """Activation, effort over greatest effort, of each actuator or muscle; joint loads below.
+
+    Where EMG was measured (`Solution.with_measured`), its envelope stands under its muscle's row.
+    """
     title = "Activation: effort over greatest effort"
-    found, loads = activations(solution), joint_loads(solution)
+    computed, measured, loads = activations(solution), emg(solution), joint_loads(solution)
+    found = beneath(computed, measured)
     if not found:
         return nothing_to_draw(title, caption(solution), NO_LIMITS)
     rows = 0.35 + 0.19 * len(found)
@@ -47,6 +52,19 @@ def activation(solution: Solution) -> Figure:
     return figure
 
 
+def beneath(
+    computed: dict[str, np.ndarray], measured: dict[str, np.ndarray]
+) -> dict[str, np.ndarray]:
+    """Rows of what was computed, each with what was measured of it under it."""
+    rows = {}
+    for name in dict.fromkeys([*computed, *measured]):
+        if name in computed:
+            rows[name] = computed[name]
+        if name in measured:
+            rows[f"{name}{EMG_ROW}"] = measured[name]
+    return rows
+
+
 def field(axes: Axes, time: np.ndarray, found: dict[str, np.ndarray]) -> None:
     """Rows of colour from 0 to 1; beyond 1 and without a result they have colours of their own."""
     values = np.array(list(found.values()))
@@ -56,10 +74,15 @@ def field(axes: Axes, time: np.ndarray, found: dict[str, np.ndarray]) -> None:
         cmap=colours, vmin=0.0, vmax=1.0, rasterized=True,
     )  # fmt: skip
     axes.set_yticks(np.arange(len(found)) + 0.5, list(map(readable, found)), fontsize=7)
+    for name, label in zip(found, axes.get_yticklabels(), strict=True):
+        if name.endswith(EMG_ROW):
+            label.set(style="italic", color=GREY)
     axes.invert_yaxis()
     axes.grid(False)
     # A line between pairs, so that rows can be followed to their names.
-    for level in range(2, len(found), 2):
+    stems = [stem(name.removesuffix(EMG_ROW)) for name in found]
+    pairs = [i for i in range(1, len(stems)) if stems[i] != stems[i - 1]]
+    for level in pairs:
         axes.axhline(level, color=GREY, lw=0.6)
     over = bool(np.nanmax(values, initial=0.0) > 1.0)
     beside = axes.inset_axes((1.015, 0.0, 0.018, 1.0))  # no panel of its own

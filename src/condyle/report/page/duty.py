@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...mechanism.chain import limits
-from ..actuators import Duty, activations, edges, joint_loads, limits_text
+from ..actuators import EMG_ROW, Duty, activations, edges, emg, joint_loads, limits_text
 from ..scene import styles
 from ..words import side, stem
 from .columns import Columns
@@ -68,14 +68,18 @@ def plane_panels(
 def activation_panels(solution: Solution, columns: Columns) -> Iterator[Panel]:
     """Activations as rows of colour, and under them the loads on the joints."""
     found, loads = activations(solution), joint_loads(solution)
-    if not found:
+    measured = emg(solution)
+    names = [*found, *(name for name in measured if name not in found)]
+    if not names:
         return
-    names, numbers = list(found), {c.name: i for i, c in enumerate(solution.mechanism.chains)}
+    numbers = {c.name: i for i, c in enumerate(solution.mechanism.chains)}
     effort = solution["torque"].values
-    rows = [
-        Line(name, f"torque.{name}", effort[:, numbers[name]], style)
-        for name, style in zip(names, styles(names), strict=True)
-    ]
+    rows = []
+    for name, style in zip(names, styles(names), strict=True):
+        if name in found:
+            rows.append(Line(name, f"torque.{name}", effort[:, numbers[name]], style))
+        if name in measured:
+            rows.append(Line(f"{name}{EMG_ROW}", f"emg.{name}", measured[name], style))
     field = panel(
         columns,
         SECTION,
@@ -83,11 +87,13 @@ def activation_panels(solution: Solution, columns: Columns) -> Iterator[Panel]:
         "Activation",
         Shown(""),
         {"": rows},
-        note="Effort over greatest effort; orange: beyond 1, a limit is exceeded.",
+        note="Effort over greatest effort; orange: beyond 1, a limit is exceeded."
+        + (" EMG: its measured envelope over its greatest." if measured else ""),
     )
     # The page has the efforts already: an activation is |effort| times a scale.
     for line in field["sets"][0]["lines"]:
-        line["scale"] = 1.0 / limits(solution.mechanism.chains[numbers[line["label"]]]).greatest
+        if line["label"] in found:
+            line["scale"] = 1.0 / limits(solution.mechanism.chains[numbers[line["label"]]]).greatest
     yield field | {"kind": "field", "decimals": 3}
     if loads:
         names = list(loads)

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..scene import Scene, contact_normals, contact_patch, place, platform_hull, styles
 from ..scene.chains import PLATFORM_JOINT
+from .beside import markers, reach
 from .columns import Columns
 
 if TYPE_CHECKING:
@@ -39,7 +40,8 @@ def machine(solution: Solution, columns: Columns) -> dict[str, Any]:
     arrows = [*_contact_arrows(solution, scene, columns, size), *_load_arrow(solution, columns)]
     scales = _scales(arrows, size)
     ends = [a.far_end(scene.on_platform(a.at), scales[a.kind]["metresPerNewton"]) for a in arrows]
-    low, high = _box(np.vstack([cloud, *ends]), size)
+    everything = np.vstack([cloud, reach(solution), *ends])
+    low, high = _box(everything, size)
     arm = _rounded(TRIAD * size)
     triad = low + arm * np.vstack([np.zeros(3), np.eye(3)])
     surfaces = list(_surfaces(mechanism, scene, size))
@@ -60,6 +62,7 @@ def machine(solution: Solution, columns: Columns) -> dict[str, Any]:
             {"name": name, "at": {"platform": list(point)}}
             for name, point in mechanism.platform.points.items()
         ],
+        "markers": markers(solution, columns),
         "surfaces": surfaces,
         "undrawn": _undrawn(mechanism, surfaces),
         "arrows": [arrow.description for arrow in arrows],
@@ -67,7 +70,7 @@ def machine(solution: Solution, columns: Columns) -> dict[str, Any]:
         "traces": list(_traces(solution)),
         "range": [[float(a), float(b)] for a, b in zip(low, high, strict=True)],
         "triad": {"origin": low.tolist(), "arm": arm},
-        "extent": _extremes(np.vstack([cloud, *ends, triad])).tolist(),
+        "extent": _extremes(np.vstack([everything, triad])).tolist(),
     }
 
 

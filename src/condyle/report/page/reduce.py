@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..actuators import Duty, DutyMeter, duty
+from .beside import marker_panels
 from .columns import Columns
 from .duty import activation_panels
 from .envelope import Envelope
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 BUDGET = 3_400_000  # bytes of samples, so that a page of 5001 samples stays under 10 MB
 BUCKETS = 1200  # of an envelope: two of them a pixel of a wide plot
-DRAWN = (4, 20)  # columns a chain, and besides, that the picture in space needs
+DRAWN = (4, 3, 20)  # columns a chain, a marker, and besides, that the picture in space needs
 PIECE = 32_768  # samples that are looked at together
 
 
@@ -60,7 +61,8 @@ def reduced(solution: Solution) -> Reduced:
     time, status = solution["time"].values, solution["status"].values
     count = len(time)
     lines = curve_values(solution.isel(time=slice(0, 2)).load())
-    columns = len(lines) + DRAWN[0] * solution.sizes["chain"] + DRAWN[1]
+    counts = solution.sizes["chain"], solution.sizes.get("marker", 0), 1
+    columns = len(lines) + sum(n * count for n, count in zip(DRAWN, counts, strict=True))
     affordable = max(BUDGET // (4 * max(columns, 1)), 2)
     if count <= affordable:
         whole = solution.load()
@@ -99,6 +101,7 @@ def curve_values(solution: Solution) -> dict[str, np.ndarray]:
     columns = Columns(solution["time"].values)
     time_panels(solution, columns, every=True)
     list(activation_panels(solution, columns))
+    list(marker_panels(solution, columns))
     for number in {n for panel in track_panels(solution, columns) for n in panel["columns"]}:
         name = list(columns.values)[number]
         columns.lines[name] = number

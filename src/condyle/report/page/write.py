@@ -15,6 +15,7 @@ from ...progress import step
 from ..failures import failures, longest
 from ..scene import DARK, LIGHT
 from .alerts import alerts
+from .beside import marker_panels
 from .columns import Columns
 from .duty import activation_panels, plane_panels
 from .facts import (
@@ -31,9 +32,13 @@ from .machine import machine
 from .panels import time_panels
 from .reduce import Reduced, reduced
 from .source import opened
+from .sweep import bands_section, sweep_section
 from .tracks import track_panels
 
 if TYPE_CHECKING:
+    import xarray as xr
+
+    from ...motion import Beside
     from ...results.solution import Solution
     from ..tables import Table
 
@@ -62,6 +67,8 @@ def write_report(
     *,
     tables: Sequence[Table] | None = None,
     files: Sequence[str | os.PathLike[str]] | None = None,
+    measured: Beside | str | os.PathLike[str] | None = None,
+    sweep: xr.Dataset | None = None,
 ) -> Path:
     """Write the report, whole or not at all.
 
@@ -72,17 +79,27 @@ def write_report(
             tables: of `condyle.report.tables`, to print on it; default: those that the solution
                 keeps, which `condyle compare` puts there.
             files: inputs of the run, to be named with their hashes.
+            measured: markers and EMG, as of `Solution.with_measured`, to show beside it.
+            sweep: of `condyle.sweep`, to be shown too.
     Returns: the path.
     Raises: InputError: if a file cannot be read or the report cannot be written.
     """
     with step("writing the report"):
         if isinstance(solution, str | os.PathLike):
             with opened(solution) as found:
-                page = report_html(found, tables=tables, files=files)
+                page = _html_of(found, measured, tables=tables, files=files, sweep=sweep)
         else:
-            page = report_html(solution, tables=tables, files=files)
+            page = _html_of(solution, measured, tables=tables, files=files, sweep=sweep)
         write_text(path, page)
     return Path(path)
+
+
+def _html_of(
+    solution: Solution, measured: Beside | str | os.PathLike[str] | None, **options: Any
+) -> str:
+    return report_html(
+        solution if measured is None else solution.with_measured(measured), **options
+    )
 
 
 def report_html(
@@ -90,23 +107,26 @@ def report_html(
     *,
     tables: Sequence[Table] | None = None,
     files: Sequence[str | os.PathLike[str]] | None = None,
+    sweep: xr.Dataset | None = None,
 ) -> str:
     """The report as text; see `write_report`."""
     from plotly.offline import get_plotlyjs
 
     from ..tables import kept_tables
 
+    bands = bands_section(solution)
     page = reduced(solution)
     solution = page.solution
     scripts = [_lines(get_plotlyjs()), _script()]
     name, options = solution.attrs["mechanism_name"], solution.options
+    what = "Simulation" if options.get("motion_kind") == "simulation" else "Inverse dynamics"
     parts = {
         "policy": text(_policy(scripts)),
         "style": Markup(_asset("page.css")),
         "title": text(f"{name} - condyle report"),
         "name": text(name),
         "subtitle": text(
-            f"Inverse dynamics by {options['formulation']}, route {options['route']}; motion: "
+            f"{what} by {options['formulation']}, route {options['route']}; motion: "
             f"{PurePath(options['motion']).name}; load: {PurePath(options['load']).name}"
         ),
         "version": text(solution.attrs.get("source", "condyle")),
@@ -116,6 +136,8 @@ def report_html(
         "chains": chain_table(solution),
         "reactions": reaction_tables(solution),
         "tables": given_tables(kept_tables(solution) if tables is None else tables),
+        "bands": bands,
+        "sweep": sweep_section(sweep),
         "run": provenance(solution, [Path(file) for file in files or ()]),
         "payload": json_for_script(_payload(page)),
         "plotly": tag("script", Markup(scripts[0])),
@@ -129,7 +151,11 @@ def _payload(page: Reduced) -> dict[str, Any]:
     solution = page.solution
     columns = Columns(solution["time"].values)
     drawn = machine(solution, columns)
-    panels = [*time_panels(solution, columns), *activation_panels(solution, columns)]
+    panels = [
+        *time_panels(solution, columns),
+        *activation_panels(solution, columns),
+        *marker_panels(solution, columns),
+    ]
     planes = plane_panels(solution, columns, page.duties)
     tracks = track_panels(solution, columns)
     told = alerts(solution, columns)

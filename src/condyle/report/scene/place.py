@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...mechanism import Mechanism
+from ...motion.markers.bryant import rotations
 from .chains import ChainDrawing, drawing_points
 
 
@@ -27,17 +28,6 @@ class Scene:
     def on_platform(self, point: tuple[float, ...]) -> np.ndarray:
         """A point of the platform, (3,) in {M}, in {S}, (N, 3)."""
         return on_platform(self.position, self.rotation, point)
-
-
-def rotations(angles: np.ndarray) -> np.ndarray:
-    """R = Rx(alpha) Ry(beta) Rz(gamma), (N, 3, 3), of angles (N, 3) [rad] ([Cheng2023] eq. 2)."""
-    (ca, cb, cg), (sa, sb, sg) = np.cos(angles).T, np.sin(angles).T
-    rows = [
-        [cb * cg, -cb * sg, sb],
-        [ca * sg + sa * sb * cg, ca * cg - sa * sb * sg, -sa * cb],
-        [sa * sg - ca * sb * cg, sa * cg + ca * sb * sg, ca * cb],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)
 
 
 def on_platform(position: np.ndarray, R: np.ndarray, point: tuple[float, ...]) -> np.ndarray:

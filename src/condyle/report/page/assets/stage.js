@@ -55,9 +55,10 @@ function fitted(name) {
 }
 
 let view = "Oblique", flat = CAMERAS.Oblique.flat;
+const NEEDS = { surfaces: drawn.surfaces, forces: drawn.arrows, markers: drawn.markers };  // of layers that may be empty
 const layersShown = Object.fromEntries(
-  ["platform", "chains", "surfaces", "forces", "traces", "labels", "axes"]
-    .filter((layer) => (layer !== "surfaces" || drawn.surfaces.length) && (layer !== "forces" || drawn.arrows.length))
+  ["platform", "chains", "surfaces", "forces", "traces", "markers", "labels", "axes"]
+    .filter((layer) => !(layer in NEEDS) || NEEDS[layer].length)
     .map((layer) => [layer, true]));
 const NEUTRAL = { light: "#7d8894", dark: "#8d98a5" };
 const PLATFORM = { light: "#c9d3de", dark: "#5b6877" };
@@ -166,6 +167,36 @@ function labelTrace(index) {
   };
 }
 
+// Measured markers: a sign and a colour for each body, nothing where one was not seen.
+const MARKERS = {
+  fixed: { symbol: "square", sign: "■", colour: 2, text: "markers measured on the base" },
+  platform: { symbol: "diamond", sign: "◆", colour: 0, text: "on the platform" },
+  "": { symbol: "circle", sign: "●", colour: 4, text: "of no stated body" },
+};
+
+function markerTrace(index) {
+  const places = drawn.markers.map((marker) => marker.columns.map((c) => {
+    const value = 1e3 * column(c)[index];
+    return Number.isFinite(value) ? value : null;
+  }));
+  const looks = drawn.markers.map((marker) => MARKERS[marker.body]);
+  return {
+    type: "scatter3d", mode: "markers", name: "markers", hoverinfo: "text", text: drawn.markers.map((marker) => plain(marker.name)),
+    x: places.map((p) => p[0]), y: places.map((p) => p[1]), z: places.map((p) => p[2]),
+    marker: { size: 5, symbol: looks.map((look) => look.symbol), color: looks.map((look) => colour(look.colour)), line: { width: 0 } },
+  };
+}
+
+function fillMarkerLegend() {
+  const legend = document.getElementById("marker-legend");
+  const bodies = Object.keys(MARKERS).filter((body) => drawn.markers.some((marker) => marker.body === body));
+  legend.hidden = !bodies.length;
+  legend.replaceChildren(...bodies.flatMap((body, n) => {
+    const { sign, text, colour: number } = MARKERS[body];
+    return [n ? ", " : "", element("span", { style: `color:${colour(number)}` }, sign), ` ${text}`];
+  }));
+}
+
 // Plotly reads a little HTML in labels, and looks texts up in plain objects, where "constructor" is
 // found before it was put there; a name is only text.
 const plain = (text) => {
@@ -205,6 +236,7 @@ function stageTraces(index, grey) {
   const solids = bodies(index, grey);
   const traces = Object.entries(solids).map(([name, s]) => ({ ...solidTrace(name, s), layer: SOLID_LAYERS[name] }));
   traces.push({ ...labelTrace(index), layer: "labels" });
+  if (drawn.markers.length) traces.push({ ...markerTrace(index), layer: "markers" });
   traces.push(...surfaceTraces().map((t) => ({ ...t, layer: "surfaces" })));
   traces.push(...pathTraces().map((t) => ({ ...t, layer: "traces" })));
   traces.push(...triadTraces().map((t) => ({ ...t, layer: "axes" })));
@@ -225,6 +257,7 @@ const keyOf = ({ drawn, grey }) => `${drawn} ${grey}`;
 
 async function drawStage() {
   stageBusy = true;
+  fillMarkerLegend();
   const wanted = wantedAt(clock.index);
   setPose(wanted.drawn);
   const layout = stageLayout();
@@ -245,7 +278,7 @@ function shown3d(wanted) {
   stageNode.dataset.grey = wanted.grey;
 }
 
-const MOVING = 6;  // platform, chains, joints, balls, forces, labels
+const MOVING = drawn.markers.length ? 7 : 6;  // platform, chains, joints, balls, forces, labels, markers
 const LABELS = 5;
 
 // Names after the picture was turned; they may lie on each other now.
@@ -268,6 +301,7 @@ async function moveStage(index) {
     setPose(wanted.drawn);
     const solids = Object.values(bodies(wanted.drawn, wanted.grey));
     const parts = [...solids, labelTrace(wanted.drawn)];
+    if (drawn.markers.length) parts.push(markerTrace(wanted.drawn));
     if (stageShows.endsWith("true") !== wanted.grey) {
       await Plotly.restyle(stageNode, { facecolor: solids.map((s) => s.colours) }, [...solids.keys()]);
     }

@@ -1,7 +1,14 @@
 #define PAST_CACHES 400000 /* doubles */
 
-/* What a kernel exports. A sample that the quick code cannot vouch for is done again, robustly. */
+#if SINGLE
+HIDDEN void prepare_quick(const double *par, const double *const *lane, double *table);
+#endif
+#if ROBUST
+HIDDEN void prepare_robust(const double *par, const double *const *lane, double *table);
+HIDDEN int robust(const double *restrict table, const double *restrict in, double *restrict out);
+#endif
 
+/* What does not change from sample to sample. */
 void prepare(const double *par, const double *const *lane, double *table) {
     prepare_step(par, lane, table + STEP_TABLE);
 #if SINGLE
@@ -12,33 +19,8 @@ void prepare(const double *par, const double *const *lane, double *table) {
 #endif
 }
 
-/* The status that a sample's checks give: 0, that of the first that fails for sure, or AGAIN. */
-static int judged(const double *check) {
-    int status = 0;
-    for (int i = 0; i < CHECKS; i++) {
-        if (check[i] >= tolerance[i]) continue;
-        int own = check[i] < 0 ? below[i] : AGAIN;
-        if (status == 0 || (status == AGAIN && own != AGAIN)) status = own;
-    }
-    return status;
-}
-
-#if SINGLE
-/* One sample: INPUTS numbers, of which W more may be read; OUTPUTS + CHECKS numbers are written. */
-int one(const double *restrict table, const double *restrict in, double *restrict out) {
-    if (__builtin_expect(quick(table + QUICK_TABLE, in, out), 1)) return 0;
-    int status = judged(out + OUTPUTS);
-#if ROBUST
-    if (status == AGAIN) {
-        robust(table + ROBUST_TABLE, in, out);
-        status = judged(out + OUTPUTS);
-    }
-#endif
-    return status;
-}
-#endif
-
-/* Blocks of W samples, read from columns of any strides, written to columns.
+/* Blocks of W samples, read from columns of any strides, written to columns. A sample that the quick
+ * code cannot vouch for is done again, robustly.
  *
  * in:     INPUTS columns;  stride: between the samples of each, in doubles, 0 for a constant.
  * out:    OUTPUTS columns of doubles, `columns` apart.

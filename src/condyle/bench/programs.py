@@ -1,0 +1,120 @@
+"""Efforts within limits, beside solvers of quadratic programs that are called from Python."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..distribution import Problem, distribute
+from ..distribution.reduced import Reduced, reduce
+from ..mechanism.chain import limits
+from ..mechanism.mechanism import Mechanism
+from ..model.evaluator import Evaluator
+from .rows import Probe
+
+DIFFERENT = 1e-3  # of the largest effort: less, and a solver has solved the same program
+BINDING = "bounded where limits bind"
+PROGRAMS = 16  # that others solve, one after the other
+
+
+Given = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # q, q', q'', load
+
+
+@dataclass(frozen=True)
+class Bites:
+    """Samples of a mechanism whose limits bind, and how they are called."""
+
+    label: str
+    model: Evaluator
+    given: Given
+
+    def ours(self) -> float:
+        """Seconds a sample of `torques`, from q to efforts."""
+        start = time.perf_counter()
+        self.model.torques(*self.given, outputs=("contact",), threads=1)
+        return (time.perf_counter() - start) / len(self.given[0])
+
+    def programs(self) -> tuple[Reduced, np.ndarray]:
+        """Some of the programs, contacts eliminated, and the efforts that solve them, (R, n)."""
+        rows = np.linspace(0, len(self.given[0]) - 1, PROGRAMS).astype(int)
+        q, q1, q2, load = (a[rows] for a in self.given)
+        model = self.model
+        at = model.evaluate(q, q1, q2, load)
+        ports = {"pose": at.pose, "pose_rate": at.pose_rate}
+        ports |= {"pose_acceleration": at.pose_acceleration}
+        ports |= {"force": load[:, :3], "moment": load[:, 3:6], "point": load[:, 6:]}
+        s = {k: np.moveaxis(a, -1, 0) for k, a in model.kernel("balance").run(ports).values.items()}
+        both = [limits(chain) for chain in model.mechanism.chains]
+        low, high = (np.array([getattr(x, name) for x in both]) for name in ("low", "high"))
+        push = [c.push if c.one_sided else 0.0 for c in model.mechanism.contacts]
+        J, contacts = s["J"].transpose(0, 2, 1), s["normal"]
+        problem = Problem(s["Q"], J, contacts, None, low, high, np.array(push))
+        found = distribute(problem, "bounded")
+        good = np.flatnonzero(found.status == 0)
+        problem, pattern = problem.take(good), np.zeros((len(good), problem.k))
+        return reduce(problem, pattern, np.ones(problem.n), 0.0, True), found.effort[good]
+
+
+def program_probes(bites: Bites, unavailable: dict[str, str]) -> Iterator[Probe]:
+    """Our row, and one of each solver that is installed."""
+    label = f"{bites.label}: {BINDING}"
+    yield Probe(label, bites.ours, 0.0)
+    try:
+        solvers = _solvers()
+    except ImportError:
+        unavailable["quadratic programs"] = "run from the root of the repository"
+        return
+    r, right = bites.programs()
+    given = [_arguments(r, i) for i in range(r.count)]
+    for name, solve in solvers.items():
+        try:
+            got = np.array([solve(*one) for one in given])
+        except ImportError as problem:
+            unavailable[name] = str(problem)
+            continue
+        error = float(np.abs(got - right).max() / np.abs(right).max())
+        probe = Probe(f"{label}, {name}", partial(_seconds, solve, given), error)
+        yield replace(probe, tolerance=DIFFERENT, note="the program alone, from Python")
+
+
+def _arguments(r: Reduced, i: int) -> tuple[np.ndarray, ...]:
+    m, c = r.m, r.right[r.m :, i]
+    bounds = (c - r.contact_high[:, i], c - r.contact_low[:, i])
+    one = (r.G[:m, :, i], r.right[:m, i], r.low[:, i], r.high[:, i], r.G[m:, :, i], *bounds)
+    return tuple(np.ascontiguousarray(a) for a in one)
+
+
+def _seconds(solve: Callable[..., np.ndarray], given: list[tuple[np.ndarray, ...]]) -> float:
+    start = time.perf_counter()
+    for one in given:
+        solve(*one)
+    return (time.perf_counter() - start) / len(given)
+
+
+def _solvers() -> dict[str, Callable[..., Any]]:
+    sys.path.insert(0, str(Path.cwd()))
+    try:
+        found: dict[str, Callable[..., Any]] = importlib.import_module(
+            "benchmarks.programs"
+        ).SOLVERS
+        return found
+    finally:
+        sys.path.pop(0)
+
+
+def tight(mechanism: Mechanism, limit: float) -> Mechanism:
+    """The mechanism with limits on all efforts."""
+    own = {"torque_limit": limit}
+    chains = [
+        chain.model_copy(update={"actuator": chain.actuator.model_copy(update=own)})
+        for chain in mechanism.chains
+    ]
+    return mechanism.replace(chains=tuple(chains))

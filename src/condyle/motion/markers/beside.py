@@ -1,0 +1,121 @@
+"""What was measured beside a motion, to be shown with what was computed: markers and EMG.
+
+One table: `t`; of every marker `<marker>_x`, `_y`, `_z` [m] in {S}, and its distance from its place
+in its body, `<marker>_residual_fixed` or `<marker>_residual_platform` [m]; of every chain with EMG
+`emg_<chain>`, 1 at its greatest. Cells are empty where nothing was seen.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from condyle.errors import InputError
+from condyle.motion.arrays import check_rising
+from condyle.motion.table import read_table
+from condyle.motion.words import columns_are
+
+AXES = "xyz"
+BODIES = ("fixed", "platform")
+EMG = "emg_"
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """Markers and EMG at times of their own.
+
+    Attributes: t: (N,) [s], rising.
+                names: of the markers, (m,);  bodies: theirs, "fixed", "platform" or "" if unknown.
+                points: (N, m, 3) [m] in {S};  residual: distance of each marker from its place in
+                    its body, (N, m) [m]; NaN where not seen.
+                emg: chain -> envelope, (N,), 1 at its greatest.
+                source: where it came from, for messages.
+    """
+
+    t: np.ndarray
+    names: tuple[str, ...] = ()
+    bodies: tuple[str, ...] = ()
+    points: np.ndarray = field(default_factory=lambda: np.empty((0, 0, 3)))
+    residual: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
+    emg: dict[str, np.ndarray] = field(default_factory=dict)
+    source: str = "measured"
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """The table."""
+        found = {"t": self.t}
+        for i, (name, body) in enumerate(zip(self.names, self.bodies, strict=True)):
+            found |= {f"{name}_{axis}": self.points[:, i, k] for k, axis in enumerate(AXES)}
+            if body:
+                found[f"{name}_residual_{body}"] = self.residual[:, i]
+        return found | {f"{EMG}{chain}": values for chain, values in self.emg.items()}
+
+    def at(self, times: np.ndarray) -> Beside:
+        """The same at other times, linear between the samples; NaN beside a gap and outside."""
+
+        def along(values: np.ndarray) -> np.ndarray:
+            columns = values.reshape(len(self.t), -1).T
+            found = [np.interp(times, self.t, c, np.nan, np.nan) for c in columns]
+            return (
+                np.array(found)
+                .reshape(len(found), len(times))
+                .T.reshape(len(times), *values.shape[1:])
+            )
+
+        markers = bool(self.names)
+        return Beside(
+            times,
+            self.names,
+            self.bodies,
+            along(self.points) if markers else np.empty((len(times), 0, 3)),
+            along(self.residual) if markers else np.empty((len(times), 0)),
+            {chain: along(values) for chain, values in self.emg.items()},
+            self.source,
+        )
+
+
+def read_beside(source: Beside | str | os.PathLike[str]) -> Beside:
+    """Read a table (CSV or Parquet) of what was measured beside a motion.
+
+    Raises: InputError: for a file without markers or EMG, or of which a column is none of them.
+    """
+    if isinstance(source, Beside):
+        return source
+    table = read_table(source, gaps=True)
+    where, columns = table.source, dict(table.columns)
+    for name, values in columns.items():
+        bad = np.flatnonzero(np.isinf(values) | (np.isnan(values) & (name == "t")))
+        if len(bad):
+            raise InputError(f'{table.where(bad[0])}, column "{name}": expected a finite number')
+    if "t" not in columns:
+        raise InputError(f'{where}: column "t" is missing; expected t, then markers or EMG')
+    t = columns.pop("t")
+    check_rising(t, table.where)
+    names = [
+        n[:-2] for n in columns if n[-2:] == "_x" and {f"{n[:-2]}_y", f"{n[:-2]}_z"} <= {*columns}
+    ]
+    points = [np.column_stack([columns.pop(f"{name}_{axis}") for axis in AXES]) for name in names]
+    bodies, residual = [], []
+    for name in names:
+        body = next((b for b in BODIES if f"{name}_residual_{b}" in columns), "")
+        nothing = np.full(len(t), np.nan)
+        bodies.append(body)
+        residual.append(columns.pop(f"{name}_residual_{body}") if body else nothing)
+    emg = {n[len(EMG) :]: columns.pop(n) for n in list(columns) if n.startswith(EMG)}
+    if columns:
+        raise InputError(
+            f"{where}: {columns_are(columns)} neither of a marker (<marker>_x, _y, _z, "
+            "_residual_fixed or _residual_platform) nor EMG (emg_<chain>)"
+        )
+    if not names and not emg:
+        raise InputError(f"{where}: has no markers (<marker>_x, _y, _z) and no EMG (emg_<chain>)")
+    return Beside(
+        t,
+        tuple(names),
+        tuple(bodies),
+        np.stack(points, axis=1) if names else np.empty((len(t), 0, 3)),
+        np.column_stack(residual) if names else np.empty((len(t), 0)),
+        emg,
+        where,
+    )

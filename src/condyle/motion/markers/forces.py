@@ -1,0 +1,204 @@
+"""The load from analogue channels, turned and carried into the mechanism's frame."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from condyle.errors import InputError
+from condyle.motion.load import Load
+from condyle.motion.markers.bodies import Bodies
+from condyle.motion.markers.bryant import rotations
+from condyle.motion.markers.channel_tables import Forces
+from condyle.motion.markers.labels import find_label
+from condyle.motion.markers.plates import CHANNELS, Plate
+from condyle.motion.markers.recording import Recording
+from condyle.motion.markers.registration import Registration
+from condyle.motion.points import DEFAULT_LOAD_POINT, resolve_load_point
+from condyle.motion.units import Dimension, unit_factor
+from condyle.motion.words import listed, short
+
+if TYPE_CHECKING:
+    from condyle.mechanism.mechanism import Mechanism
+
+_FORCE, _MOMENT, _LENGTH = ("force", 0), ("moment", 0), ("length", 0)
+_IN = {_FORCE: "N, kN or mN", _MOMENT: "N m or N mm", _LENGTH: "m, cm or mm"}
+_OF_PLATE: dict[int, tuple[Dimension, ...]] = {
+    1: (_FORCE,) * 3 + (_LENGTH,) * 2 + (_MOMENT,),
+    2: (_FORCE,) * 3 + (_MOMENT,) * 3,
+    3: (_FORCE,) * 8,
+}
+
+
+def measured_load(
+    table: Forces,
+    recording: Recording,
+    bodies: Bodies,
+    registration: Registration,
+    mechanism: Mechanism,
+    pose: tuple[slice, np.ndarray],
+) -> Load:
+    """The load on the platform; where the base is not seen, linear between its neighbours.
+
+    Three channels are a force at a point. A plate's wrench keeps its line of action, through the
+    centre of pressure, by its moment about the point where loads act by default; unless a point is
+    named: then the force acts there.
+
+    Args:   pose: frames of the motion, and X_EE at them, (K, 6) [m, rad].
+    Raises: InputError: for channels, plates or points that are not there, and wrong units.
+    """
+    points = mechanism.platform.points
+    if table.point is not None and table.point not in points:
+        resolve_load_point(table.point, points)  # which says what there is
+    if table.plate is None:
+        force = np.stack([_channel(recording, n, _FORCE) for n in table.channels or ()], axis=-1)
+        force = _about_zero(table, recording, force.mean(axis=1))
+        in_base = _turned(table, force, bodies) @ registration.rotation.T
+        return _load(table, recording, recording.t, in_base, table.point)
+    plate, assumed = _plate(recording, table.plate)
+    force, moment = (w.mean(axis=1) @ plate.axes.T for w in _wrench(recording, plate))
+    both = _about_zero(table, recording, np.hstack([force, moment]))
+    base = bodies.fixed.fit
+    force, moment = (
+        _back(base.rotation, v) @ registration.rotation.T for v in np.split(both, 2, 1)
+    )
+    if table.point is not None:
+        return _load(table, recording, recording.t, force, table.point, assumed)
+    kept, X = pose
+    # About any point the wrench is the same one; that of `condyle run` needs no option there.
+    name = DEFAULT_LOAD_POINT if DEFAULT_LOAD_POINT in points else next(iter(points), None)
+    at = rotations(X[:, 3:]) @ np.array(points[name] if name else (0.0, 0.0, 0.0)) + X[:, :3]
+    middle = registration.to_base(
+        bodies.steadied(np.tile(plate.centre, (len(base.position), 1, 1)))
+    )
+    arm = middle[kept, 0] - at
+    wrench = np.hstack([force[kept], moment[kept] + np.cross(arm, force[kept])])
+    return _load(table, recording, recording.t[kept], wrench, name, assumed)
+
+
+def _load(
+    table: Forces,
+    recording: Recording,
+    t: np.ndarray,
+    wrench: np.ndarray,
+    point: str | None,
+    assumed: tuple[str, ...] = (),
+) -> Load:
+    known = np.isfinite(wrench).all(axis=1)  # not where the base is not seen
+    signed = -wrench[known] if table.reverse else wrench[known]
+    load = Load.from_arrays(t[known], signed, point=point, source=recording.source)
+    return replace(load, warnings=(*assumed, *load.warnings))
+
+
+def _turned(table: Forces, force: np.ndarray, bodies: Bodies) -> np.ndarray:
+    """Forces, (F, 3), along the laboratory's axes at home, the base's turn taken out."""
+    if table.axes == "fixed":
+        return force
+    if table.axes == "platform":
+        return np.einsum("fij,fj->fi", bodies.platform.fit.rotation, force)
+    return _back(bodies.fixed.fit.rotation, force)
+
+
+def _back(rotation: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    return np.einsum("fji,fj->fi", rotation, vectors)
+
+
+def _about_zero(table: Forces, recording: Recording, values: np.ndarray) -> np.ndarray:
+    """Values less their mean while there is no load."""
+    if table.zero is None:
+        return values
+    start, end = table.zero
+    within = (recording.t >= start - 1e-9) & (recording.t <= end + 1e-9)
+    if not within.any():
+        raise InputError(
+            f"forces: zero: {recording.source} has no frame from {start:g} to {end:g} s; it runs "
+            f"from {recording.t[0]:.6g} to {recording.t[-1]:.6g} s"
+        )
+    return values - values[within].mean(axis=0)
+
+
+def _plate(recording: Recording, number: int) -> tuple[Plate, tuple[str, ...]]:
+    """The plate of that number, and what had to be assumed of it.
+
+    Raises: InputError: if there is none, or the file does not say enough of it.
+    """
+    source, plates = recording.source, recording.plates
+    if number > len(plates):
+        there = f"has {len(plates)}" if plates else "has no force plate (FORCE_PLATFORM:USED)"
+        other = "; name three channels instead" if not plates else ""
+        raise InputError(f"{source}: forces: plate {number} asked for, and it {there}{other}")
+    plate = plates[number - 1]
+    where = f"{source}: force plate {number}"
+    if plate.type not in CHANNELS:
+        raise InputError(
+            f"{where} is of type {plate.type}, expected {listed(map(str, CHANNELS), '')}. Name "
+            "three channels instead"
+        )
+    wanted, count = CHANNELS[plate.type], len(recording.channels)
+    if len(plate.channels) < wanted or not all(0 <= c < count for c in plate.channels):
+        named = ", ".join(str(c + 1) for c in plate.channels) or "none"
+        raise InputError(
+            f"{where} (type {plate.type}) needs {wanted} of the file's {count} channels; "
+            f"FORCE_PLATFORM:CHANNEL names {named}"
+        )
+    if not plate.stands:
+        raise InputError(f"{where}: its corners (FORCE_PLATFORM:CORNERS) span no surface")
+    if plate.type == 4 and not plate.matrix.any():
+        raise InputError(f"{where} is of type 4 and has no FORCE_PLATFORM:CAL_MATRIX")
+    assumed = []
+    if plate.type in (2, 4) and plate.origin[2] > 0:
+        assumed.append(
+            f"{where}: FORCE_PLATFORM:ORIGIN has z above 0, as if the sensor were above the "
+            "surface; its sign was turned over"
+        )
+        plate = replace(plate, origin=-plate.origin)
+    moments = [] if plate.type == 3 else plate.channels[-1 if plate.type == 1 else 3 :]
+    if plate.type != 4 and not all(recording.channel_units[c] for c in moments):
+        assumed.append(f"{where}: moments without a unit; N {recording.unit} was assumed")
+    return plate, tuple(assumed)
+
+
+def _wrench(recording: Recording, plate: Plate) -> tuple[np.ndarray, np.ndarray]:
+    """Force and moment about the middle of the surface, (F, n, 3) each, in the plate's axes."""
+    names = [recording.channels[c] for c in plate.channels]
+    kinds = _OF_PLATE.get(plate.type)
+    if kinds is None:  # the matrix gives newtons, and moments in the file's length
+        signals = _finite(recording, recording.samples[..., list(plate.channels)], names)
+        scale = np.repeat([1.0, recording.metres], 3)[:, None]
+        return replace(plate, matrix=plate.matrix * scale).wrench(signals)
+    columns = [_values(recording, c, kind) for c, kind in zip(plate.channels, kinds, strict=True)]
+    return plate.wrench(np.stack(columns, axis=-1))
+
+
+def _channel(recording: Recording, name: str, kind: Dimension) -> np.ndarray:
+    """Samples of a channel, (F, n), in SI."""
+    at = find_label(name, recording.channels, f"{recording.source}: forces", "channel")
+    return _values(recording, at, kind)
+
+
+def _values(recording: Recording, at: int, kind: Dimension) -> np.ndarray:
+    """Samples of the channel of that number, (F, n), in SI; without a unit N, and the file's
+    length."""
+    name, unit = recording.channels[at], recording.channel_units[at]
+    plain = unit.translate({ord(c): None for c in " .*-\u00b7\u22c5_"})
+    if plain:
+        try:
+            factor = unit_factor(plain, kind)
+        except InputError:
+            raise InputError(
+                f'{recording.source}: channel "{short(name)}" is in {short(unit)}; a {kind[0]} is '
+                f"in {_IN[kind]}. Scale the channel, or write the load as a table"
+            ) from None
+    else:
+        factor = 1.0 if kind == _FORCE else recording.metres
+    return _finite(recording, recording.samples[..., at], [name]) * factor
+
+
+def _finite(recording: Recording, samples: np.ndarray, names: list[str]) -> np.ndarray:
+    if not np.isfinite(samples).all():
+        raise InputError(
+            f"{recording.source}: channel {listed(names)} has samples that are no numbers"
+        )
+    return samples

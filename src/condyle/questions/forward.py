@@ -1,0 +1,152 @@
+"""Forward dynamics: the accelerations that efforts and a load make, and the contact forces.
+
+From the independent coordinates q, their rates q', efforts and the load. With the equations affine
+in the accelerations (`inertia`), c'' = start + Pi w and forces G mu of the contacts,
+
+    H c'' + F = G mu,    Pi^T G = 0:    (Pi^T H Pi) w = - Pi^T (F + H start),
+
+and q'' = S^-1 w. The matrix is symmetric and positive definite.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import casadi as ca
+
+from ..dynamics.least_norm import definite_solve
+from ..graph.program import Program, Variants
+from ..kinematics.chain import FAMILIES
+from ..kinematics.contact import indices, solve_small
+from ..status import Status
+from .builder import Builder, Lanes
+from .equations import Wrench
+from .friction import Contacts, contacts
+from .inertia import Affine, affine
+from .inverse import DOUBTFUL, HUGE, add_sliding, feasibility
+from .platform import ANGLE_UNITS, Platform, closed, given, normal_forces
+from .rubbing import consistent
+from .structure import Structure
+
+# What can be asked for besides the accelerations.
+OUTPUTS = ("contact", "motion", "joint", "sliding")
+# |pivot| over the diagonal's entry below which elimination loses too many digits.
+CONDITIONED = 1e-5
+
+
+def forward(structure: Structure, wanted: Collection[str] = ()) -> Variants:
+    """Accelerations alone, or with some of `OUTPUTS`."""
+    return Variants(program(structure, wanted), single=True)
+
+
+def program(structure: Structure, wanted: Collection[str] = ()) -> Program:
+    """The graph; samples that it cannot vouch for go the robust path."""
+    b = Builder(structure)
+    platform = closed(b, rates=1)
+    effort = b.lane_sample("effort", unit="N m or N")
+    eq = affine(b, platform, Wrench.of(b), effort)
+    touch = contacts(b, platform) if structure.friction else None
+    found = _solved(b, platform, eq, touch, "contact" in wanted)
+    q2 = solve_small(eq.S, found.w)
+    b.output("acceleration", q2, "per s^2", structure.m)
+    if "contact" in wanted:
+        b.output("contact_force", found.force, "N", len(structure.contacts))
+    if "motion" in wanted:
+        motion = platform.motion
+        b.output("pose", platform.pose, ANGLE_UNITS)
+        b.output("pose_rate", motion.rate, "per s")
+        b.output("pose_acceleration", motion.acceleration + motion.M_J @ q2, "per s^2")
+    if "joint" in wanted:
+        b.output("joint", _joints(b, platform), "rad or m")
+        b.output("joint_rate", eq.rates, "rad/s or m/s")
+        turned = eq.start + eq.basis.rates(found.w)
+        pairs = zip(eq.biases, eq.rows, strict=True)
+        accelerations = [bias + ca.dot(row, turned) for bias, row in pairs]
+        b.output("joint_acceleration", accelerations, "per s^2")
+    if "sliding" in wanted:
+        add_sliding(b, touch or contacts(b, platform))
+    b.check(feasibility(b, platform, eq.discriminants), DOUBTFUL, Status.unreachable)
+    finite = ca.fabs(ca.sum1(q2)) < HUGE
+    b.check(2 * found.sure * finite - 1, 0.5)
+    return b.finish()
+
+
+def forward_system(structure: Structure) -> Program:
+    """The equations themselves, at whole poses that meet the contacts, for the robust path.
+
+    Port pose_acceleration is what the rates alone, q'' = 0, make of X_EE''.
+    """
+    b = Builder(structure)
+    platform = given(b)
+    effort = b.lane_sample("effort", unit="N m or N")
+    eq = affine(b, platform, Wrench.of(b), effort)
+    m, k = structure.m, len(structure.contacts)
+    b.output("H", _columns(eq), "kg, kg m, kg m^2", 6, m)
+    b.output("F", eq.F + eq.H @ eq.start, "N, N m", 6)
+    b.output("S", eq.S, "", m, m)
+    b.output("M_J", platform.motion.M_J, "", 6, m)
+    touch = contacts(b, platform)
+    b.output("normal", (eq.B.T @ touch.N).T, "", k, 6)
+    b.output("friction", (eq.B.T @ touch.T).T, "", k, 6)
+    add_sliding(b, touch)
+    b.output("joint_rate", eq.rates, "rad/s or m/s")
+    pairs = list(zip(eq.biases, eq.rows, strict=True))
+    b.output("bias", [bias + ca.dot(row, eq.start) for bias, row in pairs], "per s^2")
+    along = eq.basis.rates(ca.SX.eye(m))
+    b.output("J", [along.T @ row for row in eq.rows], "", m)
+    return b.finish()
+
+
+@dataclass(frozen=True)
+class _Solved:
+    """w, the contact forces along the unit normals (where wanted), and whether to trust them."""
+
+    w: ca.SX
+    force: ca.SX
+    sure: ca.SX
+
+
+def _columns(eq: Affine) -> ca.SX:
+    """H Pi, (s, m)."""
+    ind, dep = list(eq.basis.identity), list(eq.basis.others)
+    return eq.H[:, ind] + eq.H[:, dep] @ eq.basis.rest if dep else eq.H[:, ind]
+
+
+def _solved(
+    b: Builder, platform: Platform, eq: Affine, touch: Contacts | None, wanted: bool
+) -> _Solved:
+    H, F = _columns(eq), eq.F + eq.H @ eq.start
+    rubbing = list(b.structure.friction)
+    right = -F
+    if touch is not None:
+        T = eq.B.T @ touch.T[:, rubbing]
+        right = ca.horzcat(right, T)
+    M, pulled = eq.basis.generalized_force(H), eq.basis.generalized_force(right)
+    x, excess = definite_solve(M, pulled, ca.diag(M), CONDITIONED)
+    sure = ca.SX(1)
+    for one in excess:
+        sure = sure * (one > 0)
+    w, force = x[:, 0], ca.SX(0, 1)
+    if wanted or touch is not None:
+        dep = indices(b.structure.dependent)
+        left = F[dep] + H[dep, :] @ w
+        force = normal_forces(b, platform.motion, solve_small(eq.G[dep, :], left))
+        if touch is not None:
+            left = T[dep, :] - H[dep, :] @ x[:, 1:]
+            each = ca.horzsplit(solve_small(eq.G[dep, :], left))
+            K = ca.horzcat(*(normal_forces(b, platform.motion, mu) for mu in each))
+            y, count = consistent(K[rubbing, :], force[rubbing])
+            w, force = w - x[:, 1:] @ y, force + K @ y
+            sure = sure * (count == 1)
+    return _Solved(w, force, sure)
+
+
+def _joints(b: Builder, platform: Platform) -> Lanes:
+    """Joint coordinates, principal values."""
+    found = []
+    for group, kind in enumerate(b.structure.families):
+        family = FAMILIES[kind]
+        position = platform.placement.position + platform.R @ b.lane(group, "joint")
+        found.append(family.loop(family.named(b.lane(group, "constants")), position).q_r[0])
+    return found

@@ -1,0 +1,129 @@
+"""The mechanism at an instant of a simulation: where everything is, how fast, and what rubs.
+
+All that loads, sensors, events and controllers ask of a state q, q'; accelerations belong to
+`forward`. And the energy of a state, which the dynamics do not need and a balance does.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..dynamics.joint_space import chain_jacobians
+from ..graph.program import Program, Variants
+from ..kinematics.chain import FAMILIES
+from ..kinematics.contact import contact_frame
+from ..status import Status
+from .builder import Builder
+from .equations import Wrench, platform_body
+from .friction import contacts
+from .inertia import affine
+from .numbers import single_contacts
+from .platform import ANGLE_UNITS, Platform, closed
+from .structure import Structure
+
+CERTAIN = 0.5  # of a placement's discriminant, which is 0 or 1 where it was iterated
+
+
+def instant(structure: Structure, inertia: bool = False) -> Variants:
+    """Pose, twist, joints and contacts from the independent coordinates and rates.
+
+    Results: pose, pose_rate (6,); R (3, 3); T (6, m): [V; omega] = T q'; joint, joint_rate, and
+    A (m,) a lane: theta' = A q'; loss, power that an actuator's own friction takes [W];
+    contact_point (k, 3); rub (k,), power of friction a newton of contact force [m/s].
+
+    Args: inertia: M_r of `matrices` too, (m, m).
+    """
+    b = Builder(structure)
+    platform = closed(b, rates=1)
+    motion, s = platform.motion, structure
+    T = motion.E @ motion.M_J
+    b.output("pose", platform.pose, ANGLE_UNITS)
+    b.output("pose_rate", motion.rate, "per s")
+    b.output("R", platform.R, "1", 3, 3)
+    b.output("T", T, "", 6, s.m)
+    joints, rates, rows, losses, discriminants = [], [], [], [], []
+    for group, kind in enumerate(s.families):
+        family = FAMILIES[kind]
+        r = platform.R @ b.lane(group, "joint")
+        loop = family.loop(
+            family.named(b.lane(group, "constants")), platform.placement.position + r
+        )
+        row = b.lane(group, "mask") * (T.T @ ca.vertcat(loop.J, ca.cross(r, loop.J)))
+        rate = ca.dot(row, platform.q1)
+        joints.append(loop.q_r[0])
+        rates.append(rate)
+        rows.append(row)
+        losses.append(_loss(b, group, rate))
+        discriminants.append(loop.discriminant)
+    b.output("joint", joints, "rad or m")
+    b.output("joint_rate", rates, "rad/s or m/s")
+    b.output("A", rows, "", s.m)
+    b.output("loss", losses, "W")
+    touch, k = contacts(b, platform), len(s.contacts)
+    position = platform.placement.position
+    frame = contact_frame(single_contacts(s, b.parameter), position, platform.R)
+    points = [position + r for r in frame.levers]
+    b.output("contact_point", ca.horzcat(ca.SX(3, 0), *points).T, "m", k, 3)
+    rubs = [ca.dot(touch.slip[:, i], touch.drag[:, i]) for i in range(k)]
+    b.output("rub", ca.vertcat(ca.SX(0, 1), *rubs), "m/s", k)
+    if inertia:
+        b.output("inertia_matrix", _inertia(b, platform), "kg, kg m, kg m^2", s.m, s.m)
+    placement = platform.placement
+    if placement.discriminant is not None:
+        below = None if placement.iterated else Status.unreachable
+        b.check(placement.discriminant, CERTAIN if placement.iterated else 0.0, below)
+    b.check(b.least(discriminants), 0.0, Status.unreachable)
+    return Variants(b.finish(), single=True)
+
+
+def energy(structure: Structure) -> Program:
+    """Kinetic and potential energy [J], from q and q'; the potential is 0 at the origin of {S}."""
+    b = Builder(structure)
+    platform = closed(b, rates=1)
+    motion, g = platform.motion, b.parameter("gravity")
+    body = platform_body(b, lumped=False)
+    V, omega = motion.twist[:3], motion.twist[3:]
+    spin = platform.R.T @ omega
+    kinetic = body.mass * ca.dot(V, V) / 2 + ca.dot(spin, body.inertia @ spin) / 2
+    potential = -body.mass * ca.dot(g, platform.placement.position)
+    moving, held = [], []
+    for group, kind in enumerate(structure.families):
+        family, c = FAMILIES[kind], FAMILIES[kind].named(b.lane(group, "constants"))
+        r = platform.R @ b.lane(group, "joint")
+        loop = family.loop(c, platform.placement.position + r)
+        _, inverse = chain_jacobians(family, c, loop.q_r)
+        rate = inverse @ (V + ca.cross(omega, r))
+        own, high = ca.SX(0), ca.SX(0)
+        q = ca.SX.sym("q_r", 3)
+        for link in family.links(c, q):
+            speed = ca.jacobian(link.centre, q) @ rate
+            turn = link.spin @ rate
+            own += link.mass * ca.dot(speed, speed) / 2 + ca.dot(turn, link.inertia @ turn) / 2
+            high -= link.mass * ca.dot(g, link.centre)
+        own, high = ca.substitute([own, high], [q], [loop.q_r])
+        if structure.losses:
+            own += b.lane(group, "actuator")[0] * rate[0] ** 2 / 2
+        mask = b.lane(group, "mask")
+        moving.append(mask * own)
+        held.append(mask * high)
+    b.output("kinetic", kinetic + b.total(moving), "J")
+    b.output("potential", potential + b.total(held), "J")
+    return b.finish()
+
+
+def _loss(b: Builder, group: int, rate: ca.SX) -> ca.SX:
+    """Power that an actuator's viscous and Coulomb friction take [W]."""
+    if not b.structure.losses:
+        return 0 * rate
+    _, viscous, coulomb, square = ca.vertsplit(b.lane(group, "actuator"))
+    return (viscous + coulomb / ca.sqrt(rate * rate + square)) * rate * rate
+
+
+def _inertia(b: Builder, platform: Platform) -> ca.SX:
+    zero = ca.SX.zeros(3)
+    no_effort = [ca.SX(0) for _ in b.structure.families]
+    eq = affine(b, platform, Wrench(zero, zero, zero), no_effort)
+    upper = ca.triu(eq.H)
+    H = upper + ca.triu(eq.H, False).T
+    pulled = eq.basis.generalized_force(H)  # Pi^T H
+    return eq.S.T @ eq.basis.generalized_force(pulled.T) @ eq.S

@@ -1,0 +1,81 @@
+"""What was measured beside a motion, as part of its solution: markers and EMG at its samples."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import InputError, did_you_mean
+from ..motion import Beside, read_beside
+from ..motion.markers.bryant import rotations
+
+if TYPE_CHECKING:
+    from .solution import Solution
+
+PLACE, RESIDUAL, OFFSET, EMG = "marker_place", "marker_residual", "marker_offset", "emg"
+
+_MEANINGS = {
+    PLACE: ("m", "measured marker in {S}; nan where it was not seen"),
+    RESIDUAL: ("m", "distance of the marker from its place in its body of markers"),
+    OFFSET: ("m", "distance of the marker from where the computed motion has its mean place"),
+    EMG: ("1", "envelope of the muscle's EMG, 1 at its greatest; nan where none was measured"),
+}
+
+
+def with_measured(solution: Solution, measured: Beside | str | os.PathLike[str]) -> Solution:
+    """A copy with the variables above, as far as they were measured.
+
+    They are linear between the samples of the measurement, NaN in its gaps and outside. An offset
+    tells of smoothing, of projection onto the contacts, and of all that a residual tells of.
+
+    Raises: InputError: for chains that are not there, or times that do not meet the solution's.
+    """
+    found = read_beside(measured)
+    time, chains = solution["time"].values, [str(name) for name in solution["chain"].values]
+    if found.t[-1] < time[0] or found.t[0] > time[-1]:
+        raise InputError(
+            f"{found.source}: runs from {found.t[0]:.6g} to {found.t[-1]:.6g} s, and the solution "
+            f"from {time[0]:.6g} to {time[-1]:.6g} s; they have no time in common"
+        )
+    for chain in found.emg:
+        if chain not in chains:
+            raise InputError(
+                f'{found.source}: column "emg_{chain}": "{solution.attrs["mechanism_name"]}" has '
+                f'no chain "{chain}".{did_you_mean(chain, chains)}'
+            )
+    here = found.at(time)
+    result = solution.drop_dims("marker", errors="ignore").drop_vars(EMG, errors="ignore")
+    if found.names:
+        result = result.assign_coords(
+            marker=list(found.names), marker_body=("marker", list(found.bodies))
+        )
+        seen = ("time", "marker")
+        result[PLACE] = (*seen, "axis"), here.points, _attributes(PLACE)
+        result[RESIDUAL] = seen, here.residual, _attributes(RESIDUAL)
+        result[OFFSET] = seen, _offset(here, solution["pose"].values), _attributes(OFFSET)
+    if found.emg:
+        nothing = np.full(len(time), np.nan)
+        envelope = np.column_stack([here.emg.get(chain, nothing) for chain in chains])
+        result[EMG] = ("time", "chain"), envelope, _attributes(EMG)
+    return result
+
+
+def _attributes(name: str) -> dict[str, str]:
+    units, meaning = _MEANINGS[name]
+    return {"units": units, "long_name": meaning}
+
+
+def _offset(here: Beside, pose: np.ndarray) -> np.ndarray:
+    """Distance of each marker from its mean place on its body, carried along, (N, m) [m]."""
+    R, p = rotations(pose[:, 3:]), pose[:, :3]
+    found = np.full(here.points.shape[:2], np.nan)
+    for i, body in enumerate(here.bodies):
+        # A rigid motion keeps distances, so that they may be taken in the body.
+        x = here.points[:, i]
+        own = x if body == "fixed" else np.einsum("nji,nj->ni", R, x - p)
+        known = np.isfinite(own).all(axis=1)
+        if body and known.any():
+            found[known, i] = np.linalg.norm(own[known] - own[known].mean(axis=0), axis=1)
+    return found

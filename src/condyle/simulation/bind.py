@@ -1,0 +1,267 @@
+"""A scenario on a mechanism: the plan of a run, with all that does not fit said at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, ScenarioError
+from ..kinematics.chain import FAMILIES
+from ..mechanism import load as load_mechanism
+from ..mechanism.chain import limits
+from ..mechanism.home import characteristic_length
+from ..model.evaluator import Evaluator
+from ..motion import Motion, read_table
+from .controllers import FunctionLaw, Law
+from .integrators import Settings
+from .loads import BoundFunction, BoundLoad
+from .plan import WORKS, ClosedLoop, OpenLoop, Plan, Sensing
+from .point import Instant
+from .reference import default_motion, path_of
+from .scenario import Scenario
+
+ABSOLUTE = 1e-3  # of the mechanism's size, radians or joules: what rtol is of, at the least
+PERIOD = 1e-3  # seconds, of a controller in Python where the scenario says none
+LoadFunction = Callable[..., Any]
+
+
+def bind(
+    model: Evaluator,
+    scenario: Scenario,
+    *,
+    controller: Callable[..., Any] | None = None,
+    loads: Sequence[LoadFunction] = (),
+    motion: Motion | None = None,
+    stop_at_bounds: bool = False,
+    source: str = "scenario",
+) -> Plan:
+    """The plan of a scenario.
+
+    Args:   controller: a function in the place of the scenario's law;  loads: functions besides.
+            motion: to follow, in the place of the controller's.
+    Raises: ScenarioError: with everything that does not fit the mechanism.
+    """
+    problems = _Problems()
+    with problems:
+        bound = _loads(model, scenario, loads)
+    with problems:
+        drive = _drive(model, scenario, controller, motion)
+    start = None
+    with problems:
+        start = _start(model, scenario, drive if not problems.lines else None)
+    if problems.lines or start is None:
+        raise ScenarioError(source, problems.lines)
+    q, q1 = start
+    own = [limits(chain) for chain in model.mechanism.chains]
+    low, high, speed = (np.array([getattr(x, n) for x in own]) for n in ("low", "high", "speed"))
+    names = model.independent
+    length = characteristic_length(model.mechanism)
+    scale = np.array([length if n in "XYZ" else 1.0 for n in names])
+    atol = scenario.rtol * ABSOLUTE * np.concatenate([scale, scale, np.ones(len(WORKS))])
+    return Plan(
+        model,
+        q,
+        q1,
+        scenario.duration,
+        _times(scenario),
+        drive,
+        bound,
+        tuple(load.begin(_moved(model, q, load)) for load in bound),
+        low,
+        high,
+        speed,
+        scenario.method,
+        Settings(scenario.rtol, atol, scenario.step),
+        stop_at_bounds,
+    )
+
+
+class _Problems:
+    """Collects what does not fit, part by part."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def __enter__(self) -> None: ...
+
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> bool:
+        if isinstance(error, InputError):
+            self.lines += getattr(error, "problems", None) or [str(error)]
+            return True
+        return False
+
+
+def _times(scenario: Scenario) -> np.ndarray:
+    """Of the results, (N,) [s]: i / rate, and the end."""
+    count = int(np.floor(scenario.duration * scenario.rate + 1e-9)) + 1
+    times = np.arange(count) / scenario.rate
+    if scenario.duration - times[-1] > 1e-9 / scenario.rate:
+        return np.append(times, scenario.duration)
+    times[-1] = min(times[-1], scenario.duration)
+    return times
+
+
+def _loads(
+    model: Evaluator, scenario: Scenario, functions: Sequence[LoadFunction]
+) -> tuple[BoundLoad, ...]:
+    names = _names([load.name or load.kind for load in scenario.loads])
+    found = [
+        load.bind(model.mechanism, name) for load, name in zip(scenario.loads, names, strict=True)
+    ]
+    for i, given in enumerate(functions):
+        function, point = given if isinstance(given, tuple) else (given, None)
+        if not callable(function):
+            raise InputError(
+                "loads: expected functions (t, s, v) -> force, or (function, point), got "
+                f"{type(function).__name__}"
+            )
+        at = np.zeros(3) if point is None else model.load_point(point)
+        found.append(BoundFunction(f"function_{i + 1}", at, point, function))
+    return tuple(found)
+
+
+def _names(wanted: Sequence[str]) -> list[str]:
+    """Each once: food, food_2, food_3."""
+    found: list[str] = []
+    for name in wanted:
+        k, one = 1, name
+        while one in found:
+            k += 1
+            one = f"{name}_{k}"
+        found.append(one)
+    return found
+
+
+def _drive(
+    model: Evaluator,
+    scenario: Scenario,
+    function: Callable[..., Any] | None,
+    motion: Motion | None,
+) -> OpenLoop | ClosedLoop:
+    if scenario.closed_loop:
+        return _closed(model, scenario, function, motion)
+    if function is not None:
+        law = FunctionLaw(model, function)
+        path = path_of(model, motion or default_motion(model), None, None)
+        return ClosedLoop(law, path, PERIOD, 0, _sensing(model, scenario, PERIOD))
+    n = len(model.mechanism.chains)
+    if scenario.efforts is None:
+        return OpenLoop(np.zeros(1), np.zeros((1, n)))
+    return _open(model, scenario.efforts.file)
+
+
+def _open(model: Evaluator, file: str) -> OpenLoop:
+    names = [f"tau_{name}" for name in model.mechanism.chain_names]
+    units = [FAMILIES[chain.kind].effort_unit for chain in model.mechanism.chains]
+    kinds = {"N": ("force", 0), "N m": ("moment", 0)}
+    known = {"t": ("time", 0)} | {n: kinds[u] for n, u in zip(names, units, strict=True)}
+    table = read_table(file, known=known)
+    times, efforts = table.require(["t"])[:, 0], table.require(names)
+    if (np.diff(times) <= 0).any():
+        raise InputError(f"{file}: times must rise from row to row")
+    return OpenLoop(times, efforts)
+
+
+def _closed(
+    model: Evaluator,
+    scenario: Scenario,
+    function: Callable[..., Any] | None,
+    motion: Motion | None,
+) -> ClosedLoop:
+    table = scenario.controller
+    own = model.choosing(table.distribution, table.preload) if _chooses(table) else model
+    if table.model is not None:
+        other = load_mechanism(table.model)
+        _same_machine(model, other, table.model)
+        own = type(model)(
+            other,
+            model.formulation,
+            model.route,
+            model.backend.asked,
+            table.distribution,
+            table.preload,
+        )
+    law: Law = table.bind(own) if function is None else FunctionLaw(own, function)
+    path = path_of(
+        own,
+        motion or _motion(table, own),
+        getattr(table, "force", None),
+        getattr(table, "force_file", None),
+    )
+    if table.ideal:
+        return ClosedLoop(law, path, None, 0, None)
+    period = 1.0 / table.rate
+    return ClosedLoop(law, path, period, table.delay, _sensing(own, scenario, period))
+
+
+def _chooses(table: Any) -> bool:
+    return table.distribution is not None or bool(table.preload)
+
+
+def _same_machine(model: Evaluator, other: Any, file: str) -> None:
+    one = model.mechanism
+    if one.chain_names != other.chain_names:
+        raise InputError(
+            f"controller.model: {file} has the chains {', '.join(other.chain_names)}, and the "
+            f"plant {', '.join(one.chain_names)}; they must have the same, in the same order"
+        )
+    from ..mechanism.home import independent_coordinates
+
+    if model.independent != (names := independent_coordinates(other)):
+        raise InputError(
+            f"controller.model: {file} has the independent coordinates {', '.join(names)}, and "
+            f"the plant {', '.join(model.independent)}; set `dependent` in one of the files"
+        )
+
+
+def _motion(table: Any, model: Evaluator) -> Motion:
+    if table.motion is None:
+        return default_motion(model)
+    return Motion.from_csv(table.motion, units=table.units, landmark=table.landmark)
+
+
+def _sensing(model: Evaluator, scenario: Scenario, period: float) -> Sensing | None:
+    sensors = scenario.sensors
+    if sensors is None:
+        return None
+    resolution = np.full(len(model.mechanism.chains), sensors.encoder_resolution)
+    cutoff = sensors.velocity_cutoff
+    smoothing = 0.0 if cutoff is None else float(np.exp(-2 * np.pi * cutoff * period))
+    return Sensing(resolution, sensors.velocity == "difference", smoothing)
+
+
+def _start(
+    model: Evaluator, scenario: Scenario, drive: OpenLoop | ClosedLoop | None
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """q and q' to begin with, (m,) each; None where the path is not known."""
+    names = model.independent
+    given = scenario.start.given
+    strange = [n for n in given if n.lstrip("d") not in names]
+    if strange:
+        raise InputError(
+            f"start: {', '.join(strange)} is not free: the independent coordinates are "
+            f"{', '.join(names)} (and their rates, {', '.join(f'd{n}' for n in names)})"
+        )
+    q = np.array([given.get(n, 0.0) for n in names])
+    q1 = np.array([given.get(f"d{n}", 0.0) for n in names])
+    if scenario.start.on_motion:
+        if not isinstance(drive, ClosedLoop):
+            return None
+        q, q1 = (a[0] for a in drive.path.states(np.zeros(1))[:2])
+    at = Instant(model)
+    if at(q, q1):
+        raise InputError(f"start: the pose cannot be reached: {_said(names, q)}")
+    return q, q1
+
+
+def _said(names: Iterable[str], values: Iterable[float]) -> str:
+    return ", ".join(f"{n} = {v:g}" for n, v in zip(names, values, strict=True))
+
+
+def _moved(model: Evaluator, q: np.ndarray, load: BoundLoad) -> list[float]:
+    """How far the load's point is from home at q, (3,) [m]."""
+    at = Instant(model)
+    at(q, np.zeros_like(q))
+    return (at.position(load.point) - load.point).tolist()

@@ -1,0 +1,139 @@
+"""The plan of a simulation: a scenario on a mechanism, as plain numbers.
+
+`run` makes a trace of it. Another way to run the same plan, such as a compiled loop, needs no more
+than what stands here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model.evaluator import Evaluator
+from .controllers import Law
+from .events import Event
+from .integrators import Settings
+from .loads import BoundLoad
+from .reference import Path
+
+WORKS = ("actuators", "load", "actuator_losses", "contact_friction")
+
+
+@dataclass(frozen=True)
+class OpenLoop:
+    """Efforts over time: times (R,) [s], efforts (R, n), linear between rows, held outside."""
+
+    times: np.ndarray
+    efforts: np.ndarray
+
+
+@dataclass(frozen=True)
+class Sensing:
+    """Encoders: resolution [rad or m] of every chain (n,), 0 where exact.
+
+    difference: whether rates are differences of counts over a period, and not tachometers'.
+    smoothing:  of differences, from 0 (none) below 1: v = smoothing v + (1 - smoothing) difference.
+    """
+
+    resolution: np.ndarray
+    difference: bool
+    smoothing: float
+
+
+@dataclass(frozen=True)
+class ClosedLoop:
+    """A law, called every period, whose efforts come `delay` periods later and are held.
+
+    period:  [s]; None: at all times.
+    sensing: None where it sees the state itself.
+    """
+
+    law: Law
+    path: Path
+    period: float | None
+    delay: int
+    sensing: Sensing | None
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What to run.
+
+    q, q1:    state to begin with, (m,) each;  modes: of the loads.
+    times:    (N,) [s], of the results;  duration: [s].
+    low, high, speed: limits of the actuators, (n,) each, infinite where there is none.
+    method, settings: of the integrator.
+    stop_at_bounds: whether a contact at the end of its surface ends the run.
+    """
+
+    model: Evaluator
+    q: np.ndarray
+    q1: np.ndarray
+    duration: float
+    times: np.ndarray
+    drive: OpenLoop | ClosedLoop
+    loads: tuple[BoundLoad, ...]
+    modes: tuple[int, ...]
+    low: np.ndarray
+    high: np.ndarray
+    speed: np.ndarray
+    method: str
+    settings: Settings
+    stop_at_bounds: bool = False
+
+    @property
+    def size(self) -> int:
+        """Of the state: q, q', and the works of `WORKS`."""
+        return 2 * len(self.q) + len(WORKS)
+
+    def corners(self) -> np.ndarray:
+        """Times at which the rate of the state has a corner, rising, from 0 to the end [s]."""
+        found = [np.array([0.0, self.duration])]
+        if isinstance(self.drive, OpenLoop):
+            found.append(self.drive.times)
+        elif self.drive.period is not None:
+            found.append(self.ticks())
+        found += [load.breaks(0.0, self.duration) for load in self.loads]
+        every = np.unique(np.concatenate(found))
+        every = every[(every >= 0) & (every <= self.duration)]
+        apart = np.concatenate([np.diff(every) > 1e-12, [True]])
+        kept = every[apart]
+        kept[0] = 0.0
+        return kept
+
+    def ticks(self) -> np.ndarray:
+        """Times at which the controller looks, (K,) [s]; none in open loop."""
+        if isinstance(self.drive, OpenLoop) or self.drive.period is None:
+            return np.empty(0)
+        rate = 1.0 / self.drive.period
+        count = max(int(np.ceil(self.duration * rate - 1e-9)), 1)
+        return np.arange(count) / rate
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What happened, at the times that were reached.
+
+    t: (N,) [s];  state: (N, 2 m + works), as of `Plan.size`;  modes: (N, loads).
+    effort: (N, n), as it acted;  tick: (N,), index of the controller's last look, -1 without one.
+    command, count: (K, n), efforts asked for at every tick, and encoders' joints;
+    estimate: (K, 2 m), the state that the controller took it to be;  force: (K,), of the bite.
+    events: in order; the last one may have ended the run.
+    """
+
+    t: np.ndarray
+    state: np.ndarray
+    modes: np.ndarray
+    effort: np.ndarray
+    tick: np.ndarray
+    command: np.ndarray
+    count: np.ndarray
+    estimate: np.ndarray
+    force: np.ndarray
+    events: tuple[Event, ...]
+
+    @property
+    def ended(self) -> Event | None:
+        """What ended the run before its time."""
+        return self.events[-1] if self.events and self.events[-1].ends else None

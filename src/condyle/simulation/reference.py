@@ -1,0 +1,105 @@
+"""What a controller is to follow, at any time: the path in q_EE, and the force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..model.evaluator import Evaluator
+from ..motion import Motion, read_table
+from .controllers.base import Reference
+from .point import Instant
+
+DEGREE = 5  # of the spline through q, as of motions
+
+
+@dataclass(frozen=True)
+class Path:
+    """A spline through q at the motion's own times; before and after them it stays where it is.
+
+    times: (N,) [s];  q: (N, m).
+    force: (F,) times [s] and (F,) newtons, linear between; one of each where it stays.
+    """
+
+    model: Evaluator
+    times: np.ndarray
+    q: np.ndarray
+    force_times: np.ndarray
+    force: np.ndarray
+
+    @cached_property
+    def _spline(self) -> Any:
+        from scipy.interpolate import make_interp_spline
+
+        return make_interp_spline(self.times - self.times[0], self.q, k=DEGREE)
+
+    @cached_property
+    def _instant(self) -> Instant:
+        return Instant(self.model)
+
+    def states(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """q, q' and q'' at times (K,), (K, m) each."""
+        since = np.clip(t, self.times[0], self.times[-1]) - self.times[0]
+        q, q1, q2 = (self._spline(since, nu) for nu in range(3))
+        outside = (t < self.times[0]) | (t > self.times[-1])
+        q1[outside] = q2[outside] = 0.0
+        return q, q1, q2
+
+    def references(self, t: np.ndarray) -> list[Reference]:
+        """One at each of the times (K,) [s]."""
+        q, q1, q2 = self.states(t)
+        answer = self.model.kernel("instant").run({"q": q, "q1": q1})
+        if answer.status.any():
+            bad = int(np.argmax(answer.status != 0))
+            raise InputError(
+                f"controller.motion: the pose at t = {t[bad]:g} s cannot be reached: q = {q[bad]}"
+            )
+        joint, rate = answer.values["joint"].T, answer.values["joint_rate"].T
+        force = np.interp(t, self.force_times, self.force)
+        return [Reference(*row) for row in zip(q, q1, q2, joint, rate, force.tolist(), strict=True)]
+
+    def at(self, t: float) -> Reference:
+        """At one time [s]."""
+        q, q1, q2 = (a[0] for a in self.states(np.array([t])))
+        self._instant(q, q1)
+        force = float(np.interp(t, self.force_times, self.force))
+        joint, rate = (self._instant[name].copy() for name in ("joint", "joint_rate"))
+        return Reference(q, q1, q2, joint, rate, force)
+
+
+def path_of(model: Evaluator, motion: Motion, force: float | None, file: str | None) -> Path:
+    """The path of a motion on a model's mechanism.
+
+    Args: force: f_d [N] at all times;  file: CSV of t, force instead.
+    """
+    q = model.independent_motion(motion)[0][0]
+    if not np.isfinite(q).all():
+        bad = int(np.argmin(np.isfinite(q).all(axis=1)))
+        raise InputError(
+            f"{motion.source}: the contacts cannot be met at t = {motion.t[bad]:g} s; the motion "
+            "leads out of reach"
+        )
+    times, newtons = np.zeros(1), np.array([force or 0.0])
+    if file is not None:
+        table = read_table(file, known={"t": ("time", 0), "force": ("force", 0)})
+        times, newtons = table.require(["t", "force"]).T
+        if (np.diff(times) <= 0).any():
+            raise InputError(f"{file}: times must rise from row to row")
+    return Path(model, motion.t - motion.t[0], q, times, newtons)
+
+
+def default_motion(model: Evaluator) -> Motion:
+    """The bundled chewing path where it fits; else a trial motion about home."""
+    from ..motion import reference_motion, trial_motion
+
+    machine = model.mechanism
+    if len(machine.contacts) == 2 and "incisor" in machine.platform.points:
+        return reference_motion()
+    return trial_motion(machine)
+
+
+__all__ = ["Path", "default_motion", "path_of"]

@@ -1,0 +1,312 @@
+"""Run a plan: from corner to corner, with a look at events after every step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any, NoReturn
+
+import numpy as np
+
+from ..progress import step as progress
+from ..status import STATUS_NAMES, Status
+from .compiled import DONE, LOOK, STEP, Loop, loop_of
+from .controllers import Measured
+from .events import KINDS, Event
+from .integrators import INTEGRATORS, Stuck
+from .plan import ClosedLoop, OpenLoop, Plan, Trace
+from .plant import Plant
+from .sensing import Lost, Observer
+from .watch import Crossing, Watch
+
+ROUNDING = 1e-12  # seconds
+MANY = 100  # events of a kind and an owner that are listed
+SAY = 0.01  # seconds of the simulation between two words of progress
+
+
+def run(plan: Plan) -> Trace:
+    """What happens."""
+    with progress("simulating", plan.duration) as advance:
+        return Run(plan, advance).trace()
+
+
+class Run:
+    """One run of a plan, under way."""
+
+    def __init__(self, plan: Plan, advance: Callable[[float], None] = lambda _: None) -> None:
+        self._plan, self._advance = plan, advance
+        self._plant = Plant(plan.model, plan.loads)
+        self._watch = Watch(plan, self._plant)
+        self._modes = list(plan.modes)
+        self._events: list[Event] = []
+        self._seen: dict[tuple[str, str], int] = {}
+        n, count = len(plan.low), len(plan.times)
+        self._effort = np.zeros(n)
+        self._tick = -1
+        self._next = 0
+        self._state = np.empty((count, plan.size))
+        self._kept_modes = np.zeros((count, len(plan.loads)), dtype=np.int8)
+        self._kept_effort = np.empty((count, n))
+        self._kept_tick = np.empty(count, dtype=np.int64)
+        self._drive = plan.drive
+        self._loop = _Loop(plan, self._plant) if isinstance(plan.drive, ClosedLoop) else None
+        self._cut = np.zeros(n, dtype=bool)
+
+    def trace(self) -> Trace:
+        """Run to the end, or to what ends it."""
+        plan = self._plan
+        y = np.zeros(plan.size)
+        y[: 2 * len(plan.q)] = np.concatenate([plan.q, plan.q1])
+        integrator = INTEGRATORS[plan.method](self._rate, plan.settings)
+        with suppress(_Ended):
+            if (quick := self.quick()) is not None:
+                y = self._by_compiled_code(quick, integrator, y)
+            else:
+                y = self._by_steps(integrator, y)
+            self._keep_end(plan.duration, y)
+        return self._trace()
+
+    def _by_steps(self, integrator: Any, y: np.ndarray) -> np.ndarray:
+        """From corner to corner; returns the last state."""
+        plan = self._plan
+        corners, ticks, said = plan.corners(), plan.ticks(), 0.0
+        for t, until in zip(corners[:-1].tolist(), corners[1:].tolist(), strict=True):
+            due = self._tick + 1
+            if due < len(ticks) and ticks[due] <= t + ROUNDING:
+                self._look(t, y, due)
+            _, y = self._between(integrator, t, until, y)
+            if until - said >= SAY:
+                self._advance(until - said)
+                said = until
+        return y
+
+    def quick(self) -> Loop | None:
+        """The run in compiled code, where there is such a loop for its plan."""
+        if self._plan.method != "rk4":
+            return None
+        results = (self._state, self._kept_effort, self._kept_modes, self._kept_tick)
+        loop, m, n = self._loop, len(self._plan.q), len(self._effort)
+        looks, aims = (np.empty((0, n)), np.empty((0, n)), np.empty((0, 2 * m))), np.empty(0)
+        if loop is not None:
+            looks = (loop.command, loop.count, loop.estimate)
+            aims = np.array([np.concatenate([*a.state, a.joint, a.joint_rate]) for a in loop.aims])
+        return loop_of(self._plan, self._watch.told, self._watch.past, results, looks, aims)
+
+    def _by_compiled_code(self, quick: Loop, integrator: Any, y: np.ndarray) -> np.ndarray:
+        """The same by `loop.c`, but for what it hands back; returns the last state."""
+        corners, said = self._plan.corners(), 0.0
+        quick.y[:] = y
+        while True:
+            quick.set_modes(self._modes)
+            code = quick.advance()
+            t, self._next, self._tick = quick.t, quick.next, quick.tick
+            self._effort, y, fresh = quick.effort.copy(), quick.y.copy(), False
+            self._advance(t - said)
+            said = t
+            if code == DONE:
+                return y
+            if code == LOOK:
+                self._look(t, y, self._tick + 1)
+            elif code == STEP:
+                until = float(corners[quick.corner + 1])
+                t, y = self._between(integrator, t, until, y, once=True)
+                if t >= until - ROUNDING:
+                    quick.corner += 1
+                    fresh = True
+            quick.y[:], quick.effort[:], quick.cut[:] = y, self._effort, self._cut
+            quick.go_on(t, self._next, self._tick, fresh)
+
+    def _trace(self) -> Trace:
+        done, looked, loop = self._next, self._tick + 1, self._loop
+        n, m = len(self._effort), len(self._plan.q)
+        return Trace(
+            self._plan.times[:done],
+            self._state[:done],
+            self._kept_modes[:done],
+            self._kept_effort[:done],
+            self._kept_tick[:done],
+            np.empty((0, n)) if loop is None else loop.command[:looked],
+            np.empty((0, n)) if loop is None else loop.count[:looked],
+            np.empty((0, 2 * m)) if loop is None else loop.estimate[:looked],
+            np.empty(0) if loop is None else loop.force[:looked],
+            tuple(self._events),
+        )
+
+    # -- efforts ------------------------------------------------------------------------------
+
+    def _rate(self, t: float, y: np.ndarray) -> np.ndarray:
+        plant, drive = self._plant, self._drive
+        wrench = plant.state(t, y, self._modes)
+        return plant.rate_here(y, self._acting(t, y, drive), wrench)
+
+    def _acting(self, t: float, y: np.ndarray, drive: OpenLoop | ClosedLoop) -> np.ndarray:
+        """Efforts at a time, within limits, at the state that was looked at last."""
+        if isinstance(drive, OpenLoop):
+            effort = np.array([np.interp(t, drive.times, one) for one in drive.efforts.T])
+        elif drive.period is None:
+            assert self._loop is not None
+            effort = self._loop.at_once(t, y, self._modes)
+        else:
+            return self._effort
+        return np.clip(effort, self._plan.low, self._plan.high)
+
+    def _look(self, t: float, y: np.ndarray, k: int) -> None:
+        """The controller looks, and what it asked for before comes to act."""
+        assert self._loop is not None
+        try:
+            asked = self._loop.look(t, y, self._modes, k)
+        except Lost:
+            self._end(t, y, "lost", KINDS["lost"])
+        if not np.isfinite(asked).all():
+            self._end(t, y, "no_effort", KINDS["no_effort"])
+        self._tick = k
+        self._effort = np.clip(asked, self._plan.low, self._plan.high)
+        self._saturation(t, y, asked)
+
+    def _saturation(self, t: float, y: np.ndarray, asked: np.ndarray) -> None:
+        cut = asked != self._effort
+        for i in np.flatnonzero(cut & ~self._cut):
+            name = self._plan.model.mechanism.chain_names[i]
+            text = f"asked for {asked[i]:.4g}, gives {self._effort[i]:.4g}"
+            self._note(t, y, "saturated", text, name)
+        self._cut = cut
+
+    # -- between two corners ------------------------------------------------------------------
+
+    def _between(
+        self, integrator: Any, t: float, until: float, y: np.ndarray, once: bool = False
+    ) -> tuple[float, np.ndarray]:
+        """Integrate to `until`, or one step; raises _Ended where the run is over before."""
+        try:
+            self._begin(integrator, t, until, y)
+            while t < until - ROUNDING:
+                step = integrator.step()
+                crossing = self._watch.crossing(step, self._modes, self._acting_here)
+                end = step.t1 if crossing is None else crossing.time
+                self._keep(t, end, step.at)
+                t, y = end, step.y1
+                if crossing is not None:
+                    y = crossing.state
+                    self._happened(crossing)
+                    if t < until - ROUNDING and not once:
+                        self._begin(integrator, t, until, y)
+                if once:
+                    break
+        except Stuck as stuck:
+            self._keep_end(t, y)
+            kind = "stiff" if stuck.status is None else STATUS_NAMES[stuck.status]
+            kind = kind if kind in KINDS else "stiff"
+            self._end(t, y, kind, KINDS[kind])
+        return t, y
+
+    def _begin(self, integrator: Any, t: float, until: float, y: np.ndarray) -> None:
+        integrator.restart(t, y, until)
+        effort = self._acting_here(t, y)
+        for crossing in self._watch.begin(t, y, self._modes, effort):
+            self._happened(crossing)
+
+    def _acting_here(self, t: float, y: np.ndarray) -> np.ndarray:
+        self._plant.state(t, y, self._modes)
+        return self._acting(t, y, self._drive)
+
+    def _happened(self, crossing: Crossing) -> None:
+        t, y = crossing.time, crossing.state
+        if crossing.load is not None:
+            self._modes[crossing.load] = crossing.mode
+        if crossing.ends:
+            self._keep_end(t, y)
+            self._end(t, y, crossing.kind, crossing.text, crossing.owner)
+        elif crossing.kind:
+            self._note(t, y, crossing.kind, crossing.text, crossing.owner)
+
+    def _end(self, t: float, y: np.ndarray, kind: str, text: str, owner: str = "") -> NoReturn:
+        self._note(t, y, kind, text, owner, ends=True)
+        raise _Ended
+
+    def _note(
+        self, t: float, y: np.ndarray, kind: str, text: str, owner: str = "", ends: bool = False
+    ) -> None:
+        names = self._plan.model.independent
+        names = (*names, *(f"d{name}" for name in names))
+        state = dict(zip(names, y[: len(names)].tolist(), strict=True))
+        seen = self._seen[kind, owner] = self._seen.get((kind, owner), 0) + 1
+        if seen > MANY and not ends:
+            return
+        if seen == MANY and not ends:
+            text += "; more of these are not listed"
+        self._events.append(Event(float(t), kind, text, owner, ends, state))
+
+    # -- what is kept ---------------------------------------------------------------------------
+
+    def _keep(self, t: float, end: float, at: Callable[[float], np.ndarray]) -> None:
+        """States at the results' times from t on, before the end."""
+        times = self._plan.times
+        while self._next < len(times) and times[self._next] < end - ROUNDING:
+            when = times[self._next]
+            self._keep_one(when, at(max(when, t)))
+
+    def _keep_end(self, t: float, y: np.ndarray) -> None:
+        """The last one."""
+        times = self._plan.times
+        while self._next < len(times) and times[self._next] <= t + ROUNDING:
+            self._keep_one(times[self._next], y)
+
+    def _keep_one(self, t: float, y: np.ndarray) -> None:
+        i = self._next
+        self._state[i], self._kept_modes[i], self._kept_tick[i] = y, self._modes, self._tick
+        if isinstance(self._drive, ClosedLoop) and self._drive.period is not None:
+            self._kept_effort[i] = self._effort
+        else:
+            self._kept_effort[i] = self._acting_here(t, y)
+        self._next += 1
+
+
+class _Ended(Exception):
+    """The run is over; why is among the events."""
+
+
+class _Loop:
+    """The controller's side: sensors, law, and efforts on their way."""
+
+    def __init__(self, plan: Plan, plant: Plant) -> None:
+        drive = plan.drive
+        assert isinstance(drive, ClosedLoop)
+        self._drive, self._plant, m, n = drive, plant, len(plan.q), len(plan.low)
+        self._m = m
+        self._memory = drive.law.begin()
+        ticks = plan.ticks()
+        self.aims = drive.path.references(ticks) if len(ticks) else []
+        self.command, self.count = (np.empty((len(ticks), n)) for _ in range(2))
+        self.estimate, self.force = np.empty((len(ticks), 2 * m)), np.zeros(len(ticks))
+        self._observer = None
+        if drive.sensing is not None and drive.period is not None:
+            self._observer = Observer(drive.law.model, drive.sensing, drive.period)
+            at = plant.look(plan.q, plan.q1)
+            self._observer.begin(plan.q, plan.q1, at["joint"].copy())
+
+    def look(self, t: float, y: np.ndarray, modes: list[int], k: int) -> np.ndarray:
+        """Look at tick k; returns the efforts asked for that begin to act now, (n,)."""
+        plant, law = self._plant, self._drive.law
+        plant.state(t, y, modes)
+        at, m = plant.last, self._m
+        joint, rate = at["joint"].copy(), at["joint_rate"].copy()
+        q, q1 = y[:m].copy(), y[m : 2 * m].copy()
+        force = plant.force_at(law.place, t, modes)
+        if self._observer is not None:
+            joint, rate, q, q1 = self._observer.see(joint, rate)
+        now = Measured(t, q, q1, joint, rate, force)
+        asked, self._memory = law(now, self.aims[k], self._memory)
+        self.command[k], self.count[k] = asked, joint
+        self.estimate[k], self.force[k] = np.concatenate([q, q1]), np.linalg.norm(force)
+        # Until the first efforts come, the drives hold what they will be.
+        return self.command[max(k - self._drive.delay, 0)]
+
+    def at_once(self, t: float, y: np.ndarray, modes: list[int]) -> np.ndarray:
+        """Efforts of an ideal controller at the state that was looked at last, (n,)."""
+        at, law, m = self._plant.last, self._drive.law, self._m
+        force = self._plant.force_at(law.place, t, modes)
+        now = Measured(t, y[:m], y[m : 2 * m], at["joint"], at["joint_rate"], force)
+        asked, _ = law(now, self._drive.path.at(t), self._memory)
+        if not np.isfinite(asked).all():
+            raise Stuck(Status.infeasible)
+        return asked

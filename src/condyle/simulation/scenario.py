@@ -1,0 +1,211 @@
+"""The scenario: what a simulation is told, as a file or in Python."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from functools import lru_cache, reduce
+from operator import or_
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, ValidationError, create_model, model_validator
+
+from ..errors import InputError, ScenarioError
+from ..mechanism.messages import describe, shown
+from ..mechanism.quantities import PER_METRE
+from ..mechanism.schema import schema_of
+from ..mechanism.toml import nests_too_deep, read_tables, read_text, too_deep
+from .controllers import CONTROLLERS
+from .integrators import INTEGRATORS
+from .loads import LOADS
+from .table import File, Frequency, Gain, Length, Number, Positive, Table
+
+LONGEST = 1e4  # seconds
+COORDINATES = ("X", "Y", "Z", "alpha", "beta", "gamma")
+
+
+class Start(Table):
+    """Where the mechanism begins: independent coordinates and their rates, 0 where not said."""
+
+    X: Length | None = None
+    Y: Length | None = None
+    Z: Length | None = None
+    alpha: Number | None = None
+    beta: Number | None = None
+    gamma: Number | None = None
+    dX: Length | None = None
+    dY: Length | None = None
+    dZ: Length | None = None
+    dalpha: Number | None = None
+    dbeta: Number | None = None
+    dgamma: Number | None = None
+    on_motion: bool = Field(
+        default=False, description="begin where the controller's motion does, and as fast"
+    )
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        if self.on_motion and self.given:
+            raise ValueError(f"on_motion says where to begin; remove {next(iter(self.given))}")
+        return self
+
+    @property
+    def given(self) -> dict[str, float]:
+        """What is said, by name."""
+        return {n: v for n, v in self.entries().items() if n != "on_motion" and v is not None}
+
+
+class Efforts(Table):
+    """Efforts in open loop."""
+
+    file: File = Field(description="CSV of t [s] and tau_<chain> [N m or N], linear between rows")
+
+
+class Sensors(Table):
+    """What stands between the mechanism and its controller: encoders in the actuators' joints.
+
+    From their counts the pose follows by forward kinematics, from the last pose on. Without this
+    table a controller sees the state itself.
+    """
+
+    encoder_resolution: Gain = Field(default=0.0, description="rad or m a count; 0: exact")
+    velocity: Literal["difference", "exact"] = Field(
+        default="difference", description="of counts over a period, or by tachometers"
+    )
+    velocity_cutoff: Frequency | None = Field(
+        default=None, description="Hz, of a first-order low-pass on differences; default none"
+    )
+
+
+class Scenario(Table):
+    """A simulation: how long, from where, driven by what, under which loads. All values are SI."""
+
+    duration: Positive = Field(default=1.0, le=LONGEST, description="s")
+    rate: Frequency = Field(default=1000.0, description="of the results, Hz")
+    method: str = Field(default="DOP853", description=", ".join(INTEGRATORS))
+    rtol: float = Field(
+        default=1e-9, ge=1e-13, le=1e-2, allow_inf_nan=False, description="of the integrator"
+    )
+    step: Positive | None = Field(default=None, description="s, of a method with fixed steps")
+    start: Start = Start()
+    efforts: Efforts | None = None
+    controller: Any = None
+    sensors: Sensors | None = None
+    loads: tuple[Any, ...] = Field(default=(), alias="load", max_length=100)
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        problems = []
+        if self.method not in INTEGRATORS:
+            known = ", ".join(INTEGRATORS)
+            problems.append(f'method: got "{self.method:.40}"; available: {known}')
+        elif INTEGRATORS[self.method].fixed != (self.step is not None):
+            problems.append(
+                f"step: {self.method} chooses its own steps, by rtol; remove it"
+                if self.step is not None
+                else f"step is missing: {self.method} has fixed steps [s], such as 1e-4"
+            )
+        closed = self.controller is not None and self.controller.kind != "none"
+        if closed and self.efforts is not None:
+            problems.append("efforts and controller: efforts come from one of them; remove one")
+        if not closed and self.start.on_motion:
+            problems.append("start.on_motion: there is no controller with a motion")
+        if closed:
+            problems += _controller_problems(self.controller, self.sensors)
+        names = [load.name for load in self.loads if load.name is not None]
+        problems += [f'two loads are called "{n}"' for n in {*names} if names.count(n) > 1]
+        if problems:
+            raise ValueError("; ".join(problems))
+        return self
+
+    @property
+    def closed_loop(self) -> bool:
+        """Whether a controller chooses the efforts."""
+        return self.controller is not None and self.controller.kind != "none"
+
+
+def _controller_problems(controller: Any, sensors: Sensors | None) -> Iterable[str]:
+    if not controller.ideal:
+        return
+    if not controller.continuous:
+        yield f"controller.ideal: {controller.kind} has a memory and needs a rate; remove ideal"
+    if controller.delay:
+        yield "controller.ideal: there is no delay without periods; remove one of them"
+    if sensors is not None:
+        yield "controller.ideal: it sees the state itself; remove ideal, or the sensors"
+
+
+def load_scenario(source: str | os.PathLike[str]) -> Scenario:
+    """Read a scenario file; files that it names are looked for next to it.
+
+    Raises: ScenarioError: with every problem found;  InputError: if it is no TOML file.
+    """
+    path = Path(source)
+    if not path.is_file():
+        from ..errors import no_such_file
+
+        raise no_such_file(path)
+    return scenario_from(read_tables(read_text(path), str(source)), str(source), path.parent)
+
+
+def scenario_from(
+    data: Mapping[str, Any], source: str = "scenario", folder: str | Path | None = None
+) -> Scenario:
+    """A scenario of the tables of a file, lengths in its `length_unit`.
+
+    Args: folder: where files are that it names; default: the current one.
+    """
+    if not isinstance(data, Mapping):
+        raise InputError(f"{source}: expected the tables of a scenario, got {shown(data)}")
+    if nests_too_deep(data):
+        raise too_deep(source)
+    data = dict(data)
+    unit = data.pop("length_unit", "m")
+    problems = []
+    if not isinstance(unit, str) or unit not in PER_METRE:
+        problems.append(f'length_unit: expected "m" or "mm", got {shown(unit)}')
+        unit = "m"
+    if isinstance(data.get("controller"), Mapping) and data["controller"].get("kind") == "none":
+        data.pop("controller")
+    if "loads" in data:  # a name that Python has for a key of the file
+        problems.append('loads: is not a key of the file format. Did you mean "load"?')
+        del data["loads"]
+    root = whole()
+    try:
+        found = root.model_validate(data, context={"per_metre": PER_METRE[unit], "folder": folder})
+    except ValidationError as error:
+        problems += describe(error, data, root)
+    if problems:
+        raise ScenarioError(source, problems)
+    return found
+
+
+def scenario_schema() -> dict[str, Any]:
+    """The JSON schema of scenario files, for editors."""
+    schema = schema_of(whole())
+    unit = {"enum": list(PER_METRE), "default": "m", "description": "of lengths; all else is SI"}
+    return {**schema, "properties": {"length_unit": unit, **schema["properties"]}} | {
+        "title": "condyle scenario"
+    }
+
+
+def whole() -> type[Scenario]:
+    """The table with all kinds of controller and load that are registered now."""
+    return _whole(tuple(CONTROLLERS.values()), tuple(LOADS.values()))
+
+
+@lru_cache(maxsize=8)
+def _whole(controllers: tuple[type[Table], ...], loads: tuple[type[Table], ...]) -> type[Scenario]:
+    # Types that are made while the program runs: pydantic can read them, type checkers cannot.
+    made: Any = create_model
+    kind = Field(discriminator="kind")
+    controller: Any = Annotated[reduce(or_, controllers), kind]  # type: ignore[valid-type]
+    load: Any = Annotated[reduce(or_, loads), kind]  # type: ignore[valid-type]
+    found: type[Scenario] = made(
+        "Scenario",
+        __base__=Scenario,
+        controller=(controller | None, None),
+        loads=(tuple[load, ...], Field(default=(), alias="load", max_length=100)),
+    )
+    return found

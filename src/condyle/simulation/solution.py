@@ -1,0 +1,176 @@
+"""From a trace to a labelled solution: what moved, what was commanded, measured and lost."""
+
+from __future__ import annotations
+
+import json
+import time
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..model.data import Evaluation
+from ..model.distributing import shares
+from ..model.evaluator import Evaluator, with_point
+from ..questions.equations import INTERNAL
+from ..results.assemble import labelled
+from ..results.derived import Derived
+from ..results.solution import Solution
+from ..results.variables import ACCOUNTS
+from ..results.warnings import Notice, Watch
+from .plan import ClosedLoop, Plan, Trace
+from .plant import Plant
+from .scenario import Scenario
+
+
+def solved(plan: Plan, trace: Trace, scenario: Scenario, source: str, started: float) -> Solution:
+    """The solution of a run; `started`: of the clock `perf_counter`."""
+    if not len(trace.t):
+        end = trace.ended
+        raise InputError(f"{source}: the run ended before it began: {end}")
+    model, m = plan.model, len(plan.q)
+    q, q1 = trace.state[:, :m], trace.state[:, m : 2 * m]
+    wrench, forces = _loads(plan, trace)
+    load = with_point(wrench, np.zeros(3))
+    evaluation = _evaluation(model, q, q1, trace.effort, load)
+    simulated = _energy(model, q, q1, trace, plan)
+    simulated |= {"load_force": forces, "load_mode": trace.modes} if plan.loads else {}
+    if isinstance(plan.drive, ClosedLoop):
+        simulated |= _controlled(plan, plan.drive, trace)
+    derived = Derived(model.mechanism, evaluation, wrench, simulated=simulated)
+    watch = Watch(model.mechanism)
+    watch.see(derived, trace.t)
+    notices = watch.notices()
+    if (end := trace.ended) is not None:
+        text = f"the run ended at t = {end.time:.6g} s of {plan.duration:g} s: {end.text}"
+        whose = f' ("{end.owner}")' if end.owner else ""
+        notices.append(Notice("ended", text + whose, end.owner or None, time=end.time))
+    parts = model.parts if INTERNAL in model.parts else (*model.parts, INTERNAL)
+    seconds = time.perf_counter() - started
+    solution = labelled(
+        model,
+        derived,
+        trace.t,
+        parts,
+        f"Simulation of {model.mechanism.name}",
+        _options(plan, scenario, source, seconds),
+        notices,
+    )
+    solution["torque"].attrs["long_name"] = "actuator effort as it acted"
+    solution.attrs["events"] = json.dumps([event.to_dict() for event in trace.events])
+    labels: dict[str, Any] = {"account": list(ACCOUNTS)}
+    if plan.loads:
+        labels["source"] = [load.name for load in plan.loads]
+    return solution.assign_coords(labels)
+
+
+def _evaluation(
+    model: Evaluator, q: np.ndarray, q1: np.ndarray, effort: np.ndarray, load: np.ndarray
+) -> Evaluation:
+    """Everything about the states of a trace, from forward dynamics."""
+    found = model.forward(q, q1, effort, load, ("motion", "joint", "sliding"))
+    ports = {name: found[name] for name in ("pose", "pose_rate", "pose_acceleration")}
+    ports |= {"force": load[:, :3], "moment": load[:, 3:6], "point": load[:, 6:]}
+    s = {
+        name: np.moveaxis(a, -1, 0) for name, a in model.kernel("system").run(ports).values.items()
+    }
+    rubbed = any(c.friction.coefficient for c in model.mechanism.contacts)
+    share = shares(s, effort, found.contact_force if rubbed else None)
+    return Evaluation(
+        found["pose"],
+        found["pose_rate"],
+        found["pose_acceleration"],
+        effort,
+        share.transpose(2, 0, 1),
+        found.contact_force,
+        found["joint_rate"],
+        found["joint_acceleration"],
+        model.configuration(found["pose"]),
+        found["slip"],
+        found["friction_force"],
+        np.ones(len(q)),
+        found.status,
+    )
+
+
+def _loads(plan: Plan, trace: Trace) -> tuple[np.ndarray, np.ndarray]:
+    """Wrench of all loads about O_M, (N, 6), and force of each, (N, loads, 3), at the trace."""
+    count = len(trace.t)
+    wrench, forces = np.zeros((count, 6)), np.zeros((count, len(plan.loads), 3))
+    if not plan.loads:
+        return wrench, forces
+    plant = Plant(plan.model, plan.loads)
+    for i, (t, y, modes) in enumerate(zip(trace.t.tolist(), trace.state, trace.modes, strict=True)):
+        wrench[i] = plant.state(t, y, modes)
+        for k, (load, (s, v, _)) in enumerate(zip(plan.loads, plant.places(), strict=True)):
+            forces[i, k] = load.law(t, s, v, int(modes[k]))[:3]
+    return wrench, forces
+
+
+def _energy(
+    model: Evaluator, q: np.ndarray, q1: np.ndarray, trace: Trace, plan: Plan
+) -> dict[str, np.ndarray]:
+    """Kinetic and potential energy, works and losses since the start [J], and losses now [W]."""
+    values = model.kernel("energy").run({"q": q, "q1": q1}).values
+    accounts = [values["kinetic"], values["potential"], *trace.state[:, 2 * len(plan.q) :].T]
+    found = {"energy": np.column_stack(accounts)}
+    if any(not chain.actuator.ideal for chain in model.mechanism.chains):
+        found["actuator_loss"] = model.kernel("instant").run({"q": q, "q1": q1}).values["loss"].T
+    return found
+
+
+def _controlled(plan: Plan, drive: ClosedLoop, trace: Trace) -> dict[str, np.ndarray]:
+    """What was asked for, seen and followed."""
+    m = len(plan.q)
+    wanted, rate, _ = drive.path.states(trace.t)
+    found = {
+        "reference": wanted,
+        "reference_rate": rate,
+        "tracking_error": wanted - trace.state[:, :m],
+    }
+    if drive.period is None:
+        return found
+    k = trace.tick
+    found |= {
+        "command": trace.command[k],
+        "measured_joint": trace.count[k],
+        "estimate": trace.estimate[k, :m],
+        "estimate_rate": trace.estimate[k, m:],
+    }
+    if drive.law.place is not None:
+        found["bite_force"] = trace.force[k]
+    if drive.path.force.any():
+        found["bite_reference"] = np.interp(trace.t, drive.path.force_times, drive.path.force)
+    return found
+
+
+def _options(plan: Plan, scenario: Scenario, source: str, seconds: float) -> dict[str, Any]:
+    model = plan.model
+    kind = scenario.controller.kind if scenario.closed_loop else "open loop"
+    return {
+        "formulation": model.formulation,
+        "route": model.route,
+        "distribution": model.policy.objective,
+        "preload": model.policy.preload,
+        "contact_weight": 0.0,
+        "reference_force": model.reference_force,
+        "motion": f"simulation, {kind}",
+        "motion_sha256": None,
+        "motion_kind": "simulation",
+        "landmark": None,
+        "load": ", ".join(load.name for load in plan.loads) or "no load",
+        "load_sha256": None,
+        "load_point": next((load.place for load in plan.loads if load.place), None),
+        "independent": list(model.independent),
+        "dependent": list(model.dependent),
+        "characteristic_length": model.characteristic_length,
+        "contact_residual_of_given_pose": None,
+        "smoothing": None,
+        "derivation_seconds": model.derivation_seconds,
+        "solve_seconds": seconds,
+        "scenario_source": source,
+        "scenario": json.loads(scenario.model_dump_json(by_alias=True, exclude_none=True)),
+        "method": plan.method,
+        "rtol": plan.settings.rtol,
+        "step": plan.settings.step,
+    }

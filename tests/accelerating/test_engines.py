@@ -1,0 +1,26 @@
+"""Accelerations and contact forces meet engines that know nothing of condyle."""
+
+from __future__ import annotations
+
+import pytest
+from oracles.forward_tree import MujocoTree, PinocchioTree, forward_dynamics
+
+from .cases import BUNDLED, CASES, by_numpy, case, close, efforts, load_of, state
+
+TOLERANCE = 1e-9
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_tree_with_its_loops_closed(name: str) -> None:
+    c, model = case(name), by_numpy(name)
+    engines = [PinocchioTree(c.raw)]
+    engines += [MujocoTree(c.raw)] if name in BUNDLED or "n8" in name else []
+    effort, load, s = efforts(c), load_of(c), c.states
+    ours = model.forward(*state(c, model), effort, load, ("motion",))
+    assert not ours.status.any()
+    for i in range(len(load)):
+        given = s["pose"][i], s["pose_rate"][i], effort[i], s["wrench"][i], s["load_point"]
+        for engine in engines:
+            (theirs,) = forward_dynamics(engine, c.raw, *given)
+            close(ours["pose_acceleration"][i], theirs.acceleration, TOLERANCE)
+            close(ours.contact_force[i], theirs.force, TOLERANCE)

@@ -1,0 +1,136 @@
+"""What was measured beside a motion: through files, onto a solution, and what is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from oracles.recorded_jaw import FIXED, LOWER, PLATFORM, record
+
+import condyle
+from condyle.errors import InputError
+from condyle.motion import Motion, from_c3d, read_beside, write_table
+from condyle.motion.markers import Beside
+from condyle.results.solution import Solution, open_solution
+
+
+@pytest.fixture(scope="module")
+def beside(tmp_path_factory: pytest.TempPathFactory) -> Beside:
+    """Eight markers, one of them not seen for a while, and EMG of a crank."""
+    jaw = record(seconds=2.0)
+    jaw.at("Lower_FL")[150:155] = np.nan
+    emg = np.abs(np.sin(jaw.t))[:, None, None]
+    path = tmp_path_factory.mktemp("beside") / "a.c3d"
+    jaw.write(path, channels=[("E", "V")], analog=emg)
+    name = condyle.load("masticatory").chain_names[2]
+    tables = jaw.tables(emg={"channels": {name: "E"}, "high_pass": 0.0})
+    return from_c3d(path, tables, "masticatory").beside
+
+
+@pytest.fixture(scope="module")
+def solution() -> Solution:
+    """A pose of which all is known, at every third sample."""
+    jaw = record(seconds=2.0)
+    motion = Motion.from_arrays(jaw.t, jaw.pose, ("X", "Y", "Z", "alpha", "beta", "gamma"))
+    model = condyle.derive(condyle.load("masticatory"), backend="numpy")
+    return model.solve(motion).isel(time=slice(20, None, 3))
+
+
+@pytest.mark.parametrize("name", ["p.csv", "p.parquet"])
+def test_a_table_comes_back(beside: Beside, tmp_path: Path, name: str) -> None:
+    write_table(tmp_path / name, beside.columns())
+    got = read_beside(tmp_path / name)
+    assert (got.names, got.bodies) == (beside.names, beside.bodies)
+    for one, two in (
+        (got.t, beside.t),
+        (got.points, beside.points),
+        (got.residual, beside.residual),
+        *((got.emg[chain], values) for chain, values in beside.emg.items()),
+    ):
+        np.testing.assert_array_equal(one, two)
+    assert np.isnan(got.points[150, 4]).all()
+
+
+def test_markers_ride_on_the_solution(solution: Solution, beside: Beside, tmp_path: Path) -> None:
+    got = solution.with_measured(beside)
+    assert "marker_place" not in solution and isinstance(got, Solution)
+    assert got["marker"].values.tolist() == [*FIXED, *PLATFORM]
+    assert got["marker_body"].values.tolist() == ["fixed"] * 4 + ["platform"] * 4
+    pick = np.searchsorted(beside.t, solution["time"].values - 1e-9)
+    np.testing.assert_allclose(got["marker_place"].values, beside.points[pick], atol=1e-12)
+    np.testing.assert_allclose(got["marker_residual"].values, beside.residual[pick], atol=1e-12)
+    # The solution's platform is where the markers are, but for what its contacts take away.
+    seen = np.isfinite(got["marker_offset"].values)
+    assert 1e-6 < np.nanmax(got["marker_offset"].values[:, 4:]) < 2e-3
+    assert np.nanmax(got["marker_offset"].values[:, :4]) < 2e-6
+    assert not seen[:, 4].all() and seen[:, [0, 5]].all()
+    emg = got["emg"].values
+    assert np.isfinite(emg).all(axis=0).tolist() == [c == 2 for c in range(6)]
+    got.save(tmp_path / "s.nc")
+    back = open_solution(tmp_path / "s.nc")
+    np.testing.assert_array_equal(back["marker_place"].values, got["marker_place"].values)
+    assert back["marker_place"].attrs["units"] == "m"
+    again = back.with_measured(Beside(beside.t, emg=beside.emg))
+    assert "marker_place" not in again and "marker" not in again.dims and "emg" in again
+
+
+def test_offsets_are_distances_from_the_computed_motion(solution: Solution, beside: Beside) -> None:
+    """A marker that swings by 4 mm about its place on the platform."""
+    t, pose = solution["time"].values, solution["pose"].values
+    from scipy.spatial.transform import Rotation
+
+    swing = 4e-3 * np.sign(np.sin(40 * t))
+    own = np.array(LOWER["Lower_BR"]) + swing[:, None] * [0, 0, 1]
+    place = Rotation.from_euler("XYZ", pose[:, 3:]).apply(own) + pose[:, :3]
+    only = Beside(t, ("M",), ("platform",), place[:, None], np.zeros((len(t), 1)))
+    got = solution.with_measured(only)["marker_offset"].values[:, 0]
+    np.testing.assert_allclose(got, np.abs(swing - swing.mean()), atol=1e-9)
+    nameless = Beside(t, ("M",), ("",), place[:, None], np.full((len(t), 1), np.nan))
+    assert np.isnan(solution.with_measured(nameless)["marker_offset"].values).all()
+
+
+def test_outside_its_times_nothing_was_measured(solution: Solution, beside: Beside) -> None:
+    t = solution["time"].values
+    short = beside.at(beside.t[beside.t < 1.0])
+    got = solution.with_measured(short)["marker_place"].values
+    assert np.isnan(got[t >= 1.0]).all() and np.isfinite(got[t < 0.98]).all()
+
+
+Spoil = Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda c: {k: v for k, v in c.items() if k != "t"}, 'column "t" is missing'),
+        (lambda c: {"t": c["t"]}, "no markers .* and no EMG"),
+        (lambda c: {**c, "force": c["t"]}, 'column "force" is neither of a marker'),
+        (lambda c: {k: v for k, v in c.items() if k != "Upper_FL_y"}, '"Upper_FL_x", "Upper_FL_z"'),
+        (lambda c: {**c, "A_residual_fixed": c["t"]}, '"A_residual_fixed" is neither'),
+        (lambda c: {**c, "t": c["t"][::-1].copy()}, "times must rise"),
+        (lambda c: {**c, "t": np.where(c["t"] == 1, np.nan, c["t"])}, 'column "t": expected a fin'),
+        (lambda c: {**c, "Upper_FL_x": np.full(len(c["t"]), np.inf)}, "expected a finite number"),
+        (lambda c: {**c, "t": c["t"] + 100}, "no time in common"),
+        (lambda c: {**c, "emg_masseter": c["t"]}, 'has no chain "masseter"'),
+    ],
+)
+def test_tables_that_cannot_be_used(
+    solution: Solution, beside: Beside, tmp_path: Path, spoil: Spoil, said: str
+) -> None:
+    write_table(tmp_path / "p.csv", spoil(beside.columns()))
+    with pytest.raises(InputError, match=said) as caught:
+        solution.with_measured(tmp_path / "p.csv")
+    assert "\n" not in str(caught.value)
+
+
+def test_files_that_are_none(solution: Solution, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        solution.with_measured(tmp_path / "p.csv")
+    (tmp_path / "p.csv").write_text("t,A_x,A_y,A_z\n0,1,2,x\n")
+    with pytest.raises(InputError, match='got "x", expected a number'):
+        solution.with_measured(tmp_path / "p.csv")
+    (tmp_path / "p.csv").write_text("t;A_x;A_y;A_z\n0,5;;2;3\n1;1;;\n")
+    got = read_beside(tmp_path / "p.csv")
+    np.testing.assert_array_equal(got.points[0, 0], [np.nan, 2, 3])

@@ -1,0 +1,164 @@
+"""Events, loads that change their mode, and runs that end early."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.results.model import Model
+from condyle.simulation.bind import bind
+from condyle.simulation.loads.food import APART, BROKEN, TOUCHING, FoodTable
+from condyle.simulation.loads.spring import Spring
+from condyle.simulation.run import run
+from condyle.simulation.scenario import scenario_from
+
+FALL = {"duration": 0.08, "rate": 500}
+
+
+def test_a_bound_is_told_of_or_ends_the_run(jaw: Model) -> None:
+    """Its time is where the margin is zero, and what was computed before is kept."""
+    going = {**FALL, "start": {"dX": -0.2}}
+    told = condyle.simulate(jaw, going)
+    ended = condyle.simulate(jaw, going, stop_at_bounds=True)
+    first = ended.events[-1]
+    assert first["kind"] == "bound" and first["ends"] and not told.events[0]["ends"]
+    margin = told["bound_margin"].sel(contact=first["owner"])
+    i = int(np.argmax(margin.values < 0))
+    t0, t1 = told["time"].values[i - 1 : i + 1]
+    assert t0 < first["time"] <= t1
+    assert ended["time"].values[-1] == t0 and ended.sizes["time"] == i
+    assert np.abs(ended["pose"] - told["pose"][:i]).max() < 1e-12
+    assert f'"{first["owner"]}"' in ended.warnings[-1]
+    q = np.array([[first["state"][n] for n in jaw.independent]])
+    pose = jaw.evaluate(q, 0 * q, 0 * q, np.zeros((1, 9))).pose
+    point = jaw.configuration(pose).contact_point[0]
+    assert abs(point[:, 0] + 0.02765).min() < 1e-9
+
+
+def test_a_ball_that_would_have_to_be_pulled_ends_the_run() -> None:
+    """The human jaw with slack muscles falls off its skull at once."""
+    jaw = condyle.derive("human-jaw")
+    plan = bind(jaw, scenario_from(FALL))
+    trace = run(plan)
+    assert trace.ended is not None and trace.ended.kind == "lift_off"
+    assert trace.ended.owner in jaw.mechanism.contact_names
+
+
+def test_food_breaks_where_its_force_is_reached(jaw: Model) -> None:
+    """A push of 30 N through the molar closes the teeth on a crisp of 20 N."""
+    crisp = {"kind": "food", "thickness": 1e-3, "stiffness": 2e4, "damping": 5.0}
+    tables = {
+        "duration": 0.05,
+        "rate": 2000,
+        "start": {"beta": 0.05, "X": 0.001},
+        "load": [
+            crisp | {"break_force": 20.0, "point": "right_molar"},
+            {"kind": "constant", "point": "right_molar", "force": [0, 0, 30.0]},
+        ],
+    }
+    found = condyle.simulate(jaw, tables)
+    events = [e for e in found.events if e["owner"] == "food"]
+    assert [e["kind"] for e in events][:2] == ["food_touched", "food_broken"]
+    force = -found["load_force"].sel(source="food", axis="z").values
+    t, broken = found["time"].values, events[1]["time"]
+    assert (force[t > broken] == 0).all() and force[t < events[0]["time"]].max() == 0
+    assert 10 < force.max() <= 20
+    mode = found["load_mode"].sel(source="food").values
+    assert (mode[0], mode[-1]) == (APART, BROKEN) and TOUCHING in mode
+
+
+def test_laws_of_food_and_springs(jaw: Model) -> None:
+    machine = jaw.mechanism
+    food = FoodTable(
+        kind="food",
+        point="incisor",
+        thickness=0.01,
+        stiffness=1e3,
+        damping=10.0,
+        direction=(0, 0, 2),
+    ).bind(machine, "food")
+    still, shut = (0.0, 0.0, 0.0), (0.0, 0.0, -0.004)
+    assert food.law(0, shut, still, TOUCHING) == pytest.approx((0, 0, -6.0))
+    assert food.law(0, shut, (0, 0, 0.1), TOUCHING) == pytest.approx((0, 0, -7.0))
+    assert food.law(0, shut, (0, 0, -0.1), TOUCHING) == pytest.approx((0, 0, -6.0))
+    assert food.law(0, shut, still, BROKEN) == (0, 0, 0) == food.law(0, (0, 0, -0.02), still, 1)
+    assert food.begin(still) == BROKEN and food.begin((0, 0, -0.02)) == APART
+    spring = Spring(
+        kind="spring", point="incisor", direction=(3, 0, 4), stiffness=100.0, damping=1.0, rest=0.01
+    ).bind(machine, "spring")
+    # x = 0.6 * 0.05 - 0.01 = 0.02 m, x' = 0.8 * 0.5 m/s
+    assert spring.law(0, (0.05, 0, 0), (0, 0, 0.5), 0) == pytest.approx((-1.44, 0, -1.92))
+
+
+def test_a_table_of_loads_is_the_load_of_the_inverse(jaw: Model, tmp_path: Path) -> None:
+    """Inverse dynamics of what happened, under the same load, gives back the efforts."""
+    path = tmp_path / "push.csv"
+    path.write_text("t,Fx,Fz,My\n0,0,0,0\n0.015,1,-2,0.01\n0.03,0,3,0\n")
+    load = {"kind": "csv", "file": str(path), "point": "left_molar"}
+    efforts = tmp_path / "efforts.csv"
+    names = ",".join(f"tau_{n}" for n in jaw.mechanism.chain_names)
+    efforts.write_text(f"t,{names}\n0,0,0,0,0,0,0\n0.03,0.01,0.02,0.01,0.02,0.01,0.0\n")
+    tables = {"duration": 0.03, "load": [load], "efforts": {"file": str(efforts)}}
+    found = condyle.simulate(jaw, tables)
+    assert found["torque"].values[-1] == pytest.approx([0.01, 0.02, 0.01, 0.02, 0.01, 0.0])
+    assert found["load"].values[-1, 2] == pytest.approx(3.0)
+    q, q1, q2 = (
+        found[n].sel(coordinate=list(jaw.independent)).values
+        for n in ("pose", "pose_rate", "pose_acceleration")
+    )
+    given = np.hstack([found["load"].values, np.zeros((len(q), 3))])
+    again = jaw.torques(q, q1, q2, given, ("share",)).effort
+    # Least norm leaves out what balances itself.
+    internal = found["share"].sel(part="internal").values
+    assert np.abs(again + internal - found["torque"].values).max() < 1e-9
+
+
+def test_functions_as_loads_and_controllers(jaw: Model) -> None:
+    def push(t: float, s: Any, v: Any) -> list[float]:
+        return [0.0, 0.0, -2.0]
+
+    one = condyle.simulate(jaw, FALL, loads=[(push, "incisor")])
+    constant = {"kind": "constant", "point": "incisor", "force": [0.0, 0.0, -2.0]}
+    other = condyle.simulate(jaw, {**FALL, "load": [constant]})
+    assert np.abs(one["pose"] - other["pose"]).max() < 1e-14
+    with pytest.raises(condyle.InputError, match=r"expected a force \(3,\)"):
+        condyle.simulate(jaw, FALL, loads=[lambda t, s, v: 3.0])
+    with pytest.raises(condyle.InputError, match=r"efforts of shape \(6,\)"):
+        condyle.simulate(jaw, FALL, controller=lambda now, aim: [1.0])
+
+
+def test_command(condyle_command: Any, tmp_path: Path) -> None:
+    scenario = Path("fall.toml")
+    scenario.write_text("duration = 0.02\n[start]\ndX = -0.2\n")
+    ran = condyle_command(
+        "simulate",
+        "masticatory",
+        "--scenario",
+        scenario,
+        "--out",
+        "o",
+        "--json",
+        "--stop-at-bounds",
+    )
+    data = json.loads(ran.out)
+    assert ran.status == 0 and data["events"][-1]["kind"] == "bound"
+    assert {Path(f).name for f in data["files"]} == {"masticatory.nc", "masticatory.csv"}
+    scenario.write_text("duration = 0.02\n[start]\nZ = 1.0\nbeat = 1\n")
+    failed = condyle_command("simulate", "masticatory", "--scenario", scenario, "--out", "p")
+    assert failed.status == 2 and "Did you mean" in failed.err and not Path("p").exists()
+    assert condyle_command("simulate", "--new", "new.toml").status == 0
+    assert Path("new.toml").is_file()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
+def test_a_full_disk_leaves_nothing(jaw: Model, tmp_path: Path) -> None:
+    found = condyle.simulate(jaw, {"duration": 0.01})
+    (full := tmp_path / "full.csv").symlink_to("/dev/full")
+    with pytest.raises(condyle.InputError, match="cannot be written"):
+        found.save(tmp_path / "a.csv", full)
+    assert list(tmp_path.iterdir()) == [full]

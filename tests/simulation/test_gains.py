@@ -1,0 +1,91 @@
+"""What --check-gains foretells is what happens."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import trapezoid
+
+import condyle
+from condyle.errors import UnsupportedError
+from condyle.results.model import Model
+from condyle.simulation.bind import bind
+from condyle.simulation.gains import Sampled, check_gains, error_bound
+from condyle.simulation.plan import ClosedLoop, Sensing
+from condyle.simulation.scenario import scenario_from
+
+KP, PERIOD = 400.0, 1e-3
+
+
+def report(model: Model, **controller: Any) -> Any:
+    table = {"kind": "computed_torque", "stiffness": KP} | controller
+    t = np.linspace(0, 1, 11)
+    rest = condyle.Motion.from_arrays(t, {n: 0 * t for n in model.independent})
+    return check_gains(bind(model, scenario_from({"controller": table}), motion=rest))
+
+
+def test_a_continuous_loop_has_the_roots_of_its_gains(jaw: Model) -> None:
+    """e'' + Kv e' + Kp e = 0 in every coordinate, whatever the mechanism does."""
+    home = report(jaw, damping=24.0, ideal=True).points[0]
+    assert np.allclose(home.eigenvalues.real, -12, rtol=1e-4)
+    assert np.allclose(np.abs(home.eigenvalues.imag), 16, rtol=1e-4)
+    assert np.isclose(home.damping, 24.0 / 2 / np.sqrt(KP), rtol=1e-4)
+
+
+def test_the_margin_of_phase() -> None:
+    """L = (Kv s + Kp) / s^2 passes 1 at w with w^4 = Kp^2 + (Kv w)^2; holding takes w T / 2."""
+    T, Kv = 1e-4, 24.0
+    A, B = np.array([[0.0, 1.0], [0, 0]]), np.array([[0.0], [1]])
+    loop = ClosedLoop(None, None, T, 0, None)  # type: ignore[arg-type]
+    w = np.sqrt((Kv**2 + np.sqrt(Kv**4 + 4 * KP**2)) / 2)
+    margin = np.degrees(np.arctan(Kv * w / KP) - w * T / 2)
+    assert np.isclose(Sampled(A, B, np.array([[KP, Kv]]), loop, 1).phase(), margin, atol=0.05)
+
+
+@pytest.mark.parametrize("smoothing", [None, 0.0, 0.6])
+def test_a_sampled_loop_is_late(jaw: Model, smoothing: float | None) -> None:
+    """A double integrator, held and one period late, beside its recursion run step by step."""
+    T, Kv = PERIOD, 2 * np.sqrt(KP)
+    sensing = None if smoothing is None else Sensing(np.zeros(1), True, smoothing)
+    loop = ClosedLoop(None, None, T, 1, sensing)  # type: ignore[arg-type]
+    A, B = np.array([[0.0, 1.0], [0, 0]]), np.array([[0.0], [1]])
+    z = np.linalg.eigvals(Sampled(A, B, np.array([[KP, Kv]]), loop, 1).closed())
+    x, v, late, before, rate = 1e-3, 0.0, 0.0, 1e-3, 0.0
+    size = []
+    for _ in range(4000):
+        rate = v if smoothing is None else smoothing * rate + (1 - smoothing) * (x - before) / T
+        before, asked = x, -KP * x - Kv * rate
+        x, v, late = x + T * v + T**2 / 2 * late, v + T * late, asked
+        size.append(np.hypot(x, v / np.sqrt(KP)))
+    decay = (size[3999] / size[2999]) ** (1 / 1000)
+    assert np.isclose(np.abs(z).max(), decay, rtol=2e-4)
+
+
+@pytest.mark.parametrize(("damping", "stable"), [(0.03, True), (0.4, False)])
+def test_unstable_drives_are_foretold(jaw: Model, damping: float, stable: bool) -> None:
+    """A damper against a rotor of 6.6e-5 kg m^2 at 1 kHz: what is said is what happens."""
+    pd = {"kind": "joint_pd", "stiffness": 3.0, "damping": damping}
+    t = np.linspace(0, 1, 11)
+    rest = condyle.Motion.from_arrays(t, {n: 0 * t for n in jaw.independent})
+    tables = {"duration": 0.03, "controller": pd, "start": {"beta": 1e-5}}
+    said = check_gains(bind(jaw, scenario_from(tables), motion=rest))
+    assert said.stable == stable and bool(said.warnings) != stable
+    error = np.abs(condyle.simulate(jaw, tables, motion=rest)["tracking_error"].values)
+    assert (error[-1].max() < 2e-5) == stable
+
+
+def test_no_loop_no_gains(jaw: Model) -> None:
+    with pytest.raises(UnsupportedError, match="no controller"):
+        check_gains(bind(jaw, scenario_from({})))
+
+
+@pytest.mark.parametrize("damping", [10.0, 30.0, 40.0, 60.0])
+def test_the_bound_of_errors(damping: float) -> None:
+    """int |h| of the impulse response, by sampling it."""
+    t = np.linspace(0, 10, 200001)
+    roots = np.roots([1, damping, 400.0 + 1e-9]).astype(complex)
+    h = ((np.exp(roots[0] * t) - np.exp(roots[1] * t)) / (roots[0] - roots[1])).real
+    area = trapezoid(np.abs(h), x=t)
+    assert np.isclose(error_bound(400.0, damping, 3.0), 3 * area, rtol=1e-4)

@@ -1,0 +1,68 @@
+"""Orders, agreement, and what results must not depend on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.results.model import Model
+from condyle.simulation.integrators import Settings
+from condyle.simulation.integrators.rk4 import RK4, hermite
+
+START = {"X": 0.001, "beta": 0.04, "dbeta": -0.3, "dalpha": 0.2}
+
+
+def free(model: Model, **scenario: Any) -> condyle.Solution:
+    """A fall of 20 ms from START."""
+    return condyle.simulate(model, {"duration": 0.02, "start": START, **scenario})
+
+
+def last(solution: condyle.Solution) -> np.ndarray:
+    """Pose and its rate at the end, (12,)."""
+    return np.concatenate([solution[name].values[-1] for name in ("pose", "pose_rate")])
+
+
+def test_rk4_is_of_fourth_order(rubbing: Model) -> None:
+    exact = last(free(rubbing, rtol=1e-13))
+    errors = [
+        np.abs(last(free(rubbing, method="rk4", step=step)) - exact).max()
+        for step in (1e-3, 5e-4, 2.5e-4)
+    ]
+    orders = np.log2(np.divide(errors[:-1], errors[1:]))
+    assert (np.abs(orders - 4) < 0.25).all()
+
+
+def test_methods_agree(rubbing: Model) -> None:
+    one, other = (last(free(rubbing, method=m, rtol=1e-10)) for m in ("DOP853", "Radau"))
+    assert np.abs(one - other).max() < 1e-8
+
+
+@pytest.mark.parametrize("method", [{}, {"method": "rk4", "step": 5e-4}])
+def test_results_do_not_depend_on_their_grid(jaw: Model, method: dict[str, Any]) -> None:
+    """Nor does it matter that there is a grid between the steps: interpolation keeps the order."""
+    coarse, fine = (free(jaw, rate=rate, rtol=1e-11, **method) for rate in (100, 3700))
+    assert np.abs(last(coarse) - last(fine)).max() < 1e-15
+    if not method:
+        at = fine.interp(time=coarse["time"].values[1], method="cubic")
+        assert np.abs(at["pose"] - coarse["pose"][1]).max() < 1e-7
+
+
+def test_a_step_is_a_cubic_between_its_ends() -> None:
+    """Values and rates of a cubic come back exactly."""
+    cubic, rate = (lambda t: np.array([t**3 - t])), (lambda t: np.array([3 * t**2 - 1]))
+    found = hermite(0.3, 0.5, cubic(1.0), rate(1.0), cubic(1.5), rate(1.5))
+    assert np.isclose(found[0], cubic(1.15)[0], rtol=1e-14)
+    stepper = RK4(lambda t, y: 3 * np.array([t**2]), Settings(1e-9, np.zeros(1), 0.4))
+    stepper.restart(0.0, np.zeros(1), 1.0)
+    steps = [stepper.step() for _ in range(3)]
+    assert [s.t1 for s in steps][-1] == 1.0 and np.isclose(steps[-1].y1[0], 1.0, rtol=1e-14)
+
+
+def test_contacts_are_kept(jaw: Model) -> None:
+    """Every pose is on the surfaces, however long: the state is the independent coordinates."""
+    solution = free(jaw)
+    assert jaw.contact_residual(solution["pose"].values) < 1e-13
+    assert (solution["status"].values == 0).all()

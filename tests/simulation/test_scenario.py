@@ -1,0 +1,86 @@
+"""Scenario files: what they hold, and ten ways to get one wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import condyle
+from condyle.errors import InputError, ScenarioError
+from condyle.results.model import Model
+from condyle.simulation import FOODS, load_scenario, scenario_schema
+from condyle.simulation.scenario import scenario_from
+from condyle.simulation.starter import STARTER, default_scenario
+
+PD = {"kind": "joint_pd", "stiffness": 1.0, "damping": 0.1}
+FOOD = {"kind": "food", "food": "carrot", "point": "right_molar"}
+
+
+@pytest.mark.parametrize(
+    ("tables", "said"),
+    [
+        ({"duratoin": 1.0}, 'duratoin: is not a key of the file format.*Did you mean "duration"'),
+        ({"duration": -1.0}, "duration: expected a value above 0"),
+        ({"method": "euler"}, 'method: got "euler"; available: DOP853, Radau, rk4'),
+        ({"method": "rk4"}, "step is missing: rk4 has fixed steps"),
+        ({"controller": {"kind": "pid"}}, "controller: the kind 'pid' is unknown"),
+        ({"controller": PD | {"stifness": 3.0}}, 'stifness.*Did you mean "stiffness"'),
+        ({"controller": {"kind": "computed_torque"}}, "controller.stiffness: is missing"),
+        ({"load": [FOOD | {"food": "peanutt"}]}, 'no food "peanutt". Did you mean "peanut"'),
+        ({"controller": PD, "efforts": {"file": __file__}}, "efforts come from one of them"),
+        ({"controller": PD | {"motion": "nowhere.csv"}}, "there is no file"),
+        ({"controller": {"kind": "bite_force", "stiffness": 1.0}}, "expected force .N. or force_f"),
+        ({"start": {"on_motion": True}}, "no controller with a motion"),
+        ({"load": [FOOD | {"break_thickness": 1.0}]}, "expected less than thickness"),
+        ({"controller": PD | {"ideal": True, "delay": 1}}, "no delay without periods"),
+    ],
+)
+def test_wrong_scenarios(tables: dict[str, Any], said: str) -> None:
+    with pytest.raises(ScenarioError, match=said) as error:
+        scenario_from(tables)
+    assert len(error.value.problems) == 1 and "\n" not in error.value.problems[0]
+
+
+@pytest.mark.parametrize(
+    ("tables", "said"),
+    [
+        ({"start": {"Z": 0.001}}, "Z is not free: the independent coordinates are X, Y, alpha"),
+        ({"start": {"beta": 1.0}}, "start: the pose cannot be reached"),
+        ({"load": [FOOD | {"point": "chin"}]}, 'no load point "chin"'),
+        ({"controller": PD | {"stiffness": [1.0, 2.0]}}, "expected one number, or 6"),
+    ],
+)
+def test_scenarios_that_do_not_fit(jaw: Model, tables: dict[str, Any], said: str) -> None:
+    with pytest.raises(ScenarioError, match=said):
+        condyle.simulate(jaw, tables)
+
+
+def test_a_file_and_what_it_names(tmp_path: Path, jaw: Model) -> None:
+    (tmp_path / "path.csv").write_text("t,X\n")
+    path = tmp_path / "chew.toml"
+    text = 'length_unit = "mm"\n[start]\nX = 2.0\n[controller]\nkind = "joint_pd"\n'
+    path.write_text(text + 'stiffness = 1.0\ndamping = 0.1\nmotion = "path.csv"\n')
+    scenario = load_scenario(path)
+    assert scenario.start.given == {"X": 0.002}
+    assert scenario.controller.motion == str(tmp_path / "path.csv")
+    path.write_text("[start")
+    with pytest.raises(InputError, match="is not TOML"):
+        condyle.simulate(jaw, path)
+
+
+def test_foods_have_sources_and_units_do_not_change_them() -> None:
+    assert all(food.source for food in FOODS.values())
+    for unit in ("m", "mm"):
+        (load,) = scenario_from({"length_unit": unit, "load": [FOOD]}).loads
+        assert load.thickness == FOODS["carrot"].thickness
+    assert scenario_from({"load": [FOOD | {"break_force": 5.0}]}).loads[0].break_force == 5.0
+
+
+def test_starter_and_schema(tmp_path: Path) -> None:
+    path = tmp_path / "starter.toml"
+    path.write_text(STARTER)
+    assert load_scenario(path).controller.kind == "computed_torque"
+    assert default_scenario().closed_loop
+    assert {"controller", "load", "length_unit"} <= scenario_schema()["properties"].keys()
