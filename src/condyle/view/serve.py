@@ -10,20 +10,26 @@ import contextlib
 import io
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import viser
 
-from ..errors import CondyleError
+from ..errors import CondyleError, InputError
 from ..mechanism import Mechanism, load
 from ..results.solution import Solution, open_solution
 from .gate import Gate, guarded
+from .live import LivePlayer
 from .panel import Panel
 from .playback import Playback
 from .session import Session
 from .snapshot import Snapshot
 from .stage import Stage
+
+if TYPE_CHECKING:
+    from ..simulation import Scenario
+    from ..simulation.plan import Plan
 
 DEFAULT = "masticatory"
 BRAND = (16, 93, 202)
@@ -33,7 +39,8 @@ FRAME = 1 / 30  # seconds between pictures of a solution that plays
 class View:
     """A running page. `url` is where it is; `close` ends it.
 
-    Attributes: session: the pose and the load that people move;  playback: a solution, or None;
+    Attributes: session: the pose and the load that people move;  playback: a solution or a
+                simulation that the page shows, or None;  live: the simulation, if there is one;
                 snapshot: what is shown now;  port: that was free.
     """
 
@@ -48,6 +55,7 @@ class View:
         solution: Solution | None = None,
         host: str = "127.0.0.1",
         port: int = 8080,
+        live: LivePlayer | None = None,
     ) -> None:
         """Start serving. Raises: MechanismError: if the contacts do not hold the platform."""
         session = Session(mechanism)
@@ -65,7 +73,8 @@ class View:
         self._wake = threading.Event()
         self._closed = False
         self.dragging = False
-        self.playback: Playback | None = None
+        self.live = live
+        self.playback: Playback | LivePlayer | None = live
         self._enter(session)
         if solution is not None:
             self.play_solution(solution)
@@ -95,13 +104,14 @@ class View:
         Raises: CondyleError: if it cannot be; the page keeps what it had.
         """
         session = Session(mechanism)  # before anything is cleared
-        self.playback = None
+        self.playback = self.live = None
         self._enter(session)
 
     def play_solution(self, solution: Solution) -> None:
         """Show a solution and its mechanism, at its first sample; for the worker."""
         playback = Playback(solution)
         if playback.mechanism != self.session.mechanism:
+            self.live = None
             self._enter(Session(playback.mechanism))
         self.playback = playback
         points = self.session.mechanism.platform.points
@@ -188,14 +198,31 @@ def open_view(
     solution: Solution | str | Path | None = None,
     host: str = "127.0.0.1",
     port: int = 8080,
+    scenario: Scenario | Mapping[str, Any] | str | Path | None = None,
 ) -> View:
     """Start the page and return at once; see `serve`."""
+    if solution is not None and scenario is not None:
+        raise InputError("a page shows a solution or simulates a scenario; leave one of them out")
     if isinstance(solution, str | Path):
         solution = open_solution(solution)
     if not isinstance(mechanism, Mechanism):
         solved = solution.mechanism if solution is not None else None
         mechanism = load(mechanism) if mechanism is not None else solved or load(DEFAULT)
-    return View(mechanism, solution, host, port)
+    live = None if scenario is None else LivePlayer(planned(mechanism, scenario))
+    return View(mechanism, solution, host, port, live)
+
+
+def planned(mechanism: Mechanism, scenario: Any) -> Plan:
+    """What a scenario does to a mechanism.
+
+    Raises: ScenarioError: for a scenario with anything wrong, or that does not fit.
+    """
+    from ..results.model import derive
+    from ..simulation.bind import bind
+    from ..simulation.simulating import as_scenario
+
+    source = str(scenario) if isinstance(scenario, str | Path) else "scenario"
+    return bind(derive(mechanism), as_scenario(scenario), source=source)
 
 
 def serve(
@@ -204,6 +231,7 @@ def serve(
     host: str = "127.0.0.1",
     port: int = 8080,
     open_browser: bool = False,
+    scenario: Scenario | Mapping[str, Any] | str | Path | None = None,
 ) -> None:
     """Serve the live page until interrupted.
 
@@ -212,9 +240,10 @@ def serve(
             solution: to play back, or the path of its NetCDF file; its own mechanism is shown.
             host, port: where to listen; the next free port is taken if `port` is not.
             open_browser: show the page at once.
+            scenario: to simulate while the page is open, as of `condyle.simulate`, or its file.
     Raises: CondyleError: if mechanism or solution cannot be used.
     """
-    view = open_view(mechanism, solution, host, port)
+    view = open_view(mechanism, solution, host, port, scenario)
     if view.port != port and port:
         print(f"condyle view: port {port} is in use; took {view.port}", flush=True)
     print(f"condyle view: {view.url} (stop with Ctrl-C)", flush=True)
