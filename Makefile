@@ -2,12 +2,13 @@
 # make bench  compare with other engines    make docs   build the documentation
 # make format  set the code                 make fuzz   the long run of the fuzzers
 # make lint    ruff and mypy alone          make house  which room imports which
+# make coverage  what the tests of three rooms leave out
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 
-.PHONY: run test lint house format fuzz narrow install bench docs clean
+.PHONY: run test lint house format fuzz coverage narrow install bench docs clean
 
 run: $(VENV)/run.stamp
 	$(BIN)/condyle run --out results --figures
@@ -29,6 +30,13 @@ format: $(VENV)/test.stamp
 
 fuzz: $(VENV)/test.stamp
 	$(BIN)/pytest --numprocesses 2 tests/fuzz --fuzz-runs 100000
+
+# Of the rooms that people's words and files come through; measuring all takes half as long again.
+ROOMS := cli mechanism motion
+coverage: $(VENV)/test.stamp
+	$(BIN)/pytest --numprocesses 2 $(ROOMS:%=--cov=condyle.%) --cov-report= $(ROOMS:%=tests/%) tests/surfaces
+	@echo "Least covered:"
+	@$(BIN)/coverage report --fail-under=95
 
 narrow: $(VENV)/test.stamp
 	.ci/narrow x86-64-v3

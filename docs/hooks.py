@@ -22,10 +22,11 @@ os.environ.setdefault("MPLBACKEND", "agg")
 GENERATED = Path(__file__).parent / "generated"
 EXAMPLES = Path(__file__).parents[1] / "examples"
 FIGURES = ("motion", "path", "torque", "share", "contact_force", "contact_track", "singularity")
-PICTURES = ("mechanism", *FIGURES)
+MAPS = ("map-ratio", "map-singular")
+PICTURES = ("mechanism", *FIGURES, *MAPS)
 # Pieces that pages take in.
 PAGES = ("cli.md", "operations.md", "structure.md", "variables.md")
-PAGES += ("dimensions.md", "statuses.md", "warnings.md")
+PAGES += ("quantities.md", "dimensions.md", "statuses.md", "warnings.md")
 REPORT = "report.html"
 FILES = (*(f"{name}.png" for name in PICTURES), *PAGES, REPORT)
 
@@ -62,6 +63,7 @@ def generate(folder: Path) -> None:
     for name in FIGURES:
         PLOTS[name](solution).savefig(folder / f"{name}.png", dpi=110)
     draw_mechanism(condyle.load("masticatory")).savefig(folder / "mechanism.png", dpi=110)
+    draw_maps(folder, solution)
     plt.close("all")
     write_report(reference_solution(100.0, reactions=True), folder / REPORT)
 
@@ -71,6 +73,7 @@ def text_pages(folder: Path) -> None:
     pages = {"cli.md": command_help(), "operations.md": operation_counts()}
     pages["structure.md"] = structure()
     pages |= {"variables.md": variable_table(), "dimensions.md": dimension_table()}
+    pages["quantities.md"] = quantity_table()
     pages |= {"statuses.md": status_table(), "warnings.md": warning_table()}
     for name, text in pages.items():
         (folder / name).write_text(text, encoding="utf-8")
@@ -84,6 +87,39 @@ def reference_solution(rate: float, reactions: bool = False) -> Any:
     motion = Motion.from_csv(bundled_reference()[0], rate=rate)
     model = condyle.derive(condyle.load("masticatory"), backend="numpy")
     return model.solve(motion, condyle.reference_load(), reactions=reactions)
+
+
+def draw_maps(folder: Path, solution: Any) -> None:
+    """Write `MAPS`: the chewing robot under the reference run, and a platform's singular curves."""
+    import condyle
+    from condyle.analysis.map.axes import grid_of
+    from condyle.analysis.map.compute import asked_of
+    from condyle.analysis.map.slices import slices_of
+    from condyle.report.figures.map import map_figure
+
+    run = solution["pose"].sel(coordinate=["X", "beta"]).values
+    jaw = ["X=-5:15:120 mm", "beta=-15:25:120 deg"]
+    legs = ["X=-2500:2500:100 mm", "gamma=-140:140:100 deg"]
+    for picture, name, over, hold, strokes, path in (
+        ("map-ratio", "masticatory", jaw, "", "", run),
+        ("map-singular", "gough-stewart", legs, "alpha=10 deg", "*=-1500:1500 mm", None),
+    ):
+        model = condyle.derive(condyle.load(name), backend="numpy")
+        asked = asked_of(model, strokes=strokes or ())
+        slices = list(slices_of(asked.reach, grid_of(model.mechanism, over, hold)))
+        found = condyle.workspace_map(model, over, "ratio", hold, strokes=strokes or ())
+        map_figure(found, "ratio", slices, path).savefig(folder / f"{picture}.png", dpi=110)
+
+
+def quantity_table() -> str:
+    """What can be mapped."""
+    from condyle.analysis.map import QUANTITIES
+
+    rows = [
+        f"| `{name}` | {q.meaning} | {', '.join(f'`{v.name}`' for v in q.variables) or '`cause`'} |"
+        for name, q in QUANTITIES.items()
+    ]
+    return "\n".join(["| quantity | what it is | variables |", "|---|---|---|", *rows]) + "\n"
 
 
 def variable_table() -> str:

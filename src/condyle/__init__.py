@@ -43,9 +43,11 @@ _HOMES = {
     "simulate": "simulation",
     "simulate_all": "simulation",
     "ScenarioError": "errors",
+    "workspace_map": "analysis.map",
 }
 
 if TYPE_CHECKING:
+    from .analysis.map import workspace_map
     from .errors import (
         CondyleError,
         InfeasibleError,
@@ -63,9 +65,10 @@ if TYPE_CHECKING:
     from .results.solution import Solution, open_solution
     from .simulation import Scenario, load_scenario, simulate, simulate_all
 
-# What the report gives to results and comparisons, which do not know it.
+# What the report gives to results, comparisons and exports, which do not know it.
 register("solution.plot", "condyle.report.figures:SolutionPlots")
 register("comparison.text", "condyle.report.tables:comparison_text")
+register("mechanism.look", "condyle.report.scene.look:Look")
 
 __all__ = [*_HOMES, "__version__"]
 

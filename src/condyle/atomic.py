@@ -1,10 +1,11 @@
-"""Files that appear whole or not at all."""
+"""Files, and folders of them, that appear whole or not at all."""
 
 from __future__ import annotations
 
 import os
 import re
 import secrets
+import shutil
 import socket
 import time
 import zlib
@@ -29,8 +30,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     """
     target = _checked(path)
     direct = target.exists() and not target.is_file()
-    name = f".{target.name[:100]}.{_host()}-{os.getpid()}-{secrets.token_hex(4)}.part"
-    temporary = target if direct else target.with_name(name)
+    temporary = target if direct else _beside(target)
     if not direct:
         _sweep(target.parent)
     try:
@@ -47,10 +47,41 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
 
 
+@contextmanager
+def replacing_folder(path: str | os.PathLike[str], mark: str) -> Iterator[Path]:
+    """Lend a temporary path for a folder; put it at `path` when the block succeeds, else remove it.
+
+    Args:   mark: a file that folders of this kind have; others are not replaced.
+    Raises: InputError: if `path` cannot be written, or is something else.
+    """
+    target = Path(os.path.realpath(path))
+    if target.exists() and not (target / mark).is_file():
+        raise InputError(f"{path}: exists and is something else; give another name, or remove it")
+    if not target.parent.is_dir():
+        raise InputError(f"{path}: the folder {target.parent} does not exist; create it first")
+    temporary = _beside(target)
+    _sweep(target.parent)
+    try:
+        yield temporary
+        if target.exists():
+            shutil.rmtree(target)
+        os.replace(temporary, target)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _beside(target: Path) -> Path:
+    """A name in the same folder that tells whose it is."""
+    name = f".{target.name[:100]}.{_host()}-{os.getpid()}-{secrets.token_hex(4)}.part"
+    return target.with_name(name)
+
+
 def _sweep(folder: Path) -> None:
     """Remove what killed processes left in a folder.
 
-    A file of this machine goes when its process is gone. Of another machine, or where the number
+    What is of this machine goes when its process is gone. Of another machine, or where the number
     of the process was given anew, nobody can tell; those go after a day without a change.
     """
     with suppress(OSError), os.scandir(folder) as entries:
@@ -60,7 +91,10 @@ def _sweep(folder: Path) -> None:
             with suppress(OSError):
                 gone = left[1] == _host() and not _lives(int(left[2]))
                 if gone or time.time() - entry.stat().st_mtime > _FORGOTTEN:
-                    os.unlink(entry.path)
+                    if entry.is_dir(follow_symlinks=False):
+                        shutil.rmtree(entry.path, ignore_errors=True)
+                    else:
+                        os.unlink(entry.path)
 
 
 def _host() -> str:

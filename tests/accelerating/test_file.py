@@ -118,6 +118,18 @@ def test_rows_that_fail(condyle_command: Run, model: Evaluator) -> None:
     assert "accelerations at row 1 are not finite" in outcome.err
 
 
+def test_without_rates_it_is_at_rest(condyle_command: Run, model: Evaluator) -> None:
+    q, _, effort = drawn(model)
+    names = columns_of(model)
+    write(Path("in.csv"), [*names[:4], *names[8:]], np.hstack([q, effort]))
+    outcome = condyle_command(*WORDS)
+    assert outcome.status == 0
+    assert "the states are at rest" in outcome.err
+    found = model.forward(q, 0 * q, effort, np.zeros((COUNT, 9)))
+    rows = np.array(read("out.csv")[1], dtype=float)
+    np.testing.assert_array_equal(rows[:, :4], found.acceleration)
+
+
 def test_columns_that_are_missing(condyle_command: Run, model: Evaluator) -> None:
     q, q1, effort = drawn(model)
     rows = np.hstack([q, q1, effort])

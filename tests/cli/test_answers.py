@@ -37,11 +37,18 @@ CALLS: dict[str, tuple[str, ...]] = {
     "pose": ("pose", "masticatory", "--joints", "joints.csv", "--out", "poses.csv"),
     "pose --flag": ("pose", "masticatory", "--joints", "far.csv", "--out", "poses.csv", "--flag"),
     "pose --all": ("pose", "masticatory", "--joints", "joints.csv", "--out", "modes.csv", "--all"),
+    "map": (
+        *("map", "my jaw.toml", "--over", "X=-1:4:4 mm", "--no-figures"),
+        *("--quantity", "joint", "--out", "my maps"),
+    ),
     "compare": ("compare", *QUICK, "--motion", "my path.csv", "--no-figures", "--out", "x y"),
     "motion from-c3d": (
         *("motion", "from-c3d", "a trial.c3d", "--markers", "markers.toml"),
         *("--mechanism", "my jaw.toml", "--out", "a motion.csv"),
     ),
+    "export fmu": ("export", "fmu", "my jaw.toml", "--out", "units", "--kind", "inverse"),
+    "export matlab": ("export", "matlab", "my jaw.toml", "--out", "for matlab"),
+    "export mjcf": ("export", "mjcf", "my jaw.toml", "--out", "for mujoco"),
     "plot": ("plot",),
     "plot SOLUTION": ("plot", "a run.nc", "--figure", "load", "--out", "my figures"),
     "report": ("report", "a run.nc"),
@@ -69,6 +76,7 @@ def command(
     """Runs commands where the files of `CALLS` are."""
     monkeypatch.setenv("CONDYLE_BACKEND", "numpy")
     monkeypatch.setenv("CONDYLE_CACHE", str(tmp_path / "kernels"))
+    monkeypatch.setattr("condyle.export.fmu._built", lambda sources: b"")  # it takes seconds
     text = bundled_text("masticatory")
     Path("my jaw.toml").write_text(text)
     Path("off.toml").write_text(text.replace("offset = 13.215", "offset = 13.5", 1))

@@ -165,5 +165,5 @@ def test_side_by_side(model: condyle.Model) -> None:
         for one, other in zip(found, alone, strict=True):
             np.testing.assert_array_equal(one["pose"], other["pose"])
     told[3]["start"] = {"dZ": 1.0}
-    with pytest.raises(condyle.CondyleError, match=r"scenario 4: start"):
+    with pytest.raises(condyle.CondyleError, match=r"scenario 4: 1 problem\n.*start: dZ"):
         condyle.simulate_all(model, told)

@@ -17,6 +17,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
+from ..analysis.map import workspace_map
 from ..backends.c.kernel import CompiledKernel
 from ..backends.compiler import find_compiler
 from ..backends.kernel import Kernel
@@ -39,6 +40,8 @@ BOUNDED = f"{LEAST_NORM}, within limits that are inactive"
 FRICTION = f"{LEAST_NORM}, friction at two contacts"
 FORWARD = "forward dynamics"
 MANY = 100_000  # samples of what people call
+MAPPED = 200_000
+MAP = "map of reach and ratio, a pose"
 SOLVE = "solve along a landmark's path"
 
 
@@ -224,6 +227,14 @@ def asked_probes(mechanism: Mechanism) -> Iterator[Probe]:
     chew, bite = reference_motion(), reference_load()
     path = Motion.from_arrays(chew.t, chew.value, chew.names, landmark="incisor", times=t)
     yield _python_probe(f"{label}: {SOLVE}", lambda: model.solve(path, bite), MANY)
+
+
+def map_probes(mechanism: Mechanism) -> Iterator[Probe]:
+    """A map over two coordinates, on one core: what can be reached, and the singularity ratio."""
+    model = Evaluator(mechanism, backend="compiled")
+    over = {"X": (-5e-3, 5e-3, 400), "beta": (-0.1, 0.35, MAPPED // 400)}
+    call = partial(workspace_map, model, over, "ratio", threads=1)
+    yield _python_probe(f"{mechanism.name}: {MAP}", call, MAPPED)
 
 
 def policy_probes(mechanism: Mechanism) -> Iterator[Probe]:

@@ -24,17 +24,20 @@ from ..dynamics import FORMULATIONS
 from ..mechanism import bundled_text, load
 from ..model.evaluator import Evaluator
 from ..progress import step
+from .exported import PORTABLE, WIDE, exported_probes
 from .motion import SECOND, motion_rows
 from .own import (
     BOUNDED,
     FORWARD,
     FRICTION,
     LEAST_NORM,
+    MAP,
     SOLVE,
     Timer,
     asked_probes,
     jaw_probes,
     limit_probes,
+    map_probes,
     own_probes,
     policy_probes,
     reachable_samples,
@@ -43,6 +46,7 @@ from .own import (
 )
 from .programs import BINDING
 from .rows import Probe, Row, timed
+from .simulating import LOOP, simulation_probes
 
 REFERENCE = "masticatory"
 CYCLE = "one cycle of the clock"
@@ -109,9 +113,12 @@ def run_benchmark(seconds: float = 1.0) -> Benchmark:
                 probes += own_probes(load(name), ["virtual_power"])
         with step("building other engines"):
             probes += _peer_probes(unavailable)
-        probes += asked_probes(load(REFERENCE))
+        probes += [*asked_probes(load(REFERENCE)), *map_probes(load(REFERENCE))]
+        with step("building exported C"):
+            probes += exported_probes(load(REFERENCE))
         probes += [*policy_probes(load(REFERENCE)), *jaw_probes(load("human-jaw"))]
         probes += limit_probes(load(REFERENCE), load("human-jaw"), unavailable)
+        probes += simulation_probes(load(REFERENCE))
         probes.append(Probe(OPERATION, timer.vector_operation, 0.0))
         rows = _timed(probes, rounds)
         with step("swinging for a second"):
@@ -255,6 +262,8 @@ def _ratios(rows: list[Row], lanes: int) -> dict[str, float]:
         if ours and theirs and ours.error <= min(row.error for row in theirs):
             least_time = min(row.seconds for row in theirs)
             ratios[f"{SECOND}, times faster than {engine}, and nearer"] = least_time / ours.seconds
+    for what in (WIDE, PORTABLE):
+        ratios[f"one evaluation, {what} over the kernel"] = by_name[f"{REFERENCE} {what}"].over(one)
     least = by_name[f"{REFERENCE}: {LEAST_NORM}"]
     for what, name in (("bounded", BOUNDED), ("friction at two contacts", FRICTION)):
         ratios[f"{what} over least norm"] = by_name[f"{REFERENCE}: {name}"].over(least)
@@ -266,10 +275,14 @@ def _ratios(rows: list[Row], lanes: int) -> dict[str, float]:
     asked = by_name[f"{REFERENCE}: torques"]
     for what in ("evaluate", SOLVE):
         ratios[f"{what} over efforts alone"] = by_name[f"{REFERENCE}: {what}"].over(asked)
+    loop = by_name[f"{REFERENCE}: {LOOP}"]
+    ratios["control at 1 kHz, plant at 10 kHz, times real time"] = 1 / loop.seconds
     for size in ("100", "5000"):
         few = [by_name.get(f"{own}: batch of {size}, {t}") for t in ("one thread", "two threads")]
         if few[0] and few[1]:
             ratios[f"two threads over one, {size} samples"] = few[1].over(few[0])
+    mapped = by_name[f"{REFERENCE}: {MAP}"].seconds
+    ratios["map of 1e6 poses, reach and ratio, one core [s]"] = 1e6 * mapped
     threads = [by_name.get(f"{own}: batch, {what}") for what in ("one thread", "two threads")]
     if threads[0] and threads[1]:
         ratios["two threads, times faster than one"] = threads[0].over(threads[1])

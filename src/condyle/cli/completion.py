@@ -23,8 +23,32 @@ DISTRIBUTIONS = {  # name -> what is least, and subject to what
     "minimax": "the largest of them, then weighted",
 }
 BACKENDS = ("auto", "compiled", "numpy")
+FMUS = ("plant", "inverse", "controller")
 STYLES = ("screen", "journal", "journal-wide")
+EXPORTS = (
+    "inverse",
+    "contact",
+    "forward",
+    "motion",
+    "closure",
+    "pose",
+    "computed_torque",
+)
 UNITS = ("m,rad", "m,deg", "mm,rad", "mm,deg", "cm,rad", "cm,deg")
+QUANTITIES = (
+    "reachable",
+    "pose",
+    "bounds",
+    "joint",
+    "ratio",
+    "condition",
+    "transmission",
+    "effort",
+    "contact_force",
+    "load_limit",
+    "speed",
+    "stiffness",
+)
 FIGURES = (
     "activation",
     "contact_force",

@@ -10,16 +10,25 @@ import typer
 from ..errors import InputError, shortened
 from .answer import Answer, command_line
 from .command import BEGIN, command
+from .inputs import warn
 
 
 @command(BEGIN, example="condyle new my-robot")
 def new(
     name: Annotated[str, typer.Argument(help="Name of the mechanism; the file is NAME.toml.")],
+    from_mjcf: Annotated[
+        Path | None,
+        typer.Option(
+            help="Take the mechanism from a model of MuJoCo, if its chains and contacts are of "
+            "the kinds that a mechanism file has."
+        ),
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
 ) -> Answer:
     """A mechanism file to start from.
 
-    A small mechanism that works, with a comment on every number, to change step by step.
+    A small mechanism that works, with a comment on every number, to change step by step; or, with
+    --from-mjcf, a parallel mechanism of MuJoCo's world.
     """
     from ..atomic import write_text
     from ..mechanism import parse
@@ -40,5 +49,19 @@ def new(
         ) from None
     if path.exists() and not force:
         raise InputError(f"{path} exists already; choose another name or add --force")
+    if from_mjcf is not None:
+        text = _imported(from_mjcf, stem)
     write_text(path, text)
     return Answer(f"Wrote {path}", {"files": [path]}, command_line("check", path))
+
+
+def _imported(source: Path, name: str) -> str:
+    """The file of what stands in a model of MuJoCo, its first lines saying what it has not."""
+    from ..export.mjcf_import import from_mjcf
+    from ..mechanism import dumps
+
+    found = from_mjcf(source, name)
+    warn(list(found.notes))
+    told = [f"Of {source.name}, a model of MuJoCo. {{S}} is at the platform's mass centre at home."]
+    lines = [f"# {line}" for line in (*told, *found.notes)]
+    return "\n".join([*lines, "", dumps(found.mechanism)])

@@ -126,6 +126,7 @@ Trim = Annotated[
 Reactions = Annotated[
     bool, typer.Option("--reactions", help="Forces and moments in every joint too.")
 ]
+Mat = Annotated[bool, typer.Option("--mat", help="Write results for MATLAB (.mat) too.")]
 Backend = Annotated[
     str,
     typer.Option(

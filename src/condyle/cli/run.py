@@ -42,6 +42,7 @@ def run(
     trim: options.Trim = 0.0,
     figures: Annotated[bool, typer.Option("--figures", help="Draw figures too.")] = False,
     reactions: options.Reactions = False,
+    mat: options.Mat = False,
     report: Annotated[
         bool, typer.Option("--report", help="Write the page of condyle report too.")
     ] = False,
@@ -71,7 +72,7 @@ def run(
     if strict:
         refuse(solution.notices)
     folder, stem = output_folder(out), file_stem(machine.name)
-    files = [folder / f"{stem}.nc", folder / f"{stem}.csv"]
+    files = [folder / f"{stem}{ending}" for ending in (".nc", ".csv", *[".mat"] * mat)]
     solution.save(*files)
     if figures:
         from ..report.figures import save_solution_figures

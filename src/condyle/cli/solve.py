@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ..errors import InputError
 from . import options
 from .answer import Answer, command_line
 from .command import COMPUTE, command
@@ -32,6 +33,7 @@ def solve(
     preload: options.Preload = 0.0,
     contact_weight: options.ContactWeight = 0.0,
     reactions: options.Reactions = False,
+    mat: options.Mat = False,
     backend: options.Backend = "auto",
     threads: options.Threads = None,
     strict: options.Strict = False,
@@ -45,9 +47,13 @@ def solve(
 
     from ..results.states import solve_file
 
+    if mat and out.suffix.lower() == ".mat":
+        raise InputError(f"--out {out}: --mat writes that file; give the table another name")
     machine, policy = condyle.load(mechanism), (distribution, preload, contact_weight)
     model = chosen_model(machine, formulation, route, backend, *policy)
-    solved = solve_file(model, states, out, load_point, flag, strict, reactions, threads)
+    files = [out, out.with_suffix(".mat")] if mat else [out]
+    how = load_point, flag, strict, reactions, threads
+    solved = solve_file(model, states, out, *how, mat=files[1] if mat else None)
     rows, warnings, greatest = solved
     warn(warnings)
     data = {
@@ -58,9 +64,9 @@ def solve(
         "rows": rows,
         "greatest_activation": None if greatest is None else greatest._asdict(),
         "warnings": warnings,
-        "files": [out],
+        "files": files,
     }
-    text = f"{rows} rows solved: {out}"
+    text = f"{rows} rows solved: {', '.join(map(str, files))}"
     if greatest is not None:
         value, chain, row = greatest
         text += f"\nGreatest activation (effort over its limit): {value:.4g}, {chain} in row {row}"

@@ -19,6 +19,13 @@ def view(
     solution: Annotated[
         Path | None, typer.Option(help="Results (.nc) to play back; they bring their mechanism.")
     ] = None,
+    map: Annotated[
+        Path | None,
+        typer.Option(
+            help="A map over two or three coordinates (.nc or .zarr) to turn and to click; it "
+            "brings its mechanism."
+        ),
+    ] = None,
     simulate: Annotated[
         Path | None,
         typer.Option(
@@ -38,11 +45,13 @@ def view(
     require("viser", "view")
     from ..view import serve
 
+    own = solution is None and map is None
     serve(
-        None if solution else mechanism,
+        mechanism if own else None,
         solution,
         port=port,
         open_browser=browser,
+        map=map,
         scenario=simulate,
     )
     if not quiet:

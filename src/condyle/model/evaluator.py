@@ -11,7 +11,7 @@ import time
 from collections.abc import Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Self
 
 import numpy as np
@@ -23,7 +23,7 @@ from ..distribution import OBJECTIVES
 from ..dynamics import ROUTES
 from ..dynamics import formulation as formulation_named
 from ..errors import InputError, MechanismError, did_you_mean
-from ..kinematics.contact import indices
+from ..kinematics.contact import closed_form_available, indices
 from ..kinematics.singularity import Singularity
 from ..mechanism.home import (
     characteristic_length,
@@ -48,6 +48,7 @@ from .data import Accelerations, Configuration, Efforts, Evaluation
 from .distributing import LEAST, Distributor, Policy
 from .reference_force import reference_force
 from .robust import Robust
+from .survey import SURVEYED, Survey, judged
 
 CONDITION = "condition"
 DEFAULT = (None, 0.0, 0.0)  # distribution, preload and contact weight
@@ -455,6 +456,37 @@ class Evaluator:
         J_A, transmission, sigma = (values[name].T for name in ("J_A", "transmission", "J_W_sigma"))
         extremes = values["J_A_extremes"]
         return Singularity.of(J_A, transmission, sigma, extremes, self.characteristic_length)
+
+    def survey(
+        self, q: np.ndarray, wanted: Collection[str] = (), threads: int | None = None
+    ) -> Survey:
+        """What poses are like, each judged, as fast as the machine: for maps.
+
+        Args:    q: (N, m), in the order of `independent`.  wanted: of `SURVEYED`: pose, joint,
+                 transmission, rates (of the joints on q', lanes last but one), rows (of the
+                 dimensionless J_W), ratio, points (of the contacts).
+        Raises:  InputError: for a name that is none of these.
+        """
+        for name in wanted:
+            if name not in SURVEYED:
+                raise InputError(f'no output "{name}".{did_you_mean(name, SURVEYED)}')
+        check_states(self.independent, q)
+        wanted = tuple(name for name in SURVEYED if name in wanted)
+        answer = self.kernel("survey", wanted).run({"q": q}, threads)
+
+        def follow(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            some = np.asarray(q, dtype=float)[rows]
+            poses, reached = self._robust.motion(some, 0 * some, 0 * some)
+            return poses["pose"], reached
+
+        at_poses = partial(self._robust.survey, wanted)
+        return judged(answer, self._iterated, follow, at_poses)
+
+    @cached_property
+    def _iterated(self) -> bool:
+        """Whether contacts are closed in a fixed number of steps, which may be too few."""
+        forms = [form for form, _ in self._structure.contacts]
+        return not closed_form_available(forms, self._structure.dependent)
 
     # -- the matrices of the equations of motion ---------------------------------------------
 

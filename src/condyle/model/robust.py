@@ -42,6 +42,7 @@ class Robust:
         self._independent = independent
         self._distributor = distributor
         angles = [name not in ("X", "Y", "Z") for name in independent]
+        self._surveys: dict[tuple[str, ...], NumpyKernel] = {}
         self._scale = np.where(angles, characteristic(structure, numbers), 1.0)
 
     def _kernel(self, name: str) -> NumpyKernel:
@@ -165,6 +166,19 @@ class Robust:
         sigma = np.full((len(rows), self._structure.m), np.nan)
         sigma[good] = np.linalg.svd(rows[good], compute_uv=False)
         values["J_W_sigma"] = sigma.T
+        return values
+
+    def survey(self, wanted: tuple[str, ...], pose: np.ndarray) -> Arrays:
+        """Results of that question at whole poses, and `rows`, by name, samples last."""
+        wanted = (*wanted, *(() if "rows" in wanted else ("rows",)))
+        if wanted not in self._surveys:
+            question = Question.about(self._structure, "survey", wanted, True)
+            self._surveys[wanted] = NumpyKernel(question.variants(), self._numbers)
+        values = self._surveys[wanted].run({"pose": pose}).values
+        rows = np.moveaxis(values["rows"], -1, 0)
+        good = np.isfinite(rows).all(axis=(1, 2))
+        if "J_W_sigma" in values:
+            values["J_W_sigma"][:, good] = np.linalg.svd(rows[good], compute_uv=False).T
         return values
 
     def _contact_forces(self, s: Arrays, effort: np.ndarray) -> np.ndarray:

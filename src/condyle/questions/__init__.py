@@ -26,6 +26,7 @@ from .linear import linear
 from .matrices import jacobians, matrices
 from .reactions import reactions
 from .structure import Structure
+from .survey import survey
 
 QUESTIONS: dict[str, Callable[..., Program | Variants]] = {
     "inverse": inverse,
@@ -38,6 +39,7 @@ QUESTIONS: dict[str, Callable[..., Program | Variants]] = {
     "closure": closure,
     "conditions": conditions,
     "configuration": configuration,
+    "survey": survey,
     "encoders": encoders,
     "instant": instant,
     "energy": energy,
@@ -53,6 +55,7 @@ GEOMETRY = (
     "closure",
     "conditions",
     "configuration",
+    "survey",
     "encoders",
     "instant",
     "energy",

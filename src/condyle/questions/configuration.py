@@ -31,7 +31,8 @@ def configuration(structure: Structure) -> Program:
 
 def add(b: Builder, platform: Platform) -> Lanes:
     """The configuration among a question's outputs; returns the dimensionless rows of J_W."""
-    loops, rows = _loops(b, platform)
+    loops = loops_of(b, platform)
+    rows = on_rates(b, platform, [loop.rod / loop.rod_length for loop in loops], scaled=True)
     b.output("joint", [loop.q_r[0] for loop in loops], "rad or m")
     b.output("beta", [loop.q_r[1] for loop in loops], "rad")
     b.output("gamma", [loop.q_r[2] for loop in loops], "rad")
@@ -57,21 +58,30 @@ def add(b: Builder, platform: Platform) -> Lanes:
     return rows
 
 
-def _loops(b: Builder, platform: Platform) -> tuple[list[Loop], Lanes]:
-    """The closed loops of the chains, and the dimensionless rows of J_W on q_EE'."""
-    s, motion = b.structure, platform.motion
-    ind = independent_indices(s.dependent)
-    length = b.parameter("length")
-    scale = ca.vertcat(*(1 / length if i >= 3 else ca.SX(1) for i in ind))
-    B = motion.E @ motion.M_J
-    loops, rows = [], []
-    for group, kind in enumerate(s.families):
+def loops_of(b: Builder, platform: Platform) -> list[Loop]:
+    """The closed loops of the chains, one a group."""
+    loops = []
+    for group, kind in enumerate(b.structure.families):
         family = FAMILIES[kind]
-        r = platform.R @ b.lane(group, "joint")
-        position = platform.placement.position + r
-        loop = family.loop(family.named(b.lane(group, "constants")), position)
-        e = loop.rod / loop.rod_length
-        mask = b.lane(group, "mask")
-        rows.append(mask * scale * (B.T @ ca.vertcat(e, ca.cross(r, e))))
-        loops.append(loop)
-    return loops, rows
+        position = platform.placement.position + platform.R @ b.lane(group, "joint")
+        loops.append(family.loop(family.named(b.lane(group, "constants")), position))
+    return loops
+
+
+def on_rates(b: Builder, platform: Platform, rows: Lanes, scaled: bool = False) -> Lanes:
+    """Rows (3,) on the velocities of the platform joints as rows (m,) on q_EE'.
+
+    Args: scaled: for rates whose angles are multiplied by the characteristic length.
+    """
+    motion = platform.motion
+    B = motion.E @ motion.M_J
+    scale = ca.SX.ones(b.structure.m)
+    if scaled:
+        length = b.parameter("length")
+        ind = independent_indices(b.structure.dependent)
+        scale = ca.vertcat(*(1 / length if i >= 3 else ca.SX(1) for i in ind))
+    found = []
+    for group, row in enumerate(rows):
+        r, mask = platform.R @ b.lane(group, "joint"), b.lane(group, "mask")
+        found.append(mask * scale * (B.T @ ca.vertcat(row, ca.cross(r, row))))
+    return found

@@ -43,7 +43,7 @@ def forward(structure: Structure, wanted: Collection[str] = ()) -> Variants:
 def program(structure: Structure, wanted: Collection[str] = ()) -> Program:
     """The graph; samples that it cannot vouch for go the robust path."""
     b = Builder(structure)
-    platform = closed(b, still=True)
+    platform = closed(b, rates=1)
     effort = b.lane_sample("effort", unit="N m or N")
     eq = affine(b, platform, Wrench.of(b), effort)
     touch = contacts(b, platform) if structure.friction else None

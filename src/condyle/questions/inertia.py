@@ -20,8 +20,8 @@ import casadi as ca
 
 from ..dynamics import FORMULATIONS
 from ..dynamics.virtual_power import VirtualPower
-from ..kinematics.chain import FAMILIES
-from ..kinematics.state import twist_state
+from ..kinematics.chain import FAMILIES, ChainDynamics
+from ..kinematics.state import State, twist_state
 from .builder import Builder, Lanes
 from .equations import Wrench, equations, loss, platform_body, symmetric, total
 from .platform import Basis, Platform, twist_basis
@@ -55,7 +55,7 @@ class Affine:
 
 def affine(b: Builder, platform: Platform, load: Wrench, effort: Lanes) -> Affine:
     """The equations of a platform whose accelerations are those of q'' = 0."""
-    if FORMULATIONS[b.structure.formulation].lumps:
+    if b.structure.formulation == VirtualPower.name:
         return _by_chains(b, platform, load, effort)
     return _by_derivatives(b, platform, load, effort)
 
@@ -63,59 +63,68 @@ def affine(b: Builder, platform: Platform, load: Wrench, effort: Lanes) -> Affin
 def _by_chains(b: Builder, platform: Platform, load: Wrench, effort: Lanes) -> Affine:
     """In twists, from every chain's mass as its platform joint feels it."""
     s, motion = b.structure, platform.motion
-    method = VirtualPower()
-    g = b.parameter("gravity")
+    method, body, g = VirtualPower(), platform_body(b, lumped=True), b.parameter("gravity")
     # Forces of rates alone: what accelerations add is H times them.
     state = twist_state(platform.placement.position, motion.R, motion.twist, ca.SX.zeros(6))
-    sums, rows, rates, biases, discriminants = [], [], [], [], []
-    for group, kind in enumerate(s.families):
-        family = FAMILIES[kind]
-        M, A = state.point(b.lane(group, "joint")), ca.SX.sym("A", 3)
-        chain = family.dynamics(
-            family.named(b.lane(group, "constants")), M.position, M.velocity, A, g
-        )
-        taken = chain.effort + loss(b, group, chain) - effort[group]
-        on_M = total(list(chain.forces.values())) + chain.J * taken
-        slope = ca.jacobian(on_M, A)
-        mask = ca.SX(1) if family.padding else b.lane(group, "mask")
-        mass = mask * symmetric([slope[i, j] for i, j in UPPER])
-        force = mass @ M.acceleration + mask * ca.substitute(on_M, A, ca.SX.zeros(3))
-        lever = ca.skew(M.lever)
-        coupled = lever @ mass
-        turned = coupled @ lever.T
-        sums.append(
-            ca.vertcat(
-                force,
-                lever @ force,
-                *(mass[i, j] for i, j in UPPER),
-                ca.vec(coupled),
-                *(turned[i, j] for i, j in UPPER),
-            )
-        )
-        rows.append(state.generalized_force(mask * chain.J, M.lever))
-        rates.append(chain.rate)
-        biases.append(ca.substitute(chain.acceleration, A, M.acceleration))
-        discriminants.append(chain.discriminant)
-    found = b.total(sums)
+    chains = [_chain(b, group, state, g, effort[group]) for group in range(len(s.chains))]
+    found = b.total([c.terms for c in chains])
     coupled = ca.reshape(found[12:21], 3, 3)
     mass, turned = (symmetric(ca.vertsplit(part)) for part in (found[6:12], found[21:27]))
-    H = method.inertia(state, platform_body(b, lumped=True))
-    H = H + ca.vertcat(ca.horzcat(mass, coupled.T), ca.horzcat(coupled, turned))
-    F = found[:6] + method.platform(state, platform_body(b, lumped=True), g)
+    own = method.inertia(state, body)
     basis = twist_basis(motion, s.dependent)
     return Affine(
-        H,
-        F - load.about_centre(motion.R),
-        motion.twist_rate,
-        basis,
-        (motion.E @ motion.M_J)[list(basis.identity), :],
-        ca.SX.eye(6),
-        motion.frame.N,
-        rows,
-        rates,
-        biases,
-        discriminants,
+        H=own + ca.vertcat(ca.horzcat(mass, coupled.T), ca.horzcat(coupled, turned)),
+        F=found[:6] + method.platform(state, body, g) - load.about_centre(motion.R),
+        start=motion.twist_rate,
+        basis=basis,
+        S=(motion.E @ motion.M_J)[list(basis.identity), :],
+        B=ca.SX.eye(6),
+        G=motion.frame.N,
+        rows=[c.row for c in chains],
+        rates=[c.motion.rate for c in chains],
+        biases=[c.motion.acceleration for c in chains],
+        discriminants=[c.motion.discriminant for c in chains],
     )
+
+
+@dataclass(frozen=True)
+class _Chain:
+    """The chains of one group, where the platform's accelerations are zero.
+
+    terms: force and moment about O_M, then A_M, [r] A_M and [r] A_M [r]^T, (27,); of symmetric
+           matrices the entries `UPPER`.
+    """
+
+    terms: ca.SX
+    row: ca.SX
+    motion: ChainDynamics
+
+
+def _chain(b: Builder, group: int, state: State, g: ca.SX, effort: ca.SX) -> _Chain:
+    family = FAMILIES[b.structure.families[group]]
+    constants = family.named(b.lane(group, "constants"))
+    M, A = state.point(b.lane(group, "joint")), ca.SX.sym("A", 3)
+    chain = family.dynamics(constants, M.position, M.velocity, A, g)
+    taken = chain.effort + loss(b, group, chain) - effort
+    on_M = total(list(chain.forces.values())) + chain.J * taken
+    slope = ca.jacobian(on_M, A)
+    # A lane without a chain does nothing: its idle constants see to that, or the mask.
+    mask = ca.SX(1) if family.padding else b.lane(group, "mask")
+    mass = mask * symmetric([slope[i, j] for i, j in UPPER])
+    force = mass @ M.acceleration + mask * ca.substitute(on_M, A, ca.SX.zeros(3))
+    lever = ca.skew(M.lever)
+    coupled = lever @ mass
+    turned = coupled @ lever.T
+    terms = ca.vertcat(
+        force,
+        lever @ force,
+        *(mass[i, j] for i, j in UPPER),
+        ca.vec(coupled),
+        *(turned[i, j] for i, j in UPPER),
+    )
+    acceleration = ca.substitute(chain.acceleration, A, M.acceleration)
+    row = state.generalized_force(mask * chain.J, M.lever)
+    return _Chain(terms, row, replace(chain, acceleration=acceleration))
 
 
 def _by_derivatives(b: Builder, platform: Platform, load: Wrench, effort: Lanes) -> Affine:
@@ -132,17 +141,17 @@ def _by_derivatives(b: Builder, platform: Platform, load: Wrench, effort: Lanes)
     assert eq.G is not None
     carried = b.total([c.row * t for c, t in zip(eq.chains, effort, strict=True)])
     Q = b.cut(eq.Q - carried)
-    ind = list(eq.basis.identity)
+    S = (motion.E @ motion.M_J)[list(eq.basis.identity), :] if twists else ca.SX.eye(s.m)
     return Affine(
-        b.jacobian(Q, unknown),
-        b.at_zero(Q, unknown),
-        start,
-        eq.basis,
-        (motion.E @ motion.M_J)[ind, :] if twists else ca.SX.eye(s.m),
-        eq.state.B,
-        eq.G,
-        [c.row for c in eq.chains],
-        [c.dynamics.rate for c in eq.chains],
-        [b.at_zero(c.dynamics.acceleration, unknown) for c in eq.chains],
-        [c.dynamics.discriminant for c in eq.chains],
+        H=b.jacobian(Q, unknown),
+        F=b.at_zero(Q, unknown),
+        start=start,
+        basis=eq.basis,
+        S=S,
+        B=eq.state.B,
+        G=eq.G,
+        rows=[c.row for c in eq.chains],
+        rates=[c.dynamics.rate for c in eq.chains],
+        biases=[b.at_zero(c.dynamics.acceleration, unknown) for c in eq.chains],
+        discriminants=[c.dynamics.discriminant for c in eq.chains],
     )

@@ -34,7 +34,7 @@ def instant(structure: Structure, inertia: bool = False) -> Variants:
     Args: inertia: M_r of `matrices` too, (m, m).
     """
     b = Builder(structure)
-    platform = closed(b, still=True)
+    platform = closed(b, rates=1)
     motion, s = platform.motion, structure
     T = motion.E @ motion.M_J
     b.output("pose", platform.pose, ANGLE_UNITS)
@@ -79,7 +79,7 @@ def instant(structure: Structure, inertia: bool = False) -> Variants:
 def energy(structure: Structure) -> Program:
     """Kinetic and potential energy [J], from q and q'; the potential is 0 at the origin of {S}."""
     b = Builder(structure)
-    platform = closed(b, still=True)
+    platform = closed(b, rates=1)
     motion, g = platform.motion, b.parameter("gravity")
     body = platform_body(b, lumped=False)
     V, omega = motion.twist[:3], motion.twist[3:]

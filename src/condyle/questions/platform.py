@@ -45,14 +45,14 @@ class Platform:
         return self.motion.R
 
 
-def closed(b: Builder, still: bool = False) -> Platform:
+def closed(b: Builder, rates: int = 2) -> Platform:
     """From the independent coordinates, ports q, q1 and q2: the contacts give the rest.
 
-    Args: still: without q2, which is zero.
+    Args: rates: how many of q' and q'' are ports; others are zero.
     """
     s = b.structure
-    q, q1 = (b.sample(name, s.m) for name in ("q", "q1"))
-    q2 = ca.SX.zeros(s.m) if still else b.sample("q2", s.m)
+    zero = ca.SX.zeros(s.m)
+    q, q1, q2 = (b.sample(n, s.m) if i <= rates else zero for i, n in enumerate(("q", "q1", "q2")))
     contacts = contact_symbols(s, b.parameter)
     if closed_form_available([form for form, _ in s.contacts], s.dependent):
         placement = closed_form(contacts, s.dependent, q, b.parameter("branch"))

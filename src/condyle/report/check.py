@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.map.room import ball_around_home
 from ..kinematics.chain import FAMILIES
 from ..kinematics.singularity import KINDS
 from ..mechanism.actuator import Limits
@@ -141,6 +142,12 @@ def _singularity(d: Mapping[str, Any]) -> Iterator[str]:
     )
     yield f"  J_A: smallest over largest {s['J_A_ratio']:.4g}"
     yield f"  near: {s['near']}"
+    room = d["room"]
+    yield (
+        f"room around home: a ball of {length_text(room['radius'])} (angles times the "
+        f"characteristic length), off singularities and within bounds, ends at {room['ends_at']}; "
+        f"{room['points']} points, {length_text(room['spacing'])} apart"
+    )
 
 
 def _count(items: Sized, word: str) -> str:
@@ -151,6 +158,7 @@ def describe(mechanism: Mechanism) -> Description:
     """Describe a mechanism at home."""
     model = Evaluator(mechanism, backend="numpy")  # one pose: building a kernel takes longer
     s = model.configuration(np.zeros((1, 6))).singularity
+    room = ball_around_home(model)
     m = mechanism.degrees_of_freedom
     platform = mechanism.platform
     chains = {
@@ -182,6 +190,12 @@ def describe(mechanism: Mechanism) -> Description:
                 "J_W_condition": float(min(s.condition[0], 1e300)),
                 "J_A_ratio": float(s.inverse_ratio[0]),
                 "near": KINDS[int(s.kind()[0])],
+            },
+            "room": {
+                "radius": room.radius,
+                "ends_at": room.stops,
+                "points": room.points,
+                "spacing": room.spacing,
             },
             "warnings": [
                 {"kind": found.kind, "message": found.message, **found.data}

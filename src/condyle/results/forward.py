@@ -25,9 +25,10 @@ from ..status import Status
 from .contacts import lift_off, lift_off_columns
 from .failures import status_columns
 from .solution import named_columns
-from .states import CHUNK_ROWS
+from .states import CHUNK_ROWS, loads
 from .variables import WRENCH
 
+AT_REST = "no rates (dX ...) are given: the states are at rest"
 KINDS = {"N m": "moment", "N": "force"}
 
 
@@ -44,8 +45,8 @@ def forward_file(
     Rows never influence each other.
 
     Args:    states: CSV, or Parquet if its name ends in .parquet, with 6 - k pose coordinates,
-             their rates dX..., tau_<chain> of every chain, and optionally some of Fx, Fy, Fz, Mx,
-             My, Mz. Other columns are named in a warning.
+             their rates dX... (none: at rest), tau_<chain> of every chain, and optionally some of
+             Fx, Fy, Fz, Mx, My, Mz. Other columns are named in a warning.
              out: ddX... of the given coordinates, contact_<contact>, the pose, joint_<chain>, and
              lift_off_<contact> of one-sided contacts; with `flag` also status and cause.
              flag: keep rows that have no accelerations, empty, with a status.
@@ -61,6 +62,10 @@ def forward_file(
             rows += table.rows
             pulled += lifted.sum(axis=0)
             unused = list(table.warnings)
+            if _at_rest(table):
+                unused.append(
+                    f"{table.source}: no rates (dX ...) are given: the states are at rest"
+                )
     names = model.mechanism.contact_names
     return rows, [
         *unused,
@@ -83,16 +88,11 @@ def forward_table(
     """Output columns for the rows of one table, and where one-sided contacts would pull, (N, k)."""
     mechanism = model.mechanism
     names = _coordinates(model, table)
-    q, q1 = (table.require([prefix + name for name in names]) for prefix in ("", "d"))
+    q = table.require(names)
+    q1 = np.zeros_like(q) if _at_rest(table) else table.require([f"d{name}" for name in names])
     effort = table.require([f"tau_{name}" for name in mechanism.chain_names])
     q, q1, _ = model.independent_states(names, q, q1, np.zeros_like(q), threads=threads)
-    wrench, point = np.zeros((table.rows, 6)), np.zeros(3)
-    given = [name for name in WRENCH if name in table.columns]
-    for name in given:
-        wrench[:, WRENCH.index(name)] = table.columns[name]
-    if load_point is not None or set(given) & set(WRENCH[:3]):
-        point = model.load_point(load_point)
-    load = with_point(wrench, point)
+    load = with_point(*loads(model, table, load_point))
     found = model.forward(q, q1, effort, load, ("motion", "joint"), threads)
     cause = _causes(model, found, flag, first_row)
     good = found.status == Status.ok
@@ -120,6 +120,10 @@ def _known(model: Evaluator) -> dict[str, Dimension]:
     for chain in model.mechanism.chains:
         known[f"tau_{chain.name}"] = KINDS[FAMILIES[chain.kind].effort_unit], 0
     return known
+
+
+def _at_rest(table: Table) -> bool:
+    return not any(f"d{name}" in table.columns for name in COORDINATES)
 
 
 def _coordinates(model: Evaluator, table: Table) -> list[str]:

@@ -22,6 +22,7 @@ from ..progress import step
 from .accessors import extend
 from .contacts import AXES, BOUND_TOLERANCE, bound_margins, lift_off, lift_off_columns
 from .failures import Failure, failures, status_columns
+from .matlab import dataset_variables, write_mat
 from .netcdf import write_netcdf
 from .variables import VARIABLES, WRENCH
 from .warnings import Notice
@@ -101,18 +102,20 @@ class Solution(xr.Dataset):
         return with_measured(self, measured)
 
     def save(self, *paths: str | Path) -> None:
-        """Write as NetCDF (.nc), CSV (.csv) or Parquet (.parquet): every file whole, or none."""
+        """Write as NetCDF (.nc), CSV, Parquet or MATLAB (.mat): every file whole, or none."""
         with step("writing results"), ExitStack() as stack:
             for path in paths:
                 suffix = Path(path).suffix.lower()
-                if suffix not in (".nc", ".csv", ".parquet"):
+                if suffix not in (".nc", ".csv", ".parquet", ".mat"):
                     raise InputError(
-                        f"{path}: expected a name that ends in .nc, .csv or .parquet, got "
+                        f"{path}: expected a name that ends in .nc, .csv, .parquet or .mat, got "
                         f'"{suffix}"'
                     )
                 temporary = stack.enter_context(replacing(path))
                 if suffix == ".nc":
                     write_netcdf(self, temporary)
+                elif suffix == ".mat":
+                    write_mat(temporary, dataset_variables(self))
                 else:
                     write_table(temporary, self.columns(), parquet=suffix == ".parquet")
 

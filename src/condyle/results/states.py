@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from ..atomic import replacing
 from ..errors import InputError
 from ..mechanism.mechanism import COORDINATES
 from ..model.evaluator import Evaluator, with_point
@@ -16,6 +18,7 @@ from ..motion import Table, TableWriter, iter_table
 from .contacts import AXES, lift_off_columns
 from .derived import Derived
 from .failures import status_columns
+from .matlab import table_variables, write_mat
 from .solution import named_columns
 from .variables import VARIABLES, WRENCH
 from .warnings import Watch, refuse
@@ -49,6 +52,7 @@ def solve_file(
     strict: bool = False,
     reactions: bool = False,
     threads: int | None = None,
+    mat: str | Path | None = None,
 ) -> Solved:
     """Solve every row of a states file; the output appears whole or not at all.
 
@@ -61,17 +65,23 @@ def solve_file(
              out: likewise CSV or Parquet.
              reactions: columns reaction_<joint>_<chain>_x, _y, _z ... too.
              threads: at most so many; the file does not depend on it.
+             mat: file for MATLAB to write as well; it takes the memory of the whole table.
     Returns: number of rows, warnings, and the greatest activation.
     Raises:  InputError, UnreachableError, SingularError, BoundsError: nothing is written then.
     """
     known = [p + name for p in ("", "d", "dd") for name in COORDINATES] + list(WRENCH)
     watch = Watch(model.mechanism, rows=True)
     rows, unused, greatest = 0, list[str](), None
-    with TableWriter(out) as writer:
+    kept: list[dict[str, np.ndarray | list[str]]] = []
+    with ExitStack() as stack:
+        matlab = None if mat is None else stack.enter_context(replacing(mat))
+        writer = stack.enter_context(TableWriter(out))
         for table in iter_table(states, CHUNK_ROWS, known=known, doing="solving"):
             columns, derived = solve_table(model, table, load_point, flag, rows, reactions, threads)
             watch.see(derived, np.arange(rows, rows + table.rows) + 1)
             writer.write(columns)
+            if matlab is not None:
+                kept.append(columns)
             greatest = _greater(greatest, derived, rows)
             rows += table.rows
             unused = list(table.warnings)
@@ -80,6 +90,10 @@ def solve_file(
         notices = watch.notices()
         if strict:
             refuse(notices)
+        if matlab is not None:
+            names = kept[0] if kept else {}
+            whole = {name: np.concatenate([part[name] for part in kept]) for name in names}
+            write_mat(matlab, table_variables(model.mechanism, whole))
     return Solved(rows, [*unused, *(notice.text for notice in notices)], greatest)
 
 
@@ -116,13 +130,7 @@ def solve_table(
     else:
         q1, q2 = (table.require([p + name for name in names]) for p in ("d", "dd"))
     q, q1, q2 = model.independent_states(names, q, q1, q2, threads=threads)
-    wrench = np.zeros((table.rows, 6))
-    point = np.zeros(3)
-    given = [name for name in WRENCH if name in table.columns]
-    for name in given:
-        wrench[:, WRENCH.index(name)] = table.columns[name]
-    if load_point is not None or set(given) & set(WRENCH[:3]):
-        point = model.load_point(load_point)
+    wrench, point = loads(model, table, load_point)
     evaluation = model.evaluate(q, q1, q2, with_point(wrench, point), threads)
     mechanism = model.mechanism
     derived = Derived(mechanism, evaluation, wrench, model.limited)
@@ -152,6 +160,17 @@ def solve_table(
         shortfall = derived.shortfall if derived.limited else None
         columns |= status_columns(mechanism, evaluation.status, derived.cause, shortfall)
     return columns, derived
+
+
+def loads(model: Evaluator, table: Table, load_point: str | None) -> tuple[np.ndarray, np.ndarray]:
+    """Wrenches of a table, (N, 6), zero where it has none, and where they act, (3,)."""
+    wrench, point = np.zeros((table.rows, 6)), np.zeros(3)
+    given = [name for name in WRENCH if name in table.columns]
+    for name in given:
+        wrench[:, WRENCH.index(name)] = table.columns[name]
+    if load_point is not None or set(given) & set(WRENCH[:3]):
+        point = model.load_point(load_point)
+    return wrench, point
 
 
 def state_coordinates(model: Evaluator, table: Table) -> list[str]:

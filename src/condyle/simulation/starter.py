@@ -8,7 +8,7 @@ STARTER = """\
 # A scenario: what happens to a mechanism. Run it: condyle simulate MECHANISM --scenario THIS_FILE
 # SI throughout; with length_unit = "mm" lengths (thickness, rest, X..) are millimetres.
 
-duration = 5.0                  # s
+duration = 2.0                  # s
 rate = 1000                     # Hz, of the results
 rtol = 1e-9                     # of the integrator; method = "DOP853", "Radau", or "rk4" with step
 

@@ -1,4 +1,4 @@
-"""The controls of a live simulation: its clock, its knobs, the hand that pulls, and what it says."""
+"""The controls of a live simulation: clock, knobs, the hand that pulls, and what it says."""
 
 from __future__ import annotations
 

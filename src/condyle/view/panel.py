@@ -224,6 +224,11 @@ class Panel:
         i = session.model.independent.index(name)
         self._known[i] = session.q[i]
 
+    def take(self, q: np.ndarray) -> None:
+        """Go to independent coordinates, (m,) [m, rad]."""
+        self._take_over()
+        self._view.session.q = q.copy()
+
     def drag(self, pose: np.ndarray, holding: bool) -> None:
         """Follow the drag control, held at X_EE (6,) or let go there."""
         self._take_over()

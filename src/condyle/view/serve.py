@@ -11,16 +11,19 @@ import io
 import threading
 import time
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import viser
 
+from ..analysis.map.files import mechanism_of, open_map
 from ..errors import CondyleError, InputError
 from ..mechanism import Mechanism, load
 from ..results.solution import Solution, open_solution
 from .gate import Gate, guarded
 from .live import LivePlayer
+from .maps import MapLayer
 from .panel import Panel
 from .playback import Playback
 from .session import Session
@@ -28,6 +31,8 @@ from .snapshot import Snapshot
 from .stage import Stage
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from ..simulation import Scenario
     from ..simulation.plan import Plan
 
@@ -55,6 +60,7 @@ class View:
         solution: Solution | None = None,
         host: str = "127.0.0.1",
         port: int = 8080,
+        dataset: xr.Dataset | None = None,
         live: LivePlayer | None = None,
     ) -> None:
         """Start serving. Raises: MechanismError: if the contacts do not hold the platform."""
@@ -75,9 +81,12 @@ class View:
         self.dragging = False
         self.live = live
         self.playback: Playback | LivePlayer | None = live
+        self.map: MapLayer | None = None
         self._enter(session)
         if solution is not None:
             self.play_solution(solution)
+        if dataset is not None:
+            self.show_map(dataset)
         self._worker = threading.Thread(target=self._work, name="condyle-view", daemon=True)
         self._worker.start()
         self._wake.set()
@@ -122,6 +131,14 @@ class View:
         self.stage.show_markers([str(b) for b in solution["marker_body"].values] if has else [])
         self.panel.show_playback(playback)
 
+    def show_map(self, dataset: xr.Dataset) -> None:
+        """Show a map beside its mechanism, which goes where the map is clicked; for the worker."""
+        mechanism = mechanism_of(dataset)
+        if mechanism != self.session.mechanism:
+            self._enter(Session(mechanism))
+        self.map = MapLayer(self._server.scene, self.stage.centre, self.session.model, dataset)
+        self.map.on_click(lambda q: self.wish("map", partial(self.panel.take, q)))
+
     def set_dark(self, dark: bool) -> None:
         """Draw the page dark or light."""
         self.dark = dark
@@ -152,6 +169,7 @@ class View:
             self.stage.remove()
             self._server.gui.reset()
         self.session = session
+        self.map = None
         self.stage = Stage(self._server, session.mechanism)
         self.stage.look_from(self._server.initial_camera, "Oblique")
         for client in self._server.get_clients().values():
@@ -191,6 +209,8 @@ class View:
         with self._server.atomic():
             self.stage.show(self.snapshot, self.dragging)
             self.panel.show(self.snapshot)
+            if self.map is not None:
+                self.map.show(self.snapshot.pose)
 
 
 def open_view(
@@ -198,18 +218,25 @@ def open_view(
     solution: Solution | str | Path | None = None,
     host: str = "127.0.0.1",
     port: int = 8080,
+    map: xr.Dataset | str | Path | None = None,
     scenario: Scenario | Mapping[str, Any] | str | Path | None = None,
 ) -> View:
     """Start the page and return at once; see `serve`."""
-    if solution is not None and scenario is not None:
-        raise InputError("a page shows a solution or simulates a scenario; leave one of them out")
+    if scenario is not None and (solution is not None or map is not None):
+        raise InputError("a page that simulates a scenario shows no solution and no map beside it")
+    if isinstance(map, str | Path):
+        map = open_map(map)
+    if map is not None and map["status"].ndim == 1:
+        raise InputError("this map goes over one coordinate; the view shows those of two or three")
+    if map is not None and solution is None:
+        mechanism = mechanism_of(map)
     if isinstance(solution, str | Path):
         solution = open_solution(solution)
     if not isinstance(mechanism, Mechanism):
         solved = solution.mechanism if solution is not None else None
         mechanism = load(mechanism) if mechanism is not None else solved or load(DEFAULT)
     live = None if scenario is None else LivePlayer(planned(mechanism, scenario))
-    return View(mechanism, solution, host, port, live)
+    return View(mechanism, solution, host, port, map, live)
 
 
 def planned(mechanism: Mechanism, scenario: Any) -> Plan:
@@ -231,6 +258,7 @@ def serve(
     host: str = "127.0.0.1",
     port: int = 8080,
     open_browser: bool = False,
+    map: xr.Dataset | str | Path | None = None,
     scenario: Scenario | Mapping[str, Any] | str | Path | None = None,
 ) -> None:
     """Serve the live page until interrupted.
@@ -240,10 +268,12 @@ def serve(
             solution: to play back, or the path of its NetCDF file; its own mechanism is shown.
             host, port: where to listen; the next free port is taken if `port` is not.
             open_browser: show the page at once.
+            map: of `workspace_map`, or the path of its file: shown beside its mechanism, which
+                goes where the map is clicked.
             scenario: to simulate while the page is open, as of `condyle.simulate`, or its file.
-    Raises: CondyleError: if mechanism or solution cannot be used.
+    Raises: CondyleError: if mechanism, solution, map or scenario cannot be used.
     """
-    view = open_view(mechanism, solution, host, port, scenario)
+    view = open_view(mechanism, solution, host, port, map, scenario)
     if view.port != port and port:
         print(f"condyle view: port {port} is in use; took {view.port}", flush=True)
     print(f"condyle view: {view.url} (stop with Ctrl-C)", flush=True)

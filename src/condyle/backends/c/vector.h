@@ -22,7 +22,7 @@
 typedef double vec __attribute__((vector_size(8 * W)));
 typedef int64_t mask __attribute__((vector_size(8 * W)));
 typedef double unaligned __attribute__((vector_size(8 * W), aligned(8)));
-#define INLINE static inline __attribute__((always_inline))
+#define INLINE static inline __attribute__((always_inline, unused))
 /* Seen by the other text of a kernel alone. */
 #define HIDDEN __attribute__((visibility("hidden")))
 

@@ -1,0 +1,200 @@
+"""What a map goes over: one to three independent coordinates, and what the others are held at.
+
+As text `X=-5:5:200 mm`: from -5 to 5 mm in 200 values; held coordinates as `Y=1 mm,alpha=2 deg`.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...errors import InputError, did_you_mean
+from ...mechanism.home import dependent_coordinates, independent_coordinates
+from ...mechanism.mechanism import COORDINATES, Mechanism
+from ...motion.units import dimension, unit_factor
+
+MOST_AXES, MOST_POINTS = 3, 10**10
+_OVER = re.compile(r"\s*(\w+)\s*=\s*([^:\s]+)\s*:\s*([^:\s]+)\s*:\s*(\S+)\s*(.*?)\s*")
+_VALUE = re.compile(r"\s*(\w+)\s*=\s*(\S+)\s*(.*?)\s*")
+
+Over = Iterable[str] | Mapping[str, tuple[float, float, int]]
+Values = str | Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A coordinate from `low` to `high`, SI, in `count` equal steps less one."""
+
+    name: str
+    low: float
+    high: float
+    count: int
+
+    @property
+    def values(self) -> np.ndarray:
+        """(count,) [m or rad]."""
+        return np.linspace(self.low, self.high, self.count)
+
+    @property
+    def span(self) -> float:
+        return self.high - self.low
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Points of the independent coordinates: axes go, the last one fastest; the others stay.
+
+    names: the independent coordinates, (m,);  held: their values where no axis has them, (m,).
+    """
+
+    names: tuple[str, ...]
+    axes: tuple[Axis, ...]
+    held: tuple[float, ...]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return tuple(axis.count for axis in self.axes)
+
+    @property
+    def size(self) -> int:
+        return math.prod(self.shape)
+
+    @property
+    def columns(self) -> list[int]:
+        """Of q that the axes move."""
+        return [self.names.index(axis.name) for axis in self.axes]
+
+    def states(self, points: np.ndarray) -> np.ndarray:
+        """q, (N, m), of points along the axes, (N, d) [m or rad]."""
+        q = np.empty((len(points), len(self.names)), order="F")
+        q[:] = self.held
+        q[:, self.columns] = points
+        return q
+
+    def block(self, start: int, stop: int) -> np.ndarray:
+        """q of some points in their order, (stop - start, m)."""
+        places = np.unravel_index(np.arange(start, stop), self.shape)
+        along = [axis.values[i] for axis, i in zip(self.axes, places, strict=True)]
+        return self.states(np.column_stack(along))
+
+
+def grid_of(mechanism: Mechanism, over: Over, hold: Values = "") -> Grid:
+    """The grid that was asked for.
+
+    Args:   over: texts such as "X=-5:5:200 mm", or {"X": (low, high, count)} in SI.
+            hold: text such as "Y=0 mm,alpha=0 deg", or {"Y": value} in SI; 0 for the others.
+    Raises: InputError: for what is no independent coordinate, range, count or unit.
+    """
+    if isinstance(over, str):
+        over = [over]
+    if isinstance(over, Mapping):
+        axes = [_axis(name, *_triple(name, of)) for name, of in over.items()]
+    else:
+        axes = [axis_of(text) for text in over]
+    names = independent_coordinates(mechanism)
+    if not 1 <= len(axes) <= MOST_AXES:
+        raise InputError(
+            f"a map goes over one to three coordinates; got {len(axes)}. Give --over for each, of "
+            f"{', '.join(names)}"
+        )
+    held = values_of(hold, COORDINATES)
+    moved = [axis.name for axis in axes]
+    for name in (*moved, *held):
+        require_independent(mechanism, name)
+    for name in moved:
+        if moved.count(name) > 1:
+            raise InputError(f"{name}: the map goes over it twice; give each coordinate once")
+        if name in held:
+            raise InputError(f"{name}: the map goes over it, so it cannot be held; leave one out")
+    grid = Grid(names, tuple(axes), tuple(held.get(name, 0.0) for name in names))
+    if grid.size > MOST_POINTS:
+        raise InputError(f"the map has {grid.size:.3g} points; at most {MOST_POINTS:.0e} are taken")
+    return grid
+
+
+def require_independent(mechanism: Mechanism, name: str) -> None:
+    """Raises InputError for a coordinate that cannot be given."""
+    names = independent_coordinates(mechanism)
+    if name in names:
+        return
+    if name in dependent_coordinates(mechanism):
+        raise InputError(
+            f'{name} is determined by the contacts of "{mechanism.name}"; its independent '
+            f"coordinates are {', '.join(names)}"
+        )
+    raise InputError(f'"{name}" is not a coordinate.{did_you_mean(name, names)}')
+
+
+def axis_of(text: str) -> Axis:
+    """`X=-5:5:200 mm` as an axis in SI."""
+    found = _OVER.fullmatch(text)
+    if found is None:
+        raise InputError(f'"{text}": expected name=low:high:count unit, as in "X=-5:5:200 mm"')
+    name, low, high, count, unit = found.groups()
+    scale = _scale(name, unit, text)
+    return _axis(name, number(low, text) * scale, number(high, text) * scale, count)
+
+
+def values_of(given: Values, known: Sequence[str]) -> dict[str, float]:
+    """`Y=0 mm,alpha=0 deg` by name, in SI.
+
+    Raises: InputError: for a name that is not known, one that stands twice, or no number.
+    """
+    if isinstance(given, Mapping):
+        pairs = [(name, number(value, f"{name}={value}")) for name, value in given.items()]
+    else:
+        pairs = []
+        for part in given.split(",") if given.strip() else []:
+            if (found := _VALUE.fullmatch(part)) is None:
+                raise InputError(f'"{part.strip()}": expected name=value unit, as in "Y=1 mm"')
+            name, value, unit = found.groups()
+            pairs.append((name, number(value, part) * _scale(name, unit, part)))
+    for name in (names := [name for name, _ in pairs]):
+        if name not in known:
+            raise InputError(f'"{name}" is not one of those.{did_you_mean(name, known)}')
+        if names.count(name) > 1:
+            raise InputError(f"{name}: stands twice; give it once")
+    return dict(pairs)
+
+
+def number(given: object, where: str) -> float:
+    """A finite number."""
+    try:
+        value = float(given)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise InputError(f'"{where.strip()}": "{given}" is not a number') from None
+    if not math.isfinite(value):
+        raise InputError(f'"{where.strip()}": expected a finite number, got {given}')
+    return value
+
+
+def _scale(name: str, unit: str, text: str) -> float:
+    kind = dimension(name)
+    if not unit or kind is None:  # an unknown name is told of later, with what there is
+        return 1.0
+    try:
+        return unit_factor(unit, kind)
+    except InputError as error:
+        raise InputError(f'"{text.strip()}": {error}') from None
+
+
+def _triple(name: str, given: object) -> tuple[object, object, object]:
+    if not isinstance(given, Sequence) or isinstance(given, str) or len(given) != 3:
+        raise InputError(f"{name}: expected (low, high, count), got {given!r:.60}")
+    return given[0], given[1], given[2]
+
+
+def _axis(name: str, low: object, high: object, count: object) -> Axis:
+    ends = [number(value, f"{name}={value}") for value in (low, high)]
+    whole = number(count, f"{name}: count {count}")
+    if whole != int(whole) or whole < 2:
+        raise InputError(f"{name}: the count is {count}; expected a whole number of at least 2")
+    if not ends[0] < ends[1]:
+        raise InputError(
+            f"{name}: the range goes from {ends[0]:g} to {ends[1]:g}; give the lesser first"
+        )
+    return Axis(name, ends[0], ends[1], int(whole))

@@ -1,0 +1,110 @@
+"""What is asked of a map, and one block of its poses, evaluated as far as it is wanted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from ...kinematics.singularity import SINGULAR
+from ...model.data import Efforts
+from ...model.evaluator import Evaluator
+from ...model.survey import Survey
+from ...results.contacts import bound_margins
+from ...status import Status
+from .ability import Ability
+from .reach import Reach
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What does not change from pose to pose.
+
+    load:      force and moment in {S}, and the point they act at in {M}, (9,) [N, N m, m].
+    direction: of the further load whose largest size is looked for, a unit vector in {S}, (3,).
+    stiffness: of the actuators, (n,) [N m/rad or N/m]; None if it was not given.
+    """
+
+    model: Evaluator
+    reach: Reach
+    load: np.ndarray
+    direction: np.ndarray | None = None
+    stiffness: np.ndarray | None = None
+
+    @cached_property
+    def ability(self) -> Ability:
+        return Ability.of(self.model)
+
+
+@dataclass
+class Block:
+    """N poses; everything is computed once, when it is first wanted.
+
+    wanted: of the survey, by all quantities.
+    """
+
+    asked: Asked
+    q: np.ndarray
+    wanted: frozenset[str] = field(default_factory=frozenset)
+
+    @cached_property
+    def _surveyed(self) -> tuple[Survey, np.ndarray]:
+        return self.asked.reach.survey(self.q, self.wanted)
+
+    @property
+    def survey(self) -> Survey:
+        return self._surveyed[0]
+
+    @property
+    def margin(self) -> np.ndarray:
+        """Of each chain's reach, (n, N)."""
+        return self._surveyed[1]
+
+    def value(self, name: str) -> np.ndarray:
+        """Of the survey, samples last."""
+        return self.survey.values[name]
+
+    @cached_property
+    def held(self) -> Efforts:
+        """What holds the platform at rest under the load; where it cannot be reached, nothing."""
+        still, good = np.zeros_like(self.q), self.survey.reached
+        q = np.where(good[:, None], self.q, 0.0)
+        load = np.broadcast_to(self.asked.load, (len(q), 9))
+        found = self.asked.model.torques(
+            q, still, still, load, ("contact",), self.asked.reach.threads
+        )
+        status = np.where(good, found.status, Status.unreachable)
+        bad = status != Status.ok
+        force = found["contact_force"]
+        found.effort[bad], force[bad] = np.nan, np.nan
+        return Efforts(found.effort, {"contact_force": force}, status)
+
+    @cached_property
+    def bounds(self) -> np.ndarray:
+        """How far each contact point is within its bounds, (N, k) [m]; infinite without bounds."""
+        return bound_margins(self.asked.model.mechanism, np.moveaxis(self.value("points"), -1, 0))
+
+    @property
+    def pose(self) -> np.ndarray:
+        """(N, 6)."""
+        return self.value("pose").T
+
+    @property
+    def cause(self) -> np.ndarray:
+        """Index into `owners` of what forbids each pose, (N,) int16; 0 where nothing does."""
+        n = len(self.margin)
+        status, survey = self.survey.status, self.survey
+        found = np.zeros(len(status), dtype=np.int16)
+        short = ~(self.margin >= 0)
+        chain = 1 + short.argmax(axis=0)
+        unreachable = status == Status.unreachable
+        found[unreachable] = np.where(survey.met, chain, 1 + n)[unreachable]
+        singular = status == Status.singular
+        if singular.any():
+            found[singular] = 2 + n
+            if "transmission" in survey.values:
+                locked = singular & (survey.inverse_ratio < SINGULAR)
+                weakest = np.abs(self.value("transmission")[:, locked]).argmin(axis=0)
+                found[locked] = 1 + weakest
+        return found

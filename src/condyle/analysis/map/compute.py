@@ -1,0 +1,241 @@
+"""A map as a labelled dataset: in memory, or streamed to a folder where it would not fit."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ... import __version__
+from ...atomic import replacing_folder
+from ...errors import InputError, did_you_mean
+from ...extras import require
+from ...mechanism import dumps
+from ...mechanism.mechanism import COORDINATES, Mechanism
+from ...model.evaluator import Evaluator
+from ...motion.units import FORCE, MOMENT
+from ...progress import step
+from .axes import Grid, Over, Values, grid_of, number, values_of
+from .block import Asked, Block
+from .quantities import Mapped, Quantity, chosen, variables
+from .reach import Reach, Strokes
+from .store import MARK, Kept, Memory, Sink, Zarr
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+BLOCK = 1 << 16  # poses at a time
+
+
+def workspace_map(
+    model: Evaluator,
+    over: Over,
+    quantity: str | Sequence[str] = "ratio",
+    hold: Values = "",
+    load: Values = "",
+    load_point: str | None = None,
+    direction: str | Sequence[float] | None = None,
+    stiffness: float | Mapping[str, float] | None = None,
+    strokes: Strokes = (),
+    store: str | os.PathLike[str] | None = None,
+    threads: int | None = None,
+) -> xr.Dataset:
+    """Quantities at rest over one, two or three of the independent coordinates.
+
+        condyle.workspace_map(model, ["X=-5:5:200 mm", "beta=-5:20:200 deg"], "ratio")
+
+    Args:   model: of `condyle.derive`; its distribution chooses the efforts.
+            over: such texts, or {"X": (low, high, count)} [m, rad].
+            quantity: one or more of `condyle.analysis.map.QUANTITIES`.
+            hold: the other coordinates, "Y=1 mm,alpha=2 deg" or {"Y": 1e-3}; by default 0.
+            load: on the platform, "Fz=-50 N" or {"Fz": -50.0} [N, N m], in {S}.
+            load_point: where it acts; by default as for `solve`.
+            direction: of the further load that quantity `load_limit` looks for, in {S}: "0,0,-1".
+            stiffness: of every actuator, or by chain [N m/rad or N/m].
+            strokes: "leg_*=-200:300 mm": ranges of joint coordinates that count as reach.
+            store: a folder (.zarr) to stream to, for more than memory holds; it appears whole or
+            not at all.  threads: at most so many.
+    Returns: a dataset with a dimension for each axis; `status` and `cause` always.
+    Raises: InputError: for anything that cannot be used as given, before any work.
+    """
+    grid = grid_of(model.mechanism, over, hold)
+    asked = asked_of(model, load, load_point, direction, stiffness, strokes, threads)
+    quantities = chosen((quantity,) if isinstance(quantity, str) else tuple(quantity), asked)
+    return mapped(asked, grid, quantities, store)
+
+
+def asked_of(
+    model: Evaluator,
+    load: Values = "",
+    load_point: str | None = None,
+    direction: str | Sequence[float] | None = None,
+    stiffness: float | Mapping[str, float] | None = None,
+    strokes: Strokes = (),
+    threads: int | None = None,
+) -> Asked:
+    """What does not change from pose to pose, checked; arguments as of `workspace_map`."""
+    wrench = values_of(load, (*FORCE, *MOMENT))
+    point = np.zeros(3)
+    if wrench or direction is not None or load_point is not None:
+        point = _point(model, load_point)
+    force = [wrench.get(name, 0.0) for name in (*FORCE, *MOMENT)]
+    reach = Reach.of(model, strokes, threads)
+    return Asked(
+        model,
+        reach,
+        np.array([*force, *point]),
+        _direction(direction),
+        _per_chain(model.mechanism, stiffness),
+    )
+
+
+def mapped(
+    asked: Asked,
+    grid: Grid,
+    quantities: tuple[Quantity, ...],
+    store: str | os.PathLike[str] | None = None,
+) -> xr.Dataset:
+    """The map itself."""
+    import xarray as xr
+
+    mechanism = asked.model.mechanism
+    found = list(variables(quantities))
+    coordinates = {axis.name: (axis.values, _unit(axis.name)) for axis in grid.axes}
+    coordinates |= {
+        dim: (np.array(entries), {})
+        for dim, entries in _entries(asked).items()
+        if any(dim in v.dims for v in found)
+    }
+    kept = {
+        v.name: Kept(
+            (*(axis.name for axis in grid.axes), *v.dims),
+            (*grid.shape, *(len(_entries(asked)[dim]) for dim in v.dims)),
+            v.dtype,
+            v.attributes(mechanism),
+        )
+        for v in found
+    }
+    attributes = _attributes(asked, grid)
+    if store is None:
+        memory = Memory(kept, grid.shape)
+        fill(asked, grid, quantities, memory, BLOCK)
+        arrays = memory.arrays()
+        return xr.Dataset(
+            {name: (k.dims, arrays[name], dict(k.attributes)) for name, k in kept.items()},
+            {name: (name, values, about) for name, (values, about) in coordinates.items()},
+            attributes,
+        )
+    require("zarr", "maps")
+    row = grid.size // grid.shape[0]
+    rows = max(BLOCK // row, 1)
+    with replacing_folder(store, MARK) as folder:
+        sink = Zarr(folder, kept, grid.shape, rows, coordinates, attributes)
+        fill(asked, grid, quantities, sink, rows * row)
+    return xr.open_zarr(Path(store), chunks=None, consolidated=False)
+
+
+def size_of(asked: Asked, grid: Grid, quantities: tuple[Quantity, ...]) -> int:
+    """Bytes that a map takes."""
+    entries = {dim: len(names) for dim, names in _entries(asked).items()}
+    each = [
+        np.dtype(v.dtype).itemsize * int(np.prod([entries[dim] for dim in v.dims]))
+        for v in variables(quantities)
+    ]
+    return grid.size * sum(each)
+
+
+def fill(
+    asked: Asked, grid: Grid, quantities: tuple[Quantity, ...], sink: Sink, block: int
+) -> None:
+    """Evaluate all poses, block by block."""
+    wanted = frozenset(name for quantity in quantities for name in quantity.needs)
+    found = list(variables(quantities))
+    with step("mapping", grid.size) as advance:
+        for start in range(0, grid.size, block):
+            stop = min(start + block, grid.size)
+            here = Block(asked, grid.block(start, stop), wanted)
+            sink.write(start, stop, {v.name: _values(v, here) for v in found})
+            advance(stop - start)
+
+
+def _values(variable: Mapped, block: Block) -> np.ndarray:
+    with np.errstate(invalid="ignore"):
+        return variable.values(block)
+
+
+def _entries(asked: Asked) -> dict[str, list[Any]]:
+    """What stands along each dimension but the axes."""
+    mechanism, names = asked.model.mechanism, list(asked.model.independent)
+    return {
+        "chain": list(mechanism.chain_names),
+        "contact": list(mechanism.contact_names),
+        "coordinate": list(COORDINATES),
+        "mode": list(range(1, len(names) + 1)),
+        "row": names,
+        "column": names,
+    }
+
+
+def _unit(name: str) -> dict[str, str]:
+    return {"units": "m" if name in COORDINATES[:3] else "rad"}
+
+
+def _attributes(asked: Asked, grid: Grid) -> dict[str, Any]:
+    model = asked.model
+    held = {
+        name: value
+        for name, value in zip(grid.names, grid.held, strict=True)
+        if name not in [axis.name for axis in grid.axes]
+    }
+    return {
+        "title": "map of a mechanism at rest",
+        "mechanism": dumps(model.mechanism),
+        "mechanism_name": model.mechanism.name,
+        "held": json.dumps(held),
+        "load": asked.load.tolist(),
+        "stroke_low": asked.reach.low.tolist(),
+        "stroke_high": asked.reach.high.tolist(),
+        "distribution": model.policy.objective,
+        "condyle": __version__,
+    }
+
+
+def _point(model: Evaluator, name: str | None) -> np.ndarray:
+    """Where a load acts; O_M in a mechanism without points."""
+    if name is None and not model.mechanism.platform.points:
+        return np.zeros(3)
+    return model.load_point(name)
+
+
+def _direction(given: str | Sequence[float] | None) -> np.ndarray | None:
+    if given is None:
+        return None
+    parts = given.split(",") if isinstance(given, str) else list(given)
+    if len(parts) != 3:
+        raise InputError(f'direction "{given}": expected three numbers, as in "0,0,-1"')
+    vector = np.array([number(part, f"direction {given}") for part in parts])
+    if not (size := np.linalg.norm(vector)):
+        raise InputError(f'direction "{given}": has no length; expected such as "0,0,-1"')
+    return vector / size
+
+
+def _per_chain(
+    mechanism: Mechanism, given: float | Mapping[str, float] | None
+) -> np.ndarray | None:
+    if given is None:
+        return None
+    names = mechanism.chain_names
+    table = given if isinstance(given, Mapping) else dict.fromkeys(names, given)
+    for name in table:
+        if name not in names:
+            raise InputError(f'stiffness: no chain "{name}".{did_you_mean(name, names)}')
+    if missing := [name for name in names if name not in table]:
+        raise InputError(f"stiffness: {', '.join(missing)} have none; give one for every chain")
+    values = np.array([number(table[name], f"stiffness {table[name]}") for name in names])
+    if not (values > 0).all():
+        raise InputError(f"stiffness: expected numbers above 0, got {values.min():g}")
+    return values

@@ -1,0 +1,66 @@
+"""Maps in files: whole or not at all, and read again."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...atomic import replacing
+from ...errors import InputError, no_such_file
+from ...mechanism import Mechanism, parse
+from ...model.evaluator import Evaluator
+from ...results.netcdf import write_netcdf
+from .axes import Axis, Grid
+from .reach import Reach
+from .store import MARK
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def save_map(dataset: xr.Dataset, file: Path) -> None:
+    """As NetCDF. Raises: InputError: if it cannot be written."""
+    with replacing(file) as temporary:
+        write_netcdf(dataset, temporary)
+
+
+def open_map(path: str | Path) -> xr.Dataset:
+    """A map that was written as NetCDF or as Zarr.
+
+    Raises: InputError: if the file is missing or is no map.
+    """
+    import xarray as xr
+
+    try:
+        if (Path(path) / MARK).is_file():
+            dataset = xr.open_zarr(Path(path), chunks=None, consolidated=False)
+        else:
+            dataset = xr.load_dataset(path, engine="h5netcdf")
+    except FileNotFoundError:
+        raise no_such_file(path) from None
+    except Exception as error:
+        raise InputError(f"{path} is not a map: {error}") from None
+    if "held" not in dataset.attrs or "cause" not in dataset:
+        raise InputError(f"{path} is not a map; `condyle map` writes them")
+    return dataset
+
+
+def mechanism_of(dataset: xr.Dataset) -> Mechanism:
+    """The mechanism that was mapped."""
+    return parse(dataset.attrs["mechanism"], "the mechanism of the map")
+
+
+def grid_and_reach(dataset: xr.Dataset, model: Evaluator) -> tuple[Grid, Reach]:
+    """What it goes over, and what it took for reach."""
+    names = model.independent
+    axes = []
+    for name in map(str, dataset["status"].dims):
+        values = dataset[name].values
+        axes.append(Axis(name, float(values[0]), float(values[-1]), len(values)))
+    held = json.loads(dataset.attrs["held"])
+    grid = Grid(names, tuple(axes), tuple(held.get(name, 0.0) for name in names))
+    low, high = (np.array(dataset.attrs[f"stroke_{end}"], dtype=float) for end in ("low", "high"))
+    return grid, Reach(model, low, high)

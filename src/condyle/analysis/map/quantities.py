@@ -1,0 +1,242 @@
+"""What can be mapped: each quantity by name, with its variables.
+
+A quantity of your own is an entry in `QUANTITIES`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...errors import InputError, did_you_mean
+from ...kinematics.singularity import KINDS, NEAR_SINGULAR
+from ...mechanism.chain import limits
+from ...mechanism.mechanism import COORDINATES, Mechanism
+from ...results.variables import cause_flags, of_effort, of_joint, of_pose
+from ...status import STATUS_NAMES
+from .ability import limited
+from .block import Asked, Block
+
+Units = str | Callable[[Mechanism], str]
+POSE_UNITS = of_pose("{}")
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """A variable of a map.
+
+    dims:   besides the axes: chain, contact, coordinate, mode, row, column.
+    values: of a block, (N, *dims).
+    """
+
+    name: str
+    dims: tuple[str, ...]
+    units: Units
+    meaning: str
+    values: Callable[[Block], np.ndarray]
+    dtype: str = "f8"
+    flags: str | Callable[[Mechanism], str] = ""
+
+    def attributes(self, mechanism: Mechanism) -> dict[str, str]:
+        units = self.units if isinstance(self.units, str) else self.units(mechanism)
+        flags = self.flags if isinstance(self.flags, str) else self.flags(mechanism)
+        return {"units": units, "long_name": self.meaning} | (
+            {"flag_meanings": flags} if flags else {}
+        )
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What one word asks for.
+
+    needs: of the survey.  lacks: what keeps a map from having it, or nothing.
+    """
+
+    meaning: str
+    needs: tuple[str, ...]
+    variables: tuple[Mapped, ...]
+    lacks: Callable[[Asked], str] = lambda asked: ""
+
+
+def _ratio(b: Block) -> np.ndarray:
+    return np.fmin(b.survey.inverse_ratio, b.survey.direct_ratio)
+
+
+def _kind(b: Block) -> np.ndarray:
+    s = b.survey
+    return (s.inverse_ratio < NEAR_SINGULAR) + 2 * (s.direct_ratio < NEAR_SINGULAR)
+
+
+def _condition(b: Block) -> np.ndarray:
+    with np.errstate(divide="ignore"):
+        return 1.0 / b.survey.direct_ratio
+
+
+def _load(b: Block) -> np.ndarray:
+    assert b.asked.direction is not None
+    return b.asked.ability.largest(b.pose, b.asked.load, b.asked.direction)
+
+
+def scaled_rates(b: Block) -> np.ndarray:
+    """Rates of the joints, (N, n, m), by those of q, angles multiplied by the length."""
+    model = b.asked.model
+    angles = [name not in COORDINATES[:3] for name in model.independent]
+    scale = np.where(angles, 1.0 / model.characteristic_length, 1.0)
+    return b.value("rates").transpose(2, 1, 0) * scale
+
+
+def _speed(b: Block) -> np.ndarray:
+    """A rate of size v makes joint i turn at |row_i| v in its worst direction."""
+    speeds = [limits(chain).speed for chain in b.asked.model.mechanism.chains]
+    with np.errstate(divide="ignore"):
+        return (np.array(speeds) / np.linalg.norm(scaled_rates(b), axis=2)).min(axis=1)
+
+
+def _stiffness(b: Block, rates: np.ndarray) -> np.ndarray:
+    """J^T k J, (N, m, m)."""
+    assert b.asked.stiffness is not None
+    return rates.transpose(0, 2, 1) @ (b.asked.stiffness[:, None] * rates)
+
+
+def _stiffness_matrix(b: Block) -> np.ndarray:
+    return _stiffness(b, b.value("rates").transpose(2, 1, 0))
+
+
+def _stiffness_values(b: Block) -> np.ndarray:
+    K = _stiffness(b, scaled_rates(b))
+    found = np.full(K.shape[:2], np.nan)
+    good = np.isfinite(K).all(axis=(1, 2))
+    found[good] = np.linalg.eigvalsh(K[good])
+    return found
+
+
+def _no_limits(asked: Asked) -> str:
+    if asked.direction is None:
+        return "which way the load acts: --direction 0,0,-1"
+    if not limited(asked.model.mechanism):
+        return "efforts with limits: torque_limit or force_limit in the mechanism file"
+    return ""
+
+
+def _no_speeds(asked: Asked) -> str:
+    if all(np.isinf(limits(chain).speed) for chain in asked.model.mechanism.chains):
+        return "actuators with a speed_limit in the mechanism file"
+    return ""
+
+
+def _no_bounds(asked: Asked) -> str:
+    found = [c.bounds.x or c.bounds.y or c.bounds.z for c in asked.model.mechanism.contacts]
+    return "" if any(found) else "contacts with bounds in the mechanism file"
+
+
+def _no_contacts(asked: Asked) -> str:
+    return "" if asked.model.mechanism.contacts else "contacts"
+
+
+def _no_stiffness(asked: Asked) -> str:
+    return "" if asked.stiffness is not None else "how stiff actuators are: --stiffness 1000"
+
+
+# Which variables every map has.
+ALWAYS = (
+    Mapped(
+        "status", (), "1", "what became of the pose",
+        lambda b: b.survey.status, "u1", " ".join(STATUS_NAMES),
+    ),
+    Mapped(
+        "cause", (), "1", "chain, contact or platform that forbids the pose",
+        lambda b: b.cause, "i2", cause_flags,
+    ),
+)  # fmt: skip
+
+QUANTITIES: dict[str, Quantity] = {
+    "reachable": Quantity("whether a pose can be reached, and what forbids it", (), ()),
+    "pose": Quantity(
+        "the whole pose", ("pose",),
+        (Mapped("pose", ("coordinate",), POSE_UNITS, "pose of the platform X_EE",
+                lambda b: b.pose),),
+    ),
+    "bounds": Quantity(
+        "how far contacts are within their bounds", ("points",),
+        (Mapped("bounds", ("contact",), "m", "distance of the contact point to its bounds, inside",
+                lambda b: b.bounds),),
+        _no_bounds,
+    ),
+    "joint": Quantity(
+        "joint coordinates", ("joint",),
+        (Mapped("joint", ("chain",), of_joint(), "joint coordinate, zero at home",
+                lambda b: b.value("joint").T),),
+    ),
+    "ratio": Quantity(
+        "how near to a singularity, and of which kind", ("ratio", "transmission"),
+        (
+            Mapped("ratio", (), "1", "smaller of both singularity ratios: 0 is singular", _ratio),
+            Mapped("kind", (), "1", f"kind of a singularity whose ratio is below {NEAR_SINGULAR:g}",
+                   _kind, "u1", " ".join(KINDS)),
+        ),
+    ),
+    "condition": Quantity(
+        "condition number of the dimensionless J_W", ("ratio",),
+        (Mapped("condition", (), "1", "condition number of the dimensionless J_W", _condition),),
+    ),
+    "transmission": Quantity(
+        "transmission of each chain", ("transmission",),
+        (Mapped("transmission", ("chain",), "1", "transmission of the chain: 1 is best, 0 none",
+                lambda b: b.value("transmission").T),),
+    ),
+    "effort": Quantity(
+        "efforts that hold the platform under gravity and the load", (),
+        (Mapped("effort", ("chain",), of_effort(), "effort that holds the platform at rest",
+                lambda b: b.held.effort),),
+    ),
+    "contact_force": Quantity(
+        "contact forces under gravity and the load", (),
+        (Mapped("contact_force", ("contact",), "N", "contact force at rest, along the unit normal",
+                lambda b: b.held["contact_force"]),),
+        _no_contacts,
+    ),
+    "load_limit": Quantity(
+        "largest further load in a direction that limits allow", ("pose",),
+        (Mapped("load_limit", (), "N", "largest further load in the direction; -inf: none is held",
+                _load),),
+        _no_limits,
+    ),
+    "speed": Quantity(
+        "speed that speed limits allow in the worst direction", ("rates",),
+        (Mapped("speed", (), "m/s", "speed that limits allow in every direction, of q' with angles "
+                "times the characteristic length", _speed),),
+        _no_speeds,
+    ),
+    "stiffness": Quantity(
+        "stiffness that given stiffnesses of the actuators make", ("rates",),
+        (
+            Mapped("stiffness", ("mode",), "N/m", "principal stiffnesses, rising; angles times the "
+                   "characteristic length", _stiffness_values),
+            Mapped("stiffness_matrix", ("row", "column"), "N/m, N/rad, N m/rad",
+                   "stiffness in q_EE", _stiffness_matrix),
+        ),
+        _no_stiffness,
+    ),
+}  # fmt: skip
+
+
+def chosen(names: tuple[str, ...], asked: Asked) -> tuple[Quantity, ...]:
+    """The quantities by name.
+
+    Raises: InputError: for one there is not, or one that the mechanism has not.
+    """
+    for name in names:
+        if name not in QUANTITIES:
+            raise InputError(f'no quantity "{name}".{did_you_mean(name, QUANTITIES)}')
+        if lack := QUANTITIES[name].lacks(asked):
+            raise InputError(f"quantity {name} needs {lack}")
+    return tuple(QUANTITIES[name] for name in dict.fromkeys(names))
+
+
+def variables(quantities: tuple[Quantity, ...]) -> Iterator[Mapped]:
+    """Of a map of these."""
+    yield from ALWAYS
+    for quantity in quantities:
+        yield from quantity.variables

@@ -1,0 +1,105 @@
+"""Which poses can be reached: by contacts, by chains, and within the strokes of the joints.
+
+Strokes are given with the map, since a mechanism file has none: ranges of joint coordinates from
+home, by the chains' names, `leg_*=-200:300 mm`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from functools import cached_property
+
+import numpy as np
+
+from ...errors import InputError, did_you_mean
+from ...kinematics.chain import FAMILIES
+from ...mechanism.mechanism import Mechanism
+from ...model.evaluator import Evaluator
+from ...model.survey import Survey
+from ...motion.units import unit_factor
+from ...status import Status
+from .axes import number
+
+_STROKE = re.compile(r"\s*(\S+?)\s*=\s*([^:\s]+)\s*:\s*([^:\s]+)\s*(.*?)\s*")
+
+Strokes = Collection[str] | Mapping[str, tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Reach:
+    """What a mechanism can reach; low, high: of the joint coordinates, (n,) [rad or m]."""
+
+    model: Evaluator
+    low: np.ndarray
+    high: np.ndarray
+    threads: int | None = None
+
+    @staticmethod
+    def of(model: Evaluator, strokes: Strokes = (), threads: int | None = None) -> Reach:
+        """Raises InputError for chains that there are not, or ranges that are none."""
+        return Reach(model, *strokes_of(model.mechanism, strokes), threads)
+
+    @cached_property
+    def needs(self) -> tuple[str, ...]:
+        """Of a survey, to judge by."""
+        limited = np.isfinite(self.low).any() or np.isfinite(self.high).any()
+        return ("joint",) if limited else ()
+
+    def survey(self, q: np.ndarray, wanted: Collection[str] = ()) -> tuple[Survey, np.ndarray]:
+        """A survey, and each chain's margin (n, N): negative where it forbids the pose.
+
+        Poses beyond a stroke count as unreachable. Margins are dimensionless and continuous,
+        no number where the contacts are not met.
+        """
+        found = self.model.survey(q, {*wanted, *self.needs}, self.threads)
+        margin = found.discriminant
+        if self.needs:
+            joint = found.values["joint"]
+            spans = np.where(np.isfinite(self.high - self.low), self.high - self.low, 1.0)
+            inside = np.minimum(joint - self.low[:, None], self.high[:, None] - joint)
+            margin = np.fmin(margin, inside / spans[:, None])
+            beyond = found.reached & (margin < 0).any(axis=0)
+            found.status[beyond] = Status.unreachable
+            for value in found.values.values():
+                value[..., beyond] = np.nan
+        return found, margin
+
+    def margin(self, q: np.ndarray) -> np.ndarray:
+        """The least margin of all chains, (N,): negative, or no number, out of reach."""
+        return self.survey(q)[1].min(axis=0)
+
+
+def strokes_of(mechanism: Mechanism, given: Strokes) -> tuple[np.ndarray, np.ndarray]:
+    """Least and greatest joint coordinates, (n,) each; infinite where nothing is said."""
+    low = np.full(len(mechanism.chains), -np.inf)
+    high = -low
+    for pattern, ends, unit in _pairs(given):
+        text = f"{pattern}={ends[0]}:{ends[1]}"
+        mine = [i for i, name in enumerate(mechanism.chain_names) if fnmatchcase(name, pattern)]
+        if not mine:
+            known = did_you_mean(pattern, mechanism.chain_names)
+            raise InputError(f'stroke "{text}": no chain is called "{pattern}".{known}')
+        for i in mine:
+            kind = "angle" if FAMILIES[mechanism.chains[i].kind].joint_unit == "rad" else "length"
+            scale = unit_factor(unit, (kind, 0)) if unit else 1.0
+            low[i], high[i] = (number(end, text) * scale for end in ends)
+            if not low[i] < 0 < high[i]:
+                raise InputError(
+                    f'stroke "{text}": expected a range about home, such as "{pattern}=-0.1:0.2"'
+                )
+    return low, high
+
+
+def _pairs(given: Strokes) -> list[tuple[str, tuple[object, object], str]]:
+    if isinstance(given, Mapping):
+        return [(name, (low, high), "") for name, (low, high) in given.items()]
+    found = []
+    for text in [given] if isinstance(given, str) else given:
+        if (match := _STROKE.fullmatch(text)) is None:
+            raise InputError(f'"{text}": expected chain=low:high unit, as in "leg_*=-200:300 mm"')
+        name, low, high, unit = match.groups()
+        found.append((name, (low, high), unit))
+    return found

@@ -1,0 +1,291 @@
+"""The greatest ball and the greatest box around home that are free: reachable, and more.
+
+Free poses are reachable, within the contacts' bounds, off singularities by a margin, and, where
+actuators have limits, such that efforts within them hold the load. What is found is certified as
+far as it was looked at: at so many points, so far apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import gamma, pi
+
+import numpy as np
+
+from ...errors import InputError
+from ...kinematics.singularity import NEAR_SINGULAR
+from ...mechanism.mechanism import COORDINATES
+from ...model.evaluator import Evaluator
+from .ability import limited
+from .axes import Axis, Grid
+from .block import Asked, Block
+from .reach import Reach
+
+POINTS, FEW = 20_000, 500  # in the ball; where it has to be quick
+CONES = (0.5, 0.15, 0.05)  # half widths around the nearest pose that is not free
+RAYS, HALVINGS = 60, 24
+GROWTH = 2.0  # of the ball until it meets something
+STEPS, NUDGE = 12, 1e-6  # along the border
+ROUNDING = 1e-9  # of the radius, by which rays go further
+BOX = {1: 2001, 2: 201, 3: 41}  # points along each axis
+RANGE = "the range"
+
+Margins = Callable[[np.ndarray], np.ndarray]  # of points (N, d) -> (reasons, N)
+
+
+@dataclass(frozen=True)
+class Ball:
+    """radius: [m], angles multiplied by the characteristic length;  stops: what ends it.
+
+    points: at which all is well inside;  spacing: their mean distance [m].
+    """
+
+    radius: float
+    stops: str
+    points: int
+    spacing: float
+
+
+@dataclass(frozen=True)
+class Box:
+    """low, high: of each axis, SI;  spacing: of the points at which all is well, SI."""
+
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+    spacing: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Free:
+    """Which poses are free.
+
+    margin: least singularity ratio;  limits: whether efforts within limits must hold the load.
+    """
+
+    asked: Asked
+    margin: float = NEAR_SINGULAR
+    limits: bool = True
+
+    def margins(self, q: np.ndarray) -> np.ndarray:
+        """(reasons, N): negative, or no number, where not free; all but the last continuous."""
+        model = self.asked.model
+        block = Block(self.asked, q, frozenset({"ratio", "transmission", "points", "pose"}))
+        survey = block.survey
+        ratio = np.fmin(survey.inverse_ratio, survey.direct_ratio)
+        rows = [survey.closing, *block.margin, ratio - self.margin, *block.bounds.T]
+        found = np.vstack([*rows, np.ones(len(q))])
+        if self.limits and limited(model.mechanism):
+            some = np.flatnonzero((found >= 0).all(axis=0))
+            held = self.asked.ability.holds(block.pose[some], self.asked.load)
+            found[-1, some[~held]] = -1.0
+        return found
+
+    @cached_property
+    def reasons(self) -> list[str]:
+        """What a negative margin is the end of."""
+        mechanism = self.asked.model.mechanism
+        contacts = mechanism.contact_names
+        return [
+            f"the reach of contacts {' & '.join(contacts)}",
+            *(f"the reach of chain {name}" for name in mechanism.chain_names),
+            "a singularity",
+            *(f"the bounds of contact {name}" for name in contacts),
+            "the limits of efforts",
+        ]
+
+
+def scale_of(grid: Grid, length: float) -> np.ndarray:
+    """What turns a radius [m] into each axis' unit, (d,)."""
+    return np.array([1.0 if a.name in COORDINATES[:3] else 1.0 / length for a in grid.axes])
+
+
+def greatest_ball(free: Free, grid: Grid, points: int = POINTS) -> Ball:
+    """Around home, within the range of the axes; the other coordinates are held.
+
+    The nearest pose that is not free is looked for among many, and from there along the border.
+
+    Raises: InputError: if home is outside the range.
+    """
+    scale, d = scale_of(grid, free.asked.model.characteristic_length), len(grid.axes)
+    radius = _room_in_range(grid, scale)
+    rng = np.random.default_rng(0)
+    way = rng.normal(size=(points, d))
+    way *= (rng.random((points, 1)) ** (1 / d)) / np.linalg.norm(way, axis=1, keepdims=True)
+    way[0] = 0.0
+
+    def margins(x: np.ndarray) -> np.ndarray:
+        return free.margins(grid.states(x * scale))
+
+    stops, whole = RANGE, radius
+    radius = whole / GROWTH**6  # far poses cost most
+    few = way[:FEW]
+    while radius < whole and free_of(margins(radius * few)).all():
+        radius = min(GROWTH * radius, whole)
+    for some in (few, way):
+        while (bad := np.flatnonzero(~free_of(found := margins(radius * some)))).size:
+            first = bad[np.argmin(np.linalg.norm(some[bad], axis=1))]
+            row = int(np.argmax(~(found[:, first] >= 0)))
+            nearest, row = _along_rays(margins, radius * some[first], row, rng)
+            nearest = _on_the_border(margins, nearest, row)
+            radius, stops = float(np.linalg.norm(nearest)), free.reasons[row]
+            if radius == 0.0:
+                return Ball(0.0, stops, points, 0.0)
+    return Ball(radius, stops, points, radius * (_ball_volume(d) / points) ** (1 / d))
+
+
+def ball_around_home(model: Evaluator, points: int = FEW) -> Ball:
+    """In all independent coordinates, no further than the characteristic length and a radian.
+
+    Without limits of efforts; quick, for one look at a mechanism.
+    """
+    length = model.characteristic_length
+    ends = [length if name in COORDINATES[:3] else 1.0 for name in model.independent]
+    axes = tuple(Axis(n, -end, end, 2) for n, end in zip(model.independent, ends, strict=True))
+    reach = Reach.of(model)
+    free = Free(Asked(model, reach, np.zeros(9)), limits=False)
+    return greatest_ball(free, Grid(model.independent, axes, (0.0,) * len(axes)), points)
+
+
+def free_of(margins: np.ndarray) -> np.ndarray:
+    """Whether all margins, (reasons, N), are numbers and not negative, (N,)."""
+    return np.asarray((margins >= 0).all(axis=0))
+
+
+def _along_rays(
+    margins: Margins, nearest: np.ndarray, row: int, rng: np.random.Generator
+) -> tuple[np.ndarray, int]:
+    """A pose where the rays near one that is not free end, and what ends the shortest."""
+    for cone in CONES:
+        size = float(np.linalg.norm(nearest))
+        if size == 0.0:
+            break
+        rays = nearest / size + cone * rng.normal(size=(RAYS, len(nearest)))
+        rays = np.vstack([nearest / size, rays / np.linalg.norm(rays, axis=1, keepdims=True)])
+        out = size * (1 + ROUNDING)
+        rays = rays[~free_of(margins(out * rays))]
+        low, high = np.zeros(len(rays)), np.full(len(rays), out)
+        for _ in range(HALVINGS if len(rays) else 0):
+            middle = (low + high) / 2
+            fine = free_of(margins(middle[:, None] * rays))
+            low, high = np.where(fine, middle, low), np.where(fine, high, middle)
+        if len(rays) and low.min() < size:
+            best = int(np.argmin(low))
+            row = int(np.argmax(~(margins(high[best] * rays[best : best + 1])[:, 0] >= 0)))
+            nearest = low[best] * rays[best]
+    return nearest, row
+
+
+def _on_the_border(margins: Margins, nearest: np.ndarray, row: int) -> np.ndarray:
+    """The pose of least size at which a smooth margin vanishes, from one that is near it.
+
+    Each step goes to the foot of the perpendicular on the margin's tangent plane.
+    """
+    d, x = len(nearest), nearest
+    h = NUDGE * float(np.linalg.norm(nearest))
+    around = h * np.vstack([np.zeros(d), np.eye(d), -np.eye(d)])
+    for _ in range(STEPS if h else 0):
+        v = margins(x + around)[row]
+        slope = (v[1 : d + 1] - v[d + 1 :]) / (2 * h)
+        square = float(slope @ slope)
+        if not (np.isfinite(square) and square > 0 and np.isfinite(v[0])):
+            break
+        x = (slope @ x - v[0]) * slope / square
+        size = float(np.linalg.norm(x))
+        out = x * (1 + NUDGE)
+        if size < np.linalg.norm(nearest) and not free_of(margins(out[None]))[0]:
+            nearest = x
+    return nearest
+
+
+def _ball_volume(d: int) -> float:
+    return pi ** (d / 2) / gamma(d / 2 + 1)
+
+
+def _room_in_range(grid: Grid, scale: np.ndarray) -> float:
+    ends = [min(-a.low, a.high) / s for a, s in zip(grid.axes, scale, strict=True)]
+    if min(ends) <= 0:
+        outside = [a.name for a in grid.axes if not a.low < 0 < a.high]
+        raise InputError(f"home, where {outside[0]} is 0, is not inside the range of the map")
+    return float(min(ends))
+
+
+def greatest_box(free: Free, grid: Grid) -> Box | None:
+    """The box of largest volume around home, of one to three axes; None if home is not free.
+
+    Raises: InputError: if home is outside the range.
+    """
+    _room_in_range(grid, np.ones(len(grid.axes)))
+    sides, homes = [], []
+    for axis in grid.axes:
+        n = BOX[len(grid.axes)] - 1
+        below = min(max(round(-axis.low / axis.span * n), 1), n - 1)
+        sides.append(
+            np.r_[
+                np.linspace(axis.low, 0, below + 1)[:-1], np.linspace(0, axis.high, n - below + 1)
+            ]
+        )
+        homes.append(below)
+    points = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1)
+    good = free_of(free.margins(grid.states(points.reshape(-1, len(sides)))))
+    ends = best_box(good.reshape(points.shape[:-1]), homes, sides)
+    if ends is None:
+        return None
+    low = tuple(float(s[a]) for s, (a, _) in zip(sides, ends, strict=True))
+    high = tuple(float(s[b]) for s, (_, b) in zip(sides, ends, strict=True))
+    return Box(low, high, tuple(float(np.diff(s).max()) for s in sides))
+
+
+def best_box(
+    good: np.ndarray, home: Sequence[int], sides: Sequence[np.ndarray]
+) -> list[tuple[int, int]] | None:
+    """First and last index along each axis of the box of good points around home that is largest.
+
+    Exact on the grid: for every range of the axes before the last, the last one's longest run.
+    """
+    if not good[tuple(home)]:
+        return None
+    if good.ndim == 3:
+        best: tuple[float, list[tuple[int, int]]] = (-1.0, [])
+        for low in range(home[0], -1, -1):
+            slab: np.ndarray = np.asarray(good[low : home[0] + 1].all(axis=0))
+            if not slab[tuple(home[1:])]:
+                break
+            for high in range(home[0], len(good)):
+                slab = np.asarray(slab & good[high])
+                if (inner := best_box(slab, home[1:], sides[1:])) is None:
+                    break
+                size = sides[0][high] - sides[0][low]
+                for (a, b), side in zip(inner, sides[1:], strict=True):
+                    size *= side[b] - side[a]
+                if size > best[0]:
+                    best = size, [(low, high), *inner]
+        return best[1]
+    if good.ndim == 1:
+        return [_run(good, home[0])]
+    runs = np.array(
+        [_run(row, home[1]) if row[home[1]] else (home[1] + 1, home[1]) for row in good]
+    )
+    ok = runs[:, 0] <= home[1]
+    up = int(np.argmin(np.append(ok[home[0] :], False)))  # rows onward from home that are good
+    down = int(np.argmin(np.append(ok[home[0] :: -1], False)))
+    above, below = runs[home[0] : home[0] + up], runs[home[0] - down + 1 : home[0] + 1][::-1]
+    first = np.maximum.outer(np.maximum.accumulate(below[:, 0]), np.maximum.accumulate(above[:, 0]))
+    last = np.minimum.outer(np.minimum.accumulate(below[:, 1]), np.minimum.accumulate(above[:, 1]))
+    height = np.subtract.outer(
+        -sides[0][home[0] - np.arange(down)], -sides[0][home[0] + np.arange(up)]
+    )
+    area = height * (sides[1][last] - sides[1][first])
+    i, j = np.unravel_index(int(np.argmax(area)), area.shape)
+    return [(home[0] - int(i), home[0] + int(j)), (int(first[i, j]), int(last[i, j]))]
+
+
+def _run(good: np.ndarray, at: int) -> tuple[int, int]:
+    """First and last index of the good values around one."""
+    after = np.flatnonzero(~good[at:])
+    before = np.flatnonzero(~good[at::-1])
+    return (
+        at - (int(before[0]) - 1 if before.size else at),
+        at + (int(after[0]) - 1 if after.size else len(good) - 1 - at),
+    )

@@ -1,0 +1,110 @@
+"""condyle export: a mechanism as something else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from . import completion, options
+from .answer import Answer
+from .command import COMPUTE, command, group
+from .inputs import output_folder, warn
+
+export = group("export", COMPUTE, "A mechanism for controllers and other programs.")
+
+
+@command(COMPUTE, example="condyle export c masticatory --out masticatory-c", of=export, name="c")
+def c(
+    mechanism: options.Mechanism,
+    out: Annotated[Path, typer.Option(help="Folder for source, header, example and tests.")],
+    question: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="What to export; repeat for more: inverse, contact (with contact forces), forward "
+            "(accelerations), motion, closure, pose (from encoders), computed_torque. Default: all "
+            "but closure, which needs --from or --landmark.",
+            autocompletion=completion.one_of(*completion.EXPORTS),
+        ),
+    ] = None,
+    coordinates: Annotated[
+        str | None,
+        typer.Option("--from", help="Coordinates that closure starts from, as in X,Y,Z,alpha."),
+    ] = None,
+    landmark: Annotated[
+        str | None,
+        typer.Option(
+            help="Platform point whose path closure starts from.",
+            autocompletion=completion.points,
+        ),
+    ] = None,
+    precision: Annotated[
+        str,
+        typer.Option(
+            help="double, or float for processors that compute in it alone.",
+            autocompletion=completion.one_of("double", "float"),
+        ),
+    ] = "double",
+    constants: Annotated[
+        str,
+        typer.Option(
+            help="inside, or struct: in a structure that a program fills at run time.",
+            autocompletion=completion.one_of("inside", "struct"),
+        ),
+    ] = "inside",
+    prefix: Annotated[
+        str | None,
+        typer.Option(help="What all names in C begin with. Default: the mechanism's name."),
+    ] = None,
+    lanes: Annotated[
+        int, typer.Option(help="Width of GCC's vector types: 2, 4 or 8 doubles; 0: none.")
+    ] = 8,
+    formulation: options.Formulation = "virtual_power",
+    route: options.Route = "core",
+) -> Answer:
+    """C99 source and header for a controller.
+
+    No heap, no globals, no input or output, bounded time. With it come an example, recorded test
+    vectors, a Makefile whose `make check` compares with them, and a page of measured facts.
+    """
+    import condyle
+
+    from ..export import Wish, in_order, usual
+    from ..export import export as exported_of
+    from ..export.facts import write_facts
+    from ..export.package import write_package
+
+    machine = condyle.load(mechanism)
+    given = (one.strip() for one in coordinates.split(",")) if coordinates else ()
+    names = in_order(tuple(given))
+    closing = ("closure",) if coordinates or landmark else ()
+    made = exported_of(
+        machine,
+        question or (*usual(machine), *closing),
+        formulation=formulation,
+        route=route,
+        precision=precision,
+        prefix=prefix,
+        constants=constants,
+        lanes=lanes,
+        coordinates=names,
+        landmark=landmark,
+    )
+    files = write_package(made, machine, Wish(names, landmark), output_folder(out))
+    facts = write_facts(made, out)
+    files["facts"] = facts.path
+    warn(facts.warnings)
+    mapped = {name: ours for name, ours in made.names.items() if name != ours}
+    lines = [f'"{machine.name}" in C: {", ".join(f.name for f in made.functions)}']
+    lines += [f"  {name} is {ours}" for name, ours in mapped.items()]
+    lines += [f"Wrote {', '.join(path.name for path in files.values())} to {out}"]
+    data = {
+        "prefix": made.prefix,
+        "functions": [f.name for f in made.functions],
+        "names": mapped,
+        "symbols": list(made.symbols),
+        "facts": facts.data,
+        "files": list(files.values()),
+    }
+    return Answer("\n".join(lines), data, f"make -C {out} check")

@@ -1,0 +1,32 @@
+"""condyle export matlab: MEX functions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from . import options
+from .answer import Answer, command_line, files_line
+from .command import COMPUTE, command
+from .export import export
+from .inputs import output_folder
+
+
+@command(
+    COMPUTE, example="condyle export matlab masticatory --out matlab", of=export, name="matlab"
+)
+def matlab(
+    mechanism: options.Mechanism,
+    out: Annotated[Path, typer.Option(help="Folder for the files.")],
+) -> Answer:
+    """Functions for MATLAB and Octave (MEX): C, help texts, build.m and an example."""
+    import condyle
+
+    from ..export.matlab import write_matlab
+
+    machine = condyle.load(mechanism)
+    files = write_matlab(machine, output_folder(out))
+    data = {"mechanism": machine.name, "files": files}
+    return Answer(files_line(files), data, command_line("check", mechanism))

@@ -1,0 +1,36 @@
+"""condyle export mjcf: a mechanism for MuJoCo."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from . import options
+from .answer import Answer, command_line
+from .command import COMPUTE, command
+from .export import export
+from .inputs import file_stem, output_folder, warn
+
+
+@command(COMPUTE, example="condyle export mjcf masticatory --out mujoco", of=export, name="mjcf")
+def mjcf(
+    mechanism: options.Mechanism,
+    out: Annotated[Path, typer.Option(help="Folder for the file.")],
+) -> Answer:
+    """A model for MuJoCo (MJCF): loops, contacts, actuators with limits and losses, sensors.
+
+    Controls are efforts in N m or N, joints are zero at home. What of the mechanism is only
+    approximate there is said on stderr and in the file.
+    """
+    import condyle
+
+    from ..export.mjcf import write_mjcf
+
+    machine = condyle.load(mechanism)
+    path = output_folder(out) / f"{file_stem(machine.name)}.xml"
+    made = write_mjcf(machine, path)
+    warn(list(made.notes))
+    data = {"mechanism": machine.name, "notes": made.notes, "files": [path]}
+    return Answer(f"Wrote {path}", data, command_line("check", mechanism))

@@ -1,0 +1,23 @@
+"""Mechanisms as something else: C for controllers, and what other targets make of that.
+
+    exported = export(condyle.load("masticatory"), ("inverse", "motion"))
+    exported.source, exported.header, exported["inverse"].arguments
+
+A target is a file that writes what it is for from an `Exported`.
+"""
+
+from .catalogue import CATALOGUE, DEFAULT, Wish, in_order, usual
+from .exported import Argument, Exported, Function
+from .source import export
+
+__all__ = [
+    "CATALOGUE",
+    "DEFAULT",
+    "Argument",
+    "Exported",
+    "Function",
+    "Wish",
+    "export",
+    "in_order",
+    "usual",
+]

@@ -1,0 +1,186 @@
+"""The page of measured facts of an exported folder: by compiling it, where there is a compiler."""
+
+from __future__ import annotations
+
+import platform
+import re
+import shutil
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..atomic import write_text
+from ..backends.compiler import CompilerError, find_compiler
+from .exported import Exported
+from .package import TOLERANCE
+
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=fast", "-fno-math-errno")
+SECONDS = 300
+NOTHING: dict[str, Any] = {"code": None, "stack": None, "error": None, "wrong": None}
+_TOLD = re.compile(r"^(\w+): (\d+) samples, worst error (\S+), (\d+) wrong", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Where they stand, and the same as data: function -> name -> number, None if not measured.
+
+    warnings: functions that do not answer as recorded where they were compiled.
+    """
+
+    path: Path
+    data: dict[str, Any]
+    warnings: list[str]
+
+
+def write_facts(exported: Exported, folder: Path) -> Facts:
+    """Measure and write FACTS.md."""
+    measured, how = _measured(exported, folder)
+    rows = {
+        f.name: {
+            "operations": f.operations,
+            "iterations": f.iterations,
+            **measured.get(f.name, NOTHING),
+        }
+        for f in exported.functions
+    }
+    path = folder / "FACTS.md"
+    write_text(path, _page(exported, rows, how))
+    warnings = [
+        f"{name} does not answer as recorded: worst error {row['error']:.1e}, {row['wrong']} wrong "
+        "statuses; look at it with make check"
+        for name, row in rows.items()
+        if row["wrong"] or (row["error"] or 0.0) > TOLERANCE[exported.precision]
+    ]
+    return Facts(path, {"functions": rows, "measured_by": how}, warnings)
+
+
+def _measured(e: Exported, folder: Path) -> tuple[dict[str, dict[str, Any]], str]:
+    """Bytes of code and stack, and the worst error, by function; and by what."""
+    try:
+        command = list(find_compiler().command)
+    except CompilerError:
+        return {}, ""
+    with tempfile.TemporaryDirectory(prefix="condyle-facts-") as place:
+        try:
+            code = _code(e, command, folder, Path(place))
+            errors = _errors(e, command, folder, Path(place))
+        except (OSError, subprocess.SubprocessError):
+            return {}, ""
+    version = _run([*command, "--version"], folder).splitlines()[0]
+    how = f"{version}, {' '.join(FLAGS)}, {platform.machine()}"
+    found = {f.name: dict(NOTHING) for f in e.functions}
+    for name in found:
+        found[name] |= code.get(name, {}) | errors.get(name, {})
+    return found, how
+
+
+def _code(e: Exported, command: list[str], folder: Path, place: Path) -> dict[str, dict[str, Any]]:
+    """Bytes of machine code and of stack of each function, with those that it alone calls."""
+    source = folder / f"{e.prefix}.c"
+    call = [*command, *FLAGS, "-c", str(source), "-o", str(place / "code.o")]
+    try:
+        _run([*call, "-fstack-usage"], place)
+    except subprocess.SubprocessError:
+        _run(call, place)
+    sizes: dict[str, int] = {}
+    if shutil.which("nm"):
+        for line in _run(["nm", "-S", "-t", "d", str(place / "code.o")], place).splitlines():
+            parts = line.split()
+            if len(parts) == 4 and parts[2] in "tT":
+                name = parts[3].partition(".")[0]  # GCC names parts and copies after it
+                sizes[name] = sizes.get(name, 0) + int(parts[1])
+    stacks: dict[str, int] = {}
+    for usage in place.glob("*.su"):
+        for line in usage.read_text(encoding="utf-8").splitlines():
+            where, size, *_ = line.split("\t")
+            stacks[where.rpartition(":")[2].partition(".")[0]] = int(size)
+    calls = _calls(e.source, {*sizes, *stacks})
+    found: dict[str, dict[str, Any]] = {}
+    for f in e.functions:
+        inner = _reached(calls, f.name)
+        found[f.name] = {
+            "code": sum(sizes.get(n, 0) for n in inner) if sizes else None,
+            "stack": _deepest(calls, stacks, f.name) if stacks else None,
+        }
+    return found
+
+
+def _calls(source: str, names: set[str]) -> dict[str, set[str]]:
+    """Which functions call which, of those that the compiler kept."""
+    found: dict[str, set[str]] = {}
+    here = ""
+    for line in source.splitlines():
+        if line and not line[0].isspace() and line.endswith(")"):
+            here = line.partition("(")[0].rpartition(" ")[2].lstrip("*")
+        elif here and line.startswith(" "):
+            words = set(re.findall(r"(\w+)\(", line))
+            found.setdefault(here, set()).update(words & names - {here})
+    return found
+
+
+def _reached(calls: dict[str, set[str]], name: str) -> set[str]:
+    found = {name}
+    for inner in calls.get(name, set()):
+        found |= _reached(calls, inner)
+    return found
+
+
+def _deepest(calls: dict[str, set[str]], stacks: dict[str, int], name: str) -> int:
+    inner = (_deepest(calls, stacks, n) for n in calls.get(name, set()))
+    return stacks.get(name, 0) + max(inner, default=0)
+
+
+def _errors(
+    e: Exported, command: list[str], folder: Path, place: Path
+) -> dict[str, dict[str, Any]]:
+    """The worst error over the recorded samples."""
+    program = place / "checker"
+    sources = [str(folder / "check.c"), str(folder / f"{e.prefix}.c")]
+    _run([*command, *FLAGS, *sources, "-o", str(program), "-lm"], place)
+    told = subprocess.run([str(program)], capture_output=True, text=True, timeout=SECONDS).stdout
+    return {
+        name: {"error": float(error), "wrong": int(wrong)}
+        for name, _, error, wrong in _TOLD.findall(told)
+    }
+
+
+def _run(call: list[str], place: Path) -> str:
+    done = subprocess.run(
+        call,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        timeout=SECONDS,
+        cwd=place,
+        check=True,
+    )
+    return done.stdout
+
+
+def _page(e: Exported, rows: dict[str, dict[str, Any]], how: str) -> str:
+    lines = [
+        f"# {e.prefix}: measured facts",
+        "",
+        f"Measured with {how}. Portable code, {e.precision}; yours will differ."
+        if how
+        else "Not measured: no C compiler was at hand. `condyle export` again where there is one.",
+        "",
+        "| function | operations | looks at most | code [bytes] | stack [bytes] | worst error |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name, row in rows.items():
+        looks = str(row["iterations"] or "no iteration")
+        error = "" if row["error"] is None else f"{row['error']:.1e}"
+        cells = [name, row["operations"], looks, row["code"], row["stack"], error]
+        lines.append(f"| {' | '.join('' if cell is None else str(cell) for cell in cells)} |")
+    lines += [
+        "",
+        "- Operations: additions, products, roots and quotients of one call, a fused multiply-add, "
+        "or a sine with its cosine, as one; of one look at a pose where there are several.",
+        "- Code and stack: of a function with all that it calls, but the C library.",
+        "- Worst error: over the recorded samples, of the largest entry of each result.",
+        f"- Of the C library it may call {', '.join(e.symbols) or 'nothing'}.",
+    ]
+    return "\n".join([*lines, ""])

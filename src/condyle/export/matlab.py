@@ -1,0 +1,155 @@
+"""Target `matlab`: MEX functions of the exported C, with help texts, a build script and an example.
+
+A function takes matrices with a row an entry and a column a sample; one column serves all samples.
+Results are likewise; the last output is the status of every sample. MATLAB and Octave.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator, Sequence
+from importlib.resources import files
+from pathlib import Path
+
+from ..atomic import write_text
+from ..mechanism import Mechanism
+from . import source
+from .exported import Argument, Exported, Function
+from .names import identifier
+
+DEFAULT = ("contact", "inverse", "forward", "motion", "pose", "computed_torque")
+LONGEST = 63  # letters of a name in MATLAB
+
+
+def write_matlab(
+    mechanism: Mechanism, folder: Path, questions: Sequence[str] = DEFAULT
+) -> list[Path]:
+    """Write sources, gateways, help, `build.m` and `NAME_example.m`.
+
+    Raises: InputError, UnsupportedError: for what cannot be exported to C, or a file that cannot be
+            written.
+    """
+    e = source.export(mechanism, questions, lanes=0, prefix=_prefix(mechanism))
+    texts = {f"{e.prefix}.c": e.source, f"{e.prefix}.h": e.header}
+    for f in e.functions:
+        texts[f"{f.name}_mex.c"] = gateway(e, f)
+        texts[f"{f.name}.m"] = help_text(e, f, mechanism)
+    texts |= {"build.m": build(e), f"{e.prefix}_example.m": example(e, mechanism)}
+    paths = []
+    for name, text in texts.items():
+        paths.append(folder / name)
+        write_text(paths[-1], text)
+    return paths
+
+
+def gateway(e: Exported, f: Function) -> str:
+    """C of one MEX function."""
+    rows = [f'    {{{a.size}, "{a.name}"}},' for a in (*f.inputs, *f.outputs)]
+    words = ", ".join(
+        f"in[{i}]" if a.given else f"out[{i - len(f.inputs)}]" for i, a in _in_order(f)
+    )
+    parts = [
+        f"/* {f.name} for MATLAB and Octave: {f.text} */",
+        f'#include "{e.prefix}.h"',
+        f"#define INPUTS {len(f.inputs)}",
+        f"#define OUTPUTS {len(f.outputs)}",
+        f'#define NAME "{f.name}"',
+        "static const struct { unsigned size; const char *name; } ARGUMENTS[] = {",
+        *rows,
+        "};",
+        f"#define CALL(in, out) {f.name}({words})",
+        "",
+    ]
+    room = files(__package__)
+    return "\n".join(parts) + (room / "matlab_mex.c").read_text(encoding="utf-8")
+
+
+def help_text(e: Exported, f: Function, mechanism: Mechanism) -> str:
+    """The .m file that `help` shows, and that says what to do before there is a MEX function."""
+    outputs = ", ".join([a.name for a in f.outputs] + ["status"])
+    inputs = ", ".join(a.name for a in f.inputs)
+    lines = [f"{f.name.upper()}  {f.text}", f"  [{outputs}] = {f.name}({inputs})", ""]
+    lines += [
+        f'  Of the mechanism "{mechanism.name}", written by condyle. Samples stand in columns;'
+    ]
+    lines += ["  one column serves all samples.", ""]
+    for a in f.arguments:
+        lines += textwrap.wrap(
+            f"{a.name} ({a.size} x N): {a.text} [{a.unit}]: {', '.join(a.labels)}",
+            92,
+            initial_indent="  ",
+            subsequent_indent="      ",
+        )
+    words = "; ".join(f"{name.lower()}: {why}" for name, why in f.statuses.items())
+    lines += textwrap.wrap(
+        f"status (1 x N): 0 where there is a result, else results are NaN. {words}. Without this "
+        "output it is an error.",
+        92,
+        initial_indent="  ",
+        subsequent_indent="      ",
+    )
+    head = f"function varargout = {f.name}(varargin)"
+    text = [head, *(f"% {line}".rstrip() for line in lines)]
+    return "\n".join([*text, "error('run build.m first: it compiles this function');", "end", ""])
+
+
+def build(e: Exported) -> str:
+    """build.m."""
+    lines = ["% Compiles the functions of this folder: needs a C compiler (mex -setup C)."]
+    lines += ["here = fileparts(mfilename('fullpath'));", "before = cd(here);"]
+    lines += ["back = onCleanup(@() cd(before));"]
+    lines += [f"mex('-c', '{e.prefix}.c');", f"object = dir('{e.prefix}.o*');"]
+    for f in e.functions:
+        lines.append(f"mex('-output', '{f.name}', '{f.name}_mex.c', object(1).name);")
+    return "\n".join([*lines, "rehash", ""])
+
+
+def example(e: Exported, mechanism: Mechanism) -> str:
+    """NAME_example.m: a sway about home, there and back."""
+    f = e.functions[0]
+    lines = [
+        f'% What the functions of "{mechanism.name}" are for: run build.m once before this.',
+        "t = linspace(0, 1, 101);",
+    ]
+    for a in f.inputs:
+        lines.append(f"{a.name} = zeros({a.size}, 1);  % {', '.join(a.labels)} [{a.unit}]")
+    names = [a.name for a in f.inputs]
+    if {"q", "q1", "q2"} <= set(names):
+        lines += [
+            "% A sway of the first coordinate by 0.1 mm (or 0.1 mrad), once a second.",
+            "q = repmat(q, size(t)); q1 = repmat(q1, size(t)); q2 = repmat(q2, size(t));",
+            "w = 2 * pi;",
+            "q(1, :) = 1e-4 * sin(w * t); q1(1, :) = 1e-4 * w * cos(w * t);",
+            "q2(1, :) = -1e-4 * w^2 * sin(w * t);",
+        ]
+    outputs = ", ".join([a.name for a in f.outputs] + ["status"])
+    lines.append(f"[{outputs}] = {f.name}({', '.join(names)});")
+    lines.append("assert(all(status == 0))")
+    if any(a.name == "effort" for a in f.outputs):
+        effort = next(a for a in f.outputs if a.name == "effort")
+        legend = ", ".join(f"'{label}'" for label in map(_plain, effort.labels))
+        lines += [f"% plot(t, effort'); legend({legend}); ylabel('effort [{effort.unit}]');"]
+        known = {g.question: g for g in e.functions}
+        if "forward" in known:
+            lines += [
+                "% And back: those efforts make those accelerations.",
+                f"again = {known['forward'].name}(q, q1, effort, force, moment, point);",
+                "assert(max(abs(again(:) - q2(:))) < 1e-6 * max(abs(q2(:))))",
+            ]
+    return "\n".join([*lines, ""])
+
+
+def _in_order(f: Function) -> Iterator[tuple[int, Argument]]:
+    """Arguments of the C function, counted inputs first."""
+    order = {a.name: i for i, a in enumerate((*f.inputs, *f.outputs))}
+    return ((order[a.name], a) for a in f.arguments)
+
+
+def _plain(label: str) -> str:
+    """Between quotes, and with underscores that are not subscripts."""
+    return label.replace("'", "''").replace("_", "\\_")
+
+
+def _prefix(mechanism: Mechanism) -> str:
+    """Short enough that every function's name is one in MATLAB."""
+    return identifier(mechanism.name).lower()[:40]

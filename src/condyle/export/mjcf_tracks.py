@@ -1,0 +1,157 @@
+"""How a point stays on a surface by joints: slides and hinges, exactly where there are such.
+
+A plane is two slides, a sphere two hinges about its centre, a cylinder a slide and a hinge. Over
+any other surface two slides u and v run along the directions of principal curvature, and a height
+w = g(u) + h(v) follows them by polynomials of degree four, which MuJoCo has as equations between
+joints. That is exact for surfaces of second order seen along Z, and else a fit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from ..errors import UnsupportedError
+from ..kinematics.batch import evaluate
+from ..mechanism import Contact
+from ..mechanism.surface import Cylinder, Plane, Profile, Quadratic, Sphere
+
+DEGREE = 4  # of MuJoCo's polynomials
+GRID, STEPS = 21, 30
+NOISE = 1e-9  # metres: a fit as near as this is exact, and a term as small is none
+
+
+@dataclass(frozen=True)
+class Freedom:
+    """A joint: "slide" or "hinge", its unit axis, and the point it turns about, in {S} at home."""
+
+    kind: str
+    axis: np.ndarray
+    point: np.ndarray
+
+
+@dataclass(frozen=True)
+class Stage:
+    """The joints of one body; `law`: the second is that polynomial of the first, (5,)."""
+
+    freedoms: tuple[Freedom, ...]
+    law: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class Track:
+    """Bodies on each other, the first on the base.
+
+    error: how far the last one's point may be off the surface [m], 0 where it cannot;
+    reach: up to so far from home [m], or None: within the bounds.
+    """
+
+    stages: tuple[Stage, ...]
+    error: float = 0.0
+    reach: float | None = None
+
+
+def track(contact: Contact, size: float) -> Track:
+    """The joints that keep a ball's centre where its contact lets it be.
+
+    Args: size: a length of the mechanism [m], for the reach of a fit without bounds.
+    """
+    surface, point = contact.offset_surface, np.array(contact.point)
+    normal = _derivatives(surface, point)[0]
+    n = normal / np.linalg.norm(normal)
+    if isinstance(surface, Plane):
+        u, v = tangents(n)
+        return Track((Stage((Freedom("slide", u, point), Freedom("slide", v, point))),))
+    if isinstance(surface, Sphere):
+        centre = np.array(surface.centre)
+        return Track((Stage(tuple(Freedom("hinge", axis, centre) for axis in tangents(n))),))
+    if isinstance(surface, Cylinder):
+        axis = np.array(surface.axis) / np.linalg.norm(surface.axis)
+        centre = np.array(surface.point)
+        return Track((Stage((Freedom("slide", axis, point), Freedom("hinge", axis, centre))),))
+    return _fit(contact, point, n, size)
+
+
+def tangents(n: np.ndarray) -> np.ndarray:
+    """Two unit vectors across a unit vector, rows (2, 3); the first as level as may be."""
+    u = np.cross(n, [0.0, 0.0, 1.0]) if np.hypot(n[0], n[1]) > 1e-9 else np.array([0.0, 1.0, 0.0])
+    u = np.cross(u, n) / np.linalg.norm(u)
+    return np.array([u, np.cross(n, u)])
+
+
+def _fit(contact: Contact, point: np.ndarray, n: np.ndarray, size: float) -> Track:
+    """w = g(u) + h(v), by least squares over a grid."""
+    surface = contact.offset_surface
+    level = isinstance(surface, Quadratic | Profile)
+    frame = np.eye(3) if level else np.vstack([tangents(n), n])
+    frame[:2] = _principal(surface, point, frame) @ frame[:2]
+    samples, reach = _samples(contact, point, frame, size)
+    length = np.abs(samples[:, :2]).max()
+    powers = np.arange(1, DEGREE + 1)
+    u, v = ((samples[:, i : i + 1] / length) ** powers for i in (0, 1))
+    found = np.linalg.lstsq(np.hstack([u, v]), samples[:, 2], rcond=None)[0]
+    found[np.abs(found) < NOISE] = 0.0
+    error = float(np.abs(np.hstack([u, v]) @ found - samples[:, 2]).max())
+    along, across = (np.append(0.0, half / length**powers) for half in (found[:4], found[4:]))
+    s, t, w = (Freedom("slide", axis, point) for axis in frame)
+    stages: tuple[Stage, ...] = (Stage((s, w), along), Stage((t, w), across))
+    if not across.any():
+        stages = (Stage((s, w, t), along),)
+    return Track(stages, error if error > 10 * NOISE else 0.0, reach)
+
+
+def _principal(surface: object, point: np.ndarray, frame: np.ndarray) -> np.ndarray:
+    """Directions in which the height has no mixed term, (2, 2), the more curved one first."""
+    if isinstance(surface, Profile):
+        d = np.array(surface.direction[:2]) / np.linalg.norm(surface.direction[:2])
+        return np.array([d, [-d[1], d[0]]])
+    bend = frame[:2] @ _derivatives(surface, point)[1] @ frame[:2].T
+    values, vectors = np.linalg.eigh(bend)
+    rows = vectors.T[np.argsort(-np.abs(values))]
+    return rows * np.array([[1.0], [np.sign(np.linalg.det(rows))]])
+
+
+def _samples(
+    contact: Contact, point: np.ndarray, frame: np.ndarray, size: float
+) -> tuple[np.ndarray, float | None]:
+    """(u, v, w) of points of the surface within the bounds, (N, 3), else within a reach [m]."""
+    spans = [getattr(contact.bounds, axis) for axis in "xyz"]
+    given = [np.abs(np.subtract(s, p)).max() for s, p in zip(spans, point, strict=True) if s]
+    reach = None if given else 0.2 * size
+    half = float(np.linalg.norm(given)) if reach is None else reach
+    line = np.linspace(-half, half, GRID)
+    flat = np.column_stack([a.ravel() for a in np.meshgrid(line, line)])
+    p = ca.SX.sym("p", 3)
+    surface = contact.offset_surface
+    function = ca.Function("phi", [p], [surface.phi(p), surface.gradient(p)])
+    height = np.zeros(len(flat))
+    with np.errstate(all="ignore"):
+        for _ in range(STEPS):
+            at = point + np.column_stack([flat, height]) @ frame
+            value, gradient = evaluate(function, at)
+            step = value[:, 0] / (gradient @ frame[2])
+            height = height - step
+    at = point + np.column_stack([flat, height]) @ frame
+    good = (np.abs(step) < 1e-12 + 1e-9 * half) & (np.abs(height) <= 2 * half)
+    for axis, span in enumerate(spans):
+        if span is not None:
+            good &= (at[:, axis] >= span[0]) & (at[:, axis] <= span[1])
+    if reach is not None:
+        good &= np.linalg.norm(flat, axis=1) <= reach
+    if good.sum() < 4 * DEGREE:
+        raise UnsupportedError(
+            f'contact "{contact.name}": its {surface.kind} cannot be followed about home; '
+            "mjcf needs a surface that is smooth within the bounds"
+        )
+    return np.column_stack([flat, height])[good], reach
+
+
+def _derivatives(surface: object, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Gradient (3,) and second derivative (3, 3) of phi at a point."""
+    p = ca.SX.sym("p", 3)
+    gradient = surface.gradient(p)  # type: ignore[attr-defined]
+    function = ca.Function("d", [p], [gradient, ca.jacobian(gradient, p)])
+    first, second = function(point)
+    return np.asarray(first).ravel(), np.asarray(second)

@@ -1,0 +1,74 @@
+static real sqrt_s(real a) { return F(sqrt)(a); }
+static real rsqrt_s(real a) { return R(1.0) / F(sqrt)(a); }
+static real fabs_s(real a) { return F(fabs)(a); }
+static real fmin_s(real a, real b) { return a < b ? a : b; }
+static real fmax_s(real a, real b) { return a > b ? a : b; }
+static real le_s(real a, real b) { return a <= b ? R(1.0) : R(0.0); }
+static real lt_s(real a, real b) { return a < b ? R(1.0) : R(0.0); }
+static real eq_s(real a, real b) { return a >= b && a <= b ? R(1.0) : R(0.0); }
+static real ne_s(real a, real b) { return a >= b && a <= b ? R(0.0) : R(1.0); }
+static real not_s(real a) { return a >= R(0.0) && a <= R(0.0) ? R(1.0) : R(0.0); }
+static real and_s(real a, real b) { return not_s(a) + not_s(b) > R(0.0) ? R(0.0) : R(1.0); }
+static real or_s(real a, real b) { return not_s(a) + not_s(b) > R(1.5) ? R(0.0) : R(1.0); }
+static real where_s(real a, real b) { return not_s(a) > R(0.0) ? R(0.0) : b; }
+static real sign_s(real a) { return a < R(0.0) ? R(-1.0) : a > R(0.0) ? R(1.0) : a; }
+static real copysign_s(real a, real b) { return F(copysign)(a, b); }
+static real pow_s(real a, real b) { return F(pow)(a, b); }
+static real fmod_s(real a, real b) { return F(fmod)(a, b); }
+static real remainder_s(real a, real b) { return F(remainder)(a, b); }
+static real hypot_s(real a, real b) { return F(hypot)(a, b); }
+static real floor_s(real a) { return F(floor)(a); }
+static real ceil_s(real a) { return F(ceil)(a); }
+static real exp_s(real a) { return F(exp)(a); }
+static real expm1_s(real a) { return F(expm1)(a); }
+static real log_s(real a) { return F(log)(a); }
+static real log1p_s(real a) { return F(log1p)(a); }
+static real tan_s(real a) { return F(tan)(a); }
+static real asin_s(real a) { return F(asin)(a); }
+static real acos_s(real a) { return F(acos)(a); }
+static real atan_s(real a) { return F(atan)(a); }
+static real sinh_s(real a) { return F(sinh)(a); }
+static real cosh_s(real a) { return F(cosh)(a); }
+static real tanh_s(real a) { return F(tanh)(a); }
+static real asinh_s(real a) { return F(asinh)(a); }
+static real acosh_s(real a) { return F(acosh)(a); }
+static real atanh_s(real a) { return F(atanh)(a); }
+static real erf_s(real a) { return F(erf)(a); }
+
+/* Sine and cosine: quarter turns off in three parts, then polynomials (Cephes). No branch, so that
+ * every angle takes the same time, for which two values are volatile too; no number where the angle
+ * is beyond ANGLES. */
+static void sincos_s(real x, real *sine, real *cosine) {
+    const int far = !(F(fabs)(x) < ANGLES);
+    const volatile real angle = far ? R(0.0) : x, lost = far ? (real)NAN : R(0.0);
+    const real a0 = angle, missing = lost;
+    const long turns = (long)(a0 * R(0.63661977236758138243) + (a0 < R(0.0) ? R(-0.5) : R(0.5)));
+    const real n = (real)turns;
+    const real r = ((a0 - n * QUARTER_1) - n * QUARTER_2) - n * QUARTER_3;
+    const real z = r * r;
+    const real s = r + r * z * sine_terms(z) + missing;
+    const real c = R(1.0) - R(0.5) * z + z * z * cosine_terms(z) + missing;
+    const real a = (turns & 1) ? c : s;
+    const real b = (turns & 1) ? s : c;
+    *sine = (turns & 2) ? -a : a;
+    *cosine = ((turns + 1) & 2) ? -b : b;
+}
+
+/* Arc of a point: t = lesser over greater coordinate, or (t - 1) / (t + 1) where that is smaller, so
+ * that |t| <= 1/2; what is left is a number of eighths of a turn. No branch. */
+static real atan2_s(real y, real x) {
+    const real across = F(fabs)(y), along = F(fabs)(x);
+    const int steep = across > along, back = x < R(0.0);
+    const real most = steep ? across : along, least = steep ? along : across;
+    const int wide = least > R(0.5) * most;
+    const real over = wide ? least - most : least, under = wide ? least + most : most;
+    const real t = over / (under > R(0.0) ? under : R(1.0));
+    const real z = t * t;
+    const real part = t + t * z * arc_terms(z);
+    const real first = wide ? R(1.0) : R(0.0);
+    const real second = steep ? R(2.0) - first : first;
+    const real eighths = back ? R(4.0) - second : second;
+    const real rest = steep != back ? -part : part;
+    const real arc = eighths * ARC_STEP + (rest + eighths * ARC_STEP_REST) + (y - y);
+    return y < R(0.0) ? -arc : arc;
+}

@@ -1,0 +1,96 @@
+"""Many poses at rest, each judged: can it be reached, and if not, what forbids it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..backends.kernel import AGAIN, Answer
+from ..kinematics.singularity import SINGULAR, ratio
+from ..questions.inverse import CERTAIN
+from ..questions.survey import SURVEYED
+from ..status import Status
+
+Arrays = dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What N poses are like.
+
+    values:  by name of `SURVEYED`, samples last, lanes before them; no number where the pose
+             cannot be reached. Of "ratio": J_W_sigma (m, N) and J_A_extremes (2, N).
+    met:     whether the contacts can be met, (N,).
+    discriminant: of the chains' assembly, (n, N), negative out of reach; no number where the
+             contacts are not met.
+    closing: discriminant of the contacts' closing in closed form, (N,), negative where they are not
+             met; otherwise 1 or no number.
+    status:  (N,): ok, unreachable or, where the ratio is known, singular.
+    """
+
+    values: Mapping[str, np.ndarray]
+    met: np.ndarray
+    discriminant: np.ndarray
+    closing: np.ndarray
+    status: np.ndarray
+
+    @property
+    def reached(self) -> np.ndarray:
+        """Whether the contacts are met and every chain reaches, (N,)."""
+        return self.status != Status.unreachable
+
+    @property
+    def inverse_ratio(self) -> np.ndarray:
+        """Smallest over largest |transmission|, (N,)."""
+        least, most = self.values["J_A_extremes"]
+        return ratio(least, most)
+
+    @property
+    def direct_ratio(self) -> np.ndarray:
+        """Smallest over largest singular value of J_W, (N,)."""
+        sigma = self.values["J_W_sigma"]
+        return ratio(sigma[-1], sigma[0])
+
+
+def judged(
+    answer: Answer,
+    iterated: bool,
+    follow: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
+    at_poses: Callable[[np.ndarray], Arrays],
+) -> Survey:
+    """Judge a kernel's answer, and look again at samples that it is not certain of.
+
+    Args: iterated: whether contacts are closed in a fixed number of steps.
+          follow: poses (N, 6) of some samples, and whether their contacts are met.
+          at_poses: all values at whole poses, and `rows`, by numpy.
+    """
+    values, again = dict(answer.values), answer.status == AGAIN
+    met, reach = values.pop("met"), values["discriminant"]
+    known = met >= (CERTAIN if iterated else 0.0)
+    if iterated and (doubtful := np.flatnonzero(~known)).size:
+        pose, known[doubtful] = follow(doubtful)
+        doubtful = doubtful[known[doubtful]]
+        better = at_poses(pose[np.isfinite(pose).all(axis=1)])
+        for name, value in values.items():
+            value[..., doubtful] = better[name]
+    reach[:, ~known] = np.nan
+    reached = known & (reach >= 0).all(axis=0)
+    if "J_W_sigma" in values and (doubtful := np.flatnonzero(again & reached)).size:
+        rows = np.moveaxis(at_poses(follow(doubtful)[0])["rows"], -1, 0)
+        values["J_W_sigma"][:, doubtful] = np.linalg.svd(rows, compute_uv=False).T
+    status = np.where(reached, Status.ok, Status.unreachable).astype(np.int8)
+    del values["discriminant"]
+    if not reached.all():
+        for value in values.values():
+            value[..., ~reached] = np.nan
+    closing = np.where(known, 1.0, np.nan) if iterated else met
+    found = Survey(values, known, reach, closing, status)
+    if "J_W_sigma" in values:
+        near = np.minimum(found.inverse_ratio, found.direct_ratio) < SINGULAR
+        status[reached & near] = Status.singular
+    return found
+
+
+__all__ = ["SURVEYED", "Survey", "judged"]

@@ -1,0 +1,51 @@
+"""A map's numbers in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import pi
+
+from ..analysis.map.numbers import Numbers
+from ..mechanism.mechanism import COORDINATES
+from ..mechanism.plausibility import length_text
+
+
+def numbers_text(numbers: Numbers) -> str:
+    """A paragraph a number."""
+    return "\n".join(_lines(numbers))
+
+
+def _lines(n: Numbers) -> Iterator[str]:
+    v = n.volume
+    yield (
+        f"reachable:  {v.share:.4%} of the range, {v.value:.6g} {n.unit}, error about "
+        f"{v.error:.1g}, at most {v.bound:.1g} ({v.poses} poses, finest cell {_sides(n, v.cell)})"
+    )
+    free = f"reachable, within bounds and limits, singularity ratio at least {n.margin:g}"
+    if n.ball is None:
+        yield "around home: nothing, home is outside the range"
+        return
+    yield (
+        f"ball:       radius {length_text(n.ball.radius)} around home is {free} (angles times the "
+        f"characteristic length); ends at {n.ball.stops}; certified at {n.ball.points} points, "
+        f"{length_text(n.ball.spacing)} apart"
+    )
+    if n.box is None:
+        yield f"box:        none, home is not {free}"
+        return
+    pairs = zip(n.axes, n.box.low, n.box.high, strict=True)
+    sides = ", ".join(f"{name} {_ends(name, low, high)}" for name, low, high in pairs)
+    yield f"box:        {sides}; certified at points {_sides(n, n.box.spacing)} apart"
+
+
+def _sides(n: Numbers, values: tuple[float, ...]) -> str:
+    return " x ".join(_size(name, value) for name, value in zip(n.axes, values, strict=True))
+
+
+def _size(name: str, value: float) -> str:
+    return f"{value * 1e3:.3g} mm" if name in COORDINATES[:3] else f"{value * 180 / pi:.3g} deg"
+
+
+def _ends(name: str, low: float, high: float) -> str:
+    scale, unit = (1e3, "mm") if name in COORDINATES[:3] else (180 / pi, "deg")
+    return f"{low * scale:.4g} to {high * scale:.4g} {unit}"

@@ -1,0 +1,125 @@
+"""Results for MATLAB: one struct a variable, with its unit, its meaning and its dimensions.
+
+    s = load("run.mat");  plot(s.time.values, s.torque.values);  legend(s.chain)
+
+`values` has the shape of the labelled array, time first. Names along a dimension are cell arrays of
+their own (`chain`, `contact`, `coordinate`); `info` says what the file is. Version 7 of the
+format, which MATLAB since 2004 and Octave read.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..errors import InputError
+from ..mechanism.mechanism import COORDINATES, Mechanism
+from .contacts import AXES
+from .variables import VARIABLES
+
+LONGEST = 63  # letters of a name
+LARGEST = 2**31  # bytes of a variable, which the format counts with 32 bits
+
+
+def dataset_variables(dataset: xr.Dataset) -> dict[str, Any]:
+    """What a file has of a solution, or of any labelled dataset."""
+    found: dict[str, Any] = {"info": _info(dataset.attrs)}
+    for name, coordinate in dataset.coords.items():
+        if coordinate.dtype.kind in "OUST":
+            found[matlab_name(str(name))] = cells(coordinate.values)
+        else:
+            found[matlab_name(str(name))] = _entry(coordinate)
+    for name, variable in dataset.data_vars.items():
+        found[matlab_name(str(name))] = _entry(variable)
+    return found
+
+
+def table_variables(mechanism: Mechanism, columns: Mapping[str, Any]) -> dict[str, Any]:
+    """What a file has of the columns of `condyle solve`: those of a variable stand side by side."""
+    labels = {
+        "chain": mechanism.chain_names,
+        "contact": mechanism.contact_names,
+        "coordinate": COORDINATES,
+    }
+    info = {"title": f"Inverse dynamics of {mechanism.name}", "mechanism_name": mechanism.name}
+    found: dict[str, Any] = {"info": _info(info)} | {n: cells(v) for n, v in labels.items()}
+    rest = dict(columns)
+    for variable in VARIABLES:
+        if variable.column is None:
+            continue
+        names = [f"{variable.column}{label}" for label in labels[variable.dims[1]]]
+        if names and all(name in rest for name in names):
+            values = np.column_stack([rest.pop(name) for name in names])
+            said = variable.attributes(mechanism)
+            found[variable.name] = entry(values, ("row", variable.dims[1]), said)
+    for name in [n for n in rest if n.startswith("reaction_") and n.endswith(f"_{AXES[0]}")]:
+        stem = name.removesuffix(AXES[0])
+        values = np.column_stack([rest.pop(f"{stem}{axis}") for axis in AXES])
+        unit = "N m" if "moment" in stem or "torque" in stem else "N"
+        found[matlab_name(stem.rstrip("_"))] = entry(values, ("row", "axis"), {"units": unit})
+    for name, column in rest.items():
+        values = np.asarray(column)
+        found[matlab_name(name)] = (
+            cells(values) if values.dtype.kind in "OU" else entry(values, ("row",), {})
+        )
+    return found
+
+
+def write_mat(path: Path, variables: Mapping[str, Any]) -> None:
+    """Write a file of named variables.
+
+    Raises: OSError: if it cannot be written.
+    """
+    from scipy.io import savemat
+
+    savemat(
+        str(path),
+        dict(variables),
+        appendmat=False,
+        long_field_names=True,
+        do_compression=True,
+        oned_as="column",
+    )
+
+
+def entry(
+    values: np.ndarray, dims: tuple[str, ...], said: Mapping[str, Any]
+) -> dict[str, np.ndarray | str]:
+    """The struct of one variable.
+
+    Raises: InputError: for one of more than 2 GiB, which the format cannot hold.
+    """
+    if values.nbytes >= LARGEST:
+        raise InputError("a variable of a .mat file has at most 2 GiB; write NetCDF (.nc) instead")
+    values = values.astype(float) if values.dtype.kind in "biu" else values
+    text = {key: str(said.get(key, "")) for key in ("units", "long_name")}
+    flags = {"flag_meanings": said["flag_meanings"]} if "flag_meanings" in said else {}
+    return {"values": values, **text, "dims": cells(dims), **flags}
+
+
+def cells(texts: Any) -> np.ndarray:
+    """A column of texts as a cell array."""
+    column = np.empty((len(texts), 1), dtype=object)
+    column[:, 0] = [str(text) for text in texts]
+    return column
+
+
+def matlab_name(name: str) -> str:
+    """A name that MATLAB takes: letters, digits and underscores, a letter first."""
+    plain = re.sub(r"\W", "_", name, flags=re.ASCII)
+    if not plain[:1].isalpha():
+        plain = f"x{plain}"
+    return plain[:LONGEST]
+
+
+def _entry(array: xr.DataArray) -> dict[str, Any]:
+    return entry(array.values, tuple(map(str, array.dims)), array.attrs)
+
+
+def _info(attributes: Mapping[str, Any]) -> dict[str, str]:
+    return {matlab_name(str(key)): str(value) for key, value in attributes.items()}

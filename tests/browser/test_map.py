@@ -1,0 +1,71 @@
+"""Maps in the live page: where a hand clicks, the mechanism goes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.errors import InputError
+from condyle.view import View, open_view
+from condyle.view.maps import BESIDE, SIDE
+
+from .conftest import PATIENCE, Tab
+
+OVER = ["X=-5:12:12 mm", "beta=-15:30:12 deg", "Y=-6:6:5 mm"]
+
+
+@pytest.fixture(scope="module")
+def model() -> condyle.Model:
+    return condyle.derive(condyle.load("masticatory"), backend="numpy")
+
+
+@pytest.fixture(scope="module")
+def view(model: condyle.Model) -> Iterator[View]:
+    running = open_view(map=condyle.workspace_map(model, OVER, hold="alpha=1 deg"), port=0)
+    yield running
+    running.close()
+
+
+def test_rays_become_poses(view: View, model: condyle.Model) -> None:
+    """A ray through the cube from the front: reachable, on the ray, the held coordinate held."""
+    layer = view.map
+    assert layer is not None
+    corner = view.stage.centre + np.array(BESIDE) - SIDE / 2
+    target = corner + SIDE * np.array([0.4, 0.2, 0.5])
+    q = layer.state_at(target - [0, 9, 0], np.array([0.0, 2.0, 0.0]))
+    assert q is not None
+    X, Y, alpha, beta = q
+    assert (X, Y, alpha) == pytest.approx((-5e-3 + 0.4 * 17e-3, 0, np.radians(1)), abs=1e-12)
+    assert np.radians(-15.001) < beta < np.radians(-5)
+    assert model.survey(q[None]).reached.all()
+    assert layer.state_at(target + 9, np.array([0.0, 1.0, 0.0])) is None
+
+
+def test_a_map_over_one_coordinate_is_refused(model: condyle.Model) -> None:
+    with pytest.raises(InputError, match="one coordinate"):
+        open_view(map=condyle.workspace_map(model, "X=0:5:3 mm"), port=0)
+
+
+def test_a_click_moves_the_mechanism(open_tab: Callable[..., Tab], view: View) -> None:
+    tab = open_tab(view.url)
+    tab.page.wait_for_selector("[data-level]")
+
+    def skin(pixels: np.ndarray) -> np.ndarray:
+        blue = pixels[..., 2].astype(int)
+        return (blue > 150) & (blue - pixels[..., 0] > 50) & (pixels[..., 1] > 120)
+
+    pixels = tab.picture_where("canvas", lambda p: skin(p).sum() > 500, "the map")
+    rows, columns = np.nonzero(skin(pixels))
+    box = tab.page.locator("canvas").first.bounding_box()
+    assert box is not None
+    order = np.argsort(np.hypot(rows - np.median(rows), columns - np.median(columns)))
+    place = order[0]
+    tab.page.mouse.click(box["x"] + float(columns[place]), box["y"] + float(rows[place]))
+    tab.page.wait_for_function(
+        "() => [...document.querySelectorAll('input')].some(i => Number(i.value) === 1)",
+        timeout=PATIENCE,
+    )
+    assert view.session.q[2] == pytest.approx(np.radians(1))

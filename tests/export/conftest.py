@@ -1,0 +1,64 @@
+"""Exported folders that several tests use, written once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from families.cases import case
+
+import condyle
+from condyle.export import DEFAULT, Exported, Wish, export
+from condyle.export.package import write_package
+
+
+@dataclass(frozen=True)
+class Folder:
+    exported: Exported
+    path: Path
+
+    @property
+    def source(self) -> str:
+        return f"{self.exported.prefix}.c"
+
+
+def written(name: str, path: Path, **options: Any) -> Folder:
+    """The package of a bundled mechanism or a test case."""
+    known = name in condyle.bundled_mechanisms()
+    mechanism = condyle.load(name) if known else case(name).mechanism
+    landmark = options.get("landmark")
+    questions = options.pop("questions", (*DEFAULT, *(("closure",) if landmark else ())))
+    exported = export(mechanism, questions, **options)
+    path.mkdir()
+    write_package(exported, mechanism, Wish((), landmark), path)
+    return Folder(exported, path)
+
+
+FOLDERS: dict[str, tuple[str, dict[str, Any]]] = {
+    "jaw": ("masticatory", {"landmark": "incisor", "prefix": "jaw"}),
+    "single": ("gough-stewart", {"precision": "float", "questions": ("inverse", "pose")}),
+    "curved": ("masticatory-curved", {"precision": "float", "questions": ("inverse", "motion")}),
+    "struct": (
+        "gough-stewart",
+        {"constants": "struct", "prefix": "hexapod", "questions": ("inverse", "motion", "pose")},
+    ),
+    "mixed": ("mixed_k1_n7", {"prefix": "mixed", "questions": ("contact", "forward", "pose")}),
+}
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Folder]:
+    """One of `FOLDERS` by name."""
+    found: dict[str, Folder] = {}
+    base = tmp_path_factory.mktemp("exported")
+
+    def get(name: str) -> Folder:
+        if name not in found:
+            mechanism, options = FOLDERS[name]
+            found[name] = written(mechanism, base / name, **options)
+        return found[name]
+
+    return get

@@ -1,0 +1,130 @@
+"""Exported C under the strictest flags, sanitizers, for Arm, with a linter, as C++, and linked."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from export.conftest import Folder
+from support.tools import need, run
+
+Folders = Callable[[str], Folder]
+STRICT = "-Werror -Wshadow -Wstrict-prototypes -Wmissing-prototypes -Wdouble-promotion"
+SANITIZED = "-fsanitize=address,undefined -fno-sanitize-recover=all"
+CORTEX = (
+    "-mcpu=cortex-m7",
+    "-mfpu=fpv5-d16",
+    "-mfloat-abi=hard",
+    "-isystem",
+    "/usr/include/newlib",
+)
+
+
+def checked(of: Folder, flags: str, **variables: str) -> str:
+    """`make check`, from scratch."""
+    run("make", "-s", "clean", folder=of.path)
+    given = [f"{name}={value}" for name, value in variables.items()]
+    told = run("make", "-s", "check", f"CFLAGS={flags} {STRICT}", *given, folder=of.path)
+    functions = [f.name for f in of.exported.functions]
+    # GCC has something to note about the passing of vectors.
+    lines = [line for line in told.splitlines() if "worst error" in line]
+    assert [line.split(":")[0] for line in lines] == functions
+    assert told.count(": ok") == len(functions)
+    if of.exported.precision == "double":  # the folder's own bound leaves room for others' roots
+        assert all(float(e) < 1e-13 for e in re.findall(r"worst error (\S+),", told))
+    return told
+
+
+@pytest.mark.parametrize("name", ["jaw", "single", "curved", "struct", "mixed"])
+def test_the_recorded_samples(folder: Folders, name: str) -> None:
+    need("gcc", "make")
+    checked(folder(name), "-O1", CC="gcc")
+
+
+@pytest.mark.parametrize("name", ["jaw", "struct"])
+def test_clang_has_nothing_to_say(folder: Folders, name: str) -> None:
+    need("clang", "make")
+    checked(folder(name), "-O1", CC="clang")
+
+
+def test_vector_types(folder: Folders) -> None:
+    need("clang", "make")
+    flags = "-DJAW_VECTOR"  # of any processor
+    checked(folder("jaw"), "-O1", CC="clang", VECTOR="1", VECTOR_FLAGS=flags)
+
+
+@pytest.mark.parametrize("name", ["struct", "mixed"])
+def test_sanitizers(folder: Folders, name: str) -> None:
+    need("gcc", "make")
+    checked(folder(name), f"-O1 -g {SANITIZED}", CC="gcc")
+
+
+def test_sanitizers_with_vector_types(folder: Folders) -> None:
+    need("gcc", "make")
+    checked(folder("jaw"), f"-O1 {SANITIZED}", CC="gcc", VECTOR="1", VECTOR_FLAGS="-DJAW_VECTOR")
+
+
+@pytest.mark.parametrize("name", ["jaw", "single", "struct"])
+def test_a_bare_arm_calls_only_what_is_stated(folder: Folders, name: str) -> None:
+    of = folder(name)
+    need("arm-none-eabi-nm")
+    strict = ["-Wall", "-Wextra", "-Wconversion", "-pedantic", *STRICT.split()]
+    build = ["-std=c99", "-O2", *strict, *CORTEX, "-c", of.source, "-o", "bare.o"]
+    run("arm-none-eabi-gcc", *build, folder=of.path)
+    told = run("arm-none-eabi-nm", "-u", "bare.o", folder=of.path)
+    # Compilers put memcpy for loops that copy.
+    assert set(told.replace("U", "").split()) <= {*of.exported.symbols, "memcpy"}
+    own = run("arm-none-eabi-nm", "--defined-only", "bare.o", folder=of.path)
+    kinds = {line.split()[1] for line in own.splitlines()}
+    assert kinds <= {"T", "t", "r", "R", "a"}, "no variables"
+
+
+def test_64_bit_arm(folder: Folders) -> None:
+    need("aarch64-linux-gnu-gcc", "qemu-aarch64", "make")
+    arm = {"CC": "aarch64-linux-gnu-gcc", "RUN": "qemu-aarch64", "LDFLAGS": "-static"}
+    checked(folder("jaw"), "-O1", **arm)
+
+
+def test_a_linter_is_content(folder: Folders) -> None:
+    of = folder("jaw")
+    checks = "-checks=clang-analyzer-*,bugprone-*,-bugprone-easily-swappable-parameters"
+    checks += ",-bugprone-implicit-widening-of-multiplication-result"  # of sizes below a hundred
+    call = ("clang-tidy", "--quiet", checks, "-warnings-as-errors=*")
+    run(*call, of.source, "main.c", "check.c", "--", "-std=c99", folder=of.path)
+
+
+@pytest.mark.parametrize("name", ["jaw", "struct"])
+def test_the_header_is_cpp(folder: Folders, name: str) -> None:
+    of = folder(name)
+    flags = ("-Wall", "-Wextra", "-pedantic", "-Werror", "-std=c++11", "-fsyntax-only")
+    source = of.path / "as.cpp"
+    source.write_text(f'#include "{of.exported.prefix}.h"\nint main() {{ return 0; }}\n')
+    run("clang", "-x", "c++", *flags, source, folder=of.path)
+
+
+def test_two_mechanisms_in_one_program(folder: Folders, tmp_path: Path) -> None:
+    jaw, hexapod = folder("jaw"), folder("struct")
+    lines = [f'#include "{of.exported.prefix}.h"' for of in (jaw, hexapod)]
+    lines += ["int main(void) {", "    double q[6] = {0}, pose[6], rate[6], more[6];"]
+    lines += ["    hexapod_numbers numbers = HEXAPOD_NUMBERS;", "    hexapod_constants k;"]
+    lines += [
+        "    hexapod_prepare(&numbers, &k);",
+        "    return jaw_motion(q, q, q, pose, rate, more)",
+    ]
+    lines += ["        + hexapod_motion(&k, q, q, q, pose, rate, more);", "}", ""]
+    (tmp_path / "both.c").write_text("\n".join(lines))
+    sources = [of.path / of.source for of in (jaw, hexapod)]
+    paths = [f"-I{of.path}" for of in (jaw, hexapod)]
+    flags = ("-std=c99", "-O0", "-Wall", "-Werror")
+    run("gcc", *flags, *paths, "both.c", *sources, "-o", "both", "-lm", folder=tmp_path)
+    run("./both", folder=tmp_path)
+
+
+def test_the_example(folder: Folders) -> None:
+    of = folder("jaw")
+    run("make", "-s", "all", "CC=gcc", "CFLAGS=-O0 -Werror", folder=of.path)
+    told = run("./example", folder=of.path).splitlines()
+    (effort,) = of.exported["inverse"].outputs
+    assert [line.split(":")[0].removeprefix("effort ") for line in told] == list(effort.labels)

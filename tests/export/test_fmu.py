@@ -1,0 +1,278 @@
+"""FMUs: fmpy finds nothing to warn of, and they compute what condyle does."""
+
+from __future__ import annotations
+
+import shutil
+import zipfile
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.validation import validate_fmu
+from scipy.integrate import solve_ivp
+
+import condyle
+from condyle.errors import InputError
+from condyle.export import fmu as target
+from condyle.export.fmu_description import exponents
+
+Array = np.ndarray
+KINDS, VERSIONS = ("plant", "inverse", "controller"), (2, 3)
+Q = ("X", "Y", "alpha", "beta")
+POINT = np.array([0.02, 0.01, 0.005])
+FORCE, MOMENT = np.array([3.0, -2.0, 10.0]), np.array([0.01, 0.02, -0.03])
+EXACT = 1e-9  # of the largest entry
+
+needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
+pytestmark = needs_compiler
+
+
+@pytest.fixture(scope="module")
+def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, int], Path]:
+    """Every kind and version of the reference mechanism, compiled without optimising: quicker."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(target, "FLAGS", tuple(f for f in target.FLAGS if f != "-O2"))
+        models = {kind: target.fmu_model(condyle.load("masticatory"), kind) for kind in KINDS}
+        patch.setattr(target, "fmu_model", lambda mechanism, kind: models[kind])
+        folder, made = tmp_path_factory.mktemp("fmu"), {}
+        for kind in KINDS:
+            for version in VERSIONS:
+                made[kind, version] = folder / f"{kind}{version}.fmu"
+                path = made[kind, version]
+                assert target.write_fmu(condyle.load("masticatory"), kind, version, path)
+    return made
+
+
+@pytest.fixture(scope="module")
+def model() -> condyle.Model:
+    return condyle.derive("masticatory", backend="numpy")
+
+
+def row(name: str, labels: Any, values: Any) -> dict[str, float]:
+    return {f"{name}.{label}": float(v) for label, v in zip(labels, values, strict=True)}
+
+
+STATE = np.array([0.001, 0.0005, 0.01, 0.05]), np.array([0.01, -0.02, 0.1, 0.4])
+AHEAD = np.array([0.3, 0.1, 1.0, -2.0])
+LOAD = row("force", ("Fx", "Fy", "Fz"), FORCE) | row("moment", ("Mx", "My", "Mz"), MOMENT)
+HERE = row("q", Q, STATE[0]) | row("q1", Q, STATE[1]) | row("point", "xyz", POINT)
+ROW = np.concatenate([FORCE, MOMENT, POINT])[None]
+
+
+def asked(path: Path, given: dict[str, float], wanted: list[str], how: str, **options: Any) -> Any:
+    """Results of the last moment of a short simulation with inputs held."""
+    options = {"stop_time": 1e-3, "output_interval": 1e-3} | options
+    found = fmpy.simulate_fmu(str(path), start_values=given, output=wanted, fmi_type=how, **options)
+    return np.array([found[name][-1] for name in wanted])
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_fmpy_has_nothing_to_say(
+    fmus: dict[tuple[str, int], Path], kind: str, version: int
+) -> None:
+    path = fmus[kind, version]
+    assert validate_fmu(str(path)) == []
+    names = zipfile.ZipFile(path).namelist()
+    assert "sources/fmu.c" in names and any(name.startswith("binaries/") for name in names)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("how", ["ModelExchange", "CoSimulation"])
+def test_inverse(
+    fmus: dict[tuple[str, int], Path], model: condyle.Model, version: int, how: str
+) -> None:
+    found = model.evaluate(STATE[0][None], STATE[1][None], AHEAD[None], ROW)
+    chains, contacts = model.mechanism.chain_names, model.mechanism.contact_names
+    names = [f"effort.{c}" for c in chains] + [f"contact_force.{c}" for c in contacts]
+    got = asked(fmus["inverse", version], HERE | LOAD | row("q2", Q, AHEAD), names, how)
+    right = np.concatenate([found.effort[0], found.contact_force[0]])
+    np.testing.assert_allclose(got, right, rtol=0, atol=EXACT * np.abs(right).max())
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_controller(fmus: dict[tuple[str, int], Path], model: condyle.Model, version: int) -> None:
+    gains, damping = np.array([100.0, 200, 300, 400]), np.array([10.0, 20, 30, 40])
+    wanted = STATE[0] + 0.001, STATE[1] + 0.02
+    q2 = AHEAD + damping * (wanted[1] - STATE[1]) + gains * (wanted[0] - STATE[0])
+    right = model.torques(STATE[0][None], STATE[1][None], q2[None], ROW).effort[0]
+    given = HERE | LOAD | row("q_d", Q, wanted[0]) | row("q1_d", Q, wanted[1])
+    given |= row("q2_d", Q, AHEAD) | row("kp", Q, gains) | row("kd", Q, damping)
+    names = [f"effort.{c}" for c in model.mechanism.chain_names]
+    got = asked(fmus["controller", version], given, names, "CoSimulation")
+    np.testing.assert_allclose(got, right, rtol=0, atol=EXACT * np.abs(right).max())
+
+
+def falling(model: condyle.Model, efforts: Array) -> Callable[[float, Array], Array]:
+    """Rates of the state under efforts and the load, held."""
+
+    def rate(_: float, x: Array) -> Array:
+        found = model.forward(x[None, :4], x[None, 4:], efforts[None], ROW)
+        return np.concatenate([x[4:], found.acceleration[0]])
+
+    return rate
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("how", ["ModelExchange", "CoSimulation"])
+def test_plant(
+    fmus: dict[tuple[str, int], Path], model: condyle.Model, version: int, how: str
+) -> None:
+    """Where it begins the accelerations are forward's; 20 ms later it is where scipy brings it."""
+    chains = model.mechanism.chain_names
+    efforts = model.torques(STATE[0][None], STATE[1][None], AHEAD[None], ROW).effort[0]
+    given = HERE | LOAD | row("effort", chains, efforts)
+    names = [f"q.{c}" for c in Q] + [f"q1.{c}" for c in Q]
+    start = np.concatenate(STATE)
+    if how == "ModelExchange":
+        options = {"solver": "CVode", "relative_tolerance": 1e-10}
+        at_first = partial(asked, fmus["plant", version], given, how=how, solver="Euler")
+        rates = at_first([f"acceleration.{c}" for c in Q], stop_time=1e-15, output_interval=1e-15)
+        np.testing.assert_allclose(rates, AHEAD, rtol=0, atol=EXACT * np.abs(AHEAD).max())
+    else:
+        options = {}
+    right = solve_ivp(
+        falling(model, efforts), (0, 0.02), start, method="DOP853", rtol=1e-11, atol=1e-13
+    ).y[:, -1]
+    got = asked(fmus["plant", version], given, names, how, stop_time=0.02, **options)
+    assert np.abs(right - start).max() > 1e-3
+    np.testing.assert_allclose(got, right, rtol=0, atol=1e-8)
+
+
+def test_a_simulated_chew(fmus: dict[tuple[str, int], Path], model: condyle.Model) -> None:
+    """The plant under the efforts of a chew, each held for 1 ms, as scipy integrates the same."""
+    motion = condyle.reference_motion()
+    states = model.independent_motion(motion)[0]
+    solution = model.solve(motion)
+    first, count = 1400, 30
+    t, effort = solution["time"].values[first:], solution["torque"].values[first:]
+    x = np.concatenate([states[0][first], states[1][first]])
+    given = row("q", Q, x[:4]) | row("q1", Q, x[4:])
+    chains = model.mechanism.chain_names
+    columns = [("time", float)] + [(f"effort.{c}", float) for c in chains]
+    signal = np.array([(t[i], *effort[i]) for i in range(count + 1)], dtype=columns)
+    found = fmpy.simulate_fmu(
+        str(fmus["plant", 3]),
+        fmi_type="CoSimulation",
+        start_time=t[0],
+        stop_time=t[count],
+        output_interval=t[1] - t[0],
+        input=signal,
+        start_values=given,
+        output=[f"q.{c}" for c in Q],
+    )
+    free = np.zeros((1, 9))
+    for i in range(count):
+
+        def rate(_: float, x: Array, tau: Array = effort[i]) -> Array:
+            ahead = model.forward(x[None, :4], x[None, 4:], tau[None], free).acceleration[0]
+            return np.concatenate([x[4:], ahead])
+
+        x = solve_ivp(rate, (t[i], t[i + 1]), x, method="RK45", rtol=1e-10, atol=1e-12).y[:, -1]
+    got = np.array([found[f"q.{c}"][-1] for c in Q])
+    np.testing.assert_allclose(got, x[:4], rtol=0, atol=1e-8)
+    assert np.abs(x[:4] - states[0][first]).max() > 1e-3
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_masses_can_be_tuned(fmus: dict[tuple[str, int], Path], version: int) -> None:
+    """As in a mechanism that has them."""
+    heavier = {"platform.mass": 0.3, "platform.inertia.xx": 2e-4, "gravity[2]": -3.0}
+    heavier |= {f"chain.{c}.crank.inertia": 1e-4 for c in ("masseter_left", "masseter_right")}
+    changed = condyle.load("masticatory").set(heavier)
+    states = (a[None] for a in (*STATE, AHEAD))
+    right = condyle.derive(changed, backend="numpy").torques(*states, ROW).effort[0]
+    given = HERE | LOAD | row("q2", Q, AHEAD)
+    given |= {"platform.mass": 0.3, "platform.inertia.xx": 2e-4, "gravity.z": -3.0}
+    given |= {f"crank_inertia.{c}": 1e-4 for c in ("masseter_left", "masseter_right")}
+    names = [f"effort.{c}" for c in changed.chain_names]
+    got = asked(fmus["inverse", version], given, names, "CoSimulation")
+    np.testing.assert_allclose(got, right, rtol=0, atol=EXACT * np.abs(right).max())
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_what_cannot_be_reached_is_said(fmus: dict[tuple[str, int], Path], version: int) -> None:
+    """No value is made up: reading it is refused, and `status` says why."""
+    far = row("q", Q, [0.5, 0, 0, 0])
+    with pytest.raises(Exception, match=r"(?i)discard|failed"):
+        asked(fmus["inverse", version], far, ["effort.masseter_left"], "ModelExchange")
+    assert asked(fmus["inverse", version], far, ["status"], "ModelExchange") == [1]
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_state_can_be_kept_and_brought_back(
+    fmus: dict[tuple[str, int], Path], version: int, tmp_path: Path
+) -> None:
+    """In memory and as bytes; a step from it is the same step again, and reset is the beginning."""
+    path = fmus["plant", version]
+    description = fmpy.read_model_description(str(path))
+    numbers = {v.name: v.valueReference for v in description.modelVariables}
+    folder = fmpy.extract(str(path), unzipdir=str(tmp_path))
+    kind = fmpy.fmi2.FMU2Slave if version == 2 else fmpy.fmi3.FMU3Slave
+    unit = kind(
+        guid=description.guid,
+        unzipDirectory=folder,
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        instanceName="x",
+    )
+    get = unit.getReal if version == 2 else unit.getFloat64
+    keep, back = (
+        (unit.getFMUstate, unit.setFMUstate)
+        if version == 2
+        else (unit.getFMUState, unit.setFMUState)
+    )
+    unpack = unit.deSerializeFMUstate if version == 2 else unit.deserializeFMUState
+    pack = unit.serializeFMUstate if version == 2 else unit.serializeFMUState
+    unit.instantiate()
+    if version == 2:
+        unit.setupExperiment(startTime=0.0)
+    unit.enterInitializationMode()
+    unit.exitInitializationMode()
+
+    def step(now: float) -> float:
+        unit.doStep(currentCommunicationPoint=now, communicationStepSize=0.01)
+        return get([numbers["q.X"]])[0]
+
+    first = step(0.0)
+    state = keep()
+    packed = pack(state)
+    second = step(0.01)
+    back(state)
+    assert step(0.01) == second != first
+    back(unpack(packed))
+    assert step(0.01) == second
+    unit.reset()
+    assert get([numbers["q.X"]])[0] == 0.0
+    unit.freeInstance()
+
+
+def test_units_are_powers_of_base_units() -> None:
+    assert exponents("N m") == {"kg": 1, "m": 2, "s": -2}
+    assert exponents("rad/s^2") == {"rad": 1, "s": -2}
+    assert exponents("1/s") == {"s": -1} and exponents("1") == {}
+
+
+def test_wrong_wishes(tmp_path: Path) -> None:
+    jaw = condyle.load("masticatory")
+    with pytest.raises(InputError, match="Did you mean"):
+        target.write_fmu(jaw, "plants", 3, tmp_path / "x.fmu")
+    with pytest.raises(InputError, match="version 1"):
+        target.write_fmu(jaw, "plant", 1, tmp_path / "x.fmu")
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_command(
+    condyle_command: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(target, "_built", lambda sources: None)
+    outcome = condyle_command(
+        "export", "fmu", "gough-stewart", "--out", "f", "--kind", "plant", "--fmi", "2"
+    )
+    assert outcome.status == 0 and "no binary" in outcome.err
+    (path,) = (tmp_path / "f").iterdir()
+    assert path.name == "gough-stewart-plant.fmu"
+    assert not any("binaries" in name for name in zipfile.ZipFile(path).namelist())

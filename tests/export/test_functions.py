@@ -1,0 +1,185 @@
+"""What exported functions do: bad samples, constants that change, poses from encoders."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from export.conftest import Folder
+from support.tools import run
+
+import condyle
+from condyle.export import Exported, export
+from condyle.model.forward import ForwardKinematics
+
+Folders = Callable[[str], Folder]
+OK, UNREACHABLE, SINGULAR, OUT_OF_BOUNDS, INFEASIBLE = range(5)
+KEPT = 77.0  # what stands in results before a call
+
+
+class Library:
+    """Exported functions on arrays: by question, arguments by name."""
+
+    def __init__(self, exported: Exported, folder: Path) -> None:
+        self.exported = exported
+        (folder / f"{exported.prefix}.c").write_text(exported.source)
+        (folder / f"{exported.prefix}.h").write_text(exported.header)
+        flags = ("-std=c99", "-O1", "-ffp-contract=fast", "-shared", "-fPIC")
+        run("gcc", *flags, f"{exported.prefix}.c", "-o", "exported.so", "-lm", folder=folder)
+        self._library = ctypes.CDLL(str(folder / "exported.so"))
+
+    def __call__(
+        self, question: str, **given: np.ndarray | float
+    ) -> tuple[int, dict[str, np.ndarray]]:
+        f = self.exported[question]
+        arrays = {a.name: np.full(a.size, 0.0 if a.given else KEPT) for a in f.arguments}
+        for name, value in given.items():
+            arrays[name][:] = value
+        pointers = [a.ctypes.data_as(ctypes.c_void_p) for a in arrays.values()]
+        status = getattr(self._library, f.name)(*pointers)
+        return status, {a.name: arrays[a.name] for a in f.outputs}
+
+
+@pytest.fixture(scope="module")
+def jaw(folder: Folders, tmp_path_factory: pytest.TempPathFactory) -> Library:
+    return Library(folder("jaw").exported, tmp_path_factory.mktemp("library"))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e60, -1e200, 1e308])
+@pytest.mark.parametrize("question", ["inverse", "forward", "motion", "pose", "closure"])
+def test_no_number_gets_in(jaw: Library, question: str, bad: float) -> None:
+    """Not by any argument; and what stood in the results stays."""
+    for a in jaw.exported[question].inputs:
+        for i in range(a.size):
+            value = np.zeros(a.size)
+            value[i] = bad
+            status, found = jaw(question, **{a.name: value})
+            assert status == OUT_OF_BOUNDS, (a.name, i)
+            assert all((v == KEPT).all() for v in found.values())
+
+
+def test_out_of_reach(jaw: Library) -> None:
+    for question in ("inverse", "contact", "computed_torque"):
+        status, found = jaw(question, q=[0.3, 0, 0, 0])
+        assert status == UNREACHABLE and (found["effort"] == KEPT).all()
+
+
+def test_a_singular_pose_is_named_and_others_balance(tmp_path: Path) -> None:
+    """A hexapod a quarter turn about Z is singular; towards it by tenths, what is ok balances."""
+    mechanism = condyle.load("gough-stewart")
+    hexapod = Library(export(mechanism, ("inverse",), prefix="hexapod", lanes=0), tmp_path)
+    status, found = hexapod("inverse", q=[0, 0, 0, 0, 0, np.pi / 2], force=[1.0, 0, 0])
+    assert status == SINGULAR and (found["effort"] == KEPT).all()
+    model = condyle.derive(mechanism, backend="numpy")
+    passed = 0
+    for size in 10.0 ** -np.arange(1, 9):
+        q = np.array([0.01, -0.02, 0.015, 0.02, -0.03, np.pi / 2 - size])
+        status, found = hexapod("inverse", q=q, force=[1.0, 2.0, -30.0])
+        if status == OK:
+            J = model.jacobians(q[None])["J_theta"][0]
+            right = model.torques(
+                q[None], 0 * q[None], 0 * q[None], np.array([[1.0, 2, -30, 0, 0, 0, 0, 0, 0]])
+            ).effort[0]
+            off = np.abs(J.T @ (found["effort"] - right)).max()
+            assert off <= 1e-11 * np.abs(J.T @ np.diag(right)).max()
+            passed += 1
+    assert passed >= 5
+
+
+def test_small_and_denormal_numbers_are_numbers(jaw: Library) -> None:
+    home = jaw("inverse")
+    assert home[0] == OK
+    for tiny in (5e-324, -1e-310, 1e-200):
+        status, found = jaw("inverse", q=tiny, q1=tiny, q2=tiny, force=tiny)
+        assert status == OK
+        np.testing.assert_allclose(found["effort"], home[1]["effort"], rtol=1e-12)
+
+
+def test_poses_from_encoders_follow_a_motion(jaw: Library) -> None:
+    """Each from the one before, as the library finds them; from far off they are not guessed."""
+    model = condyle.derive(condyle.load("masticatory"))
+    t = np.linspace(0, 2 * np.pi, 60)[:, None]
+    q = np.hstack(
+        [0.004 * np.sin(t), 0.002 * np.sin(2 * t), 0.08 * (1 - np.cos(t)), 0.03 * np.sin(t)]
+    )
+    poses, _ = model._poses(q, 0 * q, 0 * q)
+    joints = model.kernel("encoders").run({"pose": poses["pose"]}).values["joint"].T
+    start = np.zeros(6)
+    for joint, pose in zip(joints, poses["pose"], strict=True):
+        status, found = jaw("pose", joint=joint, start=start)
+        assert status == OK
+        np.testing.assert_allclose(found["pose"], pose, atol=1e-11)
+        assert np.abs(found["residual"]).max() < 1e-11
+        start = found["pose"]
+    assert jaw("pose", joint=joints[30] + [0.1, 0, 0, 0, 0, 0], start=start)[0] == INFEASIBLE
+    right = ForwardKinematics(model.mechanism).solve(joints[:1] + 3.0).status[0]
+    assert right != OK and jaw("pose", joint=joints[0] + 3.0)[0] in (UNREACHABLE, SINGULAR)
+
+
+def test_turning_joints_may_count_whole_turns(jaw: Library) -> None:
+    assert jaw("pose", joint=2 * np.pi * np.arange(-3, 3))[0] == OK
+
+
+def test_the_controller_is_the_inverse_at_a_corrected_acceleration(jaw: Library) -> None:
+    rng = np.random.default_rng(5)
+    q, q1, q_d, q1_d, q2_d = 0.01 * rng.normal(size=(5, 4))
+    kp, kd = rng.uniform(1, 100, (2, 4))
+    load = {"force": [1.0, -2.0, 3.0], "point": [0.05, 0.02, -0.01]}
+    wanted = {"q_d": q_d, "q1_d": q1_d, "q2_d": q2_d, "kp": kp, "kd": kd}
+    status, found = jaw("computed_torque", q=q, q1=q1, **wanted, **load)
+    q2 = q2_d + kd * (q1_d - q1) + kp * (q_d - q)
+    model = condyle.derive(condyle.load("masticatory"))
+    acting = np.hstack([load["force"], np.zeros(3), load["point"]])
+    right = model.one(q, q1, q2, acting)
+    assert status == OK
+    np.testing.assert_allclose(found["effort"], right, rtol=0, atol=1e-13 * np.abs(right).max())
+
+
+def test_forward_undoes_inverse(jaw: Library) -> None:
+    rng = np.random.default_rng(6)
+    q, q1, q2 = 0.004 * rng.normal(size=(3, 4)) * [[1], [10], [100]]
+    states = {"q": q, "q1": q1, "force": [3.0, 1.0, -9.0], "point": 0.03}
+    status, found = jaw("contact", q2=q2, **states)
+    assert status == OK
+    status, back = jaw("forward", effort=found["effort"], **states)
+    assert status == OK
+    np.testing.assert_allclose(back["acceleration"], q2, rtol=1e-10)
+    np.testing.assert_allclose(back["contact_force"], found["contact_force"], rtol=1e-10)
+
+
+def test_numbers_that_change_are_another_mechanism(tmp_path: Path) -> None:
+    """A calibrated mechanism's numbers in the same code: its efforts."""
+    nominal = condyle.load("gough-stewart")
+    chains = list(nominal.chains)
+    chains[2] = chains[2].model_copy(update={"platform": tuple(np.add(chains[2].platform, 1e-3))})
+    calibrated = nominal.model_copy(update={"chains": tuple(chains)})
+    asked = {"questions": ("inverse",), "constants": "struct", "prefix": "arm"}
+    one, other = (export(m, **asked) for m in (nominal, calibrated))
+    assert one.source == other.source and one.header != other.header
+    told = []
+    for name, e in (("one", one), ("other", other)):
+        (tmp_path / f"{e.prefix}.h").write_text(e.header)
+        (tmp_path / f"{e.prefix}.c").write_text(e.source)
+        program = """#include <stdio.h>
+#include "arm.h"
+int main(void) {
+    arm_numbers numbers = ARM_NUMBERS;
+    arm_constants constants;
+    double q[6] = {0.01, 0.02, 0.01, 0.1, 0.2, 0.1}, zero[6] = {0}, effort[6];
+    arm_prepare(&numbers, &constants);
+    if (arm_inverse(&constants, q, zero, zero, zero, zero, zero, effort)) return 1;
+    for (int i = 0; i < 6; i++) printf("%.17g\\n", effort[i]);
+    return 0;
+}
+"""
+        (tmp_path / "main.c").write_text(program)
+        run("gcc", "-std=c99", "-O0", "main.c", "arm.c", "-o", name, "-lm", folder=tmp_path)
+        told.append(np.array(run(f"./{name}", folder=tmp_path).split(), dtype=float))
+    q = np.array([0.01, 0.02, 0.01, 0.1, 0.2, 0.1])
+    for found, mechanism in zip(told, (nominal, calibrated), strict=True):
+        right = condyle.derive(mechanism, backend="numpy").one(q, 0 * q, 0 * q, np.zeros(9))
+        np.testing.assert_allclose(found, right, rtol=0, atol=1e-12 * np.abs(right).max())
+    assert np.abs(told[0] - told[1]).max() > 1e-4 * np.abs(told[0]).max()

@@ -1,0 +1,68 @@
+"""MEX functions, compiled and called by Octave."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import loadmat, savemat
+from support.tools import run
+
+import condyle
+from condyle.errors import InputError
+from condyle.export.matlab import write_matlab
+
+
+def test_every_function_has_a_gateway_and_a_help_text(tmp_path: Path) -> None:
+    files = write_matlab(condyle.load("gough-stewart"), tmp_path, ("inverse",))
+    names = {path.name for path in files}
+    stem = "gough_stewart"
+    assert names == {
+        *(f"{stem}.c", f"{stem}.h", f"{stem}_inverse.m", f"{stem}_inverse_mex.c"),
+        *("build.m", f"{stem}_example.m"),
+    }
+    text = (tmp_path / f"{stem}_inverse.m").read_text()
+    assert "leg_1, leg_2" in text and "[N]" in text and "independent coordinates" in text
+
+
+def test_a_question_that_there_is_not(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="invers"):
+        write_matlab(condyle.load("gough-stewart"), tmp_path, ("invers",))
+    assert not list(tmp_path.iterdir())
+
+
+def test_octave_computes_what_condyle_does(tmp_path: Path) -> None:
+    """Samples in columns; the example runs; a bad sample is a status, or an error without one."""
+    mechanism = condyle.load("masticatory")
+    write_matlab(mechanism, tmp_path, ("contact", "forward"))
+    rng = np.random.default_rng(2)
+    scale = np.array([1e-3, 1e-3, 0.02, 0.05])
+    q, q1, q2 = (rng.uniform(-1, 1, (5, 4)) * scale * s for s in (1, 10, 100))
+    q[3, 0] = 0.5  # out of reach
+    load = np.hstack([rng.uniform(-10, 10, (5, 3)), np.zeros((5, 3)), np.full((5, 3), 0.01)])
+    force, point = load[:, :3], load[:1, 6:]
+    savemat(tmp_path / "in.mat", {"q": q.T, "q1": q1.T, "q2": q2.T, "force": force.T})
+    savemat(tmp_path / "point.mat", {"point": point.T})
+    code = """
+        build; masticatory_example;
+        load('in.mat'); load('point.mat'); none = zeros(3, 1);
+        [effort, contact, status] = masticatory_contact(q, q1, q2, force, none, point);
+        try masticatory_contact(q, q1, q2, force, none, point); said = '';
+        catch e, said = e.message; end
+        try masticatory_contact(q(1:3, :), q1, q2, force, none, point); wrong = '';
+        catch e, wrong = e.message; end
+        save('-v7', 'out.mat', 'effort', 'contact', 'status', 'said', 'wrong');
+    """
+    run("octave-cli", "--quiet", "--no-init-file", "--eval", code, folder=tmp_path)
+    out = loadmat(tmp_path / "out.mat", simplify_cells=True)
+    model = condyle.derive(mechanism, backend="numpy")
+    found = model.evaluate(q, q1, q2, load)
+    good = found.status == 0
+    assert list(out["status"]) == [0, 0, 0, 1, 0] and good.sum() == 4
+    assert np.isnan(out["effort"][:, 3]).all()
+    for got, right in ((out["effort"], found.effort), (out["contact"], found.contact_force)):
+        bound = 1e-12 * np.abs(right[good]).max()
+        np.testing.assert_allclose(got.T[good], right[good], rtol=0, atol=bound)
+    assert "sample 4 has status 1" in out["said"]
+    assert "q: expected a real matrix of 4 rows" in out["wrong"]

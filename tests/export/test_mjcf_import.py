@@ -1,0 +1,190 @@
+"""From MuJoCo's world to a mechanism file: there and back, a foreign platform, and clear noes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from oracles.rotations import bryant
+from pydantic import BaseModel
+from support.mujoco_player import Player
+
+import condyle
+from condyle.errors import InputError, UnsupportedError
+from condyle.export.mjcf import write_mjcf
+from condyle.export.mjcf_import import Found, from_mjcf
+from condyle.mechanism import load
+
+TEMPLATE = Path(__file__).with_name("stewart.xml")
+LENGTH = 0.5  # of a leg's two capsules
+
+
+def same(a: Any, b: Any, place: str = "") -> None:
+    """Two mechanisms agree in every number, but for the bounds, which MuJoCo does not have."""
+    if isinstance(a, BaseModel):
+        for key in type(a).model_fields:
+            if key not in ("bounds", "axis", "smoothing_speed"):
+                same(getattr(a, key), getattr(b, key), f"{place}.{key}")
+    elif isinstance(a, dict) or hasattr(a, "items"):
+        assert a.keys() == b.keys(), place
+        for key in a:
+            same(a[key], b[key], f"{place}.{key}")
+    elif isinstance(a, tuple):
+        assert len(a) == len(b), place
+        for i, (x, y) in enumerate(zip(a, b, strict=True)):
+            same(x, y, f"{place}[{i}]")
+    elif isinstance(a, float):
+        assert a == pytest.approx(b, rel=1e-9, abs=1e-11), place
+    else:
+        assert a == b, place
+
+
+@pytest.mark.parametrize("name", ["gough-stewart", "hexaglide", "masticatory", "human-jaw"])
+def test_there_and_back(name: str, tmp_path: Path) -> None:
+    mechanism = condyle.load(name)
+    write_mjcf(mechanism, tmp_path / "m.xml")
+    found = from_mjcf(tmp_path / "m.xml", name)
+    same(mechanism, found.mechanism)
+    assert not found.notes
+    for ours, theirs in zip(mechanism.chains, found.mechanism.chains, strict=True):
+        if ours.kind in ("RSS", "PSS"):  # a shaft comes back square to its crank
+            axes = [np.array(c.axis) / np.linalg.norm(c.axis) for c in (ours, theirs)]
+            np.testing.assert_allclose(*axes, rtol=0, atol=1e-2)
+
+
+def test_losses_and_every_family_come_back(tmp_path: Path) -> None:
+    changes = {
+        f"chain.masseter_left.actuator.{key}": value
+        for key, value in {
+            "torque_limit": (-1.0, 3.0),
+            "rotor_inertia": 1e-4,
+            "viscous": 0.004,
+            "coulomb": 0.03,
+        }.items()
+    }
+    mechanism = condyle.load("masticatory").set(changes)
+    write_mjcf(mechanism, tmp_path / "m.xml")
+    same(mechanism, from_mjcf(tmp_path / "m.xml", mechanism.name).mechanism)
+
+
+def stewart(folder: Path, carried: bool = True, **changes: str) -> Path:
+    """A foreign platform; `carried`: by a ball joint on its first leg."""
+    angles = np.radians([5, 55, 125, 175, 245, 295])
+    tops = np.radians([-10, 70, 110, 190, 230, 310])
+    base = np.column_stack([0.5 * np.cos(angles), 0.5 * np.sin(angles), 0.05 + 0 * angles])
+    top = np.column_stack([0.25 * np.cos(tops), 0.25 * np.sin(tops), 0.75 + 0 * tops])
+    plate = (
+        '<geom type="box" size="0.2 0.15 0.03" density="800" pos="0.01 0 0.02"/>'
+        '<site name="tool" pos="0 0 0.1"/>'
+    )
+    platform = f'<body name="plate" pos="0 0 0.85"><freejoint/>{plate}</body>'
+    legs, connects, drives = "", "", ""
+    for i, (b, t) in enumerate(zip(base, top, strict=True)):
+        x, y, z = (t - b) / np.linalg.norm(t - b)
+        tilt = np.degrees([np.arctan2(-y, z), np.arcsin(x), 0.0])  # Rx Ry take Z onto the leg
+        assert np.allclose(bryant(np.radians(tilt)) @ [0, 0, 1], [x, y, z])
+        ends = _text([0, 0, np.linalg.norm(t - b)])
+        hung = ""
+        if i == 0 and carried:
+            R = bryant(np.radians(tilt)).T
+            turned = _text(np.degrees(_bryant(R)))
+            at = R @ (np.array([0, 0, 0.75]) - b)
+            hung = (
+                f'<body name="plate" pos="{_text(at)}" euler="{turned}">'
+                f'<joint type="ball" pos="{_text(t - [0, 0, 0.75])}"/>{plate}</body>'
+            )
+        legs += f"""<body pos="{_text(b)}" euler="{_text(tilt)}" childclass="leg">
+          <joint name="u{i}" axis="1 0 0"/><geom size="0.01" fromto="0 0 0 0 0 0.02"/>
+          <body name="tube{i}"><joint axis="0 1 0" name="v{i}"/>
+            <geom size="0.02" fromto="0 0 0.1 0 0 {LENGTH}"/>
+            <body name="bar{i}"><joint name="leg{i}" class="drive"/>
+              <geom size="0.012" fromto="0 0 0.3 0 0 0.7"/>
+              <site name="end{i}" pos="{ends}"/>{hung}
+            </body></body></body>"""
+        if not hung:
+            connects += f'<connect body1="bar{i}" body2="plate" anchor="{ends}"/>'
+        drives += f'<position name="servo{i}" joint="leg{i}" class="drive"/>'
+    text = TEMPLATE.read_text()
+    for key, value in {
+        "LEGS": legs,
+        "PLATFORM": "" if carried else platform,
+        "CONNECTS": connects,
+        "DRIVES": drives,
+        **changes,
+    }.items():
+        text = text.replace(key, value)
+    (folder / "stewart.xml").write_text(text)
+    return folder / "stewart.xml"
+
+
+def _text(values: Any) -> str:
+    return " ".join(repr(float(v)) for v in values)
+
+
+def _bryant(R: np.ndarray) -> np.ndarray:
+    b = np.arcsin(R[0, 2])
+    return np.array([np.arctan2(-R[1, 2], R[2, 2]), b, np.arctan2(-R[0, 1], R[0, 0])])
+
+
+@pytest.mark.parametrize("carried", [False, True])
+def test_a_foreign_stewart_platform(tmp_path: Path, carried: bool) -> None:
+    """Its numbers follow from the drawing: bases, joints, limits, and weights at rest."""
+    path = stewart(tmp_path, carried)
+    found: Found = from_mjcf(path, "six")
+    m = found.mechanism
+    assert [c.kind for c in m.chains] == ["SPS"] * 6 and not m.contacts
+    assert m.chain_names == tuple(f"leg{i}" for i in range(6))
+    com = np.array([0.01, 0, 0.87])
+    assert m.chains[0].base == pytest.approx(
+        np.array([0.5 * np.cos(np.radians(5)), 0.5 * np.sin(np.radians(5)), 0.15]) - com
+    )
+    actuator = m.chains[2].actuator
+    assert actuator.force_limit == (-400.0, 500.0) and actuator.reflected_inertia == 0.5
+    assert (actuator.viscous, actuator.coulomb) == (3.0, 2.0)
+    assert m.platform.points["tool"] == pytest.approx(np.array([0, 0, 0.95]) - com)
+    player = Player(path.read_text(), "plate")
+    player.equations()
+    free = player.free()
+    zero = np.zeros((1, 6))
+    efforts = condyle.derive(m, backend="numpy").torques(zero, zero, zero, np.zeros((1, 9))).effort
+    needed = free.T @ player.needed()
+    at = [player.model.joint(f"leg{i}").dofadr[0] for i in range(6)]
+    assert free.shape[1] == 6
+    np.testing.assert_allclose(
+        free[at].T @ efforts[0], needed, rtol=0, atol=2e-3 * abs(needed).max()
+    )
+
+
+NOES = {
+    "a weld": ({"CONNECTS": '<weld body1="bar1" body2="bar2"/>'}, "kind weld"),
+    "open loops": ({"CONNECTS": '<connect site1="end1" site2="tool"/>'}, "open at home, by"),
+    "no platform": ({"CONNECTS": ""}, "no body is held by 3"),
+    "not MJCF": ({"<mujoco": "<robot"}, "cannot read it"),
+}
+
+
+@pytest.mark.parametrize("name", NOES)
+def test_a_clear_no(tmp_path: Path, name: str) -> None:
+    changes, said = NOES[name]
+    path = stewart(tmp_path, **changes)
+    with pytest.raises((InputError, UnsupportedError), match=said):
+        from_mjcf(path, "x")
+
+
+def test_another_chain_is_named_with_its_joints(tmp_path: Path) -> None:
+    path = stewart(tmp_path, carried=False, **{'<joint axis="0 1 0" name="v1"/>': ""})
+    with pytest.raises(UnsupportedError, match=r'"leg1".* hinge slide ball; expected ball slide'):
+        from_mjcf(path, "x")
+
+
+def test_the_command(condyle_command: Callable[..., Any], tmp_path: Path) -> None:
+    stewart(tmp_path)
+    outcome = condyle_command("new", "six", "--from-mjcf", "stewart.xml")
+    assert outcome.status == 0, outcome.err
+    assert load(tmp_path / "six.toml").name == "six"
+    assert "symmetric" not in outcome.err
+    refused = condyle_command("new", "six", "--from-mjcf", "missing.xml", "--force")
+    assert refused.status == 2 and "missing.xml" in refused.err

@@ -1,0 +1,118 @@
+"""Names, order, options and refusals."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import condyle
+from condyle.cli import completion
+from condyle.errors import InputError, UnsupportedError
+from condyle.export import CATALOGUE, export
+from condyle.export.names import identifier, identifiers, require_prefix
+from condyle.export.pick import picked
+
+
+@pytest.mark.parametrize(
+    "name, wanted",
+    [("left", "left"), ("left-1", "left_1"), ("2nd", "n2nd"), ("int", "int_"), ("class", "class_")],
+)
+def test_identifiers(name: str, wanted: str) -> None:
+    assert identifier(name) == wanted
+
+
+def test_no_two_names_meet() -> None:
+    found = identifiers(["a-b", "a_b", "A_B", "a_b_2"])
+    assert len({name.lower() for name in found.values()}) == 4
+
+
+@pytest.mark.parametrize("prefix", ["", "1a", "a-b", "int", "x" * 41, "a b", "é"])
+def test_prefixes_that_c_does_not_take(prefix: str) -> None:
+    with pytest.raises(InputError, match="prefix"):
+        require_prefix(prefix)
+
+
+def test_names_that_change_are_listed() -> None:
+    machine = condyle.load("masticatory")
+    chains = [c.model_copy(update={"name": f"chain-{i}"}) for i, c in enumerate(machine.chains)]
+    renamed = machine.model_copy(update={"chains": tuple(chains), "name": "3-jaw"})
+    e = export(renamed, ("motion",))
+    assert e.prefix == "n3_jaw" and e.names["chain-4"] == "chain_4"
+    assert "chain-4 is chain_4" in e.header and "N3_JAW_CHAIN_chain_4 = 4" in e.header
+
+
+def test_every_argument_is_documented() -> None:
+    e = export(condyle.load("masticatory"), ("motion", "pose"))
+    for f in e.functions:
+        for a in f.arguments:
+            assert f"{a.name}[{a.size}]  {'in' if a.given else 'out'}: {a.text} [" in e.header
+            assert a.size == len(a.units) == len(a.labels)
+    assert e["pose"].inputs[0].labels == tuple(c.name for c in condyle.load("masticatory").chains)
+    assert e.prototype(e["pose"]).startswith("int masticatory_pose(const double joint[6], ")
+
+
+@pytest.mark.parametrize(
+    "options, said",
+    [
+        ({"questions": ("invers",)}, "inverse"),
+        ({"questions": ()}, "no question"),
+        ({"precision": "half"}, "precision"),
+        ({"constants": "outside"}, "struct"),
+        ({"lanes": 3}, "lanes"),
+        ({"questions": ("closure",)}, "degrees of freedom"),
+        ({"questions": ("closure",), "landmark": "nose"}, "landmark"),
+    ],
+)
+def test_refusals_say_what_is_wrong(options: dict[str, Any], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        export(condyle.load("masticatory"), **{"questions": ("motion",), **options})
+
+
+def test_friction_at_many_contacts_has_no_closed_form() -> None:
+    machine = condyle.load("masticatory")
+    rough = [c.model_copy(update={"friction": _friction()}) for c in machine.contacts]
+    third = rough[0].model_copy(update={"name": "third", "point": (0.05, 0.0, 0.0)})
+    third = third.model_copy(update={"surface": _plane()})
+    many = machine.model_copy(update={"contacts": (*rough, third)})
+    with pytest.raises(UnsupportedError, match="at most 2"):
+        export(many, ("inverse",))
+
+
+def _friction() -> Any:
+    from condyle.mechanism.contact import Friction
+
+    return Friction(coefficient=0.1)
+
+
+def _plane() -> Any:
+    from condyle.mechanism.surface.plane import Plane
+
+    return Plane(kind="plane", slope=(0.0, 0.0), offset=0.0)
+
+
+def test_the_command(condyle_command: Any, tmp_path: Path) -> None:
+    done = condyle_command(
+        "export", "c", "gough-stewart", "--question", "motion", "--out", "x", "--json"
+    )
+    assert done.status == 0, done.err
+    told = json.loads(done.out)
+    assert told["functions"] == ["gough_stewart_motion"]
+    assert {Path(f).name for f in told["files"]} == {f.name for f in (tmp_path / "x").iterdir()}
+    refused = condyle_command("export", "c", "gough-stewart", "--prefix", "a-b", "--out", "y")
+    assert refused.status == 2 and "prefix" in refused.err and not (tmp_path / "y").exists()
+
+
+def test_completion_knows_every_question() -> None:
+    assert tuple(CATALOGUE) == completion.EXPORTS
+
+
+def test_only_what_is_used_is_taken() -> None:
+    text = (
+        "static int b(void) { return 1; }\n\n/* A. */\nstatic int a(void) {\n    return b();\n}\n"
+    )
+    assert picked(text, "x = b();") == "static int b(void) { return 1; }\n"
+    assert "/* A. */" in picked(text, "x = a();") and "int b(" in picked(text, "x = a();")
+    assert picked(text, "x").strip() == ""

@@ -1,0 +1,71 @@
+"""What is on the pictures of maps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.analysis.map.axes import grid_of
+from condyle.analysis.map.compute import asked_of
+from condyle.analysis.map.slices import slices_of
+from condyle.report.figures.map import LINES, drawn, grown, map_figure
+
+
+@pytest.fixture(scope="module")
+def model() -> condyle.Model:
+    return condyle.derive(condyle.load("masticatory"), backend="numpy")
+
+
+def drawing(model: condyle.Model, over: list[str], quantity: str | list[str]):
+    asked, grid = asked_of(model), grid_of(model.mechanism, over)
+    return condyle.workspace_map(model, over, quantity), list(slices_of(asked.reach, grid))
+
+
+def test_two_coordinates(model: condyle.Model) -> None:
+    """The border, the bounds and the motion stand where they are, in the units of the axes."""
+    over = ["X=-5:15:9 mm", "beta=-15:45:8 deg"]
+    dataset, slices = drawing(model, over, ["reachable", "ratio", "transmission"])
+    assert drawn(dataset) == ["cause", "ratio", "transmission"]
+    (one,) = slices
+    run = np.array([[0.0, 0.0], [0.001, 0.02]])
+    figure = map_figure(dataset, "ratio", slices, run)
+    place = figure.axes[0]
+    assert (place.get_xlabel(), place.get_ylabel()) == ("X [mm]", "β [°]")
+    np.testing.assert_allclose(place.get_xlim() + place.get_ylim(), (-5, 15, -15, 45))
+    paths = [line.get_xydata() for line in place.lines]
+    np.testing.assert_allclose(paths[-1], run * [1e3, 180 / np.pi])
+    for line, path in zip(one.lines, paths, strict=False):
+        np.testing.assert_allclose(path, line.points * [1e3, 180 / np.pi])
+    assert {line.kind for line in one.lines} == {"reach", "bounds"} <= LINES.keys()
+    labels = {text.get_text() for text in figure.legends[0].get_texts()}
+    assert {"reach of a chain", "bounds of a contact", "motion of the run"} <= labels
+    six = map_figure(dataset, "transmission", slices)
+    titles = [axes.get_title(loc="left") for axes in six.axes if axes.get_title(loc="left")]
+    assert titles[0] == "temporalis left" and len(titles) == 6
+    reach = map_figure(dataset, "cause", slices)
+    assert any("temporalis" in text.get_text() for text in reach.legends[0].get_texts())
+
+
+def test_slices_of_three_coordinates(model: condyle.Model) -> None:
+    over = ["X=-3:8:6 mm", "beta=-8:14:5 deg", "Y=-2:2:4 mm"]
+    dataset, slices = drawing(model, over, "ratio")
+    assert len(slices) == 2 and all(s.at == dataset.Y[s.index] for s in slices)
+    figure = map_figure(dataset, "ratio", slices)
+    titles = [a.get_title(loc="left") for a in figure.axes]
+    assert titles[:2] == [f"Y = {s.at * 1e3:.3g} mm" for s in slices]
+
+
+def test_one_coordinate(model: condyle.Model) -> None:
+    dataset, _ = drawing(model, ["X=-5:30:30 mm"], ["ratio", "pose"])
+    figure = map_figure(dataset, "pose")
+    lines = figure.axes[0].lines
+    assert [line.get_label() for line in lines] == ["Z", "γ"]  # what the contacts determine
+    assert np.isnan(lines[0].get_ydata()).any()
+
+
+def test_fields_grow_over_the_border() -> None:
+    field = np.full((5, 5), np.nan)
+    field[2, 2] = 3.0
+    assert (grown(field, 1)[1:4, 1:4] == 3.0).all() and np.isnan(grown(field, 1)[0]).all()
+    assert (grown(field, 2) == 3.0).all()

@@ -1,0 +1,97 @@
+"""Results for MATLAB: scipy reads back what was written, and Octave does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.io import loadmat
+from support.tools import run
+
+import condyle
+from condyle.motion import bundled_reference
+from condyle.results.matlab import matlab_name
+
+OCTAVE = ("octave-cli", "--quiet", "--no-init-file", "--eval")
+
+
+@pytest.fixture(scope="module")
+def solution() -> condyle.Solution:
+    motion = condyle.Motion.from_csv(bundled_reference()[0], rate=20)
+    return condyle.derive("masticatory", backend="numpy").solve(motion, condyle.reference_load())
+
+
+@pytest.fixture(scope="module")
+def saved(solution: condyle.Solution, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("mat") / "run.mat"
+    solution.save(path)
+    return path
+
+
+def test_every_variable_comes_back(solution: condyle.Solution, saved: Path) -> None:
+    read = loadmat(saved, simplify_cells=True)
+    assert list(read["chain"]) == list(solution["chain"].values)
+    assert read["info"]["mechanism_name"] == "masticatory"
+    for name, variable in solution.data_vars.items():
+        entry = read[name]
+        np.testing.assert_array_equal(np.ravel(entry["values"]), np.ravel(variable.values))
+        assert entry["units"] == variable.attrs["units"]
+        assert entry["long_name"] == variable.attrs["long_name"]
+        assert list(np.atleast_1d(entry["dims"])) == list(variable.dims)
+    assert read["torque"]["values"].shape == solution["torque"].shape
+
+
+def test_octave_reads_it(solution: condyle.Solution, saved: Path) -> None:
+    lines = (
+        f's = load("{saved}");',
+        'printf("%d %d\\n", size(s.torque.values));',
+        'printf("%.17g\\n", s.torque.values(3, 2));',
+        'printf("%s|%s|%s\\n", s.torque.units, s.chain{2}, s.torque.dims{1});',
+    )
+    size, value, words = run(*OCTAVE, "\n".join(lines), folder=saved.parent).split("\n")[:3]
+    assert size.split() == [str(n) for n in solution["torque"].shape]
+    assert float(value) == float(solution["torque"].values[2, 1])
+    assert words == f"N m|{solution.mechanism.chain_names[1]}|time"
+
+
+def test_states_as_a_table(condyle_command: Callable[..., Any], tmp_path: Path) -> None:
+    names = [p + n for p in ("", "d", "dd") for n in ("X", "Y", "alpha", "beta")]
+    rows = [",".join(names), ",".join(["0"] * 12), ",".join(["0.001"] * 12)]
+    (tmp_path / "states.csv").write_text("\n".join(rows))
+    command = (
+        "solve",
+        "masticatory",
+        "--states",
+        "states.csv",
+        "--out",
+        "x.csv",
+        "--backend",
+        "numpy",
+    )
+    outcome = condyle_command(*command, "--mat", "--reactions")
+    assert outcome.status == 0 and "x.mat" in outcome.out
+    read = loadmat(tmp_path / "x.mat", simplify_cells=True)
+    written = np.genfromtxt(tmp_path / "x.csv", delimiter=",", names=True)
+    chains = list(read["chain"])
+    columns = np.column_stack([written[f"tau_{chain}"] for chain in chains])
+    np.testing.assert_array_equal(read["torque"]["values"], columns)
+    assert read["torque"]["units"] == "N m" and read["pose"]["values"].shape == (2, 6)
+    reaction = read["reaction_shaft_force_masseter_left"]
+    assert reaction["units"] == "N" and reaction["values"].shape == (2, 3)
+
+
+def test_run_writes_it_beside_the_others(
+    condyle_command: Callable[..., Any], tmp_path: Path
+) -> None:
+    outcome = condyle_command("run", "--rate", "20", "--backend", "numpy", "--mat")
+    assert outcome.status == 0, outcome.err
+    assert {path.suffix for path in (tmp_path / "results").iterdir()} == {".nc", ".csv", ".mat"}
+
+
+def test_names_that_matlab_takes() -> None:
+    assert matlab_name("masseter left") == "masseter_left"
+    assert matlab_name("2nd") == "x2nd" and matlab_name("_x") == "x_x"
+    assert len(matlab_name("a" * 100)) == 63
