@@ -25,6 +25,7 @@ BALL: RGB = (194, 24, 91)
 ALARM: RGB = (201, 42, 42)
 WARNING: RGB = (224, 160, 74)
 LOAD: RGB = (70, 80, 92)
+HAND: RGB = (16, 93, 202)
 MARKERS: dict[str, RGB] = {"fixed": (7, 169, 115), "platform": (16, 93, 202), "": (116, 95, 138)}
 MARKER = 2.4  # radius of a measured marker, over that of a rod
 BODY = {"calm": PLATFORM, "warning": WARNING, "unreachable": ALARM}
@@ -241,7 +242,9 @@ class Stage:
                 handle.visible = False
             return
         while len(self._pushes) < len(snapshot.pushes):
-            self._pushes.append(self._arrow(f"pushes/{len(self._pushes)}", LOAD, 1))
+            last = len(self._pushes) == len(snapshot.pushes) - 1
+            colour = HAND if last else LOAD
+            self._pushes.append(self._arrow(f"pushes/{len(self._pushes)}", colour, 1))
         for handle, force, point in zip(
             self._pushes, snapshot.pushes, snapshot.pushes_at, strict=True
         ):
