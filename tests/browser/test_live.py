@@ -145,7 +145,7 @@ def grip(tab: Tab) -> tuple[int, int]:
 
     def blue(pixels: np.ndarray) -> Any:
         left = 440  # of it there are blue rods
-        return np.argwhere(near(pixels[420:, left:560], HANDLE)) + [420, left]
+        return np.argwhere(near(pixels[420:, left:560], HANDLE)) + np.array([420, left])
 
     found = blue(tab.picture_where("canvas", lambda p: len(blue(p)) > 20, "the grip"))
     return int(found[0][1]), int(found[0][0]) + 10

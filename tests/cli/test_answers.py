@@ -48,6 +48,7 @@ CALLS: dict[str, tuple[str, ...]] = {
         *("motion", "from-c3d", "a trial.c3d", "--markers", "markers.toml"),
         *("--mechanism", "my jaw.toml", "--out", "a motion.csv"),
     ),
+    "export c": ("export", "c", "my jaw.toml", "--question", "motion", "--out", "for c"),
     "export fmu": ("export", "fmu", "my jaw.toml", "--out", "units", "--kind", "inverse"),
     "export matlab": ("export", "matlab", "my jaw.toml", "--out", "for matlab"),
     "export mjcf": ("export", "mjcf", "my jaw.toml", "--out", "for mujoco"),

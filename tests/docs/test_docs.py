@@ -102,7 +102,11 @@ def registers() -> Iterator[None]:
 def put_files_of_a_reader(folder: Path) -> None:
     """Files that commands in the text name without making them."""
     (folder / "my.toml").write_text(bundled_text("masticatory"), encoding="utf-8")
-    (folder / "masses.toml").write_text(MASSES, encoding="utf-8")
+    for name in ("masses.toml", "study.toml"):
+        (folder / name).write_text(MASSES, encoding="utf-8")
+    (folder / "chew.toml").write_text("duration = 0.004\n")
+    drives = '[controller]\nkind = "joint_pd"\nstiffness = 5\ndamping = 0.03\n'
+    (folder / "drives.toml").write_text(f"duration = 0.002\n{drives}")
     jaw = record(noise=5e-5)
     jaw.write(folder / "trial.c3d")
     jaw.write_tables(folder / "markers.toml")
@@ -357,6 +361,14 @@ JSON = {
     "condyle map": (
         *("map", "masticatory", "--over", "X=0:3:3 mm", "--quantity", "joint", "--no-figures"),
     ),
+    "condyle simulate": ("simulate", "my.toml", "--scenario", "chew.toml", "--out", "fall"),
+    "condyle simulate --check-gains": (
+        *("simulate", "my.toml", "--scenario", "drives.toml", "--check-gains"),
+    ),
+    "condyle simulate --new": ("simulate", "my.toml", "--new", "--out", "new"),
+    "condyle export fmu": ("export", "fmu", "gough-stewart", "--kind", "inverse", "--out", "units"),
+    "condyle export matlab": ("export", "matlab", "gough-stewart", "--out", "matlab"),
+    "condyle export mjcf": ("export", "mjcf", "gough-stewart", "--out", "mujoco"),
     "condyle export c": ("export", "c", "gough-stewart", "--question", "motion", "--out", "c"),
     "condyle plot": ("plot",),
     "condyle plot SOLUTION": (
