@@ -193,8 +193,7 @@ class Evaluator:
         """
         assert self._general is not None
         other = copy(self._general)
-        own = ("characteristic_length", "reference_force", "policy", "_distributor", "_robust")
-        for name in own:
+        for name in _cached_by(type(self)):
             other.__dict__.pop(name, None)
         other.mechanism = mechanism
         _ = other.policy  # has to fit, now
@@ -659,6 +658,12 @@ class Evaluator:
             general = self._general is not None
             self._closures[key] = Closure(self.mechanism, names, landmark, self.backend, general)
         return self._closures[key]
+
+
+def _cached_by(kind: type) -> tuple[str, ...]:
+    """What instances keep because it was asked for once."""
+    kept = (vars(one).items() for one in kind.__mro__)
+    return tuple(n for items in kept for n, v in items if isinstance(v, cached_property))
 
 
 def _names(outputs: Collection[str]) -> list[str]:
