@@ -40,7 +40,7 @@ def exported_probes(mechanism: Mechanism) -> Iterator[Probe]:
         source = folder / f"{'wide' if define else 'plain'}.c"
         text = define + made.source + ADAPTER.format(call=call(made))
         source.write_text(text, encoding="utf-8")
-        compiler.build(source, source.with_suffix(".so"))
+        compiler.build(source.with_suffix(".so"), source)
         one = ctypes.CDLL(str(source.with_suffix(".so"))).one
         run = partial(_seconds, timer, one, samples, len(case.samples))
         yield Probe(f"{mechanism.name} {name}", run, _error(one, samples, case.right[:FEW]))
