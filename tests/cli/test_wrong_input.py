@@ -219,6 +219,21 @@ CASES: dict[str, Case] = {
     "solution is none": (("report", "in.csv"), "t\n0\n", "is not a NetCDF solution"),
     "solution empty": (("plot", "in.csv"), "", "is not a NetCDF solution"),
     "solution to view": (("view", "--no-browser", "--solution", "a.nc"), None, "no such file"),
+    "scenario to view": (
+        ("view", "--no-browser", "--simulate", "in.csv"),
+        "duration = -1\n[controller]\nkind = 'pid'\n",
+        "2 problems",
+    ),
+    "scenario that does not fit": (
+        ("view", "--no-browser", "--simulate", "in.csv"),
+        "[start]\ndZ = 1.0\n",
+        "dZ is not free",
+    ),
+    "solution and scenario to view": (
+        ("view", "--no-browser", "--simulate", "in.csv", "--solution", "in.csv"),
+        "",
+        "shows no solution",
+    ),
     "figure": (("plot", "--figure", "torq"), None, 'Did you mean "torque"'),
     # commands, options and numbers
     "command": (("chekc",), None, "'check'"),

@@ -26,20 +26,37 @@ def view(
             "brings its mechanism."
         ),
     ] = None,
+    simulate: Annotated[
+        Path | None,
+        typer.Option(
+            help="Scenario (TOML) to run live, as of condyle simulate: turn gains and food while "
+            "it runs, and pull the platform with the mouse.",
+        ),
+    ] = None,
     port: Annotated[int, typer.Option(help="Port on 127.0.0.1.", min=1, max=65535)] = 8080,
     browser: Annotated[bool, typer.Option(help="Open the page in a browser.")] = True,
     quiet: options.Quiet = False,
 ) -> None:
     """A mechanism to move by hand, in the browser.
 
-    A page of this machine alone: move the platform and read torques, contact forces and reach, or
-    play back a run. It stays until Ctrl-C.
+    A page of this machine alone: move the platform and read torques, contact forces and reach,
+    play back a run, or simulate one while you look. It stays until Ctrl-C.
     """
     require("viser", "view")
     from ..view import serve
 
     own = solution is None and map is None
-    serve(mechanism if own else None, solution, port=port, open_browser=browser, map=map)
+    serve(
+        mechanism if own else None,
+        solution,
+        port=port,
+        open_browser=browser,
+        map=map,
+        scenario=simulate,
+    )
     if not quiet:
         then = ("report", solution) if solution else ("check", mechanism)
-        typer.echo(f"Next: {command_line(*then)}")
+        line = command_line(*then)
+        if simulate is not None:
+            line = command_line("simulate", mechanism, scenario=simulate)
+        typer.echo(f"Next: {line}")

@@ -123,6 +123,7 @@ class Loop:
 
     y, effort, cut: state, efforts as they act (n,), and which of them limits cut; to be changed
     between calls as `go_on` is called.
+    budget: steps that `advance` takes at most.
     """
 
     def __init__(
@@ -148,7 +149,7 @@ class Loop:
         m, n, k = len(plan.q), len(plan.low), len(plan.model.mechanism.contacts)
         self.y, self.effort = np.zeros(plan.size), np.zeros(n)
         self.cut = np.zeros(n, dtype=np.uint8)
-        self._past = past
+        self._past, self.budget = past, BUDGET
         self._flags = np.zeros(len(past), dtype=np.uint8)
         plant = run.plant
         plant.m, plant.n, plant.k, plant.loads, plant.guards = m, n, k, len(plan.loads), len(guards)
@@ -167,8 +168,7 @@ class Loop:
         plant.low, plant.high = self._at(bounds[0]), self._at(bounds[1])
         plant.past = self._flags.ctypes.data
         self._loads = (_Load * max(len(plan.loads), 1))()
-        for i, load in enumerate(plan.loads):
-            self._fill(self._loads[i], load)
+        self._fill_all(plan.loads)
         plant.load = ctypes.addressof(self._loads)
         self._time(plan)
         run.y, run.effort = self.y.ctypes.data, self.effort.ctypes.data
@@ -213,7 +213,7 @@ class Loop:
     def advance(self) -> int:
         """Go on; returns DONE, PAUSE (nothing happened yet), or what the caller has to see to."""
         self._flags[:] = self._past
-        self._run.budget = BUDGET
+        self._run.budget = self.budget
         return int(self._library.advance(ctypes.addressof(self._run)))
 
     def go_on(self, t: float, next_: int, tick: int, fresh: bool) -> None:
@@ -225,6 +225,13 @@ class Loop:
         """Of the loads."""
         for load, mode in zip(self._loads, modes, strict=False):
             load.mode = mode
+
+    def change(self, drive: OpenLoop | ClosedLoop, loads: Sequence[BoundLoad]) -> None:
+        """Go on with other numbers in the law and in the loads, which stay what they are."""
+        self._fill_all(loads)
+        if self._run.drive in (JOINT_PD, COMPUTED_TORQUE):
+            assert isinstance(drive, ClosedLoop)
+            self._gains(drive.law)
 
     # -- what it reads ------------------------------------------------------------------------
 
@@ -257,9 +264,12 @@ class Loop:
         else:
             return
         run.aims = aims.ctypes.data
-        run.stiffness, run.damping = self._at(law.stiffness), self._at(law.damping)
+        self._gains(law)
         run.inverse, _, order = self._kernel(law.model, "inverse", ())
         run.inverse_order = self._at(np.array(order, dtype=np.int64))
+
+    def _gains(self, law: Any) -> None:
+        self._run.stiffness, self._run.damping = self._at(law.stiffness), self._at(law.damping)
 
     def _kernel(
         self, model: Evaluator, question: str, *details: Any
@@ -275,6 +285,10 @@ class Loop:
             where[result.name] = start
             start += kernel.interface.width(result)
         return found, where, kernel.order
+
+    def _fill_all(self, loads: Sequence[BoundLoad]) -> None:
+        for to, load in zip(self._loads, loads, strict=False):
+            self._fill(to, load)
 
     def _fill(self, to: _Load, load: BoundLoad) -> None:
         told = _load(load)

@@ -24,13 +24,23 @@ class Plant:
     """Kernels and loads of one run. It looks at one state at a time."""
 
     def __init__(self, model: Evaluator, loads: Sequence[BoundLoad]) -> None:
-        self._model, self._loads = model, loads
+        self._model = model
         self._m = len(model.independent)
         self._instant = Instant(model)
         self._forward = Single(model.kernel("forward", ("contact",)))
-        self._points = [tuple(load.point.tolist()) for load in loads]
+        self.loads = loads
         self._zero = np.zeros(3)
         self._lossy = bool(model.mechanism.contacts)
+
+    @property
+    def loads(self) -> Sequence[BoundLoad]:
+        """What acts on the platform."""
+        return self._loads
+
+    @loads.setter
+    def loads(self, loads: Sequence[BoundLoad]) -> None:
+        self._loads = loads
+        self._points = [tuple(load.point.tolist()) for load in loads]
 
     # -- a state --------------------------------------------------------------------------
 

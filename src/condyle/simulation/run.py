@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any, NoReturn
 
 import numpy as np
 
 from ..progress import step as progress
 from ..status import STATUS_NAMES, Status
-from .compiled import DONE, LOOK, STEP, Loop, loop_of
+from .compiled import BUDGET, DONE, LOOK, PAUSE, STEP, Loop, loop_of
 from .controllers import Measured
 from .events import KINDS, Event
 from .integrators import INTEGRATORS, Stuck
+from .loads import BoundLoad
 from .plan import ClosedLoop, OpenLoop, Plan, Trace
 from .plant import Plant
 from .sensing import Lost, Observer
@@ -31,14 +34,17 @@ def run(plan: Plan) -> Trace:
 
 
 class Run:
-    """One run of a plan, under way."""
+    """One run of a plan, under way.
+
+    t, y: where it is [s], and the state there;  modes: of the loads;  events: up to there.
+    """
 
     def __init__(self, plan: Plan, advance: Callable[[float], None] = lambda _: None) -> None:
         self._plan, self._advance = plan, advance
         self._plant = Plant(plan.model, plan.loads)
         self._watch = Watch(plan, self._plant)
-        self._modes = list(plan.modes)
-        self._events: list[Event] = []
+        self.modes = list(plan.modes)
+        self.events: list[Event] = []
         self._seen: dict[tuple[str, str], int] = {}
         n, count = len(plan.low), len(plan.times)
         self._effort = np.zeros(n)
@@ -51,34 +57,58 @@ class Run:
         self._drive = plan.drive
         self._loop = _Loop(plan, self._plant) if isinstance(plan.drive, ClosedLoop) else None
         self._cut = np.zeros(n, dtype=bool)
+        self._corners, self._ticks, self._corner = plan.corners(), plan.ticks(), 0
+        self._integrator: Any = INTEGRATORS[plan.method](self._rate, plan.settings)
+        self.t, self.y = 0.0, np.zeros(plan.size)
+        self.y[: 2 * len(plan.q)] = np.concatenate([plan.q, plan.q1])
 
     def trace(self) -> Trace:
         """Run to the end, or to what ends it."""
-        plan = self._plan
-        y = np.zeros(plan.size)
-        y[: 2 * len(plan.q)] = np.concatenate([plan.q, plan.q1])
-        integrator = INTEGRATORS[plan.method](self._rate, plan.settings)
-        with suppress(_Ended):
-            if (quick := self.quick()) is not None:
-                y = self._by_compiled_code(quick, integrator, y)
-            else:
-                y = self._by_steps(integrator, y)
-            self._keep_end(plan.duration, y)
+        with suppress(Ended):
+            self.go_to(self._plan.duration, self.quick())
+            self._keep_end(self._plan.duration, self.y)
         return self._trace()
 
-    def _by_steps(self, integrator: Any, y: np.ndarray) -> np.ndarray:
-        """From corner to corner; returns the last state."""
-        plan = self._plan
-        corners, ticks, said = plan.corners(), plan.ticks(), 0.0
-        for t, until in zip(corners[:-1].tolist(), corners[1:].tolist(), strict=True):
+    def go_to(self, until: float, quick: Loop | None) -> None:
+        """Run to a time, the end at most [s]; `quick`: of this run, the same every time.
+
+        Raises: Ended: where the run is over before.
+        """
+        if quick is not None:
+            self._by_compiled_code(until, quick)
+        else:
+            self._by_steps(until)
+
+    def change(self, drive: OpenLoop | ClosedLoop, loads: tuple[BoundLoad, ...]) -> None:
+        """Go on with other numbers in the law and in the loads, which stay what they are."""
+        self._drive = drive
+        self._plan = replace(self._plan, drive=drive, loads=loads)
+        self._plant.loads = self._watch.loads = loads
+        if self._loop is not None:
+            assert isinstance(drive, ClosedLoop)
+            self._loop.change(drive)
+        for crossing in self._watch.overtaken(self.t, self.y, self.modes):
+            self._happened(crossing)
+
+    def effort(self) -> np.ndarray:
+        """Efforts as they act now, (n,)."""
+        return self._acting_here(self.t, self.y).copy()
+
+    def _by_steps(self, until: float) -> None:
+        """From corner to corner."""
+        corners, ticks, said = self._corners, self._ticks, self.t
+        while self.t < until - ROUNDING:
             due = self._tick + 1
-            if due < len(ticks) and ticks[due] <= t + ROUNDING:
-                self._look(t, y, due)
-            _, y = self._between(integrator, t, until, y)
-            if until - said >= SAY:
-                self._advance(until - said)
-                said = until
-        return y
+            if due < len(ticks) and ticks[due] <= self.t + ROUNDING:
+                self._look(self.t, self.y, due)
+            corner = float(corners[self._corner + 1])
+            end = min(corner, until)
+            _, self.y = self._between(self._integrator, self.t, end, self.y)
+            self.t = end
+            self._corner += end == corner
+            if end - said >= SAY:
+                self._advance(end - said)
+                said = end
 
     def quick(self) -> Loop | None:
         """The run in compiled code, where there is such a loop for its plan."""
@@ -92,27 +122,30 @@ class Run:
             aims = np.array([np.concatenate([*a.state, a.joint, a.joint_rate]) for a in loop.aims])
         return loop_of(self._plan, self._watch.told, self._watch.past, results, looks, aims)
 
-    def _by_compiled_code(self, quick: Loop, integrator: Any, y: np.ndarray) -> np.ndarray:
-        """The same by `loop.c`, but for what it hands back; returns the last state."""
-        corners, said = self._plan.corners(), 0.0
-        quick.y[:] = y
+    def _by_compiled_code(self, until: float, quick: Loop) -> None:
+        """The same by `loop.c`, but for what it hands back."""
+        step = self._plan.settings.step
+        assert step is not None
+        quick.y[:] = self.y
         while True:
-            quick.set_modes(self._modes)
-            code = quick.advance()
+            quick.set_modes(self.modes)
+            quick.budget = min(max(math.ceil((until - self.t) / step), 0), BUDGET)
+            code, said = quick.advance(), self.t
             t, self._next, self._tick = quick.t, quick.next, quick.tick
             self._effort, y, fresh = quick.effort.copy(), quick.y.copy(), False
+            self.t, self.y = t, y
             self._advance(t - said)
-            said = t
-            if code == DONE:
-                return y
+            if code == DONE or (code == PAUSE and t >= until - ROUNDING):
+                return
             if code == LOOK:
                 self._look(t, y, self._tick + 1)
             elif code == STEP:
-                until = float(corners[quick.corner + 1])
-                t, y = self._between(integrator, t, until, y, once=True)
-                if t >= until - ROUNDING:
+                end = float(self._corners[quick.corner + 1])
+                t, y = self._between(self._integrator, t, end, y, once=True)
+                if t >= end - ROUNDING:
                     quick.corner += 1
                     fresh = True
+                self.t, self.y = t, y
             quick.y[:], quick.effort[:], quick.cut[:] = y, self._effort, self._cut
             quick.go_on(t, self._next, self._tick, fresh)
 
@@ -129,14 +162,14 @@ class Run:
             np.empty((0, n)) if loop is None else loop.count[:looked],
             np.empty((0, 2 * m)) if loop is None else loop.estimate[:looked],
             np.empty(0) if loop is None else loop.force[:looked],
-            tuple(self._events),
+            tuple(self.events),
         )
 
     # -- efforts ------------------------------------------------------------------------------
 
     def _rate(self, t: float, y: np.ndarray) -> np.ndarray:
         plant, drive = self._plant, self._drive
-        wrench = plant.state(t, y, self._modes)
+        wrench = plant.state(t, y, self.modes)
         return plant.rate_here(y, self._acting(t, y, drive), wrench)
 
     def _acting(self, t: float, y: np.ndarray, drive: OpenLoop | ClosedLoop) -> np.ndarray:
@@ -145,7 +178,7 @@ class Run:
             effort = np.array([np.interp(t, drive.times, one) for one in drive.efforts.T])
         elif drive.period is None:
             assert self._loop is not None
-            effort = self._loop.at_once(t, y, self._modes)
+            effort = self._loop.at_once(t, y, self.modes)
         else:
             return self._effort
         return np.clip(effort, self._plan.low, self._plan.high)
@@ -154,7 +187,7 @@ class Run:
         """The controller looks, and what it asked for before comes to act."""
         assert self._loop is not None
         try:
-            asked = self._loop.look(t, y, self._modes, k)
+            asked = self._loop.look(t, y, self.modes, k)
         except Lost:
             self._end(t, y, "lost", KINDS["lost"])
         if not np.isfinite(asked).all():
@@ -176,12 +209,12 @@ class Run:
     def _between(
         self, integrator: Any, t: float, until: float, y: np.ndarray, once: bool = False
     ) -> tuple[float, np.ndarray]:
-        """Integrate to `until`, or one step; raises _Ended where the run is over before."""
+        """Integrate to `until`, or one step; raises Ended where the run is over before."""
         try:
             self._begin(integrator, t, until, y)
             while t < until - ROUNDING:
                 step = integrator.step()
-                crossing = self._watch.crossing(step, self._modes, self._acting_here)
+                crossing = self._watch.crossing(step, self.modes, self._acting_here)
                 end = step.t1 if crossing is None else crossing.time
                 self._keep(t, end, step.at)
                 t, y = end, step.y1
@@ -202,17 +235,17 @@ class Run:
     def _begin(self, integrator: Any, t: float, until: float, y: np.ndarray) -> None:
         integrator.restart(t, y, until)
         effort = self._acting_here(t, y)
-        for crossing in self._watch.begin(t, y, self._modes, effort):
+        for crossing in self._watch.begin(t, y, self.modes, effort):
             self._happened(crossing)
 
     def _acting_here(self, t: float, y: np.ndarray) -> np.ndarray:
-        self._plant.state(t, y, self._modes)
+        self._plant.state(t, y, self.modes)
         return self._acting(t, y, self._drive)
 
     def _happened(self, crossing: Crossing) -> None:
         t, y = crossing.time, crossing.state
         if crossing.load is not None:
-            self._modes[crossing.load] = crossing.mode
+            self.modes[crossing.load] = crossing.mode
         if crossing.ends:
             self._keep_end(t, y)
             self._end(t, y, crossing.kind, crossing.text, crossing.owner)
@@ -221,7 +254,8 @@ class Run:
 
     def _end(self, t: float, y: np.ndarray, kind: str, text: str, owner: str = "") -> NoReturn:
         self._note(t, y, kind, text, owner, ends=True)
-        raise _Ended
+        self.t, self.y = t, y
+        raise Ended
 
     def _note(
         self, t: float, y: np.ndarray, kind: str, text: str, owner: str = "", ends: bool = False
@@ -234,7 +268,7 @@ class Run:
             return
         if seen == MANY and not ends:
             text += "; more of these are not listed"
-        self._events.append(Event(float(t), kind, text, owner, ends, state))
+        self.events.append(Event(float(t), kind, text, owner, ends, state))
 
     # -- what is kept ---------------------------------------------------------------------------
 
@@ -253,7 +287,7 @@ class Run:
 
     def _keep_one(self, t: float, y: np.ndarray) -> None:
         i = self._next
-        self._state[i], self._kept_modes[i], self._kept_tick[i] = y, self._modes, self._tick
+        self._state[i], self._kept_modes[i], self._kept_tick[i] = y, self.modes, self._tick
         if isinstance(self._drive, ClosedLoop) and self._drive.period is not None:
             self._kept_effort[i] = self._effort
         else:
@@ -261,7 +295,7 @@ class Run:
         self._next += 1
 
 
-class _Ended(Exception):
+class Ended(Exception):
     """The run is over; why is among the events."""
 
 
@@ -274,7 +308,7 @@ class _Loop:
         self._drive, self._plant, m, n = drive, plant, len(plan.q), len(plan.low)
         self._m = m
         self._memory = drive.law.begin()
-        ticks = plan.ticks()
+        ticks = self._ticks = plan.ticks()
         self.aims = drive.path.references(ticks) if len(ticks) else []
         self.command, self.count = (np.empty((len(ticks), n)) for _ in range(2))
         self.estimate, self.force = np.empty((len(ticks), 2 * m)), np.zeros(len(ticks))
@@ -283,6 +317,15 @@ class _Loop:
             self._observer = Observer(drive.law.model, drive.sensing, drive.period)
             at = plant.look(plan.q, plan.q1)
             self._observer.begin(plan.q, plan.q1, at["joint"].copy())
+
+    def change(self, drive: ClosedLoop) -> None:
+        """Another law, or another force to aim at."""
+        before, self._drive = self._drive.path, drive
+        path = drive.path
+        if path is not before:
+            force = np.interp(self._ticks, path.force_times, path.force).tolist()
+            aims = zip(self.aims, force, strict=True)
+            self.aims = [replace(aim, force=f) for aim, f in aims]
 
     def look(self, t: float, y: np.ndarray, modes: list[int], k: int) -> np.ndarray:
         """Look at tick k; returns the efforts asked for that begin to act now, (n,)."""

@@ -15,6 +15,7 @@ from .plant import Plant
 
 TOLERANCE = 1e-12  # seconds, of the time of an event
 
+MODES = 3  # of a load, at most, that follow one another at once
 SUDDEN = 1e-9  # m, N, rad/s or m/s beyond zero: not rounding
 
 Acting = Callable[[float, np.ndarray], np.ndarray]
@@ -51,7 +52,7 @@ class Watch:
     """The guards of one run: bounds, pulls of one-sided contacts, speeds, and the loads' own."""
 
     def __init__(self, plan: Plan, plant: Plant) -> None:
-        self._plant, self._loads = plant, plan.loads
+        self._plant, self.loads = plant, plan.loads
         machine = self._machine = plan.model.mechanism
         self._m = len(plan.q)
         self._bounded = [
@@ -113,6 +114,23 @@ class Watch:
             self._guards(modes)[first], t, step.y1 if t == step.t1 else step.at(t)
         )
 
+    def overtaken(self, t: float, y: np.ndarray, modes: Sequence[int]) -> list[Crossing]:
+        """What loads do at once whose numbers have changed, each until nothing more happens."""
+        self._plant.state(t, y, modes)
+        found = []
+        for i, (load, mode, (s, v, _)) in enumerate(
+            zip(self.loads, modes, self._plant.places(), strict=True)
+        ):
+            for _ in range(MODES):
+                values = load.guards(t, s, v, mode)
+                passed = [j for j, g in zip(load.jumps(mode), values, strict=True) if g > 0]
+                if not passed:
+                    break
+                mode = passed[0].mode
+                guard = _Guard(passed[0].kind, passed[0].text, load.name, load=i, mode=mode)
+                found.append(self._crossing(guard, t, y))
+        return found
+
     @staticmethod
     def _crossing(g: _Guard, t: float, y: np.ndarray) -> Crossing:
         return Crossing(t, y, g.kind, g.text, g.owner, g.ends, g.load, g.mode)
@@ -135,7 +153,7 @@ class Watch:
 
     def _guards(self, modes: Sequence[int]) -> list[_Guard]:
         found = list(self._own)
-        for i, (load, mode) in enumerate(zip(self._loads, modes, strict=True)):
+        for i, (load, mode) in enumerate(zip(self.loads, modes, strict=True)):
             for jump in load.jumps(mode):
                 found.append(_Guard(jump.kind, jump.text, load.name, load=i, mode=jump.mode))
         return found
@@ -154,7 +172,7 @@ class Watch:
         if self._quick.size:
             rate = np.abs(plant.last["joint_rate"][self._quick])
             values += (rate - self._speed).tolist()
-        if self._loads:
-            for load, mode, (s, v, _) in zip(self._loads, modes, plant.places(), strict=True):
+        if self.loads:
+            for load, mode, (s, v, _) in zip(self.loads, modes, plant.places(), strict=True):
                 values += load.guards(t, s, v, mode)
         return np.array(values)

@@ -16,6 +16,8 @@ from ..errors import InputError
 from ..kinematics.chain import FAMILIES
 from ..mechanism import Mechanism, bundled_mechanisms, load, parse
 from ..results.solution import Solution, open_solution
+from .live import LivePlayer
+from .live_panel import LivePanel
 from .playback import Playback
 from .readout import COLOURS, effects_html, internal_text, status_html, tables_html
 from .session import MOST_INTERNAL, Session
@@ -33,7 +35,8 @@ class Page(Protocol):
     session: Session
     stage: Stage
     snapshot: Snapshot
-    playback: Playback | None
+    playback: Playback | LivePlayer | None
+    live: LivePlayer | None
     dragging: bool
     dark: bool
 
@@ -54,6 +57,10 @@ class Panel:
         self._gui.set_panel_label(f"condyle - {view.session.mechanism.name}")
         self._status = self._gui.add_html("")
         tabs = self._gui.add_tab_group()
+        self._live: LivePanel | None = None
+        if view.live is not None:
+            with tabs.add_tab("Live"):
+                self._live = LivePanel(self._gui, self, view.live, view.stage)
         with tabs.add_tab("Move"):
             self._add_pose()
             self._add_load()
@@ -68,7 +75,7 @@ class Panel:
         views.on_click(lambda _: view.wish("camera", partial(view.look_from, views.value)))
         self._follow_drags()
 
-    def _hear(self, kind: str, handle: Any, action: Callable[[Any], None]) -> None:
+    def hear(self, kind: str, handle: Any, action: Callable[[Any], None]) -> None:
         """Wish `action(value)` when a hand changes a handle, not when the panel itself does."""
 
         # On viser's own thread: a pool's thread might read the value after the worker's next one.
@@ -78,7 +85,7 @@ class Panel:
 
         handle.on_update(heard)
 
-    def _press(self, label: str, action: Callable[[], None], **options: Any) -> Any:
+    def press(self, label: str, action: Callable[[], None], **options: Any) -> Any:
         button = self._gui.add_button(label, **options)
         button.on_click(lambda _: self._view.wish(label, action))
         return button
@@ -90,13 +97,14 @@ class Panel:
         for c in self._coordinates.values():
             low, high = round_outwards(c.low * c.scale, c.high * c.scale)
             slider = self._gui.add_slider(f"{c.name} [{c.unit}]", low, high, 0.01, 0.0)
-            self._hear(c.name, slider, partial(self.move, c.name))
+            self.hear(c.name, slider, partial(self.move, c.name))
             self._sliders[c.name] = slider
         self._known = session.q.copy()
-        self._press("Go home", self.go_home)
-        show = self._gui.add_checkbox("Handle to drag", True)
+        self.press("Go home", self.go_home)
         control = self._view.stage.control
-        self._hear("control", show, lambda on: setattr(control, "visible", on))
+        control.visible = self._view.live is None  # the hand of a simulation has a grip of its own
+        show = self._gui.add_checkbox("Handle to drag", control.visible)
+        self.hear("control", show, lambda on: setattr(control, "visible", on))
 
     def _add_load(self) -> None:
         mechanism = self._view.session.mechanism
@@ -106,10 +114,10 @@ class Panel:
         with self._gui.add_folder("Load on the platform"):
             for axis, name in enumerate(("Fx", "Fy", "Fz")):
                 slider = self._gui.add_slider(f"{name} [N]", -most, most, most / 500, 0.0)
-                self._hear(name, slider, partial(self.push, axis))
+                self.hear(name, slider, partial(self.push, axis))
             here, points = session.load_point, session.load_points
             at = self._gui.add_dropdown("at", points, initial_value=here)
-            self._hear("at", at, lambda point: session.set_load(session.load, point))
+            self.hear("at", at, lambda point: session.set_load(session.load, point))
 
     def _add_internal(self) -> None:
         """One slider for each direction of internal efforts, as many as a panel can hold."""
@@ -124,10 +132,10 @@ class Panel:
             slider = self._gui.add_slider(
                 f"direction {i + 1} [{unit}]", -high, high, high / 500, 0.0
             )
-            self._hear(f"internal {i}", slider, partial(session.set_internal, i))
+            self.hear(f"internal {i}", slider, partial(session.set_internal, i))
             self._internal.append(slider)
         if shown:
-            self._press("No internal efforts", self.release)
+            self.press("No internal efforts", self.release)
         self._effects = self._gui.add_html("")
 
     def release(self) -> None:
@@ -142,18 +150,18 @@ class Panel:
         upload = self._gui.add_upload_button("Open a solution", mime_type=".nc")
         upload.on_upload(lambda _: self._view.wish("open", partial(self.open_nc, upload.value)))
         self._time: Any = self._gui.add_slider("t [s]", 0.0, 1.0, 0.001, 0.0, disabled=True)
-        self._play = self._press("Play", self.toggle, disabled=True)
+        self._play = self.press("Play", self.toggle, disabled=True)
         self._speed = self._gui.add_dropdown("Speed", tuple(SPEEDS), initial_value="1×")
-        self._hear("time", self._time, self.seek)
-        self._hear("speed", self._speed, self.set_speed)
+        self.hear("time", self._time, self.seek)
+        self.hear("speed", self._speed, self.set_speed)
 
     def _add_files(self) -> None:
         bundled = self._gui.add_dropdown("Bundled", ("-", *bundled_mechanisms()))
-        self._hear("open", bundled, self.open_bundled)
+        self.hear("open", bundled, self.open_bundled)
         upload = self._gui.add_upload_button("Open a mechanism (.toml)", mime_type=".toml")
         upload.on_upload(lambda _: self._view.wish("open", partial(self.open_toml, upload.value)))
         dark = self._gui.add_checkbox("Dark page", self._view.dark)
-        self._hear("dark", dark, self._view.set_dark)
+        self.hear("dark", dark, self._view.set_dark)
 
     def _follow_drags(self) -> None:
         stage = self._view.stage
@@ -181,6 +189,8 @@ class Panel:
                 c, slider = self._coordinates[name], self._sliders[name]
                 slider.value = float(np.clip(value * c.scale, slider.min, slider.max))
         self._known = session.q.copy()
+        if self._live is not None:
+            self._live.show(self._view.playback is self._view.live)
         if self._playback is not None:
             self._time.value = self._playback.now
             self._play.label = "Pause" if self._playback.playing else "Play"
@@ -242,6 +252,14 @@ class Panel:
         self._view.playback.pause()
         self._view.playback = None
         self._view.session.take_pose(self._view.snapshot.pose)
+
+    def wish(self, kind: str, action: Callable[[], None]) -> None:
+        """Let the view's worker do something soon."""
+        self._view.wish(kind, action)
+
+    def watch_live(self) -> None:
+        """Show the simulation again, if a hand or a solution had taken over."""
+        self._view.playback = self._view.live
 
     def _player(self) -> Playback:
         """The playback, on the page again if a hand had taken over."""

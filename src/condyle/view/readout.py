@@ -8,14 +8,16 @@ from html import escape
 import numpy as np
 
 from ..kinematics.chain import FAMILIES
-from ..mechanism import Mechanism
+from ..mechanism import COORDINATES, Mechanism
 from ..mechanism.chain import limits
 from .internal import Directions
+from .live import LivePlayer, event_lines
 from .snapshot import Snapshot
 
 COLOURS = {"calm": "#2b8a3e", "warning": "#b35c00", "unreachable": "#c92a2a"}
 SIGNS = {"calm": "✓", "warning": "⚠", "unreachable": "✕"}
 _CELL = "padding:1px 5px;text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums"
+EVENTS = 8  # that the page lists
 DIGITS = 6  # most significant digits
 _HEAD = "opacity:.65;font-weight:400"
 _NAME = "padding:1px 6px 1px 0;text-align:left;font-weight:500;white-space:nowrap"
@@ -76,6 +78,30 @@ def effects_html(
     if changed:
         tables += _table(["Chain", "added effort"], changed, "internal")
     return f'<div style="margin:4px 10px;font-size:12px;overflow-x:auto">{tables}</div>'
+
+
+def live_html(player: LivePlayer) -> str:
+    """Errors of a simulation, forces of its loads, and what has happened, the newest first."""
+    now, parts = player.moment, []
+    if now.error is not None:
+        heads, cells = ["Tracking error"], [""]
+        for name, error in zip(player.independent, now.error, strict=True):
+            length = name in COORDINATES[:3]
+            heads.append(f"{name} {'mm' if length else '°'}")
+            cells.append(number(error * 1e3 if length else np.degrees(error), 3))
+        parts.append(_table(heads, [cells], "errors"))
+    names = [*player.load_names, "your hand"]
+    rows = [
+        [name, number(float(np.linalg.norm(force)), 2, "N")]
+        for name, force in zip(names, now.forces, strict=True)
+    ]
+    if now.bite is not None:
+        rows.append(["as the controller feels it", number(now.bite, 2, "N")])
+    parts.append(_table(["Load", "force"], rows, "loads"))
+    lines = event_lines(player, EVENTS)
+    items = "<br>".join(map(escape, lines)) or "Nothing has happened yet."
+    parts.append(f'<div data-table="events" style="line-height:1.4">{items}</div>')
+    return f'<div style="margin:4px 10px;font-size:12px;overflow-x:auto">{"".join(parts)}</div>'
 
 
 def _pose(s: Snapshot) -> str:

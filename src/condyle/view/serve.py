@@ -10,10 +10,10 @@ import contextlib
 import io
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import viser
 
@@ -22,6 +22,7 @@ from ..errors import CondyleError, InputError
 from ..mechanism import Mechanism, load
 from ..results.solution import Solution, open_solution
 from .gate import Gate, guarded
+from .live import LivePlayer
 from .maps import MapLayer
 from .panel import Panel
 from .playback import Playback
@@ -32,6 +33,9 @@ from .stage import Stage
 if TYPE_CHECKING:
     import xarray as xr
 
+    from ..simulation import Scenario
+    from ..simulation.plan import Plan
+
 DEFAULT = "masticatory"
 BRAND = (16, 93, 202)
 FRAME = 1 / 30  # seconds between pictures of a solution that plays
@@ -40,7 +44,8 @@ FRAME = 1 / 30  # seconds between pictures of a solution that plays
 class View:
     """A running page. `url` is where it is; `close` ends it.
 
-    Attributes: session: the pose and the load that people move;  playback: a solution, or None;
+    Attributes: session: the pose and the load that people move;  playback: a solution or a
+                simulation that the page shows, or None;  live: the simulation, if there is one;
                 snapshot: what is shown now;  port: that was free.
     """
 
@@ -56,6 +61,7 @@ class View:
         host: str = "127.0.0.1",
         port: int = 8080,
         dataset: xr.Dataset | None = None,
+        live: LivePlayer | None = None,
     ) -> None:
         """Start serving. Raises: MechanismError: if the contacts do not hold the platform."""
         session = Session(mechanism)
@@ -73,7 +79,8 @@ class View:
         self._wake = threading.Event()
         self._closed = False
         self.dragging = False
-        self.playback: Playback | None = None
+        self.live = live
+        self.playback: Playback | LivePlayer | None = live
         self.map: MapLayer | None = None
         self._enter(session)
         if solution is not None:
@@ -106,13 +113,14 @@ class View:
         Raises: CondyleError: if it cannot be; the page keeps what it had.
         """
         session = Session(mechanism)  # before anything is cleared
-        self.playback = None
+        self.playback = self.live = None
         self._enter(session)
 
     def play_solution(self, solution: Solution) -> None:
         """Show a solution and its mechanism, at its first sample; for the worker."""
         playback = Playback(solution)
         if playback.mechanism != self.session.mechanism:
+            self.live = None
             self._enter(Session(playback.mechanism))
         self.playback = playback
         points = self.session.mechanism.platform.points
@@ -211,8 +219,11 @@ def open_view(
     host: str = "127.0.0.1",
     port: int = 8080,
     map: xr.Dataset | str | Path | None = None,
+    scenario: Scenario | Mapping[str, Any] | str | Path | None = None,
 ) -> View:
     """Start the page and return at once; see `serve`."""
+    if scenario is not None and (solution is not None or map is not None):
+        raise InputError("a page that simulates a scenario shows no solution and no map beside it")
     if isinstance(map, str | Path):
         map = open_map(map)
     if map is not None and map["status"].ndim == 1:
@@ -224,7 +235,21 @@ def open_view(
     if not isinstance(mechanism, Mechanism):
         solved = solution.mechanism if solution is not None else None
         mechanism = load(mechanism) if mechanism is not None else solved or load(DEFAULT)
-    return View(mechanism, solution, host, port, map)
+    live = None if scenario is None else LivePlayer(planned(mechanism, scenario))
+    return View(mechanism, solution, host, port, map, live)
+
+
+def planned(mechanism: Mechanism, scenario: Any) -> Plan:
+    """What a scenario does to a mechanism.
+
+    Raises: ScenarioError: for a scenario with anything wrong, or that does not fit.
+    """
+    from ..results.model import derive
+    from ..simulation.bind import bind
+    from ..simulation.simulating import as_scenario
+
+    source = str(scenario) if isinstance(scenario, str | Path) else "scenario"
+    return bind(derive(mechanism), as_scenario(scenario), source=source)
 
 
 def serve(
@@ -234,6 +259,7 @@ def serve(
     port: int = 8080,
     open_browser: bool = False,
     map: xr.Dataset | str | Path | None = None,
+    scenario: Scenario | Mapping[str, Any] | str | Path | None = None,
 ) -> None:
     """Serve the live page until interrupted.
 
@@ -244,9 +270,10 @@ def serve(
             open_browser: show the page at once.
             map: of `workspace_map`, or the path of its file: shown beside its mechanism, which
                 goes where the map is clicked.
-    Raises: CondyleError: if mechanism or solution cannot be used.
+            scenario: to simulate while the page is open, as of `condyle.simulate`, or its file.
+    Raises: CondyleError: if mechanism, solution, map or scenario cannot be used.
     """
-    view = open_view(mechanism, solution, host, port, map)
+    view = open_view(mechanism, solution, host, port, map, scenario)
     if view.port != port and port:
         print(f"condyle view: port {port} is in use; took {view.port}", flush=True)
     print(f"condyle view: {view.url} (stop with Ctrl-C)", flush=True)

@@ -31,6 +31,8 @@ class Snapshot:
     time:           of a solution that is played [s], or None.
     stale:          there is no result, and `pose` is that of another time.
     over:           chains whose effort is outside its limits.
+    pushes, pushes_at: forces besides, (l, 3) in {S} [N], and their points, (l, 3) in {M} [m];
+                    the last is a hand's.
     markers:        of a solution with measured ones, (m, 3) [m] in {S}, NaN where not seen.
     """
 
@@ -56,4 +58,6 @@ class Snapshot:
     time: float | None = None
     stale: bool = False
     over: tuple[str, ...] = ()
+    pushes: np.ndarray | None = None
+    pushes_at: np.ndarray | None = None
     markers: np.ndarray | None = None

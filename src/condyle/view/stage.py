@@ -25,6 +25,7 @@ BALL: RGB = (194, 24, 91)
 ALARM: RGB = (201, 42, 42)
 WARNING: RGB = (224, 160, 74)
 LOAD: RGB = (70, 80, 92)
+HAND: RGB = (16, 93, 202)
 MARKERS: dict[str, RGB] = {"fixed": (7, 169, 115), "platform": (16, 93, 202), "": (116, 95, 138)}
 MARKER = 2.4  # radius of a measured marker, over that of a rod
 BODY = {"calm": PLATFORM, "warning": WARNING, "unreachable": ALARM}
@@ -64,19 +65,11 @@ class Stage:
         self._add_platform()
         self._add_chains()
         self._arrows = {
-            name: self._scene.add_arrows(
-                f"/forces/{name}",
-                np.zeros((count, 2, 3)),
-                colour,
-                shaft_radius=0.018,
-                head_radius=0.045,
-                head_length=0.11,
-                visible=False,
-            )
-            for name, colour, count in self._arrow_kinds()
+            name: self._arrow(name, colour, count) for name, colour, count in self._arrow_kinds()
         }
         self._paths: list[Any] = []
         self._markers: list[Any] = []
+        self._pushes: list[Any] = []
         self.control = self._scene.add_transform_controls(
             "/drag", scale=0.55, line_width=3.0, depth_test=False
         )
@@ -84,6 +77,17 @@ class Stage:
     def _arrow_kinds(self) -> list[tuple[str, RGB, int]]:
         count = len(self.mechanism.contacts)
         return [("load", LOAD, 1)] + ([("contact", BALL, count)] if count else [])
+
+    def _arrow(self, name: str, colour: RGB, count: int) -> Any:
+        return self._scene.add_arrows(
+            f"/forces/{name}",
+            np.zeros((count, 2, 3)),
+            colour,
+            shaft_radius=0.018,
+            head_radius=0.045,
+            head_length=0.11,
+            visible=False,
+        )
 
     def _add_static(self, home: Any) -> None:
         """Lights and contact surfaces."""
@@ -193,6 +197,7 @@ class Stage:
             for name in drawing.balls:
                 self._joints[chain.name, name].position = points[name]
         self._show_forces(snapshot)
+        self._show_pushes(snapshot)
         places = np.full((len(self._markers), 3), np.nan)
         if snapshot.markers is not None:
             places = self.scale * snapshot.markers
@@ -229,6 +234,32 @@ class Stage:
             if name == "contact":
                 at = at - arrow - radii * force / np.maximum(size, 1e-300)
             handle.points = np.stack([at, at + arrow], axis=1).astype(np.float32)
+
+    def _show_pushes(self, snapshot: Snapshot) -> None:
+        """Forces of loads that answer, and of the hand: each leaves its point."""
+        if snapshot.pushes is None or snapshot.pushes_at is None:
+            for handle in self._pushes:
+                handle.visible = False
+            return
+        while len(self._pushes) < len(snapshot.pushes):
+            last = len(self._pushes) == len(snapshot.pushes) - 1
+            colour = HAND if last else LOAD
+            self._pushes.append(self._arrow(f"pushes/{len(self._pushes)}", colour, 1))
+        for handle, force, point in zip(
+            self._pushes, snapshot.pushes, snapshot.pushes_at, strict=True
+        ):
+            size = float(np.linalg.norm(force))
+            handle.visible = bool(np.isfinite(size)) and size > 0
+            if handle.visible:
+                at = self.scale * snapshot.scene.on_platform(tuple(point)).ravel()
+                arrow = force * ARROW / max(size, self.largest_force["load"])
+                handle.points = np.stack([at, at + arrow])[None].astype(np.float32)
+
+    def add_grip(self) -> Any:
+        """A handle at a point, to pull it by."""
+        return self._scene.add_transform_controls(
+            "/grip", scale=0.4, line_width=3.0, depth_test=False, disable_rotations=True
+        )
 
     def show_paths(self, paths: list[np.ndarray]) -> None:
         """Draw the paths (N, 3) [m] of a solution, in place of those before."""

@@ -10,7 +10,7 @@ All that lasts from one period to the next is in `memory`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -65,7 +65,11 @@ class Law:
 
     model: the mechanism as the controller takes it to be.
     point: where it measures force, in {M}, or None.
+    knobs: numbers that a hand may turn while it runs, with their units (see `condyle.simulation.
+           knobs`); `force` is that of the path.
     """
+
+    knobs: ClassVar[Mapping[str, str]] = {}
 
     model: Evaluator
     point: np.ndarray | None = field(default=None, kw_only=True)

@@ -21,8 +21,9 @@ hard. Since f is borne all the time, efforts do not jump where one law follows t
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -90,6 +91,12 @@ class BiteForceLaw(ComputedTorqueLaw):
 
     period: [s], over which the integral grows at a call.
     """
+
+    knobs: ClassVar[Mapping[str, str]] = {
+        **ComputedTorqueLaw.knobs,
+        "force": "N", "proportional": "1", "integral": "1/s", "bite_damping": "1/s",
+        "threshold": "N",
+    }  # fmt: skip
 
     direction: np.ndarray
     proportional: float

@@ -14,8 +14,9 @@ see `condyle.simulation.gains.error_bound`.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -40,6 +41,8 @@ class ComputedTorque(ControllerTable):
 
 @dataclass(frozen=True)
 class ComputedTorqueLaw(Law):
+    knobs: ClassVar[Mapping[str, str]] = {"stiffness": "1/s²", "damping": "1/s"}
+
     stiffness: np.ndarray
     damping: np.ndarray
 

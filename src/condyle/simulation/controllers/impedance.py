@@ -13,8 +13,9 @@ dynamically consistent (Khatib, IEEE J. Robotics and Automation 3 (1987) 43-53).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -55,6 +56,10 @@ class Impedance(ControllerTable):
 
 @dataclass(frozen=True)
 class ImpedanceLaw(Law):
+    knobs: ClassVar[Mapping[str, str]] = {
+        "stiffness": "N/m", "damping": "N s/m", "posture": "1/s²", "posture_damping": "1/s",
+    }  # fmt: skip
+
     stiffness: np.ndarray
     damping: np.ndarray
     posture: float

@@ -11,8 +11,9 @@ other: gains should be alike. A cable takes no push: it slackens where the law a
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -43,6 +44,10 @@ class JointPD(ControllerTable):
 
 @dataclass(frozen=True)
 class JointPDLaw(Law):
+    knobs: ClassVar[Mapping[str, str]] = {
+        "stiffness": "N m/rad or N/m", "damping": "N m s/rad or N s/m",
+    }  # fmt: skip
+
     stiffness: np.ndarray
     damping: np.ndarray
     gravity: bool

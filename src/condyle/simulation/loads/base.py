@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -34,8 +34,11 @@ class BoundLoad:
 
         force = law(t, s, v, mode),   s = p - p_home, v = p',
 
-    in {S}, with p the point. The mode is an integer that only guards change.
+    in {S}, with p the point. The mode is an integer that only guards change. `knobs`: numbers that
+    a hand may turn while it runs, with their units.
     """
+
+    knobs: ClassVar[Mapping[str, str]] = {}
 
     name: str
     point: np.ndarray

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -125,6 +125,10 @@ class FoodTable(LoadTable):
 
 @dataclass(frozen=True)
 class BoundFood(BoundLoad):
+    knobs: ClassVar[Mapping[str, str]] = {
+        "thickness": "m", "stiffness": "N/m", "damping": "N s/m", "break_force": "N",
+    }  # fmt: skip
+
     direction: tuple[float, ...] = (0.0, 0.0, 1.0)
     thickness: float = 0.0
     stiffness: float = 0.0

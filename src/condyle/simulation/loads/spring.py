@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
@@ -34,6 +34,8 @@ class Spring(LoadTable):
 
 @dataclass(frozen=True)
 class BoundSpring(BoundLoad):
+    knobs: ClassVar[Mapping[str, str]] = {"stiffness": "N/m", "damping": "N s/m", "rest": "m"}
+
     direction: tuple[float, ...] = (0.0, 0.0, 1.0)
     stiffness: float = 0.0
     damping: float = 0.0

@@ -1,0 +1,185 @@
+"""A simulation to watch while it runs: it keeps pace with the clock as well as it can."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..kinematics.singularity import KINDS
+from ..mechanism import Mechanism
+from ..motion.points import DEFAULT_LOAD_POINT
+from ..report.scene import place
+from ..results.contacts import bound_margins
+from ..simulation.integrators import Stuck
+from ..simulation.live import Live, Moment
+from ..simulation.plan import Plan
+from .session import CENTRE, force_vectors, over_limits, state_messages
+from .snapshot import Level, Snapshot
+
+SLICE = 2e-3  # seconds of the simulation between two looks at the clock
+BUDGET = 0.04  # seconds of work between two pictures
+LONGEST = 0.1  # seconds: a longer time between two pictures is not made up for
+BEHIND = 0.9  # of the speed that was asked for, below which the page says so
+SMOOTHING = 0.8  # of the pace, from picture to picture
+HAND = 1000.0  # 1/s^2: stiffness of the hand, of the platform's mass
+
+
+class LivePlayer:
+    """A simulation with a clock; of the same use to the page as a `Playback`.
+
+    Attributes: playing;  speed: times real time;  again: whether it begins again at its end;
+                stiffness: of the hand [N/m];  pull_at: name of the point that it holds.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        self.mechanism: Mechanism = plan.model.mechanism
+        self._plan, self._model = plan, plan.model
+        self.live = Live(plan)
+        self.playing, self.speed, self.again = True, 1.0, True
+        self.stiffness = HAND * self.mechanism.platform.mass
+        points = self.mechanism.platform.points
+        self.pull_at = DEFAULT_LOAD_POINT if DEFAULT_LOAD_POINT in points else CENTRE
+        self._pace = 1.0
+        self._last = self.live.moment()
+
+    @property
+    def now(self) -> float:
+        """Time of the simulation [s]."""
+        return self.live.t
+
+    @property
+    def independent(self) -> tuple[str, ...]:
+        """Names of q."""
+        return tuple(self._model.independent)
+
+    @property
+    def load_names(self) -> tuple[str, ...]:
+        """Of the scenario's loads."""
+        return tuple(load.name for load in self._plan.loads)
+
+    @property
+    def pull_points(self) -> tuple[str, ...]:
+        """Where a hand can pull."""
+        return (CENTRE, *self.mechanism.platform.points)
+
+    @property
+    def moment(self) -> Moment:
+        """The last that could be seen."""
+        return self._last
+
+    # -- time -----------------------------------------------------------------------------------
+
+    def play(self) -> None:
+        """Go on; from the start where it is over."""
+        if self.live.over:
+            self.live.restart()
+        self.playing = True
+
+    def pause(self) -> None:
+        self.playing = False
+
+    def restart(self) -> None:
+        """From the start, with sliders as they are."""
+        self.live.restart()
+
+    def advance(self, seconds: float) -> bool:
+        """Let `seconds` of real time pass; returns whether anything moved."""
+        if not self.playing or seconds <= 0:
+            return False
+        seconds = min(seconds, LONGEST)
+        begun, late = self.live.t, time.perf_counter() + BUDGET
+        until = begun + seconds * self.speed
+        while not self.live.over and self.live.t < until and time.perf_counter() < late:
+            self.live.go_to(min(self.live.t + SLICE, until))
+        if self.live.over:
+            if self.again and self.live.ended is None:
+                self.live.restart()
+            else:
+                self.playing = False
+        else:
+            pace = (self.live.t - begun) / (seconds * self.speed)
+            self._pace = SMOOTHING * self._pace + (1 - SMOOTHING) * pace
+        return True
+
+    # -- hands ----------------------------------------------------------------------------------
+
+    def pull(self, held: np.ndarray) -> None:
+        """Hold the point `pull_at` by a spring at (3,) [m] in {S}, critically damped."""
+        damping = 2 * float(np.sqrt(self.stiffness * self.mechanism.platform.mass))
+        self.live.pull(self._pulled(), held, self.stiffness, damping)
+
+    def let_go(self) -> None:
+        """Take the hand away."""
+        self.live.let_go()
+
+    def grip(self) -> np.ndarray:
+        """Where the point `pull_at` is, (3,) [m] in {S}."""
+        scene = place(self.mechanism, self._last.pose[None], self._last.joint[None])
+        return np.array(scene.on_platform(tuple(self._pulled()))).ravel()
+
+    def _pulled(self) -> np.ndarray:
+        return np.array(self.mechanism.platform.points.get(self.pull_at, (0.0, 0.0, 0.0)))
+
+    # -- what is seen -----------------------------------------------------------------------------
+
+    def snapshot(self) -> Snapshot:
+        """The mechanism now, or where it could be seen last."""
+        stale = False
+        try:
+            self._last = self.live.moment()
+        except Stuck:
+            stale = True
+        now = self._last
+        scene = place(self.mechanism, now.pose[None], now.joint[None])
+        found = self._model.configuration(now.pose[None])
+        margin = bound_margins(self.mechanism, found.contact_point)[0]
+        measures = found.singularity
+        ratio = float(measures.ratio[0])
+        level, messages = self._messages(now, margin)
+        return Snapshot(
+            mechanism=self.mechanism,
+            pose=now.pose,
+            wanted=None,
+            scene=scene,
+            broken=(),
+            joint=now.joint,
+            rate=now.joint_rate,
+            torque=now.effort,
+            reach=None,
+            contact_force=now.contact_force,
+            force_vector=force_vectors(self.mechanism, scene.contacts, now.contact_force),
+            margin=margin,
+            load=np.zeros(3),
+            load_at=np.zeros(3),
+            ratio=ratio,
+            condition=float(measures.condition[0]),
+            near=KINDS[int(measures.kind()[0])] if np.isfinite(ratio) else KINDS[0],
+            level=level,
+            messages=messages,
+            time=self.live.t,
+            stale=stale,
+            over=over_limits(self.mechanism, now.effort),
+            pushes=now.forces,
+            pushes_at=now.points,
+        )
+
+    def _messages(self, now: Moment, margin: np.ndarray) -> tuple[Level, tuple[str, ...]]:
+        state = state_messages(
+            self.mechanism, margin, now.contact_force, now.effort, now.joint_rate
+        )
+        if (end := self.live.ended) is not None:
+            whose = f" ({end.owner})" if end.owner else ""
+            return "unreachable", (f"It ended: {end.text}{whose}", *state)
+        told: list[str] = []
+        if self.live.over:
+            told.append("It is over.")
+        if self.playing and self._pace < BEHIND:
+            told.append(f"Slower than asked: {self._pace * self.speed:.2g} times real time")
+        return ("warning" if state else "calm"), (*told, *state)
+
+
+def event_lines(player: LivePlayer, count: int) -> Sequence[str]:
+    """The last events, the newest first."""
+    return [str(event) for event in player.live.events[: -count - 1 : -1]]

@@ -1,0 +1,151 @@
+"""A live simulation: its clock and its messages without a page, then its page under hands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.errors import InputError
+from condyle.view import View, live, open_view
+from condyle.view.live import LivePlayer
+from condyle.view.readout import live_html, status_html
+from condyle.view.serve import planned
+
+from .conftest import Tab
+from .test_view import HANDLE, fill, near, row
+
+TORQUE = {"kind": "computed_torque", "stiffness": 2500.0}
+FOOD = {"kind": "food", "food": "bolus", "point": "right_molar"}
+CHEW = {"duration": 3.0, "controller": TORQUE, "load": [FOOD]}
+
+
+@pytest.fixture
+def player(reference: condyle.Mechanism, monkeypatch: pytest.MonkeyPatch) -> LivePlayer:
+    monkeypatch.setattr(live, "BUDGET", np.inf)  # however slow this machine is
+    return LivePlayer(planned(reference, CHEW))
+
+
+def test_it_keeps_the_time_of_the_clock(player: LivePlayer) -> None:
+    assert player.advance(0.03) and player.now == pytest.approx(0.03, abs=1e-9)
+    player.speed = 0.5
+    player.advance(0.04)
+    assert player.now == pytest.approx(0.05, abs=1e-9)
+    player.advance(1e3)  # after a long sleep it does not run after the clock
+    assert player.now == pytest.approx(0.1, abs=1e-9)
+    player.pause()
+    assert not player.advance(0.1) and player.now == pytest.approx(0.1, abs=1e-9)
+    player.play()
+    player.restart()
+    assert player.now == 0
+
+
+def test_it_says_that_it_cannot_keep_pace(
+    player: LivePlayer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(live, "BUDGET", 0.0)
+    for _ in range(20):
+        player.advance(0.1)
+    assert player.now == 0
+    assert "Slower than asked" in player.snapshot().messages[0]
+
+
+def test_its_numbers_are_those_of_a_simulation(
+    reference: condyle.Mechanism, player: LivePlayer
+) -> None:
+    for _ in range(5):
+        player.advance(0.1)
+    found = player.snapshot()
+    solved = condyle.simulate(condyle.derive(reference), {**CHEW, "duration": 0.5, "rate": 100.0})
+    last = solved.isel(time=-1)
+    for name, value in {"pose": found.pose, "joint": found.joint, "torque": found.torque}.items():
+        np.testing.assert_allclose(value, last[name], rtol=1e-3, atol=1e-6, err_msg=name)
+    np.testing.assert_allclose(found.contact_force, last["contact_force"], rtol=1e-3, atol=1e-4)
+    assert found.time == pytest.approx(0.5) and found.rate is not None
+    told = live_html(player)
+    error = np.degrees(last["tracking_error"].values[3])
+    assert f">{error:.3f}<" in told and "food" in told
+
+
+def test_an_end_is_said_and_a_restart_goes_on(reference: condyle.Mechanism) -> None:
+    player = LivePlayer(planned(reference, {"duration": 5.0, "start": {"dbeta": 0.1}}))
+    while player.playing:
+        player.advance(0.1)
+    found = player.snapshot()
+    assert found.level == "unreachable" and "It ended" in found.messages[0]
+    assert np.isfinite(found.pose).all() and "It ended" in status_html(found)
+    player.play()
+    assert player.now == 0 and player.advance(0.01) and player.live.ended is None
+
+
+def test_it_begins_again_at_its_end(
+    reference: condyle.Mechanism, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(live, "BUDGET", np.inf)
+    player = LivePlayer(planned(reference, {"duration": 0.05, "controller": TORQUE}))
+    player.advance(0.1)
+    assert player.now == 0 and player.playing
+    player.again = False
+    player.advance(0.1)
+    assert not player.playing and player.snapshot().messages[0] == "It is over."
+
+
+def test_a_scenario_stands_alone(reference: condyle.Mechanism) -> None:
+    with pytest.raises(InputError, match="no solution"):
+        open_view(reference, "a.nc", scenario=CHEW)
+
+
+@pytest.fixture
+def view(browser: object) -> Iterator[View]:
+    running = open_view("masticatory", port=0, scenario={**CHEW, "duration": 1000.0})
+    yield running
+    running.close()
+
+
+def test_hands_on_the_page(open_tab: Callable[..., Tab], view: View) -> None:
+    tab = open_tab(view.url)
+    player = view.live
+    assert player is not None and view.playback is player
+    tab.page.locator('[data-table="events"]').wait_for()
+    tab.until(lambda: player.now > 0.1, "time passes")
+    tab.page.get_by_role("button", name="Pause").click()
+    tab.page.get_by_role("button", name="Run").wait_for()
+    assert not player.playing
+    fill(tab, "thickness [mm]", 15)
+    thickness = [knob.field for knob in player.live.knobs].index("thickness")
+    tab.until(lambda: player.live.values[thickness] == pytest.approx(0.015), "the food grows")
+    x, y = grip(tab)
+    mouse = tab.page.mouse
+    mouse.move(x, y)
+    tab.page.wait_for_timeout(300)
+    mouse.down()
+    for step in range(1, 6):
+        mouse.move(x, y - 12 * step)
+        tab.page.evaluate("() => new Promise((done) => requestAnimationFrame(done))")
+    tab.until(lambda: player.live.pulling, "the hand pulls")
+    tab.page.locator('[data-table="loads"] tr').filter(has_text="your hand").wait_for()
+    tab.until(lambda: float(row(tab, "loads", "your hand")[1].split()[0]) > 0, "its force is told")
+    mouse.up()
+    tab.until(lambda: not player.live.pulling, "the hand lets go")
+    tab.page.get_by_role("button", name="As in the scenario").click()
+    tab.until(lambda: player.live.values[thickness] == pytest.approx(0.01), "as it was")
+    tab.page.get_by_role("button", name="Restart").click()
+    tab.until(lambda: player.playing, "it runs again")
+    tab.page.get_by_role("tab", name="Move").click()
+    fill(tab, "beta [°]", 3)
+    tab.until(lambda: view.playback is None, "a hand on the mechanism ends it")
+    assert not player.playing
+
+
+def grip(tab: Tab) -> tuple[int, int]:
+    """A place on the blue arrow of the grip."""
+
+    def blue(pixels: np.ndarray) -> Any:
+        left = 440  # of it there are blue rods
+        return np.argwhere(near(pixels[420:, left:560], HANDLE)) + [420, left]
+
+    found = blue(tab.picture_where("canvas", lambda p: len(blue(p)) > 20, "the grip"))
+    return int(found[0][1]), int(found[0][0]) + 10

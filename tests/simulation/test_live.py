@@ -1,0 +1,171 @@
+"""Runs under a hand: the same as whole runs, whatever turns and pulls; checked against scenarios
+that have those numbers from the start."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.simulation import run as running
+from condyle.simulation.bind import bind
+from condyle.simulation.live import Live
+from condyle.simulation.scenario import scenario_from
+
+BASE = {"duration": 0.1, "method": "rk4", "step": 2e-4}
+TORQUE = {"kind": "computed_torque", "stiffness": 400.0, "damping": 30.0, "rate": 500.0}
+BITE = {**TORQUE, "kind": "bite_force", "force": 20.0, "proportional": 0.5, "threshold": 0.5}
+FOOD = {"kind": "food", "food": "bolus", "point": "right_molar", "break_force": 60.0}
+SPRING = {"kind": "spring", "point": "incisor", "stiffness": 150.0, "damping": 1.5, "rest": 1e-3}
+START = {"beta": 0.15, "dbeta": -2.0}  # closing, off the path: all numbers matter
+CASES: dict[str, dict[str, Any]] = {
+    "in C": {"controller": TORQUE, "start": START, "load": [FOOD, SPRING]},
+    "a law that Python has": {"controller": BITE, "start": START, "load": [FOOD]},
+    "servo drives": {
+        "controller": {"kind": "joint_pd", "stiffness": 2.0, "damping": 0.02, "rate": 500.0},
+        "start": START,
+    },
+}
+
+
+def live(told: dict[str, Any], model: condyle.Model) -> Live:
+    return Live(bind(model, scenario_from({**BASE, **told})))
+
+
+def state(told: dict[str, Any], model: condyle.Model) -> np.ndarray:
+    """q and q' at the end of a whole run."""
+    plan = bind(model, scenario_from({**BASE, **told}))
+    trace = running.run(plan)
+    assert trace.t[-1] == plan.duration
+    return trace.state[-1, : 2 * len(plan.q)]
+
+
+def now(found: Live) -> np.ndarray:
+    moment = found.moment()
+    velocity = found._run.y[len(moment.q) : 2 * len(moment.q)]
+    return np.concatenate([moment.q, velocity])
+
+
+def of_food(found: Live) -> list[str]:
+    return [event.kind for event in found.events if event.owner == "food"]
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_bit_by_bit_is_the_whole_run(
+    name: str, jaw: condyle.Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    expected = state(CASES[name], jaw)
+    with monkeypatch.context() as patch:
+        for means in ("c", "python"):
+            if means == "python":
+                patch.setattr(running, "loop_of", lambda *_: None)
+            found = live(CASES[name], jaw)
+            for t in np.arange(0.0, 0.11, 0.0073):
+                found.go_to(t)
+                assert abs(found.t - min(t, 0.1)) < 1e-3  # a few steps
+            found.go_to(1.0)
+            assert found.over and found.ended is None and found.t == pytest.approx(0.1)
+            # Where pauses cut a step of Python's in two, it is more exact than the whole run.
+            np.testing.assert_allclose(now(found), expected, rtol=0, atol=1e-6)
+            if means == "c":
+                np.testing.assert_allclose(now(found), expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_every_knob_is_the_number_of_the_scenario(name: str, jaw: condyle.Model) -> None:
+    told = CASES[name]
+    found = live(told, jaw)
+    owners = {knob.owner for knob in found.knobs}
+    assert owners == {"controller", *(load["kind"] for load in told.get("load", ()))}
+    before = state(told, jaw)
+    for i, knob in enumerate(found.knobs):
+        value = 0.6 * knob.value
+        other = {**told, "load": [dict(load) for load in told.get("load", ())]}
+        tables = {load["kind"]: load for load in other["load"]}
+        tables["controller"] = other["controller"] = dict(told["controller"])
+        tables[knob.owner][knob.field] = value
+        found.reset()
+        found.turn(i, value)
+        found.restart()
+        found.go_to(1.0)
+        expected = state(other, jaw)
+        np.testing.assert_allclose(now(found), expected, rtol=0, atol=1e-10, err_msg=str(knob))
+        idle = ("break_force", "threshold")  # numbers of what happens in another run
+        assert knob.field in idle or np.abs(expected - before).max() > 1e-8, knob
+
+
+def test_a_knob_turned_on_the_way(jaw: condyle.Model) -> None:
+    """The law that goes on is that of the new number: it was not there before."""
+    one, other = (live(CASES["in C"], jaw) for _ in range(2))
+    for found in (one, other):
+        found.go_to(0.04)
+    np.testing.assert_array_equal(now(one), now(other))
+    stiffness = next(i for i, k in enumerate(one.knobs) if k.field == "stiffness")
+    one.turn(stiffness, 3e3)
+    for found in (one, other):
+        found.go_to(0.1)
+    assert np.abs(now(one) - now(other)).max() > 1e-3
+    one.reset()
+    assert one.values == other.values
+
+
+def test_a_hand_is_three_springs(jaw: condyle.Model) -> None:
+    point = np.array(jaw.mechanism.platform.points["incisor"])
+    away, k, c = np.array([0.01, -0.02, -0.015]), 120.0, 3.0
+    springs = [
+        {
+            "kind": "spring", "point": "incisor", "direction": u.tolist(),
+            "stiffness": k, "damping": c, "rest": float(rest),
+        }
+        for u, rest in zip(np.eye(3), away, strict=True)
+    ]  # fmt: skip
+    found = live({"controller": TORQUE}, jaw)
+    assert not found.pulling
+    found.pull(point, point + away, k, c)
+    assert found.pulling
+    np.testing.assert_allclose(found.moment().forces[-1][2], k * away[2], rtol=1e-9)
+    np.testing.assert_array_equal(found.moment().points[-1], point)
+    found.go_to(1.0)
+    expected = state({"controller": TORQUE, "load": springs}, jaw)
+    np.testing.assert_allclose(now(found), expected, rtol=0, atol=1e-11)
+    found.let_go()
+    assert not found.pulling and not found.moment().forces[-1].any()
+
+
+def test_food_that_grows_between_the_teeth_touches_them(jaw: condyle.Model) -> None:
+    found = live({"controller": TORQUE, "start": START, "load": [FOOD]}, jaw)
+    thickness = next(i for i, k in enumerate(found.knobs) if k.field == "thickness")
+    found.turn(thickness, 1e-4)
+    found.restart()
+    found.go_to(0.01)
+    assert of_food(found) == [] and not found.moment().forces.any()
+    found.turn(thickness, 0.02)
+    assert of_food(found) == ["food_touched"]
+    assert np.linalg.norm(found.moment().forces[0]) > 1
+    found.turn(thickness, 1e-4)
+    assert of_food(found) == ["food_touched", "food_left"]
+    assert not found.moment().forces.any()
+
+
+def test_what_ends_it_is_kept_and_it_can_begin_again(jaw: condyle.Model) -> None:
+    found = live({"duration": 5.0, "start": {"dbeta": 0.1}}, jaw)
+    found.go_to(5.0)
+    assert found.over and found.ended is not None and found.ended.ends
+    assert 0 < found.t < 5 and np.isfinite(found.moment().pose).all()
+    t = found.t
+    found.go_to(5.0)
+    found.let_go()
+    assert found.t == t
+    found.restart()
+    assert found.t == 0 and not found.over and found.events == []
+
+
+def test_adaptive_methods_take_steps_that_keep_pace(jaw: condyle.Model) -> None:
+    told = {"duration": 0.02, "controller": TORQUE}
+    plan = bind(jaw, scenario_from(told))
+    found = Live(plan)
+    found.go_to(1.0)
+    exact = running.run(plan).state[-1, :8]
+    np.testing.assert_allclose(now(found), exact, rtol=0, atol=1e-7)
