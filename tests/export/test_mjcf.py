@@ -119,7 +119,7 @@ def reference_run() -> dict[str, np.ndarray]:
 
 
 @pytest.mark.parametrize(
-    ("stiffness", "damping", "seconds", "bound"), [(1.0, 0.01, 5.0, 1e-5), (0.0, 0.0, 1.0, 5e-5)]
+    ("stiffness", "damping", "seconds", "bound"), [(1.0, 0.01, 5.0, 1e-5), (0.0, 0.0, 3.0, 1e-3)]
 )
 def test_mujoco_follows_the_reference_motion(
     reference_run: dict[str, np.ndarray],
@@ -130,8 +130,8 @@ def test_mujoco_follows_the_reference_motion(
 ) -> None:
     """Under our efforts and the bite: with weak joint control for 5 s to 0.01 mm.
 
-    Alone for 1 s to 0.05 mm: without control it is not stable, as jaws are not, and what MuJoCo's
-    soft equations let go grows.
+    Alone for 3 s, two of them moving, to 1 mm: without control what MuJoCo's soft equations let go
+    is never brought back.
     """
     mechanism, run = condyle.load("masticatory"), reference_run
     t, point = run["time"], np.array(mechanism.platform.points["right_molar"])

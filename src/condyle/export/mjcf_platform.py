@@ -139,21 +139,25 @@ class PlatformWriter:
     def _real(self, body: Element, contact: Contact) -> None:
         """A ball against a plane: the normal of MuJoCo's plane is its Z axis, towards the ball."""
         ball, up = _ball(contact, self.size), contact.push * _normal(contact)
-        for parent, name, at in (
-            (body, f"{contact.name}_ball", np.array(contact.point)),
-            (self.world, f"{contact.name}_wall", contact.point - ball * up),
-        ):
-            shape = (
-                {"class_": "ball", "size": [ball]}
-                if parent is body
-                else {
-                    "class_": "wall",
-                    "type": "plane",
-                    "quat": quaternion(onto(up)),
-                    "size": [0.3 * self.size, 0.3 * self.size, 0.01],
-                }
-            )
-            element(parent, "geom", name=name, pos=at, **shape)
+        wide = 0.3 * self.size
+        element(
+            body,
+            "geom",
+            class_="ball",
+            name=f"{contact.name}_ball",
+            pos=contact.point,
+            size=[ball],
+        )
+        element(
+            self.world,
+            "geom",
+            class_="wall",
+            name=f"{contact.name}_wall",
+            type="plane",
+            pos=contact.point - ball * up,
+            quat=quaternion(onto(up)),
+            size=[wide, wide, 0.01],
+        )
         mu = contact.friction.coefficient
         element(
             child(self.root, "contact"),
