@@ -365,7 +365,7 @@ JSON = {
     "condyle simulate --check-gains": (
         *("simulate", "my.toml", "--scenario", "drives.toml", "--check-gains"),
     ),
-    "condyle simulate --new": ("simulate", "my.toml", "--new", "--out", "new"),
+    "condyle simulate --new": ("simulate", "my.toml", "--new", "first.toml"),
     "condyle export fmu": ("export", "fmu", "gough-stewart", "--kind", "inverse", "--out", "units"),
     "condyle export matlab": ("export", "matlab", "gough-stewart", "--out", "matlab"),
     "condyle export mjcf": ("export", "mjcf", "gough-stewart", "--out", "mujoco"),
