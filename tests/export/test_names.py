@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from support.tools import need, run
 
 import condyle
 from condyle.cli import completion
@@ -123,3 +125,19 @@ def test_only_what_is_used_is_taken() -> None:
     assert picked(text, "x = b();") == "static int b(void) { return 1; }\n"
     assert "/* A. */" in picked(text, "x = a();") and "int b(" in picked(text, "x = a();")
     assert picked(text, "x").strip() == ""
+
+
+def test_names_that_look_like_c_are_only_words(
+    condyle_command: Callable[..., Any], tmp_path: Path
+) -> None:
+    """What ends a comment or begins a format elsewhere does nothing here."""
+    need("gcc", "make")
+    machine = condyle.load("gough-stewart").set({"name": "a */ int x /* b"})
+    machine = machine.set({f"chain.{machine.chain_names[0]}.name": "50 % ?? \\ leg */"})
+    condyle.dump(machine, tmp_path / "odd.toml")
+    done = condyle_command("export", "c", "odd.toml", "--question", "inverse", "--out", "odd")
+    assert done.status == 0, done.err
+    for what in ("check", "example"):
+        told = run("make", "-s", what, "CC=gcc -Werror", folder=tmp_path / "odd")
+        assert what == "example" or ": ok" in told
+    assert "effort 50 % ?? \\ leg */: " in run("./example", folder=tmp_path / "odd")

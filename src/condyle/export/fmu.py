@@ -19,6 +19,7 @@ from ..errors import InputError
 from ..mechanism import Mechanism
 from .fmu_description import build_description, description
 from .fmu_model import Fmu, fmu_model
+from .names import in_comment
 
 VERSIONS = (2, 3)
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")
@@ -64,7 +65,7 @@ def fmu_sources(fmu: Fmu, version: int) -> dict[str, str]:
     room = files(__package__)
     parts = ["fmu_core.c", f"fmu{version}.c"]
     includes = "math.h", "stdbool.h", "stddef.h", "stdint.h", "stdlib.h", "string.h"
-    about = fmu.text.replace("*/", "* /")
+    about = in_comment(fmu.text)
     text = f"/* {about}: an FMU, written by condyle. Compile this file alone. */\n"
     text += "".join(f"#include <{name}>\n" for name in includes)
     text += f'{fmu.head}\n#define MODEL_TOKEN "{fmu.token}"\n\n'

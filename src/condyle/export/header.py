@@ -11,6 +11,7 @@ from ..mechanism.home import dependent_coordinates, independent_coordinates
 from ..mechanism.mechanism import Mechanism
 from .context import CODES
 from .exported import Argument, Exported, Function
+from .names import in_comment
 
 WHY = {
     "OK": "results are written",
@@ -119,5 +120,5 @@ def _comment(lines: Sequence[str]) -> str:
             line, WIDTH - 3, subsequent_indent=" " * (indent + 2 if indent else 0)
         )
         out += wrapped or [""]
-    text = "\n".join(f" * {line}".rstrip() for line in out)
+    text = "\n".join(f" * {in_comment(line)}".rstrip() for line in out)
     return f"/*\n{text}\n */\n"

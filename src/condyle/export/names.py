@@ -39,6 +39,16 @@ def identifiers(names: Iterable[str]) -> dict[str, str]:
     return found
 
 
+def in_comment(text: str) -> str:
+    """Text of a file, such as a name, that ends no comment of C's."""
+    return text.replace("*/", "* /").replace("/*", "/ *")
+
+
+def in_format(text: str) -> str:
+    """Text of a file as part of a format of printf, within quotes."""
+    return text.replace("\\", "\\\\").replace('"', '\\"').replace("%", "%%").replace("?", "\\?")
+
+
 def require_prefix(prefix: str) -> str:
     """Raises InputError for what no name in C can begin with."""
     if not _WORD.fullmatch(prefix) or prefix in RESERVED or len(prefix) > 40:

@@ -12,6 +12,7 @@ from ..atomic import write_text
 from ..mechanism.mechanism import Mechanism
 from .catalogue import Wish
 from .exported import Exported, Function
+from .names import in_format
 from .reference import Reference
 from .vectors import Vectors, vectors
 
@@ -79,7 +80,7 @@ def example(e: Exported) -> str:
     ]
     for a in f.outputs:
         for i, (label, unit) in enumerate(zip(a.labels, a.units, strict=True)):
-            text = f"{a.name} {label}: %.9g {unit}"
+            text = f"{a.name} {in_format(label)}: %.9g {unit}"
             lines.append(f'    printf("{text}\\n", (double){a.name}[{i}]);')
     return "\n".join([*lines, "    return 0;", "}", ""])
 

@@ -22,7 +22,7 @@ from .catalogue import Entry, Wish, in_order, least_norm, require_question, usua
 from .context import Body, Context
 from .exported import Exported, Function
 from .header import WHY, header_text
-from .names import identifier, identifiers, require_prefix
+from .names import identifier, identifiers, in_comment, require_prefix
 from .pick import picked, used
 from .precision import require_precision
 
@@ -152,7 +152,8 @@ def _portable(c: Context, bodies: Sequence[Body]) -> str:
 
 def _source(c: Context, bodies: Sequence[Body], portable: str) -> str:
     parts = [
-        f'/* {c.prefix}.c - mechanism "{c.mechanism.name}", written by condyle {__version__}. */',
+        f'/* {c.prefix}.c - mechanism "{in_comment(c.mechanism.name)}", written by condyle '
+        f"{__version__}. */",
         f'#include "{c.prefix}.h"',
         "#include <math.h>\n",
         portable,
