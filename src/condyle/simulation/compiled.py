@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Sequence
 from ctypes import c_double, c_int64, c_void_p
+from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
@@ -21,6 +22,7 @@ from ..backends.c.kernel import CompiledKernel, Single
 from ..backends.c.library import obtained, tool
 from ..backends.compiler import CompilerError, find_compiler
 from ..model.evaluator import Evaluator
+from .controllers.bite_force import BiteForceLaw
 from .controllers.computed_torque import ComputedTorqueLaw
 from .controllers.joint_pd import JointPDLaw
 from .loads import BoundLoad
@@ -29,10 +31,16 @@ from .loads.csv import BoundTable
 from .loads.food import BoundFood
 from .loads.spring import BoundSpring
 from .plan import ClosedLoop, OpenLoop, Plan
+from .sensing import Observer
 
 DONE, PAUSE, STEP, LOOK = range(4)
 CONSTANT, TABLE, SPRING, FOOD = range(4)
-OPEN, ELSEWHERE, JOINT_PD, COMPUTED_TORQUE = range(4)
+OPEN, ELSEWHERE, JOINT_PD, COMPUTED_TORQUE, BITE_FORCE = range(5)
+LAWS = {
+    JointPDLaw: JOINT_PD,
+    ComputedTorqueLaw: COMPUTED_TORQUE,
+    BiteForceLaw: BITE_FORCE,
+}
 STATE, LANES = 16, 64
 BUDGET = 20_000  # steps between two words of progress
 PLACES = ("pose", "R", "T", "joint", "joint_rate", "loss", "contact_point", "rub")
@@ -63,6 +71,28 @@ class _Plant(ctypes.Structure):
     ]
 
 
+class _Observer(ctypes.Structure):
+    _fields_ = [
+        *((n, c_int64) for n in ("on", "difference", "joint", "A")),
+        *((n, c_double) for n in ("smoothing", "period")),
+        ("at", _Kernel),
+        *((n, c_void_p) for n in ("order", "resolution", "weight", "scale", "turning")),
+        *((n, c_void_p) for n in ("q", "q1", "before", "rate", "first")),
+    ]
+
+
+class _Bite(ctypes.Structure):
+    _fields_ = [
+        *((n, c_int64) for n in ("R", "T", "inertia")),
+        ("point", c_double * 3),
+        ("direction", c_double * 3),
+        *((n, c_double) for n in ("proportional", "integral", "damping")),
+        *((n, c_double) for n in ("threshold", "release", "period")),
+        ("at", _Kernel),
+        *((n, c_void_p) for n in ("felt", "memory", "force")),
+    ]
+
+
 class _Run(ctypes.Structure):
     _fields_ = [
         ("plant", _Plant),
@@ -76,6 +106,8 @@ class _Run(ctypes.Structure):
         *((n, c_void_p) for n in ("inverse_order", "command", "counts", "estimate", "times")),
         *((n, c_int64) for n in ("count", "next")),
         *((n, c_void_p) for n in ("kept_state", "kept_effort", "kept_modes", "kept_tick")),
+        ("observer", _Observer),
+        ("bite", _Bite),
     ]
 
 
@@ -99,6 +131,23 @@ def _opened(path: str) -> ctypes.CDLL:
     library = ctypes.CDLL(path)
     library.advance.argtypes = [c_void_p]
     return library
+
+
+@dataclass(frozen=True)
+class Side:
+    """What a controller in Python and one in C share, look by look.
+
+    aims: (K, 3 m + 2 n + 1) q, q', q'', joint, joint rate, force at every tick.
+    command, count: (K, n);  estimate: (K, 2 m);  force: (K,);  memory: of the law.
+    """
+
+    aims: np.ndarray
+    command: np.ndarray
+    count: np.ndarray
+    estimate: np.ndarray
+    force: np.ndarray
+    memory: np.ndarray
+    observer: Observer | None
 
 
 def loop_of(plan: Plan, *shared: Any) -> Loop | None:
@@ -133,18 +182,17 @@ class Loop:
         guards: list[tuple[int, int, float]],
         past: np.ndarray,
         results: tuple[np.ndarray, ...],
-        looks: tuple[np.ndarray, ...],
-        aims: np.ndarray,
+        side: Side | None,
     ) -> None:
         """The loop.
 
         Args:
             guards: kind (0 bound, 1 lift off, 2 speed), contact or chain, and sign of the push or
             limit;  past: (guards,) of bool.
-            results: state, effort, modes, tick;  looks: command, counts, estimate.
-            aims: (K, 3 m + 2 n) q, q', q'', joint, joint rate at every tick.
+            results: state, effort, modes, tick;  side: the controller's, if there is one.
         """
-        self._library, self._keep = library, [plan, aims, *results, *looks]
+        self._library = library
+        self._keep: list[Any] = [plan, side, *results]
         self._run = run = _Run()
         m, n, k = len(plan.q), len(plan.low), len(plan.model.mechanism.contacts)
         self.y, self.effort = np.zeros(plan.size), np.zeros(n)
@@ -174,8 +222,13 @@ class Loop:
         run.y, run.effort = self.y.ctypes.data, self.effort.ctypes.data
         run.min, run.max = self._at(plan.low), self._at(plan.high)
         run.cut = self.cut.ctypes.data
-        self._drive(plan, aims)
-        run.command, run.counts, run.estimate = (a.ctypes.data for a in looks)
+        if side is None:
+            assert isinstance(plan.drive, OpenLoop)
+            run.drive, run.rows = OPEN, len(plan.drive.times)
+            run.effort_times = self._at(plan.drive.times)
+            run.efforts = self._at(plan.drive.efforts)
+        else:
+            self._control(plan, side)
         run.times, run.count = self._at(plan.times), len(plan.times)
         state, effort, modes, tick = results
         run.kept_state, run.kept_effort = state.ctypes.data, effort.ctypes.data
@@ -229,7 +282,7 @@ class Loop:
     def change(self, drive: OpenLoop | ClosedLoop, loads: Sequence[BoundLoad]) -> None:
         """Go on with other numbers in the law and in the loads, which stay what they are."""
         self._fill_all(loads)
-        if self._run.drive in (JOINT_PD, COMPUTED_TORQUE):
+        if self._run.drive > ELSEWHERE:
             assert isinstance(drive, ClosedLoop)
             self._gains(drive.law)
 
@@ -247,29 +300,51 @@ class Loop:
         run.corner_time, run.is_tick = self._at(corners), self._at(is_tick)
         run.step = plan.settings.step
 
-    def _drive(self, plan: Plan, aims: np.ndarray) -> None:
+    def _control(self, plan: Plan, side: Side) -> None:
         run, drive = self._run, plan.drive
-        if isinstance(drive, OpenLoop):
-            run.drive, run.rows = OPEN, len(drive.times)
-            run.effort_times, run.efforts = self._at(drive.times), self._at(drive.efforts)
-            return
+        assert isinstance(drive, ClosedLoop)
         law = drive.law
-        run.drive, run.delay = ELSEWHERE, drive.delay
-        if drive.sensing is not None or not _plain(law.model):
+        run.aims, run.delay = side.aims.ctypes.data, drive.delay
+        run.command, run.counts = side.command.ctypes.data, side.count.ctypes.data
+        run.estimate = side.estimate.ctypes.data
+        run.drive = LAWS.get(type(law), ELSEWHERE) if _plain(law.model) else ELSEWHERE
+        if run.drive == ELSEWHERE:
             return
-        if type(law) is JointPDLaw:
-            run.drive, run.gravity = JOINT_PD, law.gravity
-        elif type(law) is ComputedTorqueLaw:
-            run.drive = COMPUTED_TORQUE
-        else:
-            return
-        run.aims = aims.ctypes.data
-        self._gains(law)
+        run.gravity = getattr(law, "gravity", False)
         run.inverse, _, order = self._kernel(law.model, "inverse", ())
         run.inverse_order = self._at(np.array(order, dtype=np.int64))
+        if side.observer is not None:
+            self._observe(law.model, side.observer)
+        if isinstance(law, BiteForceLaw):
+            bite = run.bite
+            bite.at, where, _ = self._kernel(law.model, "instant", True)
+            bite.R, bite.T, bite.inertia = where["R"], where["T"], where["inertia_matrix"]
+            bite.felt = self._at(np.array([x.place == law.place for x in plan.loads], np.uint8))
+            bite.memory, bite.force = side.memory.ctypes.data, side.force.ctypes.data
+        self._gains(law)
+
+    def _observe(self, model: Evaluator, observer: Observer) -> None:
+        to, sensing = self._run.observer, observer.sensing
+        to.at, where, order = self._kernel(model, "instant")
+        to.on, to.difference = True, sensing.difference
+        to.joint, to.A = where["joint"], where["A"]
+        to.smoothing, to.period = sensing.smoothing, observer.period
+        to.order = self._at(np.array(order, dtype=np.int64))
+        to.resolution, to.weight = self._at(sensing.resolution), self._at(observer.weight)
+        to.scale, to.turning = self._at(observer.scale), self._at(observer.turning.view(np.uint8))
+        for name in ("q", "q1", "before", "rate", "first"):
+            setattr(to, name, getattr(observer, name).ctypes.data)
+        self._keep.append(observer)
 
     def _gains(self, law: Any) -> None:
         self._run.stiffness, self._run.damping = self._at(law.stiffness), self._at(law.damping)
+        if isinstance(law, BiteForceLaw):
+            bite = self._run.bite
+            assert law.point is not None
+            bite.point[:], bite.direction[:] = law.point.tolist(), law.direction.tolist()
+            bite.proportional, bite.integral = law.proportional, law.integral
+            bite.damping, bite.threshold = law.bite_damping, law.threshold
+            bite.release, bite.period = law.release, law.period
 
     def _kernel(
         self, model: Evaluator, question: str, *details: Any

@@ -12,7 +12,9 @@ enum { DONE, PAUSE, STEP, LOOK };    /* why `advance` returns; PAUSE: after `bud
 enum { CONSTANT, TABLE, SPRING, FOOD };              /* loads */
 enum { APART, TOUCHING, BROKEN };                    /* modes of food */
 enum { BOUND, LIFT_OFF, SPEED };                     /* guards */
-enum { OPEN, ELSEWHERE, JOINT_PD, COMPUTED_TORQUE }; /* who chooses efforts */
+enum { OPEN, ELSEWHERE, JOINT_PD, COMPUTED_TORQUE, BITE_FORCE }; /* who chooses efforts */
+enum { FREE, BITING, LEAVING };                      /* of a bite */
+enum { ITERATIONS = 8 };                             /* from encoders to a pose */
 enum { STATE = 16, LANES = 64 };                     /* most of 2 m + 4, and of n */
 
 /* One evaluation, and places for what goes in and out. */
@@ -43,9 +45,31 @@ typedef struct {
     Load *load;
 } Plant;
 
+/* Encoders, as of `sensing.py`. at: the question `instant` of the controller's model, its results and
+ * lanes; resolution, turning, weight, before, rate (n,) in the callers' order; scale, q, q1 (m,). */
+typedef struct {
+    int64_t on, difference, joint, A;
+    double smoothing, period;
+    Kernel at;
+    const int64_t *order;
+    const double *resolution, *weight, *scale;
+    const uint8_t *turning;
+    double *q, *q1, *before, *rate;
+    uint8_t *first;
+} Observer;
+
+/* A bite, as of `controllers/bite_force.py`. felt: per load, whether it acts at the point. */
+typedef struct {
+    int64_t R, T, inertia;
+    double point[3], direction[3], proportional, integral, damping, threshold, release, period;
+    Kernel at;
+    const uint8_t *felt;
+    double *memory, *force;
+} Bite;
+
 /* The run. corners (C,) [s]; is_tick (C,): whether the controller looks there.
- * Open loop: efforts (R, n) at effort_times (R,). Closed: aims (K, 3 m + 2 n): q, q', q'', joint,
- * rate; gains: stiffness and damping, of the coordinates or of the chains; inverse: of its own
+ * Open loop: efforts (R, n) at effort_times (R,). Closed: aims (K, 3 m + 2 n + 1): q, q', q'', joint,
+ * rate, force; gains: stiffness and damping, of the coordinates or of the chains; inverse: of its own
  * model. Results: times (N,); state (N, 2 m + 4), modes, effort, tick; of looks command and counts
  * (K, n), estimate (K, 2 m). y, effort, limits and all results are in the callers' order. */
 typedef struct {
@@ -66,6 +90,8 @@ typedef struct {
     double *kept_state, *kept_effort;
     int8_t *kept_modes;
     int64_t *kept_tick;
+    Observer observer;
+    Bite bite;
 } Run;
 
 static double dot3(const double *a, const double *b) {
@@ -237,42 +263,198 @@ static void given(const Run *r, double t, double *effort) {
     }
 }
 
+/* What a controller sees, in the callers' order. */
+typedef struct {
+    double q[STATE], q1[STATE], joint[LANES], rate[LANES];
+} Seen;
+
+/* x of M x = b, (m, m), by elimination with pivots, both overwritten; 0 where there is none. */
+static int solved(double *M, double *b, int64_t m) {
+    for (int64_t k = 0; k < m; k++) {
+        int64_t p = k;
+        for (int64_t i = k + 1; i < m; i++)
+            if (fabs(M[i * m + k]) > fabs(M[p * m + k])) p = i;
+        if (!(fabs(M[p * m + k]) > 0)) return 0;
+        for (int64_t j = 0; j < m; j++) {
+            double held = M[k * m + j];
+            M[k * m + j] = M[p * m + j], M[p * m + j] = held;
+        }
+        double held = b[k];
+        b[k] = b[p], b[p] = held;
+        for (int64_t i = k + 1; i < m; i++) {
+            double f = M[i * m + k] / M[k * m + k];
+            for (int64_t j = k; j < m; j++) M[i * m + j] -= f * M[k * m + j];
+            b[i] -= f * b[k];
+        }
+    }
+    for (int64_t k = m - 1; k >= 0; k--) {
+        for (int64_t j = k + 1; j < m; j++) b[k] -= M[k * m + j] * b[j];
+        b[k] /= M[k * m + k];
+    }
+    return 1;
+}
+
+/* x of A x ~ right (n,), by least squares with the observer's weights, at its last look. */
+static int fitted(const Observer *o, int64_t m, int64_t n, const double *right, double *x) {
+    double M[36] = {0};
+    for (int i = 0; i < m; i++) x[i] = 0;
+    for (int j = 0; j < n; j++) {
+        const double *row = o->at.out + o->A + j; /* entry i stands n i further */
+        double w = o->weight[o->order[j]] * o->weight[o->order[j]];
+        for (int i = 0; i < m; i++) {
+            x[i] += w * row[n * i] * right[o->order[j]];
+            for (int k = 0; k < m; k++) M[i * m + k] += w * row[n * i] * row[n * k];
+        }
+    }
+    return solved(M, x, m);
+}
+
+static int observed_at(const Observer *o, int64_t m, const double *q, const double *q1) {
+    memcpy(o->at.in, q, (size_t)m * sizeof *q);
+    memcpy(o->at.in + m, q1, (size_t)m * sizeof *q);
+    return o->at.one(o->at.table, o->at.in, o->at.out);
+}
+
+/* The state that the encoders' counts give, in place of the true one; whether they give any. */
+static int observed(const Observer *o, int64_t m, int64_t n, Seen *seen) {
+    const double turn = 6.283185307179586;
+    double off[LANES], dq[6], largest = INFINITY;
+    int first = o->first[0];
+    for (int j = 0; j < n; j++) {
+        double step = o->resolution[j], part = o->smoothing, count = seen->joint[j];
+        if (step > 0) count = step * nearbyint(count / step);
+        if (o->difference && first) seen->rate[j] = o->rate[j];
+        else if (o->difference)
+            seen->rate[j] = part * o->rate[j] + (1 - part) * (count - o->before[j]) / o->period;
+        seen->joint[j] = count;
+    }
+    for (int i = 0; i < m; i++) seen->q[i] = first ? o->q[i] : o->q[i] + o->period * o->q1[i];
+    for (int k = 0; k < ITERATIONS && !(largest < 1e-13); k++) {
+        if (observed_at(o, m, seen->q, o->q1)) return 0;
+        for (int j = 0; j < n; j++) {
+            int64_t i = o->order[j];
+            off[i] = seen->joint[i] - o->at.out[o->joint + j];
+            if (o->turning[i]) off[i] -= turn * nearbyint(off[i] / turn);
+        }
+        if (!fitted(o, m, n, off, dq)) return 0;
+        largest = 0;
+        for (int i = 0; i < m; i++) {
+            seen->q[i] += dq[i];
+            if (!(fabs(dq[i] / o->scale[i]) <= largest)) largest = fabs(dq[i] / o->scale[i]);
+        }
+    }
+    return largest < 1e-6 && fitted(o, m, n, seen->rate, seen->q1);
+}
+
+/* The load that a bite's efforts bear, and what it does to the acceleration; whether there is. */
+static int bitten(const Run *r, const Seen *seen, const double *aim, const double *force,
+                  double *acceleration, double *load, double *memory) {
+    const Bite *b = &r->bite;
+    const double *u = b->direction, *out = b->at.out;
+    int64_t m = r->plant.m, n = r->plant.n;
+    double J[6], by[6], M[36], lever[3], ahead = 0, closing = 0, along = 0, speed = 0, mass = 0;
+    memcpy(b->at.in, seen->q, (size_t)m * sizeof *J);
+    memcpy(b->at.in + m, seen->q1, (size_t)m * sizeof *J);
+    if (b->at.one(b->at.table, b->at.in, b->at.out)) return 0;
+    for (int i = 0; i < 3; i++) lever[i] = dot3(out + b->R + 3 * i, b->point);
+    double turned[3] = {lever[1] * u[2] - lever[2] * u[1], lever[2] * u[0] - lever[0] * u[2],
+                        lever[0] * u[1] - lever[1] * u[0]};
+    for (int i = 0; i < m; i++) {
+        J[i] = 0;
+        for (int a = 0; a < 3; a++)
+            J[i] += u[a] * out[b->T + a * m + i] + turned[a] * out[b->T + (3 + a) * m + i];
+        ahead += J[i] * (aim[i] - seen->q[i]);
+        closing += J[i] * aim[m + i];
+        along += J[i] * acceleration[i];
+        speed += J[i] * seen->q1[i];
+        by[i] = J[i];
+    }
+    double felt = -dot3(u, force), push = felt;
+    int mode = (int)memory[0];
+    if (felt < b->threshold / 2) mode = FREE;
+    else if (mode == BITING) mode = ahead < -b->release && closing < 0 ? LEAVING : BITING;
+    else if (mode == FREE && felt > b->threshold && closing > 0) mode = BITING;
+    double total = mode == BITING ? memory[1] : 0;
+    if (mode == BITING) {
+        double wanted = aim[3 * m + 2 * n], error = wanted - felt;
+        memcpy(M, out + b->inertia, (size_t)(m * m) * sizeof *M);
+        if (!solved(M, by, m)) return 0;
+        for (int i = 0; i < m; i++) mass += J[i] * by[i];
+        for (int i = 0; i < m; i++) acceleration[i] -= by[i] / mass * (along + b->damping * speed);
+        push = wanted + b->proportional * error + b->integral * total;
+        total += error * b->period;
+    }
+    for (int a = 0; a < 3; a++) load[a] = -push * u[a], load[3 + a] = 0, load[6 + a] = b->point[a];
+    memory[0] = mode, memory[1] = total;
+    return 1;
+}
+
 /* The controller looks: 0, or LOOK where the caller has to. */
 static int controlled(Run *r) {
     const Plant *p = &r->plant;
+    const Observer *o = &r->observer;
     int64_t m = p->m, n = p->n, k = r->tick + 1;
-    double twist[6], asked[LANES], now[LANES], *in = r->inverse.in;
-    const double *at = p->instant.out, *aim = r->aims + k * (3 * m + 2 * n), *y = r->y;
-    if (r->drive == ELSEWHERE || look(p, y, twist)) return LOOK;
-    memset(in, 0, (size_t)(3 * m + 9) * sizeof *in);
-    memcpy(in, r->drive == JOINT_PD ? aim : y, (size_t)m * sizeof *in);
-    if (r->drive == COMPUTED_TORQUE)
-        for (int i = 0; i < m; i++) {
-            in[m + i] = y[m + i];
-            in[2 * m + i] = aim[2 * m + i] + r->damping[i] * (aim[m + i] - y[m + i]) +
-                            r->stiffness[i] * (aim[i] - y[i]);
+    double twist[6], asked[LANES], now[LANES], *in = r->inverse.in, force[3] = {0}, memory[2];
+    const double *at = p->instant.out, *aim = r->aims + k * (3 * m + 2 * n + 1);
+    Seen seen;
+    if (r->drive == ELSEWHERE || look(p, r->y, twist)) return LOOK;
+    memcpy(seen.q, r->y, (size_t)m * sizeof *seen.q);
+    memcpy(seen.q1, r->y + m, (size_t)m * sizeof *seen.q);
+    for (int j = 0; j < n; j++) {
+        seen.joint[p->order[j]] = at[p->joint + j];
+        seen.rate[p->order[j]] = at[p->joint_rate + j];
+    }
+    if (r->drive == BITE_FORCE)
+        for (int i = 0; i < p->loads; i++) {
+            double s[3], v[3], lever[3], f[6];
+            if (!r->bite.felt[i]) continue;
+            place(p, p->load + i, twist, s, v, lever);
+            law(p->load + i, r->t, s, v, f);
+            for (int a = 0; a < 3; a++) force[a] += f[a];
         }
+    if (o->on && !observed(o, m, n, &seen)) return LOOK;
+    memset(in, 0, (size_t)(3 * m + 9) * sizeof *in);
     memset(asked, 0, (size_t)n * sizeof *asked);
-    if (r->drive == COMPUTED_TORQUE || r->gravity) {
+    memcpy(in, r->drive == JOINT_PD ? aim : seen.q, (size_t)m * sizeof *in);
+    if (r->drive != JOINT_PD)
+        for (int i = 0; i < m; i++) {
+            in[m + i] = seen.q1[i];
+            in[2 * m + i] = aim[2 * m + i] + r->damping[i] * (aim[m + i] - seen.q1[i]) +
+                            r->stiffness[i] * (aim[i] - seen.q[i]);
+        }
+    if (r->drive == BITE_FORCE) {
+        memcpy(memory, r->bite.memory, sizeof memory);
+        if (!bitten(r, &seen, aim, force, in + 2 * m, in + 3 * m, memory)) return LOOK;
+    }
+    if (r->drive != JOINT_PD || r->gravity) {
         if (r->inverse.one(r->inverse.table, in, r->inverse.out)) return LOOK;
         for (int j = 0; j < n; j++) asked[r->inverse_order[j]] = r->inverse.out[j];
     }
-    for (int j = 0; j < n; j++) {
-        int64_t i = p->order[j];
-        double joint = at[p->joint + j], speed = at[p->joint_rate + j];
-        r->counts[k * n + i] = joint;
-        if (r->drive == JOINT_PD)
-            asked[i] += r->stiffness[i] * (aim[3 * m + i] - joint) +
-                        r->damping[i] * (aim[3 * m + n + i] - speed);
-    }
+    for (int i = 0; i < n && r->drive == JOINT_PD; i++)
+        asked[i] += r->stiffness[i] * (aim[3 * m + i] - seen.joint[i]) +
+                    r->damping[i] * (aim[3 * m + n + i] - seen.rate[i]);
     memcpy(r->command + k * n, asked, (size_t)n * sizeof *asked);
     const double *due = r->command + (k > r->delay ? k - r->delay : 0) * n;
     for (int j = 0; j < n; j++) {
         now[j] = fmin(fmax(due[j], r->min[j]), r->max[j]);
         if (!isfinite(asked[j]) || (now[j] != due[j]) != r->cut[j]) return LOOK;
     }
+    /* Nothing is handed back any more: what lasts until the next look. */
     memcpy(r->effort, now, (size_t)n * sizeof *now);
-    memcpy(r->estimate + k * 2 * m, y, (size_t)(2 * m) * sizeof *y);
+    memcpy(r->counts + k * n, seen.joint, (size_t)n * sizeof *now);
+    memcpy(r->estimate + k * 2 * m, seen.q, (size_t)m * sizeof *seen.q);
+    memcpy(r->estimate + k * 2 * m + m, seen.q1, (size_t)m * sizeof *seen.q);
+    if (o->on) {
+        memcpy(o->q, seen.q, (size_t)m * sizeof *seen.q);
+        memcpy(o->q1, seen.q1, (size_t)m * sizeof *seen.q);
+        memcpy(o->before, seen.joint, (size_t)n * sizeof *now);
+        memcpy(o->rate, seen.rate, (size_t)n * sizeof *now);
+        o->first[0] = 0;
+    }
+    if (r->drive == BITE_FORCE) {
+        memcpy(r->bite.memory, memory, sizeof memory);
+        r->bite.force[k] = sqrt(dot3(force, force));
+    }
     r->tick = k;
     return 0;
 }

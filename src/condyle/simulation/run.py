@@ -12,7 +12,7 @@ import numpy as np
 
 from ..progress import step as progress
 from ..status import STATUS_NAMES, Status
-from .compiled import BUDGET, DONE, LOOK, PAUSE, STEP, Loop, loop_of
+from .compiled import BUDGET, DONE, LOOK, PAUSE, STEP, Loop, Side, loop_of
 from .controllers import Measured
 from .events import KINDS, Event
 from .integrators import INTEGRATORS, Stuck
@@ -115,12 +115,8 @@ class Run:
         if self._plan.method != "rk4":
             return None
         results = (self._state, self._kept_effort, self._kept_modes, self._kept_tick)
-        loop, m, n = self._loop, len(self._plan.q), len(self._effort)
-        looks, aims = (np.empty((0, n)), np.empty((0, n)), np.empty((0, 2 * m))), np.empty(0)
-        if loop is not None:
-            looks = (loop.command, loop.count, loop.estimate)
-            aims = np.array([np.concatenate([*a.state, a.joint, a.joint_rate]) for a in loop.aims])
-        return loop_of(self._plan, self._watch.told, self._watch.past, results, looks, aims)
+        side = None if self._loop is None else self._loop.side()
+        return loop_of(self._plan, self._watch.told, self._watch.past, results, side)
 
     def _by_compiled_code(self, until: float, quick: Loop) -> None:
         """The same by `loop.c`, but for what it hands back."""
@@ -307,16 +303,17 @@ class _Loop:
         assert isinstance(drive, ClosedLoop)
         self._drive, self._plant, m, n = drive, plant, len(plan.q), len(plan.low)
         self._m = m
-        self._memory = drive.law.begin()
+        self.memory = drive.law.begin().copy()
         ticks = self._ticks = plan.ticks()
         self.aims = drive.path.references(ticks) if len(ticks) else []
         self.command, self.count = (np.empty((len(ticks), n)) for _ in range(2))
         self.estimate, self.force = np.empty((len(ticks), 2 * m)), np.zeros(len(ticks))
-        self._observer = None
+        self._rows: np.ndarray | None = None
+        self.observer = None
         if drive.sensing is not None and drive.period is not None:
-            self._observer = Observer(drive.law.model, drive.sensing, drive.period)
+            self.observer = Observer(drive.law.model, drive.sensing, drive.period)
             at = plant.look(plan.q, plan.q1)
-            self._observer.begin(plan.q, plan.q1, at["joint"].copy())
+            self.observer.begin(plan.q, plan.q1, at["joint"].copy())
 
     def change(self, drive: ClosedLoop) -> None:
         """Another law, or another force to aim at."""
@@ -326,6 +323,15 @@ class _Loop:
             force = np.interp(self._ticks, path.force_times, path.force).tolist()
             aims = zip(self.aims, force, strict=True)
             self.aims = [replace(aim, force=f) for aim, f in aims]
+            if self._rows is not None:
+                self._rows[:, -1] = force
+
+    def side(self) -> Side:
+        """What compiled code shares with this."""
+        rows = [np.concatenate([*a.state, a.joint, a.joint_rate, [a.force]]) for a in self.aims]
+        self._rows = np.array(rows)
+        looks = self.command, self.count, self.estimate, self.force
+        return Side(self._rows, *looks, self.memory, self.observer)
 
     def look(self, t: float, y: np.ndarray, modes: list[int], k: int) -> np.ndarray:
         """Look at tick k; returns the efforts asked for that begin to act now, (n,)."""
@@ -335,10 +341,11 @@ class _Loop:
         joint, rate = at["joint"].copy(), at["joint_rate"].copy()
         q, q1 = y[:m].copy(), y[m : 2 * m].copy()
         force = plant.force_at(law.place, t, modes)
-        if self._observer is not None:
-            joint, rate, q, q1 = self._observer.see(joint, rate)
+        if self.observer is not None:
+            joint, rate, q, q1 = self.observer.see(joint, rate)
         now = Measured(t, q, q1, joint, rate, force)
-        asked, self._memory = law(now, self.aims[k], self._memory)
+        asked, after = law(now, self.aims[k], self.memory)
+        self.memory[:] = after  # in place: compiled code goes on from here, too
         self.command[k], self.count[k] = asked, joint
         self.estimate[k], self.force[k] = np.concatenate([q, q1]), np.linalg.norm(force)
         # Until the first efforts come, the drives hold what they will be.
@@ -349,7 +356,7 @@ class _Loop:
         at, law, m = self._plant.last, self._drive.law, self._m
         force = self._plant.force_at(law.place, t, modes)
         now = Measured(t, y[:m], y[m : 2 * m], at["joint"], at["joint_rate"], force)
-        asked, _ = law(now, self._drive.path.at(t), self._memory)
+        asked, _ = law(now, self._drive.path.at(t), self.memory)
         if not np.isfinite(asked).all():
             raise Stuck(Status.infeasible)
         return asked

@@ -21,6 +21,7 @@ from .point import Instant
 
 ITERATIONS = 8
 CONVERGED = 1e-13  # step of q, in the mechanism's size and radians
+ROUGH = 1e-6  # the same, after the last iteration
 
 
 class Lost(Exception):
@@ -31,24 +32,24 @@ class Observer:
     """What a controller's machine knows of its state."""
 
     def __init__(self, model: Evaluator, sensing: Sensing, period: float) -> None:
-        self._sensing, self._period = sensing, period
+        self.sensing, self.period = sensing, period
         self._at = Instant(model)
         families = [FAMILIES[chain.kind] for chain in model.mechanism.chains]
         length = characteristic_length(model.mechanism)
-        self._turning = np.array([f.joint_unit == "rad" for f in families])
-        self._weight = np.where(self._turning, length, 1.0)[:, None]
-        self._scale = np.where([n in "XYZ" for n in model.independent], length, 1.0)
+        self.turning = np.array([f.joint_unit == "rad" for f in families])
+        self.weight = np.where(self.turning, length, 1.0)
+        self.scale = np.where([n in "XYZ" for n in model.independent], length, 1.0)
 
     def begin(self, q: np.ndarray, q1: np.ndarray, joint: np.ndarray) -> None:
         """A machine knows where it starts."""
-        self._q, self._q1, self._before = q.copy(), q1.copy(), self.counts(joint)
+        self.q, self.q1, self.before = q.copy(), q1.copy(), self.counts(joint)
         self._at(q, q1)
-        self._rate = self._at["joint_rate"].copy()
-        self._first = True
+        self.rate = self._at["joint_rate"].copy()
+        self.first = np.ones(1, dtype=np.uint8)
 
     def counts(self, joint: np.ndarray) -> np.ndarray:
         """What encoders read of joints (n,)."""
-        step = self._sensing.resolution
+        step = self.sensing.resolution
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(step > 0, step * np.round(joint / step), joint)
 
@@ -60,33 +61,35 @@ class Observer:
         Args:   joint, joint_rate: as they are.
         Raises: Lost: where they give none.
         """
-        sensing, count = self._sensing, self.counts(joint)
+        sensing, count = self.sensing, self.counts(joint)
+        rate = self.rate
         if not sensing.difference:
-            self._rate = joint_rate.copy()
-        elif not self._first:
+            rate = joint_rate
+        elif not self.first[0]:
             part = sensing.smoothing
-            self._rate = part * self._rate + (1 - part) * (count - self._before) / self._period
-        q = self._q if self._first else self._q + self._period * self._q1
-        self._first, self._before = False, count
+            rate = part * rate + (1 - part) * (count - self.before) / self.period
+        q = self.q if self.first[0] else self.q + self.period * self.q1
         for _ in range(ITERATIONS):
-            if self._at(q, self._q1):
+            if self._at(q, self.q1):
                 raise Lost
             off = count - self._at["joint"]
-            off = np.where(self._turning, off - 2 * np.pi * np.round(off / (2 * np.pi)), off)
+            off = np.where(self.turning, off - 2 * np.pi * np.round(off / (2 * np.pi)), off)
             dq = self._solve(off)
             q = q + dq
-            if np.abs(dq / self._scale).max() < CONVERGED:
+            if np.abs(dq / self.scale).max() < CONVERGED:
                 break
         else:
-            if not np.abs(dq / self._scale).max() < 1e-6:
+            if not np.abs(dq / self.scale).max() < ROUGH:
                 raise Lost
-        self._q, self._q1 = q, self._solve(self._rate)
-        return count, self._rate, q, self._q1
+        # In place: compiled code goes on from here, too.
+        self.q[:], self.q1[:], self.before[:], self.rate[:] = q, self._solve(rate), count, rate
+        self.first[0] = 0
+        return count, self.rate.copy(), q, self.q1.copy()
 
     def _solve(self, right: np.ndarray) -> np.ndarray:
         """x with A x ~ right, at the last look."""
-        A = self._at["A"] * self._weight
+        A = self._at["A"] * self.weight[:, None]
         try:
-            return np.linalg.solve(A.T @ A, A.T @ (self._weight[:, 0] * right))
+            return np.linalg.solve(A.T @ A, A.T @ (self.weight * right))
         except np.linalg.LinAlgError:
             raise Lost from None
