@@ -143,9 +143,10 @@ def test_hands_on_the_page(open_tab: Callable[..., Tab], view: View) -> None:
 def grip(tab: Tab) -> tuple[int, int]:
     """A place on the blue arrow of the grip."""
 
+    top, left = 420, 440  # of it there are blue rods
+
     def blue(pixels: np.ndarray) -> Any:
-        left = 440  # of it there are blue rods
-        return np.argwhere(near(pixels[420:, left:560], HANDLE)) + [420, left]
+        return np.argwhere(near(pixels[top:, left:560], HANDLE))
 
     found = blue(tab.picture_where("canvas", lambda p: len(blue(p)) > 20, "the grip"))
-    return int(found[0][1]), int(found[0][0]) + 10
+    return left + int(found[0][1]), top + int(found[0][0]) + 10
