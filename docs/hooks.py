@@ -23,7 +23,8 @@ GENERATED = Path(__file__).parent / "generated"
 EXAMPLES = Path(__file__).parents[1] / "examples"
 FIGURES = ("motion", "path", "torque", "share", "contact_force", "contact_track", "singularity")
 MAPS = ("map-ratio", "map-singular")
-PICTURES = ("mechanism", *FIGURES, *MAPS)
+STUDIES = ("sweep-scatter", "sweep-effects", "bands")
+PICTURES = ("mechanism", *FIGURES, *MAPS, *STUDIES)
 # Pieces that pages take in.
 PAGES = ("cli.md", "operations.md", "structure.md", "variables.md")
 PAGES += ("quantities.md", "dimensions.md", "statuses.md", "warnings.md")
@@ -64,8 +65,39 @@ def generate(folder: Path) -> None:
         PLOTS[name](solution).savefig(folder / f"{name}.png", dpi=110)
     draw_mechanism(condyle.load("masticatory")).savefig(folder / "mechanism.png", dpi=110)
     draw_maps(folder, solution)
+    draw_studies(folder)
     plt.close("all")
     write_report(reference_solution(100.0, reactions=True), folder / REPORT)
+
+
+def draw_studies(folder: Path) -> None:
+    """Pictures of a small sweep, and of the bands of the example with the jaw."""
+    import condyle
+    from condyle.analysis.sweep import read_study, with_bands
+    from condyle.motion import Motion, bundled_reference
+    from condyle.report.figures import PLOTS
+    from condyle.report.figures.sweep import SWEEP_PLOTS
+
+    base = "chain.masseter_{}.base[2]"
+    own = {"what": base.format("left"), "mirror": base.format("right"), "scale": [0.97, 1.03]}
+    study = {
+        "motion": {"file": "reference", "rate": 20.0},
+        "vary": [own, {"what": "platform.mass", "range": [0.2, 0.3]}],
+        "sampling": {"kind": "sobol", "count": 64},
+        "measure": {
+            "peak_effort": {"of": "effort", "take": "max_abs"},
+            "joint_load": {"of": "contact_force", "take": "min", "contact": "left_condyle"},
+        },
+    }
+    table = condyle.sweep(study, workers=1)
+    for name in ("sweep-scatter", "sweep-effects"):
+        SWEEP_PLOTS[name](table).savefig(folder / f"{name}.png", dpi=110)
+    motion = Motion.from_csv(bundled_reference()[0], rate=20)
+    load = condyle.reference_load()
+    jaw = condyle.derive(condyle.load("human-jaw"), distribution="weighted")
+    known = read_study(EXAMPLES / "studies" / "human-jaw.toml")
+    banded = with_bands(jaw.solve(motion, load), known, motion, load, workers=1)
+    PLOTS["contact_force"](banded).savefig(folder / "bands.png", dpi=110)
 
 
 def text_pages(folder: Path) -> None:

@@ -44,10 +44,13 @@ _HOMES = {
     "simulate_all": "simulation",
     "ScenarioError": "errors",
     "workspace_map": "analysis.map",
+    "Study": "analysis.sweep",
+    "sweep": "analysis.sweep",
 }
 
 if TYPE_CHECKING:
     from .analysis.map import workspace_map
+    from .analysis.sweep import Study, sweep
     from .errors import (
         CondyleError,
         InfeasibleError,

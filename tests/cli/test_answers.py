@@ -33,6 +33,8 @@ CALLS: dict[str, tuple[str, ...]] = {
     "run": ("run", "my jaw.toml", *QUICK, "--out", "the results"),
     "run --report": ("run", *QUICK, "--report"),
     "solve": ("solve", "my jaw.toml", "--states", "states.csv", "--out", "torques.csv"),
+    "simulate": ("simulate", "my jaw.toml", "--scenario", "a fall.toml", "--out", "fallen"),
+    "simulate --check-gains": ("simulate", "my jaw.toml", "--scenario", "pd.toml", "--check-gains"),
     "forward": ("forward", "my jaw.toml", "--states", "efforts.csv", "--out", "found.csv"),
     "pose": ("pose", "masticatory", "--joints", "joints.csv", "--out", "poses.csv"),
     "pose --flag": ("pose", "masticatory", "--joints", "far.csv", "--out", "poses.csv", "--flag"),
@@ -49,6 +51,7 @@ CALLS: dict[str, tuple[str, ...]] = {
     "export fmu": ("export", "fmu", "my jaw.toml", "--out", "units", "--kind", "inverse"),
     "export matlab": ("export", "matlab", "my jaw.toml", "--out", "for matlab"),
     "export mjcf": ("export", "mjcf", "my jaw.toml", "--out", "for mujoco"),
+    "sweep": ("sweep", "my study.toml", "--out", "my rows", "--workers", "1"),
     "plot": ("plot",),
     "plot SOLUTION": ("plot", "a run.nc", "--figure", "load", "--out", "my figures"),
     "report": ("report", "a run.nc"),
@@ -56,7 +59,22 @@ CALLS: dict[str, tuple[str, ...]] = {
     "cache --clear": ("cache", "--clear"),
     "schema": ("schema",),
 }
-RESULTS = {"check", "check of another", "check --project", "plot", "cache", "cache --clear"}
+RESULTS = {
+    "simulate --check-gains",
+    "check",
+    "check of another",
+    "check --project",
+    "plot",
+    "cache",
+    "cache --clear",
+}
+STUDY = """
+motion = { file = "trial", rate = 4 }
+load = "none"
+[[vary]]
+what = "platform.mass"
+values = [0.2, 0.3]
+"""
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +97,11 @@ def command(
     monkeypatch.setattr("condyle.export.fmu._built", lambda sources: b"")  # it takes seconds
     text = bundled_text("masticatory")
     Path("my jaw.toml").write_text(text)
+    Path("my study.toml").write_text(STUDY)
     Path("off.toml").write_text(text.replace("offset = 13.215", "offset = 13.5", 1))
+    Path("a fall.toml").write_text("duration = 0.004")
+    drives = 'duration = 0.002\n[controller]\nkind = "joint_pd"\nstiffness = 5\ndamping = 0.03\n'
+    Path("pd.toml").write_text(drives)
     Path("my path.csv").write_bytes(bundled_reference()[0].read_bytes())
     states = [prefix + name for prefix in ("", "d", "dd") for name in ("X", "Y", "alpha", "beta")]
     joints = [f"joint_{name}" for name in condyle.load("masticatory").chain_names]

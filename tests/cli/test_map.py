@@ -59,6 +59,7 @@ def test_three_coordinates_and_zarr(condyle_command: Callable[..., Any], tmp_pat
         (("--format", "xls"), 'no format "xls"'),
         (("--run", "missing.nc"), "missing.nc"),
         (("--margin", "2"), "margin"),
+        (("--scheduler", "nobody"), "expected processes, threads, dask"),
         (("--distribution", "bouned"), "bounded"),
     ],
 )

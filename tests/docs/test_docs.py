@@ -34,8 +34,15 @@ BLOCK = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```", re.MULTILINE | re.DOTALL)
 EQUATIONS = 67
 # Pages whose numbers are many: interpreted they would take minutes.
 COMPILED = {"kernels.md", "simulate.md", "controllers.md", "tutorial-simulate.md"}
+MASSES = """
+motion = { file = "trial", rate = 4 }
+load = "none"
+[[vary]]
+what = "platform.mass"
+values = [0.2, 0.3]
+"""
 # Blocks and commands of some pages, so that a test that finds none of them fails.
-RUN = {"tutorial.md": 9, "forward-kinematics.md": 5}
+RUN = {"tutorial.md": 10, "forward-kinematics.md": 5}
 
 
 @dataclass(frozen=True)
@@ -95,6 +102,7 @@ def registers() -> Iterator[None]:
 def put_files_of_a_reader(folder: Path) -> None:
     """Files that commands in the text name without making them."""
     (folder / "my.toml").write_text(bundled_text("masticatory"), encoding="utf-8")
+    (folder / "masses.toml").write_text(MASSES, encoding="utf-8")
     jaw = record(noise=5e-5)
     jaw.write(folder / "trial.c3d")
     jaw.write_tables(folder / "markers.toml")
@@ -355,6 +363,7 @@ JSON = {
         *("plot", "results/masticatory.nc", "--figure", "torque", "--out", "figures"),
     ),
     "condyle report": ("report", "results/masticatory.nc"),
+    "condyle sweep": ("sweep", "masses.toml", "--out", "rows", "--workers", "1"),
     "condyle cache": ("cache",),
 }
 

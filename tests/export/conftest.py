@@ -28,13 +28,24 @@ class Folder:
 def written(name: str, path: Path, **options: Any) -> Folder:
     """The package of a bundled mechanism or a test case."""
     known = name in condyle.bundled_mechanisms()
-    mechanism = condyle.load(name) if known else case(name).mechanism
+    mechanism = limited() if name == "limited" else None
+    mechanism = mechanism or (condyle.load(name) if known else case(name).mechanism)
     landmark = options.get("landmark")
     questions = options.pop("questions", (*DEFAULT, *(("closure",) if landmark else ())))
     exported = export(mechanism, questions, **options)
     path.mkdir()
     write_package(exported, mechanism, Wish((), landmark), path)
     return Folder(exported, path)
+
+
+def limited() -> condyle.Mechanism:
+    """The reference mechanism with limits that bind, and a contact that can only push."""
+    machine = condyle.load("masticatory")
+    actuator = machine.chains[0].actuator.model_copy(update={"torque_limit": (-0.35, 0.35)})
+    chains = tuple(c.model_copy(update={"actuator": actuator}) for c in machine.chains)
+    left, right = machine.contacts
+    sided = left.model_copy(update={"one_sided": True, "side": "below"})
+    return machine.model_copy(update={"chains": chains, "contacts": (sided, right)})
 
 
 FOLDERS: dict[str, tuple[str, dict[str, Any]]] = {
@@ -45,6 +56,7 @@ FOLDERS: dict[str, tuple[str, dict[str, Any]]] = {
         "gough-stewart",
         {"constants": "struct", "prefix": "hexapod", "questions": ("inverse", "motion", "pose")},
     ),
+    "limited": ("limited", {"questions": ("bounded",)}),
     "mixed": ("mixed_k1_n7", {"prefix": "mixed", "questions": ("contact", "forward", "pose")}),
 }
 

@@ -10,6 +10,8 @@ import pytest
 from export.conftest import Folder
 from support.tools import need, run
 
+from condyle.export.facts import write_facts
+
 Folders = Callable[[str], Folder]
 STRICT = "-Werror -Wshadow -Wstrict-prototypes -Wmissing-prototypes -Wdouble-promotion"
 SANITIZED = "-fsanitize=address,undefined -fno-sanitize-recover=all"
@@ -37,13 +39,13 @@ def checked(of: Folder, flags: str, **variables: str) -> str:
     return told
 
 
-@pytest.mark.parametrize("name", ["jaw", "single", "curved", "struct", "mixed"])
+@pytest.mark.parametrize("name", ["jaw", "single", "curved", "struct", "mixed", "limited"])
 def test_the_recorded_samples(folder: Folders, name: str) -> None:
     need("gcc", "make")
     checked(folder(name), "-O1", CC="gcc")
 
 
-@pytest.mark.parametrize("name", ["jaw", "struct"])
+@pytest.mark.parametrize("name", ["struct", "limited"])
 def test_clang_has_nothing_to_say(folder: Folders, name: str) -> None:
     need("clang", "make")
     checked(folder(name), "-O1", CC="clang")
@@ -55,7 +57,7 @@ def test_vector_types(folder: Folders) -> None:
     checked(folder("jaw"), "-O1", CC="clang", VECTOR="1", VECTOR_FLAGS=flags)
 
 
-@pytest.mark.parametrize("name", ["struct", "mixed"])
+@pytest.mark.parametrize("name", ["struct", "limited"])
 def test_sanitizers(folder: Folders, name: str) -> None:
     need("gcc", "make")
     checked(folder(name), f"-O1 -g {SANITIZED}", CC="gcc")
@@ -128,3 +130,27 @@ def test_the_example(folder: Folders) -> None:
     told = run("./example", folder=of.path).splitlines()
     (effort,) = of.exported["inverse"].outputs
     assert [line.split(":")[0].removeprefix("effort ") for line in told] == list(effort.labels)
+
+
+def test_facts_are_measured_wherever_the_folder_is(
+    folder: Folders, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By a relative path too; a function's code holds that of those that it calls."""
+    need("gcc", "nm")
+    of = folder("jaw")
+    monkeypatch.chdir(of.path.parent)
+    rows = write_facts(of.exported, Path(of.path.name)).data["functions"]
+    for name, row in rows.items():
+        assert row["code"] > 8 * row["operations"] or "computed" in name, name
+        assert row["stack"] > 100 and row["error"] < 1e-12 and not row["wrong"]
+    assert rows["jaw_computed_torque"]["code"] > rows["jaw_inverse"]["code"]
+
+
+def test_the_tick_of_the_page(folder: Folders, tmp_path: Path) -> None:
+    """The controller that docs/how-to/controller.md shows, on the functions of the header."""
+    page = Path(__file__).parents[2] / "docs" / "how-to" / "controller.md"
+    shown = page.read_text(encoding="utf-8").split("```c\n")[1].split("```")[0]
+    text = shown.replace("masticatory", "jaw").replace("MASTICATORY", "JAW")
+    (tmp_path / "tick.c").write_text(text)
+    paths = f"-I{folder('jaw').path}"
+    run("gcc", "-std=c99", "-Wall", "-Werror", paths, "-fsyntax-only", "tick.c", folder=tmp_path)

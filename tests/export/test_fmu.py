@@ -203,39 +203,42 @@ def test_what_cannot_be_reached_is_said(fmus: dict[tuple[str, int], Path], versi
     assert asked(fmus["inverse", version], far, ["status"], "ModelExchange") == [1]
 
 
-@pytest.mark.parametrize("version", VERSIONS)
-def test_a_state_can_be_kept_and_brought_back(
-    fmus: dict[tuple[str, int], Path], version: int, tmp_path: Path
-) -> None:
-    """In memory and as bytes; a step from it is the same step again, and reset is the beginning."""
-    path = fmus["plant", version]
+def started(path: Path, version: int, folder: Path) -> tuple[Any, Callable[[str], float]]:
+    """A plant in co-simulation, and what reads one of its variables."""
     description = fmpy.read_model_description(str(path))
     numbers = {v.name: v.valueReference for v in description.modelVariables}
-    folder = fmpy.extract(str(path), unzipdir=str(tmp_path))
     kind = fmpy.fmi2.FMU2Slave if version == 2 else fmpy.fmi3.FMU3Slave
     unit = kind(
         guid=description.guid,
-        unzipDirectory=folder,
+        unzipDirectory=fmpy.extract(str(path), unzipdir=str(folder)),
         modelIdentifier=description.coSimulation.modelIdentifier,
         instanceName="x",
     )
-    get = unit.getReal if version == 2 else unit.getFloat64
-    keep, back = (
-        (unit.getFMUstate, unit.setFMUstate)
-        if version == 2
-        else (unit.getFMUState, unit.setFMUState)
-    )
-    unpack = unit.deSerializeFMUstate if version == 2 else unit.deserializeFMUState
-    pack = unit.serializeFMUstate if version == 2 else unit.serializeFMUState
     unit.instantiate()
     if version == 2:
         unit.setupExperiment(startTime=0.0)
     unit.enterInitializationMode()
     unit.exitInitializationMode()
+    get = unit.getReal if version == 2 else unit.getFloat64
+    return unit, lambda name: get([numbers[name]])[0]
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_state_can_be_kept_and_brought_back(
+    fmus: dict[tuple[str, int], Path], version: int, tmp_path: Path
+) -> None:
+    """In memory and as bytes; a step from it is the same step again, and reset is the beginning."""
+    unit, read = started(fmus["plant", version], version, tmp_path)
+    two = version == 2
+    keep, back = (
+        (unit.getFMUstate, unit.setFMUstate) if two else (unit.getFMUState, unit.setFMUState)
+    )
+    pack = unit.serializeFMUstate if two else unit.serializeFMUState
+    unpack = unit.deSerializeFMUstate if two else unit.deserializeFMUState
 
     def step(now: float) -> float:
         unit.doStep(currentCommunicationPoint=now, communicationStepSize=0.01)
-        return get([numbers["q.X"]])[0]
+        return read("q.X")
 
     first = step(0.0)
     state = keep()
@@ -246,7 +249,22 @@ def test_a_state_can_be_kept_and_brought_back(
     back(unpack(packed))
     assert step(0.01) == second
     unit.reset()
-    assert get([numbers["q.X"]])[0] == 0.0
+    assert read("q.X") == 0.0
+    unit.freeInstance()
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_plant_stops_where_it_cannot_go_on(
+    fmus: dict[tuple[str, int], Path], version: int, tmp_path: Path
+) -> None:
+    """Without efforts the jaw falls until a crank is in line; the step is refused, and said why."""
+    unit, read = started(fmus["plant", version], version, tmp_path)
+    now = 0.0
+    with pytest.raises(Exception, match=r"(?i)discard|failed|status"):
+        while now < 2:
+            unit.doStep(currentCommunicationPoint=now, communicationStepSize=0.01)
+            now += 0.01
+    assert 0.05 < now < 1 and read("status") in (1, 2)
     unit.freeInstance()
 
 

@@ -138,6 +138,25 @@ def test_the_controller_is_the_inverse_at_a_corrected_acceleration(jaw: Library)
     np.testing.assert_allclose(found["effort"], right, rtol=0, atol=1e-13 * np.abs(right).max())
 
 
+def test_limits_bind_in_the_recorded_samples(folder: Folders) -> None:
+    """Else the samples of `bounded` would say nothing that those of `contact` do not."""
+    of = folder("limited")
+    text = (of.path / f"{of.exported.prefix}_vectors.h").read_text()
+
+    def recorded(name: str) -> np.ndarray:
+        body = text.partition(f"{of.exported.prefix}_{name}[")[2].partition("= {")[2]
+        rows = body.partition("};")[0]
+        return np.array(
+            [float(x) for x in rows.replace("{", "").replace("}", "").split(",") if x.strip()]
+        )
+
+    status = recorded("bounded_status")
+    efforts = recorded("bounded_effort").reshape(len(status), -1)
+    at_limit = np.isclose(np.abs(efforts), 0.35, atol=1e-12).any(axis=1)
+    assert (status == INFEASIBLE).any() and at_limit.sum() >= 3
+    assert np.abs(efforts).max() <= 0.35 + 1e-12
+
+
 def test_forward_undoes_inverse(jaw: Library) -> None:
     rng = np.random.default_rng(6)
     q, q1, q2 = 0.004 * rng.normal(size=(3, 4)) * [[1], [10], [100]]

@@ -81,6 +81,13 @@ def test_friction_at_many_contacts_has_no_closed_form() -> None:
         export(many, ("inverse",))
 
 
+def test_limits_need_few_free_efforts() -> None:
+    with pytest.raises(UnsupportedError, match="24 chains"):
+        export(condyle.load("human-jaw"), ("bounded",))
+    with pytest.raises(UnsupportedError, match="double"):
+        export(condyle.load("masticatory"), ("bounded",), precision="float")
+
+
 def _friction() -> Any:
     from condyle.mechanism.contact import Friction
 

@@ -14,7 +14,7 @@ from condyle.results.model import Model
 from condyle.simulation.bind import bind
 from condyle.simulation.loads.food import APART, BROKEN, TOUCHING, FoodTable
 from condyle.simulation.loads.spring import Spring
-from condyle.simulation.run import run
+from condyle.simulation.run import Run, run
 from condyle.simulation.scenario import scenario_from
 
 FALL = {"duration": 0.08, "rate": 500}
@@ -153,6 +153,18 @@ def test_command(condyle_command: Any, tmp_path: Path) -> None:
     assert failed.status == 2 and "Did you mean" in failed.err and not Path("p").exists()
     assert condyle_command("simulate", "--new", "new.toml").status == 0
     assert Path("new.toml").is_file()
+
+
+def test_an_interrupted_run_leaves_nothing(
+    condyle_command: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupt(self: Run) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Run, "trace", interrupt)
+    Path("fall.toml").write_text("duration = 0.02")
+    ran = condyle_command("simulate", "--scenario", "fall.toml", "--out", "o")
+    assert ran.status == 130 and not Path("o").exists()
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")

@@ -11,6 +11,8 @@ import condyle
 from condyle.errors import InputError, ScenarioError
 from condyle.results.model import Model
 from condyle.simulation import FOODS, load_scenario, scenario_schema
+from condyle.simulation.bind import bind
+from condyle.simulation.plausibility import odd_things
 from condyle.simulation.scenario import scenario_from
 from condyle.simulation.starter import STARTER, default_scenario
 
@@ -55,6 +57,20 @@ def test_wrong_scenarios(tables: dict[str, Any], said: str) -> None:
 def test_scenarios_that_do_not_fit(jaw: Model, tables: dict[str, Any], said: str) -> None:
     with pytest.raises(ScenarioError, match=said):
         condyle.simulate(jaw, tables)
+
+
+def test_what_looks_like_a_slip(jaw: Model) -> None:
+    odd = {
+        "duration": 6.0,
+        "start": {"beta": 0.05},
+        "controller": PD | {"delay": 1},
+        "sensors": {"encoder_resolution": 0.1},
+        "load": [FOOD | {"thickness": 8.0}],
+    }
+    said = " ".join(odd_things(bind(jaw, scenario_from(odd))))
+    for words in ("8000 mm of food", "mostly in beta", "ends at 5 s of 6 s", "is it in degrees"):
+        assert words in said
+    assert not list(odd_things(bind(jaw, default_scenario())))
 
 
 def test_a_file_and_what_it_names(tmp_path: Path, jaw: Model) -> None:

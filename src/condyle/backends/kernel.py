@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from ..errors import InputError
-from ..graph.program import Interface, Result
+from ..graph.program import Interface, Numbers, Result
 
 OK, AGAIN = 0, 255  # statuses; others are those of the program's checks
 
@@ -32,6 +32,10 @@ class Kernel(Protocol):
 
     name: str
     interface: Interface
+
+    def renumbered(self, numbers: Numbers) -> Kernel:
+        """The same kernel on the numbers of another mechanism of its structure."""
+        ...
 
     def run(self, inputs: Mapping[str, np.ndarray], threads: int | None = None) -> Answer:
         """Evaluate samples.

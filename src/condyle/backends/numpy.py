@@ -6,6 +6,7 @@ It needs no compiler, and is what the other backends are tested against.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,14 @@ class NumpyKernel:
         self._order = numbers.order
         self._main = _Runner(variants.main, numbers)
         self._robust = None if variants.robust is None else _Runner(variants.robust, numbers)
+
+    def renumbered(self, numbers: Numbers) -> NumpyKernel:
+        """The same program on the numbers of another mechanism of its structure."""
+        other = copy(self)
+        other._order = numbers.order
+        other._main = self._main.renumbered(numbers)
+        other._robust = None if self._robust is None else self._robust.renumbered(numbers)
+        return other
 
     def run(self, inputs: Mapping[str, np.ndarray], threads: int | None = None) -> Answer:
         workers(threads)
@@ -61,9 +70,23 @@ class _Runner:
         self._program = program
         self._place: dict[Value, int] = {}
         self._fixed: list[Any] = []  # the first places
-        varying = [v for v in program.order if program.graph.nodes[v].varies]
-        for v in program.order:
-            node = program.graph.nodes[v]
+        self._fix(numbers)
+        self._buffers: list[int] = []  # lanes of the places after those
+        self._leaves: list[tuple[int, int]] = []  # place and column
+        self._steps: list[tuple[Callable[..., Any], tuple[int, ...], int]] = []
+        self._allocate([v for v in program.order if program.graph.nodes[v].varies])
+
+    def renumbered(self, numbers: Numbers) -> _Runner:
+        """The same calls on other numbers."""
+        other = copy(self)
+        other._fix(numbers)
+        return other
+
+    def _fix(self, numbers: Numbers) -> None:
+        """Compute what does not vary; each has the same place whatever the numbers."""
+        self._fixed = []
+        for v in self._program.order:
+            node = self._program.graph.nodes[v]
             if not node.varies:
                 self._place[v] = len(self._fixed)
                 self._fixed.append(_number(node.op, node.data, numbers) if not node.args else None)
@@ -74,10 +97,6 @@ class _Runner:
                     with np.errstate(all="ignore"):
                         self._call(v)(*given, out=out)
                     self._fixed[-1] = out
-        self._buffers: list[int] = []  # lanes of the places after those
-        self._leaves: list[tuple[int, int]] = []  # place and column
-        self._steps: list[tuple[Callable[..., Any], tuple[int, ...], int]] = []
-        self._allocate(varying)
 
     def _lanes(self, v: Value) -> int:
         group = self._program.graph.nodes[v].group

@@ -47,6 +47,7 @@ from .own import (
 from .programs import BINDING
 from .rows import Probe, Row, timed
 from .simulating import LOOP, simulation_probes
+from .sweeps import ALL, sweep_ratios, sweep_rows
 
 REFERENCE = "masticatory"
 CYCLE = "one cycle of the clock"
@@ -127,6 +128,8 @@ def run_benchmark(seconds: float = 1.0) -> Benchmark:
             rows += ready_rows(REFERENCE)
     if processors > 1:
         rows += _timed(list(thread_probes(load(REFERENCE))), rounds)
+        with step("solving studies"):
+            rows += sweep_rows()
     compiler = find_compiler()
     facts = {
         "processor": _processor(),
@@ -286,6 +289,7 @@ def _ratios(rows: list[Row], lanes: int) -> dict[str, float]:
     threads = [by_name.get(f"{own}: batch, {what}") for what in ("one thread", "two threads")]
     if threads[0] and threads[1]:
         ratios["two threads, times faster than one"] = threads[0].over(threads[1])
+    ratios |= sweep_ratios(by_name) if ALL in by_name else {}
     ready = f"{REFERENCE}: file to ready kernel"
     ratios["file to ready kernel, cold [s]"] = by_name[f"{ready}, cold"].seconds
     ratios["file to ready kernel, cached [s]"] = by_name[f"{ready}, cached"].seconds

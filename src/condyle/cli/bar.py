@@ -12,6 +12,7 @@ from ..progress import Advance, watched_by
 
 DELAY = 1.0  # seconds before anything is shown
 PERIOD = 0.1  # seconds between two pictures of the bar
+MANY = 1000  # things to do, of which a rate says something
 
 
 @dataclass(eq=False)
@@ -66,12 +67,22 @@ class _Bar:
         from rich.progress import (
             BarColumn,
             Progress,
+            ProgressColumn,
+            Task,
             TaskProgressColumn,
             TextColumn,
             TimeRemainingColumn,
         )
+        from rich.text import Text
 
-        columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
+        class Rate(ProgressColumn):
+            """How many a second, of many."""
+
+            def render(self, task: Task) -> Text:
+                known = task.speed and (task.total or 0) >= MANY
+                return Text(f"{task.speed:.0f}/s" if known else "")
+
+        columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), Rate())
         with (
             suppress(OSError),  # a terminal that went away
             Progress(

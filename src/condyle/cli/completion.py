@@ -28,6 +28,7 @@ STYLES = ("screen", "journal", "journal-wide")
 EXPORTS = (
     "inverse",
     "contact",
+    "bounded",
     "forward",
     "motion",
     "closure",

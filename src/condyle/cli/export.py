@@ -22,9 +22,10 @@ def c(
     question: Annotated[
         list[str] | None,
         typer.Option(
-            help="What to export; repeat for more: inverse, contact (with contact forces), forward "
-            "(accelerations), motion, closure, pose (from encoders), computed_torque. Default: all "
-            "but closure, which needs --from or --landmark.",
+            help="What to export; repeat for more: inverse, contact (with contact forces), bounded "
+            "(within limits), forward (accelerations), motion, closure, pose (from encoders), "
+            "computed_torque. Default: all but bounded, and but closure, which needs --from or "
+            "--landmark.",
             autocompletion=completion.one_of(*completion.EXPORTS),
         ),
     ] = None,

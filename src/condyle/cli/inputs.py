@@ -13,6 +13,7 @@ from ..errors import InputError
 from ..extras import require
 
 if TYPE_CHECKING:
+    from ..analysis.sweep import Study
     from ..mechanism import Mechanism
     from ..motion import Load, Motion
     from ..results.model import Model
@@ -98,6 +99,24 @@ def weight_of(machine: Mechanism, contact_weight: float) -> float:
             f"--contact-weight: expected a number of at least 0, got {contact_weight:g}"
         )
     return contact_weight / reference_force(machine) ** 2
+
+
+def study_for(path: Path, machine: Mechanism) -> Study:
+    """The study of a file, whose numbers are to vary in a mechanism.
+
+    Raises: InputError: for a file that is none, or that names another mechanism.
+    """
+    import condyle
+
+    from ..analysis.sweep import read_study
+
+    study = read_study(path)
+    if study.mechanism is not None and condyle.load(study.mechanism) != machine:
+        raise InputError(
+            f'--vary {path}: the study is of "{study.mechanism}", the run of "{machine.name}"; '
+            "name one of them in both, or leave it out of the study"
+        )
+    return study
 
 
 def chews(machine: Mechanism, landmark: str | None = None) -> bool:

@@ -81,6 +81,16 @@ def map_(
     ] = None,
     backend: options.Backend = "auto",
     threads: options.Threads = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="With --scheduler: so many. Default: all processors.")
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            help="Who computes, as for sweep: processes, threads, dask, or the address of a Dask "
+            "scheduler. Default: this process. Same numbers."
+        ),
+    ] = None,
 ) -> Answer:
     """Where a mechanism can go, and what it can do there at rest.
 
@@ -98,6 +108,7 @@ def map_(
     from ..analysis.map.files import save_map
     from ..analysis.map.numbers import numbers_of
     from ..analysis.map.quantities import chosen
+    from ..analysis.sweep.schedule import check_scheduler
     from ..report.maps import numbers_text
 
     machine = condyle.load(mechanism)
@@ -106,13 +117,15 @@ def map_(
     model = chosen_model(machine, "virtual_power", "core", backend, distribution, preload, 0.0)
     asked = asked_of(model, load, load_point, direction, stiffness, stroke or (), threads)
     quantities = chosen(names, asked)
+    if scheduler is not None:
+        check_scheduler(workers, scheduler)
     path = _run_path(run, grid) if run is not None else None
     streamed = format == "zarr" or (format == "auto" and size_of(asked, grid, quantities) > LARGE)
     if streamed:
         require("zarr", "maps")
     stem = output_folder(out) / f"{file_stem(machine.name)}-map"
     file = stem.with_suffix(".zarr" if streamed else ".nc")
-    dataset = mapped(asked, grid, quantities, file if streamed else None)
+    dataset = mapped(asked, grid, quantities, file if streamed else None, workers, scheduler)
     if not streamed:
         save_map(dataset, file)
     numbers = numbers_of(asked, grid, margin)

@@ -24,6 +24,9 @@ def report(
         list[Path] | None,
         typer.Option(help="Input of the run to name with its hash; repeat for more."),
     ] = None,
+    sweep: Annotated[
+        Path | None, typer.Option(help="Folder of a sweep, to show on the page too.")
+    ] = None,
 ) -> Answer:
     """A run as one web page to send.
 
@@ -34,8 +37,14 @@ def report(
     from ..report.page import write_report
 
     beside = solution.parent / f"{solution.stem}.html"
+    found = None
+    if sweep is not None:
+        require("matplotlib", "figures")
+        from ..analysis.sweep import read_sweep
+
+        found = read_sweep(sweep)
     inputs = [solution, *([measured] if measured else []), *(file or ())]
-    path = write_report(solution, out or beside, files=inputs, measured=measured)
+    path = write_report(solution, out or beside, files=inputs, measured=measured, sweep=found)
     size = path.stat().st_size
     return Answer(
         f"Wrote {path} ({size / 1e6:.1f} MB); open it in a browser",

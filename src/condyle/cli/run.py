@@ -16,6 +16,7 @@ from .inputs import (
     motion_and_load,
     output_folder,
     require_drawing,
+    study_for,
     warn,
 )
 
@@ -51,6 +52,12 @@ def run(
     measured: options.Measured = None,
     strict: options.Strict = False,
     flag: options.Flag = False,
+    vary: Annotated[
+        Path | None,
+        typer.Option(
+            help="Study (TOML) whose numbers vary: quantiles of efforts and contact forces too."
+        ),
+    ] = None,
 ) -> Answer:
     """Torques and contact forces along a motion.
 
@@ -63,6 +70,7 @@ def run(
     from ..results.warnings import refuse
 
     machine = condyle.load(mechanism)
+    study = None if vary is None else study_for(vary, machine)
     path, acting = motion_and_load(machine, motion, load, units, landmark, smooth, rate, trim)
     policy = distribution, preload, contact_weight
     model = chosen_model(machine, formulation, route, backend, *policy)
@@ -71,6 +79,10 @@ def run(
         solution = solution.with_measured(measured)
     if strict:
         refuse(solution.notices)
+    if study is not None:
+        from ..analysis.sweep import with_bands
+
+        solution = with_bands(solution, study, path, acting, mechanism=machine, workers=threads)
     folder, stem = output_folder(out), file_stem(machine.name)
     files = [folder / f"{stem}{ending}" for ending in (".nc", ".csv", *[".mat"] * mat)]
     solution.save(*files)
@@ -81,7 +93,7 @@ def run(
     if report:
         from ..report.page import write_report
 
-        inputs = [file for file in (motion, load, measured) if file is not None]
+        inputs = [file for file in (motion, load, measured, vary) if file is not None]
         inputs += [Path(mechanism)] if Path(mechanism).is_file() else []
         files.append(write_report(solution, folder / f"{stem}.html", files=inputs))
     warn([*path.warnings, *acting.warnings, *solution.warnings])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from enum import StrEnum
 from typing import Annotated
 
 import typer
@@ -11,22 +12,30 @@ from .answer import Answer
 from .command import UPKEEP, command
 
 
+class Format(StrEnum):
+    """Files that have a schema."""
+
+    mechanism = "mechanism"
+    scenario = "scenario"
+    study = "study"
+
+
 @command(UPKEEP, example="condyle schema > condyle.schema.json")
 def schema(
-    scenario: Annotated[
-        bool, typer.Option("--scenario", help="Of scenarios of condyle simulate.")
-    ] = False,
+    of: Annotated[Format, typer.Argument(help="Of mechanisms, scenarios or studies.")] = (
+        Format.mechanism
+    ),
 ) -> Answer:
-    """The format of mechanism files, for editors.
+    """The format of mechanism files, of scenarios or of studies, for editors.
 
     A JSON schema: an editor that knows it completes keys and marks mistakes while you type.
     """
-    from ..mechanism import json_schema
-
-    if scenario:
-        from ..simulation import scenario_schema
-
-        data = scenario_schema()
+    if of is Format.study:
+        from ..analysis.sweep import json_schema
+    elif of is Format.scenario:
+        from ..simulation import scenario_schema as json_schema
     else:
-        data = json_schema()
+        from ..mechanism import json_schema
+
+    data = json_schema()
     return Answer(json.dumps(data, indent=2), data, "condyle check masticatory", "document")

@@ -13,7 +13,7 @@ from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..model.distributing import LEAST
 from ..questions import Prescribed
 from ..questions.friction import MOST
-from . import encoders
+from . import encoders, limited
 from .context import Body, Context
 from .exported import Argument
 from .straight import function
@@ -196,6 +196,11 @@ CATALOGUE: dict[str, Entry] = {
     "contact": Entry(
         "Efforts of least norm that make a motion under a load, and the contact forces.",
         _contact_arguments, _contact, _EFFORTS,
+    ),
+    "bounded": Entry(
+        "Efforts of least norm within the actuators' limits, and the contact forces.",
+        _contact_arguments, lambda c, wish: limited.body(c, _contact_arguments(c, wish)),
+        (*_EFFORTS, "INFEASIBLE", "UNCERTIFIED"), ("contact", "motion"), limited.ROUNDS,
     ),
     "forward": Entry(
         "Accelerations that efforts and a load make, and the contact forces.",

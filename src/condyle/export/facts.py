@@ -36,7 +36,7 @@ class Facts:
 
 def write_facts(exported: Exported, folder: Path) -> Facts:
     """Measure and write FACTS.md."""
-    measured, how = _measured(exported, folder)
+    measured, how = _measured(exported, folder.resolve())
     rows = {
         f.name: {
             "operations": f.operations,
@@ -112,7 +112,7 @@ def _calls(source: str, names: set[str]) -> dict[str, set[str]]:
     found: dict[str, set[str]] = {}
     here = ""
     for line in source.splitlines():
-        if line and not line[0].isspace() and line.endswith(")"):
+        if line[:1].isalpha() and line.endswith(")"):
             here = line.partition("(")[0].rpartition(" ")[2].lstrip("*")
         elif here and line.startswith(" "):
             words = set(re.findall(r"(\w+)\(", line))

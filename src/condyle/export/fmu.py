@@ -88,5 +88,5 @@ def _built(sources: dict[str, str]) -> bytes | None:
         for name, text in sources.items():
             Path(folder, name).write_text(text, encoding="utf-8")
         library = Path(folder, "fmu.bin")
-        replace(compiler, flags=FLAGS).build(Path(folder, "fmu.c"), library)
+        replace(compiler, flags=FLAGS).build(library, Path(folder, "fmu.c"))
         return library.read_bytes()

@@ -95,6 +95,7 @@ static int instance_advance(Instance *me, double end)
     const double span = end - me->time;
     double x[MODEL_ORDER], y[MODEL_ORDER], k[7][MODEL_ORDER];
     double h = me->step > 0.0 && me->step < span ? me->step : span;
+    int why = 2; /* steps that shrink without end lead to where rates are infinite */
     memcpy(x, me->v + MODEL_STATES, sizeof x);
     if (!(span > 0.0))
         return instance_rates(me, x, k[0]);
@@ -120,8 +121,11 @@ static int instance_advance(Instance *me, double end)
         }
         if (failed || !(worst <= 1.0)) {
             h *= failed ? 0.25 : fmax(0.2, 0.9 * pow(worst, -0.2));
+            why = failed ? me->failed : why;
             if (h < 1e-12 * (1.0 + fabs(me->time))) {
                 instance_rates(me, x, k[0]);
+                me->failed = why;
+                me->v[MODEL_STATUS] = (double)why;
                 return 1;
             }
             continue;

@@ -53,6 +53,13 @@ def _inverse(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
     return {"effort": found.effort, "contact_force": found["contact_force"]}, found.status
 
 
+def _bounded(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
+    model = r.model.choosing("bounded")
+    load = np.hstack([given[name] for name in ("force", "moment", "point")])
+    found = model.torques(given["q"], given["q1"], given["q2"], load, outputs=("contact",))
+    return {"effort": found.effort, "contact_force": found["contact_force"]}, found.status
+
+
 def _forward(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
     load = np.hstack([given[name] for name in ("force", "moment", "point")])
     found = r.model.forward(given["q"], given["q1"], given["effort"], load)
@@ -95,6 +102,7 @@ def _reached(reached: np.ndarray) -> np.ndarray:
 _ANSWERS: dict[str, Callable[[Reference, Given], tuple[Arrays, np.ndarray]]] = {
     "inverse": _inverse,
     "contact": _inverse,
+    "bounded": _bounded,
     "forward": _forward,
     "motion": _motion,
     "closure": _closure,

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from .actuator import CableActuator, Limits, LinearActuator, RotaryActuator
-from .bodies import Crank, LegBody, Rod, Slider, across, check_rod_length, distance
+from .bodies import Crank, LegBody, Rod, Slider, across, check_rod_length, cross, distance
 from .quantities import Direction, Name, Point
 from .table import Table
 
@@ -105,7 +105,7 @@ class RSS(ChainTable):
         coupler = np.subtract(joint, tip)
         check_rod_length(coupler, "coupler", "crank_tip")
         if base is not None and axis is not None:
-            tangent = np.cross(axis, np.subtract(tip, base))
+            tangent = cross(axis, np.subtract(tip, base))
             sine = abs(coupler @ tangent) / (np.linalg.norm(coupler) * np.linalg.norm(tangent))
             if sine < NO_BRANCH:
                 raise ValueError(

@@ -4,16 +4,18 @@ the contacts hold at all."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from functools import lru_cache
 from itertools import combinations
 from typing import Protocol
 
 import casadi as ca
 import numpy as np
 
+from .bodies import cross
 from .chain import Chain
 from .contact import Contact
 from .coordinates import COORDINATES
-from .surface import Parallel
+from .surface import Parallel, of_form
 
 DEPENDENT_ORDER = ("Z", "gamma", "alpha", "beta", "Y", "X")
 MAX_CONDITION = 1e4
@@ -44,10 +46,24 @@ def characteristic_length(mechanism: Parts) -> float:
 
 def contact_gradient(contact: Contact) -> tuple[float, np.ndarray]:
     """phi [m] and its gradient, (3,) [1], of one contact at home."""
-    p = ca.SX.sym("p", 3)
-    phi = contact.offset_surface.phi(p)
-    value, gradient = ca.Function("phi", [p], [phi, ca.gradient(phi, p)])(contact.point)
-    return float(value), np.asarray(gradient).ravel()
+    locus = contact.offset_surface
+    value, *gradient = _at(locus.form, (*contact.point, *locus.constants()))
+    return value, np.array(gradient)
+
+
+@lru_cache(maxsize=256)
+def _at(form: str, numbers: tuple[float, ...]) -> tuple[float, ...]:
+    """phi and the entries of its gradient, from a point and the constants of a surface."""
+    return tuple(map(float, _equation(form, len(numbers) - 3)(*numbers)))
+
+
+@lru_cache(maxsize=256)
+def _equation(form: str, count: int) -> ca.Function:
+    """phi and the entries of its gradient, from the entries of a point and `count` constants."""
+    p, c = ca.SX.sym("p", 3), ca.SX.sym("c", count)
+    phi = of_form(form).phi(p, c)
+    found = [phi, *ca.vertsplit(ca.gradient(phi, p))]
+    return ca.Function("phi", [*ca.vertsplit(p), *ca.vertsplit(c)], found)
 
 
 def home_residuals(mechanism: Parts) -> np.ndarray:
@@ -68,7 +84,7 @@ def constraint_jacobian(mechanism: Parts) -> np.ndarray:
     for contact in mechanism.contacts:
         _, gradient = contact_gradient(contact)
         # At home R_omega is the identity, so angles act as rotations about the axes of {S}.
-        rows.append(np.concatenate([gradient, np.cross(contact.point, gradient) / length]))
+        rows.append(np.concatenate([gradient, cross(contact.point, gradient) / length]))
     return np.array(rows).reshape(-1, 6)
 
 
@@ -101,7 +117,8 @@ def dependent_coordinates(mechanism: Parts) -> tuple[str, ...]:
     """
     if not mechanism.contacts:
         return ()
-    return mechanism.dependent or next(usable_sets(mechanism))
+    known = getattr(mechanism, "first_usable", None)  # a mechanism looks for them once
+    return mechanism.dependent or known or next(usable_sets(mechanism))
 
 
 def independent_coordinates(mechanism: Parts) -> tuple[str, ...]:

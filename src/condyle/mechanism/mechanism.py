@@ -12,7 +12,7 @@ from ..errors import InputError, MechanismError
 from .chain import Chain
 from .contact import Bounds, Contact
 from .coordinates import COORDINATES, Coordinate
-from .home import home_problems
+from .home import home_problems, usable_sets
 from .paths import changed, value_at
 from .platform import Inertia, Platform
 from .portrait import in_html, in_words
@@ -85,6 +85,11 @@ class Mechanism(Table):
     @property
     def degrees_of_freedom(self) -> int:
         return 6 - len(self.contacts)
+
+    @cached_property
+    def first_usable(self) -> tuple[str, ...] | None:
+        """The first set of coordinates that the contacts determine at home, if there is one."""
+        return next(usable_sets(self), None)
 
     @cached_property
     def chain_names(self) -> tuple[str, ...]:

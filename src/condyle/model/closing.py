@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,8 +37,11 @@ class Closure:
         names: Sequence[str] = (),
         landmark: str | None = None,
         backend: Backend | None = None,
+        general: bool = False,
     ) -> None:
-        """Raises: InputError: if these do not determine a pose."""
+        """Args:   general: whether its kernel serves every mechanism of the structure.
+        Raises: InputError: if these do not determine a pose.
+        """
         if landmark is None:
             require_independent(mechanism, names)
             self.names = tuple(sorted(names, key=COORDINATES.index))
@@ -45,14 +49,32 @@ class Closure:
             require_landmark(mechanism, landmark)
             self.names = ()
         prescribed = Prescribed(self.names)
+        self._landmark = landmark
         structure = structure_of(mechanism)
         self._numbers = Layout.of(structure).numbers(mechanism, landmark)
-        structure = specialised(structure, self._numbers)
+        if not general:
+            structure = specialised(structure, self._numbers)
         question = Question.about(structure, "closure", prescribed)
         backend = backend or Backend()
         self._kernel: Kernel = backend.kernel(question.key, question.variants, self._numbers)
         self._robust = (structure, self._numbers, prescribed)
         self._follow: Follow | None = None
+
+    def renumbered(self, mechanism: Mechanism) -> Closure:
+        """The same, if it is general, of another mechanism of the structure.
+
+        Raises: InputError: if the names or the landmark do not determine its pose.
+        """
+        if self._landmark is None:
+            require_independent(mechanism, self.names)
+        else:
+            require_landmark(mechanism, self._landmark)
+        other = copy(self)
+        structure, _, prescribed = self._robust
+        other._numbers = Layout.of(structure).numbers(mechanism, self._landmark)
+        other._kernel = self._kernel.renumbered(other._numbers)
+        other._robust, other._follow = (structure, other._numbers, prescribed), None
+        return other
 
     def solve(
         self, s: np.ndarray, s1: np.ndarray, s2: np.ndarray, threads: int | None = None

@@ -77,6 +77,7 @@ class Evaluator:
         distribution: str | None = None,
         preload: float = 0.0,
         contact_weight: float = 0.0,
+        general: bool = False,
     ) -> None:
         """Derive the equations of motion.
 
@@ -85,6 +86,8 @@ class Evaluator:
                 preload: least push of one-sided contacts [N].
                 contact_weight: W / N_ref^2 of `weighted` [1/N^2].
                 backend: compiled, numpy, or auto (compiled where there is a C compiler).
+                general: for `renumbered`: kernels that serve every mechanism of the structure,
+                by leaving out nothing that happens to be zero in this one.
         Raises: InputError:       for an unknown formulation, route or backend.
                 UnsupportedError: where route `direct` has no closed form.
                 MechanismError:   if the contacts do not hold the platform at home.
@@ -106,7 +109,8 @@ class Evaluator:
         with step("deriving the equations"):
             structure = structure_of(mechanism, self.formulation, route)
             self._numbers = Layout.of(structure).numbers(mechanism)
-            self._structure = specialised(structure, self._numbers)
+            self._structure = structure if general else specialised(structure, self._numbers)
+        self._general: Any = self if general else None  # who lends kernels
         self._kernels: dict[Any, Kernel] = {}
         self._closures: dict[Any, Closure] = {}
         self._local = threading.local()  # what belongs to one thread
@@ -119,6 +123,11 @@ class Evaluator:
             f"  {len(self.mechanism.chains)} efforts from q = ({', '.join(self.independent)})"
         )
 
+    def __copy__(self) -> Self:
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
+        return other
+
     def __reduce__(self) -> tuple[Any, ...]:
         """Models travel as their recipe; kernels are found again in the cache."""
         return type(self), (
@@ -127,6 +136,7 @@ class Evaluator:
             self.route,
             self.backend.asked,
             *self._asked,
+            *((True,) if self._general is not None else ()),
         )
 
     # -- what it is ------------------------------------------------------------------------
@@ -173,6 +183,26 @@ class Evaluator:
         _ = other.policy  # has to fit, now
         return other
 
+    def renumbered(self, mechanism: Mechanism) -> Self:
+        """The same model, if it is general, of another mechanism of the same structure.
+
+        It shares the kernels, so that it costs a thousandth of a new one. The mechanism must have
+        been checked, as one from a file or from `Mechanism.set` is.
+
+        Raises: InputError: if the distribution does not fit the mechanism.
+        """
+        assert self._general is not None
+        other = copy(self._general)
+        own = ("characteristic_length", "reference_force", "policy", "_distributor", "_robust")
+        for name in own:
+            other.__dict__.pop(name, None)
+        other.mechanism = mechanism
+        _ = other.policy  # has to fit, now
+        other._numbers = Layout.of(self._structure).numbers(mechanism)
+        other._kernels, other._closures = {}, {}
+        other._local = threading.local()
+        return other
+
     @cached_property
     def policy(self) -> Policy:
         """How efforts are chosen; forward dynamics has no need of it.
@@ -193,6 +223,9 @@ class Evaluator:
     def kernel(self, question: str, *details: Any) -> Kernel:
         """The kernel of a question; see `condyle.questions`."""
         asked = question, details
+        if asked not in self._kernels and self._general not in (None, self):
+            shared = self._general.kernel(question, *details)
+            self._kernels[asked] = shared.renumbered(self._numbers)
         if asked not in self._kernels:
             structure = self._structure
             if question == "inverse" and self._distributor.unsolved_friction:
@@ -619,8 +652,12 @@ class Evaluator:
 
     def _closure(self, names: tuple[str, ...], landmark: str | None) -> Closure:
         key = ("closure", names, landmark)
+        if key not in self._closures and self._general not in (None, self):
+            shared = self._general._closure(names, landmark)
+            self._closures[key] = shared.renumbered(self.mechanism)
         if key not in self._closures:
-            self._closures[key] = Closure(self.mechanism, names, landmark, self.backend)
+            general = self._general is not None
+            self._closures[key] = Closure(self.mechanism, names, landmark, self.backend, general)
         return self._closures[key]
 
 

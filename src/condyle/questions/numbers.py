@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import casadi as ca
@@ -14,11 +15,11 @@ from ..dynamics import FORMULATIONS
 from ..errors import UnsupportedError
 from ..graph.program import Numbers
 from ..kinematics.chain import FAMILIES
+from ..kinematics.chain.family import Constants
 from ..kinematics.contact import (
     ContactSymbols,
     angle_equation,
     closed_form_available,
-    contacts_of,
     mean_and_difference,
 )
 from ..mechanism.chain import Chain
@@ -31,6 +32,7 @@ NO_LOSSES = (0.0, 0.0, 0.0, 1.0)
 Parameter = Callable[[str], ca.SX]  # a mechanism's number by name
 Slot = tuple[int, int]  # start, count
 Vector = tuple[float, ...]
+ChainNumbers = dict[str, np.ndarray]  # constants of a chain by name
 INERTIA = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # order of an inertia's entries
 
 
@@ -68,11 +70,17 @@ class Layout:
 
         Args: landmark: the platform point whose path is given, if one is.
         """
+        return self._values(mechanism, landmark, constants_of(mechanism))
+
+    def _values(
+        self, mechanism: Mechanism, landmark: str | None, constants: Sequence[ChainNumbers]
+    ) -> dict[str, Any]:
         points = [contact.point for contact in mechanism.contacts]
+        masses = end_masses(mechanism, constants)
         values: dict[str, Any] = {
             "gravity": mechanism.gravity,
             **_body(mechanism, {}),
-            **{f"lumped_{name}": v for name, v in _body(mechanism, end_masses(mechanism)).items()},
+            **{f"lumped_{name}": v for name, v in _body(mechanism, masses).items()},
             "branch": 1.0,
             "length": characteristic_length(mechanism),
             "landmark": mechanism.platform.points[landmark] if landmark else (0.0, 0.0, 0.0),
@@ -95,21 +103,20 @@ class Layout:
 
     def numbers(self, mechanism: Mechanism, landmark: str | None = None) -> Numbers:
         """All of them, as backends take them."""
-        values = self.values(mechanism, landmark)
+        constants = constants_of(mechanism)
+        values = self._values(mechanism, landmark, constants)
         parameters = np.concatenate([np.ravel(values[name]) for name in self.parameters])
         lanes, padding = [], []
         for kind in self.structure.families:
             family = FAMILIES[kind]
-            chains = [c for c in mechanism.chains if c.kind == kind]
-            rows = [
-                [1.0, *c.platform, *family.vector(family.constants(c)), *self._losses(c)]
-                for c in chains
-            ]
-            idle = family.constants(chains[0])
-            idle |= {name: np.zeros_like(idle[name]) for name in self.pads(kind)}
+            own = zip(mechanism.chains, constants, strict=True)
+            chains = [(chain, given) for chain, given in own if chain.kind == kind]
+            rows = [[1.0, *c.platform, *family.vector(g), *self._losses(c)] for c, g in chains]
+            first, idle = chains[0]
+            idle = idle | {name: np.zeros_like(idle[name]) for name in self.pads(kind)}
             lanes.append(np.array(rows, dtype=float).T.copy())
-            own = [*NO_LOSSES] if self.structure.losses else []
-            padding.append(np.array([0.0, *chains[0].platform, *family.vector(idle), *own]))
+            none = [*NO_LOSSES] if self.structure.losses else []
+            padding.append(np.array([0.0, *first.platform, *family.vector(idle), *none]))
         order = tuple(
             i
             for kind in self.structure.families
@@ -188,19 +195,41 @@ def require_closed_form(mechanism: Mechanism) -> None:
 
 def closed_branch(mechanism: Mechanism) -> float:
     """-sign(B) of the angle equation at home, which keeps the dependent angle on its branch."""
-    dependent = dependent_coordinates(mechanism)
-    equation = angle_equation(contacts_of(mechanism), dependent, ca.SX.zeros(6))
-    return -float(np.sign(float(ca.evalf(equation.B))))
+    if not mechanism.contacts:
+        return 0.0
+    forms = tuple((c.offset_surface.form, 3) for c in mechanism.contacts)
+    given = [n for c in mechanism.contacts for n in (*c.point, *c.offset_surface.constants())]
+    B = _angle_sine(forms, dependent_coordinates(mechanism))
+    return -float(np.sign(float(B(*given))))
 
 
-def end_masses(mechanism: Mechanism) -> dict[Vector, float]:
-    """Masses [kg] of the chains that move with the platform's joints, by the joints' points."""
+@lru_cache(maxsize=32)
+def _angle_sine(forms: tuple[tuple[str, int], ...], dependent: tuple[str, ...]) -> ca.Function:
+    """B of the angle equation at home, from each contact's point and the constants of its plane."""
+    symbols = [(ca.SX.sym("p", 3), ca.SX.sym("c", count)) for _, count in forms]
+    contacts = [
+        ContactSymbols(of_form(form), p, c)
+        for (form, _), (p, c) in zip(forms, symbols, strict=True)
+    ]
+    given = [entry for pair in symbols for part in pair for entry in ca.vertsplit(part)]
+    return ca.Function("B", given, [angle_equation(contacts, dependent, ca.SX.zeros(6)).B])
+
+
+def constants_of(mechanism: Mechanism) -> list[ChainNumbers]:
+    """Constants of every chain, by the names of its family."""
+    return [FAMILIES[chain.kind].constants(chain) for chain in mechanism.chains]
+
+
+def end_masses(mechanism: Mechanism, constants: Sequence[ChainNumbers]) -> dict[Vector, float]:
+    """Masses [kg] of the chains that move with the platform's joints, by the joints' points.
+
+    Args: constants: as of `constants_of`.
+    """
     masses: dict[Vector, float] = {}
-    for chain in mechanism.chains:
-        family = FAMILIES[chain.kind]
-        constants = family.named(ca.SX(ca.DM(family.vector(family.constants(chain)))))
-        found = [float(ca.evalf(mass)) for mass in family.end_masses(constants).values()]
-        masses[tuple(chain.platform)] = masses.get(tuple(chain.platform), 0.0) + sum(found)
+    for chain, own in zip(mechanism.chains, constants, strict=True):
+        found = FAMILIES[chain.kind].end_masses(Constants({n: v[()] for n, v in own.items()}))
+        joint = tuple(chain.platform)
+        masses[joint] = masses.get(joint, 0.0) + sum(map(float, found.values()))
     return masses
 
 

@@ -50,9 +50,9 @@ def table_variables(mechanism: Mechanism, columns: Mapping[str, Any]) -> dict[st
     found: dict[str, Any] = {"info": _info(info)} | {n: cells(v) for n, v in labels.items()}
     rest = dict(columns)
     for variable in VARIABLES:
-        if variable.column is None:
+        if variable.column is None or len(variable.dims) < 2:
             continue
-        names = [f"{variable.column}{label}" for label in labels[variable.dims[1]]]
+        names = [f"{variable.column}{label}" for label in labels.get(variable.dims[1], ())]
         if names and all(name in rest for name in names):
             values = np.column_stack([rest.pop(name) for name in names])
             said = variable.attributes(mechanism)

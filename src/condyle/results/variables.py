@@ -52,11 +52,6 @@ def chosen_within_limits(derived: Derived) -> bool:
     return derived.limited
 
 
-def simulated(name: str) -> Callable[[Derived], bool]:
-    """Whether a simulation has brought a variable of that name."""
-    return lambda derived: name in derived.simulated
-
-
 @dataclass(frozen=True)
 class Variable:
     """A variable of a solution.
@@ -69,6 +64,7 @@ class Variable:
     when:   whether a solution has it at all.
     failed: whether failed samples may have a value too.
     sizes:  of vectors along the last dimension stand in CSV, not their components.
+    simulated: whether only a simulation has it.
     """
 
     name: str
@@ -81,6 +77,7 @@ class Variable:
     when: Callable[[Derived], bool] = always
     failed: bool = False
     sizes: bool = False
+    simulated: bool = False
 
     def attributes(self, mechanism: Mechanism) -> dict[str, str]:
         """`units`, `long_name` and, where there are flags, `flag_meanings`."""
@@ -106,8 +103,9 @@ def _simulated(
         meaning,
         lambda d: d.simulated[name],
         column=column,
-        when=simulated(name),
+        when=lambda d: name in d.simulated,
         sizes=sizes,
+        simulated=True,
     )
 
 

@@ -63,6 +63,10 @@ KINDS = {
         "samples that could not be computed (`--flag`)",
         "see their intervals and causes; scale the motion",
     ),
+    "failed_variants": Kind(
+        "variants that have samples without a result (`--vary`)",
+        "the bands leave them out; a study of the same numbers by `condyle sweep` has the reasons",
+    ),
     "near_singularity": Kind(
         "samples near a singularity",
         f"ratio below {NEAR_SINGULAR:g}: torques grow, and so does the effect of every error in "

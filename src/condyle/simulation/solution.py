@@ -20,6 +20,7 @@ from ..results.variables import ACCOUNTS
 from ..results.warnings import Notice, Watch
 from .plan import ClosedLoop, Plan, Trace
 from .plant import Plant
+from .plausibility import odd_things
 from .scenario import Scenario
 
 
@@ -40,7 +41,7 @@ def solved(plan: Plan, trace: Trace, scenario: Scenario, source: str, started: f
     derived = Derived(model.mechanism, evaluation, wrench, simulated=simulated)
     watch = Watch(model.mechanism)
     watch.see(derived, trace.t)
-    notices = watch.notices()
+    notices = [*(Notice("implausible", text) for text in odd_things(plan)), *watch.notices()]
     if (end := trace.ended) is not None:
         text = f"the run ended at t = {end.time:.6g} s of {plan.duration:g} s: {end.text}"
         whose = f' ("{end.owner}")' if end.owner else ""

@@ -61,6 +61,23 @@ def test_largest_load_is_that_of_a_linear_program(
     assert len(set(np.round(expected, 6))) > 1
 
 
+def test_holding_by_facets_and_by_chosen_efforts(
+    model_of: Models, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Many columns leave the question to the distribution; where both can answer they agree."""
+    model = model_of("masticatory")
+    grid = grid_of(model.mechanism, ["X=-3:4:8 mm", "beta=-6:6:8 deg"])
+    q = grid.block(0, grid.size)
+    survey = model.survey(q, ("pose",))
+    pose = survey.values["pose"].T[survey.reached]
+    load = np.array([0, 0, -240.0, 0, 0, 0, *model.load_point("incisor")])
+    own = ability.Ability.of(model)
+    held = own.holds(pose, load)
+    assert 5 < held.sum() < len(held) - 5
+    monkeypatch.setattr(ability, "MANY", 0)
+    np.testing.assert_array_equal(own.holds(pose, load), held)
+
+
 def by_program(model: condyle.Model, pose: np.ndarray, direction: np.ndarray, side: str) -> float:
     q = pose[None, [0, 1, 3, 4]]
     J = model.jacobians(q)["J_theta"][0]  # (n, 6)

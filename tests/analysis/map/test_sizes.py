@@ -85,6 +85,7 @@ def known(d: int, *margins: Any) -> Any:
     return SimpleNamespace(
         margins=lambda q: np.array([margin(q) for margin in margins]),
         reasons=["plane", "blob"],
+        costly=False,
         asked=SimpleNamespace(model=model),
     )
 

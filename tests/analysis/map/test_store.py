@@ -45,6 +45,21 @@ def test_blocks_do_not_matter(model_of: Models, monkeypatch: pytest.MonkeyPatch)
     xr.testing.assert_identical(condyle.workspace_map(model, OVER, QUANTITIES), right)
 
 
+@pytest.mark.parametrize("scheduler", ["processes", "threads"])
+def test_who_computes_does_not_matter(
+    model_of: Models, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scheduler: str
+) -> None:
+    model = model_of("masticatory")
+    right = condyle.workspace_map(model, OVER, QUANTITIES)
+    monkeypatch.setattr(compute, "BLOCK", 16)
+    others = {"workers": 2, "scheduler": scheduler}
+    found = condyle.workspace_map(model, OVER, QUANTITIES, store=tmp_path / "a.zarr", **others)
+    for name in right.data_vars:
+        np.testing.assert_array_equal(found[name].values, right[name].values)
+    with pytest.raises(condyle.InputError, match="expected processes, threads, dask"):
+        condyle.workspace_map(model, OVER, scheduler="nobody")
+
+
 def test_what_fails_leaves_what_was_there(
     model_of: Models, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

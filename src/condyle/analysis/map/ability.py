@@ -18,9 +18,12 @@ from math import comb
 
 import numpy as np
 
+from ...kinematics.chain import FAMILIES
+from ...kinematics.contact import indices
 from ...mechanism.chain import limits
 from ...mechanism.mechanism import Mechanism
 from ...model.evaluator import Evaluator
+from ...status import Status
 
 MANY = 300  # subsets of columns, above which a linear program is quicker
 DEPENDENT = 1e-10  # volume of d unit columns below which they have no inverse
@@ -64,9 +67,20 @@ class Ability:
 
     def holds(self, pose: np.ndarray, load: np.ndarray) -> np.ndarray:
         """Whether a load can be held within the limits, (N,)."""
+        units = {FAMILIES[chain.kind].effort_unit for chain in self.model.mechanism.chains}
+        if self.many and len(units) == 1:  # choosing efforts is quicker than linear programs
+            q = pose[:, indices(self.model.independent)]
+            loads = np.broadcast_to(load, (len(q), 9))
+            chosen = self.model.choosing("bounded").torques(q, 0 * q, 0 * q, loads)
+            return ~np.isin(chosen.status, (Status.infeasible, Status.jammed))
         columns, needed, _ = self._columns(pose, load, np.zeros(3))
         lower, upper = interval(columns, needed, 0 * needed, self.low, self.high)
         return (lower <= 0) & (upper >= 0)
+
+    @property
+    def many(self) -> bool:
+        """Whether there are too many facets to go through."""
+        return comb(len(self.low), 6 - len(self.free)) > MANY
 
     def _columns(
         self, pose: np.ndarray, load: np.ndarray, direction: np.ndarray
@@ -95,7 +109,7 @@ def interval(
     columns: np.ndarray, needed: np.ndarray, more: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Least and greatest s, (N,) each, so that needed + s more is in the zonotope; lower > upper
-    where there is none.
+    where there is none. Where there are many columns, of the s that are not negative.
 
     Args: columns: (N, d, c);  needed, more: (N, d);  low, high: (c,), infinite or not.
     """
@@ -147,24 +161,19 @@ def _within(
 def _program(
     columns: np.ndarray, needed: np.ndarray, more: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> tuple[float, float]:
-    """The same by linear programs."""
+    """The same by a linear program, s >= 0."""
     from scipy.optimize import linprog
 
     A = np.column_stack([columns, -more])
     size = np.abs(A).max(axis=1, keepdims=True)
     size[size == 0] = 1.0
-    bounds = [*zip(low, high, strict=True), (None, None)]
-    ends = []
-    for sign in (1.0, -1.0):
-        cost = np.append(np.zeros(len(low)), sign)
-        if not more.any():
-            cost[:] = 0.0
-        found = linprog(cost, A_eq=A / size, b_eq=needed / size[:, 0], bounds=bounds)
-        if found.status == 2:
-            return np.inf, -np.inf
-        unbounded = found.status == 3 or not more.any()
-        ends.append(-sign * np.inf if unbounded else sign * float(found.fun or 0.0))
-    return ends[0], ends[1]
+    bounds = [*zip(low, high, strict=True), (0.0, None)]
+    cost = np.append(np.zeros(len(low)), -1.0 if more.any() else 0.0)
+    found = linprog(cost, A_eq=A / size, b_eq=needed / size[:, 0], bounds=bounds)
+    if found.status == 2:
+        return np.inf, -np.inf
+    bounded = found.status == 0 and more.any()
+    return 0.0, -float(found.fun or 0.0) if bounded else np.inf
 
 
 def limited(mechanism: Mechanism) -> bool:

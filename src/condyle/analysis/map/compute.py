@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,7 @@ from ...mechanism.mechanism import COORDINATES, Mechanism
 from ...model.evaluator import Evaluator
 from ...motion.units import FORCE, MOMENT
 from ...progress import step
+from ..sweep.schedule import check_scheduler, done
 from .axes import Grid, Over, Values, grid_of, number, values_of
 from .block import Asked, Block
 from .quantities import Mapped, Quantity, chosen, variables
@@ -43,6 +45,8 @@ def workspace_map(
     strokes: Strokes = (),
     store: str | os.PathLike[str] | None = None,
     threads: int | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
 ) -> xr.Dataset:
     """Quantities at rest over one, two or three of the independent coordinates.
 
@@ -59,13 +63,17 @@ def workspace_map(
             strokes: "leg_*=-200:300 mm": ranges of joint coordinates that count as reach.
             store: a folder (.zarr) to stream to, for more than memory holds; it appears whole or
             not at all.  threads: at most so many.
+            workers, scheduler: as of `condyle.sweep`: processes, threads, dask, or the address of
+            a Dask scheduler; by default this process alone, with its threads. Same numbers.
     Returns: a dataset with a dimension for each axis; `status` and `cause` always.
     Raises: InputError: for anything that cannot be used as given, before any work.
     """
     grid = grid_of(model.mechanism, over, hold)
     asked = asked_of(model, load, load_point, direction, stiffness, strokes, threads)
     quantities = chosen((quantity,) if isinstance(quantity, str) else tuple(quantity), asked)
-    return mapped(asked, grid, quantities, store)
+    if scheduler is not None:
+        check_scheduler(workers, scheduler)
+    return mapped(asked, grid, quantities, store, workers, scheduler)
 
 
 def asked_of(
@@ -98,6 +106,8 @@ def mapped(
     grid: Grid,
     quantities: tuple[Quantity, ...],
     store: str | os.PathLike[str] | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
 ) -> xr.Dataset:
     """The map itself."""
     import xarray as xr
@@ -122,7 +132,7 @@ def mapped(
     attributes = _attributes(asked, grid)
     if store is None:
         memory = Memory(kept, grid.shape)
-        fill(asked, grid, quantities, memory, BLOCK)
+        fill(Pieces(asked, grid, quantities, BLOCK), memory, workers, scheduler)
         arrays = memory.arrays()
         return xr.Dataset(
             {name: (k.dims, arrays[name], dict(k.attributes)) for name, k in kept.items()},
@@ -134,7 +144,7 @@ def mapped(
     rows = max(BLOCK // row, 1)
     with replacing_folder(store, MARK) as folder:
         sink = Zarr(folder, kept, grid.shape, rows, coordinates, attributes)
-        fill(asked, grid, quantities, sink, rows * row)
+        fill(Pieces(asked, grid, quantities, rows * row), sink, workers, scheduler)
     return xr.open_zarr(Path(store), chunks=None, consolidated=False)
 
 
@@ -148,17 +158,48 @@ def size_of(asked: Asked, grid: Grid, quantities: tuple[Quantity, ...]) -> int:
     return grid.size * sum(each)
 
 
+@dataclass(frozen=True)
+class Pieces:
+    """A map in blocks of so many poses."""
+
+    asked: Asked
+    grid: Grid
+    quantities: tuple[Quantity, ...]
+    block: int
+
+    @property
+    def count(self) -> int:
+        return -(-self.grid.size // self.block)
+
+    def ends(self, piece: int) -> tuple[int, int]:
+        """The first pose of a piece, and the first after it."""
+        start = piece * self.block
+        return start, min(start + self.block, self.grid.size)
+
+
+def evaluated(pieces: Pieces, piece: int) -> dict[str, np.ndarray]:
+    """All variables at the poses of one piece."""
+    wanted = frozenset(name for quantity in pieces.quantities for name in quantity.needs)
+    here = Block(pieces.asked, pieces.grid.block(*pieces.ends(piece)), wanted)
+    return {v.name: _values(v, here) for v in variables(pieces.quantities)}
+
+
 def fill(
-    asked: Asked, grid: Grid, quantities: tuple[Quantity, ...], sink: Sink, block: int
+    pieces: Pieces, sink: Sink, workers: int | None = None, scheduler: str | None = None
 ) -> None:
-    """Evaluate all poses, block by block."""
-    wanted = frozenset(name for quantity in quantities for name in quantity.needs)
-    found = list(variables(quantities))
-    with step("mapping", grid.size) as advance:
-        for start in range(0, grid.size, block):
-            stop = min(start + block, grid.size)
-            here = Block(asked, grid.block(start, stop), wanted)
-            sink.write(start, stop, {v.name: _values(v, here) for v in found})
+    """Evaluate all poses, block by block, here or where `scheduler` says."""
+    numbers = range(pieces.count)
+    job: Any = pieces  # whoever does it hands it through as it is
+    work: Any = evaluated
+    found = (
+        ((piece, evaluated(pieces, piece)) for piece in numbers)
+        if scheduler is None
+        else done(job, work, numbers, workers, scheduler)
+    )
+    with step("mapping", pieces.grid.size) as advance:
+        for piece, arrays in found:
+            start, stop = pieces.ends(piece)
+            sink.write(start, stop, arrays)
             advance(stop - start)
 
 

@@ -82,6 +82,11 @@ class Free:
             found[-1, some[~held]] = -1.0
         return found
 
+    @property
+    def costly(self) -> bool:
+        """Whether efforts have to be chosen at every pose."""
+        return self.limits and limited(self.asked.model.mechanism) and self.asked.ability.many
+
     @cached_property
     def reasons(self) -> list[str]:
         """What a negative margin is the end of."""
@@ -110,6 +115,7 @@ def greatest_ball(free: Free, grid: Grid, points: int = POINTS) -> Ball:
     """
     scale, d = scale_of(grid, free.asked.model.characteristic_length), len(grid.axes)
     radius = _room_in_range(grid, scale)
+    points = min(points, 5 * FEW) if free.costly else points
     rng = np.random.default_rng(0)
     way = rng.normal(size=(points, d))
     way *= (rng.random((points, 1)) ** (1 / d)) / np.linalg.norm(way, axis=1, keepdims=True)
@@ -219,7 +225,7 @@ def greatest_box(free: Free, grid: Grid) -> Box | None:
     _room_in_range(grid, np.ones(len(grid.axes)))
     sides, homes = [], []
     for axis in grid.axes:
-        n = BOX[len(grid.axes)] - 1
+        n = (BOX[len(grid.axes)] - 1) // (4 if free.costly else 1)
         below = min(max(round(-axis.low / axis.span * n), 1), n - 1)
         sides.append(
             np.r_[

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Mapping
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,15 @@ class CompiledKernel:
         self.facts, self.cached = entry.facts, entry.cached
         self.interface = Interface.of(self.facts["interface"])
         self.columns = sum(self.interface.width(r) for r in self.interface.results)
+        self._prepare(numbers)
+
+    def renumbered(self, numbers: Numbers) -> CompiledKernel:
+        """The same kernel on the numbers of another mechanism of its structure."""
+        other = copy(self)
+        other._prepare(numbers)
+        return other
+
+    def _prepare(self, numbers: Numbers) -> None:
         self.order = numbers.order
         self._table = prepared(self._library, self.facts, numbers)
 

@@ -69,7 +69,7 @@ static int reflect(double M[6][COLUMNS], int row, int first, double whole) {
     double square = 0;
     for (int i = row; i < 6; i++) square += M[i][first] * M[i][first];
     if (!(square > REGULAR * REGULAR * whole)) return 0;
-    double length = M[row][first] < 0 ? -sqrt(square) : sqrt(square), v[6];
+    double length = M[row][first] < 0 ? -sqrt(square) : sqrt(square), v[6] = {0};
     for (int i = row; i < 6; i++) v[i] = M[i][first];
     v[row] += length;
     double factor = 1 / (length * v[row]);

@@ -22,6 +22,7 @@ from typing import Any, ClassVar
 import casadi as ca
 import numpy as np
 
+from ...mechanism.bodies import cross
 from ..rotation import rotation, rotation_y, rotation_z
 
 Cut = Callable[[ca.SX], ca.SX]
@@ -240,9 +241,9 @@ def rod_frame(direction: np.ndarray) -> np.ndarray:
     """N_i0, (3, 3): X along the rod at home, Y = X x X_S (X x Y_S for a rod near X_S)."""
     x = direction / np.linalg.norm(direction)
     reference = np.array([0.0, 1.0, 0.0] if abs(x[0]) > NEAR_X else [1.0, 0.0, 0.0])
-    y = np.cross(x, reference)
+    y = cross(x, reference)
     y /= np.linalg.norm(y)
-    return np.column_stack([x, y, np.cross(x, y)])
+    return np.column_stack([x, y, cross(x, y)])
 
 
 def rod_angles(N: ca.SX, rod: ca.SX, length: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:

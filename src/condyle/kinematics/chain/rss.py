@@ -12,6 +12,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from ...mechanism.bodies import cross
 from ..rotation import rotation_z
 from .family import (
     ChainDynamics,
@@ -66,7 +67,7 @@ class RSSFamily(Family):
         x = crank / np.linalg.norm(crank)
         z = np.asarray(chain.axis) - np.dot(chain.axis, x) * x
         z /= np.linalg.norm(z)
-        y = np.cross(z, x)
+        y = cross(z, x)
         plane_1 = np.array([-z[1], z[0]])
         size = np.linalg.norm(plane_1)
         plane_1 = plane_1 / size if size > LEVEL else np.array([1.0, 0.0])
@@ -76,7 +77,7 @@ class RSSFamily(Family):
         values = {
             "G": chain.base,
             "plane_1": plane_1,
-            "plane_2": np.cross(z, [*plane_1, 0.0]),
+            "plane_2": cross(z, [*plane_1, 0.0]),
             "l": np.linalg.norm(crank),
             "L": np.linalg.norm(coupler),
             "branch": -np.sign(coupler @ y),

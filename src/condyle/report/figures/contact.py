@@ -14,7 +14,7 @@ from ...kinematics.batch import evaluate
 from ...mechanism.mechanism import Bounds, Contact
 from .chains import readable, styles
 from .labels import caption
-from .panels import finish, legend, legend_above, lines
+from .panels import bands_of, finish, legend, legend_above, lines
 from .registry import plot
 from .style import ALERT, GREY, PALETTE, figsize_is_free, narrow, new_figure, nothing_to_draw
 
@@ -38,7 +38,10 @@ def contact_force(solution: Solution) -> Figure:
     figure = new_figure(title, caption(solution), 7, 3.2)
     axes = figure.subplots()
     values = solution["contact_force"].values
-    lines(axes, solution, values, list(map(readable, names)), styles(names))
+    bands = bands_of(solution, "contact_force", range(len(names)))
+    # Bands of one colour would not be told apart.
+    looks = styles(names) if bands is None else None
+    lines(axes, solution, values, list(map(readable, names)), looks, bands)
     axes.axhline(0, color=GREY, lw=0.8)
     axes.set_title("negative: against the normal")
     legend(axes, min(3, len(names)))

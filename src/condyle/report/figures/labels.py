@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from math import pi
 from pathlib import PurePath
 from typing import TYPE_CHECKING
@@ -40,6 +41,9 @@ def caption(solution: Solution) -> str:
         for what in ("motion", "load")
         if what not in invented
     ]
+    if "bands" in solution.attrs:
+        count = json.loads(solution.attrs["bands"])["variants"]
+        parts.append(f"bands: 5 to 95 and 25 to 75 % of {count} variants")
     reasons = dict.fromkeys(str(one) for one in failures(solution))
     grey = [f" Grey: no result ({', '.join(list(reasons)[:MOST_REASONS])})."] if reasons else []
     return "; ".join(parts) + "." + "".join(grey)

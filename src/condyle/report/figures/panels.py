@@ -30,18 +30,30 @@ def lines(
     values: np.ndarray,
     names: Sequence[str],
     styles: Sequence[dict[str, Any]] | None = None,
+    bands: np.ndarray | None = None,
 ) -> None:
     """Curves over time, (N, m), one a name; samples without a result are shaded.
 
     Args: styles: of the lines; by default all differ.
+          bands: quantiles over variants, (Q, N, m), from the least; the outer ones are paler.
     """
     styles = styles or [look(i) for i in range(len(names))]
     time = solution["time"].values
     for column, name, style in zip(values.T, names, styles, strict=True):
         axes.plot(time, column, label=name, **style)
+    for quantiles, style in zip(() if bands is None else bands.T, styles, strict=False):
+        for i in range(quantiles.shape[1] // 2):
+            low, high = quantiles[:, i], quantiles[:, -1 - i]
+            axes.fill_between(time, low, high, color=style["color"], alpha=0.18, lw=0)
     if len(time) > 1:
         axes.set_xlim(time[0], time[-1])
     shade_failed(axes, solution)
+
+
+def bands_of(solution: Solution, variable: str, members: Sequence[int]) -> np.ndarray | None:
+    """Quantiles of a variable, (Q, N, len(members)), where the solution has them."""
+    name = f"{variable}_quantile"
+    return solution[name].values[..., list(members)] if name in solution else None
 
 
 def shade_failed(axes: Axes, solution: Solution) -> None:

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from .chains import by_unit, groups, heading, readable, short
 from .labels import caption
 from .panels import (
+    bands_of,
     drawn_limits,
     finish,
     finish_grid,
@@ -46,7 +47,9 @@ def torque(solution: Solution) -> Figure:
     used = list(grid.ravel())[: len(panels)]
     for axes, members in zip(used, panels, strict=True):
         own = [names[i] for i in members]
-        lines(axes, solution, values[:, members], short(own) if many else list(map(readable, own)))
+        labels = short(own) if many else list(map(readable, own))
+        bands = bands_of(solution, "torque", members)
+        lines(axes, solution, values[:, members], labels, bands=bands)
         legend(axes, 2)
         axes.set_title(heading(own))
         unit = units[members[0]]

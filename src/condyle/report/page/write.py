@@ -32,9 +32,12 @@ from .machine import machine
 from .panels import time_panels
 from .reduce import Reduced, reduced
 from .source import opened
+from .sweep import bands_section, sweep_section
 from .tracks import track_panels
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from ...motion import Beside
     from ...results.solution import Solution
     from ..tables import Table
@@ -65,6 +68,7 @@ def write_report(
     tables: Sequence[Table] | None = None,
     files: Sequence[str | os.PathLike[str]] | None = None,
     measured: Beside | str | os.PathLike[str] | None = None,
+    sweep: xr.Dataset | None = None,
 ) -> Path:
     """Write the report, whole or not at all.
 
@@ -76,15 +80,16 @@ def write_report(
                 keeps, which `condyle compare` puts there.
             files: inputs of the run, to be named with their hashes.
             measured: markers and EMG, as of `Solution.with_measured`, to show beside it.
+            sweep: of `condyle.sweep`, to be shown too.
     Returns: the path.
     Raises: InputError: if a file cannot be read or the report cannot be written.
     """
     with step("writing the report"):
         if isinstance(solution, str | os.PathLike):
             with opened(solution) as found:
-                page = _html_of(found, measured, tables=tables, files=files)
+                page = _html_of(found, measured, tables=tables, files=files, sweep=sweep)
         else:
-            page = _html_of(solution, measured, tables=tables, files=files)
+            page = _html_of(solution, measured, tables=tables, files=files, sweep=sweep)
         write_text(path, page)
     return Path(path)
 
@@ -102,12 +107,14 @@ def report_html(
     *,
     tables: Sequence[Table] | None = None,
     files: Sequence[str | os.PathLike[str]] | None = None,
+    sweep: xr.Dataset | None = None,
 ) -> str:
     """The report as text; see `write_report`."""
     from plotly.offline import get_plotlyjs
 
     from ..tables import kept_tables
 
+    bands = bands_section(solution)
     page = reduced(solution)
     solution = page.solution
     scripts = [_lines(get_plotlyjs()), _script()]
@@ -129,6 +136,8 @@ def report_html(
         "chains": chain_table(solution),
         "reactions": reaction_tables(solution),
         "tables": given_tables(kept_tables(solution) if tables is None else tables),
+        "bands": bands,
+        "sweep": sweep_section(sweep),
         "run": provenance(solution, [Path(file) for file in files or ()]),
         "payload": json_for_script(_payload(page)),
         "plotly": tag("script", Markup(scripts[0])),

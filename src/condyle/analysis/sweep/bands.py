@@ -1,0 +1,132 @@
+"""How sure efforts and contact forces are along one motion: quantiles over a study's variants."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+from ...mechanism.mechanism import Mechanism
+from ...motion import Load, Motion
+from ...motion.memory import memory_at_hand
+from ...progress import step
+from ...results.solution import Solution
+from ...results.warnings import Notice
+from ...status import Status
+from .job import Job, prepared
+from .schedule import PROCESSES, check_scheduler, done
+from .solve import OK, Solver
+from .study import Study
+
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+BANDED = {"torque": "effort", "contact_force": "contact_force"}  # variable -> of an evaluation
+SUFFIX = "_quantile"
+
+
+def with_bands(
+    solution: Solution,
+    study: Study,
+    motion: Motion,
+    load: Load,
+    *,
+    mechanism: Mechanism | None = None,
+    workers: int | None = None,
+    scheduler: str = PROCESSES,
+) -> Solution:
+    """The solution with quantiles of efforts and contact forces at every time.
+
+    Of the study what varies and the sampling count; its other keys give way to how the solution was
+    made. Samples without a result are left out, time by time.
+
+    Args:   motion, load: those of the solution.
+            mechanism: that of the solution; to be given where surfaces are written in Python.
+            workers, scheduler: as of `condyle.sweep`.
+    Raises: InputError: for a study that does not fit, or more numbers than memory holds.
+    """
+    check_scheduler(workers, scheduler)
+    machine, options = mechanism or solution.mechanism, solution.options
+    same = {name: options[name] for name in ("formulation", "route", "load_point")}
+    same |= {name: options[name] for name in ("distribution", "preload", "contact_weight")}
+    own = study.model_copy(update=same)
+    job = prepared(own, machine, (motion,), load)
+    efforts, forces, failed = _all(job, workers, scheduler)
+    found = {"torque": _quantiles(efforts), "contact_force": _quantiles(forces)}
+    variables: dict[str, Any] = {}
+    for name, values in found.items():
+        given = solution[name]
+        about = {
+            "units": given.attrs["units"],
+            "long_name": f"quantiles of {name} over {job.design.count} variants",
+        }
+        variables[name + SUFFIX] = (("quantile", *given.dims), values, about)
+    level = ("quantile", list(QUANTILES), {"units": "1", "long_name": "share of variants below"})
+    made = solution.assign(variables).assign_coords({"quantile": level})
+    made.attrs["bands"] = json.dumps(
+        {"study": own.data(), "variants": job.design.count, "failed": failed}
+    )
+    return _told(made, failed, job.design.count)
+
+
+def _all(job: Job, workers: int | None, scheduler: str) -> tuple[np.ndarray, np.ndarray, int]:
+    """Efforts (V, N, n) and contact forces (V, N, k) of all variants, and how many failed."""
+    V, N = job.design.count, len(job.motions[0].t)
+    n, k = len(job.mechanism.chains), len(job.mechanism.contacts)
+    if (need := 16 * V * N * (n + k)) > (free := memory_at_hand()):  # with a copy to sort
+        raise InputError(
+            f"quantiles of {V} variants at {N} samples take {need / 1e9:.3g} GB, and there are "
+            f"{free / 1e9:.3g} GB: take fewer variants, or a lower rate of the motion"
+        )
+    efforts, forces = np.full((V, N, n), np.nan), np.full((V, N, k), np.nan)
+    failed = 0
+    with step("solving variants", V) as advance:
+        for part, (effort, force, bad) in done(job, curves, range(job.parts), workers, scheduler):
+            rows = slice(part * job.part, part * job.part + len(effort))
+            efforts[rows], forces[rows] = effort, force
+            failed += bad
+            advance(len(effort))
+    return efforts, forces, failed
+
+
+def curves(job: Job, part: int) -> tuple[np.ndarray, np.ndarray, int]:
+    """Efforts and contact forces of a part's variants, NaN without a result, and who failed."""
+    start, stop = part * job.part, min((part + 1) * job.part, job.design.count)
+    N, mechanism = len(job.motions[0].t), job.mechanism
+    effort = np.full((stop - start, N, len(mechanism.chains)), np.nan)
+    force = np.full((stop - start, N, len(mechanism.contacts)), np.nan)
+    failed = 0
+    with np.errstate(all="ignore"):
+        for number, _, (one,) in Solver(job).variants(start, stop):
+            failed += one.status != OK
+            if one.evaluation is not None:
+                good = one.evaluation.status == Status.ok
+                effort[number - start][good] = one.evaluation.effort[good]
+                force[number - start][good] = one.evaluation.contact_force[good]
+    return effort, force, failed
+
+
+def _quantiles(values: np.ndarray) -> np.ndarray:
+    """Quantiles over the first dimension, linear between values, NaN left out, (Q, ...)."""
+    ordered = np.sort(values, axis=0)  # NaN last
+    last = np.isfinite(values).sum(axis=0) - 1
+    found = np.empty((len(QUANTILES), *values.shape[1:]))
+    for i, q in enumerate(QUANTILES):
+        place = q * np.maximum(last, 0)
+        below = np.floor(place).astype(int)
+        above = np.minimum(below + 1, np.maximum(last, 0))
+        low, high = (np.take_along_axis(ordered, at[None], axis=0)[0] for at in (below, above))
+        found[i] = low + (place - below) * (high - low)
+    return found
+
+
+def _told(solution: Solution, failed: int, count: int) -> Solution:
+    """With a warning, if variants failed."""
+    if failed:
+        text = (
+            f"{failed} of {count} variants have samples without a result; the bands are of the rest"
+        )
+        notices = [*solution.notices, Notice("failed_variants", text, count=failed)]
+        solution.attrs["warnings"] = json.dumps([one.text for one in notices])
+        solution.attrs["notices"] = json.dumps([one.to_dict() for one in notices])
+    return solution

@@ -1,0 +1,183 @@
+"""A study that was checked against its mechanism: all that a worker needs to know."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+from ...mechanism import load as load_mechanism
+from ...mechanism.home import independent_coordinates
+from ...mechanism.mechanism import Mechanism
+from ...model.evaluator import Evaluator
+from ...model.reference_force import reference_force
+from ...motion import (
+    Load,
+    Motion,
+    reference_load,
+    reference_motion,
+    resolve_load_point,
+    trial_motion,
+)
+from ...motion.reference import bundled_reference
+from .measure import Reading, columns, readings
+from .sampling import Design
+from .study import NONE, REFERENCE, TRIAL, MotionFile, Study
+
+VARIANT, MOTION, STATUS, REASON, SECONDS = "variant", "motion", "status", "reason", "seconds"
+DEFAULT = "masticatory"  # mechanism
+OWN = (VARIANT, MOTION, STATUS, REASON, SECONDS)  # columns beside parameters and measures
+PARTS = 128  # of a study, if it has enough variants for so many
+LEAST_PART, LARGEST_PART = 4, 4096  # variants
+
+
+@dataclass(frozen=True)
+class Job:
+    """A study, its mechanism, motions and load, looked up and checked.
+
+    wrenches: on the platform, (N, 6) [N, N m], of each motion.
+    point: the platform's point that the load acts at, by name; None without a load.
+    """
+
+    study: Study
+    mechanism: Mechanism
+    motions: tuple[Motion, ...]
+    load: Load
+    wrenches: tuple[np.ndarray, ...]
+    point: str | None
+    design: Design
+    readings: tuple[Reading, ...] = field(default=())
+
+    @property
+    def rows(self) -> int:
+        """One for each variant and motion."""
+        return self.design.count * len(self.motions)
+
+    @cached_property
+    def part(self) -> int:
+        """Variants of a part: it belongs to the study alone, not to who does it."""
+        return min(max(LEAST_PART, -(-self.design.count // PARTS)), LARGEST_PART)
+
+    @property
+    def parts(self) -> int:
+        return -(-self.design.count // self.part)
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        return tuple(one.what for one in self.study.vary)
+
+    @property
+    def measures(self) -> tuple[str, ...]:
+        return tuple(columns(self.readings))
+
+    def changes(self, row: np.ndarray) -> dict[str, float]:
+        """Path -> number of one row of the design."""
+        values: dict[str, float] = {}
+        for one, value in zip(self.study.vary, row.tolist(), strict=True):
+            values[one.what] = value
+            values |= {f.what: f.times * value + f.plus for f in one.mirror}
+        return values
+
+    def model(self, mechanism: Mechanism) -> Evaluator:
+        """A model that lends its kernels to every mechanism of the structure.
+
+        Raises: as of `condyle.derive`.
+        """
+        s = self.study
+        weight = s.contact_weight / reference_force(self.mechanism) ** 2 if s.contact_weight else 0
+        return Evaluator(
+            mechanism, s.formulation, s.route, s.backend, s.distribution, s.preload, weight, True
+        )
+
+
+def prepared(
+    study: Study,
+    mechanism: Mechanism | None = None,
+    motions: tuple[Motion, ...] | None = None,
+    load: Load | None = None,
+) -> Job:
+    """Check a study against its mechanism, read its files, build its kernels.
+
+    Args:   mechanism, motions, load: in the place of those that the study names.
+    Raises: InputError and others of the library, before any variant is solved.
+    """
+    machine = mechanism or load_mechanism(study.mechanism or DEFAULT)
+    base = tuple(_numbers(study, machine))
+    design = Design(study.vary, study.sampling, base)
+    design.check()
+    paths = motions or tuple(_motion(one, machine) for one in study.motion)
+    acting = load or _load(study.load)
+    name = study.load_point or acting.point
+    if np.any(acting.wrench) or name is not None:
+        name = resolve_load_point(name, machine.platform.points)
+    wrenches = tuple(acting.at(path.t) for path in paths)
+    job = Job(study, machine, paths, acting, wrenches, name, design)
+    model = job.model(machine)
+    found = readings(study.measure, model)
+    taken = [*OWN, *job.parameters, *columns(found)]
+    if twice := [n for n in dict.fromkeys(taken) if taken.count(n) > 1]:
+        raise InputError(f'study: two columns would be called "{twice[0]}"; rename the measure')
+    for path in paths:  # what does not fit the mechanism shows here, and kernels are built
+        states, _ = model.independent_motion(_beginning(path))
+        load_9 = np.zeros((len(states[0]), 9))
+        model.evaluate(states[0], states[1], states[2], load_9, 1)
+    return Job(study, machine, paths, acting, wrenches, name, design, found)
+
+
+def _numbers(study: Study, machine: Mechanism) -> Iterator[float]:
+    """The mechanism's own numbers at the paths of a study; all of its paths are looked up."""
+    seen: set[str] = set()
+    for one in study.vary:
+        for path in (one.what, *(follower.what for follower in one.mirror)):
+            value = machine.get(path)
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                what = "left out in this mechanism" if value is None else "no single number"
+                hint = f"; name one, such as {path}[0]" if isinstance(value, tuple) else ""
+                raise InputError(f"vary {path}: it is {what}{hint}")
+            if path in seen:
+                raise InputError(f"vary {path}: it stands twice in the study")
+            seen.add(path)
+        yield float(machine.get(one.what))
+
+
+def _motion(given: MotionFile, machine: Mechanism) -> Motion:
+    options: dict[str, Any] = {"cutoff": given.smooth, "rate": given.rate, "trim": given.trim}
+    if given.file == TRIAL:
+        if given.units or given.landmark:
+            raise InputError('motion: "trial" takes no units and no landmark')
+        return trial_motion(machine, **options)
+    if given.file == REFERENCE:
+        if given.units:
+            raise InputError('motion: "reference" has its units; leave them out')
+        if len(machine.contacts) != 2 or not machine.platform.points.keys() & {
+            "incisor",
+            given.landmark,
+        }:
+            names = ", ".join(independent_coordinates(machine))
+            raise InputError(
+                'motion: "reference" is the path of an incisor for two contacts; '
+                f'"{machine.name}" needs a file of t, {names}, or motion = "trial"'
+            )
+        source = bundled_reference()[0]
+        if not any(options.values()) and given.landmark is None:
+            return reference_motion()
+        return Motion.from_csv(source, landmark=given.landmark or "incisor", **options)
+    return Motion.from_csv(given.file, units=given.units, landmark=given.landmark, **options)
+
+
+def _load(given: str) -> Load:
+    if given == NONE:
+        return Load.zero()
+    return reference_load() if given == REFERENCE else Load.from_csv(given)
+
+
+def _beginning(motion: Motion) -> Motion:
+    """The first two samples."""
+    arrays: Mapping[str, np.ndarray] = {
+        name: getattr(motion, name)[:2] for name in ("t", "value", "rate", "acceleration")
+    }
+    return replace(motion, **arrays)  # type: ignore[arg-type]

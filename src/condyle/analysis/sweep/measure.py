@@ -1,0 +1,139 @@
+"""What is measured of a variant: columns of numbers from the variables of a solution."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from ...errors import InputError, did_you_mean
+from ...mechanism.mechanism import COORDINATES
+from ...model.evaluator import Evaluator
+from ...results.contacts import AXES
+from ...results.derived import Derived
+from ...results.variables import VARIABLES, WRENCH, Variable
+from .study import Measure
+
+_BY_NAME = {variable.name: variable for variable in VARIABLES}
+ALIASES = {"effort": "torque"}
+
+Reduction = Callable[..., np.ndarray]
+TAKES: dict[str, Reduction] = {
+    "min": np.min,
+    "max": np.max,
+    "min_abs": lambda a, axis: np.min(np.abs(a), axis=axis),
+    "max_abs": lambda a, axis: np.max(np.abs(a), axis=axis),
+    "mean": np.mean,
+    "rms": lambda a, axis: np.sqrt(np.mean(np.square(a), axis=axis)),
+    "span": np.ptp,
+}
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A measure, looked up: its columns follow from one array.
+
+    place: of the variable's dimensions, the one entry that counts, or all;  axes: that are reduced.
+    names: of the columns, in the order of what is left.
+    """
+
+    variable: str
+    take: str
+    place: tuple[int | slice, ...]
+    axes: tuple[int, ...]
+    names: tuple[str, ...]
+    units: str
+
+    def values(self, derived: Derived) -> np.ndarray:
+        """The columns, (len(names),), of a solution whose samples are all good."""
+        a = _BY_NAME[self.variable].values(derived)[self.place]
+        if a.dtype == bool:
+            a = a.astype(float)
+        return np.atleast_1d(TAKES[self.take](a, axis=self.axes)).ravel()
+
+
+def reading(name: str, measure: Measure, model: Evaluator) -> Reading:
+    """A measure, looked up in what a model's solutions have.
+
+    Raises: InputError: for a variable, dimension or entry that there is not.
+    """
+    variable = _variable(name, measure, model)
+    labels = labels_of(model)
+    dims = variable.dims
+    for dim, entry in measure.chosen.items():
+        if dim not in dims:
+            raise InputError(
+                f"measure {name}: {measure.of} has no {dim}; it goes over {', '.join(dims)}"
+            )
+        if entry not in labels[dim]:
+            raise InputError(
+                f'measure {name}: no {dim} "{entry}".{did_you_mean(entry, labels[dim])}'
+            )
+    place = tuple(
+        labels[d].index(measure.chosen[d]) if d in measure.chosen else slice(None) for d in dims
+    )
+    left = [d for d in dims if d not in measure.chosen]
+    over = left if measure.over is None else list(measure.over)
+    for dim in over:
+        if dim not in left:
+            raise InputError(
+                f'measure {name}: over has "{dim}", and {measure.of} goes over {", ".join(left)}'
+            )
+    if "time" not in over:
+        raise InputError(f'measure {name}: over must have "time"')
+    kept = [labels[d] for d in left if d not in over]
+    names = tuple(".".join((name, *entries)) for entries in product(*kept))
+    if not names:
+        raise InputError(f"measure {name}: this mechanism has nothing along {', '.join(left)}")
+    axes = tuple(left.index(d) for d in over)
+    empty = [d for d in over if d in labels and not labels[d]]
+    if empty:
+        raise InputError(f"measure {name}: this mechanism has no {empty[0]}")
+    units = variable.attributes(model.mechanism)["units"]
+    return Reading(variable.name, measure.take, place, axes, names, units)
+
+
+def _variable(name: str, measure: Measure, model: Evaluator) -> Variable:
+    variable = _BY_NAME.get(ALIASES.get(measure.of, measure.of))
+    there = [v for v in VARIABLES if v.when(Derived(model.mechanism, None, limited=model.limited))]
+    if variable is None:
+        raise InputError(
+            f'measure {name}: no variable "{measure.of}".'
+            f"{did_you_mean(measure.of, [*ALIASES, *(v.name for v in there)])}"
+        )
+    if variable not in there:
+        raise InputError(
+            f"measure {name}: solutions of this mechanism have no {variable.name} "
+            f"({variable.meaning})"
+        )
+    return variable
+
+
+def labels_of(model: Evaluator) -> Mapping[str, tuple[str, ...]]:
+    """Entries along each dimension but time."""
+    mechanism = model.mechanism
+    return {
+        "chain": mechanism.chain_names,
+        "contact": mechanism.contact_names,
+        "coordinate": COORDINATES,
+        "part": model.parts,
+        "axis": AXES,
+        "component": WRENCH,
+        "independent": model.independent,
+    }
+
+
+def readings(measures: Mapping[str, Measure], model: Evaluator) -> tuple[Reading, ...]:
+    """All measures of a study.
+
+    Raises: InputError: as of `reading`.
+    """
+    return tuple(reading(name, measure, model) for name, measure in measures.items())
+
+
+def columns(found: tuple[Reading, ...]) -> Iterator[str]:
+    """Names of the columns of some readings."""
+    for one in found:
+        yield from one.names

@@ -1,0 +1,82 @@
+"""A whole study: checked, done in parts by whoever there is, and read back in its order."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import xarray as xr
+
+from ...mechanism.mechanism import Mechanism
+from ...motion import Load, Motion, as_load, as_motion
+from ...progress import step
+from .job import Job, prepared
+from .schedule import PROCESSES, check_scheduler, done
+from .solve import solve_part
+from .store import Store, read
+from .study import Study, read_study
+
+
+def sweep(
+    study: Study | str | os.PathLike[str] | Mapping[str, Any],
+    out: str | os.PathLike[str] | None = None,
+    *,
+    workers: int | None = None,
+    scheduler: str = PROCESSES,
+    resume: bool = False,
+    mechanism: Mechanism | None = None,
+    motion: Motion | None = None,
+    load: Load | None = None,
+) -> xr.Dataset:
+    """Solve every variant of a study; a row each, along `row`, in the order of the study.
+
+    Columns: variant, motion (where there are several), the parameters by their paths, the measures,
+    status, reason, seconds. A variant that is refused or cannot be computed has a reason, and NaN
+    for its measures.
+
+    Args:   study: as tables, the path of a TOML file, or a mapping of its keys.
+            out: folder for the Parquet dataset; None: it is not kept.
+            workers: processes; default: the processors at hand. Results do not depend on it.
+            scheduler: processes, threads, dask (a cluster on this machine), or the address of a
+            Dask scheduler.
+            resume: go on with what `out` holds of this very study.
+            mechanism, motion, load: in the place of those that the study names.
+    Raises: InputError: for a study that cannot be done, before any work.
+            LostWorkerError: if a worker was killed; what was done is kept.
+    """
+    check_scheduler(workers, scheduler)
+    job = _job(study, mechanism, motion, load)
+    if out is not None:
+        return _filled(job, out, workers, scheduler, resume)
+    with TemporaryDirectory() as folder:
+        return _filled(job, Path(folder) / "sweep", workers, scheduler, False)
+
+
+def _job(
+    study: Study | str | os.PathLike[str] | Mapping[str, Any],
+    mechanism: Mechanism | None,
+    motion: Motion | None,
+    load: Load | None,
+) -> Job:
+    asked = study if isinstance(study, Study | Mapping) else Path(study)
+    motions = None if motion is None else (as_motion(motion),)
+    with step("checking the study"):
+        return prepared(
+            read_study(asked), mechanism, motions, None if load is None else as_load(load)
+        )
+
+
+def _filled(
+    job: Job, out: str | os.PathLike[str], workers: int | None, scheduler: str, resume: bool
+) -> xr.Dataset:
+    store = Store(job, out, resume)
+    missing = store.missing()
+    with step("solving variants", job.rows) as advance:
+        advance((job.parts - len(missing)) * job.part * len(job.motions))
+        for part, rows in done(job, solve_part, missing, workers, scheduler):
+            store.write(part, rows)
+            advance(len(rows.status))
+    return read(out)

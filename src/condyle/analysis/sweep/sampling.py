@@ -1,0 +1,141 @@
+"""Which values the numbers of a study take: any row of the design, without those before it.
+
+So each worker makes its own rows, and they are the same whoever makes them.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from scipy.special import ndtri
+
+from ...errors import InputError
+from .study import Sampling, Vary
+
+MOST_LATIN = 10_000_000  # rows that are held at once, since each column is one permutation
+MOST_ROWS = 2**30  # of Sobol's sequence
+_EDGE = 2.0**-53  # from 0 and 1, where a normal distribution has no end
+
+
+@dataclass(frozen=True)
+class Design:
+    """Rows of values for `vary`.
+
+    base: the file's own number of each, which `scale` multiplies.
+    """
+
+    vary: tuple[Vary, ...]
+    sampling: Sampling
+    base: tuple[float, ...]
+
+    @property
+    def count(self) -> int:
+        """Rows."""
+        kind, count = self.sampling.kind, self.sampling.count or 0
+        if kind == "grid":
+            return math.prod(self._levels)
+        return count * (len(self.vary) + 2) if kind == "saltelli" else count
+
+    @property
+    def _levels(self) -> tuple[int, ...]:
+        return tuple(len(v.values) if v.values else v.count or 1 for v in self.vary)
+
+    def check(self) -> None:
+        """Raises InputError for more rows than the kind can make."""
+        kind = self.sampling.kind
+        most = MOST_LATIN if kind == "latin" else MOST_ROWS if kind in ("sobol", "saltelli") else 0
+        if most and (self.sampling.count or 0) > most:
+            raise InputError(
+                f"sampling.count: {kind} has at most {most} rows, got {self.sampling.count}; "
+                "take random"
+            )
+
+    def rows(self, start: int, stop: int) -> np.ndarray:
+        """Values of rows `start` to `stop`, (stop - start, len(vary)) [SI]."""
+        if self.sampling.kind == "grid":
+            places = np.unravel_index(np.arange(start, stop), self._levels)
+            columns = [
+                _on_grid(v, level, place, base)
+                for v, level, place, base in zip(
+                    self.vary, self._levels, places, self.base, strict=True
+                )
+            ]
+        else:
+            unit = self._unit(start, stop)
+            columns = [
+                _at(v, u, base) for v, u, base in zip(self.vary, unit.T, self.base, strict=True)
+            ]
+        return np.column_stack(columns)
+
+    def _unit(self, start: int, stop: int) -> np.ndarray:
+        """The rows in the unit cube."""
+        d, kind, seed = len(self.vary), self.sampling.kind, self.sampling.seed
+        if kind == "random":
+            source = np.random.PCG64(seed)
+            source.advance(start * d)  # one draw a number
+            return np.random.Generator(source).random((stop - start, d))
+        if kind == "latin":
+            return _latin(d, self.sampling.count or 0, seed)[start:stop]
+        if kind == "sobol":
+            return _sobol(d, seed, start, stop)
+        # Saltelli's: of each base row A, then A with one column of B after the other, then B.
+        first, last = start // (d + 2), -(-stop // (d + 2))
+        both = _sobol(2 * d, seed, first, last)
+        A, B = both[:, :d], both[:, d:]
+        blocks = np.repeat(A[:, None], d + 2, axis=1)
+        for i in range(d):
+            blocks[:, i + 1, i] = B[:, i]
+        blocks[:, -1] = B
+        skipped = first * (d + 2)
+        return blocks.reshape(-1, d)[start - skipped : stop - skipped]
+
+
+def _sobol(d: int, seed: int, start: int, stop: int) -> np.ndarray:
+    from scipy.stats import qmc  # which takes half a second, where it is needed
+
+    sequence = qmc.Sobol(d, scramble=True, seed=np.random.default_rng(seed))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # that a count is no power of two
+        if start:
+            sequence.fast_forward(start)
+        return sequence.random(stop - start)
+
+
+@lru_cache(maxsize=1)
+def _latin(d: int, count: int, seed: int) -> np.ndarray:
+    from scipy.stats import qmc
+
+    return qmc.LatinHypercube(d, seed=np.random.default_rng(seed)).random(count)
+
+
+def _on_grid(vary: Vary, levels: int, place: np.ndarray, base: float) -> np.ndarray:
+    """Values at places of a grid, ends included; a normal distribution in parts of equal chance."""
+    if vary.values is not None:
+        return np.array(vary.values)[place]
+    if vary.normal is not None:
+        return _at(vary, (place + 0.5) / levels, base)
+    low, high = _ends(vary, base)
+    return np.linspace(low, high, levels)[place]
+
+
+def _at(vary: Vary, unit: np.ndarray, base: float) -> np.ndarray:
+    """Values at places in [0, 1) of a distribution."""
+    if vary.values is not None:
+        return np.array(vary.values)[(unit * len(vary.values)).astype(int)]
+    if vary.normal is not None:
+        mean, deviation = vary.normal
+        return mean + deviation * ndtri(np.clip(unit, _EDGE, 1 - _EDGE))
+    low, high = _ends(vary, base)
+    return low + (high - low) * unit
+
+
+def _ends(vary: Vary, base: float) -> Sequence[float]:
+    if vary.scale is not None:
+        return sorted(factor * base for factor in vary.scale)
+    assert vary.range is not None
+    return vary.range

@@ -1,0 +1,169 @@
+"""One part of a study: its variants one after the other, each checked as a file is."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from ...errors import CondyleError, InputError, SampleError, shortened
+from ...mechanism.mechanism import Mechanism
+from ...model.data import Evaluation
+from ...model.evaluator import Evaluator, with_point
+from ...model.judge import require_ok
+from ...questions.structure import Structure, structure_of
+from ...results.assemble import assemble
+from ...results.derived import Derived
+from .job import Job
+
+OK, REFUSED, FAILED = "ok", "refused", "failed"
+LONGEST_REASON = 300
+
+
+@dataclass
+class Rows:
+    """Rows of a part, column by column.
+
+    measures: (rows, measures); NaN where a row has a reason.
+    solutions: NetCDF files by row, where they are kept.
+    """
+
+    variant: list[int] = field(default_factory=list)
+    motion: list[int] = field(default_factory=list)
+    parameters: list[np.ndarray] = field(default_factory=list)
+    measures: list[np.ndarray] = field(default_factory=list)
+    status: list[str] = field(default_factory=list)
+    reason: list[str] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)
+    solutions: dict[int, bytes] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Solved:
+    """A variant along one motion: what came of it, or the reason why nothing did."""
+
+    motion: int
+    model: Evaluator | None
+    evaluation: Evaluation | None
+    status: str
+    reason: str
+    residual: float | None = None
+
+
+class Solver:
+    """Solves variants of a job; kernels are shared by all of one structure."""
+
+    def __init__(self, job: Job) -> None:
+        self._job = job
+        self._models: dict[Structure, Evaluator] = {}
+
+    def variants(self, start: int, stop: int) -> Iterator[tuple[int, np.ndarray, list[Solved]]]:
+        """Number, values and outcomes of variants, one after the other."""
+        job = self._job
+        for number, row in enumerate(job.design.rows(start, stop), start):
+            yield number, row, self._variant(row)
+
+    def _variant(self, row: np.ndarray) -> list[Solved]:
+        motions = range(len(self._job.motions))
+        try:
+            mechanism = self._job.mechanism.set(self._job.changes(row))
+            model = self._model(mechanism)
+        except CondyleError as error:
+            return [Solved(m, None, None, REFUSED, _reason(error)) for m in motions]
+        return [self._along(model, m) for m in motions]
+
+    def _model(self, mechanism: Mechanism) -> Evaluator:
+        study = self._job.study
+        structure = structure_of(mechanism, study.formulation, study.route)
+        if structure not in self._models:
+            self._models[structure] = self._job.model(mechanism)
+        return self._models[structure].renumbered(mechanism)
+
+    def _along(self, model: Evaluator, m: int) -> Solved:
+        job, motion = self._job, self._job.motions[m]
+        point = np.zeros(3) if job.point is None else model.load_point(job.point)
+        try:
+            states, residual = model.independent_motion(motion)
+            load = with_point(job.wrenches[m], point)
+            found = model.evaluate(states[0], states[1], states[2], load, 1)
+            require_ok(model.mechanism, found, motion.t)
+        except SampleError as error:
+            return Solved(m, model, found, error.kind, _reason(error), residual)
+        except InputError as error:  # such as coordinates that are independent no more
+            return Solved(m, model, None, REFUSED, _reason(error))
+        except (ArithmeticError, np.linalg.LinAlgError) as error:
+            return Solved(m, model, None, FAILED, _reason(error))
+        return Solved(m, model, found, OK, "", residual)
+
+
+def solve_part(job: Job, part: int) -> Rows:
+    """The rows of one part."""
+    solver, rows = _solver(job), Rows()
+    none = np.full(len(job.measures), np.nan)
+    start, stop = part * job.part, min((part + 1) * job.part, job.design.count)
+    clock = time.perf_counter()
+    with np.errstate(all="ignore"):
+        for number, values, outcomes in solver.variants(start, stop):
+            for one in outcomes:
+                measured = none
+                if one.status == OK:
+                    measured = _measured(job, one)
+                if job.study.solutions and one.evaluation is not None:
+                    rows.solutions[len(rows.status)] = _netcdf(job, one)
+                now = time.perf_counter()
+                rows.variant.append(number)
+                rows.motion.append(one.motion)
+                rows.parameters.append(values)
+                rows.measures.append(measured)
+                rows.status.append(one.status)
+                rows.reason.append(one.reason)
+                rows.seconds.append(now - clock)
+                clock = now
+    return rows
+
+
+def derived_of(job: Job, one: Solved) -> Derived:
+    """What follows from a variant that was solved."""
+    assert one.model is not None
+    model = one.model
+    return Derived(model.mechanism, one.evaluation, job.wrenches[one.motion], model.limited)
+
+
+def _measured(job: Job, one: Solved) -> np.ndarray:
+    derived = derived_of(job, one)
+    return np.concatenate([reading.values(derived) for reading in job.readings])
+
+
+def _netcdf(job: Job, one: Solved) -> bytes:
+    """The whole solution, as a file."""
+    assert one.model is not None and one.evaluation is not None
+    motion, wrench = job.motions[one.motion], job.wrenches[one.motion]
+    solution = assemble(
+        one.model, motion, job.load, wrench, job.point, one.evaluation, one.residual, 0.0
+    )
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "solution.nc"
+        solution.save(path)
+        return path.read_bytes()
+
+
+def _reason(error: Exception) -> str:
+    """In one line."""
+    text = "; ".join(getattr(error, "problems", ())) or str(error) or type(error).__name__
+    return shortened(" ".join(text.split()), LONGEST_REASON)
+
+
+_last: tuple[Any, Solver] | None = None
+
+
+def _solver(job: Job) -> Solver:
+    """The one of the last call, if that was for the same job: its kernels are at hand."""
+    global _last
+    if _last is None or _last[0] is not job:
+        _last = job, Solver(job)
+    return _last[1]

@@ -1,0 +1,180 @@
+"""The folder of a study: one Parquet dataset in parts, each whole or absent, and what was asked."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import xarray as xr
+
+from ... import __version__
+from ...atomic import replacing, write_text
+from ...errors import InputError
+from ...mechanism.files import read_tables, record
+from .job import MOTION, REASON, SECONDS, STATUS, VARIANT, Job
+from .solve import Rows
+
+STUDY, PART, SOLUTIONS = "study.json", "part-{:06d}.parquet", "solutions"
+_MANY = 5  # differences that a message shows
+
+
+class Store:
+    """Where the rows of a job are, and which of its parts are there."""
+
+    def __init__(self, job: Job, folder: str | os.PathLike[str], resume: bool) -> None:
+        """Make the folder, or go on in it.
+
+        Raises: InputError: if it holds another study, or this one and `resume` was not asked for.
+        """
+        self.folder, self._job = Path(folder), job
+        asked = described(job)
+        kept = _kept(self.folder)
+        if kept is not None:
+            if differences := list(_differences(kept, asked)):
+                shown = "; ".join(differences[:_MANY])
+                more = f"; and {len(differences) - _MANY} more" if differences[_MANY:] else ""
+                raise InputError(
+                    f"{folder} holds another study: {shown}{more}. Go on with the old one, or "
+                    "take another folder"
+                )
+            if not resume:
+                raise InputError(
+                    f"{folder} holds this study already: go on with --resume (in Python "
+                    "resume=True), or take another folder"
+                )
+            return
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{folder} cannot be made a folder ({error.strerror})") from error
+        if any(self.folder.glob("part-*.parquet")):
+            raise InputError(f"{folder} holds parts of a study without its {STUDY}; take another")
+        write_text(self.folder / STUDY, json.dumps(asked, indent=1))
+
+    def missing(self) -> list[int]:
+        """Parts that are not there yet."""
+        there = {path.name for path in self.folder.glob("part-*.parquet")}
+        return [p for p in range(self._job.parts) if PART.format(p) not in there]
+
+    def write(self, part: int, rows: Rows) -> None:
+        """Write a part, whole or not at all; solutions first, so that a row has its own.
+
+        Raises: InputError: if that fails, on a full disk for one.
+        """
+        if rows.solutions:
+            (self.folder / SOLUTIONS).mkdir(exist_ok=True)
+        for row, content in rows.solutions.items():
+            name = f"{rows.variant[row]:09d}-{rows.motion[row]}.nc"
+            with replacing(self.folder / SOLUTIONS / name) as temporary:
+                temporary.write_bytes(content)
+        with replacing(self.folder / PART.format(part)) as temporary:
+            pq.write_table(_table(self._job, rows), temporary)
+
+
+def _table(job: Job, rows: Rows) -> pa.Table:
+    sources = [motion.source for motion in job.motions]
+    columns: dict[str, Any] = {VARIANT: pa.array(rows.variant, pa.int64())}
+    if len(sources) > 1:
+        columns[MOTION] = pa.array([sources[m] for m in rows.motion], pa.string())
+    for names, arrays in ((job.parameters, rows.parameters), (job.measures, rows.measures)):
+        for name, column in zip(names, np.array(arrays).T, strict=True):
+            columns[name] = pa.array(column, pa.float64())
+    columns[STATUS] = pa.array(rows.status, pa.string())
+    columns[REASON] = pa.array(rows.reason, pa.string())
+    columns[SECONDS] = pa.array(rows.seconds, pa.float64())
+    return pa.table(columns)
+
+
+def read(folder: str | os.PathLike[str]) -> xr.Dataset:
+    """The rows that a folder holds, in the order of the study, along `row`.
+
+    Attributes: study (JSON), rows (of the whole study), parameters, measures.
+
+    Raises: InputError: for a folder that holds no study, or no row of it yet.
+    """
+    kept = _kept(Path(folder))
+    if kept is None:
+        raise InputError(f"{folder} holds no study: there is no {STUDY}")
+    parts = sorted(Path(folder).glob("part-*.parquet"))
+    if not parts:
+        raise InputError(f"{folder} has no rows yet; go on with --resume")
+    try:
+        table = pa.concat_tables(pq.read_table(path) for path in parts)
+    except (OSError, pa.ArrowException) as error:
+        raise InputError(f"{folder}: a part cannot be read ({error})") from None
+    variables = {
+        name: ("row", table.column(name).to_numpy(zero_copy_only=False))
+        for name in table.column_names
+    }
+    facts = {name: json.dumps(kept[name]) for name in ("study", "units", "better")}
+    lists = {name: list(kept[name]) for name in ("parameters", "measures")}
+    attributes = {"rows": kept["rows"], "condyle_version": kept["condyle"], **facts, **lists}
+    return xr.Dataset(variables, attrs=attributes)
+
+
+def described(job: Job) -> dict[str, Any]:
+    """All that the rows follow from, as JSON has it."""
+    units = {name: one.units for one in job.readings for name in one.names}
+    measures = zip(job.study.measure.values(), job.readings, strict=True)
+    better = {n: m.better for m, one in measures for n in one.names if m.better is not None}
+    return {
+        "condyle": __version__,
+        "study": job.study.data(),
+        "mechanism": read_tables(record(job.mechanism), "mechanism"),
+        "motions": [_sha256(m.t, m.value, m.rate, m.acceleration) for m in job.motions],
+        "load": _sha256(*job.wrenches),
+        "rows": job.rows,
+        "part": job.part,
+        "parameters": list(job.parameters),
+        "measures": list(job.measures),
+        "units": units,
+        "better": better,
+    }
+
+
+def _sha256(*arrays: np.ndarray) -> str:
+    found = hashlib.sha256()
+    for a in arrays:
+        found.update(np.ascontiguousarray(a).tobytes())
+    return found.hexdigest()
+
+
+def _kept(folder: Path) -> dict[str, Any] | None:
+    """What a folder says of its study; None if it holds none."""
+    try:
+        return json.loads((folder / STUDY).read_text(encoding="utf-8"))
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{folder / STUDY} cannot be read ({error})") from None
+
+
+def _differences(kept: Mapping[str, Any], asked: Mapping[str, Any]) -> Iterator[str]:
+    """'study.vary[0].range[1] was 0.045, is 0.05' for each that differs."""
+    old, new = dict(_leaves(kept)), dict(_leaves(json.loads(json.dumps(asked))))
+    for path in {**old, **new}:
+        if old.get(path) == new.get(path):
+            continue
+        if path.startswith(("motions", "load")):
+            yield f"the samples of {path} differ"
+        else:
+            was, now = (json.dumps(d[path]) if path in d else "not there" for d in (old, new))
+            yield f"{path} was {was}, is {now}"
+
+
+def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    if isinstance(value, Mapping):
+        for key, inner in value.items():
+            yield from _leaves(inner, f"{path}.{key}" if path else key)
+    elif isinstance(value, list):
+        for i, inner in enumerate(value):
+            yield from _leaves(inner, f"{path}[{i}]")
+    else:
+        yield path, value

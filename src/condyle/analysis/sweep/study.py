@@ -1,0 +1,263 @@
+"""A study: which numbers of a mechanism vary and how, along which motions, and what is measured."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, Field, StrictBool, ValidationError, model_validator
+
+from ...errors import InputError
+from ...mechanism.library import bundled_mechanisms
+from ...mechanism.messages import describe
+from ...mechanism.quantities import listed
+from ...mechanism.schema import schema_of
+from ...mechanism.table import FrozenTable, Table
+from ...mechanism.toml import nests_too_deep, read_tables, read_text, too_deep
+
+REFERENCE, TRIAL, NONE = "reference", "trial", "none"  # words in the place of a file
+MOST_SHOWN = 3  # problems in one line
+
+Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Count = Annotated[int, Field(strict=True, ge=1)]
+
+
+def _numbers(value: Any) -> Any:
+    """Numbers are SI; text with a unit is told so."""
+    value = listed(value)
+    for one in value if isinstance(value, list | tuple) else (value,):
+        if isinstance(one, str):
+            raise ValueError(f'expected numbers in SI (m, kg, rad, N), got "{one[:40]}"')
+    return tuple(value) if isinstance(value, list) else value
+
+
+Pair = Annotated[tuple[Finite, Finite], BeforeValidator(_numbers)]
+
+
+class Follower(Table):
+    """Another number of the mechanism that follows the one that varies: times * value + plus."""
+
+    what: str
+    times: Finite = 1.0
+    plus: Finite = 0.0
+
+
+def _followers(value: Any) -> Any:
+    """One or several; as text the same number, or with "-" in front the opposite."""
+    given = value if isinstance(value, list | tuple) else [value]
+    return tuple(
+        {"what": one.lstrip("- "), "times": -1.0 if one.startswith("-") else 1.0}
+        if isinstance(one, str)
+        else one
+        for one in given
+    )
+
+
+class Vary(Table):
+    """A number of the mechanism that varies, by one of range, values, normal and scale."""
+
+    what: str = Field(description='its path, such as "chain.masseter_left.base[2]"')
+    mirror: Annotated[tuple[Follower, ...], BeforeValidator(_followers)] = Field(
+        default=(), description='paths that follow; with "-" in front by the opposite number'
+    )
+    range: Pair | None = Field(default=None, description="[lower, upper], SI")
+    values: Annotated[tuple[Finite, ...], BeforeValidator(_numbers), Field(min_length=1)] | None = (
+        Field(default=None, description="these and no others, SI")
+    )
+    normal: Pair | None = Field(default=None, description="[mean, standard deviation], SI")
+    scale: Pair | None = Field(default=None, description="[lower, upper] factor of its value")
+    count: Count | None = Field(default=None, description="of a grid")
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        ways = [n for n in ("range", "values", "normal", "scale") if getattr(self, n) is not None]
+        if len(ways) != 1:
+            got = " and ".join(ways) or "none"
+            raise ValueError(f"expected one of range, values, normal and scale, got {got}")
+        for name in ("range", "scale"):
+            pair = getattr(self, name)
+            if pair is not None and not pair[0] < pair[1]:
+                raise ValueError(
+                    f"{name}: expected [lower, upper] with lower < upper, got {list(pair)}"
+                )
+        if self.normal is not None and not self.normal[1] > 0:
+            raise ValueError(
+                f"normal: expected [mean, standard deviation > 0], got {list(self.normal)}"
+            )
+        if self.values is not None and self.count is not None:
+            raise ValueError("count: the values are their own count; leave it out")
+        return self
+
+
+class Sampling(Table):
+    """How the numbers are taken together."""
+
+    kind: Literal["grid", "sobol", "latin", "random", "saltelli"] = "grid"
+    count: Count | None = Field(default=None, description="of all samples; of a grid see [[vary]]")
+    seed: Annotated[int, Field(strict=True, ge=0)] = 0
+
+    @model_validator(mode="after")
+    def _counted(self) -> Self:
+        if self.kind == "grid" and self.count is not None:
+            raise ValueError('count: a grid has one in each [[vary]]; or choose kind = "sobol"')
+        if self.kind != "grid" and self.count is None:
+            raise ValueError(f"count is missing, and kind {self.kind} needs it")
+        return self
+
+
+TAKES = ("min", "max", "min_abs", "max_abs", "mean", "rms", "span")
+
+
+class Measure(Table):
+    """One number, or one for each entry that is left, from a variable of the solution."""
+
+    of: str = Field(description='a variable of the solution, or "effort"')
+    take: Literal["min", "max", "min_abs", "max_abs", "mean", "rms", "span"]
+    over: tuple[str, ...] | None = Field(default=None, description="dimensions; default: all")
+    better: Literal["less", "more"] | None = Field(
+        default=None, description="for the best rows and the Pareto front"
+    )
+    chain: str | None = None
+    contact: str | None = None
+    coordinate: str | None = None
+    part: str | None = None
+    axis: str | None = None
+    component: str | None = None
+    independent: str | None = None
+
+    @property
+    def chosen(self) -> dict[str, str]:
+        """Dimension -> the one entry that counts."""
+        names = ("chain", "contact", "coordinate", "part", "axis", "component", "independent")
+        return {name: entry for name in names if (entry := getattr(self, name)) is not None}
+
+
+class MotionFile(Table):
+    """A motion: a file with what `condyle run` takes for it, "reference" or "trial"."""
+
+    file: str
+    units: str | None = None
+    landmark: str | None = None
+    smooth: Finite | Literal["auto"] | None = None
+    rate: Finite | None = None
+    trim: Finite = 0.0
+
+
+def _motions(value: Any) -> Any:
+    """One or several; text is the file's name."""
+    given = value if isinstance(value, list | tuple) else [value]
+    return tuple({"file": one} if isinstance(one, str) else one for one in given)
+
+
+DEFAULT_MEASURES = {
+    "peak_effort": Measure(of="effort", take="max_abs", better="less"),
+    "margin": Measure(of="singularity_ratio", take="min", better="more"),
+}
+
+
+class Study(Table):
+    """Many variants of one mechanism along one or several motions, and what is measured."""
+
+    mechanism: str | None = Field(
+        default=None, description="a file, or a bundled mechanism; default: masticatory"
+    )
+    motion: Annotated[tuple[MotionFile, ...], BeforeValidator(_motions), Field(min_length=1)] = (
+        Field(default=(MotionFile(file=REFERENCE),), description="a file or several")
+    )
+    load: str = Field(default=REFERENCE, description='a file, "reference" or "none"')
+    load_point: str | None = None
+    formulation: str = "virtual_power"
+    route: str = "core"
+    backend: str = "auto"
+    distribution: str | None = None
+    preload: Finite = 0.0
+    contact_weight: Finite = Field(default=0.0, description="W, as of condyle run")
+    vary: tuple[Vary, ...] = Field(min_length=1)
+    sampling: Sampling = Sampling()
+    measure: dict[str, Measure] = Field(default=DEFAULT_MEASURES, min_length=1)
+    solutions: StrictBool = Field(default=False, description="keep every solution as NetCDF too")
+
+    @model_validator(mode="after")
+    def _frozen(self) -> Self:
+        object.__setattr__(self, "measure", FrozenTable(self.measure))
+        if self.sampling.kind == "grid":
+            for one in self.vary:
+                if one.values is None and one.count is None:
+                    raise ValueError(f"vary {one.what}: count is missing, and a grid needs it")
+        else:
+            for one in self.vary:
+                if one.count is not None:
+                    raise ValueError(
+                        f"vary {one.what}: count is for a grid; [sampling] has the count of "
+                        f"kind {self.sampling.kind}"
+                    )
+        return self
+
+    @classmethod
+    def checked(cls, data: Mapping[str, Any], source: str) -> Self:
+        """A study of `data`; `source` names it in messages.
+
+        Raises: InputError: with what is wrong, in one line.
+        """
+        if nests_too_deep(data):
+            raise too_deep(source)
+        try:
+            return cls.model_validate(data)
+        except ValidationError as error:
+            problems = [" ".join(p.split()) for p in describe(error, data, cls)]
+        raise InputError(f"{source}: {_in_one_line(problems)}")
+
+    def title(self) -> str:
+        return "study"
+
+    def data(self) -> dict[str, Any]:
+        """The study as JSON has it, what is left out at its default."""
+        return json.loads(self.model_dump_json(exclude_defaults=True))
+
+
+def read_study(source: str | Path | Mapping[str, Any] | Study) -> Study:
+    """A study from a TOML file, or from its tables.
+
+    Files that it names are looked for beside it.
+
+    Raises: InputError: with what is wrong, in one line.
+    """
+    if isinstance(source, Study):
+        return source
+    if isinstance(source, Mapping):
+        return Study.checked(source, "study")
+    text = _text(Path(source))
+    study = Study.checked(read_tables(text, str(source)), str(source))
+    folder = Path(source).parent
+
+    def beside(name: str, words: Iterable[str]) -> str:
+        return name if name in words else str(folder / name)
+
+    named: dict[str, Any] = {"load": beside(study.load, (REFERENCE, NONE))}
+    if study.mechanism is not None:
+        named["mechanism"] = beside(study.mechanism, bundled_mechanisms())
+    named["motion"] = [
+        one.model_copy(update={"file": beside(one.file, (REFERENCE, TRIAL))})
+        for one in study.motion
+    ]
+    return study.model_copy(update=named)
+
+
+def _text(path: Path) -> str:
+    if not path.is_file():
+        near = sorted(p.name for p in path.parent.glob("*.toml")) if path.parent.is_dir() else []
+        there = f" There are {', '.join(near[:5])}." if near else ""
+        raise InputError(f"study {path} is no file.{there}")
+    return read_text(path)
+
+
+def _in_one_line(problems: list[str]) -> str:
+    more = len(problems) - MOST_SHOWN
+    return "; ".join(problems[:MOST_SHOWN]) + (f"; and {more} more" if more > 0 else "")
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON schema of study files, for editors."""
+    return {**schema_of(Study), "title": "condyle study"}

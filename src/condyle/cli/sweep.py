@@ -1,0 +1,97 @@
+"""condyle sweep: many variants of a mechanism."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..errors import InputError
+from .answer import Answer, command_line, files_line
+from .command import COMPUTE, command
+from .inputs import output_folder, require_drawing
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@command(COMPUTE, example="condyle sweep study.toml --out sweep")
+def sweep(
+    study: Annotated[Path | None, typer.Argument(help="Study file (TOML).")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the rows. Default: as the study is called.")
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Processes. Default: the processors at hand.")
+    ] = None,
+    scheduler: Annotated[
+        str,
+        typer.Option(
+            help="Who does it: processes; threads; dask (a cluster on this machine); or the "
+            "address of a Dask scheduler, tcp://..."
+        ),
+    ] = "processes",
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with what the folder holds of this study.")
+    ] = False,
+    show: Annotated[
+        Path | None, typer.Option(help="Instead: show what the folder of a sweep tells.")
+    ] = None,
+    figures: Annotated[
+        bool, typer.Option("--figures", help="Draw figures into the folder too.")
+    ] = False,
+) -> Answer:
+    """Many variants of a mechanism: a row of measures for each.
+
+    A study names the numbers that vary, how they are sampled, and what is measured. Rows are
+    written in parts, so that a study that was stopped goes on with --resume.
+    """
+    require_drawing(figures, False)
+    if (study is None) == (show is None):
+        raise InputError("name a study, or with --show the folder of a sweep")
+    if show is not None:
+        from ..analysis.sweep import read_sweep
+
+        return _shown(read_sweep(show), show, figures)
+    assert study is not None
+    from ..analysis.sweep import sweep as solve
+
+    folder = out or Path(study.stem)
+    try:
+        table = solve(study, folder, workers=workers, scheduler=scheduler, resume=resume)
+    except KeyboardInterrupt:
+        again = command_line("sweep", study, out=folder, resume=True)
+        print(f"condyle: stopped; the rows in {folder} are whole. {again}", file=sys.stderr)
+        raise
+    return _shown(table, folder, figures)
+
+
+def _shown(table: xr.Dataset, folder: Path, figures: bool) -> Answer:
+    """The tables of a sweep, as text and as CSV, and its figures."""
+    from ..report.tables.sweep import sweep_tables
+
+    tables = sweep_tables(table)
+    files = []
+    for one in tables:
+        files.append(output_folder(folder) / f"{one.name}.csv")
+        one.write_csv(files[-1])
+    if figures:
+        from ..report.figures import save
+        from ..report.figures.sweep import sweep_plots
+
+        for name, draw in sweep_plots(table).items():
+            files += save(draw(table), folder, name)
+    data: dict[str, Any] = {
+        "rows": table.sizes["row"],
+        "asked": int(table.attrs["rows"]),
+        "parameters": list(table.attrs["parameters"]),
+        "measures": list(table.attrs["measures"]),
+        **dict.fromkeys(("outcomes", "best", "main_effects", "sobol", "pareto"), ()),
+        **{one.name.replace("-", "_"): one.records for one in tables},
+        "folder": folder,
+        "files": files,
+    }
+    text = "\n".join(one.text() for one in tables)
+    return Answer(f"{text}\n{files_line(files)}", data, command_line("sweep", show=folder))

@@ -1,0 +1,262 @@
+"""Rows of a study: right, in order, whoever does them, and none lost or doubled."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tomli_w
+import xarray as xr
+
+import condyle
+from condyle.analysis.sweep import read_sweep, schedule, store
+from condyle.analysis.sweep.schedule import LostWorkerError
+from condyle.analysis.sweep.solve import solve_part
+
+Same = Callable[[xr.Dataset, xr.Dataset], None]
+
+
+def test_rows_in_the_order_of_the_grid(alone: xr.Dataset, tables: dict[str, Any]) -> None:
+    masses = np.linspace(0.2, 0.3, 5)
+    points, bases = (tables["vary"][i]["values"] for i in (1, 2))
+    grid = np.array([(m, p, b) for m in masses for p in points for b in bases])
+    assert alone["variant"].values.tolist() == list(range(20))
+    for i, name in enumerate(alone.attrs["parameters"]):
+        np.testing.assert_array_equal(alone[name].values, grid[:, i])
+
+
+def test_a_variant_without_result_is_a_row_with_its_reason(alone: xr.Dataset) -> None:
+    refused, far = alone.isel(row=2), alone.isel(row=1)
+    assert refused["status"] == "refused" and "off the surface" in refused["reason"].item()
+    assert far["status"] == "unreachable"
+    assert 'chain "temporalis_left" cannot reach M' in far["reason"].item()
+    failed = alone["status"].values != "ok"
+    assert np.isnan(alone["peak"].values[failed]).all()
+    assert np.isfinite(alone["peak"].values[~failed]).all() and (~failed).sum() == 5
+    assert not any(alone["reason"].values[~failed])
+
+
+def test_measures_are_those_of_the_mechanism_solved_alone(
+    alone: xr.Dataset, machine: condyle.Mechanism
+) -> None:
+    motion = condyle.trial_motion(machine, rate=4.0)
+    for row in (0, 16):
+        mechanism = machine.set("platform.mass", alone["platform.mass"].values[row])
+        solution = condyle.derive(mechanism).solve(motion)
+        effort = solution["torque"].values
+        one = alone.isel(row=row)
+        # Kernels of a study leave nothing out that is zero here: other roundings, no more.
+        assert one["peak"].item() == pytest.approx(np.abs(effort).max(), rel=1e-9)
+        rms = np.sqrt((effort**2).mean(axis=0))
+        for i, chain in enumerate(mechanism.chain_names):
+            assert one[f"rms.{chain}"].item() == pytest.approx(rms[i], rel=1e-9)
+        load = solution["contact_force"].sel(contact="left_condyle").values.min()
+        assert one["load"].item() == pytest.approx(load, rel=1e-9)
+        ratio = solution["singularity_ratio"].values.min()
+        assert one["margin"].item() == pytest.approx(ratio, rel=1e-9)
+
+
+@pytest.mark.parametrize(("workers", "scheduler"), [(2, "processes"), (2, "threads")])
+def test_whoever_does_it_the_bits_are_the_same(
+    alone: xr.Dataset, tables: dict[str, Any], workers: int, scheduler: str, same: Same
+) -> None:
+    same(alone, condyle.sweep(tables, workers=workers, scheduler=scheduler))
+
+
+def test_several_motions_are_rows_of_their_own(tables: dict[str, Any], alone: xr.Dataset) -> None:
+    motions = [{"file": "trial", "rate": 4.0}, {"file": "trial", "rate": 2.0}]
+    both = condyle.sweep({**tables, "motion": motions}, workers=1)
+    assert both.sizes["row"] == 2 * alone.sizes["row"] and "motion" in both
+    np.testing.assert_array_equal(both["peak"].values[::2], alone["peak"].values)
+
+
+def test_dask_gives_the_same_bits_and_outlives_a_worker(
+    tables: dict[str, Any], tmp_path: Path, same: Same
+) -> None:
+    distributed = pytest.importorskip("distributed")
+    study = {**tables, "vary": [{**tables["vary"][0], "count": 160}]}
+    here = condyle.sweep(study, workers=1)
+    folder = tmp_path / "sweep"
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50
+    ) as cluster:
+        victim = next(iter(cluster.workers.values())).pid
+
+        def kill() -> None:
+            wait_for_parts(folder, 3)
+            os.kill(victim, signal.SIGKILL)
+
+        killer = threading.Thread(target=kill)
+        killer.start()
+        there = condyle.sweep(study, folder, scheduler=cluster.scheduler_address)
+        killer.join()
+    same(here, there)
+
+
+def wait_for_parts(folder: Path, count: int, seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while len(list(folder.glob("part-*.parquet"))) < count and time.monotonic() < end:
+        time.sleep(0.01)
+
+
+def test_killed_at_any_instant_it_goes_on(
+    tables: dict[str, Any], tmp_path: Path, same: Same
+) -> None:
+    study = {**tables, "vary": [{**tables["vary"][0], "count": 120}]}
+    file, folder = tmp_path / "study.toml", tmp_path / "sweep"
+    file.write_text(tomli_w.dumps(study))
+    command = [sys.executable, "-m", "condyle", "sweep", str(file), "--out", str(folder)]
+    random = np.random.default_rng()
+    for at in (1, 9, 17):
+        with subprocess.Popen(
+            [*command, "--workers", "2", "--resume"], stdout=subprocess.DEVNULL
+        ) as process:
+            wait_for_parts(folder, at)
+            time.sleep(random.uniform(0.0, 0.05))
+            process.kill()
+        whole = read_sweep(folder)  # what is there can be read
+        assert whole.sizes["row"] % 4 == 0
+    same(condyle.sweep(study, workers=1), condyle.sweep(file, folder, workers=1, resume=True))
+
+
+def test_a_worker_that_is_killed_is_told_and_loses_nothing(
+    tables: dict[str, Any],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    alone: xr.Dataset,
+    same: Same,
+) -> None:
+    if sys.platform != "linux":
+        pytest.skip("processes are forked only there")
+    kill = tmp_path / "kill"
+    kill.touch()
+
+    monkeypatch.setattr("condyle.analysis.sweep.run.solve_part", _Deadly(kill))
+    with pytest.raises(LostWorkerError, match="--resume"):
+        condyle.sweep(tables, tmp_path / "sweep", workers=2)
+    assert not kill.exists()
+    same(alone, condyle.sweep(tables, tmp_path / "sweep", workers=2, resume=True))
+
+
+class _Deadly:
+    """Work that kills its process once, at part 2."""
+
+    def __init__(self, file: Path) -> None:
+        self.file = file
+
+    def __call__(self, job: Any, part: int) -> Any:
+        if part == 2 and self.file.exists():
+            self.file.unlink()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return solve_part(job, part)
+
+
+def test_a_full_disk_is_told_and_resumed(
+    tables: dict[str, Any],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    alone: xr.Dataset,
+    same: Same,
+) -> None:
+    written = 0
+
+    def write(table: Any, path: Path) -> None:
+        nonlocal written
+        written += 1
+        path.write_bytes(b"half")
+        if written == 3:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+        real(table, path)
+
+    real = store.pq.write_table
+    folder = tmp_path / "sweep"
+    with monkeypatch.context() as full:
+        full.setattr(store.pq, "write_table", write)
+        with pytest.raises(condyle.InputError, match="No space left"):
+            condyle.sweep(tables, folder, workers=1)
+    assert len(list(folder.iterdir())) == 3  # the study and two parts, nothing half
+    assert read_sweep(folder).sizes["row"] == 8
+    same(alone, condyle.sweep(tables, folder, workers=1, resume=True))
+
+
+def test_a_changed_study_is_refused_with_the_difference(
+    tables: dict[str, Any], tmp_path: Path
+) -> None:
+    small = {**tables, "vary": [{**tables["vary"][0], "count": 2}]}
+    condyle.sweep(small, tmp_path, workers=1)
+    with pytest.raises(condyle.InputError, match="--resume"):
+        condyle.sweep(small, tmp_path, workers=1)
+    other = {**small, "vary": [{**small["vary"][0], "range": [0.2, 0.35]}]}
+    with pytest.raises(condyle.InputError, match=r"range\[1\] was 0.3, is 0.35"):
+        condyle.sweep(other, tmp_path, workers=1, resume=True)
+    heavier = condyle.load("masticatory").set("chain.masseter_left.coupler.com", 0.4)
+    with pytest.raises(condyle.InputError, match=r"coupler\.com was"):
+        condyle.sweep(small, tmp_path, workers=1, resume=True, mechanism=heavier)
+    kept = json.loads((tmp_path / store.STUDY).read_text())
+    assert kept["rows"] == 2
+
+
+def test_ctrl_c_ends_in_order(
+    tables: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = {**tables, "vary": [{**tables["vary"][0], "count": 40}]}
+    real = store.Store.write
+
+    def write(self: Any, part: int, rows: Any) -> None:
+        real(self, part, rows)
+        if part == 1:
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as pressed, pytest.raises(KeyboardInterrupt):
+        pressed.setattr(store.Store, "write", write)
+        condyle.sweep(study, tmp_path, workers=2)
+    there = read_sweep(tmp_path).sizes["row"]
+    assert 0 < there <= 40 and there % 4 == 0
+    whole = condyle.sweep(study, tmp_path, workers=1, resume=True)
+    assert whole["variant"].values.tolist() == list(range(40))
+
+
+def test_solutions_are_kept_on_request(tables: dict[str, Any], tmp_path: Path) -> None:
+    study = {**tables, "solutions": True, "vary": [{**tables["vary"][0], "count": 2}]}
+    table = condyle.sweep(study, tmp_path, workers=1)
+    for row in range(2):
+        solution = condyle.open_solution(tmp_path / "solutions" / f"{row:09d}-0.nc")
+        assert solution.mechanism.platform.mass == table["platform.mass"].values[row]
+        assert abs(solution["torque"].values).max() == table["peak"].values[row]
+
+
+@pytest.mark.parametrize(
+    ("workers", "scheduler", "message"),
+    [
+        (0, "processes", "expected 1 or more"),
+        (None, "slurm", "expected processes, threads, dask"),
+        (None, "tcp://127.0.0.1:9", "no Dask scheduler answers"),
+        (3, "tcp://127.0.0.1:9", "leave it out"),
+    ],
+)
+def test_wrong_schedulers_are_told_before_any_work(
+    tables: dict[str, Any],
+    tmp_path: Path,
+    workers: Any,
+    scheduler: str,
+    message: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(schedule, "PATIENCE", 1.0)
+    if "://" in scheduler:
+        pytest.importorskip("distributed")
+    with pytest.raises(condyle.InputError, match=message) as caught:
+        condyle.sweep(tables, tmp_path / "sweep", workers=workers, scheduler=scheduler)
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "sweep").exists()

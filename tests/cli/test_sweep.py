@@ -1,0 +1,76 @@
+"""condyle sweep, run --vary, report --sweep and schema study."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import tomli_w
+
+STUDY: dict[str, Any] = {
+    "motion": {"file": "trial", "rate": 4.0},
+    "load": "none",
+    "vary": [{"what": "platform.mass", "range": [0.2, 0.3], "count": 4}],
+    "measure": {
+        "peak": {"of": "effort", "take": "max_abs", "better": "less"},
+        "margin": {"of": "singularity_ratio", "take": "min", "better": "more"},
+    },
+}
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Path:
+    file = tmp_path / "study.toml"
+    file.write_text(tomli_w.dumps(STUDY))
+    return file
+
+
+def test_sweep_and_show(condyle_command: Callable[..., Any], study: Path) -> None:
+    done = condyle_command("sweep", study, "--out", "rows", "--workers", 1, "--json", "--figures")
+    assert done.status == 0, done.err
+    told = json.loads(done.out)
+    assert told["rows"] == told["asked"] == 4
+    assert told["outcomes"] == [{"status": "ok", "rows": 4, "first_reason": ""}]
+    names = {Path(file).name for file in told["files"]}
+    assert {"best.csv", "main-effects.csv", "pareto.csv", "sweep-scatter.png"} <= names
+    shown = condyle_command("sweep", "--show", "rows")
+    assert shown.status == 0 and "least peak" in shown.out and "Pareto front" in shown.out
+    again = condyle_command("sweep", study, "--out", "rows")
+    assert again.status == 2 and "--resume" in again.err
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [((), "name a study"), (("--show", "."), "holds no study"), (("a.toml",), "is no file")],
+)
+def test_wrong_calls(condyle_command: Callable[..., Any], words: Any, message: str) -> None:
+    done = condyle_command("sweep", *words)
+    assert done.status == 2 and message in done.err and done.err.count("\n") == 1
+
+
+def test_bands_and_sections_of_the_report(condyle_command: Callable[..., Any], study: Path) -> None:
+    assert condyle_command("sweep", study, "--out", "rows", "--workers", 1).status == 0
+    words = ("--vary", study, "--rate", 4, "--threads", 1, "--out", "results")
+    done = condyle_command("run", *words)
+    assert done.status == 0, done.err
+    made = condyle_command("report", "results/masticatory.nc", "--sweep", "rows")
+    assert made.status == 0, made.err
+    page = Path("results/masticatory.html").read_text()
+    assert '<section id="bands">' in page and '<section id="sweep">' in page
+    assert page.count('<img src="data:image/png') == 6
+
+
+def test_a_study_of_another_mechanism_is_refused(
+    condyle_command: Callable[..., Any], study: Path
+) -> None:
+    study.write_text(tomli_w.dumps({"mechanism": "hexaglide", **STUDY}))
+    done = condyle_command("run", "--vary", study, "--rate", 4)
+    assert done.status == 2 and 'the study is of "hexaglide"' in done.err
+
+
+def test_schema_of_studies(condyle_command: Callable[..., Any]) -> None:
+    schema = json.loads(condyle_command("schema", "study").out)
+    assert schema["title"] == "condyle study" and "vary" in schema["properties"]

@@ -1,0 +1,58 @@
+"""Models that share kernels with other mechanisms of their structure."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.model.evaluator import Evaluator, with_point
+
+CHANGES = {
+    "masticatory": {"platform.mass": 0.31, "chain.masseter_left.base[0]": 0.0352},
+    "gough-stewart": {"platform.mass": 2.0, "chain[0].piston.mass": 0.7},
+    "masticatory-curved": {"platform.inertia.xx": 1.7e-4, "chain[1].coupler.mass": 0.02},
+}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+@pytest.mark.parametrize("backend", ["numpy", "auto"])
+def test_a_renumbered_model_is_the_mechanisms_own(name: str, backend: str) -> None:
+    base = condyle.load(name)
+    other = base.set(CHANGES[name])
+    general = Evaluator(base, backend=backend, general=True)
+    motion = condyle.trial_motion(base, rate=4.0)
+    load = with_point(np.tile([1.0, 2.0, 3.0, 0.1, 0.2, 0.3], (len(motion), 1)), np.ones(3) / 50)
+    states, _ = general.independent_motion(motion)
+    before = general.evaluate(*states, load, 1).effort
+    found = general.renumbered(other).evaluate(*states, load, 1)
+    wanted = Evaluator(other, backend="numpy").evaluate(*states, load, 1)
+    for field in ("effort", "contact_force", "joint_rate"):
+        a, b = getattr(found, field), getattr(wanted, field)
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * np.abs(b).max(initial=1.0))
+    assert np.abs(found.effort - before).max() > 1e-3 * np.abs(before).max()
+    np.testing.assert_array_equal(general.evaluate(*states, load, 1).effort, before)
+
+
+def test_a_landmarks_path_too() -> None:
+    base = condyle.load("masticatory")
+    other = base.set("platform.points.incisor[0]", base.get("platform.points.incisor[0]") + 0.004)
+    motion = condyle.Motion.from_csv(condyle.motion.bundled_reference()[0], rate=4.0)
+    general = Evaluator(base, backend="numpy", general=True)
+    own, _ = general.independent_motion(motion)
+    found, _ = general.renumbered(other).independent_motion(motion)
+    wanted, _ = Evaluator(other, backend="numpy").independent_motion(motion)
+    np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-9)
+    assert np.abs(found[0] - own[0]).max() > 1e-4
+
+
+def test_copies_share_their_kernels_and_travel() -> None:
+    general = Evaluator(condyle.load("gough-stewart"), backend="numpy", general=True)
+    kernel = general.kernel("motion")
+    assert copy.copy(general).kernel("motion") is kernel
+    assert general.choosing("bounded").kernel("motion") is kernel
+    there = pickle.loads(pickle.dumps(general))
+    assert there.renumbered(general.mechanism).policy == general.policy
