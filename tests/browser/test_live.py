@@ -93,6 +93,18 @@ def test_it_begins_again_at_its_end(
     assert not player.playing and player.snapshot().messages[0] == "It is over."
 
 
+def test_a_law_that_fails_is_told_of_once(
+    player: LivePlayer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(t: float) -> None:
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    monkeypatch.setattr(player.live, "go_to", fail)
+    with pytest.raises(np.linalg.LinAlgError):
+        player.advance(0.03)
+    assert not player.advance(0.03)
+
+
 def test_a_scenario_stands_alone(reference: condyle.Mechanism) -> None:
     with pytest.raises(InputError, match="no solution"):
         open_view(reference, "a.nc", scenario=CHEW)

@@ -92,8 +92,10 @@ class LivePlayer:
         seconds = min(seconds, LONGEST)
         begun, late = self.live.t, time.perf_counter() + BUDGET
         self._clock += seconds * self.speed
+        self.playing = False  # a law that fails is told of once
         while not self.live.over and self.live.t < self._clock and time.perf_counter() < late:
             self.live.go_to(min(self.live.t + SLICE, self._clock))
+        self.playing = True
         if not self.live.over:
             pace = (self.live.t - begun) / (seconds * self.speed)
             self._pace = SMOOTHING * self._pace + (1 - SMOOTHING) * pace
