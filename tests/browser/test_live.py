@@ -93,6 +93,18 @@ def test_it_begins_again_at_its_end(
     assert not player.playing and player.snapshot().messages[0] == "It is over."
 
 
+def test_a_law_that_fails_is_told_of_once(
+    player: LivePlayer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(t: float) -> None:
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    monkeypatch.setattr(player.live, "go_to", fail)
+    with pytest.raises(np.linalg.LinAlgError):
+        player.advance(0.03)
+    assert not player.advance(0.03)
+
+
 def test_a_scenario_stands_alone(reference: condyle.Mechanism) -> None:
     with pytest.raises(InputError, match="no solution"):
         open_view(reference, "a.nc", scenario=CHEW)
@@ -143,9 +155,10 @@ def test_hands_on_the_page(open_tab: Callable[..., Tab], view: View) -> None:
 def grip(tab: Tab) -> tuple[int, int]:
     """A place on the blue arrow of the grip."""
 
+    top, left = 420, 440  # of it there are blue rods
+
     def blue(pixels: np.ndarray) -> Any:
-        left = 440  # of it there are blue rods
-        return np.argwhere(near(pixels[420:, left:560], HANDLE)) + np.array([420, left])
+        return np.argwhere(near(pixels[top:, left:560], HANDLE))
 
     found = blue(tab.picture_where("canvas", lambda p: len(blue(p)) > 20, "the grip"))
-    return int(found[0][1]), int(found[0][0]) + 10
+    return left + int(found[0][1]), top + int(found[0][0]) + 10

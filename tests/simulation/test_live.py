@@ -85,6 +85,7 @@ def test_every_knob_is_the_number_of_the_scenario(name: str, jaw: condyle.Model)
         other = {**told, "load": [dict(load) for load in told.get("load", ())]}
         tables = {load["kind"]: load for load in other["load"]}
         tables["controller"] = other["controller"] = dict(told["controller"])
+        assert knob.value == tables[knob.owner].get(knob.field, knob.value)
         tables[knob.owner][knob.field] = value
         found.reset()
         found.turn(i, value)

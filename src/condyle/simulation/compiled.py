@@ -259,6 +259,11 @@ class Loop:
         self._run.corner = value
 
     @property
+    def by_itself(self) -> bool:
+        """Whether the controller is in C, too, if there is one."""
+        return bool(self._run.drive != ELSEWHERE)
+
+    @property
     def at_a_look(self) -> bool:
         """Whether the controller is to look before it goes on."""
         return bool(self._run.fresh and self._is_tick[self._run.corner])

@@ -23,6 +23,7 @@ from .sensing import Lost, Observer
 from .watch import Crossing, Watch
 
 ROUNDING = 1e-12  # seconds
+CLOSE = 1e-6  # of a step: there already
 MANY = 100  # events of a kind and an owner that are listed
 SAY = 0.01  # seconds of the simulation between two words of progress
 
@@ -70,7 +71,7 @@ class Run:
         return self._trace()
 
     def go_to(self, until: float, quick: Loop | None) -> None:
-        """Run to a time, the end at most [s]; `quick`: of this run, the same every time.
+        """Run to a time, or to the next step after it [s]; `quick`: of this run, always the same.
 
         Raises: Ended: where the run is over before.
         """
@@ -120,25 +121,25 @@ class Run:
 
     def _by_compiled_code(self, until: float, quick: Loop) -> None:
         """The same by `loop.c`, but for what it hands back."""
-        step = self._plan.settings.step
+        step, end = self._plan.settings.step, self._plan.duration
         assert step is not None
         quick.y[:] = self.y
         while True:
             quick.set_modes(self.modes)
-            quick.budget = min(max(math.ceil((until - self.t) / step), 0), BUDGET)
+            quick.budget = min(max(math.ceil((until - self.t) / step - CLOSE), 1), BUDGET)
             code, said = quick.advance(), self.t
             t, self._next, self._tick = quick.t, quick.next, quick.tick
             self._effort, y, fresh = quick.effort.copy(), quick.y.copy(), False
             self.t, self.y = t, y
             self._advance(t - said)
-            if code == DONE or (code == PAUSE and t >= until - ROUNDING):
+            if code == DONE or (code == PAUSE and t >= until - CLOSE * step and until < end):
                 return
             if code == LOOK:
                 self._look(t, y, self._tick + 1)
             elif code == STEP:
-                end = float(self._corners[quick.corner + 1])
-                t, y = self._between(self._integrator, t, end, y, once=True)
-                if t >= end - ROUNDING:
+                corner = float(self._corners[quick.corner + 1])
+                t, y = self._between(self._integrator, t, corner, y, once=True)
+                if t >= corner - ROUNDING:
                     quick.corner += 1
                     fresh = True
                 self.t, self.y = t, y

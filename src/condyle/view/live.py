@@ -41,7 +41,7 @@ class LivePlayer:
         self.stiffness = HAND * self.mechanism.platform.mass
         points = self.mechanism.platform.points
         self.pull_at = DEFAULT_LOAD_POINT if DEFAULT_LOAD_POINT in points else CENTRE
-        self._pace = 1.0
+        self._pace, self._clock = 1.0, 0.0
         self._last = self.live.moment()
 
     @property
@@ -74,7 +74,7 @@ class LivePlayer:
     def play(self) -> None:
         """Go on; from the start where it is over."""
         if self.live.over:
-            self.live.restart()
+            self.restart()
         self.playing = True
 
     def pause(self) -> None:
@@ -83,6 +83,7 @@ class LivePlayer:
     def restart(self) -> None:
         """From the start, with sliders as they are."""
         self.live.restart()
+        self._clock = 0.0
 
     def advance(self, seconds: float) -> bool:
         """Let `seconds` of real time pass; returns whether anything moved."""
@@ -90,17 +91,19 @@ class LivePlayer:
             return False
         seconds = min(seconds, LONGEST)
         begun, late = self.live.t, time.perf_counter() + BUDGET
-        until = begun + seconds * self.speed
-        while not self.live.over and self.live.t < until and time.perf_counter() < late:
-            self.live.go_to(min(self.live.t + SLICE, until))
-        if self.live.over:
-            if self.again and self.live.ended is None:
-                self.live.restart()
-            else:
-                self.playing = False
-        else:
+        self._clock += seconds * self.speed
+        self.playing = False  # a law that fails is told of once
+        while not self.live.over and self.live.t < self._clock and time.perf_counter() < late:
+            self.live.go_to(min(self.live.t + SLICE, self._clock))
+        self.playing = True
+        if not self.live.over:
             pace = (self.live.t - begun) / (seconds * self.speed)
             self._pace = SMOOTHING * self._pace + (1 - SMOOTHING) * pace
+            self._clock = min(self._clock, self.live.t + SLICE)  # what was lost is not made up for
+        elif self.again and self.live.ended is None:
+            self.restart()
+        else:
+            self.playing = False
         return True
 
     # -- hands ----------------------------------------------------------------------------------
