@@ -104,7 +104,7 @@ def put_files_of_a_reader(folder: Path) -> None:
     (folder / "my.toml").write_text(bundled_text("masticatory"), encoding="utf-8")
     for name in ("masses.toml", "study.toml"):
         (folder / name).write_text(MASSES, encoding="utf-8")
-    (folder / "chew.toml").write_text("duration = 0.004\n")
+    (folder / "chewing.toml").write_text("duration = 0.004\n")
     drives = '[controller]\nkind = "joint_pd"\nstiffness = 5\ndamping = 0.03\n'
     (folder / "drives.toml").write_text(f"duration = 0.002\n{drives}")
     jaw = record(noise=5e-5)
@@ -361,7 +361,7 @@ JSON = {
     "condyle map": (
         *("map", "masticatory", "--over", "X=0:3:3 mm", "--quantity", "joint", "--no-figures"),
     ),
-    "condyle simulate": ("simulate", "my.toml", "--scenario", "chew.toml", "--out", "fall"),
+    "condyle simulate": ("simulate", "my.toml", "--scenario", "chewing.toml", "--out", "fall"),
     "condyle simulate --check-gains": (
         *("simulate", "my.toml", "--scenario", "drives.toml", "--check-gains"),
     ),
