@@ -123,12 +123,12 @@ def test_a_bar_of_a_command(
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv("CONDYLE_BACKEND", "numpy")
 
-    def solve(*_: Any) -> tuple[int, list[str]]:
+    def solve(*_: Any, **options: Any) -> tuple[int, list[str], None]:
         with step("solving a file", 10) as advance:
             advance(4)
             if switch is None:
                 terminal.wait_for("40%")
-        return 10, []
+        return 10, [], None
 
     monkeypatch.setattr("condyle.results.states.solve_file", solve)
     on_terminal()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -108,4 +109,4 @@ def c(
         "facts": facts.data,
         "files": list(files.values()),
     }
-    return Answer("\n".join(lines), data, f"make -C {out} check")
+    return Answer("\n".join(lines), data, f"make -C {shlex.quote(str(out))} check")

@@ -132,7 +132,8 @@ class Follow:
         return x, converged
 
     def _on_branch(self, pose: np.ndarray) -> np.ndarray:
-        return np.linalg.slogdet(self._conditions(pose)[1]).sign == self._branch
+        with np.errstate(invalid="ignore"):  # of poses that have no conditions
+            return np.linalg.slogdet(self._conditions(pose)[1]).sign == self._branch
 
     def _padded(self, s: np.ndarray) -> np.ndarray:
         return np.hstack([np.zeros((len(s), self._k)), s])
