@@ -16,6 +16,8 @@ from condyle.simulation.loads.food import APART, BROKEN, TOUCHING, FoodTable
 from condyle.simulation.loads.spring import Spring
 from condyle.simulation.run import Run, run
 from condyle.simulation.scenario import scenario_from
+from condyle.simulation.sensing import Lost, Observer
+from condyle.status import Status
 
 FALL = {"duration": 0.08, "rate": 500}
 
@@ -174,3 +176,46 @@ def test_a_full_disk_leaves_nothing(jaw: Model, tmp_path: Path) -> None:
     with pytest.raises(condyle.InputError, match="cannot be written"):
         found.save(tmp_path / "a.csv", full)
     assert list(tmp_path.iterdir()) == [full]
+
+
+def test_a_jam_ends_the_run() -> None:
+    """With mu = 3 a condyle that slides comes to a state that no pattern of friction explains."""
+    machine = condyle.load("masticatory")
+    rough = {"coefficient": 3.0, "smoothing_speed": 1e-3}
+    changes = {f"contact.{name}.friction": rough for name in machine.contact_names}
+    model = condyle.derive(machine.set(changes))
+    trace = run(bind(model, scenario_from({**FALL, "start": {"dX": -0.2}})))
+    assert trace.ended is not None and trace.ended.kind == "jammed"
+    assert 0 < trace.t[-1] <= trace.ended.time < FALL["duration"]
+    names = model.independent
+    q, q1 = (np.array([[trace.ended.state[p + n] for n in names]]) for p in ("", "d"))
+    beyond = q + 1e-5 * q1  # the state before a jam is the last that can be
+    still = np.zeros((1, 6))
+    statuses = [model.forward(x, q1, still, np.zeros((1, 9))).status[0] for x in (q, beyond)]
+    assert Status.jammed in statuses
+
+
+def test_encoders_that_give_no_pose_end_the_run(
+    jaw: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What they last gave, and all that was computed, is kept."""
+    told = {
+        **FALL,
+        "controller": {"kind": "computed_torque", "stiffness": 400.0, "rate": 500.0},
+        "sensors": {"encoder_resolution": 1e-5},
+    }
+    whole = run(bind(jaw, scenario_from(told)))
+    see, looks = Observer.see, []
+
+    def blind(self: Observer, *given: np.ndarray) -> Any:
+        looks.append(given)
+        if len(looks) > 10:
+            raise Lost
+        return see(self, *given)
+
+    monkeypatch.setattr(Observer, "see", blind)
+    trace = run(bind(jaw, scenario_from(told)))
+    assert trace.ended is not None and trace.ended.kind == "lost"
+    assert trace.ended.time == pytest.approx(10 / 500) and len(trace.command) == 10
+    kept = len(trace.t)
+    np.testing.assert_array_equal(trace.state, whole.state[:kept])
