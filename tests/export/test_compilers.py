@@ -140,9 +140,9 @@ def test_facts_are_measured_wherever_the_folder_is(
     of = folder("jaw")
     monkeypatch.chdir(of.path.parent)
     rows = write_facts(of.exported, Path(of.path.name)).data["functions"]
-    for name, row in rows.items():
-        assert row["code"] > 8 * row["operations"] or "computed" in name, name
-        assert row["stack"] > 100 and row["error"] < 1e-12 and not row["wrong"]
+    assert all(row["error"] < 1e-12 and not row["wrong"] for row in rows.values())
+    for what in ("code", "stack"):  # the same work but for the contact forces
+        assert rows["jaw_inverse"][what] > rows["jaw_contact"][what] / 2 > 0
     assert rows["jaw_computed_torque"]["code"] > rows["jaw_inverse"]["code"]
 
 

@@ -5,6 +5,7 @@ Both are straight lines of `backends.c.straight`, with arrays of their own for w
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterator
 from functools import cached_property
 
@@ -61,10 +62,11 @@ class _Body(Straight):
                     else:
                         yield f"{self.places.result(o.name, i, None)} = {self.name(v, 0)};"
 
+    @abstractmethod
     def _lanes_stored(
         self, o: Output, entry: int, v: Value, group: int, start: int
     ) -> Iterator[str]:
-        raise NotImplementedError
+        """What keeps a result that differs from lane to lane."""
 
     def number(self, value: object) -> str:
         """A number in this precision."""

@@ -63,6 +63,24 @@ def recall(text: str, source: str = "mechanism") -> Mechanism:
     return from_data(read_tables(text, source), source, at_home=False, notes=True)
 
 
+def without_unit(
+    data: Mapping[str, Any], source: str, what: str
+) -> tuple[dict[str, Any], float, list[str]]:
+    """The tables of a file but `length_unit`, units a metre, and what is wrong with that key.
+
+    Raises: InputError: for what are no tables of a `what`.
+    """
+    if not isinstance(data, Mapping):
+        raise InputError(f"{source}: expected the tables of a {what}, got {shown(data)}")
+    if nests_too_deep(data):
+        raise too_deep(source)
+    tables = dict(data)
+    unit = tables.pop("length_unit", "m")
+    if isinstance(unit, str) and unit in PER_METRE:
+        return tables, PER_METRE[unit], []
+    return tables, PER_METRE["m"], [f'length_unit: expected "m" or "mm", got {shown(unit)}']
+
+
 def from_data(
     data: Mapping[str, Any],
     source: str = "mechanism",
@@ -74,17 +92,8 @@ def from_data(
     Args: at_home: whether the contacts must be on their surfaces and hold the platform.
           notes: whether a note may stand in the place of a surface, as `record` leaves it.
     """
-    if not isinstance(data, Mapping):
-        raise InputError(f"{source}: expected the tables of a mechanism, got {shown(data)}")
-    if nests_too_deep(data):
-        raise too_deep(source)
-    data = dict(data)
-    unit = data.pop("length_unit", "m")
-    problems = []
-    if not isinstance(unit, str) or unit not in PER_METRE:
-        problems.append(f'length_unit: expected "m" or "mm", got {shown(unit)}')
-        unit = "m"
-    context = {"per_metre": PER_METRE[unit], "notes": notes, "at_home": False}
+    data, per_metre, problems = without_unit(data, source, "mechanism")
+    context = {"per_metre": per_metre, "notes": notes, "at_home": False}
     # Names that Python has for a key of the file are no keys of the file.
     fields = Mechanism.model_fields.items()
     aliased = [name for name, field in fields if field.alias and name in data]

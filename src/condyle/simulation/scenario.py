@@ -11,11 +11,12 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, create_model, model_validator
 
-from ..errors import InputError, ScenarioError
-from ..mechanism.messages import describe, shown
+from ..errors import ScenarioError
+from ..mechanism.files import without_unit
+from ..mechanism.messages import describe
 from ..mechanism.quantities import PER_METRE
 from ..mechanism.schema import schema_of
-from ..mechanism.toml import nests_too_deep, read_tables, read_text, too_deep
+from ..mechanism.toml import read_tables, read_text
 from .controllers import CONTROLLERS
 from .integrators import INTEGRATORS
 from .loads import LOADS
@@ -156,16 +157,7 @@ def scenario_from(
 
     Args: folder: where files are that it names; default: the current one.
     """
-    if not isinstance(data, Mapping):
-        raise InputError(f"{source}: expected the tables of a scenario, got {shown(data)}")
-    if nests_too_deep(data):
-        raise too_deep(source)
-    data = dict(data)
-    unit = data.pop("length_unit", "m")
-    problems = []
-    if not isinstance(unit, str) or unit not in PER_METRE:
-        problems.append(f'length_unit: expected "m" or "mm", got {shown(unit)}')
-        unit = "m"
+    data, per_metre, problems = without_unit(data, source, "scenario")
     if isinstance(data.get("controller"), Mapping) and data["controller"].get("kind") == "none":
         data.pop("controller")
     if "loads" in data:  # a name that Python has for a key of the file
@@ -173,7 +165,7 @@ def scenario_from(
         del data["loads"]
     root = whole()
     try:
-        found = root.model_validate(data, context={"per_metre": PER_METRE[unit], "folder": folder})
+        found = root.model_validate(data, context={"per_metre": per_metre, "folder": folder})
     except ValidationError as error:
         problems += describe(error, data, root)
     if problems:

@@ -10,6 +10,7 @@ All that lasts from one period to the next is in `memory`.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
@@ -60,7 +61,7 @@ NOTHING = np.zeros(0)
 
 
 @dataclass(frozen=True)
-class Law:
+class Law(ABC):
     """A controller on one mechanism: its law, with all numbers that it needs.
 
     model: the mechanism as the controller takes it to be.
@@ -79,9 +80,9 @@ class Law:
         """Memory to begin with."""
         return NOTHING
 
+    @abstractmethod
     def __call__(self, now: Measured, aim: Reference, memory: Memory) -> tuple[np.ndarray, Memory]:
         """Efforts (n,) [N m or N], before any limit, and the memory of the next period."""
-        raise NotImplementedError
 
 
 class ControllerTable(Table):
@@ -109,12 +110,12 @@ class ControllerTable(Table):
     distribution: str | None = Field(default=None, description="how it chooses efforts")
     preload: float = Field(default=0.0, ge=0, allow_inf_nan=False, description="N")
 
+    @abstractmethod
     def bind(self, model: Evaluator) -> Law:
         """The law with its numbers.
 
         Raises: InputError: where it does not fit the mechanism.
         """
-        raise NotImplementedError
 
 
 def each(given: float | Sequence[float], count: int, what: str, names: Sequence[str]) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -27,7 +28,7 @@ class Jump:
 
 
 @dataclass(frozen=True)
-class BoundLoad:
+class BoundLoad(ABC):
     """A load at a point of one mechanism.
 
     A law of few numbers, so that it can be written in C as well:
@@ -48,9 +49,9 @@ class BoundLoad:
         """The mode to begin with, at s."""
         return 0
 
+    @abstractmethod
     def law(self, t: float, s: Sequence[float], v: Sequence[float], mode: int) -> tuple[float, ...]:
         """Force (3,) [N] on the platform at the point, and, if it has one, a moment (3,) [N m]."""
-        raise NotImplementedError
 
     def guards(
         self, t: float, s: Sequence[float], v: Sequence[float], mode: int
@@ -74,12 +75,12 @@ class LoadTable(Table):
     name: Name | None = None
     point: Name | None = None
 
+    @abstractmethod
     def bind(self, mechanism: Mechanism, name: str) -> BoundLoad:
         """The load on a mechanism.
 
         Raises: InputError: where it does not fit.
         """
-        raise NotImplementedError
 
     def place(self, mechanism: Mechanism) -> tuple[str, np.ndarray]:
         """Name of the point it acts at, and where that is in {M}, (3,) [m]."""
