@@ -25,15 +25,17 @@ FLAGS = (
     "-fPIC",
     "-shared",
 )
-# GCC alone takes these. Without the first it keeps scalars in integer registers when it runs out of
-# others, on the ports that arithmetic needs. The others order the statements of one evaluation,
-# which makes it 5 % quicker, and a batch, whose chains stand abreast already, as much slower.
-GCC = ("-mtune-ctrl=^inter_unit_moves_to_vec,^inter_unit_moves_from_vec",)
-ORDERED = ("-fschedule-insns", "-fsched-pressure")
+# GCC alone takes it. Without it, it keeps scalars in integer registers when it runs out of others,
+# on the ports that arithmetic needs.
+GCC = "-mtune-ctrl=^inter_unit_moves_to_vec,^inter_unit_moves_from_vec"
 # What is made for this processor: the first that the compiler takes.
-NATIVE = (("-march=native", *GCC, *ORDERED), ("-march=native",), ("-mcpu=native",), ())
-# Chains side by side in a batch, to keep all arithmetic ports busy: as many as pay off by compiler.
-ABREAST, ABREAST_CLANG = 2, 3
+NATIVE = (("-march=native", GCC), ("-march=native",), ("-mcpu=native",), ())
+# One evaluation stands in an order that Clang should leave alone, and that GCC makes better; a batch
+# in C, whose chains stand abreast, is worse for it.
+ORDERED = ("-fschedule-insns", "-fsched-pressure")
+LEFT_ALONE = ("-fno-slp-vectorize", "-mllvm", "-enable-misched=false")
+# Instruction sets, by the compiler's macros, that `backends/x86` has batches for, by lanes.
+ASSEMBLY = {4: ("__AVX2__", "__FMA__"), 8: ("__AVX512F__", "__AVX512DQ__")}
 SECONDS = 300  # a build that takes longer has gone wrong
 ASKING = 30  # seconds in which a compiler says what it is
 REMEDY = "Install gcc or clang, name another compiler in CC, or take numpy (--backend numpy)"
@@ -59,18 +61,19 @@ class Compiler:
     lanes: int
 
     @property
-    def batch_flags(self) -> tuple[str, ...]:
-        """What it is given for a batch."""
-        return tuple(flag for flag in self.flags if flag not in ORDERED)
+    def single_flags(self) -> tuple[str, ...]:
+        """What it is given for one evaluation."""
+        return (*self.flags, *(LEFT_ALONE if self.is_clang else ORDERED))
 
     @property
     def is_clang(self) -> bool:
         return "__clang__" in self.identity
 
     @property
-    def abreast(self) -> int:
-        """Chains that should stand side by side in a batch."""
-        return ABREAST_CLANG if self.is_clang else ABREAST
+    def assembly(self) -> bool:
+        """Whether the processor takes batches as `backends/x86` writes them."""
+        needed = ("__x86_64__", *ASSEMBLY.get(self.lanes, ()))
+        return self.lanes in ASSEMBLY and all(f"#define {m} " in self.identity for m in needed)
 
     def compile(self, source: Path, target: Path, flags: tuple[str, ...]) -> None:
         """Compile C into an object file.
@@ -114,7 +117,8 @@ def find_compiler() -> Compiler:
 
 
 def rivals(compiler: Compiler) -> tuple[Compiler, ...]:
-    """Compilers of which the one whose batch is quickest is taken: this one, and Clang beside GCC.
+    """Compilers of which the one whose code for one evaluation is quickest is taken: this one, and
+    Clang beside GCC.
 
     Where `CC` names a compiler there is no other.
     """

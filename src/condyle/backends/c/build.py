@@ -1,6 +1,6 @@
 """Kernels found in the cache, or built: one evaluation and the batch side by side.
 
-Which compiler's batch is quickest differs from processor to processor, so it is measured.
+Which compiler is best at one evaluation differs from processor to processor, so it is measured.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ..compiler import Compiler, find_compiler, rivals
 from .emit import Source, emit
 from .library import aligned, load, obtained, prepared, tool
 
-SAMPLES, ROUNDS = 512, 15  # of a measurement, which takes a millisecond
+TIMES, ROUNDS = 256, 30  # evaluations, and rounds of them, of a measurement: a millisecond
 
 
 def loaded(
@@ -52,7 +52,8 @@ def _recipe(key: str, *compilers: Compiler) -> str:
 def _generator() -> str:
     """A hash of the code that turns graphs into C, and C into libraries."""
     room = Path(str(files(__package__)))
-    sources = sorted(path for path in room.iterdir() if path.suffix in (".py", ".h"))
+    both = (path for own in (room, room.parent / "x86") for path in own.iterdir())
+    sources = sorted(path for path in both if path.suffix in (".py", ".h"))
     return cache.digest(*(path.read_bytes() for path in [*sources, room.parent / "compiler.py"]))
 
 
@@ -60,7 +61,7 @@ def _make(
     folder: Path, variants: Variants, compilers: tuple[Compiler, ...], numbers: Numbers
 ) -> tuple[Path, dict[str, Any]]:
     with step("building a kernel"):
-        source = emit(variants, compilers[0].lanes)
+        source = emit(variants, compilers[0].lanes, compilers[0].assembly)
         libraries = _built(folder, source, compilers)
     facts: dict[str, Any] = {
         "graph": variants.digest,
@@ -69,14 +70,13 @@ def _make(
         "table_size": source.table_size,
         "operations": source.operations,
         "lanes": compilers[0].lanes,
-        "flags": list(compilers[0].flags),
     }
-    times = [0.0] if len(libraries) == 1 else _quickest(libraries, source, facts, numbers)
+    times = [0.0] if len(libraries) == 1 else _times(libraries, source, facts, numbers)
     best = int(np.argmin(times))
     chosen, library = compilers[best], libraries[best]
     assert library is not None
     load(str(library))  # only what can be loaded is kept
-    facts |= {"compiler": list(chosen.command), "batch_flags": list(chosen.batch_flags)}
+    facts |= {"compiler": list(chosen.command), "flags": list(chosen.single_flags)}
     if len(libraries) > 1:
         each = zip(compilers, times, strict=True)
         facts["nanoseconds"] = {c.command[0]: round(t, 2) for c, t in each if np.isfinite(t)}
@@ -84,42 +84,43 @@ def _make(
 
 
 def _built(folder: Path, source: Source, compilers: tuple[Compiler, ...]) -> list[Path | None]:
-    """The library with each compiler's batch; None where a rival of the first cannot build it."""
+    """The library with each compiler's evaluation of one sample; None where a rival of the first
+    cannot build it."""
     first = compilers[0]
-    single = folder / "single.c"
+    text, batch = folder / "batch.c", folder / "batch.o"
     with ThreadPoolExecutor() as pool:
-        jobs = []
+        singles = []
         if source.single is not None:
+            single = folder / "single.c"
             single.write_text(source.single, encoding="utf-8")
-            jobs.append(pool.submit(first.compile, single, folder / "single.o", first.flags))
-        batches = []
-        for i, compiler in enumerate(compilers):
-            text, target = folder / f"batch{i}.c", folder / f"batch{i}.o"
-            text.write_text(source.batch(compiler.abreast), encoding="utf-8")
-            batches.append(pool.submit(compiler.compile, text, target, compiler.batch_flags))
-        for job in (*jobs, batches[0]):
+            for i, c in enumerate(compilers):
+                target = folder / f"single{i}.o"
+                singles.append(pool.submit(c.compile, single, target, c.single_flags))
+        text.write_text(source.batch(), encoding="utf-8")
+        first.compile(text, batch, first.flags)
+        for job in singles[:1]:
             job.result()
-        done = [batch.exception() is None for batch in batches]
-    shared = [folder / "single.o"] if source.single is not None else []
+        done = [job.exception() is None for job in singles]
+    if not singles:
+        first.build(folder / "kernel.so", batch)
+        return [folder / "kernel.so"]
     libraries: list[Path | None] = []
     for i, whole in enumerate(done):
         library = folder / f"kernel{i}.so"
         if whole:
-            first.build(library, folder / f"batch{i}.o", *shared)
+            first.build(library, batch, folder / f"single{i}.o")
         libraries.append(library if whole else None)
     return libraries
 
 
-def _quickest(
+def _times(
     libraries: list[Path | None], source: Source, facts: dict[str, Any], numbers: Numbers
 ) -> list[float]:
-    """What a sample takes in each library's batch, at home [ns]: the least of rounds in turn."""
-    inputs = np.zeros(max(source.interface.columns, 1))
-    at = inputs.ctypes.data
-    columns = (ctypes.c_void_p * len(inputs))(*range(at, at + 8 * len(inputs), 8))
-    strides = (ctypes.c_ssize_t * len(inputs))()  # each column is one constant
+    """What one evaluation takes in each library, at home [ns]: the least of rounds in turn."""
+    given = aligned(source.interface.columns + facts["lanes"])
+    given[:] = 0.0
     rows = sum(source.interface.width(r) for r in source.interface.results)
-    out, status = aligned(rows * SAMPLES), np.empty(SAMPLES, dtype=np.uint8)
+    out = aligned(rows + source.checks)
     whole = [None if path is None else load(str(path)) for path in libraries]
     tables = [None if lib is None else prepared(lib, facts, numbers) for lib in whole]
     found = [np.inf] * len(whole)
@@ -128,14 +129,6 @@ def _quickest(
             if library is None or table is None:
                 continue
             start = time.perf_counter()
-            library.batch(
-                table.ctypes.data,
-                ctypes.addressof(columns),
-                ctypes.addressof(strides),
-                SAMPLES,
-                out.ctypes.data,
-                SAMPLES,
-                status.ctypes.data,
-            )
-            found[i] = min(found[i], (time.perf_counter() - start) / SAMPLES * 1e9)
+            library.repeat(table.ctypes.data, given.ctypes.data, out.ctypes.data, TIMES)
+            found[i] = min(found[i], (time.perf_counter() - start) / TIMES * 1e9)
     return found

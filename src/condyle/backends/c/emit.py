@@ -4,8 +4,9 @@
     one(table, in, out)              least latency: shared values scalar, lane values vectors
     batch(table, in, strides, ...)   most throughput: all values vectors over W samples
 
-All shapes are printed from the same graph: `straight` for one evaluation, `loops` for a batch.
-The two are texts of their own, since compilers do best by each with other flags.
+Both are printed from the same graph: one evaluation by `straight`, a batch as assembly where the
+processor has AVX2 or AVX-512 (see `backends/x86`), else by `loops`. They are texts of their own, so
+that each can be compiled by what does best by it.
 """
 
 from __future__ import annotations
@@ -17,9 +18,10 @@ from importlib.resources import files
 from ...graph.fuse import fuse
 from ...graph.program import Interface, Program, Variants
 from ..kernel import AGAIN
+from ..x86.lower import lowered
+from ..x86.text import Assembly, is_spread
 from .loops import Loops
 from .prepare import prepare
-from .printer import Printer
 from .straight import Straight
 
 CHAIN = 5  # terms above which a sum becomes two that run side by side
@@ -30,22 +32,22 @@ class Source:
     """Generated C and what a caller must know of it.
 
     single:     text of one evaluation, for the batch to be linked with; None where there is none.
-    batch:      text of the batch, by how many chains stand abreast in it.
+    batch:      makes the text of the batch, in about the time that the other takes to compile.
     table_size: numbers that `prepare` computes.
     checks:     numbers that `one` writes after the results.
     operations: vector operations of one batch step; a fused multiply-add counts one.
     """
 
     single: str | None
-    batch: Callable[[int], str]
+    batch: Callable[[], str]
     interface: Interface
     table_size: int
     checks: int
     operations: int
 
 
-def emit(variants: Variants, width: int) -> Source:
-    """The kernel's C for `width` lanes."""
+def emit(variants: Variants, width: int, assembly: bool) -> Source:
+    """The kernel's C for `width` lanes; assembly: whether the processor takes a batch as such."""
     main = fused(variants.main)
     step = Loops(main, width)
     apart: dict[str, Straight] = {}
@@ -55,6 +57,8 @@ def emit(variants: Variants, width: int) -> Source:
     if variants.robust is not None:
         apart["robust"] = Straight(fused(variants.robust), width)
     face, checks = main.interface, main.checks
+    assembly = assembly and not step.rolled
+    spread = assembly and is_spread(width)
     macros = {
         "W": width,
         "INPUTS": face.columns,
@@ -63,12 +67,14 @@ def emit(variants: Variants, width: int) -> Source:
         "AGAIN": AGAIN,
         "ROBUST": int("robust" in apart),
         "SINGLE": int(variants.single),
+        "SPREAD": step.table_size if spread else 0,
     }
-    printers: dict[str, Printer] = {"step": step, **apart}
+    sizes = {"step": step.table_size * (width if spread else 1)}
+    sizes |= {name: printer.table_size for name, printer in apart.items()}
     size = 0
-    for name, printer in printers.items():
+    for name, own in sizes.items():
         macros[f"{name.upper()}_TABLE"] = size
-        size += -(-printer.table_size // width) * width
+        size += -(-own // width) * width
     tolerances = ", ".join(repr(c.tolerance) for c in checks)
     below = ", ".join(str(AGAIN if c.below is None else int(c.below)) for c in checks)
     head = [
@@ -79,9 +85,9 @@ def emit(variants: Variants, width: int) -> Source:
         _text("judge.h"),
     ]
 
-    def batch(abreast: int) -> str:
-        shared = prepare(step, "prepare_step")
-        return "\n".join([*head, shared, step.function("step", abreast), _text("batch.h")])
+    def batch() -> str:
+        body = Assembly(lowered(step), width).text("step") if assembly else step.function("step")
+        return "\n".join([*head, prepare(step, "prepare_step"), body, _text("batch.h")])
 
     single = None
     if apart:

@@ -45,7 +45,7 @@ def obtained(
 
 def tool(compiler: Compiler) -> str:
     """What of a compiler shapes its libraries."""
-    return repr((compiler.command, compiler.flags, compiler.lanes, compiler.identity))
+    return repr((compiler.command, compiler.single_flags, compiler.lanes, compiler.identity))
 
 
 @lru_cache(maxsize=64)
@@ -61,6 +61,7 @@ def load(path: str) -> ctypes.CDLL:
     library.prepare.restype = None
     if hasattr(library, "one"):
         library.one.argtypes = [pointer] * 3
+        library.repeat.argtypes = [pointer, pointer, pointer, size]
     return library
 
 

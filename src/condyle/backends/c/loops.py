@@ -17,6 +17,7 @@ from ...graph.program import Program
 from .printer import Printer, nested
 
 LONG = 700  # statements of a chain above which one at a time is enough
+ABREAST = 2  # chains whose statements alternate, to keep all arithmetic ports busy
 TRIGONOMETRY = 12  # operations of half a sine and cosine
 
 Part = tuple[int, int | None]  # phase, and group of chains
@@ -42,14 +43,9 @@ class Loops(Printer):
         self.rolled = per_chain > LONG
         self.kept = self._kept() if self.rolled else set()
         self.here: Part = (0, None)
-        self.abreast = 1
 
-    def function(self, name: str, abreast: int) -> str:
-        """`static void name(table, in, at, out)`, for the samples from `at` on.
-
-        Args: abreast: chains whose statements alternate, to keep all arithmetic ports busy.
-        """
-        self.abreast = 1 if self.rolled else abreast
+    def function(self, name: str) -> str:
+        """`static void name(table, in, at, out)`, for the samples from `at` on."""
         lines = [
             f"static void {name}(const double *restrict table, const double *const *in, size_t at,",
             "    vec *restrict out) {",
@@ -62,7 +58,8 @@ class Loops(Printer):
             own = self.statements(values, 0) if part[1] is None else self._chains(part, values)
             lines += [f"  {s}" for s in own]
         self.here = (-1, None)
-        return "\n".join([*lines, *self._outputs(), "}", ""])
+        lines += [self._stored(*stored) for stored in self.outputs()]
+        return "\n".join([*lines, "}", ""])
 
     def operations(self) -> int:
         """Vector operations of a block; a fused multiply-add counts one."""
@@ -133,15 +130,9 @@ class Loops(Printer):
         """Statements of a group's chains, and the sums that they join."""
         group = part[1]
         assert group is not None
-        sums = [
-            (v, t)
-            for v in self.varying
-            if self.g.nodes[v].op in REDUCTIONS
-            for _, t in self.lane_terms(v)
-            if self._part(t) == part
-        ]
+        sums = self.sums_of(values)
         plain = [v for v in values if v not in self.absorbed]
-        count, abreast = self.counts[group], self.abreast
+        count, abreast = self.counts[group], 1 if self.rolled else ABREAST
         yield from (f"vec r{v} = {start};" for v, start in self._started(sums, group))
         if self.rolled:
             yield f"for (int c = 0; c < {count}; c++) {{"
@@ -151,10 +142,21 @@ class Loops(Printer):
             yield from (s for row in zip(*rows, strict=True) for s in row)
             for c in some:
                 for v, t in sums:
-                    yield from self._steps(v, t, c)
+                    yield from self._joined(v, t, c)
         if self.rolled:
             yield from (f"x{v}_[c] = x{v}_0;" for v in plain if v in self.kept)
             yield "}"
+
+    def sums_of(self, values: list[Value]) -> list[tuple[Value, Value]]:
+        """Reductions that the values of a part join, and which value joins each."""
+        part = self._part(values[0])
+        return [
+            (v, t)
+            for v in self.varying
+            if self.g.nodes[v].op in REDUCTIONS
+            for _, t in self.lane_terms(v)
+            if self._part(t) == part
+        ]
 
     def _started(self, sums: list[tuple[Value, Value]], group: int) -> Iterator[tuple[Value, str]]:
         """What reductions are before the first of a mechanism's chains joins them."""
@@ -162,38 +164,41 @@ class Loops(Printer):
             if self.lane_terms(v)[0][0] == group:
                 yield v, "spread(0.0)" if self.g.nodes[v].op == "sum" else "spread(HUGE_VAL)"
 
-    def _steps(self, v: Value, t: Value, copy: int, sign: str = "+") -> Iterator[str]:
+    def _joined(self, v: Value, t: Value, copy: int) -> Iterator[str]:
         """A chain's term joins a reduction."""
-        node = self.g.nodes[t]
         if self.g.nodes[v].op == "least":
             yield f"r{v} = fmin_v(r{v}, {self.name(t, copy)});"
             return
-        if t not in self.absorbed:
-            yield f"r{v} = r{v} {sign} {self.name(t, copy)};"
-            return
-        other = {"+": "-", "-": "+"}[sign]
-        if node.op in ("add", "sub"):
-            yield from self._steps(v, node.args[0], copy, sign)
-            yield from self._steps(v, node.args[1], copy, sign if node.op == "add" else other)
-            return
-        if node.op != "mul":
-            yield from self._steps(v, node.args[2], copy, sign)
-        a, b = (self.name(x, copy) for x in node.args[:2])
-        yield f"r{v} = r{v} {other if node.op == 'fnma' else sign} {a} * {b};"
+        for sign, factors in self.steps(t):
+            product = " * ".join(self.name(x, copy) for x in factors)
+            yield f"r{v} = r{v} {'+' if sign > 0 else '-'} {product};"
 
-    def _outputs(self) -> Iterator[str]:
+    def steps(self, t: Value, sign: int = 1) -> Iterator[tuple[int, tuple[Value, ...]]]:
+        """Signs and factors of what a sum's term adds to it: more than one, if it is absorbed."""
+        node = self.g.nodes[t]
+        if t not in self.absorbed:
+            yield sign, (t,)
+        elif node.op in ("add", "sub"):
+            yield from self.steps(node.args[0], sign)
+            yield from self.steps(node.args[1], sign if node.op == "add" else -sign)
+        else:
+            if node.op != "mul":
+                yield from self.steps(node.args[2], sign)
+            yield -sign if node.op == "fnma" else sign, node.args[:2]
+
+    def outputs(self) -> Iterator[tuple[int, Value, int]]:
+        """Slot, value and chain of all that is stored: results, then checks."""
         slot = 0
         for o in self.program.outputs:
             for entry in o.entries:
                 for group, v in enumerate(entry):
                     for c in range(0 if v is None else self.counts[group] if o.lanes else 1):
-                        yield self._stored(slot, v, c)
+                        assert v is not None
+                        yield slot, v, c
                         slot += 1
-        for i, check in enumerate(self.program.checks):
-            yield self._stored(slot + i, check.value, 0)
+        yield from ((slot + i, check.value, 0) for i, check in enumerate(self.program.checks))
 
-    def _stored(self, slot: int, v: Value | None, copy: int) -> str:
-        assert v is not None
+    def _stored(self, slot: int, v: Value, copy: int) -> str:
         name = self.name(v, copy)
         return f"  out[{slot}] = {f'spread({name})' if self.is_scalar(v) else name};"
 

@@ -103,10 +103,16 @@ class Printer(ABC):
         if node.varies:
             return self.target(v, copy)
         if node.group is None:
-            return f"table[{self.table.shared[v]}]"
-        slot = self.starts[node.group] + self.table.lanes[node.group][v] * self.padded[node.group]
-        at = f"{slot} + {self.lane(copy)}"
+            return f"table[{self.slot(v)}]"
+        at = f"{self.slot(v)} + {self.lane(copy)}"
         return f"table[{at}]" if self.stride == 1 else f"load(table + {at})"
+
+    def slot(self, v: Value, lane: int = 0) -> int:
+        """Where the table has a fixed value."""
+        group = self.g.nodes[v].group
+        if group is None:
+            return self.table.shared[v]
+        return self.starts[group] + self.table.lanes[group][v] * self.padded[group] + lane
 
     def lane(self, copy: int) -> str:
         """First lane of a copy."""
@@ -121,7 +127,7 @@ class Printer(ABC):
             return self.lane_sample(node.data[1], copy)
         if node.op in REDUCTIONS:
             return self.reduction(v)
-        if node.op == "div" and self._is_inverse_root(v):
+        if node.op == "div" and self.is_inverse_root(v):
             root = self.g.nodes[node.args[1]]
             return f"rsqrt{_suffix(self.kind(v))}({self.name(root.args[0], copy)})"
         if node.op in (*INFIX, "fma", "fnma", "neg"):
@@ -165,7 +171,7 @@ class Printer(ABC):
         name = self.name(term, 0)
         return f"{count} * {name}" if self.g.nodes[v].op == "sum" else name
 
-    def _is_inverse_root(self, v: Value) -> bool:
+    def is_inverse_root(self, v: Value) -> bool:
         top, bottom = (self.g.nodes[a] for a in self.g.nodes[v].args)
         return top.op == "const" and top.data[0] == 1.0 and bottom.op == "sqrt" and bottom.varies
 

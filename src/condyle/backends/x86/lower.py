@@ -1,0 +1,265 @@
+"""A batch's program as instructions on vectors of samples, chain after chain.
+
+Functions become the instructions that `vector.h` has for them, with the same digits. Where those
+would be far off (an angle of a million, what is not finite), `mend` asks the C library, lane by lane;
+`call` does so for functions that there are no instructions for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from ...graph.graph import Value
+from ...graph.operations import REDUCTIONS
+from ..c.loops import Loops
+from .listing import Listing, Name, contracted
+
+# Minimax polynomials of sine and cosine, lowest power first (Cephes), and pi / 2 in three parts.
+SINE = (
+    *(-1.66666666666666307295e-1, 8.33333333332211858878e-3, -1.98412698295895385996e-4),
+    *(2.75573136213857245213e-6, -2.50507477628578072866e-8, 1.58962301576546568060e-10),
+)
+COSINE = (
+    *(4.16666666666665929218e-2, -1.38888888888730564116e-3, 2.48015872888517045348e-5),
+    *(-2.75573141792967388112e-7, 2.08757008419747316778e-9, -1.13585365213876817300e-11),
+)
+QUARTER_TURN = (1.57079625129699707031, 7.54978941586159635335e-8, 5.39030285815811905290e-15)
+TURNS = 6.36619772367581382433e-1
+WHOLE = 6755399441055744.0  # 1.5 * 2^52: a number that is added becomes whole
+TURNS_LIMIT = 1048576.0
+SIGN, SIZE = 1 << 63, (1 << 63) - 1  # bits of a number's sign, and of the rest
+# atan(t) in t^2 for |t| <= 1/2, lowest power first, and an eighth of a turn in two parts.
+ARC = (
+    *(-3.33333333333333315e-1, 1.99999999999994849e-1, -1.42857142855987407e-1),
+    *(1.11111111008817611e-1, -9.09090861886538707e-2, 7.69229467748263467e-2),
+    *(-6.66643514414314322e-2, 5.87957310779968419e-2, -5.24006415441106853e-2),
+    *(4.62787008641868395e-2, -3.80622479499668698e-2, 2.49996895075213673e-2),
+    -9.21106350462792581e-3,
+)
+EIGHTH_TURN = (0.7853981633974483, 3.061616997868383e-17)
+PLAIN = {"add": "add", "sub": "sub", "mul": "mul", "fma": "fma", "fnma": "fnma", "sqrt": "sqrt"}
+PLAIN |= {"fmin": "min", "fmax": "max"}
+COMPARED = ("lt", "le", "eq", "ne")
+
+
+def lowered(loops: Loops) -> Listing:
+    """The instructions of one batch step, in the program's order."""
+    return _Lowering(loops).run()
+
+
+class _Lowering:
+    """What each value of the program became, by value and chain."""
+
+    def __init__(self, loops: Loops) -> None:
+        self.loops, self.nodes = loops, loops.g.nodes
+        self.listing = Listing()
+        self.found: dict[tuple[Value, int | None], Name] = {}
+        self.sums: dict[Value, Name] = {}
+        self.turned: dict[Name, tuple[Name, Name, Name]] = {}
+
+    def run(self) -> Listing:
+        loops = self.loops
+        for (_, group), values in loops.parts:
+            if group is None:
+                self._define(values, 0)
+                continue
+            joined = loops.sums_of(values)
+            for chain in range(loops.counts[group]):
+                self._define([v for v in values if v not in loops.absorbed], chain)
+                for v, term in joined:
+                    self._join(v, term, chain)
+        for slot, v, chain in loops.outputs():
+            self.listing.store(slot, self._named(v, chain))
+        self.listing.code = contracted(self.listing.code)
+        return self.listing
+
+    def _define(self, values: Sequence[Value], chain: int) -> None:
+        for v in values:
+            key = v, None if self.nodes[v].group is None else chain
+            if key not in self.found:
+                self.found[key] = self._value(v, chain)
+
+    def _named(self, v: Value, chain: int) -> Name:
+        """A value that was defined, or stands in memory."""
+        node = self.nodes[v]
+        if node.op == "const":
+            assert isinstance(node.data[0], float)
+            return self.listing.number(node.data[0])
+        if not node.varies:
+            return self.listing.place("table", self.loops.slot(v, chain))
+        return self.found[v, None if node.group is None else chain]
+
+    def _value(self, v: Value, chain: int) -> Name:
+        node, add = self.nodes[v], self.listing.add
+        if node.op == "input":
+            return self.listing.place("input", _integer(node.data[0]))
+        if node.op == "lane_input":
+            return self.listing.place("input", _integer(node.data[1]) + chain)
+        if node.op in REDUCTIONS:
+            return self._reduction(v)
+        args = [self._named(a, chain) for a in node.args]
+        if node.op == "div" and self.loops.width == 8 and self.loops.is_inverse_root(v):
+            return self._inverse_root(self._named(self.nodes[node.args[1]].args[0], chain))
+        if node.op in PLAIN or node.op == "div":
+            return add(PLAIN.get(node.op, node.op), *args)
+        if node.op in COMPARED:
+            return self._truth(add(node.op, *args))
+        if node.op in FUNCTIONS:
+            return FUNCTIONS[node.op](self, *args)
+        return add("call", args[0], *args, data=node.op)
+
+    # -- sums and minima over the chains -----------------------------------------------------
+
+    def _join(self, v: Value, term: Value, chain: int) -> None:
+        """A chain's term joins a reduction."""
+        add = self.listing.add
+        if self.nodes[v].op == "least":
+            own = self._named(term, chain)
+            self.sums[v] = add("min", self.sums[v], own) if v in self.sums else own
+            return
+        for sign, factors in self.loops.steps(term):
+            args = [self._named(x, chain) for x in factors]
+            self.sums[v] = self._plus(self.sums.get(v), sign, args)
+
+    def _plus(self, total: Name | None, sign: int, args: list[Name]) -> Name:
+        add = self.listing.add
+        if total is not None and len(args) == 2:
+            return add("fma" if sign > 0 else "fnma", *args, total)
+        if total is not None:
+            return add("add" if sign > 0 else "sub", total, *args)
+        own = add("mul", *args) if len(args) == 2 else args[0]
+        return own if sign > 0 else self._neg(own)
+
+    def _reduction(self, v: Value) -> Name:
+        total = self.sums.get(v)
+        for count, term in self.loops.shared_terms(v):
+            own = self._named(term, 0)
+            if self.nodes[v].op == "sum":
+                total = self._plus(total, 1, [self.listing.number(float(count)), own])
+            else:
+                total = own if total is None else self.listing.add("min", total, own)
+        assert total is not None
+        return total
+
+    # -- functions ---------------------------------------------------------------------------
+
+    def _truth(self, mask: Name) -> Name:
+        return self.listing.add("and", mask, self.listing.number(1.0))
+
+    def _neg(self, a: Name) -> Name:
+        return self.listing.add("xor", a, self.listing.bits(SIGN))
+
+    def _fabs(self, a: Name) -> Name:
+        return self.listing.add("and", a, self.listing.bits(SIZE))
+
+    def _copysign(self, a: Name, b: Name) -> Name:
+        sign = self.listing.add("and", b, self.listing.bits(SIGN))
+        return self.listing.add("or", self._fabs(a), sign)
+
+    def _not_zero(self, a: Name) -> Name:
+        return self.listing.add("ne", a, self.listing.number(0.0))
+
+    def _not(self, a: Name) -> Name:
+        return self._truth(self.listing.add("eq", a, self.listing.number(0.0)))
+
+    def _and(self, a: Name, b: Name) -> Name:
+        return self._truth(self.listing.add("and", self._not_zero(a), self._not_zero(b)))
+
+    def _or(self, a: Name, b: Name) -> Name:
+        return self._truth(self.listing.add("or", self._not_zero(a), self._not_zero(b)))
+
+    def _where(self, a: Name, b: Name) -> Name:
+        return self.listing.add("and", self._not_zero(a), b)
+
+    def _inverse_root(self, a: Name) -> Name:
+        """An estimate of 14 bits and two steps of Newton."""
+        add, number = self.listing.add, self.listing.number
+        y, half = add("rsqrt", a), add("mul", number(0.5), a)
+        y = add("mul", y, add("fnma", add("mul", half, y), y, number(1.5)))
+        return add("fma", y, add("fnma", add("mul", half, y), y, number(0.5)), y)
+
+    def _polynomial(self, z: Name, coefficients: Sequence[float]) -> Name:
+        number = self.listing.number
+        total = number(coefficients[-1])
+        for c in coefficients[-2::-1]:
+            total = self.listing.add("fma", total, z, number(c))
+        return total
+
+    def _sin(self, x: Name) -> Name:
+        sine, cosine, turns = self._turned(x)
+        return self._settled("sin", x, sine, cosine, self._sign(turns, 62), turns)
+
+    def _cos(self, x: Name) -> Name:
+        sine, cosine, turns = self._turned(x)
+        sign = self.listing.add("xor", self._sign(turns, 62), self._sign(turns, 63))
+        return self._settled("cos", x, cosine, sine, sign, turns)
+
+    def _settled(self, name: str, x: Name, own: Name, other: Name, sign: Name, turns: Name) -> Name:
+        """A sine or cosine from those of the angle without its quarter turns."""
+        add = self.listing.add
+        value = add("xor", add("choose", add("shift", turns, data=63), other, own), sign)
+        near = add("lt", self._fabs(x), self.listing.number(TURNS_LIMIT))
+        return add("mend", value, near, x, data=name)
+
+    def _sign(self, turns: Name, bit: int) -> Name:
+        """Bit 0 (by 63) or bit 1 (by 62) of the number of quarter turns, as a sign."""
+        moved = self.listing.add("shift", turns, data=bit)
+        return self.listing.add("and", moved, self.listing.bits(SIGN))
+
+    def _turned(self, x: Name) -> tuple[Name, Name, Name]:
+        """Sine and cosine of an angle less its quarter turns, and their number in the last bits."""
+        if x in self.turned:
+            return self.turned[x]
+        add, number = self.listing.add, self.listing.number
+        turns = add("fma", x, number(TURNS), number(WHOLE))
+        n, r = add("sub", turns, number(WHOLE)), x
+        for part in QUARTER_TURN:
+            r = add("fnma", n, number(part), r)
+        z = add("mul", r, r)
+        sine = add("fma", add("mul", r, z), self._polynomial(z, SINE), r)
+        most = add("fnma", number(0.5), z, number(1.0))
+        cosine = add("fma", add("mul", z, z), self._polynomial(z, COSINE), most)
+        self.turned[x] = sine, cosine, turns
+        return self.turned[x]
+
+    def _atan2(self, y: Name, x: Name) -> Name:
+        """As `atan2_v`: the arc of lesser over greater coordinate, and eighths of a turn."""
+        add, number, bits = self.listing.add, self.listing.number, self.listing.bits
+        across, along = self._fabs(y), self._fabs(x)
+        total = add("add", across, along)
+        steep, back = add("lt", along, across), add("lt", x, number(0.0))
+        most, least = add("choose", steep, across, along), add("choose", steep, along, across)
+        wide = add("lt", add("mul", number(0.5), most), least)
+        top = add("choose", wide, add("sub", least, most), least)
+        t = add("div", top, add("choose", wide, total, most))
+        z = add("mul", t, t)
+        zz = add("mul", z, z)
+        odd, even = self._polynomial(zz, ARC[1::2]), self._polynomial(zz, ARC[::2])
+        arc = add("fma", t, add("mul", z, add("fma", z, odd, even)), t)
+        eighths = self._truth(wide)
+        eighths = add("choose", steep, add("sub", number(2.0), eighths), eighths)
+        eighths = add("choose", back, add("sub", number(4.0), eighths), eighths)
+        turned = add("and", add("xor", steep, back), bits(SIGN))
+        arc = add("fma", eighths, number(EIGHTH_TURN[1]), add("xor", arc, turned))
+        arc = self._copysign(add("fma", eighths, number(EIGHTH_TURN[0]), arc), y)
+        plain = add("and", add("lt", number(0.0), total), add("lt", total, number(1e308)))
+        return add("mend", arc, plain, y, x, data="atan2")
+
+
+FUNCTIONS: dict[str, Callable[..., Name]] = {
+    "neg": _Lowering._neg,
+    "fabs": _Lowering._fabs,
+    "copysign": _Lowering._copysign,
+    "not": _Lowering._not,
+    "and": _Lowering._and,
+    "or": _Lowering._or,
+    "where": _Lowering._where,
+    "sin": _Lowering._sin,
+    "cos": _Lowering._cos,
+    "atan2": _Lowering._atan2,
+}
+
+
+def _integer(data: object) -> int:
+    assert isinstance(data, int)
+    return data

@@ -1,0 +1,65 @@
+"""The order of a batch's instructions: none waits long, and few values wait in registers.
+
+A processor looks a few hundred instructions ahead, but fills its queues with what waits. So they are
+put in the order in which they could start, two a cycle: of those whose arguments are there the first
+of the program's, as long as registers last; then the one that leaves the fewest values behind.
+"""
+
+from __future__ import annotations
+
+import heapq
+from bisect import insort
+from collections.abc import Sequence
+
+from .listing import Instruction
+
+ISSUE = 2  # instructions a cycle
+WINDOW = 256  # instructions of the program among which the next is looked for
+CHOICE = 24  # of those that could start, how many are compared
+LATENCY = {"div": 13, "sqrt": 20, "rsqrt": 6, "add": 3, "sub": 3, "mul": 3}
+USUAL = 4  # cycles of everything else
+
+
+def ordered(code: Sequence[Instruction], registers: int) -> list[Instruction]:
+    """The same instructions; arguments stay first."""
+    where = {instruction.to: i for i, instruction in enumerate(code) if instruction.to is not None}
+    needs = [[where[a] for a in dict.fromkeys(i.args) if a in where] for i in code]
+    users: list[list[int]] = [[] for _ in code]
+    for i, args in enumerate(needs):
+        for j in args:
+            users[j].append(i)
+    missing = [len(args) for args in needs]  # arguments that were not issued yet
+    left = [len(own) for own in users]  # users that were not issued yet
+    at = [0] * len(code)  # the cycle at which it could start, as far as known
+    ready: list[int] = []
+    future: list[tuple[int, int]] = []
+    order: list[Instruction] = []
+    entered = live = cycle = 0
+
+    def growth(i: int) -> int:
+        """Values more that are live after an instruction than before it."""
+        return (left[i] > 0) - sum(left[j] == 1 for j in needs[i])
+
+    while len(order) < len(code):
+        while entered < len(code) and entered - len(order) < WINDOW:
+            if not missing[entered]:
+                heapq.heappush(future, (at[entered], entered))
+            entered += 1
+        while future and future[0][0] <= cycle:
+            insort(ready, heapq.heappop(future)[1])
+        for _ in range(min(ISSUE, len(ready))):
+            best = ready[0] if live <= registers else min(ready[:CHOICE], key=growth)
+            ready.remove(best)
+            live += growth(best)
+            order.append(code[best])
+            done = cycle + LATENCY.get(code[best].op, USUAL)
+            for j in needs[best]:
+                left[j] -= 1
+            for user in users[best]:
+                missing[user] -= 1
+                at[user] = max(at[user], done)
+                if not missing[user] and user < entered:
+                    heapq.heappush(future, (at[user], user))
+        cycle += 1
+    return order
+
