@@ -63,7 +63,7 @@ class Contents:
 
     kernels: those that are whole.
     size:    of all that is there [bytes], also of what is broken or half built.
-    choices: compiler -> kernels whose batch it compiled because that was measured to be quickest.
+    choices: compiler -> kernels whose single evaluation it compiled, measured to be quickest.
     """
 
     folder: Path

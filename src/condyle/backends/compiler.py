@@ -30,8 +30,8 @@ FLAGS = (
 GCC = "-mtune-ctrl=^inter_unit_moves_to_vec,^inter_unit_moves_from_vec"
 # What is made for this processor: the first that the compiler takes.
 NATIVE = (("-march=native", GCC), ("-march=native",), ("-mcpu=native",), ())
-# One evaluation stands in an order that Clang should leave alone, and that GCC makes better; a batch
-# in C, whose chains stand abreast, is worse for it.
+# One evaluation stands in an order that Clang should leave alone and that GCC makes better; a batch
+# in C, whose chains stand abreast, is the worse for it.
 ORDERED = ("-fschedule-insns", "-fsched-pressure")
 LEFT_ALONE = ("-fno-slp-vectorize", "-mllvm", "-enable-misched=false")
 # Instruction sets, by the compiler's macros, that `backends/x86` has batches for, by lanes.

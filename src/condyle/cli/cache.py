@@ -25,7 +25,7 @@ def cache(
     what = f"{count}, {had.size / 1e6:.1f} MB"
     if had.choices:
         each = ", ".join(f"{name} {number}" for name, number in had.choices.items())
-        what += f"; batches by the compiler that was quickest: {each}"
+        what += f"; one evaluation by the compiler that was quickest: {each}"
     return Answer(
         f"Removed {what} from {had.folder}" if clear else f"{had.folder}: {what}",
         {

@@ -39,7 +39,7 @@ class _Body(Straight):
         roots = {v for v in self.varying if self.g.nodes[v].op == "sqrt"} - set(self.program.roots)
         for v in self.varying:
             node = self.g.nodes[v]
-            if not (node.op == "div" and self._is_inverse_root(v)):
+            if not (node.op == "div" and self.is_inverse_root(v)):
                 roots -= set(node.args)
         return roots
 

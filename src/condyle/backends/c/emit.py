@@ -57,7 +57,6 @@ def emit(variants: Variants, width: int, assembly: bool) -> Source:
     if variants.robust is not None:
         apart["robust"] = Straight(fused(variants.robust), width)
     face, checks = main.interface, main.checks
-    assembly = assembly and not step.rolled
     spread = assembly and is_spread(width)
     macros = {
         "W": width,

@@ -55,8 +55,8 @@ class Allocation(NamedTuple):
 def allocated(code: Sequence[Instruction], registers: int) -> Allocation:
     """The instructions on registers and memory.
 
-    What an operation of `OVERWRITING` writes is the register of one of its arguments, of `CALLS` the
-    first; at most one argument is in memory, and only where `ANY` and `SECOND` have it.
+    What an operation of `OVERWRITING` writes is the register of one of its arguments, of `CALLS`
+    the first; at most one argument is in memory, and only where `ANY` and `SECOND` have it.
     """
     return _Allocator(code, registers).run()
 
@@ -76,7 +76,8 @@ class _Allocator:
         self.here = 0
 
     def run(self) -> Allocation:
-        for self.here, instruction in enumerate(self.code):
+        for here, instruction in enumerate(self.code):
+            self.here = here
             self._place(instruction)
         return Allocation(self.moves, self.slots)
 
@@ -99,7 +100,7 @@ class _Allocator:
         self._leave(args)
 
     def _overwrite(self, instruction: Instruction, memory: Name | None) -> None:
-        """An instruction whose result takes an argument's register, of one that may go if there is."""
+        """An instruction whose result takes an argument's register, rather of one that may go."""
         op, to, args, data = instruction
         assert to is not None
         places = [self._operand(a) for a in args]

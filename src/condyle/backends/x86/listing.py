@@ -98,9 +98,7 @@ def contracted(code: list[Instruction]) -> list[Instruction]:
     return kept[::-1]
 
 
-def _joined(
-    instruction: Instruction, product: Callable[[Name], Instruction | None]
-) -> Instruction:
+def _joined(instruction: Instruction, product: Callable[[Name], Instruction | None]) -> Instruction:
     if instruction.op not in ("add", "sub") or len(set(instruction.args)) == 1:
         return instruction
     a, b = instruction.args

@@ -1,13 +1,14 @@
 """A batch's program as instructions on vectors of samples, chain after chain.
 
 Functions become the instructions that `vector.h` has for them, with the same digits. Where those
-would be far off (an angle of a million, what is not finite), `mend` asks the C library, lane by lane;
-`call` does so for functions that there are no instructions for.
+would be far off (an angle of a million, what is not finite), `mend` asks the C library, lane by
+lane; `call` does so for functions that there are no instructions for.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 from ...graph.graph import Value
 from ...graph.operations import REDUCTIONS
@@ -42,6 +43,16 @@ PLAIN |= {"fmin": "min", "fmax": "max"}
 COMPARED = ("lt", "le", "eq", "ne")
 
 
+class Turned(NamedTuple):
+    """Sine and cosine of an angle less its quarter turns, whose number stands in the last bits of
+    `turns`; near: whether that is accurate."""
+
+    sine: Name
+    cosine: Name
+    turns: Name
+    near: Name
+
+
 def lowered(loops: Loops) -> Listing:
     """The instructions of one batch step, in the program's order."""
     return _Lowering(loops).run()
@@ -55,7 +66,7 @@ class _Lowering:
         self.listing = Listing()
         self.found: dict[tuple[Value, int | None], Name] = {}
         self.sums: dict[Value, Name] = {}
-        self.turned: dict[Name, tuple[Name, Name, Name]] = {}
+        self.turned: dict[Name, Turned] = {}
 
     def run(self) -> Listing:
         loops = self.loops
@@ -186,40 +197,40 @@ class _Lowering:
         return total
 
     def _sin(self, x: Name) -> Name:
-        sine, cosine, turns = self._turned(x)
-        return self._settled("sin", x, sine, cosine, self._sign(turns, 62), turns)
+        t = self._turned(x)
+        return self._settled("sin", x, t, t.sine, t.cosine, self._sign(t, 62))
 
     def _cos(self, x: Name) -> Name:
-        sine, cosine, turns = self._turned(x)
-        sign = self.listing.add("xor", self._sign(turns, 62), self._sign(turns, 63))
-        return self._settled("cos", x, cosine, sine, sign, turns)
+        t = self._turned(x)
+        sign = self.listing.add("xor", self._sign(t, 62), self._sign(t, 63))
+        return self._settled("cos", x, t, t.cosine, t.sine, sign)
 
-    def _settled(self, name: str, x: Name, own: Name, other: Name, sign: Name, turns: Name) -> Name:
-        """A sine or cosine from those of the angle without its quarter turns."""
+    def _settled(
+        self, name: str, x: Name, turned: Turned, even: Name, odd: Name, sign: Name
+    ) -> Name:
+        """A sine or cosine, which is the other one of what is left after an odd number of turns."""
         add = self.listing.add
-        value = add("xor", add("choose", add("shift", turns, data=63), other, own), sign)
-        near = add("lt", self._fabs(x), self.listing.number(TURNS_LIMIT))
-        return add("mend", value, near, x, data=name)
+        value = add("choose", add("shift", turned.turns, data=63), odd, even)
+        return add("mend", add("xor", value, sign), turned.near, x, data=name)
 
-    def _sign(self, turns: Name, bit: int) -> Name:
+    def _sign(self, turned: Turned, bit: int) -> Name:
         """Bit 0 (by 63) or bit 1 (by 62) of the number of quarter turns, as a sign."""
-        moved = self.listing.add("shift", turns, data=bit)
+        moved = self.listing.add("shift", turned.turns, data=bit)
         return self.listing.add("and", moved, self.listing.bits(SIGN))
 
-    def _turned(self, x: Name) -> tuple[Name, Name, Name]:
-        """Sine and cosine of an angle less its quarter turns, and their number in the last bits."""
-        if x in self.turned:
-            return self.turned[x]
-        add, number = self.listing.add, self.listing.number
-        turns = add("fma", x, number(TURNS), number(WHOLE))
-        n, r = add("sub", turns, number(WHOLE)), x
-        for part in QUARTER_TURN:
-            r = add("fnma", n, number(part), r)
-        z = add("mul", r, r)
-        sine = add("fma", add("mul", r, z), self._polynomial(z, SINE), r)
-        most = add("fnma", number(0.5), z, number(1.0))
-        cosine = add("fma", add("mul", z, z), self._polynomial(z, COSINE), most)
-        self.turned[x] = sine, cosine, turns
+    def _turned(self, x: Name) -> Turned:
+        if x not in self.turned:
+            add, number = self.listing.add, self.listing.number
+            turns = add("fma", x, number(TURNS), number(WHOLE))
+            n, r = add("sub", turns, number(WHOLE)), x
+            for part in QUARTER_TURN:
+                r = add("fnma", n, number(part), r)
+            z = add("mul", r, r)
+            sine = add("fma", add("mul", r, z), self._polynomial(z, SINE), r)
+            most = add("fnma", number(0.5), z, number(1.0))
+            cosine = add("fma", add("mul", z, z), self._polynomial(z, COSINE), most)
+            near = add("lt", self._fabs(x), number(TURNS_LIMIT))
+            self.turned[x] = Turned(sine, cosine, turns, near)
         return self.turned[x]
 
     def _atan2(self, y: Name, x: Name) -> Name:

@@ -1,8 +1,8 @@
 """The order of a batch's instructions: none waits long, and few values wait in registers.
 
-A processor looks a few hundred instructions ahead, but fills its queues with what waits. So they are
-put in the order in which they could start, two a cycle: of those whose arguments are there the first
-of the program's, as long as registers last; then the one that leaves the fewest values behind.
+A processor looks a few hundred instructions ahead, but fills its queues with what waits. So they
+are put in the order in which they could start, two a cycle: of those whose arguments are there the
+first of the program's, while registers last; then the one that leaves the fewest values behind.
 """
 
 from __future__ import annotations
@@ -62,4 +62,3 @@ def ordered(code: Sequence[Instruction], registers: int) -> list[Instruction]:
                     heapq.heappush(future, (at[user], user))
         cycle += 1
     return order
-

@@ -2,8 +2,8 @@
 
     step(table, in, at, out, literals)    in rdi, rsi, rdx, rcx, r8
 
-AVX-512 spreads a number from memory over the lanes as it reads it; for AVX2 table and literals stand
-spread in memory.
+AVX-512 spreads a number from memory over the lanes as it reads it; for AVX2, table and literals
+stand spread in memory.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class Assembly:
         frame = area + (size * self.registers + 8 * len(SAVED) if self.called else 0)
         yield from (".text", ".p2align 6", f".globl {name}", f"{name}:")
         yield from ("pushq %rbp", "movq %rsp, %rbp", f"subq ${frame}, %rsp", "andq $-64, %rsp")
-        seldom = []
+        seldom: list[str] = []
         for move in self.moves:
             if move.op in CALLS:
                 label = f"{len(seldom)}{name}"
