@@ -2,7 +2,7 @@
 
 A processor looks a few hundred instructions ahead, but fills its queues with what waits. So they
 are put in the order in which they could start, two a cycle: of those whose arguments are there the
-first of the program's, while registers last; then the one that leaves the fewest values behind.
+first of the program's, until too many values are live; then the one that leaves the fewest values behind.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from collections.abc import Sequence
 from .listing import Instruction
 
 ISSUE = 2  # instructions a cycle
-WINDOW = 256  # instructions of the program among which the next is looked for
+WINDOW = 512  # instructions of the program among which the next is looked for
+CROWD = 1.5  # live values a register, from which few new ones are wanted
 CHOICE = 24  # of those that could start, how many are compared
 LATENCY = {"div": 13, "sqrt": 20, "rsqrt": 6, "add": 3, "sub": 3, "mul": 3}
 USUAL = 4  # cycles of everything else
@@ -35,6 +36,7 @@ def ordered(code: Sequence[Instruction], registers: int) -> list[Instruction]:
     future: list[tuple[int, int]] = []
     order: list[Instruction] = []
     entered = live = cycle = 0
+    many = CROWD * registers
 
     def growth(i: int) -> int:
         """Values more that are live after an instruction than before it."""
@@ -48,7 +50,7 @@ def ordered(code: Sequence[Instruction], registers: int) -> list[Instruction]:
         while future and future[0][0] <= cycle:
             insort(ready, heapq.heappop(future)[1])
         for _ in range(min(ISSUE, len(ready))):
-            best = ready[0] if live <= registers else min(ready[:CHOICE], key=growth)
+            best = ready[0] if live <= many else min(ready[:CHOICE], key=growth)
             ready.remove(best)
             live += growth(best)
             order.append(code[best])
