@@ -2,7 +2,7 @@
 
 A processor looks a few hundred instructions ahead, but fills its queues with what waits. So they
 are put in the order in which they could start, two a cycle: of those whose arguments are there the
-first of the program's, until too many values are live; then the one that leaves the fewest values behind.
+first of the program's, until many values are live; then the one that leaves the fewest behind.
 """
 
 from __future__ import annotations

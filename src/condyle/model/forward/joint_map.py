@@ -44,8 +44,9 @@ def joint_map(mechanism: Mechanism) -> JointMap:
 
     def at(pose: np.ndarray) -> JointsAt:
         values = kernel.run({"pose": pose}).values
-        J_theta = values["J_theta"].transpose(2, 1, 0)
-        M_J = np.moveaxis(values["M_J"], -1, 0)
+        # Sample after sample in memory: else numpy multiplies one sample by other code than many.
+        J_theta = np.ascontiguousarray(values["J_theta"].transpose(2, 1, 0))
+        M_J = np.ascontiguousarray(np.moveaxis(values["M_J"], -1, 0))
         joint, correction, phi = (values[name].T for name in ("joint", "correction", "phi"))
         return JointsAt(joint, J_theta, M_J, correction, phi)
 
