@@ -6,7 +6,6 @@ path. `condyle.derive` returns one that also labels what it finds, `condyle.resu
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Collection, Mapping, Sequence
 from copy import copy
@@ -42,10 +41,20 @@ from ..questions.numbers import Layout, require_closed_form, specialised
 from ..questions.structure import structure_of
 from ..status import Status
 from .accelerating import Accelerator
-from .checks import LOAD_COLUMNS, POSE_COLUMNS, check_array, check_states
+from .checks import (
+    LOAD,
+    LOAD_COLUMNS,
+    POSE_COLUMNS,
+    Sample,
+    as_samples,
+    check_array,
+    check_states,
+    samples_of_states,
+)
 from .closing import Closure
 from .data import Accelerations, Configuration, Efforts, Evaluation
 from .distributing import LEAST, Distributor, Policy
+from .one import OneByOne
 from .reference_force import reference_force
 from .robust import Robust
 from .survey import SURVEYED, Survey, judged
@@ -113,7 +122,6 @@ class Evaluator:
         self._general: Any = self if general else None  # who lends kernels
         self._kernels: dict[Any, Kernel] = {}
         self._closures: dict[Any, Closure] = {}
-        self._local = threading.local()  # what belongs to one thread
         self.derivation_seconds = time.perf_counter() - start
 
     def __repr__(self) -> str:
@@ -177,7 +185,7 @@ class Evaluator:
     ) -> Self:
         """The same model, kernels and all, that chooses efforts otherwise; see `derive`."""
         other = copy(self)
-        for name in ("policy", "_distributor"):
+        for name in ("policy", "_distributor", "_one_by_one"):
             other.__dict__.pop(name, None)
         other._asked = distribution, preload, contact_weight
         _ = other.policy  # has to fit, now
@@ -199,7 +207,6 @@ class Evaluator:
         _ = other.policy  # has to fit, now
         other._numbers = Layout.of(self._structure).numbers(mechanism)
         other._kernels, other._closures = {}, {}
-        other._local = threading.local()
         return other
 
     @cached_property
@@ -280,31 +287,28 @@ class Evaluator:
         """Efforts of one sample, (n,) [N m or N], at least latency: for a control loop.
 
         Args: q, q1, q2: (m,) each, in the order of `independent`;  load: (9,), as of `evaluate`.
-        Returns: efforts in the order of the chains; NaN where there are none.
+              Arrays of doubles go fastest.
+        Returns: efforts in the order of the chains, a new array; NaN where there are none.
+        Raises:  InputError: for arrays that do not fit.
         """
+        if (quick := self._one_by_one) is not None:
+            found = quick.call(q, q1, q2, load)
+            if found is not None:
+                return found
+        rows = [a[None] for a in as_samples(self._samples, q, q1, q2, load)]
+        return self.torques(rows[0], rows[1], rows[2], rows[3]).effort[0]
+
+    @cached_property
+    def _one_by_one(self) -> OneByOne | None:
+        """What `one` calls; None where a kernel alone cannot say what the efforts are."""
         kernel = self.kernel("inverse", ())
         if self._distributor.chooses or not isinstance(kernel, CompiledKernel):
-            return self._one_robustly(q, q1, q2, load)
-        if (own := getattr(self._local, "single", None)) is None:
-            own = self._local.single = kernel.single(), np.argsort(kernel.order)
-        single, order = own
-        m, given = len(q), single.given
-        given[:m] = q
-        given[m : 2 * m] = q1
-        given[2 * m : 3 * m] = q2
-        given[3 * m :] = load
-        status = single()
-        if status == Status.ok:
-            return single.found[order]
-        if status == AGAIN:
-            return self._one_robustly(q, q1, q2, load)
-        return np.full(len(order), np.nan)
+            return None
+        return OneByOne(kernel, self._samples, np.argsort(kernel.order))
 
-    def _one_robustly(
-        self, q: np.ndarray, q1: np.ndarray, q2: np.ndarray, load: np.ndarray
-    ) -> np.ndarray:
-        rows = [np.asarray(a, dtype=float)[None] for a in (q, q1, q2, load)]
-        return self.torques(rows[0], rows[1], rows[2], rows[3]).effort[0]
+    @cached_property
+    def _samples(self) -> tuple[Sample, ...]:
+        return (*samples_of_states(self.independent), LOAD)
 
     def evaluate(
         self,
@@ -439,7 +443,10 @@ class Evaluator:
     ) -> np.ndarray:
         """Accelerations of one sample, (m,), at least latency; NaN where there are none.
 
-        Args: q, q1: (m,) each;  effort: (n,);  load: (9,); as of `forward`.
+        Args: q, q1: (m,) each;  effort: (n,);  load: (9,); as of `forward`. Arrays of doubles go
+              fastest.
+        Returns: a new array.
+        Raises:  InputError: for arrays that do not fit.
         """
         return self._accelerator.one(q, q1, effort, load)
 
