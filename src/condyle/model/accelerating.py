@@ -17,11 +17,11 @@ from ..questions.forward import OUTPUTS
 from ..status import Status
 from .checks import (
     LOAD,
-    LOAD_COLUMNS,
     Sample,
     as_samples,
     check_array,
     check_states,
+    ports_of_load,
     samples_of_states,
 )
 from .data import Accelerations
@@ -136,7 +136,4 @@ class Accelerator:
     ) -> dict[str, Any]:
         check_states(self._independent, q, q1)
         check_array("effort", effort, *self._effort[1:])
-        check_array("load", load, 9, LOAD_COLUMNS)
-        load = np.asarray(load)
-        wrench = {"force": load[:, :3], "moment": load[:, 3:6], "point": load[:, 6:]}
-        return {"q": q, "q1": q1, "effort": effort, **wrench}
+        return {"q": q, "q1": q1, "effort": effort, **ports_of_load(load)}

@@ -49,6 +49,16 @@ def check_states(independent: Sequence[str], *states: Any) -> None:
         check_array(name, given, count, columns)
 
 
+def ports_of_load(load: Any) -> dict[str, np.ndarray]:
+    """Loads as questions take them.
+
+    Raises: InputError: for what is no array (N, 9).
+    """
+    check_array("load", load, 9, LOAD_COLUMNS)
+    load = np.asarray(load)
+    return {"force": load[:, :3], "moment": load[:, 3:6], "point": load[:, 6:]}
+
+
 def as_samples(wanted: Sequence[Sample], *given: Any) -> list[np.ndarray]:
     """Arrays of one sample, as doubles.
 
