@@ -91,6 +91,6 @@ def test_a_call_derives_nothing_again(monkeypatch: pytest.MonkeyPatch) -> None:
         raise AssertionError("derived again")
 
     for name in ("independent_coordinates", "dependent_coordinates"):
-        monkeypatch.setattr(f"condyle.model.evaluator.{name}", again)
+        monkeypatch.setattr(f"condyle.model.derivation.{name}", again)
     model.torques(*c.arguments)
     assert len(model.independent) == 4

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Collection
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -15,8 +15,17 @@ from ..mechanism.home import independent_coordinates
 from ..mechanism.mechanism import Mechanism
 from ..questions.forward import OUTPUTS
 from ..status import Status
-from .checks import LOAD_COLUMNS, check_array, check_states
+from .checks import (
+    LOAD,
+    Sample,
+    as_samples,
+    check_array,
+    check_states,
+    ports_of_load,
+    samples_of_states,
+)
 from .data import Accelerations
+from .one import OneByOne
 from .robust import Robust
 
 # Names of results, by what is asked for; the contact forces always come.
@@ -38,9 +47,9 @@ class Accelerator:
     ) -> None:
         """Args: kernel: the kernel of a question;  robust: the robust path, once it is wanted."""
         self._independent = independent_coordinates(mechanism)
-        self._chains = [chain.name for chain in mechanism.chains]
+        chains = [chain.name for chain in mechanism.chains]
+        self._effort = Sample("effort", len(chains), f"{', '.join(chains)} [N m or N]")
         self._kernel, self._robust = kernel, robust
-        self._local = threading.local()
 
     def __call__(
         self,
@@ -77,23 +86,24 @@ class Accelerator:
         self, q: np.ndarray, q1: np.ndarray, effort: np.ndarray, load: np.ndarray
     ) -> np.ndarray:
         """As `Evaluator.forward_one`."""
+        if (quick := self._one_by_one) is not None:
+            found = quick.call(q, q1, effort, load)
+            if found is not None:
+                return found
+        rows = [a[None] for a in as_samples(self._samples, q, q1, effort, load)]
+        return self(rows[0], rows[1], rows[2], rows[3]).acceleration[0]
+
+    @cached_property
+    def _one_by_one(self) -> OneByOne | None:
         kernel = self._for(())
         if not isinstance(kernel, CompiledKernel):
-            return self._one_of_many(q, q1, effort, load)
-        if (own := getattr(self._local, "single", None)) is None:
-            own = self._local.single = kernel.single(), np.array(kernel.order)
-        single, order = own
-        m, n, given = len(q), len(order), single.given
-        given[:m] = q
-        given[m : 2 * m] = q1
-        given[2 * m : 2 * m + n] = effort[order]
-        given[2 * m + n :] = load
-        status = single()
-        if status == Status.ok:
-            return single.found[:m].copy()
-        if status == AGAIN:
-            return self._one_of_many(q, q1, effort, load)
-        return np.full(m, np.nan)
+            return None
+        return OneByOne(kernel, self._samples, np.arange(len(self._independent)))
+
+    @cached_property
+    def _samples(self) -> tuple[Sample, ...]:
+        q, q1, _ = samples_of_states(self._independent)
+        return q, q1, self._effort, LOAD
 
     def linearised(
         self, q: np.ndarray, q1: np.ndarray, effort: np.ndarray, load: np.ndarray
@@ -107,7 +117,7 @@ class Accelerator:
         found = self._robust().linear(ports)
         s = {name: np.moveaxis(a, -1, 0) for name, a in found.items()}
         count, m = about.acceleration.shape
-        A, B = np.zeros((count, 2 * m, 2 * m)), np.zeros((count, 2 * m, len(self._chains)))
+        A, B = np.zeros((count, 2 * m, 2 * m)), np.zeros((count, 2 * m, self._effort.length))
         A[:, :m, m:] = np.eye(m)
         good = about.status == Status.ok
         A[~good] = B[~good] = np.nan
@@ -125,14 +135,5 @@ class Accelerator:
         self, q: np.ndarray, q1: np.ndarray, effort: np.ndarray, load: np.ndarray
     ) -> dict[str, Any]:
         check_states(self._independent, q, q1)
-        check_array("effort", effort, len(self._chains), f"{', '.join(self._chains)} [N m or N]")
-        check_array("load", load, 9, LOAD_COLUMNS)
-        load = np.asarray(load)
-        wrench = {"force": load[:, :3], "moment": load[:, 3:6], "point": load[:, 6:]}
-        return {"q": q, "q1": q1, "effort": effort, **wrench}
-
-    def _one_of_many(
-        self, q: np.ndarray, q1: np.ndarray, effort: np.ndarray, load: np.ndarray
-    ) -> np.ndarray:
-        rows = [np.asarray(a, dtype=float)[None] for a in (q, q1, effort, load)]
-        return self(rows[0], rows[1], rows[2], rows[3]).acceleration[0]
+        check_array("effort", effort, *self._effort[1:])
+        return {"q": q, "q1": q1, "effort": effort, **ports_of_load(load)}

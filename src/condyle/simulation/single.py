@@ -37,7 +37,7 @@ class Single:
             given = self._single.given
             for place, value in zip(self._given, inputs, strict=True):
                 given[place] = value
-            return self._single()
+            return self._single.run()
         rows = {
             port.name: np.asarray(value, dtype=float)[None]
             for port, value in zip(self._ports, inputs, strict=True)

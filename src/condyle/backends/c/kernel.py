@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Mapping
 from copy import copy
-from typing import Any
+from functools import partial
 
 import numpy as np
 
@@ -108,7 +108,7 @@ class CompiledKernel:
 
     def single(self) -> Single:
         """`one` with places of its own for what goes in and out: for one thread."""
-        return Single(self._library.one, self._table, self.interface.columns, self.columns, self)
+        return Single(self)
 
     @property
     def address(self) -> tuple[int, int, int]:
@@ -120,31 +120,29 @@ class CompiledKernel:
         return one, batch, self._table.ctypes.data
 
 
+# Holds the GIL, since to give it away and take it back costs more than some evaluations.
+_ONE = ctypes.PYFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * 3)
+
+
 class Single:
     """One evaluation after the other, bound to buffers: what a control loop calls.
 
-    given: (columns,), to be filled;  found: (results,), lanes group by group.
+    Attributes: given: (columns,), to be filled;  found: (results,), lanes group by group.
+                run: evaluates `given`; returns the status.
+                addresses: of the C function and of what it is called with, for other C: table,
+                `given`, `found`.
     """
 
-    def __init__(
-        self, one: Any, table: np.ndarray, columns: int, results: int, kernel: CompiledKernel
-    ) -> None:
+    def __init__(self, kernel: CompiledKernel) -> None:
         self._kernel = kernel  # whose table and library have to stay
-        lanes, checks = kernel.facts["lanes"], kernel.facts["checks"]
-        given, found = aligned(columns + lanes), aligned(results + checks)
+        columns, results = kernel.interface.columns, kernel.columns
+        given = aligned(columns + kernel.facts["lanes"])
+        found = aligned(results + kernel.facts["checks"])
         given[:] = 0.0
         self.given, self.found = given[:columns], found[:results]
-        self._one = one
-        self._at = (table.ctypes.data, given.ctypes.data, found.ctypes.data)
-
-    def __call__(self) -> int:
-        """Evaluate `given`; returns the status."""
-        return self._one(*self._at)
-
-    @property
-    def addresses(self) -> tuple[int, int, int, int]:
-        """Of the C function and of what it is called with, for other C: table, `given`, `found`."""
-        return ctypes.cast(self._one, ctypes.c_void_p).value or 0, *self._at
+        one, _, table = kernel.address
+        self.addresses = one, table, given.ctypes.data, found.ctypes.data
+        self.run: Callable[[], int] = partial(_ONE(one), *self.addresses[1:])
 
 
 def _readable(column: np.ndarray) -> np.ndarray:
