@@ -56,3 +56,9 @@ def test_copies_share_their_kernels_and_travel() -> None:
     assert general.choosing("bounded").kernel("motion") is kernel
     there = pickle.loads(pickle.dumps(general))
     assert there.renumbered(general.mechanism).policy == general.policy
+
+
+def test_what_was_chosen_stays_chosen() -> None:
+    base = condyle.load("masticatory")
+    chosen = Evaluator(base, backend="numpy", general=True).choosing("bounded")
+    assert chosen.renumbered(base.set(CHANGES["masticatory"])).policy == chosen.policy

@@ -132,7 +132,7 @@ class Derivation:
         other = copy(self._general)
         for name in _cached_by(type(self)):
             other.__dict__.pop(name, None)
-        other.mechanism = mechanism
+        other.mechanism, other._asked = mechanism, self._asked
         _ = other.policy  # has to fit, now
         other._numbers = Layout.of(self._structure).numbers(mechanism)
         other._kernels, other._closures = {}, {}
