@@ -63,7 +63,7 @@ class Contents:
 
     kernels: those that are whole.
     size:    of all that is there [bytes], also of what is broken or half built.
-    choices: compiler -> kernels whose single evaluation it compiled, measured to be quickest.
+    choices: kind of code -> kernels that are of that kind.
     """
 
     folder: Path
@@ -157,8 +157,7 @@ def contents() -> Contents:
         for path in entries
         if path.suffix == ".json" and (entry := _whole(folder, path.stem)) is not None
     ]
-    measured = (entry.facts["compiler"][0] for entry in kernels if "nanoseconds" in entry.facts)
-    choices = dict(sorted(Counter(measured).items()))
+    choices = dict(sorted(Counter(_kind(entry.facts) for entry in kernels).items()))
     half_built = [
         Path(top, name)
         for place in folder.glob(f"{BUILD}*")
@@ -170,6 +169,13 @@ def contents() -> Contents:
         with suppress(OSError):  # gone meanwhile
             size += path.stat().st_size
     return Contents(folder, len(kernels), size, choices)
+
+
+def _kind(facts: Facts) -> str:
+    """What code a library was made of."""
+    if facts.get("assembly"):
+        return f"assembly for {'AVX-512' if facts['lanes'] == 8 else 'AVX2'}"
+    return f"C by {Path(facts.get('compiler', ['a compiler'])[0]).name}"
 
 
 def clear() -> Contents:

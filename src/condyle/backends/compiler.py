@@ -30,12 +30,11 @@ FLAGS = (
 GCC = "-mtune-ctrl=^inter_unit_moves_to_vec,^inter_unit_moves_from_vec"
 # What is made for this processor: the first that the compiler takes.
 NATIVE = (("-march=native", GCC), ("-march=native",), ("-mcpu=native",), ())
-# One evaluation stands in an order that Clang should leave alone and that GCC makes better; a batch
-# in C, whose chains stand abreast, is the worse for it.
+# One evaluation stands in an order that GCC makes better; a batch, whose chains stand abreast, is
+# the worse for it.
 ORDERED = ("-fschedule-insns", "-fsched-pressure")
-LEFT_ALONE = ("-fno-slp-vectorize", "-mllvm", "-enable-misched=false")
-# Instruction sets, by the compiler's macros, that `backends/x86` has batches for, by lanes.
-ASSEMBLY = {4: ("__AVX2__", "__FMA__"), 8: ("__AVX512F__", "__AVX512DQ__")}
+# Instruction sets that `backends/x86` writes for, by lanes and by the compiler's macros.
+ASSEMBLY = {4: ("__AVX2__", "__FMA__"), 8: ("__AVX512F__", "__AVX512DQ__", "__AVX512VL__")}
 SECONDS = 300  # a build that takes longer has gone wrong
 ASKING = 30  # seconds in which a compiler says what it is
 REMEDY = "Install gcc or clang, name another compiler in CC, or take numpy (--backend numpy)"
@@ -62,16 +61,12 @@ class Compiler:
 
     @property
     def single_flags(self) -> tuple[str, ...]:
-        """What it is given for one evaluation."""
-        return (*self.flags, *(LEFT_ALONE if self.is_clang else ORDERED))
-
-    @property
-    def is_clang(self) -> bool:
-        return "__clang__" in self.identity
+        """What it is given for one evaluation in C."""
+        return (*self.flags, *(() if "__clang__" in self.identity else ORDERED))
 
     @property
     def assembly(self) -> bool:
-        """Whether the processor takes batches as `backends/x86` writes them."""
+        """Whether it takes, and the processor runs, what `backends/x86` writes."""
         needed = ("__x86_64__", *ASSEMBLY.get(self.lanes, ()))
         return self.lanes in ASSEMBLY and all(f"#define {m} " in self.identity for m in needed)
 
@@ -114,21 +109,6 @@ def find_compiler() -> Compiler:
     if isinstance(found, str):
         raise CompilerError(found)
     return found
-
-
-def rivals(compiler: Compiler) -> tuple[Compiler, ...]:
-    """Compilers of which the one whose code for one evaluation is quickest is taken: this one, and
-    Clang beside GCC.
-
-    Where `CC` names a compiler there is no other.
-    """
-    if os.environ.get("CC", "").strip() or compiler.is_clang:
-        return (compiler,)
-    names = (os.environ.get(name, "").strip() for name in ("PATH", "CONDYLE_LANES"))
-    clang = _find("clang", *names)
-    if isinstance(clang, str) or clang.lanes != compiler.lanes:
-        return (compiler,)
-    return compiler, clang
 
 
 @lru_cache(maxsize=8)

@@ -24,8 +24,7 @@ def cache(
     count = "1 kernel" if had.kernels == 1 else f"{had.kernels} kernels"
     what = f"{count}, {had.size / 1e6:.1f} MB"
     if had.choices:
-        each = ", ".join(f"{name} {number}" for name, number in had.choices.items())
-        what += f"; one evaluation by the compiler that was quickest: {each}"
+        what += f" ({', '.join(f'{number} {kind}' for kind, number in had.choices.items())})"
     return Answer(
         f"Removed {what} from {had.folder}" if clear else f"{had.folder}: {what}",
         {

@@ -98,7 +98,7 @@ class Scalar(_Body):
     def is_scalar(self, v: Value) -> bool:
         return True
 
-    def _bundles(self) -> list[list[Value]]:
+    def bundles(self) -> list[list[Value]]:
         return []
 
     def reduction(self, v: Value) -> str:

@@ -4,22 +4,22 @@
     one(table, in, out)              least latency: shared values scalar, lane values vectors
     batch(table, in, strides, ...)   most throughput: all values vectors over W samples
 
-Both are printed from the same graph: one evaluation by `straight`, a batch as assembly where the
-processor has AVX2 or AVX-512 (see `backends/x86`), else by `loops`. They are texts of their own, so
-that each can be compiled by what does best by it.
+Both are printed from the same graph, as assembly where the processor has AVX2 or AVX-512 (see
+`backends/x86`), else as C: one evaluation by `straight`, a batch by `loops`. They are texts of
+their own, since compilers do best by each with other flags.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import files
 
 from ...graph.fuse import fuse
 from ...graph.program import Interface, Program, Variants
 from ..kernel import AGAIN
-from ..x86.lower import lowered
-from ..x86.text import Assembly, is_spread
+from ..x86.batch import batch as batch_listing
+from ..x86.single import single as single_listing
+from ..x86.text import Batch, Single, is_spread
 from .loops import Loops
 from .prepare import prepare
 from .straight import Straight
@@ -32,14 +32,14 @@ class Source:
     """Generated C and what a caller must know of it.
 
     single:     text of one evaluation, for the batch to be linked with; None where there is none.
-    batch:      makes the text of the batch, in about the time that the other takes to compile.
+    batch:      text of the batch.
     table_size: numbers that `prepare` computes.
     checks:     numbers that `one` writes after the results.
     operations: vector operations of one batch step; a fused multiply-add counts one.
     """
 
     single: str | None
-    batch: Callable[[], str]
+    batch: str
     interface: Interface
     table_size: int
     checks: int
@@ -47,7 +47,7 @@ class Source:
 
 
 def emit(variants: Variants, width: int, assembly: bool) -> Source:
-    """The kernel's C for `width` lanes; assembly: whether the processor takes a batch as such."""
+    """The kernel's C for `width` lanes; assembly: whether the processor takes it as such."""
     main = fused(variants.main)
     step = Loops(main, width)
     apart: dict[str, Straight] = {}
@@ -83,20 +83,23 @@ def emit(variants: Variants, width: int, assembly: bool) -> Source:
         f"static const int below[CHECKS + 1] = {{{below}}};",
         _text("judge.h"),
     ]
-
-    def batch() -> str:
-        body = Assembly(lowered(step), width).text("step") if assembly else step.function("step")
-        return "\n".join([*head, prepare(step, "prepare_step"), body, _text("batch.h")])
-
+    body = Batch(batch_listing(step), width).text("step") if assembly else step.function("step")
+    batch = "\n".join([*head, prepare(step, "prepare_step"), body, _text("batch.h")])
     single = None
     if apart:
         code = [
             text
             for name, printer in apart.items()
-            for text in (prepare(printer, f"prepare_{name}"), printer.function(name))
+            for text in (prepare(printer, f"prepare_{name}"), _one(name, printer, assembly))
         ]
         single = "\n".join([*head, *code, _text("single.h")])
     return Source(single, batch, face, size, len(checks), step.operations())
+
+
+def _one(name: str, printer: Straight, assembly: bool) -> str:
+    if assembly:
+        return Single(single_listing(printer), printer.width).text(name)
+    return printer.function(name)
 
 
 def _text(name: str) -> str:

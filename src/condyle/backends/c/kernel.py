@@ -39,7 +39,7 @@ class CompiledKernel:
         """Args:   key: of everything that shapes what `build` returns.
         Raises: CompilerError: where no kernel can be built.
         """
-        entry, self._library = loaded(key, build, numbers)
+        entry, self._library = loaded(key, build)
         self.facts, self.cached = entry.facts, entry.cached
         self.interface = Interface.of(self.facts["interface"])
         self.columns = sum(self.interface.width(r) for r in self.interface.results)

@@ -61,7 +61,6 @@ def load(path: str) -> ctypes.CDLL:
     library.prepare.restype = None
     if hasattr(library, "one"):
         library.one.argtypes = [pointer] * 3
-        library.repeat.argtypes = [pointer, pointer, pointer, size]
     return library
 
 

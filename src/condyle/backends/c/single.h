@@ -11,10 +11,4 @@ int one(const double *restrict table, const double *restrict in, double *restric
 #endif
     return status;
 }
-
-/* The same sample over and over, to measure how long it takes. */
-void repeat(const double *restrict table, const double *restrict in, double *restrict out,
-            size_t count) {
-    for (size_t i = 0; i < count; i++) one(table, in, out);
-}
 #endif

@@ -25,13 +25,11 @@ class Straight(Printer):
         """`int name(table, in, out)`: whether every check is met beyond doubt."""
         head = f"HIDDEN int {name}(const double *restrict table, const double *restrict in, "
         head += "double *restrict out) {"
-        checks = self.program.checks
-        met = (f"({self.name(c.value, 0)} >= {c.tolerance!r})" for c in checks)
-        sure = f"  return {' & '.join(met) or '1'};"
+        sure = "  return sure(out + OUTPUTS);"
         return "\n".join([head, *self._body(), *self.outputs(), sure, "}", ""])
 
     def _body(self) -> Iterator[str]:
-        bundles = {bundle[0]: bundle for bundle in self._bundles()}
+        bundles = {bundle[0]: bundle for bundle in self.bundles()}
         order = scheduled(self.g, self.varying, list(bundles.values()))
         done: set[Value] = set()
         for v in order:
@@ -48,7 +46,7 @@ class Straight(Printer):
             for c in range(1 if node.group is None else self.copies[node.group]):
                 yield from (f"  {s}" for s in self.statements(pair, c))
 
-    def _bundles(self) -> list[list[Value]]:
+    def bundles(self) -> list[list[Value]]:
         """Sums over the lanes by fours and twos, of those that are ready at about one time."""
         ready = ready_times(self.g, self.varying)
         sums = [v for v in self.varying if self.g.nodes[v].op == "sum" and self.lane_terms(v)]
@@ -87,27 +85,27 @@ class Straight(Printer):
     def lane_sample(self, first: object, copy: int) -> str:
         return f"load(in + {first} + {copy * self.width})"
 
-    def outputs(self) -> Iterator[str]:
+    def stored(self) -> Iterator[tuple[int, Value, int, int]]:
+        """Slot, value, copy and number of lanes of all that is stored: results, then checks."""
         slot = 0
         for o in self.program.outputs:
             for entry in o.entries:
                 for group, v in enumerate(entry):
                     if v is None:
                         continue
-                    if not o.lanes:
-                        yield f"  out[{slot}] = {self.name(v, 0)};"
-                        slot += 1
-                        continue
-                    for c in range(self.copies[group]):
-                        yield from self._stored(slot + c * self.width, v, group, c)
-                    slot += self.counts[group]
-        for i, check in enumerate(self.program.checks):
-            yield f"  out[{slot + i}] = {self.name(check.value, 0)};"
+                    count = self.counts[group] if o.lanes else 1
+                    for c in range(-(-count // self.width)):
+                        at = c * self.width
+                        yield slot + at, v, c, min(self.width, count - at)
+                    slot += count
+        yield from ((slot + i, c.value, 0, 1) for i, c in enumerate(self.program.checks))
 
-    def _stored(self, at: int, v: Value, group: int, copy: int) -> Iterator[str]:
-        used = min(self.width, self.counts[group] - copy * self.width)
-        name = f"spread({self.name(v, copy)})" if self.is_scalar(v) else self.name(v, copy)
-        if used == self.width:
-            yield f"  store(out + {at}, {name});"
-        else:
-            yield f"  store_some(out + {at}, {name}, {used});"
+    def outputs(self) -> Iterator[str]:
+        for at, v, copy, used in self.stored():
+            name = self.name(v, copy)
+            if used == 1 and self.g.nodes[v].group is None:
+                yield f"  out[{at}] = {name};"
+                continue
+            row = f"spread({name})" if self.is_scalar(v) else name
+            some = "" if used == self.width else f", {used}"
+            yield f"  store{'_some' if some else ''}(out + {at}, {row}{some});"

@@ -17,8 +17,9 @@ NEVER = 1 << 60
 SOON = 20  # instructions to the next use, within which a value from memory takes a register
 
 # Operations that may read an argument from memory: which ones.
-ANY = ("add", "mul", "and", "or", "xor", "fma", "fnma", "fms", "sqrt")
+ANY = ("add", "mul", "and", "or", "xor", "fma", "fnma", "fms", "sqrt", "spread")
 SECOND = ("sub", "div", "min", "max", "lt", "le", "eq", "ne")
+LOGIC = ("and", "or", "xor")  # of one number too they read two, of which a slot has one
 FUSED = ("fma", "fnma", "fms")
 CALLS = ("mend", "call")
 OVERWRITING = (*FUSED, *CALLS)  # what leaves its result in the register of an argument
@@ -37,12 +38,14 @@ class Move(NamedTuple):
     op:   "load", "store", "copy", or an instruction's.
     to:   the register or slot it writes; None for an output.
     args: what it reads, in the instruction's order.
+    data, lanes: as of `Instruction`; of moves the lanes of the value.
     """
 
     op: str
     to: Place | None
     args: tuple[Place, ...]
     data: object = None
+    lanes: int = 0
 
 
 class Allocation(NamedTuple):
@@ -67,6 +70,7 @@ class _Allocator:
     def __init__(self, code: Sequence[Instruction], registers: int) -> None:
         self.code = code
         self.uses = uses(code)
+        self.lanes = {i.to: i.lanes for i in code if i.to is not None}
         self.held: list[Name | None] = [None] * registers
         self.register: dict[Name, int] = {}
         self.slot: dict[Name, int] = {}
@@ -82,8 +86,8 @@ class _Allocator:
         return Allocation(self.moves, self.slots)
 
     def _place(self, instruction: Instruction) -> None:
-        op, to, args, data = instruction
-        memory = self._from_memory(op, args)
+        op, to, args, data, lanes = instruction
+        memory = self._from_memory(instruction)
         for a in args:
             if a != memory:
                 self._fetch(a, args)
@@ -96,12 +100,12 @@ class _Allocator:
         if to is not None:
             target = Place("register", self._vacant(args))
             self._hold(to, target.number)
-        self.moves.append(Move(op, target, places, data))
+        self.moves.append(Move(op, target, places, data, lanes))
         self._leave(args)
 
     def _overwrite(self, instruction: Instruction, memory: Name | None) -> None:
         """An instruction whose result takes an argument's register, rather of one that may go."""
-        op, to, args, data = instruction
+        op, to, args, data, lanes = instruction
         assert to is not None
         places = [self._operand(a) for a in args]
         first = args[:1] if op in CALLS else (args[2], *args[:2])
@@ -111,9 +115,7 @@ class _Allocator:
             fresh = Place("register", self._vacant(args))
             source = first[0] if op in CALLS or memory is None else memory
             chosen = args.index(source)
-            self.moves.append(
-                Move("load" if source == memory else "copy", fresh, (places[chosen],))
-            )
+            self._move("load" if source == memory else "copy", source, fresh, places[chosen])
             places[chosen] = fresh
             target = fresh.number
         else:
@@ -121,7 +123,7 @@ class _Allocator:
             self._drop(target)
         self._end(args)
         self._hold(to, target)
-        self.moves.append(Move(op, Place("register", target), tuple(places), data))
+        self.moves.append(Move(op, Place("register", target), tuple(places), data, lanes))
         self._leave(args)
 
     def _may_go(self, value: Name) -> bool:
@@ -131,10 +133,16 @@ class _Allocator:
 
     # -- operands ----------------------------------------------------------------------------
 
-    def _from_memory(self, op: str, args: tuple[Name, ...]) -> Name | None:
+    def _move(self, op: str, value: Name, to: Place, source: Place) -> None:
+        self.moves.append(Move(op, to, (source,), None, self.lanes.get(value, 0)))
+
+    def _from_memory(self, instruction: Instruction) -> Name | None:
         """The argument that is read where it stands in memory, if any."""
+        op, _, args, _, lanes = instruction
         able = args if op in ANY else args[1:2] if op in SECOND else ()
         able = tuple(a for a in able if a not in self.register and args.count(a) == 1)
+        if op in LOGIC and lanes == 1:
+            able = tuple(a for a in able if a < 0)
         if not able:
             return None
         last = max(able, key=self._next)
@@ -158,7 +166,7 @@ class _Allocator:
         """Bring a value into a register."""
         if value not in self.register:
             target = self._vacant(keep)
-            self.moves.append(Move("load", Place("register", target), (self._memory(value),)))
+            self._move("load", value, Place("register", target), self._memory(value))
             self._hold(value, target)
 
     # -- registers and slots -----------------------------------------------------------------
@@ -174,7 +182,7 @@ class _Allocator:
                 self.free.append(self.slots)
                 self.slots += 1
             self.slot[value] = self.free.pop()
-            self.moves.append(Move("store", self._memory(value), (Place("register", target),)))
+            self._move("store", value, self._memory(value), Place("register", target))
         self._drop(target)
         return target
 

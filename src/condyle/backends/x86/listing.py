@@ -11,9 +11,12 @@ Name = int  # of a value that an instruction defines; negative: what stands in m
 
 
 class Home(NamedTuple):
-    """Where a value stands in memory from the start: table, input or literal, and which one.
+    """Where a value stands in memory from the start.
 
-    A literal is given by its bits, so that 0 and -0 are two.
+    kind:   table or literal, a number each; sample, a vector of samples (in a batch); given, a
+            number of the sample, row, a vector of numbers of the table, and given_row, one of the
+            sample (in one evaluation).
+    number: which one; of a literal its bits, so that 0 and -0 are two.
     """
 
     kind: str
@@ -23,15 +26,17 @@ class Home(NamedTuple):
 class Instruction(NamedTuple):
     """One operation on vectors.
 
-    to:   the value that it defines; None for what only stores.
-    args: values, or places in memory.
-    data: which output is stored, how far is shifted, or what is called.
+    to:    the value that it defines; None for what only stores.
+    args:  values, or places in memory.
+    data:  which output is stored, how far is shifted, which halves are taken, or what is called.
+    lanes: how many numbers it is about, the first of its registers'; 0 for all.
     """
 
     op: str
     to: Name | None
     args: tuple[Name, ...]
     data: object = None
+    lanes: int = 0
 
 
 @dataclass
@@ -43,14 +48,14 @@ class Listing:
     _known: dict[Home, Name] = field(default_factory=dict)
     _last: int = 0
 
-    def add(self, op: str, *args: Name, data: object = None) -> Name:
+    def add(self, op: str, *args: Name, data: object = None, lanes: int = 0) -> Name:
         """The value of one more instruction."""
         self._last += 1
-        self.code.append(Instruction(op, self._last, args, data))
+        self.code.append(Instruction(op, self._last, args, data, lanes))
         return self._last
 
-    def store(self, output: int, value: Name) -> None:
-        self.code.append(Instruction("output", None, (value,), output))
+    def store(self, output: int, value: Name, lanes: int = 0) -> None:
+        self.code.append(Instruction("output", None, (value,), output, lanes))
 
     def place(self, kind: str, number: int) -> Name:
         """A value of the table or of the sample."""
@@ -84,9 +89,10 @@ def contracted(code: list[Instruction]) -> list[Instruction]:
     read = uses(code)
     made = {i.to: i for i in code if i.to is not None}
 
-    def product(value: Name) -> Instruction | None:
+    def product(value: Name, lanes: int) -> Instruction | None:
         found = made.get(value)
-        return found if found and found.op == "mul" and len(read[value]) == 1 else None
+        alone = found and found.op == "mul" and found.lanes == lanes and len(read[value]) == 1
+        return found if alone else None
 
     joined = [_joined(i, product) for i in code]
     wanted: set[Name] = set()
@@ -98,16 +104,12 @@ def contracted(code: list[Instruction]) -> list[Instruction]:
     return kept[::-1]
 
 
-def _joined(instruction: Instruction, product: Callable[[Name], Instruction | None]) -> Instruction:
-    if instruction.op not in ("add", "sub") or len(set(instruction.args)) == 1:
-        return instruction
-    a, b = instruction.args
-    if p := product(b):
-        return Instruction(
-            "fma" if instruction.op == "add" else "fnma", instruction.to, (*p.args, a)
-        )
-    if p := product(a):
-        return Instruction(
-            "fma" if instruction.op == "add" else "fms", instruction.to, (*p.args, b)
-        )
-    return instruction
+def _joined(own: Instruction, product: Callable[[Name, int], Instruction | None]) -> Instruction:
+    if own.op not in ("add", "sub") or len(set(own.args)) == 1:
+        return own
+    a, b = own.args
+    if p := product(b, own.lanes):
+        return own._replace(op="fma" if own.op == "add" else "fnma", args=(*p.args, a))
+    if p := product(a, own.lanes):
+        return own._replace(op="fma" if own.op == "add" else "fms", args=(*p.args, b))
+    return own

@@ -1,19 +1,20 @@
-"""A batch's program as instructions on vectors of samples, chain after chain.
+"""Values of a program as instructions: what one evaluation and a batch have in common.
 
-Functions become the instructions that `vector.h` has for them, with the same digits. Where those
-would be far off (an angle of a million, what is not finite), `mend` asks the C library, lane by
-lane; `call` does so for functions that there are no instructions for.
+Functions become the instructions that `vector.h` has for them. Where those would be far off (an
+angle of a million, what is not finite), `mend` asks the C library, lane by lane; `call` does so for
+functions that there are no instructions for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from ...graph.graph import Value
 from ...graph.operations import REDUCTIONS
-from ..c.loops import Loops
-from .listing import Listing, Name, contracted
+from ..c.printer import Printer
+from .listing import Listing, Name
 
 # Minimax polynomials of sine and cosine, lowest power first (Cephes), and pi / 2 in three parts.
 SINE = (
@@ -40,6 +41,9 @@ ARC = (
 EIGHTH_TURN = (0.7853981633974483, 3.061616997868383e-17)
 PLAIN = {"add": "add", "sub": "sub", "mul": "mul", "fma": "fma", "fnma": "fnma", "sqrt": "sqrt"}
 PLAIN |= {"fmin": "min", "fmax": "max"}
+# Functions that there are instructions for: which method has them.
+FUNCTIONS = {"neg": "neg", "fabs": "fabs", "copysign": "copysign", "not": "negation", "and": "both"}
+FUNCTIONS |= {"or": "either", "where": "where", "sin": "sine", "cos": "cosine", "atan2": "arc"}
 COMPARED = ("lt", "le", "eq", "ne")
 
 
@@ -53,190 +57,176 @@ class Turned(NamedTuple):
     near: Name
 
 
-def lowered(loops: Loops) -> Listing:
-    """The instructions of one batch step, in the program's order."""
-    return _Lowering(loops).run()
+class Lowering(ABC):
+    """What each value of the program became, by value and copy."""
 
-
-class _Lowering:
-    """What each value of the program became, by value and chain."""
-
-    def __init__(self, loops: Loops) -> None:
-        self.loops, self.nodes = loops, loops.g.nodes
+    def __init__(self, printer: Printer) -> None:
+        self.printer, self.nodes = printer, printer.g.nodes
         self.listing = Listing()
         self.found: dict[tuple[Value, int | None], Name] = {}
-        self.sums: dict[Value, Name] = {}
         self.turned: dict[Name, Turned] = {}
 
-    def run(self) -> Listing:
-        loops = self.loops
-        for (_, group), values in loops.parts:
-            if group is None:
-                self._define(values, 0)
-                continue
-            joined = loops.sums_of(values)
-            for chain in range(loops.counts[group]):
-                self._define([v for v in values if v not in loops.absorbed], chain)
-                for v, term in joined:
-                    self._join(v, term, chain)
-        for slot, v, chain in loops.outputs():
-            self.listing.store(slot, self._named(v, chain))
-        self.listing.code = contracted(self.listing.code)
-        return self.listing
+    @abstractmethod
+    def add(self, op: str, *args: Name, data: object = None) -> Name:
+        """The value of one more instruction."""
 
-    def _define(self, values: Sequence[Value], chain: int) -> None:
-        for v in values:
-            key = v, None if self.nodes[v].group is None else chain
-            if key not in self.found:
-                self.found[key] = self._value(v, chain)
+    @abstractmethod
+    def fixed(self, v: Value, copy: int) -> Name:
+        """A value of the table."""
 
-    def _named(self, v: Value, chain: int) -> Name:
+    @abstractmethod
+    def given(self, v: Value, copy: int) -> Name:
+        """An input."""
+
+    @abstractmethod
+    def reduction(self, v: Value) -> Name:
+        """A sum or minimum over the chains."""
+
+    @abstractmethod
+    def estimates(self) -> bool:
+        """Whether inverse roots begin with the processor's estimate."""
+
+    def define(self, v: Value, copy: int) -> None:
+        key = v, None if self.nodes[v].group is None else copy
+        if key not in self.found:
+            self.found[key] = self._value(v, copy)
+
+    def named(self, v: Value, copy: int) -> Name:
         """A value that was defined, or stands in memory."""
         node = self.nodes[v]
         if node.op == "const":
             assert isinstance(node.data[0], float)
             return self.listing.number(node.data[0])
         if not node.varies:
-            return self.listing.place("table", self.loops.slot(v, chain))
-        return self.found[v, None if node.group is None else chain]
+            return self.fixed(v, copy)
+        return self.found[v, None if node.group is None else copy]
 
-    def _value(self, v: Value, chain: int) -> Name:
-        node, add = self.nodes[v], self.listing.add
-        if node.op == "input":
-            return self.listing.place("input", _integer(node.data[0]))
-        if node.op == "lane_input":
-            return self.listing.place("input", _integer(node.data[1]) + chain)
+    def _value(self, v: Value, copy: int) -> Name:
+        node, add = self.nodes[v], self.add
+        if node.op in ("input", "lane_input"):
+            return self.given(v, copy)
         if node.op in REDUCTIONS:
-            return self._reduction(v)
-        args = [self._named(a, chain) for a in node.args]
-        if node.op == "div" and self.loops.width == 8 and self.loops.is_inverse_root(v):
-            return self._inverse_root(self._named(self.nodes[node.args[1]].args[0], chain))
+            return self.reduction(v)
+        args = [self.named(a, copy) for a in node.args]
+        if node.op == "div" and self.printer.is_inverse_root(v) and self.estimates():
+            return self._inverse_root(self.named(self.nodes[node.args[1]].args[0], copy))
         if node.op in PLAIN or node.op == "div":
             return add(PLAIN.get(node.op, node.op), *args)
         if node.op in COMPARED:
-            return self._truth(add(node.op, *args))
+            return self.truth(add(node.op, *args))
         if node.op in FUNCTIONS:
-            return FUNCTIONS[node.op](self, *args)
+            return getattr(self, FUNCTIONS[node.op])(*args)
         return add("call", args[0], *args, data=node.op)
 
-    # -- sums and minima over the chains -----------------------------------------------------
-
-    def _join(self, v: Value, term: Value, chain: int) -> None:
-        """A chain's term joins a reduction."""
-        add = self.listing.add
-        if self.nodes[v].op == "least":
-            own = self._named(term, chain)
-            self.sums[v] = add("min", self.sums[v], own) if v in self.sums else own
-            return
-        for sign, factors in self.loops.steps(term):
-            args = [self._named(x, chain) for x in factors]
-            self.sums[v] = self._plus(self.sums.get(v), sign, args)
-
-    def _plus(self, total: Name | None, sign: int, args: list[Name]) -> Name:
-        add = self.listing.add
+    def plus(self, total: Name | None, sign: int, args: list[Name]) -> Name:
+        """A number or a product more, or less, than the total."""
         if total is not None and len(args) == 2:
-            return add("fma" if sign > 0 else "fnma", *args, total)
+            return self.add("fma" if sign > 0 else "fnma", *args, total)
         if total is not None:
-            return add("add" if sign > 0 else "sub", total, *args)
-        own = add("mul", *args) if len(args) == 2 else args[0]
-        return own if sign > 0 else self._neg(own)
+            return self.add("add" if sign > 0 else "sub", total, *args)
+        own = self.add("mul", *args) if len(args) == 2 else args[0]
+        return own if sign > 0 else self.neg(own)
 
-    def _reduction(self, v: Value) -> Name:
-        total = self.sums.get(v)
-        for count, term in self.loops.shared_terms(v):
-            own = self._named(term, 0)
+    def with_shared(self, v: Value, total: Name | None) -> Name:
+        """A reduction with its terms that are the same in all chains."""
+        for count, term in self.printer.shared_terms(v):
+            own = self.named(term, 0)
             if self.nodes[v].op == "sum":
-                total = self._plus(total, 1, [self.listing.number(float(count)), own])
+                total = self.plus(total, 1, [self.listing.number(float(count)), own])
             else:
-                total = own if total is None else self.listing.add("min", total, own)
+                total = own if total is None else self.add("min", total, own)
         assert total is not None
         return total
 
     # -- functions ---------------------------------------------------------------------------
 
-    def _truth(self, mask: Name) -> Name:
-        return self.listing.add("and", mask, self.listing.number(1.0))
+    def truth(self, mask: Name) -> Name:
+        return self.add("and", mask, self.listing.number(1.0))
 
-    def _neg(self, a: Name) -> Name:
-        return self.listing.add("xor", a, self.listing.bits(SIGN))
+    def neg(self, a: Name) -> Name:
+        return self.add("xor", a, self.listing.bits(SIGN))
 
-    def _fabs(self, a: Name) -> Name:
-        return self.listing.add("and", a, self.listing.bits(SIZE))
+    def fabs(self, a: Name) -> Name:
+        return self.add("and", a, self.listing.bits(SIZE))
 
-    def _copysign(self, a: Name, b: Name) -> Name:
-        sign = self.listing.add("and", b, self.listing.bits(SIGN))
-        return self.listing.add("or", self._fabs(a), sign)
+    def copysign(self, a: Name, b: Name) -> Name:
+        sign = self.add("and", b, self.listing.bits(SIGN))
+        return self.add("or", self.fabs(a), sign)
 
     def _not_zero(self, a: Name) -> Name:
-        return self.listing.add("ne", a, self.listing.number(0.0))
+        return self.add("ne", a, self.listing.number(0.0))
 
-    def _not(self, a: Name) -> Name:
-        return self._truth(self.listing.add("eq", a, self.listing.number(0.0)))
+    def negation(self, a: Name) -> Name:
+        return self.truth(self.add("eq", a, self.listing.number(0.0)))
 
-    def _and(self, a: Name, b: Name) -> Name:
-        return self._truth(self.listing.add("and", self._not_zero(a), self._not_zero(b)))
+    def both(self, a: Name, b: Name) -> Name:
+        return self.truth(self.add("and", self._not_zero(a), self._not_zero(b)))
 
-    def _or(self, a: Name, b: Name) -> Name:
-        return self._truth(self.listing.add("or", self._not_zero(a), self._not_zero(b)))
+    def either(self, a: Name, b: Name) -> Name:
+        return self.truth(self.add("or", self._not_zero(a), self._not_zero(b)))
 
-    def _where(self, a: Name, b: Name) -> Name:
-        return self.listing.add("and", self._not_zero(a), b)
+    def where(self, a: Name, b: Name) -> Name:
+        return self.add("and", self._not_zero(a), b)
 
     def _inverse_root(self, a: Name) -> Name:
         """An estimate of 14 bits and two steps of Newton."""
-        add, number = self.listing.add, self.listing.number
+        add, number = self.add, self.listing.number
         y, half = add("rsqrt", a), add("mul", number(0.5), a)
         y = add("mul", y, add("fnma", add("mul", half, y), y, number(1.5)))
         return add("fma", y, add("fnma", add("mul", half, y), y, number(0.5)), y)
 
-    def _polynomial(self, z: Name, coefficients: Sequence[float]) -> Name:
+    def polynomial(self, z: Name, coefficients: Sequence[float]) -> Name:
         number = self.listing.number
         total = number(coefficients[-1])
         for c in coefficients[-2::-1]:
-            total = self.listing.add("fma", total, z, number(c))
+            total = self.add("fma", total, z, number(c))
         return total
 
-    def _sin(self, x: Name) -> Name:
+    def sine(self, x: Name) -> Name:
         t = self._turned(x)
         return self._settled("sin", x, t, t.sine, t.cosine, self._sign(t, 62))
 
-    def _cos(self, x: Name) -> Name:
+    def cosine(self, x: Name) -> Name:
         t = self._turned(x)
-        sign = self.listing.add("xor", self._sign(t, 62), self._sign(t, 63))
+        sign = self.add("xor", self._sign(t, 62), self._sign(t, 63))
         return self._settled("cos", x, t, t.cosine, t.sine, sign)
 
     def _settled(
         self, name: str, x: Name, turned: Turned, even: Name, odd: Name, sign: Name
     ) -> Name:
         """A sine or cosine, which is the other one of what is left after an odd number of turns."""
-        add = self.listing.add
+        add = self.add
         value = add("choose", add("shift", turned.turns, data=63), odd, even)
         return add("mend", add("xor", value, sign), turned.near, x, data=name)
 
     def _sign(self, turned: Turned, bit: int) -> Name:
         """Bit 0 (by 63) or bit 1 (by 62) of the number of quarter turns, as a sign."""
-        moved = self.listing.add("shift", turned.turns, data=bit)
-        return self.listing.add("and", moved, self.listing.bits(SIGN))
+        moved = self.add("shift", turned.turns, data=bit)
+        return self.add("and", moved, self.listing.bits(SIGN))
 
     def _turned(self, x: Name) -> Turned:
         if x not in self.turned:
-            add, number = self.listing.add, self.listing.number
+            add, number = self.add, self.listing.number
             turns = add("fma", x, number(TURNS), number(WHOLE))
             n, r = add("sub", turns, number(WHOLE)), x
             for part in QUARTER_TURN:
                 r = add("fnma", n, number(part), r)
-            z = add("mul", r, r)
-            sine = add("fma", add("mul", r, z), self._polynomial(z, SINE), r)
-            most = add("fnma", number(0.5), z, number(1.0))
-            cosine = add("fma", add("mul", z, z), self._polynomial(z, COSINE), most)
-            near = add("lt", self._fabs(x), number(TURNS_LIMIT))
+            sine, cosine = self.polynomials(r, add("mul", r, r))
+            near = add("lt", self.fabs(x), number(TURNS_LIMIT))
             self.turned[x] = Turned(sine, cosine, turns, near)
         return self.turned[x]
 
-    def _atan2(self, y: Name, x: Name) -> Name:
+    def polynomials(self, r: Name, z: Name) -> tuple[Name, Name]:
+        """Sine and cosine of an angle within a quarter turn about zero, z its square."""
+        add, number = self.add, self.listing.number
+        sine = add("fma", add("mul", r, z), self.polynomial(z, SINE), r)
+        most = add("fnma", number(0.5), z, number(1.0))
+        return sine, add("fma", add("mul", z, z), self.polynomial(z, COSINE), most)
+
+    def arc(self, y: Name, x: Name) -> Name:
         """As `atan2_v`: the arc of lesser over greater coordinate, and eighths of a turn."""
-        add, number, bits = self.listing.add, self.listing.number, self.listing.bits
-        across, along = self._fabs(y), self._fabs(x)
+        add, number, bits = self.add, self.listing.number, self.listing.bits
+        across, along = self.fabs(y), self.fabs(x)
         total = add("add", across, along)
         steep, back = add("lt", along, across), add("lt", x, number(0.0))
         most, least = add("choose", steep, across, along), add("choose", steep, along, across)
@@ -245,32 +235,18 @@ class _Lowering:
         t = add("div", top, add("choose", wide, total, most))
         z = add("mul", t, t)
         zz = add("mul", z, z)
-        odd, even = self._polynomial(zz, ARC[1::2]), self._polynomial(zz, ARC[::2])
+        odd, even = self.polynomial(zz, ARC[1::2]), self.polynomial(zz, ARC[::2])
         arc = add("fma", t, add("mul", z, add("fma", z, odd, even)), t)
-        eighths = self._truth(wide)
+        eighths = self.truth(wide)
         eighths = add("choose", steep, add("sub", number(2.0), eighths), eighths)
         eighths = add("choose", back, add("sub", number(4.0), eighths), eighths)
         turned = add("and", add("xor", steep, back), bits(SIGN))
         arc = add("fma", eighths, number(EIGHTH_TURN[1]), add("xor", arc, turned))
-        arc = self._copysign(add("fma", eighths, number(EIGHTH_TURN[0]), arc), y)
+        arc = self.copysign(add("fma", eighths, number(EIGHTH_TURN[0]), arc), y)
         plain = add("and", add("lt", number(0.0), total), add("lt", total, number(1e308)))
         return add("mend", arc, plain, y, x, data="atan2")
 
 
-FUNCTIONS: dict[str, Callable[..., Name]] = {
-    "neg": _Lowering._neg,
-    "fabs": _Lowering._fabs,
-    "copysign": _Lowering._copysign,
-    "not": _Lowering._not,
-    "and": _Lowering._and,
-    "or": _Lowering._or,
-    "where": _Lowering._where,
-    "sin": _Lowering._sin,
-    "cos": _Lowering._cos,
-    "atan2": _Lowering._atan2,
-}
-
-
-def _integer(data: object) -> int:
+def integer(data: object) -> int:
     assert isinstance(data, int)
     return data
