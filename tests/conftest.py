@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import sys
 import tomllib
 import warnings
@@ -22,8 +21,6 @@ from condyle.mechanism import bundled_text
 for _name in ("FORCE_COLOR", "GITHUB_ACTIONS", "LINES", "NO_COLOR", "PY_COLORS", "TERMINAL_WIDTH"):
     os.environ.pop(_name, None)
 os.environ["COLUMNS"] = "100"
-# One compiler is enough: with two, kernels are built by both and measured.
-os.environ.setdefault("CC", "cc" if shutil.which("cc") else "")
 
 sys.path.insert(0, str(Path(__file__).parent))  # `from oracles import ...` from any folder
 

@@ -1,4 +1,4 @@
-"""Batches as assembly, before it is printed: lowered, put in order, given registers.
+"""Assembly before it is printed: lowered, put in order, given registers.
 
 No compiler and no particular processor is needed; `test_x86_batch` runs what is printed.
 """
@@ -19,11 +19,13 @@ from support.x86 import NEVER, Reads, Step, loads, random_listing, run_by_name, 
 
 from condyle.backends.c.emit import fused
 from condyle.backends.c.loops import LONG, Loops
+from condyle.backends.c.straight import Straight
 from condyle.backends.numpy import NumpyKernel
 from condyle.backends.x86.allocate import allocated
+from condyle.backends.x86.batch import batch
 from condyle.backends.x86.listing import Instruction, Listing, Name, contracted
-from condyle.backends.x86.lower import lowered
 from condyle.backends.x86.order import ordered
+from condyle.backends.x86.single import single
 from condyle.backends.x86.text import REGISTERS
 from condyle.dynamics import FORMULATIONS
 from condyle.graph.graph import Graph
@@ -49,13 +51,16 @@ NUMBERS = [
 TOLERANCE = 1e-12  # as of every other way to run a question; see test_values
 
 
-def step(mechanism: str, question: str, formulation: str, route: str, width: int) -> Loops:
-    """A question's batch step, as `emit` has it."""
+def variants(mechanism: str, question: str, formulation: str, route: str) -> Variants:
     own = load(mechanism)
     given = Prescribed(independent_coordinates(own))
     details = (given,) if question in ("closure", "conditions") else ()
-    structure = structure_of(own, formulation, route)
-    return Loops(fused(Question.about(structure, question, *details).variants().main), width)
+    return Question.about(structure_of(own, formulation, route), question, *details).variants()
+
+
+def step(mechanism: str, question: str, formulation: str, route: str, width: int) -> Loops:
+    """A question's batch step, as `emit` has it."""
+    return Loops(fused(variants(mechanism, question, formulation, route).main), width)
 
 
 def dealt() -> list[tuple[str, str, str, int]]:
@@ -77,22 +82,22 @@ def check_order(order: Sequence[Instruction], code: Sequence[Instruction]) -> No
     """The same instructions, arguments first."""
     assert Counter(order) == Counter(code)
     defined: set[Name] = set()
-    for _, to, args, _ in order:
+    for _, to, args, _, _ in order:
         assert all(a < 0 or a in defined for a in args)
         if to is not None:
             defined.add(to)
 
 
-def check_whole(code: Sequence[Instruction], registers: int) -> None:
+def check_whole(code: Sequence[Instruction], registers: int, hurried: bool = False) -> None:
     """Order and allocation of a listing, from one end to the other."""
-    order = ordered(code, registers)
+    order = ordered(code, registers, hurried)
     check_order(order, code)
     run_by_name(order, allocated(order, registers), registers)
 
 
 def check_numbers(loops: Loops, numbers: Numbers, inputs: dict[str, np.ndarray]) -> None:
     """Move by move, on numbers: as the backend of numpy."""
-    listing, registers = lowered(loops), REGISTERS[loops.width]
+    listing, registers = batch(loops), REGISTERS[loops.width]
     moves, _ = allocated(ordered(listing.code, registers), registers)
     state = Step(loops, numbers, inputs)
     rows = run_by_number(moves, state.home(listing), len(outputs(listing.code)))
@@ -111,9 +116,27 @@ def outputs(code: Sequence[Instruction]) -> list[int]:
 @pytest.mark.parametrize(("mechanism", "question", "formulation", "width"), dealt())
 def test_questions(mechanism: str, question: str, formulation: str, width: int) -> None:
     loops = step(mechanism, question, formulation, "core", width)
-    code = lowered(loops).code
+    code = batch(loops).code
     assert sorted(outputs(code)) == list(range(len(list(loops.outputs()))))
     check_whole(code, REGISTERS[width])
+
+
+@pytest.mark.parametrize("width", REGISTERS)
+@pytest.mark.parametrize("question", ["inverse", "forward"])
+@pytest.mark.parametrize("mechanism", MECHANISMS)
+def test_one_evaluation(mechanism: str, question: str, width: int) -> None:
+    """Of each program that `emit` prints: results are stored once, by ones, twos, fours, eights."""
+    own = variants(mechanism, question, "virtual_power", "core")
+    assert own.single
+    for p in (own.latency or own.main, own.robust):
+        if p is None:
+            continue
+        straight = Straight(fused(p), width)
+        code = single(straight).code
+        check_whole(code, REGISTERS[width], hurried=True)
+        stored = [i.data + k for i in code if i.op == "output" for k in range(i.lanes)]
+        wanted = [at + k for at, _, _, used in straight.stored() for k in range(used)]
+        assert stored == wanted == list(range(len(wanted)))
 
 
 @pytest.mark.parametrize(("formulation", "route", "width"), NUMBERS)
@@ -195,6 +218,14 @@ def test_order_is_the_same_every_time() -> None:
     assert ordered(code, 16) == ordered(list(code), 16)
 
 
+def test_the_longest_way_goes_first() -> None:
+    """In one evaluation; a batch keeps the program's order."""
+    free = listing_of(*(("mul", k, (-1, -2)) for k in range(20, 24)))
+    chain = listing_of(("sqrt", 1, (-1,)), *(("add", k + 1, (k, -1)) for k in range(1, 9)))
+    assert ordered([*free, *chain], 16, hurried=True)[0] == chain[0]
+    assert ordered([*free, *chain], 16)[0] == free[0]
+
+
 def test_what_waits_lets_others_pass() -> None:
     """A quotient takes long; what needs it comes after all that does not."""
     quotient = listing_of(("div", 1, (-1, -2)), ("add", 2, (1, -1)))
@@ -271,8 +302,8 @@ def test_slots_are_used_again() -> None:
     """Forty values wait twice over, the second time where the first have gone."""
     once = sum_of_products(40)
     again = [
-        Instruction(op, to and to + 100, tuple(a + 100 if a > 0 else a for a in args), data)
-        for op, to, args, data in once
+        i._replace(to=i.to and i.to + 100, args=tuple(a + 100 if a > 0 else a for a in i.args))
+        for i in once
     ]
     assert 40 - 8 <= allocated([*once, *again], 8).slots < 40
 

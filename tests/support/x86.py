@@ -1,4 +1,4 @@
-"""Batches for x86: small listings made at random, and machines that run what became of a listing.
+"""Code for x86: small listings made at random, and machines that run what became of a listing.
 
 One machine knows values by name, and finds out whether each stands where it is read; the other
 knows them as numbers.
@@ -30,9 +30,9 @@ IN_MEMORY = {
     **dict.fromkeys(("add", "mul", "and", "or", "xor"), (0, 1)),
     **dict.fromkeys(("sub", "div", "min", "max", "lt", "le", "eq", "ne"), (1,)),
     **dict.fromkeys(FUSED, (0, 1, 2)),
-    "sqrt": (0,),
+    **dict.fromkeys(("sqrt", "spread"), (0,)),
 }
-ARITY = {name: 1 for name in ("sqrt", "rsqrt", "shift", "output")}
+ARITY = {name: 1 for name in ("sqrt", "spread", "rsqrt", "shift", "output")}
 ARITY |= {name: 3 for name in (*FUSED, "choose", "mend")}
 
 
@@ -50,7 +50,8 @@ def random_listing(rng: np.random.Generator, count: int, homes: int = 6) -> list
             args = (args[0], *args)
         if op == "mend" and rng.random() < 0.5:
             args = (*args, int(rng.choice(choice)))
-        code.append(Instruction(op, to, args, 63 if op == "shift" else "f"))
+        lanes = int(rng.choice((0, 1, 2, 4)))
+        code.append(Instruction(op, to, args, 63 if op == "shift" else "f", lanes))
         unread = [*(v for v in unread if v not in args), to]
     stored = [*unread, -1]
     return [*code, *(Instruction("output", None, (v,), i) for i, v in enumerate(stored))]
@@ -80,7 +81,7 @@ def run_by_name(code: Sequence[Instruction], allocation: Allocation, registers: 
     i = 0
     value: Name | None
     for move in allocation.moves:
-        op, to, args, data = move
+        op, to, args = move[:3]
         given = tuple(a.number if a.kind == "home" else stands[a] for a in args)
         if op == "store":
             assert to is not None and to.kind == "slot" and 0 <= to.number < allocation.slots
@@ -94,7 +95,7 @@ def run_by_name(code: Sequence[Instruction], allocation: Allocation, registers: 
             assert (args[0].kind == "register") == (op == "copy")
             value, freed = given[0], i
         else:
-            assert (op, given, data) == (code[i].op, code[i].args, code[i].data)
+            assert (op, given, *move[3:]) == (code[i].op, code[i].args, *code[i][3:])
             check_operands(move)
             value, freed = code[i].to, i + 1
             i += 1
@@ -113,6 +114,8 @@ def check_operands(move: Move) -> None:
     """One operand in memory at most, where it may be; what overwrites takes an argument's place."""
     memory = [k for k, a in enumerate(move.args) if a.kind != "register"]
     assert len(memory) <= 1
+    if move.op in ("and", "or", "xor") and move.lanes == 1:
+        assert all(move.args[k].kind == "home" for k in memory), "a slot has one number, not two"
     assert all(k in IN_MEMORY.get(move.op, ()) for k in memory)
     if move.op in FUSED:
         assert move.to in move.args
@@ -180,7 +183,7 @@ def run_by_number(
     stands: dict[Place, np.ndarray] = {}
     found: list[np.ndarray | None] = [None] * rows
     with np.errstate(all="ignore"):
-        for op, to, places, data in moves:
+        for op, to, places, data, _ in moves:
             args = [home(p.number) if p.kind == "home" else stands[p] for p in places]
             if op == "output":
                 assert isinstance(data, int) and found[data] is None
@@ -217,7 +220,7 @@ class Step:
     def home(self, listing: Listing) -> Callable[[Name], np.ndarray]:
         def value(name: Name) -> np.ndarray:
             kind, number = listing.home(name)
-            if kind == "input":
+            if kind == "sample":
                 return self.columns[number]
             x = self.table[number] if kind == "table" else as_float(Home(kind, number))
             return np.full(self.count, x)

@@ -10,9 +10,8 @@ from ..c.straight import Straight
 from .listing import Listing, Name, contracted
 from .lower import Lowering, integer
 
-NEAR = (
-    0.785  # below pi/4 nothing is taken off an angle; an evaluation far from home may take longer
-)
+# Below pi/4 nothing is taken off an angle; beyond, the C library is asked, which takes longer.
+NEAR = 0.785
 
 
 def single(straight: Straight) -> Listing:
