@@ -20,13 +20,13 @@ from support.x86 import NEVER, Reads, Step, loads, random_listing, run_by_name, 
 from condyle.backends.c.emit import fused
 from condyle.backends.c.loops import LONG, Loops
 from condyle.backends.c.straight import Straight
+from condyle.backends.c.x86.allocate import allocated
+from condyle.backends.c.x86.batch import batch
+from condyle.backends.c.x86.listing import Instruction, Listing, Name, contracted
+from condyle.backends.c.x86.order import ordered
+from condyle.backends.c.x86.single import single
+from condyle.backends.c.x86.text import REGISTERS
 from condyle.backends.numpy import NumpyKernel
-from condyle.backends.x86.allocate import allocated
-from condyle.backends.x86.batch import batch
-from condyle.backends.x86.listing import Instruction, Listing, Name, contracted
-from condyle.backends.x86.order import ordered
-from condyle.backends.x86.single import single
-from condyle.backends.x86.text import REGISTERS
 from condyle.dynamics import FORMULATIONS
 from condyle.graph.graph import Graph
 from condyle.graph.operations import REDUCTIONS

@@ -18,9 +18,9 @@ from support.programs import no_numbers, program
 
 from condyle.backends.c.emit import emit
 from condyle.backends.c.kernel import CompiledKernel
+from condyle.backends.c.x86.text import REGISTERS
 from condyle.backends.compiler import Compiler, find_compiler
 from condyle.backends.numpy import NumpyKernel
-from condyle.backends.x86.text import REGISTERS
 from condyle.graph.graph import Graph
 from condyle.graph.program import Output, Program, Variants
 from condyle.model.evaluator import Evaluator

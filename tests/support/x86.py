@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from condyle.backends.c.loops import Loops
+from condyle.backends.c.x86.allocate import Allocation, Move, Place
+from condyle.backends.c.x86.listing import Home, Instruction, Listing, Name
 from condyle.backends.kernel import arranged, columns_of
 from condyle.backends.numpy import NumpyKernel
-from condyle.backends.x86.allocate import Allocation, Move, Place
-from condyle.backends.x86.listing import Home, Instruction, Listing, Name
 from condyle.graph.operations import OPERATIONS
 from condyle.graph.program import Numbers, Output, Variants
 

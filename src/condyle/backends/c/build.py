@@ -33,8 +33,7 @@ def loaded(key: str, build: Callable[[], Variants]) -> tuple[cache.Entry, ctypes
 def _generator() -> str:
     """A hash of the code that turns graphs into C, and C into libraries."""
     room = Path(str(files(__package__)))
-    both = (path for own in (room, room.parent / "x86") for path in own.iterdir())
-    sources = sorted(path for path in both if path.suffix in (".py", ".h"))
+    sources = sorted(path for path in room.rglob("*") if path.suffix in (".py", ".h"))
     return cache.digest(*(path.read_bytes() for path in [*sources, room.parent / "compiler.py"]))
 
 

@@ -5,7 +5,7 @@
     batch(table, in, strides, ...)   most throughput: all values vectors over W samples
 
 Both are printed from the same graph, as assembly where the processor has AVX2 or AVX-512 (see
-`backends/x86`), else as C: one evaluation by `straight`, a batch by `loops`. They are texts of
+`x86`), else as C: one evaluation by `straight`, a batch by `loops`. They are texts of
 their own, since compilers do best by each with other flags.
 """
 
@@ -17,12 +17,12 @@ from importlib.resources import files
 from ...graph.fuse import fuse
 from ...graph.program import Interface, Program, Variants
 from ..kernel import AGAIN
-from ..x86.batch import batch as batch_listing
-from ..x86.single import single as single_listing
-from ..x86.text import Batch, Single, is_spread
 from .loops import Loops
 from .prepare import prepare
 from .straight import Straight
+from .x86.batch import batch as batch_listing
+from .x86.single import single as single_listing
+from .x86.text import Batch, Single, is_spread
 
 CHAIN = 5  # terms above which a sum becomes two that run side by side
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ...graph.graph import Value
-from ..c.loops import Loops
+from ....graph.graph import Value
+from ..loops import Loops
 from .listing import Listing, Name, contracted
 from .lower import Lowering, integer
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from functools import reduce
 
-from ...graph.graph import Value
-from ...graph.schedule import scheduled
-from ..c.straight import Straight
+from ....graph.graph import Value
+from ....graph.schedule import scheduled
+from ..straight import Straight
 from .listing import Listing, Name, contracted
 from .lower import Lowering, integer
 

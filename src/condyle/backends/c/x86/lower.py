@@ -11,9 +11,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ...graph.graph import Value
-from ...graph.operations import REDUCTIONS
-from ..c.printer import Printer
+from ....graph.graph import Value
+from ....graph.operations import REDUCTIONS
+from ..printer import Printer
 from .listing import Listing, Name
 
 # Minimax polynomials of sine and cosine, lowest power first (Cephes), and pi / 2 in three parts.
