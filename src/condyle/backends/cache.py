@@ -63,7 +63,7 @@ class Contents:
 
     kernels: those that are whole.
     size:    of all that is there [bytes], also of what is broken or half built.
-    choices: kind of code -> kernels that are of that kind.
+    choices: kind of code -> kernels of that kind, where that is known.
     """
 
     folder: Path
@@ -157,7 +157,8 @@ def contents() -> Contents:
         for path in entries
         if path.suffix == ".json" and (entry := _whole(folder, path.stem)) is not None
     ]
-    choices = dict(sorted(Counter(_kind(entry.facts) for entry in kernels).items()))
+    known = (_kind(entry.facts) for entry in kernels if "assembly" in entry.facts)
+    choices = dict(sorted(Counter(known).items()))
     half_built = [
         Path(top, name)
         for place in folder.glob(f"{BUILD}*")
@@ -173,9 +174,9 @@ def contents() -> Contents:
 
 def _kind(facts: Facts) -> str:
     """What code a library was made of."""
-    if facts.get("assembly"):
+    if facts["assembly"]:
         return f"assembly for {'AVX-512' if facts['lanes'] == 8 else 'AVX2'}"
-    return f"C by {Path(facts.get('compiler', ['a compiler'])[0]).name}"
+    return f"C by {Path(facts['compiler'][0]).name}"
 
 
 def clear() -> Contents:

@@ -146,8 +146,10 @@ class Watch:
         ends = value(step.t0), value(step.t1)
         if not ends[0] < 0 < ends[1]:
             return step.t0 if ends[0] >= 0 else step.t1
+        # The event has happened, by more than rounding: whoever goes on does not meet it again.
         t, on = float(brentq(value, step.t0, step.t1, xtol=TOLERANCE, rtol=1e-15)), TOLERANCE
-        while t < step.t1 and value(t) <= 0:  # the event has happened: it is not met again
+        t = min(t + on, step.t1)
+        while t < step.t1 and value(t) <= 0:
             t, on = min(t + on, step.t1), 2 * on
         return t
 

@@ -25,8 +25,13 @@ def loaded(key: str, build: Callable[[], Variants]) -> tuple[cache.Entry, ctypes
     Raises: CompilerError: where it cannot be built, or loaded once it is.
     """
     compiler = find_compiler()
-    recipe = cache.digest(key, _generator(), tool(compiler))
+    recipe = _recipe(key, compiler)
     return obtained(recipe, lambda folder: _make(folder, build(), compiler), load)
+
+
+def _recipe(key: str, compiler: Compiler) -> str:
+    """Name of everything that shapes a kernel."""
+    return cache.digest(key, _generator(), tool(compiler))
 
 
 @lru_cache(maxsize=1)
