@@ -14,7 +14,7 @@ run: $(VENV)/run.stamp
 	$(BIN)/condyle run --out results --figures
 
 # Rooms that people's words and files come through. Measuring all takes half as long again.
-ROOMS := cli mechanism motion
+ROOMS := cli markers mechanism motion
 COVERED := $(ROOMS:%=tests/%) tests/surfaces
 
 test: lint house

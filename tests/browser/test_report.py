@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.motion import Beside, Motion
+from condyle.markers import Beside
+from condyle.motion import Motion
 from condyle.report.page import write_report
 from condyle.results.solution import Solution
 

@@ -9,7 +9,8 @@ import pytest
 
 import condyle
 from condyle.errors import InputError
-from condyle.motion import Beside, Load, Motion
+from condyle.markers import Beside
+from condyle.motion import Load, Motion
 from condyle.report.scene import contact_patch, place, platform_hull, rotations
 from condyle.results.solution import Solution
 from condyle.view import open_view

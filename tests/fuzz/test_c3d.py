@@ -11,7 +11,7 @@ from oracles.recorded_jaw import record
 
 import condyle
 from condyle.errors import CondyleError
-from condyle.motion import from_c3d
+from condyle.markers import from_c3d
 
 HEAD = 3 * 512  # header and parameters, where single bytes matter
 

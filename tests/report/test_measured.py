@@ -12,7 +12,8 @@ import pytest
 from matplotlib.collections import QuadMesh
 
 import condyle
-from condyle.motion import Beside, Motion, bundled_reference
+from condyle.markers import Beside
+from condyle.motion import Motion, bundled_reference
 from condyle.report.figures import PLOTS
 from condyle.report.page import reduce as reducing
 from condyle.report.page import report_html

@@ -11,8 +11,8 @@ from oracles.recorded_jaw import FIXED, LOWER, PLATFORM, record
 
 import condyle
 from condyle.errors import InputError
-from condyle.motion import Motion, from_c3d, read_beside, write_table
-from condyle.motion.markers import Beside
+from condyle.markers import Beside, from_c3d, read_beside
+from condyle.motion import Motion, write_table
 from condyle.results.solution import Solution, open_solution
 
 

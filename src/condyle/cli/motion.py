@@ -95,9 +95,9 @@ def from_c3d(
     """
     import condyle
 
+    from .. import markers as marked
     from ..errors import UnsupportedError
     from ..extras import require
-    from ..motion import markers as marked
 
     require("c3d", "c3d")
 

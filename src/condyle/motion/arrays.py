@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from condyle.errors import InputError
+from ..errors import InputError
 
 
 def as_samples(values: Any, name: str, source: str, size: int | None = None) -> np.ndarray:

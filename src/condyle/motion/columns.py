@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from condyle.errors import InputError
-from condyle.motion.units import Dimension, Units, dimension
-from condyle.motion.words import columns_are, guess
+from ..errors import InputError
+from .units import Dimension, Units, dimension
+from .words import columns_are, guess
 
 Known = Collection[str] | Mapping[str, Dimension]
 

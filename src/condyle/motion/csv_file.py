@@ -19,11 +19,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from condyle.errors import InputError
-from condyle.motion.columns import Known, Table
-from condyle.motion.csv_head import NUMBER, Head, Source, opened, read_head, read_line, split
-from condyle.motion.header import Header, read_header
-from condyle.motion.words import listed, printable, short
+from ..errors import InputError
+from .columns import Known, Table
+from .csv_head import NUMBER, Head, Source, opened, read_head, read_line, split
+from .header import Header, read_header
+from .words import listed, printable, short
 
 _CELL = 20  # bytes that a number takes with its separator
 

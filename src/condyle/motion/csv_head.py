@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from io import BufferedReader, FileIO, TextIOWrapper
 from typing import Protocol
 
-from condyle.errors import InputError, no_such_file
-from condyle.motion.words import printable, short
+from ..errors import InputError, no_such_file
+from .words import printable, short
 
 LONGEST = 1 << 24  # bytes of a line: beyond, it is no table
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from condyle.errors import InputError
-from condyle.motion.columns import Known, Table, checked_columns
-from condyle.motion.header import read_header
-from condyle.motion.words import short
+from ..errors import InputError
+from .columns import Known, Table, checked_columns
+from .header import read_header
+from .words import short
 
 
 def is_frame(data: Any) -> bool:

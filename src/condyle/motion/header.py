@@ -8,9 +8,9 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
-from condyle.errors import InputError
-from condyle.motion.units import Dimension, dimension, is_unit, unit_factor
-from condyle.motion.words import columns_are, guess, listed, short
+from ..errors import InputError
+from .units import Dimension, dimension, is_unit, unit_factor
+from .words import columns_are, guess, listed, short
 
 MAX_COLUMNS = 10_000
 

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from condyle.errors import InputError
-from condyle.motion.arrays import as_samples, check_rising
-from condyle.motion.columns import Table
-from condyle.motion.digest import digest
-from condyle.motion.frame import is_frame, table_from_frame
-from condyle.motion.suspicion import load_warnings
-from condyle.motion.table import read_table
-from condyle.motion.units import FORCE, MOMENT
+from ..errors import InputError
+from .arrays import as_samples, check_rising
+from .columns import Table
+from .digest import digest
+from .frame import is_frame, table_from_frame
+from .suspicion import load_warnings
+from .table import read_table
+from .units import FORCE, MOMENT
 
 _SLACK = 1e-9  # [s], by which times may miss the load's ends through rounding
 

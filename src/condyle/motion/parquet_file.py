@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from condyle.errors import InputError, no_such_file
-from condyle.motion.columns import Known, Table, checked_columns
-from condyle.motion.header import read_header
-from condyle.motion.words import printable, short
+from ..errors import InputError, no_such_file
+from .columns import Known, Table, checked_columns
+from .header import read_header
+from .words import printable, short
 
 _BUFFER = 1 << 20  # bytes of a column at once; the library's own choice keeps whole files
 

@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from condyle.errors import InputError
-from condyle.motion.arrays import as_samples, check_rising
-from condyle.motion.columns import Table
-from condyle.motion.digest import digest
-from condyle.motion.frame import is_frame, table_from_frame
-from condyle.motion.memory import memory_at_hand
-from condyle.motion.smoothing import Smoothing, parse_cutoff, smoothing_spline
-from condyle.motion.suspicion import motion_warnings
-from condyle.motion.table import read_table
-from condyle.motion.units import LANDMARK, POSE, Units, parse_units
-from condyle.motion.words import listed
+from ..errors import InputError
+from .arrays import as_samples, check_rising
+from .columns import Table
+from .digest import digest
+from .frame import is_frame, table_from_frame
+from .memory import memory_at_hand
+from .smoothing import Smoothing, parse_cutoff, smoothing_spline
+from .suspicion import motion_warnings
+from .table import read_table
+from .units import LANDMARK, POSE, Units, parse_units
+from .words import listed
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from condyle.errors import InputError
-from condyle.motion.words import guess, listed
+from ..errors import InputError
+from .words import guess, listed
 
 DEFAULT_LANDMARK = "incisor"
 DEFAULT_LOAD_POINT = "right_molar"

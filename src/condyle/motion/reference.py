@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from condyle.atomic import replacing
-from condyle.motion.load import Load
-from condyle.motion.path import Motion
+from ..atomic import replacing
+from .load import Load
+from .path import Motion
 
 MOTION_FILE = "chewing-incisor.csv"
 LOAD_FILE = "bite-force.csv"

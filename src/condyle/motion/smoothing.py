@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from condyle import progress
-from condyle.errors import InputError
-from condyle.motion.units import ANGLE_UNITS, POSE
+from .. import progress
+from ..errors import InputError
+from .units import ANGLE_UNITS, POSE
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline

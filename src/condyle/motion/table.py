@@ -10,8 +10,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from condyle.motion.columns import Known, Table
-from condyle.progress import step
+from ..progress import step
+from .columns import Known, Table
 
 CHUNK_ROWS = 16_384
 
@@ -52,9 +52,9 @@ def iter_table(
             before the one with the error have been yielded by then.
     """
     if is_parquet(path):
-        from condyle.motion.parquet_file import iter_parquet as read  # pyarrow takes a while
+        from .parquet_file import iter_parquet as read  # pyarrow takes a while
     else:
-        from condyle.motion.csv_file import iter_csv as read
+        from .csv_file import iter_csv as read
     with step(f"{doing} {Path(path).name}", _size(path)) as advance:
         chunks = read(path, chunk_rows, known, gaps)
         # A pipe may keep us waiting, and a thread that waits cannot be interrupted.

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Self
 
 import numpy as np
 
-from condyle.atomic import replacing
-from condyle.motion.table import is_parquet
+from ..atomic import replacing
+from .table import is_parquet
 
 if TYPE_CHECKING:
     import pyarrow as pa

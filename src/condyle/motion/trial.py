@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from condyle.mechanism.home import characteristic_length, independent_coordinates
-from condyle.mechanism.mechanism import Mechanism
-from condyle.motion.path import Motion
-from condyle.motion.reference import rise
+from ..mechanism.home import characteristic_length, independent_coordinates
+from ..mechanism.mechanism import Mechanism
+from .path import Motion
+from .reference import rise
 
 SWAY = 0.03  # of the characteristic length, and in radians
 SLOWEST, STEP = 0.4, 0.15  # of the first coordinate's sway, and from one to the next [Hz]

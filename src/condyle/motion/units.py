@@ -6,8 +6,8 @@ import math
 import re
 from dataclasses import dataclass, field
 
-from condyle.errors import InputError
-from condyle.motion.words import guess, short
+from ..errors import InputError
+from .words import guess, short
 
 POSE = ("X", "Y", "Z", "alpha", "beta", "gamma")
 LANDMARK = ("x", "y", "z")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from condyle.errors import nearest
+from ..errors import nearest
 
 SHOWN = 10  # names in a message; of more, the count is told
 

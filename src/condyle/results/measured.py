@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError, did_you_mean
-from ..motion import Beside, read_beside
-from ..motion.markers.bryant import rotations
+from ..markers import Beside, read_beside
+from ..markers.bryant import rotations
 
 if TYPE_CHECKING:
     from .solution import Solution

@@ -15,9 +15,10 @@ import xarray as xr
 from ..atomic import replacing
 from ..errors import InputError, no_such_file
 from ..extras import require
+from ..markers import Beside
 from ..mechanism.files import recall
 from ..mechanism.mechanism import Mechanism
-from ..motion import Beside, write_table
+from ..motion import write_table
 from ..progress import step
 from .accessors import extend
 from .contacts import AXES, BOUND_TOLERANCE, bound_margins, lift_off, lift_off_columns

@@ -38,7 +38,7 @@ from .tracks import track_panels
 if TYPE_CHECKING:
     import xarray as xr
 
-    from ...motion import Beside
+    from ...markers import Beside
     from ...results.solution import Solution
     from ..tables import Table
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...markers.bryant import rotations
 from ...mechanism import Mechanism
-from ...motion.markers.bryant import rotations
 from .chains import ChainDrawing, drawing_points
 
 

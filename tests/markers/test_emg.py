@@ -10,7 +10,7 @@ import pytest
 from oracles.recorded_jaw import Jaw, record
 
 from condyle.errors import InputError
-from condyle.motion import from_c3d
+from condyle.markers import from_c3d
 
 SAMPLES = 10  # a frame, 1000 Hz
 CHAINS = ("superficial_masseter_left", "superficial_masseter_right")

@@ -6,10 +6,10 @@ import os
 from contextlib import ExitStack
 from pathlib import Path
 
-from condyle.errors import InputError
-from condyle.motion.markers.measured import MarkerMotion
-from condyle.motion.table_writer import TableWriter
-from condyle.motion.units import FORCE, MOMENT, POSE
+from ..errors import InputError
+from ..motion.table_writer import TableWriter
+from ..motion.units import FORCE, MOMENT, POSE
+from .measured import MarkerMotion
 
 
 def write_motion(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from condyle.motion.markers.measured import MarkerMotion
+    from .measured import MarkerMotion
 
 _LISTED = 12  # gaps in the text; all are in the data
 

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from condyle.errors import InputError, did_you_mean
-from condyle.motion.markers.channel_tables import Emg
-from condyle.motion.markers.labels import find_label
-from condyle.motion.markers.recording import Recording
-from condyle.motion.words import short
+from ..errors import InputError, did_you_mean
+from ..motion.words import short
+from .channel_tables import Emg
+from .labels import find_label
+from .recording import Recording
 
 if TYPE_CHECKING:
-    from condyle.mechanism.mechanism import Mechanism
+    from ..mechanism.mechanism import Mechanism
 
 _ORDER = 2  # of each filter, run forwards and backwards: no lag, fourth order in all
 _SHORTEST = 3  # periods of a filter that a recording must last

@@ -10,13 +10,13 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
-from condyle.errors import InputError, few, no_such_file, shortened
-from condyle.mechanism.messages import describe, shown
-from condyle.mechanism.table import Table
-from condyle.mechanism.toml import LARGEST_FILE, read_tables
-from condyle.motion.markers.channel_tables import Emg, Forces
-from condyle.motion.markers.rigid import FEWEST
-from condyle.motion.words import listed, short
+from ..errors import InputError, few, no_such_file, shortened
+from ..mechanism.messages import describe, shown
+from ..mechanism.table import Table
+from ..mechanism.toml import LARGEST_FILE, read_tables
+from ..motion.words import listed, short
+from .channel_tables import Emg, Forces
+from .rigid import FEWEST
 
 DIRECTIONS = ("forward", "up")
 ORIGIN = "origin"

@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from condyle.mechanism.messages import shown
-from condyle.mechanism.table import Table
+from ..mechanism.messages import shown
+from ..mechanism.table import Table
 
 _Label = Annotated[str, Field(min_length=1, max_length=200)]
 _Hertz = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]

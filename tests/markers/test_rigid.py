@@ -7,8 +7,8 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from condyle.motion.markers.bryant import bryant_angles
-from condyle.motion.markers.rigid import common_shape, fit
+from condyle.markers.bryant import bryant_angles
+from condyle.markers.rigid import common_shape, fit
 
 SHAPE = np.array([[80, 30, 20], [50, 45, 25], [82, -28, 22], [48, -44, 35.0]]) * 1e-3
 

@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from condyle.errors import InputError
-from condyle.motion.path import MIN_ROWS
+from ..errors import InputError
+from ..motion.path import MIN_ROWS
 
 _SLACK = 1e-6  # of a frame
 _NAMED = 5  # gaps that an error names

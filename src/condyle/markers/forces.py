@@ -7,21 +7,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from condyle.errors import InputError
-from condyle.motion.load import Load
-from condyle.motion.markers.bodies import Bodies
-from condyle.motion.markers.bryant import rotations
-from condyle.motion.markers.channel_tables import Forces
-from condyle.motion.markers.labels import find_label
-from condyle.motion.markers.plates import CHANNELS, Plate
-from condyle.motion.markers.recording import Recording
-from condyle.motion.markers.registration import Registration
-from condyle.motion.points import DEFAULT_LOAD_POINT, resolve_load_point
-from condyle.motion.units import Dimension, unit_factor
-from condyle.motion.words import listed, short
+from ..errors import InputError
+from ..motion.load import Load
+from ..motion.points import DEFAULT_LOAD_POINT, resolve_load_point
+from ..motion.units import Dimension, unit_factor
+from ..motion.words import listed, short
+from .bodies import Bodies
+from .bryant import rotations
+from .channel_tables import Forces
+from .labels import find_label
+from .plates import CHANNELS, Plate
+from .recording import Recording
+from .registration import Registration
 
 if TYPE_CHECKING:
-    from condyle.mechanism.mechanism import Mechanism
+    from ..mechanism.mechanism import Mechanism
 
 _FORCE, _MOMENT, _LENGTH = ("force", 0), ("moment", 0), ("length", 0)
 _IN = {_FORCE: "N, kN or mN", _MOMENT: "N m or N mm", _LENGTH: "m, cm or mm"}

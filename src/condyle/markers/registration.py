@@ -8,10 +8,10 @@ from itertools import permutations
 
 import numpy as np
 
-from condyle.errors import InputError, did_you_mean
-from condyle.mechanism.mechanism import Mechanism
-from condyle.motion.markers.marker_file import ORIGIN, MarkerFile, Place
-from condyle.motion.markers.rigid import FLATTEST, breadth, fit
+from ..errors import InputError, did_you_mean
+from ..mechanism.mechanism import Mechanism
+from .marker_file import ORIGIN, MarkerFile, Place
+from .rigid import FLATTEST, breadth, fit
 
 _ALONG = 0.999  # cosine between forward and up, above which they are one direction
 _BETTER = 1 / 3  # of the misfit, with names exchanged, so that it is said

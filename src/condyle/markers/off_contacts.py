@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from condyle.mechanism.mechanism import Mechanism
+from ..mechanism.mechanism import Mechanism
 
 
 def off_contacts(

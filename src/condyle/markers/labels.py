@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from condyle.errors import InputError
-from condyle.motion.words import guess, listed
+from ..errors import InputError
+from ..motion.words import guess, listed
 
 
 def find_label(name: str, labels: Sequence[str], where: str, what: str = "marker") -> int:

@@ -11,27 +11,27 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from condyle.errors import InputError
-from condyle.mechanism import load as load_mechanism
-from condyle.mechanism.mechanism import Mechanism
-from condyle.motion.load import Load
-from condyle.motion.markers.beside import Beside
-from condyle.motion.markers.bodies import Bodies, Body, find_bodies
-from condyle.motion.markers.bryant import bryant_angles
-from condyle.motion.markers.channel_tables import Forces
-from condyle.motion.markers.diagnosis import odd_sizes, suspects_in, why_none
-from condyle.motion.markers.emg import envelopes
-from condyle.motion.markers.forces import measured_load
-from condyle.motion.markers.gaps import Gap, close_gaps
-from condyle.motion.markers.labels import find_label
-from condyle.motion.markers.marker_file import MarkerFile, Place, read_markers
-from condyle.motion.markers.off_contacts import off_contacts
-from condyle.motion.markers.recording import Recording, read_c3d
-from condyle.motion.markers.registration import Registration, register
-from condyle.motion.markers.summary import in_words
-from condyle.motion.path import Motion
-from condyle.motion.units import POSE
-from condyle.motion.words import listed
+from ..errors import InputError
+from ..mechanism import load as load_mechanism
+from ..mechanism.mechanism import Mechanism
+from ..motion.load import Load
+from ..motion.path import Motion
+from ..motion.units import POSE
+from ..motion.words import listed
+from .beside import Beside
+from .bodies import Bodies, Body, find_bodies
+from .bryant import bryant_angles
+from .channel_tables import Forces
+from .diagnosis import odd_sizes, suspects_in, why_none
+from .emg import envelopes
+from .forces import measured_load
+from .gaps import Gap, close_gaps
+from .labels import find_label
+from .marker_file import MarkerFile, Place, read_markers
+from .off_contacts import off_contacts
+from .recording import Recording, read_c3d
+from .registration import Registration, register
+from .summary import in_words
 
 MAX_RESIDUAL = 2e-3  # m
 MAX_GAP = 0.1  # s

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from condyle.motion.markers.bodies import Bodies
-from condyle.motion.markers.recording import Recording
-from condyle.motion.markers.rigid import FEWEST
-from condyle.motion.markers.suspects import exchanged, loose, outlier
+from .bodies import Bodies
+from .recording import Recording
+from .rigid import FEWEST
+from .suspects import exchanged, loose, outlier
 
 _SMALLEST, _LARGEST = 5e-3, 1.0  # m, of a body of markers
 _STRETCHES = 10  # in which exchanged labels are looked for

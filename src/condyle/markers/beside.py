@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from condyle.errors import InputError
-from condyle.motion.arrays import check_rising
-from condyle.motion.table import read_table
-from condyle.motion.words import columns_are
+from ..errors import InputError
+from ..motion.arrays import check_rising
+from ..motion.table import read_table
+from ..motion.words import columns_are
 
 AXES = "xyz"
 BODIES = ("fixed", "platform")

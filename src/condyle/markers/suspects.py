@@ -6,7 +6,7 @@ from itertools import combinations, permutations
 
 import numpy as np
 
-from condyle.motion.markers.rigid import FEWEST, fit
+from .rigid import FEWEST, fit
 
 _BETTER = 1 / 3  # of the misfit, once mended, so that a suspect is named
 _LOOSE = 1e-3  # m, root mean square change of distances in a body that has a loose marker

@@ -13,8 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import condyle
 from condyle.errors import InputError
-from condyle.motion import from_c3d
-from condyle.motion.markers import read_c3d
+from condyle.markers import from_c3d, read_c3d
 
 RNG = np.random.default_rng(5)
 TURN = Rotation.from_rotvec([0.3, -0.2, 0.5]).as_matrix()
@@ -49,7 +48,7 @@ def described(kind: int, **changes: Any) -> dict[str, Any]:
 def test_wrenches_are_those_of_another_library(tmp_path: Path, kind: int) -> None:
     import ezc3d
 
-    from condyle.motion.markers.forces import _plate, _wrench
+    from condyle.markers.forces import _plate, _wrench
 
     units = UNITS[kind]
     analog = RNG.normal(0, 50, (6, 4, len(units)))

@@ -12,8 +12,7 @@ from oracles.recorded_jaw import FIXED, LOWER, PLATFORM, UPPER, Jaw, record
 
 import condyle
 from condyle.errors import InputError
-from condyle.motion import MarkerMotion, from_c3d
-from condyle.motion.markers import read_markers
+from condyle.markers import MarkerMotion, from_c3d, read_markers
 
 # Single precision of some 1.5 m, over the least breadth of a brace, 15 mm.
 ROUNDING = np.array([1e-6] * 3 + [2e-5] * 3)

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from condyle.errors import InputError
-from condyle.motion.markers.labels import find_label
-from condyle.motion.markers.marker_file import MarkerFile
-from condyle.motion.markers.recording import Recording
-from condyle.motion.markers.rigid import FEWEST, FLATTEST, Fit, breadth, common_shape, fit
-from condyle.motion.words import listed
+from ..errors import InputError
+from ..motion.words import listed
+from .labels import find_label
+from .marker_file import MarkerFile
+from .recording import Recording
+from .rigid import FEWEST, FLATTEST, Fit, breadth, common_shape, fit
 
 _STILL = 1e-3  # m, by which the platform may move while the mechanism is at home
 

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from condyle.errors import CondyleError, InputError, no_such_file
-from condyle.extras import require
-from condyle.motion.digest import digest
-from condyle.motion.markers.plates import Plate, read_plates
-from condyle.motion.units import LENGTH_UNITS
-from condyle.motion.words import short
+from ..errors import CondyleError, InputError, no_such_file
+from ..extras import require
+from ..motion.digest import digest
+from ..motion.units import LENGTH_UNITS
+from ..motion.words import short
+from .plates import Plate, read_plates
 
 ASSUMED = "mm"  # what laboratories mean that name no unit
 _WORDS = {"millimet": "mm", "centimet": "cm", "micromet": "um", "met": "m"}
