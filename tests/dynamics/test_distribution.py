@@ -9,7 +9,7 @@ import pytest
 from oracles.random_mechanism import random_mechanism, random_state, toml_text
 
 import condyle
-from condyle.dynamics.distribution import minimum_norm
+from condyle.dynamics.minimum_norm import minimum_norm
 from condyle.mechanism import parse
 from condyle.model.evaluator import with_point
 

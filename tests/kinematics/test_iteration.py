@@ -13,7 +13,7 @@ from oracles.random_mechanism import random_mechanism, toml_text
 
 import condyle
 from condyle.kinematics.batch import evaluate
-from condyle.kinematics.contact import contacts_of
+from condyle.kinematics.constraints import contacts_of
 from condyle.kinematics.iteration import newton
 from condyle.mechanism import Mechanism, parse
 from condyle.mechanism.home import dependent_coordinates, independent_coordinates

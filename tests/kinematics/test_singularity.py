@@ -11,7 +11,7 @@ from oracles.random_mechanism import random_mechanism, random_state, toml_text
 
 import condyle
 from condyle import SingularError
-from condyle.kinematics.singularity import KINDS, Singularity
+from condyle.kinematics.singularities import KINDS, Singularity
 from condyle.mechanism import Mechanism, parse
 from condyle.mechanism.files import from_data
 from condyle.model.data import Evaluation

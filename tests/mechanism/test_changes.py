@@ -14,9 +14,9 @@ import pytest
 
 from condyle.errors import InputError, MechanismError
 from condyle.mechanism import Mechanism, bundled_text, dumps, parse
+from condyle.mechanism.bodies import Platform
 from condyle.mechanism.files import from_data
 from condyle.mechanism.paths import parsed, written
-from condyle.mechanism.platform import Platform
 from condyle.mechanism.surface import Expression, Sphere
 
 

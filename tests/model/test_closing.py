@@ -16,7 +16,7 @@ from oracles.rotations import platform_motion
 
 from condyle import InputError
 from condyle.backends.choose import Backend
-from condyle.kinematics.contact import (
+from condyle.kinematics.constraints import (
     contact_frame,
     contacts_of,
     indices,

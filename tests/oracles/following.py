@@ -17,7 +17,7 @@ import casadi as ca
 import numpy as np
 
 from condyle.kinematics.batch import evaluate
-from condyle.kinematics.contact import closed_form_available, contacts_of, indices, residuals
+from condyle.kinematics.constraints import closed_form_available, contacts_of, indices, residuals
 from condyle.kinematics.rotation import rotation
 from condyle.mechanism import COORDINATES, Mechanism
 from condyle.mechanism.home import characteristic_length

@@ -20,7 +20,7 @@ from condyle.dynamics import FORMULATIONS
 from condyle.dynamics.formulation import Body, Formulation
 from condyle.kinematics.batch import evaluate
 from condyle.kinematics.chain import FAMILIES, ChainDynamics, Constants, Family
-from condyle.kinematics.contact import (
+from condyle.kinematics.constraints import (
     closed_form,
     contact_frame,
     contacts_of,

@@ -12,7 +12,7 @@ import pytest
 
 import condyle
 from condyle.errors import BoundsError
-from condyle.kinematics.singularity import Singularity
+from condyle.kinematics.singularities import Singularity
 from condyle.mechanism import bundled_text, parse
 from condyle.mechanism.chain import limits
 from condyle.motion import Motion

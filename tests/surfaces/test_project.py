@@ -14,7 +14,7 @@ from oracles.random_mechanism import random_mechanism, toml_text
 
 import condyle
 from condyle.errors import InputError
-from condyle.kinematics.contact import contacts_of, residuals
+from condyle.kinematics.constraints import contacts_of, residuals
 from condyle.kinematics.project import project_home
 from condyle.mechanism.files import from_data
 from condyle.mechanism.home import characteristic_length

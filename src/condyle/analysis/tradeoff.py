@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from ..kinematics.contact import indices
+from ..kinematics.constraints import indices
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
 from ..progress import step

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from ..kinematics.chain import ChainDynamics, Constants, Family, Link, Loop
-from ..kinematics.contact import solve_small
+from ..kinematics.constraints import solve_small
 from ..kinematics.state import PointMotion
 
 

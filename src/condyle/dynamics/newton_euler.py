@@ -17,7 +17,7 @@ from typing import ClassVar
 import casadi as ca
 
 from ..kinematics.chain import ChainDynamics, Constants, Family
-from ..kinematics.contact import solve_small
+from ..kinematics.constraints import solve_small
 from ..kinematics.state import PointMotion, State
 from .formulation import Body
 from .free_body import free_bodies

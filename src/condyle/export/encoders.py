@@ -9,7 +9,7 @@ from __future__ import annotations
 from importlib.resources import files
 
 from ..graph.program import Program
-from ..kinematics.contact import indices
+from ..kinematics.constraints import indices
 from ..mechanism.home import characteristic_length, dependent_coordinates
 from ..mechanism.mechanism import COORDINATES
 from .body import Scalar

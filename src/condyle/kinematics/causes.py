@@ -19,7 +19,7 @@ from ..errors import (
 from ..mechanism.mechanism import Mechanism
 from ..status import Status
 from .chain import FAMILIES
-from .singularity import SINGULAR, Singularity
+from .singularities import SINGULAR, Singularity
 
 FLAG = "or keep such samples with --flag (flag=True)."
 UNBALANCED = (Status.infeasible, Status.jammed, Status.uncertified)

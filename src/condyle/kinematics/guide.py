@@ -10,7 +10,7 @@ from typing import Any
 
 import casadi as ca
 
-from .contact import ContactSymbols
+from .constraints import ContactSymbols
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 
-from .contact import (
+from .constraints import (
     ContactSymbols,
     Placement,
     contact_bias,

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 
 import casadi as ca
 
-from .contact import ContactSymbols, Placement, contact_frame
+from .constraints import ContactSymbols, Placement, contact_frame
 from .rotation import Bryant, turned, turned_slightly
 
 CLOSED = 1e-13  # radians that are as good as none

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from .contact import (
+from .constraints import (
     ContactFrame,
     ContactSymbols,
     Placement,

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import InputError
 from ..mechanism.home import HOME_WARNING, characteristic_length, home_residuals
 from ..mechanism.mechanism import COORDINATES, Mechanism
-from .contact import contacts_of, residuals
+from .constraints import contacts_of, residuals
 
 ITERATIONS = 50
 ON_THE_SURFACE = 1e-12  # metres

@@ -18,8 +18,8 @@ from .library import bundled_mechanisms, bundled_text
 from .mechanism import Mechanism
 from .messages import describe, shown, unknown_key
 from .quantities import PER_METRE
+from .rules import structural_problems
 from .schema import schema_of
-from .structure import structural_problems
 from .toml import nests_too_deep, read_tables, read_text, too_deep
 from .writing import dump, dumps, record, written_in_python
 

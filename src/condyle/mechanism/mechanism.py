@@ -9,15 +9,15 @@ from typing import Any, Self
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ..errors import InputError, MechanismError
+from .bodies import Inertia, Platform
 from .chain import Chain
 from .contact import Bounds, Contact
 from .coordinates import COORDINATES, Coordinate
 from .home import home_problems, usable_sets
 from .paths import changed, value_at
-from .platform import Inertia, Platform
 from .portrait import in_html, in_words
 from .quantities import Gravity, Name
-from .structure import structural_problems
+from .rules import structural_problems
 from .table import Table
 
 __all__ = ["COORDINATES", "Bounds", "Contact", "Coordinate", "Inertia", "Mechanism", "Platform"]

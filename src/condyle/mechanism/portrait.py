@@ -9,9 +9,9 @@ from typing import Protocol
 import numpy as np
 
 from ..errors import CondyleError, few
+from .bodies import Platform
 from .coordinates import COORDINATES
 from .home import Parts, dependent_coordinates
-from .platform import Platform
 
 
 class Whole(Parts, Protocol):

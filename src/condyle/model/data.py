@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kinematics.singularity import Singularity
+from ..kinematics.singularities import Singularity
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from ..backends.compiler import CompilerError
 from ..backends.notice import notice
 from ..distribution import OBJECTIVES, Objective, Problem, Quadratic, distribute
 from ..distribution import Status as Outcome
-from ..dynamics.distribution import minimum_norm
+from ..dynamics.minimum_norm import minimum_norm
 from ..errors import InputError, did_you_mean, few
 from ..kinematics.chain import FAMILIES
 from ..mechanism.chain import limits

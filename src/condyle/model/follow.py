@@ -12,7 +12,7 @@ import numpy as np
 
 from ..backends.numpy import NumpyKernel
 from ..graph.program import Numbers
-from ..kinematics.contact import closed_form_available
+from ..kinematics.constraints import closed_form_available
 from ..mechanism.mechanism import COORDINATES
 from ..questions import Prescribed, Question
 from ..questions.numbers import characteristic

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..kinematics.contact import indices
+from ..kinematics.constraints import indices
 from ..motion import Motion, resolve_landmark, resolve_load_point
 from .derivation import Derivation
 

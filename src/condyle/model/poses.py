@@ -9,8 +9,8 @@ import numpy as np
 
 from ..backends.kernel import AGAIN
 from ..errors import InputError, did_you_mean
-from ..kinematics.contact import closed_form_available
-from ..kinematics.singularity import Singularity
+from ..kinematics.constraints import closed_form_available
+from ..kinematics.singularities import Singularity
 from ..status import Status
 from .checks import POSE_COLUMNS, check_array, check_states
 from .data import Configuration

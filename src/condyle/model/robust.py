@@ -13,9 +13,9 @@ import numpy as np
 
 from ..backends.kernel import AGAIN
 from ..backends.numpy import NumpyKernel
-from ..dynamics.distribution import minimum_norm
+from ..dynamics.minimum_norm import minimum_norm
 from ..graph.program import Numbers
-from ..kinematics.singularity import SINGULAR, ratio
+from ..kinematics.singularities import SINGULAR, ratio
 from ..questions import Prescribed, Question
 from ..questions.numbers import characteristic
 from ..questions.structure import Structure

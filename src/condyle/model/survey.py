@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..backends.kernel import AGAIN, Answer
-from ..kinematics.singularity import SINGULAR, ratio
+from ..kinematics.singularities import SINGULAR, ratio
 from ..questions.inverse import CERTAIN
 from ..questions.survey import SURVEYED
 from ..status import Status

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from ..graph.program import Program
-from ..kinematics.contact import (
+from ..kinematics.constraints import (
     ContactSymbols,
     contact_bias,
     contact_frame,

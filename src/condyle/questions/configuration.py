@@ -12,7 +12,7 @@ import casadi as ca
 from ..dynamics.singular_values import singular_values
 from ..graph.program import Program
 from ..kinematics.chain import FAMILIES, Loop
-from ..kinematics.contact import contact_frame
+from ..kinematics.constraints import contact_frame
 from .builder import Builder, Lanes
 from .numbers import single_contacts
 from .platform import Platform, given, independent_indices

@@ -6,7 +6,7 @@ import casadi as ca
 
 from ..graph.program import Program
 from ..kinematics.chain import FAMILIES
-from ..kinematics.contact import contact_frame, indices, residuals, solve_small
+from ..kinematics.constraints import contact_frame, indices, residuals, solve_small
 from ..kinematics.state import pose_state
 from .builder import Builder
 from .numbers import single_contacts

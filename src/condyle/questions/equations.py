@@ -18,7 +18,7 @@ import casadi as ca
 from ..dynamics import FORMULATIONS
 from ..dynamics.formulation import Body, Formulation
 from ..kinematics.chain import FAMILIES, ChainDynamics, Constants, Family
-from ..kinematics.contact import indices, solve_small
+from ..kinematics.constraints import indices, solve_small
 from ..kinematics.state import PointMotion, State, independent_state, pose_state, twist_state
 from .builder import Builder, Lanes
 from .platform import (

@@ -18,7 +18,7 @@ import casadi as ca
 from ..dynamics.least_norm import definite_solve
 from ..graph.program import Program, Variants
 from ..kinematics.chain import FAMILIES
-from ..kinematics.contact import indices, solve_small
+from ..kinematics.constraints import indices, solve_small
 from ..status import Status
 from .builder import Builder, Lanes
 from .equations import Wrench

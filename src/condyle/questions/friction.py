@@ -17,7 +17,7 @@ from itertools import product
 
 import casadi as ca
 
-from ..kinematics.contact import contact_frame, indices, solve_small
+from ..kinematics.constraints import contact_frame, indices, solve_small
 from .builder import Builder, Lanes
 from .equations import Equations
 from .numbers import single_contacts

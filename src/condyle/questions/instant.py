@@ -11,7 +11,7 @@ import casadi as ca
 from ..dynamics.joint_space import chain_jacobians
 from ..graph.program import Program, Variants
 from ..kinematics.chain import FAMILIES
-from ..kinematics.contact import contact_frame
+from ..kinematics.constraints import contact_frame
 from ..status import Status
 from .builder import Builder
 from .equations import Wrench, platform_body

@@ -14,7 +14,7 @@ from __future__ import annotations
 import casadi as ca
 
 from ..graph.program import Program
-from ..kinematics.contact import Placement
+from ..kinematics.constraints import Placement
 from ..kinematics.parasitic import whole_motion
 from ..kinematics.rotation import Bryant
 from .builder import Builder

@@ -16,7 +16,7 @@ from ..errors import UnsupportedError
 from ..graph.program import Numbers
 from ..kinematics.chain import FAMILIES
 from ..kinematics.chain.family import Constants
-from ..kinematics.contact import (
+from ..kinematics.constraints import (
     ContactSymbols,
     angle_equation,
     closed_form_available,

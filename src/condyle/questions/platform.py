@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ..kinematics.contact import (
+from ..kinematics.constraints import (
     Placement,
     closed_form,
     closed_form_available,

@@ -17,7 +17,7 @@ from ..dynamics.free_body import FreeBodies, free_bodies
 from ..dynamics.joint_space import JointState, joint_motion
 from ..graph.program import Program
 from ..kinematics.chain import FAMILIES, Constants, Family, Joint
-from ..kinematics.contact import contact_frame, solve_small
+from ..kinematics.constraints import contact_frame, solve_small
 from ..kinematics.state import PointMotion, pose_state
 from ..mechanism.mechanism import Mechanism
 from .builder import Builder

@@ -11,7 +11,7 @@ import casadi as ca
 
 from ..dynamics.singular_values import singular_values
 from ..graph.program import Program
-from ..kinematics.contact import contact_frame
+from ..kinematics.constraints import contact_frame
 from .builder import Builder
 from .configuration import CONVERGED, loops_of, on_rates
 from .numbers import single_contacts

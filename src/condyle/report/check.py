@@ -10,7 +10,7 @@ import numpy as np
 
 from ..analysis.map.room import ball_around_home
 from ..kinematics.chain import FAMILIES
-from ..kinematics.singularity import KINDS
+from ..kinematics.singularities import KINDS
 from ..mechanism.actuator import Limits
 from ..mechanism.chain import limits
 from ..mechanism.home import HOME_WARNING, home_residuals

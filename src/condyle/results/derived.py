@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..kinematics.causes import causes
-from ..kinematics.singularity import NEAR_SINGULAR
+from ..kinematics.singularities import NEAR_SINGULAR
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
 from ..status import Status

@@ -15,7 +15,7 @@ from ..errors import (
 )
 from ..kinematics.causes import FLAG, Owner, cause_text, causes, owners, sample_error
 from ..kinematics.chain import FAMILIES
-from ..kinematics.contact import indices
+from ..kinematics.constraints import indices
 from ..mechanism.mechanism import COORDINATES
 from ..model.data import Accelerations
 from ..model.evaluator import Evaluator, with_point

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..kinematics.causes import owners
 from ..kinematics.chain import FAMILIES
-from ..kinematics.singularity import KINDS
+from ..kinematics.singularities import KINDS
 from ..mechanism.chain import limits
 from ..mechanism.home import independent_coordinates
 from ..mechanism.mechanism import COORDINATES, Mechanism

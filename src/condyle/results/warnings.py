@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import BoundsError
 from ..kinematics.causes import cause_text, owners, shortfall_text
 from ..kinematics.chain import FAMILIES
-from ..kinematics.singularity import NEAR_SINGULAR
+from ..kinematics.singularities import NEAR_SINGULAR
 from ..mechanism.chain import limits
 from ..mechanism.home import HOME_WARNING, home_residuals, home_warnings
 from ..mechanism.mechanism import Mechanism

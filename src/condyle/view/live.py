@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..kinematics.singularity import KINDS
+from ..kinematics.singularities import KINDS
 from ..mechanism import Mechanism
 from ..motion.points import DEFAULT_LOAD_POINT
 from ..report.scene import place

@@ -14,7 +14,7 @@ import viser
 from ..analysis.map.axes import Axis, Grid
 from ..analysis.map.files import grid_and_reach
 from ..analysis.map.surface import first_hit, sheet, skin
-from ..kinematics.contact import indices
+from ..kinematics.constraints import indices
 from ..mechanism import COORDINATES
 from ..model.evaluator import Evaluator
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..kinematics.singularity import KINDS
+from ..kinematics.singularities import KINDS
 from ..report.failures import Failure, at_sample, failures
 from ..report.scene import place
 from ..results.solution import Solution

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError, did_you_mean
-from ..kinematics.contact import indices
-from ..kinematics.singularity import KINDS, NEAR_SINGULAR
+from ..kinematics.constraints import indices
+from ..kinematics.singularities import KINDS, NEAR_SINGULAR
 from ..mechanism import COORDINATES, Mechanism
 from ..mechanism.chain import limits
 from ..model.data import Evaluation

@@ -19,7 +19,7 @@ from math import comb
 import numpy as np
 
 from ...kinematics.chain import FAMILIES
-from ...kinematics.contact import indices
+from ...kinematics.constraints import indices
 from ...mechanism.chain import limits
 from ...mechanism.mechanism import Mechanism
 from ...model.evaluator import Evaluator

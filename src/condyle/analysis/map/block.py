@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...kinematics.singularity import SINGULAR
+from ...kinematics.singularities import SINGULAR
 from ...model.data import Efforts
 from ...model.evaluator import Evaluator
 from ...model.survey import Survey

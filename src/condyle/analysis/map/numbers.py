@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from ...kinematics.singularity import NEAR_SINGULAR
+from ...kinematics.singularities import NEAR_SINGULAR
 from ...mechanism.mechanism import COORDINATES
 from .axes import Grid
 from .block import Asked

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import InputError, did_you_mean
-from ...kinematics.singularity import KINDS, NEAR_SINGULAR
+from ...kinematics.singularities import KINDS, NEAR_SINGULAR
 from ...mechanism.chain import limits
 from ...mechanism.mechanism import COORDINATES, Mechanism
 from ...results.variables import cause_flags, of_effort, of_joint, of_pose

@@ -15,7 +15,7 @@ from math import gamma, pi
 import numpy as np
 
 from ...errors import InputError
-from ...kinematics.singularity import NEAR_SINGULAR
+from ...kinematics.singularities import NEAR_SINGULAR
 from ...mechanism.mechanism import COORDINATES
 from ...model.evaluator import Evaluator
 from .ability import limited

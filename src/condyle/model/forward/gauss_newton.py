@@ -15,7 +15,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ...kinematics.chain import FAMILIES
-from ...kinematics.contact import indices
+from ...kinematics.constraints import indices
 from ...mechanism.home import characteristic_length, dependent_coordinates
 from ...mechanism.mechanism import Mechanism
 from .joint_map import joint_map

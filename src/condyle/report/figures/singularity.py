@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...kinematics.singularity import NEAR_SINGULAR
+from ...kinematics.singularities import NEAR_SINGULAR
 from .chains import groups, heading, readable, styles
 from .labels import caption
 from .panels import finish, legend, legend_beside, lines
