@@ -24,6 +24,7 @@ from .instant import energy, instant
 from .inverse import balance, inverse, motion, system
 from .linear import linear
 from .matrices import jacobians, matrices
+from .pose import pose
 from .reactions import reactions
 from .structure import Structure
 from .survey import survey
@@ -41,6 +42,7 @@ QUESTIONS: dict[str, Callable[..., Program | Variants]] = {
     "configuration": configuration,
     "survey": survey,
     "encoders": encoders,
+    "pose": pose,
     "instant": instant,
     "energy": energy,
     "matrices": matrices,
@@ -57,6 +59,7 @@ GEOMETRY = (
     "configuration",
     "survey",
     "encoders",
+    "pose",
     "instant",
     "energy",
     "jacobians",

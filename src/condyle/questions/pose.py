@@ -1,0 +1,208 @@
+"""The pose that encoder readings belong to, by a fixed number of Gauss-Newton steps.
+
+    X <- X + M_J dq + dX_phi,    A dq ~ theta - theta(X) - J_theta dX_phi,    A = J_theta M_J,
+
+where dX_phi moves the dependent coordinates back onto the surfaces: contacts, flat or curved, and
+joints close in the same steps. n joints over-determine the 6 - k freedoms, so ~ is least squares,
+with joints that turn multiplied by the characteristic length, and their differences taken without
+whole turns. Angles of the pose count as lengths in the same way: A and steps have no dimension.
+
+The start decides the assembly mode. Steps that shrink to a quarter each time lead to the pose
+nearest to it; where they do not, the certificate is 0, and the sample goes to
+`condyle.model.forward`, which follows it in pieces.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+
+from ..dynamics.least_norm import definite_solve
+from ..graph.program import Variants
+from ..kinematics.chain import FAMILIES
+from ..kinematics.contact import (
+    ContactSymbols,
+    contact_frame,
+    indices,
+    parasitic_jacobian,
+    solve_small,
+)
+from ..kinematics.rotation import Bryant
+from .builder import Builder, Lanes
+from .numbers import single_contacts
+from .platform import ANGLE_UNITS, independent_indices
+from .structure import Structure
+
+ITERATIONS = 5  # from one sample of a motion to the next three do
+LONGEST = 1.0  # first step, in characteristic lengths and radians
+SHRINK = 0.25  # a step over the step before, at the most
+TINY = 1e-11  # steps that need not shrink
+CLOSED = 1e-10  # the step that is left at the end
+CONDITIONED = 1e-12  # |pivot| over the diagonal's entry of A^T A, at the least
+
+
+@dataclass(frozen=True)
+class Step:
+    """A Gauss-Newton step at a pose, and what it was made of.
+
+    pose, move: X_EE and the step, (6,).   square: of the move, without dimension.
+    M_J: (6, m).   A: (m,) a group, lane values, without dimension; `weight` of each group's.
+    residual: readings less joint coordinates, lane values [rad or m].   phi: (k,) [m].
+    regular: 1, or 0 where A has not full rank, or a chain cannot reach the pose.
+    """
+
+    b: Builder
+    pose: ca.SX
+    move: ca.SX
+    square: ca.SX
+    M_J: ca.SX
+    A: Lanes
+    weight: Lanes
+    unit: ca.SX
+    residual: Lanes
+    phi: ca.SX
+    regular: ca.SX
+
+    @property
+    def free(self) -> list[int]:
+        return independent_indices(self.b.structure.dependent)
+
+    def rates(self, joint_rate: Lanes) -> ca.SX:
+        """q' (m,) with theta' ~ (d theta / dq) q', of least squares, from lane values."""
+        scaled = [w * rate for w, rate in zip(self.weight, joint_rate, strict=True)]
+        return least_squares(self.b, self.A, scaled)[0] * self.unit[self.free]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A pose from encoders.
+
+    last: the step at the pose itself: its pose, rows, residual.
+    sure: 1 where the steps converged to the pose nearest to the start, else 0.
+    """
+
+    last: Step
+    sure: ca.SX
+
+    @property
+    def pose(self) -> ca.SX:
+        """X_EE, (6,)."""
+        return self.last.pose
+
+    @property
+    def q(self) -> ca.SX:
+        """The independent coordinates, (m,)."""
+        return self.pose[self.last.free]
+
+
+def pose_from_encoders(
+    b: Builder,
+    joint: Lanes,
+    start: ca.SX,
+    iterations: int = ITERATIONS,
+    weight: Lanes | None = None,
+) -> Estimate:
+    """The pose on the contacts whose joint coordinates are nearest to readings.
+
+    Args: joint: lane values [rad or m], zero at home; turning joints may count whole turns.
+          start: X_EE, (6,), near by: on the contacts, or a little off them.
+          weight: what each chain's difference counts, besides the characteristic length; default 1.
+    """
+    contacts = single_contacts(b.structure, b.parameter)
+    step, sure = step_at(b, joint, start, contacts, weight), ca.SX(1)
+    sure = step.regular * (step.square <= LONGEST**2)
+    for _ in range(iterations):
+        before, contacts = step, _near(contacts, step.pose)
+        step = step_at(b, joint, before.pose + before.move, contacts, weight)
+        shrunk = step.square <= SHRINK**2 * before.square + TINY**2
+        sure = sure * shrunk * step.regular
+    return Estimate(step, sure * (step.square <= CLOSED**2))
+
+
+def step_at(
+    b: Builder,
+    joint: Lanes,
+    pose: ca.SX,
+    contacts: Sequence[ContactSymbols],
+    weight: Lanes | None = None,
+) -> Step:
+    """The Gauss-Newton step from any pose, also from one that does not meet the contacts."""
+    s, length = b.structure, b.parameter("length")
+    position, bryant = pose[:3], Bryant.of(pose[3:])
+    R, E = bryant.rotation(), ca.diagcat(ca.SX.eye(3), bryant.angular_velocity())
+    dep = indices(s.dependent)
+    phi = ca.vertcat(ca.SX(0, 1), *(c.phi(c.at(position, R)) for c in contacts))
+    C = contact_frame(contacts, position, R).N.T @ E
+    M_J, back = parasitic_jacobian(C, s.dependent), ca.SX.zeros(6)
+    if dep:
+        back[dep] = -solve_small(C[:, dep], phi)
+    unit = ca.vertcat(length, length, length, 1, 1, 1)
+    free = independent_indices(s.dependent)
+    residual, rows, right, weights, reach = [], [], [], [], []
+    for group, kind in enumerate(s.families):
+        family, lever = FAMILIES[kind], R @ b.lane(group, "joint")
+        loop = family.loop(family.named(b.lane(group, "constants")), position + lever)
+        turns = family.joint_unit == "rad"
+        left = joint[group] - loop.q_r[0]
+        residual.append(_without_turns(left) if turns else left)
+        J = E.T @ ca.vertcat(loop.J, ca.cross(lever, loop.J))
+        own = b.lane(group, "mask") * (ca.SX(1) if turns else 1 / length)
+        weights.append(own if weight is None else own * weight[group])
+        rows.append(weights[-1] * (unit[free] * (M_J.T @ J)))
+        right.append(weights[-1] * (residual[-1] - ca.dot(J, back)))
+        reach.append(loop.discriminant)
+    dq, regular = least_squares(b, rows, right)
+    move = back + M_J @ (unit[free] * dq)
+    regular = regular * (b.least(reach) >= 0)
+    square = ca.sumsqr(move / unit)
+    return Step(b, pose, move, square, M_J, rows, weights, unit, residual, phi, regular)
+
+
+def least_squares(b: Builder, A: Lanes, right: Lanes) -> tuple[ca.SX, ca.SX]:
+    """x with A x ~ right over all chains, (m,), by normal equations; whether A has full rank.
+
+    They square A's condition number. In steps that are repeated this costs no accuracy, only speed
+    of convergence, and that not before the condition number is a million.
+    """
+    m = b.structure.m
+    pairs = [(j, k) for j in range(m) for k in range(j, m)]
+    sums = b.total(
+        [ca.vertcat(*(a[j] * a[k] for j, k in pairs), a * y) for a, y in zip(A, right, strict=True)]
+    )
+    G = ca.SX(m, m)
+    for (j, k), product in zip(pairs, ca.vertsplit(sums[: len(pairs)]), strict=True):
+        G[j, k] = G[k, j] = product
+    x, excess = definite_solve(G, sums[len(pairs) :], ca.diag(G), CONDITIONED)
+    regular = ca.SX(1)
+    for one in excess:
+        regular = regular * (one > 0)
+    return x, regular
+
+
+def pose(structure: Structure, iterations: int = ITERATIONS) -> Variants:
+    """The pose of readings, port joint, from a pose near by, port start.
+
+    Results: pose (6,); residual, readings less joint coordinates of the pose.
+    """
+    b = Builder(structure)
+    joint = b.lane_sample("joint", unit="rad or m")
+    found = pose_from_encoders(b, joint, b.sample("start", 6, ANGLE_UNITS), iterations)
+    b.output("pose", found.pose, ANGLE_UNITS)
+    b.output("residual", found.last.residual, "rad or m")
+    b.check(2 * found.sure - 1, 0.5)
+    return Variants(b.finish(), single=True)
+
+
+def _near(contacts: Sequence[ContactSymbols], pose: ca.SX) -> list[ContactSymbols]:
+    """Contacts for poses near `pose`: see `Smooth.started_at`."""
+    R = Bryant.of(pose[3:]).rotation()
+    return [c.started_at(c.at(pose[:3], R)) for c in contacts]
+
+
+def _without_turns(difference: ca.SX) -> ca.SX:
+    """An angle's difference without whole turns."""
+    turn = 2 * math.pi
+    return difference - turn * ca.floor(difference / turn + 0.5)
