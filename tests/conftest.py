@@ -16,13 +16,23 @@ import pytest
 import condyle
 from condyle.mechanism import bundled_text
 
+sys.path.insert(0, str(Path(__file__).parent))  # `from oracles import ...` from any folder
+
+from support.browser import browser, open_tab  # noqa: F401 - fixtures
+from support.building import (  # noqa: F401 - fixtures
+    compiler_command,
+    kernel_cache,
+    kernel_folder,
+    nothing_said,
+    quick,
+    quick_command,
+)
+
 # What says of a terminal how wide and how coloured it is: no test may depend on it. Typer looks as
 # it is imported.
 for _name in ("FORCE_COLOR", "GITHUB_ACTIONS", "LINES", "NO_COLOR", "PY_COLORS", "TERMINAL_WIDTH"):
     os.environ.pop(_name, None)
 os.environ["COLUMNS"] = "100"
-
-sys.path.insert(0, str(Path(__file__).parent))  # `from oracles import ...` from any folder
 
 
 @pytest.fixture(scope="session")

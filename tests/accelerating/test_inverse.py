@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from families import cases as families
 from oracles.random_mechanism import random_mechanism, random_state
 from oracles.rubbing import balance
+from support import families
 from support.rubbing import Rubbing
 
 import condyle

@@ -5,8 +5,8 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
-from oracles.interpreter import Interpreter
 from support.cases import Case, case, error, ones
+from support.interpreter import Interpreter
 
 import condyle
 from condyle.graph.operations import BY_CASADI

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from oracles.interpreter import Interpreter
 from support.cases import case, error
 from support.children import PATIENCE, end, start, wait_for
+from support.interpreter import Interpreter
 
 from condyle.backends import cache
 from condyle.backends.c.build import _recipe

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from oracles.interpreter import Found, Interpreter
 from support.cases import case, error, errors, ones
+from support.interpreter import Found, Interpreter
 
 from condyle.backends.kernel import Answer, arranged
 from condyle.backends.numpy import NumpyKernel

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from oracles.recorded_jaw import record
+from support.recorded_jaw import record
 
 import condyle
 from condyle.bench import Benchmark

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from oracles.recorded_jaw import FIXED, PLATFORM, Jaw, record
+from support.recorded_jaw import FIXED, PLATFORM, Jaw, record
 
 from condyle.motion import read_table
 from condyle.results.solution import open_solution

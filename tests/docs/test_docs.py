@@ -19,7 +19,7 @@ from typing import Any
 
 import pytest
 import yaml
-from oracles.recorded_jaw import record
+from support.recorded_jaw import record
 
 import condyle
 from condyle.mechanism import bundled_text

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from families.cases import case
+from support.families import case
 
 import condyle
 from condyle.export import DEFAULT, Exported, Wish, export

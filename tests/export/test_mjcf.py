@@ -14,7 +14,7 @@ import pytest
 from oracles.rotations import turn
 from support.cases import case
 from support.mujoco_player import Player
-from surfaces.cases import contact, table
+from support.surfaces import contact, table
 
 import condyle
 from condyle.errors import UnsupportedError

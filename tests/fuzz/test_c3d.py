@@ -7,7 +7,7 @@ import warnings
 from pathlib import Path
 
 import numpy as np
-from oracles.recorded_jaw import record
+from support.recorded_jaw import record
 
 import condyle
 from condyle.errors import CondyleError

@@ -8,8 +8,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from oracles.following import coordinate_closure
 from oracles.random_mechanism import random_mechanism, toml_text
+from support.following import coordinate_closure
 
 import condyle
 from condyle.kinematics.batch import evaluate

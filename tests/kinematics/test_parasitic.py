@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
-from oracles.following import coordinate_closure
-from oracles.interpreter import closure_function
 from oracles.random_mechanism import random_mechanism, toml_text
+from support.following import coordinate_closure
+from support.interpreter import closure_function
 
 import condyle
 from condyle.kinematics.batch import evaluate

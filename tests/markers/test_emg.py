@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from oracles.recorded_jaw import Jaw, record
+from support.recorded_jaw import Jaw, record
 
 from condyle.errors import InputError
 from condyle.markers import from_c3d

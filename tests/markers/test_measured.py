@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from oracles.recorded_jaw import FIXED, LOWER, PLATFORM, UPPER, Jaw, record
+from support.recorded_jaw import FIXED, LOWER, PLATFORM, UPPER, Jaw, record
 
 import condyle
 from condyle.errors import InputError

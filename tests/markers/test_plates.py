@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 from oracles.c3d_file import c3d_bytes
-from oracles.recorded_jaw import Jaw, record
 from scipy.spatial.transform import Rotation
+from support.recorded_jaw import Jaw, record
 
 import condyle
 from condyle.errors import InputError
@@ -99,7 +99,7 @@ def pressed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Jaw, Path, np.nda
 
 def in_base(jaw: Jaw, path: Path) -> tuple[np.ndarray, np.ndarray]:
     """From the laboratory to {S}, s = R (x - p), from markers whose places in {S} are known."""
-    from oracles.recorded_jaw import UPPER
+    from support.recorded_jaw import UPPER
 
     shape = np.array(list(UPPER.values()))
     R, p = [], []

@@ -6,8 +6,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from oracles.following import landmark_closure
 from oracles.random_mechanism import random_mechanism, toml_text
+from support.following import landmark_closure
 
 import condyle
 from condyle.backends.choose import Backend

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from oracles.interpreter import Interpreter
 from oracles.random_mechanism import random_mechanism, toml_text
 from support.cases import ones
+from support.interpreter import Interpreter
 
 import condyle
 from condyle.mechanism import Mechanism, parse

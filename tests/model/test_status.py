@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from oracles.interpreter import Interpreter
 from scipy.optimize import minimize
 from support.cases import Case, case, ones
+from support.interpreter import Interpreter
 
 from condyle.backends.kernel import AGAIN
 from condyle.errors import InputError, UnreachableError

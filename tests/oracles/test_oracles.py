@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,14 @@ Array = np.ndarray
 HERE = Path(__file__).parent
 REFERENCE = json.loads((HERE / "reference_cases.json").read_text())
 MASTICATORY = load(HERE / "masticatory.toml")
+IMPORTS = re.compile(r"^\s*(?:from|import)\s+(?:condyle|support|\.\.)\S*", re.MULTILINE)
+
+
+def test_they_share_nothing_with_the_library() -> None:
+    found = {path.name: IMPORTS.findall(path.read_text()) for path in HERE.glob("*.py")}
+    assert not {name: lines for name, lines in found.items() if lines}
+
+
 MIXED = ("RSS", "PSS", "SPS")
 MECHANISMS: dict[str, dict[str, Any]] = {
     "k0": {"contacts": 0},

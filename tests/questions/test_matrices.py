@@ -6,8 +6,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from oracles.interpreter import Interpreter
 from support.cases import Case, case, error
+from support.interpreter import Interpreter
 
 from condyle.dynamics import FORMULATIONS
 from condyle.errors import InputError

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from families.bodies import Body, bodies
-from families.cases import MECHANISMS, Case, case, of_raw
-from families.jets import Jet
+from oracles.bodies import Body, bodies
+from oracles.jets import Jet
 from oracles.random_mechanism import random_mechanism
+from support.families import MECHANISMS, Case, case, of_raw
 
 from condyle.model.reactions import Reaction, reactions
 from condyle.results.model import Model

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from families.cases import MECHANISMS, Case, case, close
 from oracles import newton_euler
 from oracles.closure import contact_normals
 from oracles.description import read, rod_angles
 from oracles.rotations import platform_motion
+from support.families import MECHANISMS, Case, case, close
 
 import condyle
 from condyle.mechanism import Mechanism

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from oracles.recorded_jaw import FIXED, LOWER, PLATFORM, record
+from support.recorded_jaw import FIXED, LOWER, PLATFORM, record
 
 import condyle
 from condyle.errors import InputError

@@ -1,16 +1,8 @@
-"""Kernels of these tests are built quickly and kept apart; models are shared."""
+"""Models that several tests share."""
 
 from __future__ import annotations
 
 import pytest
-from support.building import (  # noqa: F401 - fixtures
-    compiler_command,
-    kernel_cache,
-    kernel_folder,
-    nothing_said,
-    quick,
-    quick_command,
-)
 
 import condyle
 from condyle.results.model import Model

@@ -1,5 +1,5 @@
 """Kernels for tests: a cache folder of their own, and a compiler that is quick because it does not
-optimise. A room's conftest takes what it needs."""
+optimise. The rooms in `OWN_CACHE` always use that folder; the others use the person's."""
 
 from __future__ import annotations
 
@@ -13,6 +13,9 @@ import pytest
 from condyle.backends import notice
 from condyle.backends.compiler import CompilerError, find_compiler
 
+OWN_CACHE = {"accelerating", "backends", "graph", "model", "questions", "results", "simulation"}
+TESTS = Path(__file__).parents[1]
+
 
 @pytest.fixture(scope="session")
 def kernel_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -24,7 +27,10 @@ def kernel_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module", autouse=True)
-def kernel_cache(kernel_folder: Path) -> Iterator[None]:
+def kernel_cache(request: pytest.FixtureRequest, kernel_folder: Path) -> Iterator[None]:
+    if request.path.relative_to(TESTS).parts[0] not in OWN_CACHE:
+        yield
+        return
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("CONDYLE_CACHE", str(kernel_folder))
         for name in ("CONDYLE_BACKEND", "CONDYLE_LANES"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from support.surfaces import close, jet
 
 from condyle.mechanism import Contact
 from condyle.mechanism.home import home_problem, home_residual
@@ -16,8 +17,6 @@ from condyle.mechanism.surface import (
     Quadratic,
     Sphere,
 )
-
-from .cases import close, jet
 
 POINT = (0.003, -0.002, 0.005)
 

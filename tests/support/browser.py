@@ -7,15 +7,10 @@ import shutil
 import time
 from collections.abc import Callable, Iterator
 from io import BytesIO
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-
-import condyle
-from condyle.report.page import write_report
-from condyle.results.solution import Solution
 
 CHROMIUM = ("/usr/bin/chromium", "chromium", "chromium-browser", "google-chrome")
 OPTIONS = (
@@ -133,15 +128,3 @@ def open_tab(browser: Any) -> Iterator[Callable[..., Tab]]:
     for tab in tabs:
         tab.page.close()
         assert tab.errors == []
-
-
-@pytest.fixture(scope="session")
-def solution(reference: condyle.Mechanism) -> Solution:
-    """All 5001 samples of the reference case."""
-    model = condyle.derive(reference, backend="interpreted")
-    return model.solve(condyle.reference_motion(), condyle.reference_load())
-
-
-@pytest.fixture(scope="session")
-def report(solution: Solution, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_report(solution, tmp_path_factory.mktemp("report") / "report.html")

@@ -6,11 +6,10 @@ import casadi as ca
 import numpy as np
 import pytest
 from oracles.surfaces import normal, read_surface
+from support.surfaces import BALL, KINDS, POINT, ball_options, close, contact, jet, table
 
 from condyle.errors import InputError
 from condyle.mechanism.surface import Expression, of_form
-
-from .cases import BALL, KINDS, POINT, ball_options, close, contact, jet, table
 
 WALLS = [(kind, None) for kind in KINDS] + [(kind, side) for kind in KINDS for side in (0, 1)]
 RNG = np.random.default_rng(1)

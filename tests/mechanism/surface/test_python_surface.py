@@ -7,6 +7,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
+from support.surfaces import close
 
 import condyle
 from condyle.analysis.compare import compare
@@ -18,8 +19,6 @@ from condyle.report.figures import PLOTS
 from condyle.report.page import write_report
 from condyle.results.model import Model
 from condyle.results.solution import Solution
-
-from .cases import close
 
 
 def wave(p: ca.SX) -> ca.SX:

@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from oracles.random_mechanism import random_mechanism, toml_text
+from support.surfaces import CLOSED, KINDS, ball_options
 
 import condyle
 from condyle.errors import InputError
@@ -18,8 +19,6 @@ from condyle.kinematics.constraints import contacts_of, residuals
 from condyle.kinematics.project import project_home
 from condyle.mechanism.files import from_data
 from condyle.mechanism.home import characteristic_length
-
-from .cases import CLOSED, KINDS, ball_options
 
 
 def phi_of(mechanism: condyle.Mechanism) -> ca.Function:

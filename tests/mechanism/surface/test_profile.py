@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
+from support.surfaces import close, jet
 
 from condyle.mechanism.surface import Profile, Quadratic
 from condyle.mechanism.surface.profile import spline_pieces
-
-from .cases import close, jet
 
 KNOTS = np.array([-12.0, -7.0, -3.0, 0.0, 4.5, 8.0, 13.0]) * 1e-3
 HEIGHTS = np.array([9.0, 6.5, 1.0, -2.5, -4.0, -3.0, -6.0]) * 1e-3

@@ -5,6 +5,9 @@ g = s(t). Each sample is solved from home, alone; rates come by the chain rule t
 K of (phi, g):
 
     K X' = (0, s'),     K X'' = (0, s'') - K' X'.
+
+Shared with the library: the mechanism's description, the contacts' residuals and the rotation. The
+iteration, its way from home and the rates are its own.
 """
 
 from __future__ import annotations

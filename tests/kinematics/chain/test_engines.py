@@ -9,8 +9,7 @@ import pytest
 from oracles import newton_euler
 from oracles.mujoco_engine import MujocoEngine
 from oracles.pinocchio_engine import PinocchioEngine
-
-from families.cases import MECHANISMS, case, close
+from support.families import MECHANISMS, case, close
 
 TOLERANCE = 1e-9
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from support.families import case
+
 import condyle
 from condyle.kinematics.chain import FAMILIES
 from condyle.questions.reactions import reaction_places
-from families.cases import case
 
-PAGE = Path(__file__).parents[2] / "docs" / "chains.md"
+PAGE = Path(__file__).parents[3] / "docs" / "chains.md"
 SOURCES = ("mechanism/chain.py", "kinematics/chain/pss.py")
 
 

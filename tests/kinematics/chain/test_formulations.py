@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 from oracles import description
+from support.families import MECHANISMS, Case, case, close, of_raw
 
 import condyle
 from condyle.dynamics import FORMULATIONS
 from condyle.mechanism import load
 from condyle.model.data import Evaluation
 from condyle.questions.numbers import has_closed_form
-from families.cases import MECHANISMS, Case, case, close, of_raw
 
 OTHERS = [name for name in FORMULATIONS if name != "virtual_power"]
 BUNDLED = Path(condyle.__file__).parent / "mechanism" / "bundled"

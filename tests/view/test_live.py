@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.browser import Tab
 
 import condyle
 from condyle.errors import InputError
@@ -15,7 +16,6 @@ from condyle.view.live import LivePlayer
 from condyle.view.readout import live_html, status_html
 from condyle.view.serve import planned
 
-from .conftest import Tab
 from .test_view import HANDLE, fill, near, row
 
 TORQUE = {"kind": "computed_torque", "stiffness": 2500.0}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from support.families import case
 
 import condyle
 from condyle.errors import UnreachableError
@@ -11,7 +12,6 @@ from condyle.mechanism import Mechanism
 from condyle.model.judge import require_ok
 from condyle.results.model import Model
 from condyle.status import Status
-from families.cases import case
 
 
 def hexaglide() -> Mechanism:

@@ -7,9 +7,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from support.families import case, close
 
 from condyle.kinematics.chain import FAMILIES, Family
-from families.cases import case, close
 
 CASES = {"RSS": "rss", "PSS": "pss", "SPS": "sps_k0", "cable": "cable_k0"}
 ARCS = (ca.OP_ATAN, ca.OP_ATAN2, ca.OP_ACOS, ca.OP_ASIN)

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.families import MECHANISMS, WITH_CABLES, case
 
 import condyle
 from condyle.errors import MechanismError
 from condyle.kinematics.chain import FAMILIES
 from condyle.mechanism import dumps, json_schema, parse
 from condyle.mechanism.files import from_data
-from families.cases import MECHANISMS, WITH_CABLES, case
 
 Change = Callable[[dict[str, Any]], None]
 

@@ -7,14 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 from oracles.random_mechanism import toml_text
+from support.surfaces import BALL, CLOSED, KINDS, ball_options, table
 
 import condyle
 from condyle.errors import MechanismError
 from condyle.mechanism import Mechanism, dumps, json_schema, parse
 from condyle.mechanism.home import home_residuals
 from condyle.report.check import describe
-
-from .cases import BALL, CLOSED, KINDS, ball_options, table
 
 HOME = np.array([-26.65, 72, 42.53])
 

@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from oracles.bodies import Body, leg, platform
+from oracles.jets import Array, Jet
+from support.families import close
 
 import condyle
 from condyle.dynamics import FORMULATIONS
 from condyle.mechanism import bundled_text
 from condyle.results.model import Model
-from families.bodies import Body, leg, platform
-from families.cases import close
-from families.jets import Array, Jet
 
 RAW = tomllib.loads(bundled_text("gough-stewart"))
 GRAVITY = np.array(RAW["gravity"], float)

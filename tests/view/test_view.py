@@ -7,12 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.browser import PATIENCE, Tab
 
 import condyle
 from condyle.results.solution import Solution
 from condyle.view import View, open_view
 
-from .conftest import PATIENCE, Tab
+
+@pytest.fixture(scope="module")
+def solution(reference: condyle.Mechanism) -> Solution:
+    """All 5001 samples of the reference case."""
+    model = condyle.derive(reference, backend="interpreted")
+    return model.solve(condyle.reference_motion(), condyle.reference_load())
 
 
 @pytest.fixture

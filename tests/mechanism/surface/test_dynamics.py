@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from oracles import newton_euler
 from oracles.random_mechanism import random_mechanism, random_state
+from support.surfaces import close
 
 import condyle
 from condyle.dynamics import FORMULATIONS
@@ -17,8 +18,6 @@ from condyle.mechanism.files import from_data
 from condyle.mechanism.surface import Expression, Plane, Profile, Quadratic, Sphere
 from condyle.model.data import Evaluation
 from condyle.results.model import Model
-
-from .cases import close
 
 COUNT = 4
 MECHANISMS: dict[str, dict[str, Any]] = {

@@ -1,7 +1,8 @@
 """A jaw before cameras, with all that is to be found known: SYNTHETIC.
 
 Four markers on a brace at the upper teeth, four at the lower, four on the face; a laboratory with
-axes of its own; a head that moves meanwhile. All in metres.
+axes of its own; a head that moves meanwhile. All in metres. Shared with the library: where a
+mechanism's file puts its named points.
 """
 
 from __future__ import annotations
@@ -13,10 +14,10 @@ from typing import Any
 
 import numpy as np
 import tomli_w
+from oracles.c3d_file import c3d_bytes
 from scipy.spatial.transform import Rotation
 
 import condyle
-from oracles.c3d_file import c3d_bytes
 
 UPPER = {
     "Upper_FL": [0.080, 0.030, 0.020],

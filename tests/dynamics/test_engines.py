@@ -15,7 +15,7 @@ from condyle.kinematics.chain import FAMILIES
 from condyle.mechanism import parse
 from condyle.model.evaluator import with_point
 
-# Cables have no bodies; tests/families holds them against the oracle of free bodies.
+# Cables have no bodies; tests/kinematics/chain holds them against the oracle of free bodies.
 RIGID = tuple(kind for kind, family in FAMILIES.items() if family.bodies)
 
 MODULES = {"pinocchio": "pinocchio", "mujoco": "mujoco", "newton_euler": "numpy"}

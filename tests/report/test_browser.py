@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.browser import Tab
 
 import condyle
 from condyle.markers import Beside
@@ -15,10 +16,20 @@ from condyle.motion import Motion
 from condyle.report.page import write_report
 from condyle.results.solution import Solution
 
-from .conftest import Tab
-
 WINDOWS = {"wide": (1440, 900), "narrow": (390, 844)}
 INDEX = "() => Number(document.getElementById('scrub').value)"
+
+
+@pytest.fixture(scope="module")
+def solution() -> Solution:
+    """All 5001 samples of the reference case."""
+    model = condyle.derive("masticatory", backend="interpreted")
+    return model.solve(condyle.reference_motion(), condyle.reference_load())
+
+
+@pytest.fixture(scope="module")
+def report(solution: Solution, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_report(solution, tmp_path_factory.mktemp("report") / "report.html")
 
 
 @pytest.fixture

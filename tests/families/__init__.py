@@ -1,1 +1,0 @@
-"""Chain families: against outside engines, against each other, and in their files."""

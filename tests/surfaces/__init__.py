@@ -1,1 +1,0 @@
-"""Contact surfaces: equations, balls on walls, files, and the dynamics on them."""

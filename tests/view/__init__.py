@@ -1,0 +1,1 @@
+"""The live view: its parts, and its page in a real browser."""
