@@ -23,7 +23,7 @@ import casadi as ca
 from ..dynamics.least_norm import definite_solve
 from ..graph.program import Variants
 from ..kinematics.chain import FAMILIES
-from ..kinematics.contact import (
+from ..kinematics.constraints import (
     ContactSymbols,
     contact_frame,
     indices,
