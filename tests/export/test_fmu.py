@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 from scipy.integrate import solve_ivp
+from support.tools import need, run
 
 import condyle
 from condyle.errors import InputError
@@ -251,6 +252,58 @@ def test_a_state_can_be_kept_and_brought_back(
     unit.reset()
     assert read("q.X") == 0.0
     unit.freeInstance()
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_what_a_host_must_not_do_is_refused(
+    fmus: dict[tuple[str, int], Path], version: int, tmp_path: Path
+) -> None:
+    """Steps at another time, back, or of no number; strange states; outputs that are set."""
+    unit, read = started(fmus["plant", version], version, tmp_path)
+    unit.doStep(currentCommunicationPoint=0.0, communicationStepSize=0.01)
+    before = read("q.X")
+    for now, span in ((0.0, 0.01), (0.02, 0.01), (0.01, -0.001), (0.01, np.nan), (np.nan, 0.01)):
+        with pytest.raises(Exception, match=r"(?i)error"):
+            unit.doStep(currentCommunicationPoint=now, communicationStepSize=span)
+    unpack = unit.deSerializeFMUstate if version == 2 else unit.deserializeFMUState
+    pack, keep = (
+        (unit.serializeFMUstate, unit.getFMUstate)
+        if version == 2
+        else (unit.serializeFMUState, unit.getFMUState)
+    )
+    packed = pack(keep())
+    for strange in (bytes(len(packed)), packed[:-1]):
+        with pytest.raises(Exception, match=r"(?i)error"):
+            unpack(strange)
+    put = unit.setReal if version == 2 else unit.setFloat64
+    variables = fmpy.read_model_description(str(fmus["plant", version])).modelVariables
+    for v in variables:
+        if v.causality == "output" and v.name.split(".")[0] not in ("q", "q1"):  # states are set
+            with pytest.raises(Exception, match=r"(?i)error"):
+                put([v.valueReference], [1.0])
+    unit.doStep(currentCommunicationPoint=0.01, communicationStepSize=0.0)
+    assert read("q.X") == before
+    unit.freeInstance()
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_compilers_have_nothing_to_say(
+    fmus: dict[tuple[str, int], Path], compiler: str, version: int, tmp_path: Path
+) -> None:
+    need(compiler)
+    for kind in ("plant", "inverse"):  # with states and without
+        zipfile.ZipFile(fmus[kind, version]).extractall(tmp_path / kind)
+        flags = (
+            "-std=c99",
+            "-pedantic",
+            "-Wall",
+            "-Wextra",
+            "-Wshadow",
+            "-Werror",
+            "-fsyntax-only",
+        )
+        run(compiler, *flags, "sources/fmu.c", folder=tmp_path / kind)
 
 
 @pytest.mark.parametrize("version", VERSIONS)

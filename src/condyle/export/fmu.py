@@ -62,14 +62,16 @@ def write_fmu(mechanism: Mechanism, kind: str, version: int, path: Path) -> bool
 
 def fmu_sources(fmu: Fmu, version: int) -> dict[str, str]:
     """fmu.c, which includes all else, and the mechanism's own."""
-    room = files(__package__)
-    parts = ["fmu_core.c", f"fmu{version}.c"]
     includes = "math.h", "stdbool.h", "stddef.h", "stdint.h", "stdlib.h", "string.h"
     about = in_comment(fmu.text)
     text = f"/* {about}: an FMU, written by condyle. Compile this file alone. */\n"
     text += "".join(f"#include <{name}>\n" for name in includes)
-    text += f'{fmu.head}\n#define MODEL_TOKEN "{fmu.token}"\n\n'
-    text += "\n".join((room / part).read_text(encoding="utf-8") for part in parts)
+    text += f'{fmu.head}\n#define MODEL_TOKEN "{fmu.token}"\n#define FMI {version}\n\n'
+    room = files("condyle")
+    step, rest = room / "backends" / "c" / "runge_kutta.h", room / "export" / "fmi.c"
+    text += "\n".join(
+        part.read_text(encoding="utf-8") for part in [step] * bool(fmu.order) + [rest]
+    )
     return {"fmu.c": text, **fmu.files}
 
 

@@ -140,6 +140,7 @@ def fmu_model(mechanism: Mechanism, kind: str) -> Fmu:
         "START": "{" + ", ".join(repr(v.start or 0.0) for v in variables) + "}",
     }
     head = "".join(f"#define MODEL_{name} {value}\n" for name, value in macros.items())
+    head += f"typedef {e.prefix}_constants model_constants;\n"
     token = hashlib.sha256((e.source + head + body).encode()).hexdigest()[:32]
     return Fmu(
         kind=kind,
@@ -149,21 +150,8 @@ def fmu_model(mechanism: Mechanism, kind: str) -> Fmu:
         variables=tuple(variables),
         order=order,
         files={f"{e.prefix}.c": e.source, f"{e.prefix}.h": e.header},
-        head=f'#include "{e.prefix}.c"\n\n{head}\n{_INSTANCE.replace("@", e.prefix)}\n{body}',
+        head=f'#include "{e.prefix}.c"\n\n{head}\n{body}',
     )
-
-
-_INSTANCE = """typedef struct {
-    double v[MODEL_VALUES];
-    double time, step;
-    int dirty, unprepared, failed, logging;
-    char name[64];
-    const void *callbacks;
-    void *environment;
-    void (*logger)(void);
-    @_constants constants;
-} Instance;
-"""
 
 
 def _scalars(e: Exported, a: Argument, role: str, first: int) -> Iterable[Scalar]:
@@ -216,7 +204,7 @@ def _tuned(mechanism: Mechanism, e: Exported) -> Iterable[Tuned]:
 
 
 def _evaluate(e: Exported, kind: str, places: dict[str, int]) -> str:
-    lines = ["static int model_evaluate(Instance *me)", "{", "    double *const v = me->v;"]
+    lines = ["static int model_evaluate(const model_constants *of, double *v)", "{"]
     if kind == "plant":
         m = len(e["forward"].inputs[0].labels)
         size = f"{m} * sizeof *v"
@@ -226,7 +214,7 @@ def _evaluate(e: Exported, kind: str, places: dict[str, int]) -> str:
         function = e[question]
         names = ["acceleration" if kind == "plant" and a.name == "q2" else a.name
                  for a in function.arguments]  # fmt: skip
-        words = ", ".join(["&me->constants", *(f"v + {places[name]}" for name in names)])
+        words = ", ".join(["of", *(f"v + {places[name]}" for name in names)])
         lines += [
             f"    status = {function.name}({words});",
             "    if (status)",
@@ -236,9 +224,9 @@ def _evaluate(e: Exported, kind: str, places: dict[str, int]) -> str:
 
 
 def _prepare(e: Exported, tuned: list[Tuned], first: int) -> str:
-    lines = ["static void model_prepare(Instance *me)", "{"]
+    lines = ["static void model_prepare(const double *v, model_constants *of)", "{"]
     lines += [f"    {e.prefix}_numbers n = {e.prefix.upper()}_NUMBERS;"]
     for i, one in enumerate(tuned):
-        lines.append(f"    {one.code.replace('value', f'me->v[{first + i}]')};")
-    lines += [f"    {e.prefix}_prepare(&n, &me->constants);", "}", ""]
+        lines.append(f"    {one.code.replace('value', f'v[{first + i}]')};")
+    lines += [f"    {e.prefix}_prepare(&n, of);", "}", ""]
     return "\n".join(lines)
