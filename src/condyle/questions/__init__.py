@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ..graph.program import Program, Variants
+from .allocation import allocation
 from .closure import Prescribed, closure, conditions
 from .configuration import configuration
 from .encoders import encoders
@@ -30,6 +31,7 @@ from .structure import Structure
 from .survey import survey
 
 QUESTIONS: dict[str, Callable[..., Program | Variants]] = {
+    "allocation": allocation,
     "inverse": inverse,
     "forward": forward,
     "forward_system": forward_system,
@@ -53,6 +55,7 @@ QUESTIONS: dict[str, Callable[..., Program | Variants]] = {
 SOURCES = ("mechanism", "kinematics", "dynamics", "graph", "questions")
 # Questions that formulation and route make no difference to.
 GEOMETRY = (
+    "allocation",
     "motion",
     "closure",
     "conditions",

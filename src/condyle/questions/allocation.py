@@ -1,0 +1,438 @@
+"""Efforts within limits: the least of a separable objective that balances a force.
+
+    least sum_i f(x_i) + W |lambda|^2 / 2   with   Q = J^T effort + D lambda,   effort = scale x,
+    low <= effort <= high,   contact_low <= lambda <= contact_high
+
+Reflections eliminate the contacts, which leaves G x + (0, lambda) = right. With multipliers
+u = (v, s) an effort answers to its price g_i = G_i . u by the least of f(x) - g x within its
+limits, and the best multipliers are where
+
+    d(u) = right . u - sum_i f*(G_i . u) - sum_k h*(s_k)
+
+is greatest: concave in six unknowns, however many efforts there are. Newton's method climbs it, its
+steps shortened or stretched by the slope of d along them. At its top the gradient vanishes, that
+is, the equations are met; efforts keep limits and conditions of optimality by construction. A
+contact force without a weight, W = 0, allows its multiplier one sign only, or 0 where it has no
+bound: such multipliers are held at 0 until the force would leave its bounds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+
+from ..graph.program import Program
+from .builder import Builder, Lanes
+from .structure import Structure
+
+REGULAR = 1e-10  # square of the sine between contacts below which digits are lost
+CONDITIONED = 1e-6  # least pivot of the efforts' equations, of its diagonal
+FLAT = 1e-13  # a pivot below this part of its full size stands for a direction without curvature
+ROUNDING = 1e-13  # of the terms of a sum
+FARKAS = 1e-9  # of its terms, by which a proof that there are no efforts must hold
+TIE = 1e-12  # of a value: patterns of friction nearer than this are equal, and the first counts
+ENOUGH = 0.1  # part of the first slope that may be left at the end of a step
+SOFT = 1e-12  # curvature of a cube at 0, of the efforts: less than a certificate shows
+HUGE = 1e300
+PROBES = 2  # of the slope along a step
+
+
+@dataclass(frozen=True)
+class Term:
+    """One term f of an objective.
+
+    answer:  (g, low, high, soft) -> x, the least of f(x) - g x in [low, high].
+    yields:  (x, soft) -> dx / dg between the limits.
+    value:   f(x).
+    degree:  of the price in efforts, by which multipliers of squares are scaled.
+    turns:   Newton's steps that nearly all samples need at most.
+    """
+
+    answer: Callable[[ca.SX, ca.SX, ca.SX, ca.SX], ca.SX]
+    yields: Callable[[ca.SX, ca.SX], ca.SX]
+    value: Callable[[ca.SX], ca.SX]
+    degree: int
+    turns: int
+
+
+def _clipped(x: ca.SX, low: ca.SX, high: ca.SX) -> ca.SX:
+    return ca.fmin(ca.fmax(x, low), high)
+
+
+def _root(g: ca.SX, low: ca.SX, high: ca.SX, soft: ca.SX) -> ca.SX:
+    """The root of x^2 + soft x = g without cancellation."""
+    price = ca.fmax(g, 0)
+    return _clipped(price / (soft / 2 + ca.sqrt(soft * soft / 4 + price)), low, high)
+
+
+TERMS = {
+    "square": Term(
+        lambda g, low, high, soft: _clipped(g, low, high),
+        lambda x, soft: ca.SX(1),
+        lambda x: x * x / 2,
+        degree=1,
+        turns=7,
+    ),
+    "cube": Term(_root, lambda x, soft: 1 / (2 * x + soft), lambda x: x**3 / 3, degree=2, turns=13),
+}
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Bounds of efforts (lanes) and of contact forces (k,); what efforts are measured by, lanes;
+    W, None where contact forces have no weight."""
+
+    low: Lanes
+    high: Lanes
+    scale: Lanes
+    contact_low: ca.SX
+    contact_high: ca.SX
+    weight: ca.SX | None = None
+
+    @staticmethod
+    def ports(b: Builder, weighs: bool) -> Limits:
+        """As inputs of every sample."""
+        k = len(b.structure.contacts)
+        masks = [b.lane(group, "mask") for group in range(len(b.structure.chains))]
+        low, high, scale = (
+            [ca.if_else(m, x, none) for m, x in zip(masks, b.lane_sample(name), strict=True)]
+            for name, none in (("low", 0), ("high", 0), ("scale", 1))
+        )
+        least, most = b.sample("contact_low", k, "N"), b.sample("contact_high", k, "N")
+        return Limits(low, high, scale, least, most, b.sample("weight", 1) if weighs else None)
+
+    def signed(self, sigma: ca.SX) -> Limits:
+        """Contact forces of these signs, or 0, besides; 0 for any sign."""
+        low = ca.if_else(sigma > 0, ca.fmax(self.contact_low, 0), self.contact_low)
+        high = ca.if_else(sigma < 0, ca.fmin(self.contact_high, 0), self.contact_high)
+        return Limits(self.low, self.high, self.scale, low, high, self.weight)
+
+
+@dataclass(frozen=True)
+class Allocated:
+    """Efforts (lanes), contact forces (k,), and the value of the objective.
+
+    sure: 1 where they are proved to be the least, else 0;  none: 1 where it is proved that there
+    are none, else 0.
+    """
+
+    effort: Lanes
+    force: ca.SX
+    value: ca.SX
+    sure: ca.SX
+    none: ca.SX
+
+
+def allocate(
+    b: Builder, Q: ca.SX, J: Lanes, D: ca.SX, limits: Limits, term: Term, turns: int = 0
+) -> Allocated:
+    """Efforts and contact forces that balance Q, (6,).
+
+    Args: J: rows of the actuator Jacobian, (6,) a group;  D: wrenches of unit forces, (6, k).
+          turns: Newton's steps; by default those of the term.
+    """
+    r = _reduced(b, Q, J, D, limits)
+    u, quality = _start(b, r, term)
+    here = _point(b, r, term, u)
+    for _ in range(turns or term.turns):
+        u, change = _turn(b, r, term, here)
+        here = _point(b, r, term, u)
+    force = here.force
+    value = b.total([term.value(x) for x in here.x])
+    if limits.weight is not None:
+        value += limits.weight * ca.sumsqr(force) / 2
+    sure = r.regular * (quality > CONDITIONED) * here.met
+    none = 1 - (1 - _empty(b, r, here.u)) * (1 - _empty(b, r, change))
+    effort = [x * s for x, s in zip(here.x, limits.scale, strict=True)]
+    return Allocated(effort, force, value, sure, none * r.regular * (1 - here.met))
+
+
+def least_pattern(
+    b: Builder,
+    Q: ca.SX,
+    J: Lanes,
+    contacts: tuple[ca.SX, ca.SX],
+    patterns: Sequence[Sequence[int]],
+    limits: Limits,
+    term: Term,
+) -> Allocated:
+    """The least of all signs that contact forces with friction can have.
+
+    Args: contacts: N and T, (6, k) each: D = N - sigma T;  patterns: sigma, (k,) each.
+    """
+    N, T = contacts
+    best: Allocated | None = None
+    for signs in patterns:
+        sigma = ca.SX(ca.DM(list(signs)))
+        one = allocate(b, Q, J, N - T @ ca.diag(sigma), limits.signed(sigma), term)
+        if best is None:
+            best = one
+            continue
+        less = one.value < best.value - TIE * ca.fabs(best.value)
+        taken = one.sure * (1 - best.sure * (1 - less))
+        known = (best.sure + best.none - best.sure * best.none) * (one.sure + one.none)
+        pairs = zip(one.effort, best.effort, strict=True)
+        best = Allocated(
+            [ca.if_else(taken, x, y) for x, y in pairs],
+            ca.if_else(taken, one.force, best.force),
+            ca.if_else(taken, one.value, best.value),
+            known * ca.fmax(one.sure, best.sure),
+            one.none * best.none,
+        )
+    assert best is not None
+    return best
+
+
+def allocation(structure: Structure, term: str, weighs: bool = False) -> Program:
+    """From the balance itself, with signs of contact forces given: a question of numbers alone."""
+    b = Builder(structure)
+    k = len(structure.contacts)
+    masks = [b.lane(group, "mask") for group in range(len(structure.chains))]
+    Q, J = b.sample("Q", 6), b.lane_sample("J", 6)
+    N, T = (ca.reshape(b.sample(name, 6 * k), 6, k) for name in ("normal", "friction"))
+    sigma, limits = b.sample("sigma", k), Limits.ports(b, weighs).signed
+    J = [ca.if_else(mask, row, 0) for mask, row in zip(masks, J, strict=True)]
+    found = allocate(b, Q, J, N - T @ ca.diag(sigma), limits(sigma), TERMS[term])
+    b.output("effort", found.effort, "N m or N")
+    b.output("contact_force", found.force, "N", k)
+    b.output("value", found.value, "")
+    b.output("none", found.none, "")
+    b.check(found.sure, 0.5)
+    return b.finish()
+
+
+# -- one pattern ---------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Reduced:
+    """G x + (0, lambda) = right: m rows of efforts alone, then those that give lambda.
+
+    steepest: greatest |G| of every row;  soft: curvature that a term has besides.
+    """
+
+    G: Lanes
+    right: ca.SX
+    low: Lanes
+    high: Lanes
+    limits: Limits
+    steepest: ca.SX
+    soft: ca.SX
+    typical: ca.SX
+    regular: ca.SX
+
+    @property
+    def m(self) -> int:
+        return 6 - self.limits.contact_low.numel()
+
+
+def _reduced(b: Builder, Q: ca.SX, J: Lanes, D: ca.SX, limits: Limits) -> _Reduced:
+    k = D.shape[1]
+    lanes = [row * s for row, s in zip(J, limits.scale, strict=True)]
+    squares = b.total([x * x for x in lanes]) + ca.sum2(D * D)
+    force, moment = ca.sum1(squares[:3]), ca.sum1(squares[3:])
+    usable = (force > 0) * (moment > 0)
+    ratio = ca.if_else(usable, force, 1) / ca.if_else(usable, moment, 1)
+    rows = ca.vertcat(ca.SX.ones(3), ca.repmat(ca.sqrt(ratio), 3, 1))
+    D, right, lanes = D * ca.repmat(rows, 1, k), Q * rows, [x * rows for x in lanes]
+    regular = ca.SX(1)
+    whole = ca.sum1(D * D)
+    for j in range(k):
+        v = D[j:, j]
+        square = ca.sumsqr(v)
+        regular *= square > REGULAR * whole[j]
+        v[0] += ca.if_else(v[0] < 0, -1, 1) * ca.sqrt(square)
+        v = b.cut(v)
+        factor = 2 / ca.sumsqr(v)
+
+        def reflected(a: ca.SX, v: ca.SX = v, factor: ca.SX = factor, j: int = j) -> ca.SX:
+            below = a[j:, :]
+            return ca.vertcat(a[:j, :], below - v @ (factor * (v.T @ below)))
+
+        D, right = ca.reshape(b.cut(reflected(D)), 6, k), b.cut(reflected(right))
+        lanes = _cut(b, [reflected(x) for x in lanes])
+    # R lambda + (rows of efforts) x = right: solved for lambda from the last one up.
+    for j in reversed(range(k)):
+        inverse = 1 / D[j, j]
+        for a in (right, *lanes):
+            a[j] = (a[j] - sum(D[j, l] * a[l] for l in range(j + 1, k))) * inverse
+    right = b.cut(ca.vertcat(right[k:], right[:k]))
+    lanes = _cut(b, [ca.vertcat(x[k:], x[:k]) for x in lanes])
+    low, high = (
+        _cut(b, [a / s for a, s in zip(own, limits.scale, strict=True)])
+        for own in (limits.low, limits.high)
+    )
+    steepest = -b.least([-ca.fabs(x) for x in lanes])
+    sizes = b.total([ca.fabs(x[: 6 - k]) for x in lanes])
+    typical = ca.SX(0)
+    for i in range(6 - k):
+        own = ca.if_else(sizes[i] > 0, ca.fabs(right[i]) / sizes[i], 0)
+        typical = ca.fmax(typical, own)
+    typical = b.cut(ca.if_else(typical > 0, typical, 1))
+    soft = SOFT * typical
+    return _Reduced(lanes, right, low, high, limits, steepest, soft, typical, regular)
+
+
+def _cut(b: Builder, lanes: Sequence[ca.SX]) -> Lanes:
+    return [b.cut(x) for x in lanes]
+
+
+@dataclass(frozen=True)
+class _Point:
+    """Efforts at multipliers u, contact forces, and what the equations then miss.
+
+    inside: 1 where an effort is between its limits, lanes;  free: 1 where a contact's multiplier
+    may move, (k,);  yields: d lambda / ds, (k,);  met: whether the equations are met.
+    """
+
+    u: ca.SX
+    x: Lanes
+    force: ca.SX
+    gradient: ca.SX
+    free: ca.SX
+    yields: ca.SX
+    met: ca.SX
+
+
+def _allowed(r: _Reduced, u: ca.SX) -> ca.SX:
+    """Multipliers with those of contacts where they may be."""
+    low, high, m = r.limits.contact_low, r.limits.contact_high, r.m
+    s = u[m:]
+    if r.limits.weight is None:
+        barred = (s < 0) * (low < -HUGE) + (s > 0) * (high > HUGE)
+        s = ca.if_else(barred, 0, s)
+    return ca.vertcat(u[:m], s)
+
+
+def _point(b: Builder, r: _Reduced, term: Term, u: ca.SX) -> _Point:
+    m, low, high = r.m, r.limits.contact_low, r.limits.contact_high
+    u = b.cut(_allowed(r, u))
+    prices = [ca.dot(G, u) for G in r.G]
+    bounds = zip(prices, r.low, r.high, strict=True)
+    x = _cut(b, [term.answer(g, least, most, r.soft) for g, least, most in bounds])
+    gradient = r.right - b.total([G * own for G, own in zip(r.G, x, strict=True)])
+    s, natural = u[m:], gradient[m:]
+    if r.limits.weight is not None:
+        price = s / r.limits.weight
+        force = _clipped(price, low, high)
+        yields = (price > low) * (price < high) / r.limits.weight
+        free = ca.SX.ones(6 - m)
+    else:
+        held = (s == 0) * (natural >= low) * (natural <= high)
+        at_low = ca.if_else(s < 0, 1, (s == 0) * (natural < low))
+        force = ca.if_else(held, natural, ca.if_else(at_low, low, high))
+        yields, free = ca.SX.zeros(6 - m), 1 - held
+    gradient = b.cut(ca.vertcat(gradient[:m], natural - force))
+    size = ca.fabs(r.right) + r.steepest * b.total([ca.fabs(own) for own in x])
+    size += ca.vertcat(ca.SX.zeros(m), ca.fabs(force))
+    met = ca.SX(1)
+    for i in range(6):
+        met *= ca.fabs(gradient[i]) <= ROUNDING * size[i]
+    return _Point(u, x, force, gradient, free, yields, met)
+
+
+def _gram(b: Builder, G: Lanes, weight: Lanes, size: int) -> ca.SX:
+    """G diag(weight) G^T of the first `size` rows."""
+    pairs = [(i, j) for i in range(size) for j in range(i + 1)]
+    weighted = _cut(b, [g[:size] * w for g, w in zip(G, weight, strict=True)])
+    both = zip(weighted, G, strict=True)
+    found = b.total([ca.vertcat(*(w[i] * g[j] for i, j in pairs)) for w, g in both])
+    M = ca.SX(size, size)
+    for at, (i, j) in enumerate(pairs):
+        M[i, j] = M[j, i] = found[at]
+    return M
+
+
+def _solved(M: ca.SX, right: ca.SX, full: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """M^-1 right by L D L^T, and the least pivot as part of `full`, the size of M's diagonal,
+    which stands in where M has no curvature."""
+    size = right.numel()
+    rows = [[M[i, j] for j in range(i + 1)] for i in range(size)]
+    x, inverse, quality = ca.vertsplit(right), [], ca.SX(1)
+    for j in range(size):
+        whole = ca.if_else(full[j] > 0, full[j], 1)
+        pivot = rows[j][j]
+        quality = ca.fmin(quality, pivot / whole)
+        inverse.append(1 / ca.if_else(pivot > FLAT * whole, pivot, whole))
+        column = [rows[i][j] for i in range(j + 1, size)]
+        for i in range(j + 1, size):
+            factor = rows[i][j] * inverse[j]
+            for l in range(j + 1, i + 1):
+                rows[i][l] = rows[i][l] - factor * column[l - j - 1]
+            x[i] = x[i] - factor * x[j]
+            rows[i][j] = factor
+    for j in reversed(range(size)):
+        x[j] = x[j] * inverse[j]
+        for i in range(j + 1, size):
+            x[j] = x[j] - rows[i][j] * x[i]
+    return ca.vertcat(*x), quality
+
+
+def _start(b: Builder, r: _Reduced, term: Term) -> tuple[ca.SX, ca.SX]:
+    """Multipliers of the least squares without limits, and how well they are known."""
+    M = _gram(b, r.G, [ca.SX(1)] * len(r.G), r.m)
+    v, quality = _solved(M, r.right[: r.m], ca.diag(M))
+    v = v * r.typical ** (term.degree - 1)
+    return ca.vertcat(v, ca.SX.zeros(6 - r.m)), quality
+
+
+def _turn(b: Builder, r: _Reduced, term: Term, here: _Point) -> tuple[ca.SX, ca.SX]:
+    """The next multipliers, and Newton's step towards them."""
+    bounds = zip(here.x, r.low, r.high, strict=True)
+    softness = [
+        ca.if_else((x > low) * (x < high), term.yields(x, r.soft), 0) for x, low, high in bounds
+    ]
+    M = _gram(b, r.G, softness, 6)
+    typical = -b.least([-own for own in softness])
+    full = b.total([G * G for G in r.G]) * ca.if_else(typical > 0, typical, 1)
+    free = ca.vertcat(ca.SX.ones(r.m), here.free)
+    for i in range(r.m, 6):
+        for j in range(i):
+            M[i, j] = M[i, j] * free[i] * free[j]
+        M[i, i] = ca.if_else(free[i], M[i, i] + here.yields[i - r.m], 1)
+        full[i] = ca.if_else(free[i], full[i] + here.yields[i - r.m], 1)
+    change, _ = _solved(M, here.gradient, full)
+    change = b.cut(change)
+    first = ca.dot(here.gradient, change)
+    # Where the slope of d along the step vanishes: sought between lengths of either sign.
+    t, top = ca.SX(1), ca.SX(float("inf"))
+    low, low_slope, top_slope = ca.SX(0), first, ca.SX(0)
+    for _ in range(PROBES):
+        slope = ca.dot(_point(b, r, term, here.u + t * change).gradient, change)
+        rises = slope > 0
+        low_slope, top_slope = (
+            ca.if_else(rises, slope, low_slope),
+            ca.if_else(rises, top_slope, slope),
+        )
+        low, top = ca.if_else(rises, t, low), ca.if_else(rises, top, t)
+        span = top - low
+        secant = low + span * low_slope / (low_slope - top_slope)
+        between = _clipped(secant, low + 0.1 * span, top - 0.1 * span)
+        found = ca.if_else(top > HUGE, 4 * t, between)
+        t = b.cut(ca.if_else(ca.fabs(slope) <= ENOUGH * first, t, found))
+        low, top, low_slope, top_slope = (b.cut(a) for a in (low, top, low_slope, top_slope))
+    t = ca.if_else(top > HUGE, low, t)
+    return here.u + ca.if_else(here.met, 0, t) * change, change
+
+
+def _empty(b: Builder, r: _Reduced, u: ca.SX) -> ca.SX:
+    """Whether multipliers prove that nothing within bounds meets the equations: 1, else 0.
+
+    The equations weighed by u read right . u = g . x + s . lambda, and the right side cannot be as
+    great as the left (Farkas).
+    """
+    u = _allowed(r, u)
+    low, high = r.limits.contact_low, r.limits.contact_high
+    lanes = zip(r.G, r.low, r.high, strict=True)
+    most = b.total([_support(ca.dot(G, u), *both) for G, *both in lanes])
+    for s, *both in zip(*(ca.vertsplit(a) for a in (u[r.m :], low, high)), strict=True):
+        most += _support(s, *both)
+    products = u * r.right
+    return ca.sum1(products) - most > FARKAS * ca.sum1(ca.fabs(products))
+
+
+def _support(price: ca.SX, low: ca.SX, high: ca.SX) -> ca.SX:
+    """The most that a price can earn."""
+    return ca.if_else(price > 0, price * high, ca.if_else(price < 0, price * low, 0))
