@@ -27,9 +27,10 @@ class Folder:
 
 def written(name: str, path: Path, **options: Any) -> Folder:
     """The package of a bundled mechanism or a test case."""
-    known = name in condyle.bundled_mechanisms()
-    mechanism = limited() if name == "limited" else None
-    mechanism = mechanism or (condyle.load(name) if known else case(name).mechanism)
+    if name in condyle.bundled_mechanisms():
+        mechanism = condyle.load(name)
+    else:
+        mechanism = CHANGED[name]() if name in CHANGED else case(name).mechanism
     landmark = options.get("landmark")
     questions = options.pop("questions", (*DEFAULT, *(("closure",) if landmark else ())))
     exported = export(mechanism, questions, **options)
@@ -48,6 +49,12 @@ def limited() -> condyle.Mechanism:
     return machine.model_copy(update={"chains": chains, "contacts": (sided, right)})
 
 
+def rubbing() -> condyle.Mechanism:
+    """The reference mechanism with friction at a contact."""
+    return condyle.load("masticatory").set({"contact.left_condyle.friction": {"coefficient": 0.1}})
+
+
+CHANGED = {"limited": limited, "rubbing": rubbing}
 FOLDERS: dict[str, tuple[str, dict[str, Any]]] = {
     "jaw": ("masticatory", {"landmark": "incisor", "prefix": "jaw"}),
     "single": ("gough-stewart", {"precision": "float", "questions": ("inverse", "pose")}),
@@ -57,6 +64,7 @@ FOLDERS: dict[str, tuple[str, dict[str, Any]]] = {
         {"constants": "struct", "prefix": "hexapod", "questions": ("inverse", "motion", "pose")},
     ),
     "limited": ("limited", {"questions": ("bounded",)}),
+    "rubbing": ("rubbing", {"questions": ("contact", "forward")}),
     "mixed": ("mixed_k1_n7", {"prefix": "mixed", "questions": ("contact", "forward", "pose")}),
 }
 

@@ -51,21 +51,19 @@ def test_clang_has_nothing_to_say(folder: Folders, name: str) -> None:
     checked(folder(name), "-O1", CC="clang")
 
 
-def test_vector_types(folder: Folders) -> None:
-    need("clang", "make")
-    flags = "-DJAW_VECTOR"  # of any processor
-    checked(folder("jaw"), "-O1", CC="clang", VECTOR="1", VECTOR_FLAGS=flags)
+@pytest.mark.parametrize("name", ["jaw", "rubbing"])
+@pytest.mark.parametrize("compiler, flags", [("clang", "-O1"), ("gcc", f"-O1 {SANITIZED}")])
+def test_vector_types(folder: Folders, name: str, compiler: str, flags: str) -> None:
+    """Of any processor."""
+    need(compiler, "make")
+    defined = f"-D{folder(name).exported.prefix.upper()}_VECTOR"
+    checked(folder(name), flags, CC=compiler, VECTOR="1", VECTOR_FLAGS=defined)
 
 
 @pytest.mark.parametrize("name", ["struct", "limited"])
 def test_sanitizers(folder: Folders, name: str) -> None:
     need("gcc", "make")
     checked(folder(name), f"-O1 -g {SANITIZED}", CC="gcc")
-
-
-def test_sanitizers_with_vector_types(folder: Folders) -> None:
-    need("gcc", "make")
-    checked(folder("jaw"), f"-O1 {SANITIZED}", CC="gcc", VECTOR="1", VECTOR_FLAGS="-DJAW_VECTOR")
 
 
 @pytest.mark.parametrize("name", ["jaw", "single", "struct"])

@@ -173,7 +173,7 @@ def _vector(p: str, lanes: int, code: str) -> str:
     """What vector types need, with names that differ from those of scalar code."""
     text = (files("condyle.backends.c") / "vector.h").read_text(encoding="utf-8")
     text = picked(text, code)
-    both = re.sub(r"\b([a-z]\w*)_s\b", r"\1_w", f"{text}\n{code}")
+    both = re.sub(r"(\b[a-z]\w*|##)_s\b", r"\1_w", f"{text}\n{code}")
     # Vectors stay within this file: how they are passed between others does not matter.
     quiet = '#pragma GCC diagnostic ignored "-Wpsabi"'
     head = f"#if defined({p}_VECTOR)\n{quiet}\n#define W {lanes}"

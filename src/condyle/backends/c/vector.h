@@ -52,7 +52,7 @@ INLINE void store_some(double *p, vec v, int some) {
     for (int i = 0; i < some; i++) p[i] = v[i];
 }
 #endif
-INLINE vec spread(double x) { return x - (vec){}; }
+INLINE vec spread(double x) { return x - (vec){0}; }
 INLINE vec choose(mask m, vec a, vec b) { return (vec)((m & (mask)a) | (~m & (mask)b)); }
 #if W == 8 && defined(__AVX512DQ__)
 INLINE int any(mask m) { return _mm512_movepi64_mask((__m512i)m) != 0; }
