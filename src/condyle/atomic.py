@@ -59,17 +59,23 @@ def replacing_folder(path: str | os.PathLike[str], mark: str) -> Iterator[Path]:
         raise InputError(f"{path}: exists and is something else; give another name, or remove it")
     if not target.parent.is_dir():
         raise InputError(f"{path}: the folder {target.parent} does not exist; create it first")
-    temporary = _beside(target)
+    temporary, old = _beside(target), _beside(target)
     _sweep(target.parent)
     try:
         yield temporary
-        if target.exists():
-            shutil.rmtree(target)
-        os.replace(temporary, target)
+        if target.exists():  # aside until the new one stands
+            os.replace(target, old)
+        try:
+            os.replace(temporary, target)
+        except OSError:
+            if old.exists():
+                os.replace(old, target)
+            raise
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
     finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+        for folder in (temporary, old):
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def _beside(target: Path) -> Path:
