@@ -108,7 +108,7 @@ def map_(
     from ..analysis.map.files import save_map
     from ..analysis.map.numbers import numbers_of
     from ..analysis.map.quantities import chosen
-    from ..analysis.sweep.schedule import check_scheduler
+    from ..analysis.workers import check_scheduler
     from ..report.maps import numbers_text
 
     machine = condyle.load(mechanism)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..motion.arrays import runs_of
 from .bodies import Bodies
 from .recording import Recording
 from .rigid import FEWEST
@@ -37,18 +38,17 @@ def why_none(bodies: Bodies, run: slice, max_residual: float) -> str:
 
 def suspects_in(recording: Recording, bodies: Bodies, bad: np.ndarray) -> list[str]:
     """Exchanged labels in the frames whose residuals are too large, and loose markers elsewhere."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], bad.astype(np.int8), [0]])))
     found, clean = [], np.ones(len(bad), dtype=bool)
-    for start, stop in sorted(edges.reshape(-1, 2), key=lambda run: run[0] - run[1])[:_STRETCHES]:
+    for run in sorted(runs_of(bad), key=lambda run: run.start - run.stop)[:_STRETCHES]:
         said = exchanged(
             [body.shape for body in bodies.both],
             [body.names for body in bodies.both],
-            [body.points[start:stop] for body in bodies.both],
+            [body.points[run] for body in bodies.both],
         )
         if said:
             t = recording.t
-            found.append((start, f"from {t[start]:.4g} to {t[stop - 1]:.4g} s {said}"))
-            clean[start:stop] = False
+            found.append((run.start, f"from {t[run][0]:.4g} to {t[run][-1]:.4g} s {said}"))
+            clean[run] = False
     moving = [said for body in bodies.both for said in loose(body.names, body.points[clean])]
     return [said for _, said in sorted(found)] + moving
 

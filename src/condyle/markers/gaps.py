@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from ..errors import InputError
+from ..motion.arrays import runs_of
 from ..motion.path import MIN_ROWS
 
 _SLACK = 1e-6  # of a frame
@@ -54,12 +55,12 @@ def close_gaps(
     """
     step = (t[-1] - t[0]) / max(len(t) - 1, 1)
     missing = ~np.isfinite(values).all(axis=1)
-    runs = _runs(missing)
+    runs = runs_of(missing)
     too_long = [r for r in runs if (r.stop - r.start) * step > longest_gap + _SLACK * step]
     if too_long and not keep_longest:
         raise _too_long(source, t, too_long, longest_gap, why)
     kept = _longest_between(too_long, len(t))
-    held = _runs(~missing[kept])
+    held = runs_of(~missing[kept])
     if not held or (~missing[kept]).sum() < MIN_ROWS:
         reason = f": {why(runs[0])}" if runs else ""
         raise InputError(
@@ -76,12 +77,6 @@ def close_gaps(
 
 def _made(run: slice, kept: slice) -> Literal["filled", "cut"]:
     return "filled" if kept.start <= run.start and run.stop <= kept.stop else "cut"
-
-
-def _runs(flag: np.ndarray) -> list[slice]:
-    """Where an array of truths, (F,), is true."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flag.astype(np.int8), [0]])))
-    return [slice(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
 def _longest_between(runs: list[slice], count: int) -> slice:

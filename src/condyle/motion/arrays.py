@@ -38,3 +38,9 @@ def check_rising(t: np.ndarray, where: Callable[[int], str]) -> None:
         raise InputError(
             f"{where(i)}: t is {now} s after {before} s; times must rise from row to row"
         )
+
+
+def runs_of(flag: np.ndarray) -> list[slice]:
+    """Where an array of truths, (N,), is true, stretch by stretch."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flag.astype(np.int8), [0]])))
+    return [slice(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from condyle.analysis.map.axes import Axis, Grid
-from condyle.analysis.map.curves import trace
+from condyle.analysis.map.lines import trace
 from condyle.analysis.map.room import Free, best_box, greatest_ball, greatest_box
 from condyle.analysis.map.volume import reachable_volume
 

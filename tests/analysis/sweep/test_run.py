@@ -20,9 +20,10 @@ import tomli_w
 import xarray as xr
 
 import condyle
-from condyle.analysis.sweep import read_sweep, schedule, store
-from condyle.analysis.sweep.schedule import LostWorkerError
+from condyle.analysis import workers as pool
+from condyle.analysis.sweep import read_sweep, store
 from condyle.analysis.sweep.solve import solve_part
+from condyle.analysis.workers import LostWorkerError
 
 Same = Callable[[xr.Dataset, xr.Dataset], None]
 
@@ -253,7 +254,7 @@ def test_wrong_schedulers_are_told_before_any_work(
     message: str,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(schedule, "PATIENCE", 1.0)
+    monkeypatch.setattr(pool, "PATIENCE", 1.0)
     if "://" in scheduler:
         pytest.importorskip("distributed")
     with pytest.raises(condyle.InputError, match=message) as caught:

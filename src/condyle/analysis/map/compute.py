@@ -20,7 +20,7 @@ from ...mechanism.mechanism import COORDINATES, Mechanism
 from ...model.evaluator import Evaluator
 from ...motion.units import FORCE, MOMENT
 from ...progress import step
-from ..sweep.schedule import check_scheduler, done
+from ..workers import check_scheduler, run_parts
 from .axes import Grid, Over, Values, grid_of, number, values_of
 from .block import Asked, Block
 from .quantities import Mapped, Quantity, chosen, variables
@@ -188,14 +188,7 @@ def fill(
     pieces: Pieces, sink: Sink, workers: int | None = None, scheduler: str | None = None
 ) -> None:
     """Evaluate all poses, block by block, here or where `scheduler` says."""
-    numbers = range(pieces.count)
-    job: Any = pieces  # whoever does it hands it through as it is
-    work: Any = evaluated
-    found = (
-        ((piece, evaluated(pieces, piece)) for piece in numbers)
-        if scheduler is None
-        else done(job, work, numbers, workers, scheduler)
-    )
+    found = run_parts(pieces, evaluated, range(pieces.count), workers, scheduler)
     with step("mapping", pieces.grid.size) as advance:
         for piece, arrays in found:
             start, stop = pieces.ends(piece)

@@ -1,63 +1,80 @@
-"""The lines of a map over two coordinates: its borders, singular curves and bounds, each traced."""
+"""The lines of a map over two coordinates: its borders, singular curves and bounds.
+
+Contour lines of a grid are brought onto the curve, point by point, by Newton's steps, and followed
+to where another margin forbids the pose, or the function ends.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from ...extras import require
+from ...motion.arrays import runs_of
 from ...results.contacts import bound_margins
 from .axes import Grid
-from .curves import Curve, Function, corrected, trace
-from .reach import Reach
+from .reach import Reach, bounded
 
-MOST = 201  # points along an axis of the grid that curves are looked for on
+LEAST, MOST = 41, 201  # points along an axis of the grid that lines are looked for on
 ROUNDING = 1e-9  # of the other margins, on a line
-HALVINGS = 30
+ROUNDS, HALVINGS = 8, 30  # of Newton; of bisection
+NUDGE = 1e-6  # of the range, for differences
+CLOSE = 1e-11  # of the range: how near to the curve points are brought
+AROUND = NUDGE * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
+
+Function = Callable[[np.ndarray], np.ndarray]  # of points (N, 2) in the unit square -> (N,)
 
 
 @dataclass(frozen=True)
-class Line:
-    """A traced curve.
+class Curve:
+    """Points on a curve, (N, 2), in the unit square; closed: the last goes on to the first."""
 
-    kind:   reach (of a chain: an inverse singularity too), stroke, contacts (what they can meet),
-            singular (direct), bounds (of a contact).
-    name:   of the chain or contact.
-    points: (N, 2) [m or rad] along the two axes;  closed: the last goes on to the first.
-    """
-
-    kind: str
-    name: str
     points: np.ndarray
     closed: bool
 
 
+@dataclass(frozen=True)
+class Line(Curve):
+    """A curve of a map; points: (N, 2) [m or rad] along the two axes.
+
+    kind: reach (of a chain: an inverse singularity too), stroke, contacts (what they can meet),
+          singular (direct), bounds (of a contact);  name: of the chain or contact.
+    """
+
+    kind: str
+    name: str
+
+
 def lines_of(reach: Reach, grid: Grid) -> list[Line]:
     """All lines of a map over two coordinates; borders where nothing else forbids the poses."""
-    low = np.array([axis.low for axis in grid.axes])
-    span = np.array([axis.span for axis in grid.axes])
-    shape = [min(max(axis.count, 41), MOST) for axis in grid.axes]
+    low, span = (np.array([getattr(axis, end) for axis in grid.axes]) for end in ("low", "span"))
+    shape = [min(max(axis.count, LEAST), MOST) for axis in grid.axes]
     square = np.meshgrid(*(np.linspace(0, 1, n) for n in shape), indexing="ij")
-    u = np.stack(square, axis=-1).reshape(-1, 2)
+    margins = Margins(reach)
 
     def everything(points: np.ndarray) -> np.ndarray:
         return margins.at(grid.states(low + span * points))
 
-    margins = Margins(reach)
-    values = everything(u)
+    values = everything(np.stack(square, axis=-1).reshape(-1, 2))
     found = []
     for i, (kind, name) in enumerate(margins.names):
+        others = [k for k in margins.forbidding if k != i]
 
         def f(points: np.ndarray, i: int = i) -> np.ndarray:
             return everything(points)[i]
 
-        own = values[i].reshape(shape)
-        if not np.isfinite(own).any():
-            continue
-        for curve in trace(f, own):
-            for part in _allowed(curve, f, i, everything, margins.forbidding):
-                found.append(Line(kind, name, low + span * part.points, part.closed))
+        def allowed(points: np.ndarray, others: list[int] = others) -> np.ndarray:
+            """Where rounding puts a point of a border beyond it, what is beside it counts."""
+            beside = (points + 1e-3 * AROUND[:, None]).reshape(-1, 2)
+            there = everything(beside).reshape(-1, len(AROUND), len(points))[others]
+            known = np.where(np.isnan(there[:, 0]), np.fmax.reduce(there, axis=1), there[:, 0])
+            return np.asarray((known >= -ROUNDING).all(axis=0))
+
+        for curve in trace(f, values[i].reshape(shape), allowed):
+            found.append(Line(low + span * curve.points, curve.closed, kind, name))
     return found
 
 
@@ -71,9 +88,7 @@ class Margins:
         model, mechanism = reach.model, reach.model.mechanism
         self._reach = reach
         self._square = len(mechanism.chains) == len(model.independent)
-        self._bounded = [
-            i for i, c in enumerate(mechanism.contacts) if c.bounds.x or c.bounds.y or c.bounds.z
-        ]
+        self._bounded = bounded(mechanism)
         chains = mechanism.chain_names
         names = [("contacts", " & ".join(mechanism.contact_names))]
         names += [("reach", name) for name in chains]
@@ -82,16 +97,13 @@ class Margins:
             names += [("stroke", chains[i])] * 2
         self.forbidding = list(range(len(names)))
         names += [("bounds", mechanism.contact_names[i]) for i in self._bounded]
-        if self._square:
-            names.append(("singular", ""))
-        self.names = names
+        self.names = names + [("singular", "")] * self._square
 
     def at(self, q: np.ndarray) -> np.ndarray:
         """(names, N); no number where a function has no value."""
         reach = self._reach
         wanted = ["joint"] * bool(self._stroked) + ["points"] * bool(self._bounded)
-        wanted += ["rows"] * self._square
-        found = reach.model.survey(q, wanted, reach.threads)
+        found = reach.model.survey(q, wanted + ["rows"] * self._square, reach.threads)
         rows = [found.closing, *found.discriminant]
         for i in self._stroked:
             joint = found.values["joint"][i]
@@ -114,56 +126,88 @@ def _determinant(rows: np.ndarray) -> np.ndarray:
     return found
 
 
-def _allowed(
-    curve: Curve,
-    f: Function,
-    own: int,
-    everything: Callable[[np.ndarray], np.ndarray],
-    forbidding: list[int],
-) -> Iterator[Curve]:
-    """The parts of a curve where no other margin is negative, out to where one is."""
-    others = [i for i in forbidding if i != own]
+def trace(f: Function, values: np.ndarray, allowed: Function | None = None) -> list[Curve]:
+    """All curves f = 0 that a grid sees.
 
-    def fine(points: np.ndarray) -> np.ndarray:
+    Where f changes its sign at a pole Newton's steps find no curve.
+
+    Args: values: of f on a grid over the unit square, (n1, n2), no number where f has none.
+          allowed: whether a point of a curve is wanted; without it all are.
+    """
+    require("contourpy", "figures")
+    from contourpy import contour_generator
+
+    cells = np.array(values.shape) - 1
+    seen: Any = contour_generator(z=np.ma.masked_invalid(_grown(values).T)).lines(0.0)
+    found = []
+    for line in seen:
+        closed = bool((line[0] == line[-1]).all())
+        points = line[: len(line) - closed] / cells
+        exact = _corrected(f, points, 2.0 / cells.max())
+        good = np.isfinite(exact[:, 0])
+        if allowed is not None:
+            good &= allowed(np.nan_to_num(exact))
+        points[good] = exact[good]
+        if closed and good.all():
+            found.append(Curve(points, True))
+            continue
+        if closed:  # begin where it is not good, and go round to there
+            order = (np.arange(len(points) + 1) + np.argmin(good)) % len(points)
+            points, good = points[order], good[order]
+        for run in runs_of(good):
+            part = points[run]
+            if run.start > 0:
+                part = np.vstack([_end(f, allowed, part[0], points[run.start - 1]), part])
+            if run.stop < len(points):
+                part = np.vstack([part, _end(f, allowed, part[-1], points[run.stop])])
+            part = part[np.append(True, np.diff(part, axis=0).any(axis=1))]
+            found += [Curve(part, False)] * (len(part) > 1)
+    return found
+
+
+def _grown(values: np.ndarray) -> np.ndarray:
+    """Values of a grid, (n1, n2), and beyond where they end two more, linear along the axes."""
+    n1, n2 = values.shape
+    for _ in range(2):
+        wide = np.pad(values, 2, constant_values=np.nan)
+        beyond = []
+        for i, k in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+            near, far = (wide[2 + m * i :, 2 + m * k :][:n1, :n2] for m in (1, 2))
+            beyond.append(2 * near - far)
+        known = np.isfinite(beyond)
         with np.errstate(invalid="ignore"):
-            return np.asarray((everything(points)[others] >= -ROUNDING).all(axis=0))
-
-    good = fine(curve.points)
-    if good.all():
-        yield curve
-        return
-    if not good.any():
-        return
-    points = curve.points
-    if curve.closed:  # begin where it is forbidden
-        turn = int(np.argmin(good))
-        points, good = np.roll(points, -turn, axis=0), np.roll(good, -turn)
-        points, good = np.vstack([points, points[:1]]), np.append(good, False)
-    changes = np.flatnonzero(np.diff(good.astype(int)))
-    ends = {int(i): _corner(f, fine, points[i], points[i + 1], bool(good[i])) for i in changes}
-    begin = 0
-    for i in [*map(int, changes), len(points) - 1]:
-        if good[i]:
-            run = list(points[begin : i + 1])
-            before, after = ends.get(begin - 1), ends.get(i)
-            run = [before] * (before is not None) + run + [after] * (after is not None)
-            if len(run) > 1:
-                yield Curve(np.array(run), False)
-        begin = i + 1
+            mean = np.where(known, beyond, 0.0).sum(axis=0) / known.sum(axis=0)
+        values = np.where(np.isfinite(values), values, mean)
+    return values
 
 
-def _corner(
-    f: Function, fine: Callable[[np.ndarray], np.ndarray], a: np.ndarray, b: np.ndarray, good: bool
-) -> np.ndarray | None:
-    """Where, from a to b along the curve, another margin changes its sign."""
-    if not good:
-        a, b = b, a
-    last = None
-    low, high = 0.0, 1.0
+def _corrected(f: Function, start: np.ndarray, reach: float) -> np.ndarray:
+    """The points of the curve near others, (N, 2), on the edge of the square along that.
+
+    No number where Newton's steps do not find one, no farther away than `reach`.
+    """
+    free, x = (start > 0) & (start < 1), start
+    with np.errstate(all="ignore"):
+        for _ in range(ROUNDS):
+            v = f((x + AROUND[:, None]).reshape(-1, 2)).reshape(len(AROUND), -1)
+            slope = free * np.column_stack([v[1] - v[2], v[3] - v[4]]) / (2 * NUDGE)
+            step = (v[0] / (slope**2).sum(axis=1))[:, None] * slope
+            x, size = x - step, np.linalg.norm(step, axis=1)
+            if not (size >= CLOSE).any():
+                break
+        found = (size < CLOSE) & (np.linalg.norm(x - start, axis=1) <= reach)
+    return np.where(found[:, None], np.clip(x, 0.0, 1.0), np.nan)
+
+
+def _end(
+    f: Function, allowed: Function | None, inside: np.ndarray, outside: np.ndarray
+) -> np.ndarray:
+    """How far a curve goes from a point of it towards another, (2,), and is allowed."""
+    way, last, low, high = outside - inside, inside, 0.0, 1.0
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        found = corrected(f, a + middle * (b - a))
-        if found is not None and fine(found[0][None])[0]:
+        found = _corrected(f, (inside + middle * way)[None], float(np.linalg.norm(way)))
+        if np.isfinite(found).all() and (allowed is None or allowed(found)[0]):
             low, last = middle, found[0]
         else:
             high = middle

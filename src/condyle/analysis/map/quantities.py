@@ -18,6 +18,7 @@ from ...results.variables import cause_flags, of_effort, of_joint, of_pose
 from ...status import STATUS_NAMES
 from .ability import limited
 from .block import Asked, Block
+from .reach import bounded
 
 Units = str | Callable[[Mechanism], str]
 POSE_UNITS = of_pose("{}")
@@ -127,8 +128,7 @@ def _no_speeds(asked: Asked) -> str:
 
 
 def _no_bounds(asked: Asked) -> str:
-    found = [c.bounds.x or c.bounds.y or c.bounds.z for c in asked.model.mechanism.contacts]
-    return "" if any(found) else "contacts with bounds in the mechanism file"
+    return "" if bounded(asked.model.mechanism) else "contacts with bounds in the mechanism file"
 
 
 def _no_contacts(asked: Asked) -> str:

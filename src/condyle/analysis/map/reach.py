@@ -16,6 +16,7 @@ import numpy as np
 
 from ...errors import InputError, did_you_mean
 from ...kinematics.chain import FAMILIES
+from ...mechanism.contact import Bounds
 from ...mechanism.mechanism import Mechanism
 from ...model.evaluator import Evaluator
 from ...model.survey import Survey
@@ -70,6 +71,11 @@ class Reach:
     def margin(self, q: np.ndarray) -> np.ndarray:
         """The least margin of all chains, (N,): negative, or no number, out of reach."""
         return self.survey(q)[1].min(axis=0)
+
+
+def bounded(mechanism: Mechanism) -> list[int]:
+    """Contacts that have bounds, by number."""
+    return [i for i, c in enumerate(mechanism.contacts) if c.bounds != Bounds()]
 
 
 def strokes_of(mechanism: Mechanism, given: Strokes) -> tuple[np.ndarray, np.ndarray]:

@@ -15,8 +15,8 @@ from ...progress import step
 from ...results.solution import Solution
 from ...results.warnings import Notice
 from ...status import Status
+from ..workers import PROCESSES, check_scheduler, run_parts
 from .job import Job, prepared
-from .schedule import PROCESSES, check_scheduler, done
 from .solve import OK, Solver
 from .study import Study
 
@@ -81,7 +81,9 @@ def _all(job: Job, workers: int | None, scheduler: str) -> tuple[np.ndarray, np.
     efforts, forces = np.full((V, N, n), np.nan), np.full((V, N, k), np.nan)
     failed = 0
     with step("solving variants", V) as advance:
-        for part, (effort, force, bad) in done(job, curves, range(job.parts), workers, scheduler):
+        for part, (effort, force, bad) in run_parts(
+            job, curves, range(job.parts), workers, scheduler
+        ):
             rows = slice(part * job.part, part * job.part + len(effort))
             efforts[rows], forces[rows] = effort, force
             failed += bad

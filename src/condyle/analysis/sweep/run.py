@@ -13,8 +13,8 @@ import xarray as xr
 from ...mechanism.mechanism import Mechanism
 from ...motion import Load, Motion, as_load, as_motion
 from ...progress import step
+from ..workers import PROCESSES, check_scheduler, run_parts
 from .job import Job, prepared
-from .schedule import PROCESSES, check_scheduler, done
 from .solve import solve_part
 from .store import Store, read
 from .study import Study, read_study
@@ -76,7 +76,7 @@ def _filled(
     missing = store.missing()
     with step("solving variants", job.rows) as advance:
         advance((job.parts - len(missing)) * job.part * len(job.motions))
-        for part, rows in done(job, solve_part, missing, workers, scheduler):
+        for part, rows in run_parts(job, solve_part, missing, workers, scheduler):
             store.write(part, rows)
             advance(len(rows.status))
     return read(out)

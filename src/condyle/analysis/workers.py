@@ -1,0 +1,160 @@
+"""Runs the parts of a job here, in threads, in processes, or on a cluster of Dask's.
+
+Scheduling, queues and what becomes of a lost worker are those of `concurrent.futures` and Dask;
+here stands only which of them is asked. Results do not depend on it.
+"""
+
+from __future__ import annotations
+
+import logging
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import (
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    as_completed,
+)
+from contextlib import ExitStack, contextmanager
+from typing import Any, TypeVar
+
+from ..backends.threads import workers as processors
+from ..errors import CondyleError, InputError
+from ..extras import require
+
+Job = TypeVar("Job")
+Result = TypeVar("Result")
+Work = Callable[[Job, int], Result]
+
+PROCESSES, THREADS, DASK = "processes", "threads", "dask"
+PATIENCE = 10.0  # seconds that a scheduler has to answer
+
+
+class LostWorkerError(CondyleError):
+    """A process that did a part of a study ended before it was done."""
+
+
+def check_scheduler(workers: int | None, scheduler: str) -> None:
+    """Raises InputError for what cannot be a scheduler, or does not answer as one."""
+    if workers is not None and workers < 1:
+        raise InputError(f"workers: expected 1 or more, got {workers}")
+    if scheduler in (PROCESSES, THREADS):
+        return
+    if scheduler != DASK and "://" not in scheduler:
+        raise InputError(
+            f'scheduler "{scheduler}": expected {PROCESSES}, {THREADS}, {DASK} (a cluster on this '
+            "machine), or the address of a Dask scheduler such as tcp://10.0.0.1:8786"
+        )
+    if scheduler != DASK and workers is not None:
+        raise InputError("workers: a cluster that runs already has its own; leave it out")
+    require("distributed", "cluster")
+    if scheduler != DASK:
+        with ExitStack() as stack:
+            _client(stack, None, scheduler)
+
+
+def run_parts(
+    job: Job,
+    work: Work[Job, Result],
+    parts: Sequence[int],
+    workers: int | None,
+    scheduler: str | None,
+) -> Iterator[tuple[int, Result]]:
+    """Parts and what `work(job, part)` made of each, in whatever order they get done.
+
+    Args:   workers: default: the processors at hand.
+            scheduler: processes, threads, dask, or the address of a Dask scheduler; None: here.
+    Raises: InputError:      if the scheduler does not answer.
+            LostWorkerError: if a worker ended; Dask tries elsewhere first.
+    """
+    count = min(workers or processors(None), len(parts))
+    if scheduler is None or not parts or (count == 1 and scheduler in (PROCESSES, THREADS)):
+        for part in parts:
+            yield part, work(job, part)
+        return
+    with _pool(job, count, scheduler) as (pool, shared):
+        waiting = {pool.submit(_part, shared, work, part): part for part in parts}
+        for future in as_completed(waiting):
+            yield waiting.pop(future), future.result()
+
+
+@contextmanager
+def _pool(job: Any, count: int, scheduler: str) -> Iterator[tuple[Executor, Any]]:
+    """An executor, and the job as its workers get it; parts not begun are forgotten at the end."""
+    lost: tuple[type[Exception], ...] = (BrokenExecutor, CancelledError)
+    pool: Executor
+    with ExitStack() as stack:
+        if scheduler == PROCESSES:  # a fork needs nothing of the caller's script, nor to pickle
+            start = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
+            pool, shared = ProcessPoolExecutor(count, start, _begin, (job,)), None
+        elif scheduler == THREADS:
+            pool, shared = ThreadPoolExecutor(count), job
+        else:
+            from distributed import KilledWorker
+
+            client = _client(stack, count, scheduler)
+            # What was submitted can be made again where it is lost.
+            pool, shared = client.get_executor(pure=False), client.submit(_same, job, pure=False)
+            lost = (*lost, KilledWorker)
+        try:
+            yield pool, shared
+        except lost as error:
+            what = f"the cluster gave up on a part: {error}."
+            if isinstance(error, BrokenExecutor):
+                what = "a worker process was killed or ended by itself (is there enough memory?)."
+            raise LostWorkerError(what, "What was done is kept; --resume does the rest.") from error
+        finally:
+            if scheduler in (PROCESSES, THREADS):
+                pool.shutdown(cancel_futures=True)
+            else:
+                pool.shutdown(wait=False)  # which cancels what is left
+
+
+_job: Any = None  # of a worker process
+
+
+def _part(shared: Any, work: Work[Any, Result], part: int) -> Result:
+    return work(_job if shared is None else shared, part)
+
+
+def _same(job: Any) -> Any:
+    return job
+
+
+def _begin(job: Any) -> None:
+    """In a worker: Ctrl-C is the parent's to hear, and without a parent there is no work."""
+    global _job
+    _job = job
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+def _client(stack: ExitStack, count: int | None, scheduler: str) -> Any:
+    """A client of the cluster at an address, or of one on this machine for as long as it takes."""
+    from distributed import Client, LocalCluster
+
+    if scheduler == DASK:
+        quiet = {"dashboard_address": None, "silence_logs": logging.CRITICAL}
+        cluster = LocalCluster(n_workers=count, threads_per_worker=1, **quiet)
+        return stack.enter_context(Client(stack.enter_context(cluster)))
+    try:
+        return stack.enter_context(Client(scheduler, timeout=PATIENCE))
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"no Dask scheduler answers at {scheduler} ({type(error).__name__}). Start one with "
+            "`dask scheduler`, and workers with `dask worker ADDRESS`"
+        ) from None
