@@ -11,16 +11,14 @@ from .graph import Graph, Value
 from .operations import BY_CASADI
 
 
-def read(
-    graph: Graph, outputs: Sequence[ca.SX], known: Mapping[str, Value], free: Sequence[ca.SX]
-) -> list[list[Value]]:
+def read(graph: Graph, outputs: Sequence[ca.SX], known: Mapping[str, Value]) -> list[list[Value]]:
     """Nodes of expressions, entry by entry.
 
-    Args: known: symbol name -> node, for every symbol in `free`, the symbols that occur.
+    Args: known: symbol name -> node, for every symbol that occurs.
     """
-    symbols = ca.vertcat(*free)
-    function = ca.Function("expressions", [symbols], [ca.densify(o) for o in outputs])
-    names = [free_symbol.name() for free_symbol in free]
+    free = ca.symvar(ca.veccat(*outputs))
+    function = ca.Function("expressions", [ca.vertcat(*free)], [ca.densify(o) for o in outputs])
+    names = [symbol.name() for symbol in free]
     work: dict[int, Value] = {}
     found: list[list[Value]] = [[-1] * o.numel() for o in outputs]
     for k in range(function.n_instructions()):

@@ -185,7 +185,7 @@ def least_pattern(
     return best
 
 
-def allocation(structure: Structure, term: str, weighs: bool = False) -> Program:
+def allocation(structure: Structure, term: str = "square", weighs: bool = False) -> Program:
     """From the balance itself, with signs of contact forces given: a question of numbers alone."""
     b = Builder(structure)
     k = len(structure.contacts)

@@ -32,7 +32,6 @@ class Builder:
         self._unknowns = 0
         self._outputs: list[tuple[str, tuple[int, ...], str, bool, list[ca.SX | None]]] = []
         self._checks: list[tuple[ca.SX, float, int | None]] = []
-        self._symbols: list[ca.SX] = []
         self._known: dict[str, Value] = {}
 
     # -- what goes in ----------------------------------------------------------------------
@@ -128,14 +127,12 @@ class Builder:
 
     def values(self, expressions: Sequence[ca.SX]) -> list[list[Value]]:
         """Values of expressions, entry by entry, column by column."""
-        return read(self.graph, expressions, self._known, self._symbols)
+        return read(self.graph, expressions, self._known)
 
     def symbols(self, name: str, values: Sequence[Value]) -> ca.SX:
         """Symbols that stand for values."""
-        made = [ca.SX.sym(f"{name}#{len(self._symbols) + i}") for i in range(len(values))]
-        for symbol, value in zip(made, values, strict=True):
-            self._known[symbol.name()] = value
-            self._symbols.append(symbol)
+        made = [ca.SX.sym(f"{name}#{len(self._known) + i}") for i in range(len(values))]
+        self._known |= {symbol.name(): value for symbol, value in zip(made, values, strict=True)}
         return ca.vertcat(*made) if made else ca.SX(0, 1)
 
     # -- what comes out --------------------------------------------------------------------
