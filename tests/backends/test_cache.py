@@ -476,23 +476,6 @@ def test_show_and_clear(condyle_command: Callable[..., Any], folder: Path) -> No
     assert condyle_command("cache", "--clear").out.startswith("Removed 0 kernels, 0.0 MB")
 
 
-@pytest.mark.parametrize(
-    ("assembly", "lanes", "kind"),
-    [(True, 8, "assembly for AVX-512"), (True, 4, "assembly for AVX2"), (False, 2, "C by cc")],
-)
-def test_what_kernels_are_made_of(
-    folder: Path, condyle_command: Callable[..., Any], assembly: bool, lanes: int, kind: str
-) -> None:
-    def make(place: Path) -> tuple[Path, dict[str, Any]]:
-        library, facts = Maker()(place)
-        made_by = {"assembly": assembly, "lanes": lanes, "compiler": ["/usr/bin/cc"]}
-        return library, facts | made_by
-
-    cache.build(RECIPE, make, quiet)
-    assert cache.contents().choices == {kind: 1}
-    assert f"1 kernel, 0.0 MB (1 {kind})" in condyle_command("cache").out
-
-
 def test_shown_while_others_build(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A workplace that goes while it is looked at is no error."""
     kept()

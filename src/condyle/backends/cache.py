@@ -18,10 +18,9 @@ import shutil
 import stat
 import tempfile
 import time
-from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -63,13 +62,11 @@ class Contents:
 
     kernels: those that are whole.
     size:    of all that is there [bytes], also of what is broken or half built.
-    choices: kind of code -> kernels of that kind, where that is known.
     """
 
     folder: Path
     kernels: int
     size: int
-    choices: dict[str, int] = field(default_factory=dict)
 
 
 def cache_folder() -> Path:
@@ -152,13 +149,7 @@ def contents() -> Contents:
     """How many kernels there are and what they take [bytes]."""
     folder = cache_folder()
     entries = _entries(folder)
-    kernels = [
-        entry
-        for path in entries
-        if path.suffix == ".json" and (entry := _whole(folder, path.stem)) is not None
-    ]
-    known = (_kind(entry.facts) for entry in kernels if "assembly" in entry.facts)
-    choices = dict(sorted(Counter(known).items()))
+    whole = [path for path in entries if path.suffix == ".json" and _whole(folder, path.stem)]
     half_built = [
         Path(top, name)
         for place in folder.glob(f"{BUILD}*")
@@ -169,14 +160,7 @@ def contents() -> Contents:
     for path in entries + half_built:
         with suppress(OSError):  # gone meanwhile
             size += path.stat().st_size
-    return Contents(folder, len(kernels), size, choices)
-
-
-def _kind(facts: Facts) -> str:
-    """What code a library was made of."""
-    if facts["assembly"]:
-        return f"assembly for {'AVX-512' if facts['lanes'] == 8 else 'AVX2'}"
-    return f"C by {Path(facts['compiler'][0]).name}"
+    return Contents(folder, len(whole), size)
 
 
 def clear() -> Contents:

@@ -33,8 +33,6 @@ NATIVE = (("-march=native", GCC), ("-march=native",), ("-mcpu=native",), ())
 # One evaluation stands in an order that GCC makes better; a batch, whose chains stand abreast, is
 # the worse for it.
 ORDERED = ("-fschedule-insns", "-fsched-pressure")
-# Instruction sets that `backends/c/x86` writes for, by lanes and by the compiler's macros.
-ASSEMBLY = {4: ("__AVX2__", "__FMA__"), 8: ("__AVX512F__", "__AVX512DQ__", "__AVX512VL__")}
 SECONDS = 300  # a build that takes longer has gone wrong
 ASKING = 30  # seconds in which a compiler says what it is
 REMEDY = "Install gcc or clang, name another compiler in CC, or take numpy (--backend numpy)"
@@ -61,14 +59,8 @@ class Compiler:
 
     @property
     def single_flags(self) -> tuple[str, ...]:
-        """What it is given for one evaluation in C."""
+        """What it is given for one evaluation."""
         return (*self.flags, *(() if "__clang__" in self.identity else ORDERED))
-
-    @property
-    def assembly(self) -> bool:
-        """Whether it takes, and the processor runs, what `backends/c/x86` writes."""
-        needed = ("__x86_64__", *ASSEMBLY.get(self.lanes, ()))
-        return self.lanes in ASSEMBLY and all(f"#define {m} " in self.identity for m in needed)
 
     def compile(self, source: Path, target: Path, flags: tuple[str, ...]) -> None:
         """Compile C into an object file.

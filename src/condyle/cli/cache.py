@@ -23,17 +23,9 @@ def cache(
     had = kernels.clear() if clear else kernels.contents()
     count = "1 kernel" if had.kernels == 1 else f"{had.kernels} kernels"
     what = f"{count}, {had.size / 1e6:.1f} MB"
-    if had.choices:
-        what += f" ({', '.join(f'{number} {kind}' for kind, number in had.choices.items())})"
     return Answer(
         f"Removed {what} from {had.folder}" if clear else f"{had.folder}: {what}",
-        {
-            "folder": had.folder,
-            "kernels": had.kernels,
-            "bytes": had.size,
-            "choices": had.choices,
-            "cleared": clear,
-        },
+        {"folder": had.folder, "kernels": had.kernels, "bytes": had.size, "cleared": clear},
         "condyle cache --clear" if had.size and not clear else "condyle run",
         "result",
     )

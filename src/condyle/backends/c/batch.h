@@ -11,9 +11,6 @@ HIDDEN int robust(const double *restrict table, const double *restrict in, doubl
 /* What does not change from sample to sample. */
 void prepare(const double *par, const double *const *lane, double *table) {
     prepare_step(par, lane, table + STEP_TABLE);
-    /* Assembly for AVX2 reads each number W times over. */
-    for (int i = SPREAD; i-- > 0;)
-        store(table + STEP_TABLE + W * i, spread(table[STEP_TABLE + i]));
 #if SINGLE
     prepare_quick(par, lane, table + QUICK_TABLE);
 #endif

@@ -38,14 +38,14 @@ def _recipe(key: str, compiler: Compiler) -> str:
 def _generator() -> str:
     """A hash of the code that turns graphs into C, and C into libraries."""
     room = Path(str(files(__package__)))
-    sources = sorted(path for path in room.rglob("*") if path.suffix in (".py", ".h"))
+    sources = sorted(path for path in room.iterdir() if path.suffix in (".py", ".h"))
     return cache.digest(*(path.read_bytes() for path in [*sources, room.parent / "compiler.py"]))
 
 
 def _make(folder: Path, variants: Variants, compiler: Compiler) -> tuple[Path, dict[str, Any]]:
     library = folder / "kernel.so"
     with step("building a kernel"):
-        source = emit(variants, compiler.lanes, compiler.assembly)
+        source = emit(variants, compiler.lanes)
         texts = {"batch": (source.batch, compiler.flags)}
         if source.single is not None:
             texts["single"] = source.single, compiler.single_flags
@@ -67,7 +67,6 @@ def _make(folder: Path, variants: Variants, compiler: Compiler) -> tuple[Path, d
         "table_size": source.table_size,
         "operations": source.operations,
         "lanes": compiler.lanes,
-        "assembly": compiler.assembly,
         "compiler": list(compiler.command),
         "flags": list(compiler.single_flags),
     }

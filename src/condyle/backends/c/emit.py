@@ -4,9 +4,8 @@
     one(table, in, out)              least latency: shared values scalar, lane values vectors
     batch(table, in, strides, ...)   most throughput: all values vectors over W samples
 
-Both are printed from the same graph, as assembly where the processor has AVX2 or AVX-512 (see
-`x86`), else as C: one evaluation by `straight`, a batch by `loops`. They are texts of
-their own, since compilers do best by each with other flags.
+Both are printed from the same graph, one evaluation by `straight`, a batch by `loops`. They are
+texts of their own, since compilers do best by each with other flags.
 """
 
 from __future__ import annotations
@@ -20,9 +19,6 @@ from ..kernel import AGAIN
 from .loops import Loops
 from .prepare import prepare
 from .straight import Straight
-from .x86.batch import batch as batch_listing
-from .x86.single import single as single_listing
-from .x86.text import Batch, Single, is_spread
 
 CHAIN = 5  # terms above which a sum becomes two that run side by side
 
@@ -46,8 +42,8 @@ class Source:
     operations: int
 
 
-def emit(variants: Variants, width: int, assembly: bool) -> Source:
-    """The kernel's C for `width` lanes; assembly: whether the processor takes it as such."""
+def emit(variants: Variants, width: int) -> Source:
+    """The kernel's C for `width` lanes."""
     main = fused(variants.main)
     step = Loops(main, width)
     apart: dict[str, Straight] = {}
@@ -57,7 +53,6 @@ def emit(variants: Variants, width: int, assembly: bool) -> Source:
     if variants.robust is not None:
         apart["robust"] = Straight(fused(variants.robust), width)
     face, checks = main.interface, main.checks
-    spread = assembly and is_spread(width)
     macros = {
         "W": width,
         "INPUTS": face.columns,
@@ -66,14 +61,11 @@ def emit(variants: Variants, width: int, assembly: bool) -> Source:
         "AGAIN": AGAIN,
         "ROBUST": int("robust" in apart),
         "SINGLE": int(variants.single),
-        "SPREAD": step.table_size if spread else 0,
     }
-    sizes = {"step": step.table_size * (width if spread else 1)}
-    sizes |= {name: printer.table_size for name, printer in apart.items()}
     size = 0
-    for name, own in sizes.items():
+    for name, printer in {"step": step, **apart}.items():
         macros[f"{name.upper()}_TABLE"] = size
-        size += -(-own // width) * width
+        size += -(-printer.table_size // width) * width
     tolerances = ", ".join(repr(c.tolerance) for c in checks)
     below = ", ".join(str(AGAIN if c.below is None else int(c.below)) for c in checks)
     head = [
@@ -83,23 +75,17 @@ def emit(variants: Variants, width: int, assembly: bool) -> Source:
         f"static const int below[CHECKS + 1] = {{{below}}};",
         _text("judge.h"),
     ]
-    body = Batch(batch_listing(step), width).text("step") if assembly else step.function("step")
-    batch = "\n".join([*head, prepare(step, "prepare_step"), body, _text("batch.h")])
+    code = [prepare(step, "prepare_step"), step.function("step")]
+    batch = "\n".join([*head, *code, _text("batch.h")])
     single = None
     if apart:
         code = [
             text
             for name, printer in apart.items()
-            for text in (prepare(printer, f"prepare_{name}"), _one(name, printer, assembly))
+            for text in (prepare(printer, f"prepare_{name}"), printer.function(name))
         ]
         single = "\n".join([*head, *code, _text("single.h")])
     return Source(single, batch, face, size, len(checks), step.operations())
-
-
-def _one(name: str, printer: Straight, assembly: bool) -> str:
-    if assembly:
-        return Single(single_listing(printer), printer.width).text(name)
-    return printer.function(name)
 
 
 def _text(name: str) -> str:

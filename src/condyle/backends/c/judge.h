@@ -1,10 +1,3 @@
-/* Whether every check is met beyond doubt. */
-INLINE int sure(const double *check) {
-    int met = 1;
-    for (int i = 0; i < CHECKS; i++) met &= check[i] >= tolerance[i];
-    return met;
-}
-
 /* The status that a sample's checks give: 0, that of the first that fails for sure, or AGAIN. */
 INLINE int judged(const double *check) {
     int status = 0;

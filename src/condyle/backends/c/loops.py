@@ -58,7 +58,7 @@ class Loops(Printer):
             own = self.statements(values, 0) if part[1] is None else self._chains(part, values)
             lines += [f"  {s}" for s in own]
         self.here = (-1, None)
-        lines += [self._stored(*stored) for stored in self.outputs()]
+        lines += self._outputs()
         return "\n".join([*lines, "}", ""])
 
     def operations(self) -> int:
@@ -130,7 +130,13 @@ class Loops(Printer):
         """Statements of a group's chains, and the sums that they join."""
         group = part[1]
         assert group is not None
-        sums = self.sums_of(values)
+        sums = [
+            (v, t)
+            for v in self.varying
+            if self.g.nodes[v].op in REDUCTIONS
+            for _, t in self.lane_terms(v)
+            if self._part(t) == part
+        ]
         plain = [v for v in values if v not in self.absorbed]
         count, abreast = self.counts[group], 1 if self.rolled else ABREAST
         yield from (f"vec r{v} = {start};" for v, start in self._started(sums, group))
@@ -147,17 +153,6 @@ class Loops(Printer):
             yield from (f"x{v}_[c] = x{v}_0;" for v in plain if v in self.kept)
             yield "}"
 
-    def sums_of(self, values: list[Value]) -> list[tuple[Value, Value]]:
-        """Reductions that the values of a part join, and which value joins each."""
-        part = self._part(values[0])
-        return [
-            (v, t)
-            for v in self.varying
-            if self.g.nodes[v].op in REDUCTIONS
-            for _, t in self.lane_terms(v)
-            if self._part(t) == part
-        ]
-
     def _started(self, sums: list[tuple[Value, Value]], group: int) -> Iterator[tuple[Value, str]]:
         """What reductions are before the first of a mechanism's chains joins them."""
         for v, _ in sums:
@@ -169,34 +164,34 @@ class Loops(Printer):
         if self.g.nodes[v].op == "least":
             yield f"r{v} = fmin_v(r{v}, {self.name(t, copy)});"
             return
-        for sign, factors in self.steps(t):
+        for sign, factors in self._steps(t):
             product = " * ".join(self.name(x, copy) for x in factors)
             yield f"r{v} = r{v} {'+' if sign > 0 else '-'} {product};"
 
-    def steps(self, t: Value, sign: int = 1) -> Iterator[tuple[int, tuple[Value, ...]]]:
+    def _steps(self, t: Value, sign: int = 1) -> Iterator[tuple[int, tuple[Value, ...]]]:
         """Signs and factors of what a sum's term adds to it: more than one, if it is absorbed."""
         node = self.g.nodes[t]
         if t not in self.absorbed:
             yield sign, (t,)
         elif node.op in ("add", "sub"):
-            yield from self.steps(node.args[0], sign)
-            yield from self.steps(node.args[1], sign if node.op == "add" else -sign)
+            yield from self._steps(node.args[0], sign)
+            yield from self._steps(node.args[1], sign if node.op == "add" else -sign)
         else:
             if node.op != "mul":
-                yield from self.steps(node.args[2], sign)
+                yield from self._steps(node.args[2], sign)
             yield -sign if node.op == "fnma" else sign, node.args[:2]
 
-    def outputs(self) -> Iterator[tuple[int, Value, int]]:
-        """Slot, value and chain of all that is stored: results, then checks."""
+    def _outputs(self) -> Iterator[str]:
+        """What is stored: results, then checks."""
         slot = 0
         for o in self.program.outputs:
             for entry in o.entries:
                 for group, v in enumerate(entry):
                     for c in range(0 if v is None else self.counts[group] if o.lanes else 1):
                         assert v is not None
-                        yield slot, v, c
+                        yield self._stored(slot, v, c)
                         slot += 1
-        yield from ((slot + i, check.value, 0) for i, check in enumerate(self.program.checks))
+        yield from (self._stored(slot + i, c.value, 0) for i, c in enumerate(self.program.checks))
 
     def _stored(self, slot: int, v: Value, copy: int) -> str:
         name = self.name(v, copy)

@@ -25,7 +25,9 @@ class Straight(Printer):
         """`int name(table, in, out)`: whether every check is met beyond doubt."""
         head = f"HIDDEN int {name}(const double *restrict table, const double *restrict in, "
         head += "double *restrict out) {"
-        sure = "  return sure(out + OUTPUTS);"
+        checks = self.program.checks
+        met = (f"({self.name(c.value, 0)} >= {c.tolerance!r})" for c in checks)
+        sure = f"  return {' & '.join(met) or '1'};"
         return "\n".join([head, *self._body(), *self.outputs(), sure, "}", ""])
 
     def _body(self) -> Iterator[str]:
@@ -85,8 +87,8 @@ class Straight(Printer):
     def lane_sample(self, first: object, copy: int) -> str:
         return f"load(in + {first} + {copy * self.width})"
 
-    def stored(self) -> Iterator[tuple[int, Value, int, int]]:
-        """Slot, value, copy and number of lanes of all that is stored: results, then checks."""
+    def outputs(self) -> Iterator[str]:
+        """What is stored: results, then checks."""
         slot = 0
         for o in self.program.outputs:
             for entry in o.entries:
@@ -96,16 +98,18 @@ class Straight(Printer):
                     count = self.counts[group] if o.lanes else 1
                     for c in range(-(-count // self.width)):
                         at = c * self.width
-                        yield slot + at, v, c, min(self.width, count - at)
+                        yield self._stored(slot + at, v, c, min(self.width, count - at))
                     slot += count
-        yield from ((slot + i, c.value, 0, 1) for i, c in enumerate(self.program.checks))
+        yield from (
+            self._stored(slot + i, c.value, 0, 1) for i, c in enumerate(self.program.checks)
+        )
 
-    def outputs(self) -> Iterator[str]:
-        for at, v, copy, used in self.stored():
-            name = self.name(v, copy)
-            if used == 1 and self.g.nodes[v].group is None:
-                yield f"  out[{at}] = {name};"
-                continue
-            row = f"spread({name})" if self.is_scalar(v) else name
-            some = "" if used == self.width else f", {used}"
-            yield f"  store{'_some' if some else ''}(out + {at}, {row}{some});"
+    def _stored(self, at: int, v: Value, copy: int, used: int) -> str:
+        name = self.name(v, copy)
+        if used == 1 and self.g.nodes[v].group is None:
+            return f"  out[{at}] = {name};"
+        row = f"spread({name})" if self.is_scalar(v) else name
+        whole = used == self.width
+        return (
+            f"  store(out + {at}, {row});" if whole else f"  store_some(out + {at}, {row}, {used});"
+        )

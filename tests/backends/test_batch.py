@@ -1,29 +1,25 @@
-"""Batches as assembly, printed and run: every size and stride, strange lanes, the C library.
-
-Where the processor has no AVX2 or AVX-512 the batch is C, of which the same must hold.
-"""
+"""Batches: every size and stride, reductions, long chains, strange lanes, the C library."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from support.cases import case, error
-from support.programs import no_numbers, program
+from support.cases import error
+from support.programs import LANES, no_numbers, program
 
-from condyle.backends.c.emit import emit
+from condyle.backends.c.emit import fused
 from condyle.backends.c.kernel import CompiledKernel
-from condyle.backends.c.x86.text import REGISTERS
-from condyle.backends.compiler import Compiler, find_compiler
+from condyle.backends.c.loops import LONG, Loops
 from condyle.backends.numpy import NumpyKernel
 from condyle.graph.graph import Graph
-from condyle.graph.program import Output, Program, Variants
-from condyle.model.evaluator import Evaluator
+from condyle.graph.operations import REDUCTIONS
+from condyle.graph.program import Numbers, Output, Port, Program, Variants
 
 ONE = (
     *("exp", "expm1", "log", "log1p", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"),
@@ -67,16 +63,17 @@ def functions() -> Program:
 
 
 FUNCTIONS = Variants(functions(), single=True)
+WIDTHS = (2, 4, 8)
 
 
-@pytest.fixture(params=REGISTERS)
+@pytest.fixture(params=WIDTHS)
 def width(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> int:
     monkeypatch.setenv("CONDYLE_LANES", str(request.param))
     return request.param
 
 
 def kernel() -> CompiledKernel:
-    return CompiledKernel("functions of x86", lambda: FUNCTIONS, no_numbers())
+    return CompiledKernel("functions while values wait", lambda: FUNCTIONS, no_numbers())
 
 
 def samples(count: int) -> np.ndarray:
@@ -175,86 +172,42 @@ def test_every_stride(width: int) -> None:
     same(run(mixed), run(np.full(whole.shape, 0.5)))
 
 
-@pytest.mark.parametrize(
-    ("name", "question", "details", "width"),
-    [
-        ("masticatory", "inverse", (("contact", "motion", "joint"),), 8),
-        ("masticatory-curved", "forward", ((),), 4),
-        ("mixed_k2_n8", "inverse", ((),), 4),
-        ("rss_k2_n6_profile", "motion", (), 8),
-    ],
-    indirect=["width"],
-)
-def test_assembly_is_c(
-    name: str,
-    question: str,
-    details: tuple[tuple[str, ...], ...],
-    width: int,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """The same numbers and statuses, of states that are reached, doubtful and out of reach."""
-    needs_assembly()
-    c = case(name).repeated(2 * width + 3)
-    c.q[1] *= 1e3
-    c.q[2] = np.nan
-    effort = np.random.default_rng(0).normal(size=(len(c.q), len(c.mechanism.chains)))
-    found = []
-    for assembly in (True, False):
-        monkeypatch.setattr(Compiler, "assembly", assembly)
-        # Nobody asks one machine for both, so that their kernels have one name.
-        (tmp_path / str(assembly)).mkdir(mode=0o700)
-        monkeypatch.setenv("CONDYLE_CACHE", str(tmp_path / str(assembly)))
-        own = Evaluator(c.mechanism, backend="compiled").kernel(question, *details)
-        assert isinstance(own, CompiledKernel) and not own.cached
-        found.append(own.run({**c.inputs, "effort": effort}))
-    (values, status), (wanted, truth) = ((a.values, a.status) for a in found)
-    np.testing.assert_array_equal(status, truth)
-    assert (status == 0).sum() > width and status.any()
-    for result, value in wanted.items():
-        assert error(values[result][..., truth == 0], value[..., truth == 0]) < CLOSE, result
+def check_numbers(p: Program, numbers: Numbers, inputs: dict[str, np.ndarray]) -> None:
+    """As the backend of numpy, to rounding."""
+    wanted = NumpyKernel(Variants(p), numbers).run(inputs).values
+    key = f"{p.counts} chains, {len(p.graph.nodes)} values"
+    for name, value in CompiledKernel(key, lambda: Variants(p), numbers).run(inputs).values.items():
+        assert error(value, wanted[name]) < 1e-14, name
 
 
-def needs_assembly() -> None:
-    if not find_compiler().assembly:
-        pytest.skip("this processor, or its compiler, has no such vectors")
+@pytest.mark.usefixtures("width")
+def test_reductions() -> None:
+    """Sums and minima over chains of two groups: of products, of differences, of what all share."""
+    graph, (near, far) = Graph(), (3, 2)
+    x = graph.leaf("input", 0)
+    a, b = graph.leaf("lane_input", 0, 1, group=0), graph.leaf("lane_input", 1, 1 + near, group=1)
+    c = graph.leaf("lane", 0, 0, group=0)
+    product, difference = graph.apply("mul", a, c), graph.apply("sub", graph.apply("mul", b, b), b)
+    roots = [graph.reduce("sum", [product, difference])]
+    for op in REDUCTIONS:
+        roots += [graph.reduce(op, terms) for terms in ([a, b], [x, b], [a, x], [x, x])]
+    outputs = tuple(Output(str(i), (), "", False, ((v,),)) for i, v in enumerate(roots))
+    ports = (Port("x", 1, "", False, 0), Port("y", 1, "", True, 1))
+    p = Program(graph, (near, far), 1 + near + far, ports, outputs, ())
+    fixed = (np.array([[2.0, -3.0, 5.0]]), np.zeros((1, far)))
+    numbers = Numbers(np.zeros(1), fixed, (np.zeros(1), np.zeros(1)), (3, 0, 4, 1, 2))
+    x_and_y = np.random.default_rng(0).normal(size=(7, p.columns))
+    check_numbers(p, numbers, {"x": x_and_y[:, :1], "y": x_and_y[:, 1:]})
 
 
-# -- what is printed -----------------------------------------------------------------------------
-
-
-def test_the_assembler_takes_it(width: int, tmp_path: Path) -> None:
-    """On every x86-64, whatever its vectors are."""
-    compiler = find_compiler()
-    if "#define __x86_64__ " not in compiler.identity:
-        pytest.skip("not an x86-64")
-    source, target = tmp_path / "batch.c", tmp_path / "batch.o"
-    source.write_text(emit(FUNCTIONS, width, assembly=True).batch, encoding="utf-8")
-    compiler.compile(source, target, compiler.flags)
-    assert target.stat().st_size
-
-
-def test_assembly_where_it_is_asked_for(width: int) -> None:
-    for assembly in (True, False):
-        assert ("__asm__(" in emit(FUNCTIONS, width, assembly).batch) == assembly
-
-
-AVX512 = ("__AVX512F__", "__AVX512DQ__", "__AVX512VL__")
-MACROS = ("__x86_64__", "__AVX2__", "__FMA__", *AVX512)
-
-
-@pytest.mark.parametrize(
-    ("lanes", "missing", "wanted"),
-    [
-        *((lanes, "", True) for lanes in REGISTERS),
-        (2, "", False),
-        *((lanes, "__x86_64__", False) for lanes in REGISTERS),
-        *((4, name, False) for name in ("__AVX2__", "__FMA__")),
-        *((8, name, False) for name in AVX512),
-        (4, "__AVX512F__", True),
-    ],
-)
-def test_who_is_asked(lanes: int, missing: str, wanted: bool) -> None:
-    """The compiler's macros, not the machine that this runs on."""
-    identity = "".join(f"#define {name} 1\n" for name in MACROS if name != missing)
-    assert Compiler(("cc",), (), identity, lanes).assembly == wanted
+@pytest.mark.usefixtures("width")
+def test_long_chains() -> None:
+    """They run in a loop."""
+    graph = Graph()
+    v = first = graph.leaf("lane_input", 0, 0, group=0)
+    for _ in range(LONG):
+        v = graph.apply("add", graph.apply("mul", v, graph.const(0.5)), first)
+    p = program(graph, [graph.reduce("sum", [v])], LANES)
+    p = replace(p, ports=(Port("y", 1, "", True, 0),))
+    assert Loops(fused(p), 8).rolled
+    check_numbers(p, no_numbers(), {"y": np.random.default_rng(0).normal(size=(5, LANES))})
