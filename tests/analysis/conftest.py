@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 import condyle
-from condyle.analysis.compare import Comparison, compare
+from condyle.analysis.comparison import Comparison, compare
 from condyle.motion import Motion, bundled_reference
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.analysis.compare import Comparison, compare, relative_difference
+from condyle.analysis.comparison import Comparison, compare, relative_difference
 from condyle.dynamics import FORMULATIONS, ROUTES
 from condyle.mechanism import Mechanism
 from condyle.mechanism.home import independent_coordinates

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from condyle.analysis.indices import indices
+from condyle.analysis.torque_indices import indices
 
 PARTS = ["platform", "legs", "load"]
 

@@ -6,8 +6,8 @@ import pytest
 
 import condyle
 from condyle.analysis import paper
-from condyle.analysis.compare import Comparison
-from condyle.analysis.indices import solution_indices
+from condyle.analysis.comparison import Comparison
+from condyle.analysis.torque_indices import solution_indices
 
 
 @pytest.mark.parametrize("contacts", [True, False], ids=["RAPM", "6RSS"])

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.analysis.compare import compare
-from condyle.analysis.tradeoff import Tradeoff, tradeoff
+from condyle.analysis.comparison import compare
+from condyle.analysis.weight_curve import Tradeoff, tradeoff
 from condyle.motion import Motion
 from condyle.report.figures.tradeoff import apart, tradeoff_figure
 from condyle.report.tables.tradeoff import tradeoff_table

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from condyle.analysis.map.quantities import QUANTITIES
+from condyle.analysis.map.map_quantities import QUANTITIES
 from condyle.cli import completion
 
 SMALL = ("--over", "X=-3:9:9 mm", "--over", "beta=-8:14:8 deg", "--backend", "numpy")

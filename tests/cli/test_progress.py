@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.analysis.compare import compare
+from condyle.analysis.comparison import compare
 from condyle.backends.compiler import CompilerError, find_compiler
 from condyle.cli import bar
 from condyle.motion import Motion, iter_table

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from condyle.markers.suspects import outlier
+from condyle.markers.marker_checks import outlier
 
 SHAPE = np.array([[80, 30, 20], [50, 45, 25], [82, -28, 22], [48, -44, 35.0]]) * 1e-3
 

@@ -15,7 +15,7 @@ from condyle.distribution import Problem, Status, distribute
 from condyle.mechanism import Mechanism
 from condyle.mechanism.chain import limits
 from condyle.model.evaluator import Evaluator
-from condyle.motion.reference import reference_load, reference_motion
+from condyle.motion.reference_case import reference_load, reference_motion
 
 TABLE = Path(__file__).parents[1] / "distribution" / "human_jaw.csv"
 NAMES = ("human-jaw", "human-jaw-curved")

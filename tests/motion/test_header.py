@@ -9,8 +9,8 @@ import pytest
 
 from condyle.errors import InputError
 from condyle.motion import Load, Motion, read_table, write_table
-from condyle.motion.header import read_header
-from condyle.motion.units import dimension, unit_factor
+from condyle.motion.column_names import read_header
+from condyle.motion.column_units import dimension, unit_factor
 
 KNOWN = ("t", "X", "Y", "alpha", "x", "y", "z", "dX", "ddX", "dalpha", "Fx", "Mx")
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from condyle.errors import InputError
-from condyle.motion.table import iter_table, read_table
+from condyle.motion.table_reader import iter_table, read_table
 
 PLAIN = "t,x,y\n0,1.5,-2\n0.5,2.5e-3,+.25\n"
 

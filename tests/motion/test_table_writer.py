@@ -11,7 +11,7 @@ from hypothesis.extra.numpy import arrays
 
 from condyle.atomic import replacing
 from condyle.errors import InputError
-from condyle.motion.table import iter_table, read_table
+from condyle.motion.table_reader import iter_table, read_table
 from condyle.motion.table_writer import TableWriter, write_table
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)

@@ -3,7 +3,7 @@ import math
 import pytest
 
 from condyle.errors import InputError
-from condyle.motion.units import Units, parse_units
+from condyle.motion.column_units import Units, parse_units
 
 
 @pytest.mark.parametrize(

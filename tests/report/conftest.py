@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.analysis.compare import Comparison, compare
+from condyle.analysis.comparison import Comparison, compare
 from condyle.motion import Load, Motion, bundled_reference
 from condyle.results.solution import Solution
 

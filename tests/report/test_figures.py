@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 import condyle
-from condyle.analysis.compare import Comparison
+from condyle.analysis.comparison import Comparison
 from condyle.kinematics.rotation import rotation
 from condyle.mechanism.surface import Plane, Quadratic
 from condyle.report import figures

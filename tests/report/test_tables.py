@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.analysis.compare import Comparison, compare
+from condyle.analysis.comparison import Comparison, compare
 from condyle.motion import Motion
 from condyle.report.tables import (
     Table,

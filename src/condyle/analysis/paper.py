@@ -7,7 +7,7 @@ from pathlib import PurePath
 
 from ..mechanism import load
 from ..mechanism.mechanism import Mechanism
-from ..motion.reference import LOAD_FILE, MOTION_FILE, SYNTHETIC
+from ..motion.reference_case import LOAD_FILE, MOTION_FILE, SYNTHETIC
 
 STAND_IN = "masticatory"  # the bundled mechanism that stands in for the authors' robot
 

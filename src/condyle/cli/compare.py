@@ -14,7 +14,7 @@ from .inputs import file_stem, motion_and_load, output_folder, require_drawing, 
 from .tradeoff import require_free_weight, weigh
 
 if TYPE_CHECKING:
-    from ..analysis.compare import Comparison
+    from ..analysis.comparison import Comparison
 
 
 @command(COMPUTE, example="condyle compare jaw.toml --motion path.csv --load bite.csv")
@@ -53,7 +53,7 @@ def compare(
     require_drawing(figures, report)
     import condyle
 
-    from ..analysis.compare import compare as compare_models
+    from ..analysis.comparison import compare as compare_models
     from ..report.tables import save_tables, tables, with_tables
 
     machine = condyle.load(mechanism)

@@ -105,9 +105,9 @@ def map_(
 
     from ..analysis.map.axes import grid_of
     from ..analysis.map.compute import asked_of, mapped, size_of
-    from ..analysis.map.files import save_map
-    from ..analysis.map.numbers import numbers_of
-    from ..analysis.map.quantities import chosen
+    from ..analysis.map.extent import numbers_of
+    from ..analysis.map.map_files import save_map
+    from ..analysis.map.map_quantities import chosen
     from ..analysis.workers import check_scheduler
     from ..report.maps import numbers_text
 

@@ -25,7 +25,7 @@ def weigh(
     report: bool,
 ) -> Answer:
     """The curve as a table, a CSV, a figure and a solution that keeps the table."""
-    from ..analysis.tradeoff import tradeoff
+    from ..analysis.weight_curve import tradeoff
     from ..atomic import write_text
     from ..report.tables import with_tables
     from ..report.tables.tradeoff import tradeoff_table

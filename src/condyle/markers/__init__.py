@@ -1,19 +1,18 @@
 """Measured motion as laboratories have it: markers of a C3D file, and the pose they give."""
 
-from .beside import Beside, read_beside
 from .gaps import Gap
 from .marker_file import MarkerFile, read_markers
-from .measured import (
+from .marker_motion import (
     MAX_GAP,
     MAX_RESIDUAL,
     MarkerMotion,
     MarkerResidual,
     from_c3d,
 )
+from .marker_report import as_data, write_motion
+from .measured_channels import Beside, read_beside
 from .recording import Recording, read_c3d
 from .registration import Registration
-from .summary import as_data
-from .writing import write_motion
 
 __all__ = [
     "MAX_GAP",

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError, did_you_mean
-from ..motion.words import short
+from ..motion.file_words import short
 from .channel_tables import Emg
-from .labels import find_label
+from .marker_labels import find_label
 from .recording import Recording
 
 if TYPE_CHECKING:

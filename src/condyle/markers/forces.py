@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError
-from ..motion.load import Load
+from ..motion.column_units import Dimension, unit_factor
+from ..motion.file_words import listed, short
+from ..motion.platform_load import Load
 from ..motion.points import DEFAULT_LOAD_POINT, resolve_load_point
-from ..motion.units import Dimension, unit_factor
-from ..motion.words import listed, short
-from .bodies import Bodies
 from .bryant import rotations
 from .channel_tables import Forces
-from .labels import find_label
+from .marker_bodies import Bodies
+from .marker_labels import find_label
 from .plates import CHANNELS, Plate
 from .recording import Recording
 from .registration import Registration

@@ -14,7 +14,7 @@ from ..errors import InputError, few, no_such_file, shortened
 from ..mechanism.messages import describe, shown
 from ..mechanism.table import Table
 from ..mechanism.toml import LARGEST_FILE, read_tables
-from ..motion.words import listed, short
+from ..motion.file_words import listed, short
 from .channel_tables import Emg, Forces
 from .rigid import FEWEST
 

@@ -12,9 +12,9 @@ import numpy as np
 
 from ..errors import CondyleError, InputError, no_such_file
 from ..extras import require
+from ..motion.column_units import LENGTH_UNITS
 from ..motion.digest import digest
-from ..motion.units import LENGTH_UNITS
-from ..motion.words import short
+from ..motion.file_words import short
 from .plates import Plate, read_plates
 
 ASSUMED = "mm"  # what laboratories mean that name no unit

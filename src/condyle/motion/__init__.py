@@ -1,20 +1,20 @@
 """Paths and loads: from files and arrays to clean samples, and tables back to files."""
 
-from .columns import Table
-from .load import Load, as_load
+from .column_units import FORCE, LANDMARK, MOMENT, POSE, Units, parse_units
+from .number_table import Table
 from .path import Motion, as_motion
+from .platform_load import Load, as_load
 from .points import resolve_landmark, resolve_load_point
-from .reference import (
+from .reference_case import (
     bundled_reference,
     reference_load,
     reference_motion,
     write_reference,
 )
 from .smoothing import AUTO_CUTOFF, Smoothing
-from .table import iter_table, read_table
+from .table_reader import iter_table, read_table
 from .table_writer import TableWriter, write_table
 from .trial import trial_motion
-from .units import FORCE, LANDMARK, MOMENT, POSE, Units, parse_units
 
 __all__ = [
     "AUTO_CUTOFF",

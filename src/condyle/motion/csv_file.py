@@ -20,10 +20,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..errors import InputError
-from .columns import Known, Table
+from .column_names import Header, read_header
 from .csv_head import NUMBER, Head, Source, opened, read_head, read_line, split
-from .header import Header, read_header
-from .words import listed, printable, short
+from .file_words import listed, printable, short
+from .number_table import Known, Table
 
 _CELL = 20  # bytes that a number takes with its separator
 

@@ -12,7 +12,7 @@ from io import BufferedReader, FileIO, TextIOWrapper
 from typing import Protocol
 
 from ..errors import InputError, no_such_file
-from .words import printable, short
+from .file_words import printable, short
 
 LONGEST = 1 << 24  # bytes of a line: beyond, it is no table
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)

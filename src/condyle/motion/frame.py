@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from .columns import Known, Table, checked_columns
-from .header import read_header
-from .words import short
+from .column_names import read_header
+from .file_words import short
+from .number_table import Known, Table, checked_columns
 
 
 def is_frame(data: Any) -> bool:

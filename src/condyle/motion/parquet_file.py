@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, no_such_file
-from .columns import Known, Table, checked_columns
-from .header import read_header
-from .words import printable, short
+from .column_names import read_header
+from .file_words import printable, short
+from .number_table import Known, Table, checked_columns
 
 _BUFFER = 1 << 20  # bytes of a column at once; the library's own choice keeps whole files
 

@@ -12,15 +12,15 @@ import numpy as np
 
 from ..errors import InputError
 from .arrays import as_samples, check_rising
-from .columns import Table
+from .column_units import LANDMARK, POSE, Units, parse_units
 from .digest import digest
+from .file_words import listed
 from .frame import is_frame, table_from_frame
 from .memory import memory_at_hand
+from .number_table import Table
 from .smoothing import Smoothing, parse_cutoff, smoothing_spline
-from .suspicion import motion_warnings
-from .table import read_table
-from .units import LANDMARK, POSE, Units, parse_units
-from .words import listed
+from .table_reader import read_table
+from .unit_checks import motion_warnings
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline

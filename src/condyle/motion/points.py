@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from ..errors import InputError
-from .words import guess, listed
+from .file_words import guess, listed
 
 DEFAULT_LANDMARK = "incisor"
 DEFAULT_LOAD_POINT = "right_molar"

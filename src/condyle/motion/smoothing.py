@@ -10,7 +10,7 @@ import numpy as np
 
 from .. import progress
 from ..errors import InputError
-from .units import ANGLE_UNITS, POSE
+from .column_units import ANGLE_UNITS, POSE
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline

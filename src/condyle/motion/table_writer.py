@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Self
 import numpy as np
 
 from ..atomic import replacing
-from .table import is_parquet
+from .table_reader import is_parquet
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -7,7 +7,7 @@ import numpy as np
 from ..mechanism.home import characteristic_length, independent_coordinates
 from ..mechanism.mechanism import Mechanism
 from .path import Motion
-from .reference import rise
+from .reference_case import rise
 
 SWAY = 0.03  # of the characteristic length, and in radians
 SLOWEST, STEP = 0.4, 0.15  # of the first coordinate's sway, and from one to the next [Hz]

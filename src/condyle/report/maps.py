@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import pi
 
-from ..analysis.map.numbers import Numbers
+from ..analysis.map.extent import Numbers
 from ..mechanism.mechanism import COORDINATES
 from ..mechanism.plausibility import length_text
 

@@ -20,7 +20,7 @@ from ..mechanism.mechanism import COORDINATES
 from ..model.data import Accelerations
 from ..model.evaluator import Evaluator, with_point
 from ..motion import Table, TableWriter, iter_table
-from ..motion.units import Dimension, dimension
+from ..motion.column_units import Dimension, dimension
 from ..status import Status
 from .contacts import lift_off, lift_off_columns
 from .failures import status_columns

@@ -12,8 +12,8 @@ import numpy as np
 import viser
 
 from ..analysis.map.axes import Axis, Grid
-from ..analysis.map.files import grid_and_reach
-from ..analysis.map.surface import first_hit, sheet, skin
+from ..analysis.map.map_files import grid_and_reach
+from ..analysis.map.skin import first_hit, sheet, skin
 from ..kinematics.constraints import indices
 from ..mechanism import COORDINATES
 from ..model.evaluator import Evaluator

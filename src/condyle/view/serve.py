@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import viser
 
-from ..analysis.map.files import mechanism_of, open_map
+from ..analysis.map.map_files import mechanism_of, open_map
 from ..errors import CondyleError, InputError
 from ..mechanism import Mechanism, load
 from ..results.solution import Solution, open_solution

@@ -10,8 +10,8 @@ import pytest
 
 import condyle
 from condyle.analysis.map import open_map, save_map
-from condyle.analysis.map.files import grid_and_reach, mechanism_of
-from condyle.analysis.map.surface import first_hit, sheet, skin
+from condyle.analysis.map.map_files import grid_and_reach, mechanism_of
+from condyle.analysis.map.skin import first_hit, sheet, skin
 
 from .conftest import Models
 

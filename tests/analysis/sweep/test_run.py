@@ -21,8 +21,8 @@ import xarray as xr
 
 import condyle
 from condyle.analysis import workers as pool
-from condyle.analysis.sweep import read_sweep, store
-from condyle.analysis.sweep.solve import solve_part
+from condyle.analysis.sweep import read_sweep, study_folder
+from condyle.analysis.sweep.variants import solve_part
 from condyle.analysis.workers import LostWorkerError
 
 Same = Callable[[xr.Dataset, xr.Dataset], None]
@@ -143,7 +143,7 @@ def test_a_worker_that_is_killed_is_told_and_loses_nothing(
     kill = tmp_path / "kill"
     kill.touch()
 
-    monkeypatch.setattr("condyle.analysis.sweep.run.solve_part", _Deadly(kill))
+    monkeypatch.setattr("condyle.analysis.sweep.sweeping.solve_part", _Deadly(kill))
     with pytest.raises(LostWorkerError, match="--resume"):
         condyle.sweep(tables, tmp_path / "sweep", workers=2)
     assert not kill.exists()
@@ -180,10 +180,10 @@ def test_a_full_disk_is_told_and_resumed(
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
         real(table, path)
 
-    real = store.pq.write_table
+    real = study_folder.pq.write_table
     folder = tmp_path / "sweep"
     with monkeypatch.context() as full:
-        full.setattr(store.pq, "write_table", write)
+        full.setattr(study_folder.pq, "write_table", write)
         with pytest.raises(condyle.InputError, match="No space left"):
             condyle.sweep(tables, folder, workers=1)
     assert len(list(folder.iterdir())) == 3  # the study and two parts, nothing half
@@ -204,7 +204,7 @@ def test_a_changed_study_is_refused_with_the_difference(
     heavier = condyle.load("masticatory").set("chain.masseter_left.coupler.com", 0.4)
     with pytest.raises(condyle.InputError, match=r"coupler\.com was"):
         condyle.sweep(small, tmp_path, workers=1, resume=True, mechanism=heavier)
-    kept = json.loads((tmp_path / store.STUDY).read_text())
+    kept = json.loads((tmp_path / study_folder.STUDY).read_text())
     assert kept["rows"] == 2
 
 
@@ -212,7 +212,7 @@ def test_ctrl_c_ends_in_order(
     tables: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     study = {**tables, "vary": [{**tables["vary"][0], "count": 40}]}
-    real = store.Store.write
+    real = study_folder.Store.write
 
     def write(self: Any, part: int, rows: Any) -> None:
         real(self, part, rows)
@@ -220,7 +220,7 @@ def test_ctrl_c_ends_in_order(
             raise KeyboardInterrupt
 
     with monkeypatch.context() as pressed, pytest.raises(KeyboardInterrupt):
-        pressed.setattr(store.Store, "write", write)
+        pressed.setattr(study_folder.Store, "write", write)
         condyle.sweep(study, tmp_path, workers=2)
     there = read_sweep(tmp_path).sizes["row"]
     assert 0 < there <= 40 and there % 4 == 0

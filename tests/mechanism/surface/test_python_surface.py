@@ -10,7 +10,7 @@ import pytest
 from support.surfaces import close
 
 import condyle
-from condyle.analysis.compare import compare
+from condyle.analysis.comparison import compare
 from condyle.errors import InputError, MechanismError
 from condyle.mechanism import Contact, Mechanism, dumps, parse
 from condyle.mechanism.surface import Expression, Unknown

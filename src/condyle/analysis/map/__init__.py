@@ -1,7 +1,7 @@
 """Maps of what a mechanism can do at rest, over its independent coordinates."""
 
 from .compute import workspace_map
-from .files import open_map, save_map
-from .quantities import QUANTITIES
+from .map_files import open_map, save_map
+from .map_quantities import QUANTITIES
 
 __all__ = ["QUANTITIES", "open_map", "save_map", "workspace_map"]

@@ -15,7 +15,7 @@ import numpy as np
 from ...errors import InputError, did_you_mean
 from ...mechanism.home import dependent_coordinates, independent_coordinates
 from ...mechanism.mechanism import COORDINATES, Mechanism
-from ...motion.units import dimension, unit_factor
+from ...motion.column_units import dimension, unit_factor
 
 MOST_AXES, MOST_POINTS = 3, 10**10
 _OVER = re.compile(r"\s*(\w+)\s*=\s*([^:\s]+)\s*:\s*([^:\s]+)\s*:\s*(\S+)\s*(.*?)\s*")

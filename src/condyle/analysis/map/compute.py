@@ -18,14 +18,14 @@ from ...extras import require
 from ...mechanism import dumps
 from ...mechanism.mechanism import COORDINATES, Mechanism
 from ...model.evaluator import Evaluator
-from ...motion.units import FORCE, MOMENT
+from ...motion.column_units import FORCE, MOMENT
 from ...progress import step
 from ..workers import check_scheduler, run_parts
 from .axes import Grid, Over, Values, grid_of, number, values_of
 from .block import Asked, Block
-from .quantities import Mapped, Quantity, chosen, variables
+from .map_quantities import Mapped, Quantity, chosen, variables
+from .map_store import MARK, Kept, Memory, Sink, Zarr
 from .reach import Reach, Strokes
-from .store import MARK, Kept, Memory, Sink, Zarr
 
 if TYPE_CHECKING:
     import xarray as xr

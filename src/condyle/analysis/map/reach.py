@@ -20,7 +20,7 @@ from ...mechanism.contact import Bounds
 from ...mechanism.mechanism import Mechanism
 from ...model.evaluator import Evaluator
 from ...model.survey import Survey
-from ...motion.units import unit_factor
+from ...motion.column_units import unit_factor
 from ...status import Status
 from .axes import number
 

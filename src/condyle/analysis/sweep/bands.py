@@ -17,8 +17,8 @@ from ...results.warnings import Notice
 from ...status import Status
 from ..workers import PROCESSES, check_scheduler, run_parts
 from .job import Job, prepared
-from .solve import OK, Solver
 from .study import Study
+from .variants import OK, Solver
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 BANDED = {"torque": "effort", "contact_force": "contact_force"}  # variable -> of an evaluation

@@ -12,8 +12,8 @@ import xarray as xr
 
 from ...errors import InputError
 from ...extras import require
-from .solve import OK
 from .study import Study
+from .variants import OK
 
 BINS = 10  # of equal counts, over which a main effect is averaged
 FEWEST = 4  # good rows without which nothing can be said

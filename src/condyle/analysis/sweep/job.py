@@ -23,7 +23,7 @@ from ...motion import (
     resolve_load_point,
     trial_motion,
 )
-from ...motion.reference import bundled_reference
+from ...motion.reference_case import bundled_reference
 from .measure import Reading, columns, readings
 from .sampling import Design
 from .study import NONE, REFERENCE, TRIAL, MotionFile, Study

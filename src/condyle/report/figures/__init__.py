@@ -22,7 +22,7 @@ from .style import STYLES
 from .torque import figure_8
 
 if TYPE_CHECKING:
-    from ...analysis.compare import Comparison
+    from ...analysis.comparison import Comparison
     from ...results.solution import Solution
 
 find_figures()

@@ -24,7 +24,7 @@ from .registry import plot
 from .style import house, narrow, new_figure
 
 if TYPE_CHECKING:
-    from ...analysis.compare import Comparison
+    from ...analysis.comparison import Comparison
     from ...analysis.runs import Run
     from ...results.solution import Solution
 

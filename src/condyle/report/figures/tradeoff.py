@@ -12,7 +12,7 @@ from .labels import caption
 from .style import DARK, house, look, new_figure
 
 if TYPE_CHECKING:
-    from ...analysis.tradeoff import Tradeoff
+    from ...analysis.weight_curve import Tradeoff
 
 
 @house

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ...analysis.compare import Comparison
+from ...analysis.comparison import Comparison
 from ...atomic import write_text
 from .differences import differences
 from .indices import table_2

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import PurePath
 
-from ...analysis.compare import Comparison, Difference
+from ...analysis.comparison import Comparison, Difference
 from ...analysis.runs import Run
 from .table import NOTHING, Table
 

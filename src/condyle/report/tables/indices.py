@@ -7,8 +7,8 @@ from pathlib import PurePath
 from typing import Any
 
 from ...analysis import paper
-from ...analysis.compare import Comparison
-from ...analysis.indices import Indices
+from ...analysis.comparison import Comparison
+from ...analysis.torque_indices import Indices
 from .table import NOTHING, Table
 
 

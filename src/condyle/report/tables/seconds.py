@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from ...analysis import paper
-from ...analysis.compare import Comparison
-from ...analysis.machine import processor
+from ...analysis.comparison import Comparison
+from ...analysis.processor import processor
 from ...analysis.runs import Run
 from .table import NOTHING, Table, cell
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import PurePath
 from typing import Any
 
-from ...analysis.tradeoff import Tradeoff
+from ...analysis.weight_curve import Tradeoff
 from .table import Table
 
 

@@ -21,7 +21,7 @@ from ..mechanism.mechanism import Mechanism
 from ..progress import step
 from ..results.model import derive
 from ..status import Status
-from .compare import samples_of
+from .comparison import samples_of
 
 if TYPE_CHECKING:
     from ..motion import Load, Motion

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .units import dimension
+from .column_units import dimension
 
 SOUND = 343.0  # m/s
 _PATH = 3.0  # m: a platform goes no farther

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from ..atomic import replacing
-from .load import Load
 from .path import Motion
+from .platform_load import Load
 
 MOTION_FILE = "chewing-incisor.csv"
 LOAD_FILE = "bite-force.csv"

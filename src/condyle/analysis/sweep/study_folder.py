@@ -19,7 +19,7 @@ from ...atomic import replacing, write_text
 from ...errors import InputError
 from ...mechanism.files import read_tables, record
 from .job import MOTION, REASON, SECONDS, STATUS, VARIANT, Job
-from .solve import Rows
+from .variants import Rows
 
 STUDY, PART, SOLUTIONS = "study.json", "part-{:06d}.parquet", "solutions"
 _MANY = 5  # differences that a message shows

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..motion.words import listed
-from .labels import find_label
+from ..motion.file_words import listed
 from .marker_file import MarkerFile
+from .marker_labels import find_label
 from .recording import Recording
 from .rigid import FEWEST, FLATTEST, Fit, breadth, common_shape, fit
 

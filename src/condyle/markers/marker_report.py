@@ -1,13 +1,20 @@
-"""What was found in a recording: for people, and as data."""
+"""What was found in a recording: in words, as data, and as files."""
 
 from __future__ import annotations
 
+import os
+from contextlib import ExitStack
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import InputError
+from ..motion.column_units import FORCE, MOMENT, POSE
+from ..motion.table_writer import TableWriter
+
 if TYPE_CHECKING:
-    from .measured import MarkerMotion
+    from .marker_motion import MarkerMotion
 
 _LISTED = 12  # gaps in the text; all are in the data
 
@@ -91,3 +98,39 @@ def as_data(found: MarkerMotion) -> dict[str, Any]:
 
 def _mm(metres: float) -> str:
     return f"{metres * 1e3:.3g} mm"
+
+
+def write_motion(
+    found: MarkerMotion,
+    out: str | os.PathLike[str],
+    measured: str | os.PathLike[str] | None = None,
+    load: str | os.PathLike[str] | None = None,
+) -> list[Path]:
+    """Write all files or none; returns their names.
+
+    Args:   out: t, X ... gamma;  measured: the columns of `Beside`, empty where nothing was seen;
+            load: t, Fx, Fy, Fz [N] and, of a plate, Mx, My, Mz [N m] in {S}. CSV, or Parquet by the
+            name's end.
+    Raises: InputError: if a file cannot be written, or two are one.
+    """
+    motion = found.motion
+    tables = {out: {"t": motion.t} | dict(zip(POSE, motion.value.T, strict=True))}
+    if measured is not None:
+        tables[measured] = found.beside.columns()
+    if load is not None:
+        if found.load is None:
+            raise InputError(
+                "load: no channels were named for it; name them in [forces] of the marker file"
+            )
+        wrench = found.load.wrench
+        given = wrench if wrench[:, 3:].any() else wrench[:, :3]
+        names = (*FORCE, *MOMENT)[: given.shape[1]]
+        tables[load] = {"t": found.load.t} | dict(zip(names, given.T.copy(), strict=True))
+    files = [Path(path) for path in (out, measured, load) if path is not None]
+    if len({path.resolve() for path in files}) < len(files):
+        raise InputError(f"{out}: two files to write have one name")
+    with ExitStack() as stack:
+        writers = [stack.enter_context(TableWriter(path)) for path in tables]
+        for writer, columns in zip(writers, tables.values(), strict=True):
+            writer.write(columns)
+    return files

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 
 from ..errors import InputError
-from .units import Dimension, dimension, is_unit, unit_factor
-from .words import columns_are, guess, listed, short
+from .column_units import Dimension, dimension, is_unit, unit_factor
+from .file_words import columns_are, guess, listed, short
 
 MAX_COLUMNS = 10_000
 

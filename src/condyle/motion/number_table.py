@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import InputError
-from .units import Dimension, Units, dimension
-from .words import columns_are, guess
+from .column_units import Dimension, Units, dimension
+from .file_words import columns_are, guess
 
 Known = Collection[str] | Mapping[str, Dimension]
 

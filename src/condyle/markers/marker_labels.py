@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..errors import InputError
-from ..motion.words import guess, listed
+from ..motion.file_words import guess, listed
 
 
 def find_label(name: str, labels: Sequence[str], where: str, what: str = "marker") -> int:

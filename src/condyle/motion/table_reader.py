@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 
 from ..progress import step
-from .columns import Known, Table
+from .number_table import Known, Table
 
 CHUNK_ROWS = 16_384
 
@@ -81,6 +81,3 @@ def _ahead(items: Iterator[T]) -> Iterator[T]:
 def _size(path: str | os.PathLike[str]) -> int | None:
     """Bytes in a file, None for a pipe."""
     return os.path.getsize(path) if os.path.isfile(path) else None
-
-
-__all__ = ["CHUNK_ROWS", "Known", "Table", "is_parquet", "iter_table", "read_table"]

@@ -14,8 +14,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..motion.arrays import check_rising
-from ..motion.table import read_table
-from ..motion.words import columns_are
+from ..motion.file_words import columns_are
+from ..motion.table_reader import read_table
 
 AXES = "xyz"
 BODIES = ("fixed", "platform")

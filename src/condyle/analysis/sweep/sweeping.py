@@ -15,9 +15,9 @@ from ...motion import Load, Motion, as_load, as_motion
 from ...progress import step
 from ..workers import PROCESSES, check_scheduler, run_parts
 from .job import Job, prepared
-from .solve import solve_part
-from .store import Store, read
 from .study import Study, read_study
+from .study_folder import Store, read
+from .variants import solve_part
 
 
 def sweep(

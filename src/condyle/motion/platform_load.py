@@ -10,12 +10,12 @@ import numpy as np
 
 from ..errors import InputError
 from .arrays import as_samples, check_rising
-from .columns import Table
+from .column_units import FORCE, MOMENT
 from .digest import digest
 from .frame import is_frame, table_from_frame
-from .suspicion import load_warnings
-from .table import read_table
-from .units import FORCE, MOMENT
+from .number_table import Table
+from .table_reader import read_table
+from .unit_checks import load_warnings
 
 _SLACK = 1e-9  # [s], by which times may miss the load's ends through rounding
 

@@ -14,24 +14,24 @@ from pydantic import ValidationError
 from ..errors import InputError
 from ..mechanism import load as load_mechanism
 from ..mechanism.mechanism import Mechanism
-from ..motion.load import Load
+from ..motion.column_units import POSE
+from ..motion.file_words import listed
 from ..motion.path import Motion
-from ..motion.units import POSE
-from ..motion.words import listed
-from .beside import Beside
-from .bodies import Bodies, Body, find_bodies
+from ..motion.platform_load import Load
 from .bryant import bryant_angles
 from .channel_tables import Forces
-from .diagnosis import odd_sizes, suspects_in, why_none
 from .emg import envelopes
 from .forces import measured_load
 from .gaps import Gap, close_gaps
-from .labels import find_label
+from .marker_bodies import Bodies, Body, find_bodies
+from .marker_checks import odd_sizes, suspects_in, why_none
 from .marker_file import MarkerFile, Place, read_markers
+from .marker_labels import find_label
+from .marker_report import in_words
+from .measured_channels import Beside
 from .off_contacts import off_contacts
 from .recording import Recording, read_c3d
 from .registration import Registration, register
-from .summary import in_words
 
 MAX_RESIDUAL = 2e-3  # m
 MAX_GAP = 0.1  # s

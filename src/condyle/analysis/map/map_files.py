@@ -14,8 +14,8 @@ from ...mechanism import Mechanism, parse
 from ...model.evaluator import Evaluator
 from ...results.netcdf import write_netcdf
 from .axes import Axis, Grid
+from .map_store import MARK
 from .reach import Reach
-from .store import MARK
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -20,8 +20,8 @@ from ..mechanism.mechanism import Mechanism
 from ..model.evaluator import Evaluator, with_point
 from ..progress import step
 from ..results.accessors import extend
-from .indices import Indices, indices
 from .runs import Run, Samples, TimedModel, run
+from .torque_indices import Indices, indices
 
 if TYPE_CHECKING:
     from ..motion import Load, Motion

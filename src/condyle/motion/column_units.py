@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass, field
 
 from ..errors import InputError
-from .words import guess, short
+from .file_words import guess, short
 
 POSE = ("X", "Y", "Z", "alpha", "beta", "gamma")
 LANDMARK = ("x", "y", "z")
