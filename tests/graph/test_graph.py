@@ -184,7 +184,7 @@ def test_reading_casadi() -> None:
     ]
     graph = Graph()
     known = {symbol.name(): graph.leaf("input", i) for i, symbol in enumerate(x)}
-    entries = read(graph, expressions, known, x)
+    entries = read(graph, expressions, known)
     function = ca.Function("f", x, expressions)
     for point in ((0.7, -1.3, 2.1), (-2.0, 0.25, 0.5), (1.0, 1.0, 1.0)):
         wanted = [[float(v) for v in ca.vertsplit(part)] for part in function(*map(ca.DM, point))]
@@ -201,7 +201,7 @@ def test_what_has_no_code_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     x = ca.SX.sym("x")
     graph = Graph()
     with pytest.raises(UnsupportedError, match="is not in the table"):
-        read(graph, [ca.erf(x)], {"x": graph.leaf("input", 0)}, [x])
+        read(graph, [ca.erf(x)], {"x": graph.leaf("input", 0)})
 
 
 @pytest.mark.parametrize("seed", range(40))
