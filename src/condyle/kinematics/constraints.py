@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import casadi as ca
@@ -82,6 +83,11 @@ def indices(names: Sequence[str]) -> list[int]:
     return [COORDINATES.index(name) for name in names]
 
 
+def independent_indices(dependent: Sequence[str]) -> list[int]:
+    """Positions of the other pose coordinates in X_EE."""
+    return [i for i, name in enumerate(COORDINATES) if name not in dependent]
+
+
 def residuals(contacts: Sequence[ContactSymbols], pose: ca.SX) -> ca.SX:
     """phi(X_EE), (k,) [m]: how far each ball centre is off its surface."""
     R = rotation(pose[3:])
@@ -148,36 +154,37 @@ def solve_small(A: ca.SX, b: ca.SX) -> ca.SX:
         return ca.SX(b.shape[0], b.shape[1])
     if size == 1:
         return b * (1 / A)
-    for i, j in ((i, j) for j in range(size) for i in range(size)):
-        if A[i, j].is_one():
-            rows = [r for r in range(size) if r != i]
-            columns = [c for c in range(size) if c != j]
-            rest = solve_small(
-                A[rows, columns] - A[rows, j] @ A[i, columns], b[rows, :] - A[rows, j] @ b[i, :]
-            )
-            x = ca.SX(size, b.shape[1])
-            x[columns, :] = rest
-            x[j, :] = b[i, :] - A[i, columns] @ rest
-            return x
-    return ca.inv_minor(A) @ b
+    if (one := _one(A)) is None:
+        return ca.inv_minor(A) @ b
+    i, j, rows, columns, below = one
+    rest = solve_small(below, b[rows, :] - A[rows, j] @ b[i, :])
+    x = ca.SX(size, b.shape[1])
+    x[columns, :] = rest
+    x[j, :] = b[i, :] - A[i, columns] @ rest
+    return x
 
 
 def determinant(A: ca.SX) -> ca.SX:
     """The determinant of a square A of a few rows; entries that are 1 by structure go first."""
-    size = A.shape[0]
-    for i, j in ((i, j) for j in range(size) for i in range(size)):
-        if size > 1 and A[i, j].is_one():
-            rows = [r for r in range(size) if r != i]
-            columns = [c for c in range(size) if c != j]
-            rest = determinant(A[rows, columns] - A[rows, j] @ A[i, columns])
-            return rest if (i + j) % 2 == 0 else -rest
-    return ca.det(A)
+    if (one := _one(A)) is None:
+        return ca.det(A)
+    i, j, _, _, below = one
+    return determinant(below) if (i + j) % 2 == 0 else -determinant(below)
+
+
+def _one(A: ca.SX) -> tuple[int, int, list[int], list[int], ca.SX] | None:
+    """An entry of A that is 1 by structure, the other rows and columns, and A without them."""
+    others = range(A.shape[0])
+    for j, i in product(others, others):
+        if len(others) > 1 and A[i, j].is_one():
+            rows, columns = [r for r in others if r != i], [c for c in others if c != j]
+            return i, j, rows, columns, A[rows, columns] - A[rows, j] @ A[i, columns]
+    return None
 
 
 def parasitic_jacobian(C: ca.SX, dependent: Sequence[str]) -> ca.SX:
     """M_J, (6, 6 - k), from C, (k, 6) ([Cheng2023] eq. 9, by the implicit function theorem)."""
-    dep = indices(dependent)
-    ind = [i for i in range(6) if i not in dep]
+    dep, ind = indices(dependent), independent_indices(dependent)
     M_J = ca.SX(6, len(ind))
     for column, row in enumerate(ind):
         M_J[row, column] = 1
@@ -240,9 +247,7 @@ def angle_equation(
     """
     dep = indices(dependent)
     unknown = ca.SX.sym("unknown", 2)
-    values: list[Any] = [None] * 6
-    for k, i in enumerate(i for i in range(6) if i not in dep):
-        values[i] = q[k]
+    values = dict(zip(independent_indices(dependent), ca.vertsplit(q), strict=False))
     positions = [i for i in dep if i < 3]
     angles = [i for i in dep if i >= 3]
     cos = [unknown[0] if i in angles else ca.cos(values[i]) for i in (3, 4, 5)]

@@ -15,16 +15,16 @@ from dataclasses import dataclass, replace
 import casadi as ca
 
 from .constraints import (
+    ContactFrame,
     ContactSymbols,
     Placement,
-    contact_bias,
     contact_frame,
     determinant,
     indices,
     solve_small,
 )
 from .one_angle import one_angle
-from .parasitic import angular_bias
+from .parasitic import rate_bias
 from .rotation import Bryant, turn_by, turned
 
 TINY = 1e-10  # steps that need not shrink
@@ -121,10 +121,8 @@ def followed(contacts: Sequence[ContactSymbols], dep: list[int], q: ca.SX) -> Pl
     sure.append(unit.square(solve_small(last.C, phi), dep) < CLOSED**2)
     sure.append(pose.square(unit) < plan.far**2)
     discriminant = ca.SX(1)
-    for condition in sure:
-        discriminant = (
-            discriminant * condition
-        )  # 0 and 1: no comparison with what is no number holds
+    for condition in sure:  # 0 and 1: no comparison with what is no number holds
+        discriminant = discriminant * condition
     return Placement(pose.position, pose.bryant, discriminant, iterated=True)
 
 
@@ -206,16 +204,16 @@ class _Contacts:
     contacts: Sequence[ContactSymbols]
     dep: list[int]
     pose: _Pose
+    frame: ContactFrame
     phi: ca.SX
     C: ca.SX
 
     @staticmethod
     def at(contacts: Sequence[ContactSymbols], dep: list[int], pose: _Pose) -> _Contacts:
         bryant = pose.bryant
-        R = bryant.rotation()
-        frame = contact_frame(contacts, pose.position, R)
-        C = frame.N.T @ ca.diagcat(ca.SX.eye(3), bryant.angular_velocity())
-        return _Contacts(contacts, dep, pose, _phi(contacts, pose), C[:, dep])
+        frame = contact_frame(contacts, pose.position, bryant.rotation())
+        C = frame.N.T @ bryant.twist_jacobian()
+        return _Contacts(contacts, dep, pose, frame, _phi(contacts, pose), C[:, dep])
 
     def at_pose(self, pose: _Pose) -> _Contacts:
         """The contacts at another pose nearby."""
@@ -244,19 +242,12 @@ class _Contacts:
         Returns: the step, and 1 - 2 h: negative where the quadratic has no root.
         """
         s = self.step()
-        b = solve_small(self.C, self._curvature_term(s))
+        rate = ca.SX.zeros(6)
+        rate[self.dep] = s
+        pose = self.pose
+        bias = rate_bias(self.contacts, self.frame, pose.position, pose.bryant, rate)
+        b = solve_small(self.C, bias)
         h = -unit.dot(s, b, self.dep) / (unit.square(s, self.dep) + NOTHING)
         fold = 1 - 2 * h
         t = 2 / (1 + ca.sqrt(ca.fmax(fold, 0)))
         return t * s - (t * t / 2) * (b + h * s), fold
-
-    def _curvature_term(self, s: ca.SX) -> ca.SX:
-        """phi'' that constant rates s of the dependent coordinates make, (k,)."""
-        rate = ca.SX.zeros(6)
-        rate[self.dep] = s
-        bryant = self.pose.bryant
-        turning = angular_bias(bryant, rate[3:])
-        twist = ca.vertcat(rate[:3], bryant.angular_velocity() @ rate[3:])
-        frame = contact_frame(self.contacts, self.pose.position, bryant.rotation())
-        bias = contact_bias(self.contacts, frame, self.pose.position, twist)
-        return bias + frame.N[3:, :].T @ turning

@@ -13,6 +13,7 @@ from .constraints import (
     Placement,
     contact_bias,
     contact_frame,
+    independent_indices,
     indices,
     parasitic_jacobian,
     solve_small,
@@ -45,24 +46,39 @@ def whole_motion(
     q_acceleration: ca.SX,
 ) -> WholeMotion:
     """Rates of the dependent coordinates by the implicit function theorem."""
-    R, R_omega = placement.bryant.rotation(), placement.bryant.angular_velocity()
-    frame = contact_frame(contacts, placement.position, R)
-    E = ca.diagcat(ca.SX.eye(3), R_omega)
-    C = frame.N.T @ E
+    position, bryant = placement.position, placement.bryant
+    frame = contact_frame(contacts, position, bryant.rotation())
+    C = frame.N.T @ bryant.twist_jacobian()
     M_J = parasitic_jacobian(C, dependent)
-    rate = M_J @ q_rate
-    twist = E @ rate
-    turning = angular_bias(placement.bryant, rate[3:])
-    dep = indices(dependent)
-    ind = [i for i in range(6) if i not in dep]
-    acceleration = ca.SX(6, 1)
+    rate, acceleration = M_J @ q_rate, ca.SX(6, 1)
+    dep, ind = indices(dependent), independent_indices(dependent)
     acceleration[ind] = q_acceleration
     if dep:
-        bias = contact_bias(contacts, frame, placement.position, twist)
-        bias += frame.N[3:, :].T @ turning
+        bias = rate_bias(contacts, frame, position, bryant, rate)
         acceleration[dep] = -solve_small(C[:, dep], C[:, ind] @ q_acceleration + bias)
-    twist_rate = ca.vertcat(acceleration[:3], R_omega @ acceleration[3:] + turning)
-    return WholeMotion(rate, acceleration, twist, twist_rate, M_J, E, R, frame)
+    return motion_at(frame, bryant, M_J, rate, acceleration)
+
+
+def motion_at(
+    frame: ContactFrame, bryant: Bryant, M_J: ca.SX, rate: ca.SX, acceleration: ca.SX
+) -> WholeMotion:
+    """From rates X_EE' and X_EE'' that the contacts allow."""
+    E = bryant.twist_jacobian()
+    turning = E[3:, 3:] @ acceleration[3:] + angular_bias(bryant, rate[3:])
+    twist_rate = ca.vertcat(acceleration[:3], turning)
+    return WholeMotion(rate, acceleration, E @ rate, twist_rate, M_J, E, bryant.rotation(), frame)
+
+
+def rate_bias(
+    contacts: Sequence[ContactSymbols],
+    frame: ContactFrame,
+    position: ca.SX,
+    bryant: Bryant,
+    rate: ca.SX,
+) -> ca.SX:
+    """C' X', (k,): the part of phi'' that rates X_EE' alone make."""
+    bias = contact_bias(contacts, frame, position, bryant.twist_jacobian() @ rate)
+    return bias + frame.N[3:, :].T @ angular_bias(bryant, rate[3:])
 
 
 def angular_bias(bryant: Bryant, angle_rates: ca.SX) -> ca.SX:

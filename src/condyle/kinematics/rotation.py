@@ -55,6 +55,10 @@ class Bryant:
         c, s = self.cos, self.sin
         return matrix([[1, 0, s[1]], [0, c[0], -s[0] * c[1]], [0, s[0], c[0] * c[1]]])
 
+    def twist_jacobian(self) -> ca.SX:
+        """E, (6, 6): [V; omega] = E X_EE'."""
+        return ca.diagcat(ca.SX.eye(3), self.angular_velocity())
+
 
 def rotation(angles: ca.SX) -> ca.SX:
     """R of (alpha, beta, gamma) [rad], (3, 3)."""

@@ -17,7 +17,7 @@ from functools import cached_property
 
 import casadi as ca
 
-from .rotation import angular_velocity_matrix, rotation
+from .rotation import Bryant
 
 
 @dataclass(frozen=True)
@@ -78,22 +78,20 @@ class State:
 
 def pose_state(pose: ca.SX, rate: ca.SX, acceleration: ca.SX) -> State:
     """State in the six coordinates X_EE (route `core`)."""
-    R, R_omega = rotation(pose[3:]), angular_velocity_matrix(pose[3:])
-    B = ca.diagcat(ca.SX.eye(3), R_omega)
-    twist = ca.vertcat(rate[:3], R_omega @ rate[3:])
-    R_omega_rate = ca.jtimes(R_omega @ rate[3:], pose, rate)
-    twist_rate = ca.vertcat(acceleration[:3], R_omega @ acceleration[3:] + R_omega_rate)
-    return State(rate, acceleration, pose, R, twist, twist_rate, B, pose)
+    bryant = Bryant.of(pose[3:])
+    B = bryant.twist_jacobian()
+    twist = B @ rate
+    twist_rate = B @ acceleration + ca.jtimes(twist, pose, rate)
+    return State(rate, acceleration, pose, bryant.rotation(), twist, twist_rate, B, pose)
 
 
 def independent_state(q: ca.SX, rate: ca.SX, acceleration: ca.SX, pose: ca.SX) -> State:
     """State in the independent coordinates, from the closed form pose(q) (route `direct`)."""
-    M_J = ca.jacobian(pose, q)
-    R_omega = angular_velocity_matrix(pose[3:])
-    B = ca.diagcat(ca.SX.eye(3), R_omega) @ M_J
+    bryant = Bryant.of(pose[3:])
+    B = bryant.twist_jacobian() @ ca.jacobian(pose, q)
     twist = B @ rate
     twist_rate = B @ acceleration + ca.jtimes(twist, q, rate)
-    return State(rate, acceleration, pose, rotation(pose[3:]), twist, twist_rate, B, q)
+    return State(rate, acceleration, pose, bryant.rotation(), twist, twist_rate, B, q)
 
 
 def twist_state(pose: ca.SX, R: ca.SX, twist: ca.SX, twist_rate: ca.SX) -> State:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..backends.kernel import AGAIN, Answer
 from ..kinematics.singularities import SINGULAR, ratio
-from ..questions.inverse import CERTAIN
+from ..questions.platform import CERTAIN
 from ..questions.survey import SURVEYED
 from ..status import Status
 

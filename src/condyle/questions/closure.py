@@ -18,7 +18,6 @@ import casadi as ca
 from ..graph.program import Program
 from ..kinematics.constraints import (
     ContactSymbols,
-    contact_bias,
     contact_frame,
     indices,
     residuals,
@@ -26,14 +25,12 @@ from ..kinematics.constraints import (
 )
 from ..kinematics.guide import Guide
 from ..kinematics.iteration import followed, newton
-from ..kinematics.parasitic import angular_bias, whole_motion
+from ..kinematics.parasitic import rate_bias, whole_motion
 from ..kinematics.rotation import Bryant
 from ..mechanism.mechanism import COORDINATES
-from ..status import Status
 from .builder import Builder
-from .inverse import CERTAIN
 from .numbers import contact_symbols, single_contacts
-from .platform import ANGLE_UNITS
+from .platform import ANGLE_UNITS, check_contacts
 from .structure import Structure
 
 
@@ -72,9 +69,7 @@ def closure(structure: Structure, prescribed: Prescribed) -> Program:
     b.output("pose", pose, ANGLE_UNITS)
     b.output("pose_rate", rate, "per s")
     b.output("pose_acceleration", acceleration, "per s^2")
-    if placement.discriminant is not None:
-        below = None if placement.iterated else Status.unreachable
-        b.check(placement.discriminant, CERTAIN if placement.iterated else 0.0, below)
+    check_contacts(b, placement)
     return b.finish()
 
 
@@ -83,12 +78,10 @@ def _rates(
 ) -> tuple[ca.SX, ca.SX]:
     """X_EE' and X_EE'', (6,), where contacts and guides fix the whole pose."""
     frame = contact_frame(contacts, position, bryant.rotation())
-    E = ca.diagcat(ca.SX.eye(3), bryant.angular_velocity())
-    K = frame.N.T @ E
+    K = frame.N.T @ bryant.twist_jacobian()
     still = ca.SX.zeros(6 - s1.numel())
     rate = solve_small(K, ca.vertcat(still, s1))
-    bias = contact_bias(contacts, frame, position, E @ rate)
-    bias += frame.N[3:, :].T @ angular_bias(bryant, rate[3:])
+    bias = rate_bias(contacts, frame, position, bryant, rate)
     return rate, solve_small(K, ca.vertcat(still, s2) - bias)
 
 

@@ -24,8 +24,8 @@ from .builder import Builder, Lanes
 from .equations import Wrench
 from .friction import Contacts, contacts
 from .inertia import Affine, affine
-from .inverse import DOUBTFUL, HUGE, add_sliding, feasibility
-from .platform import ANGLE_UNITS, Platform, closed, given, normal_forces
+from .inverse import DOUBTFUL, HUGE, add_sliding
+from .platform import ANGLE_UNITS, Platform, closed, feasibility, given, normal_forces
 from .rubbing import consistent
 from .structure import Structure
 

@@ -18,7 +18,15 @@ from . import configuration
 from .builder import Builder, Lanes
 from .equations import Equations, Wrench, equations, total
 from .friction import Contacts, LeastNorm, contacts, least_norm_pattern
-from .platform import ANGLE_UNITS, Platform, closed, given, independent_indices
+from .platform import (
+    ANGLE_UNITS,
+    Platform,
+    check_contacts,
+    closed,
+    feasibility,
+    given,
+    independent_indices,
+)
 from .structure import Structure
 
 # What can be asked for besides the efforts.
@@ -26,7 +34,6 @@ OUTPUTS = ("contact", "share", "gravity", "motion", "joint", "configuration")
 DOUBTFUL = 1e-14  # discriminant below which a sample is looked at again,
 WEAK = 1e-20  # and ratio of a pivot to its column, squared
 HUGE = 1e300
-CERTAIN = 0.5  # of a placement's discriminant, which is 0 or 1 where it was iterated
 
 
 def inverse(structure: Structure, wanted: Collection[str] = ()) -> Variants:
@@ -150,10 +157,7 @@ def motion(structure: Structure) -> Program:
     b = Builder(structure)
     platform = closed(b)
     _add_motion(b, platform)
-    placement = platform.placement
-    if placement.discriminant is not None:
-        below = None if placement.iterated else Status.unreachable
-        b.check(placement.discriminant, CERTAIN if placement.iterated else 0.0, below)
+    check_contacts(b, platform.placement)
     return b.finish()
 
 
@@ -229,19 +233,3 @@ def _every_rate_is_felt(b: Builder, eq: Equations) -> ca.SX:
     for size in ca.vertsplit(sizes)[1:]:
         least = ca.fmin(least, size)
     return least >= WEAK * ca.sum1(sizes)
-
-
-def feasibility(b: Builder, platform: Platform, chains: Lanes) -> ca.SX:
-    """Least of the dimensionless discriminants: not negative where the pose can be reached.
-
-    Args: chains: their discriminants.
-    """
-    least, placement = b.least(chains), platform.placement
-    if placement.discriminant is None:
-        return least
-    # A pose that Newton did not find is not unreachable but unknown: 0, to be looked at again.
-    return (
-        least * placement.discriminant
-        if placement.iterated
-        else ca.fmin(least, placement.discriminant)
-    )

@@ -12,17 +12,20 @@ from ..kinematics.constraints import (
     closed_form,
     closed_form_available,
     contact_frame,
+    independent_indices,
     indices,
     parasitic_jacobian,
     solve_small,
 )
 from ..kinematics.iteration import newton
-from ..kinematics.parasitic import WholeMotion, angular_bias, whole_motion
+from ..kinematics.parasitic import WholeMotion, motion_at, whole_motion
 from ..kinematics.rotation import Bryant
-from .builder import Builder
+from ..status import Status
+from .builder import Builder, Lanes
 from .numbers import contact_symbols
 
 ANGLE_UNITS = "m, m, m, rad, rad, rad"
+CERTAIN = 0.5  # of a placement's discriminant, which is 0 or 1 where it was iterated
 
 
 @dataclass(frozen=True)
@@ -75,23 +78,34 @@ def given(b: Builder, still: bool = False) -> Platform:
     rate = zero if still else b.sample("pose_rate", 6)
     acceleration = zero if still else b.sample("pose_acceleration", 6)
     bryant = Bryant.of(pose[3:])
-    placement = Placement(pose[:3], bryant, None)
-    contacts = contact_symbols(s, b.parameter)
-    R, R_omega = bryant.rotation(), bryant.angular_velocity()
-    frame = contact_frame(contacts, pose[:3], R)
-    E = ca.diagcat(ca.SX.eye(3), R_omega)
-    turning = angular_bias(bryant, rate[3:])
-    twist_rate = ca.vertcat(acceleration[:3], R_omega @ acceleration[3:] + turning)
-    M_J = parasitic_jacobian(frame.N.T @ E, s.dependent)
-    motion = WholeMotion(rate, acceleration, E @ rate, twist_rate, M_J, E, R, frame)
-    ind = independent_indices(s.dependent)
+    frame = contact_frame(contact_symbols(s, b.parameter), pose[:3], bryant.rotation())
+    M_J = parasitic_jacobian(frame.N.T @ bryant.twist_jacobian(), s.dependent)
+    motion = motion_at(frame, bryant, M_J, rate, acceleration)
+    ind, placement = independent_indices(s.dependent), Placement(pose[:3], bryant, None)
     return Platform(pose[ind], rate[ind], acceleration[ind], pose, placement, motion)
 
 
-def independent_indices(dependent: Sequence[str]) -> list[int]:
-    """Positions of the other pose coordinates in X_EE."""
-    dep = indices(dependent)
-    return [i for i in range(6) if i not in dep]
+def check_contacts(b: Builder, placement: Placement) -> None:
+    """The contacts are met; one that was iterated and is not sure is to be looked at again."""
+    if placement.discriminant is not None:
+        below = None if placement.iterated else Status.unreachable
+        b.check(placement.discriminant, CERTAIN if placement.iterated else 0.0, below)
+
+
+def feasibility(b: Builder, platform: Platform, chains: Lanes) -> ca.SX:
+    """Least of the dimensionless discriminants: not negative where the pose can be reached.
+
+    Args: chains: their discriminants.
+    """
+    least, placement = b.least(chains), platform.placement
+    if placement.discriminant is None:
+        return least
+    # A pose that Newton did not find is not unreachable but unknown: 0, to be looked at again.
+    return (
+        least * placement.discriminant
+        if placement.iterated
+        else ca.fmin(least, placement.discriminant)
+    )
 
 
 @dataclass(frozen=True)
