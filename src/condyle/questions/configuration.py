@@ -12,10 +12,8 @@ import casadi as ca
 from ..dynamics.singular_values import singular_values
 from ..graph.program import Program
 from ..kinematics.chain import FAMILIES, Loop
-from ..kinematics.constraints import contact_frame
 from .builder import Builder, Lanes
-from .numbers import single_contacts
-from .platform import Platform, given, independent_indices
+from .platform import Platform, contacts, given, independent_indices
 from .structure import Structure
 
 CONVERGED = 0.0  # what the quality of singular values must be at least
@@ -39,23 +37,19 @@ def add(b: Builder, platform: Platform) -> Lanes:
     b.output("cos_gamma", [loop.cos_gamma for loop in loops], "1")
     b.output("discriminant", [loop.discriminant for loop in loops], "1")
     b.output("J_A", [loop.J_A for loop in loops], "m^2 per rad or m")
-    transmission = [loop.J_A / loop.J_A_scale for loop in loops]
-    b.output("transmission", transmission, "1")
+    b.output("transmission", [loop.transmission for loop in loops], "1")
+    add_singularity(b, loops, rows)
+    contacts(b, platform).add_places(b)
+    return rows
+
+
+def add_singularity(b: Builder, loops: list[Loop], rows: Lanes) -> None:
+    """Singular values of J_W, from its dimensionless rows, and extremes of J_A."""
     sigma, quality = singular_values(b.total, rows)
     b.output("J_W_sigma", sigma, "1", b.structure.m)
-    size = [ca.fabs(t) for t in transmission]
+    size = [ca.fabs(loop.transmission) for loop in loops]
     b.output("J_A_extremes", ca.vertcat(b.least(size), -b.least([-s for s in size])), "1")
     b.check(quality, CONVERGED)
-
-    position, R = platform.placement.position, platform.R
-    contacts = single_contacts(b.structure, b.parameter)
-    frame = contact_frame(contacts, position, R)
-    k = len(contacts)
-    points = [position + r for r in frame.levers]
-    normals = [n / ca.norm_2(n) for n in frame.gradients]
-    for name, vectors, unit in (("contact_point", points, "m"), ("contact_normal", normals, "1")):
-        b.output(name, ca.horzcat(ca.SX(3, 0), *vectors).T, unit, k, 3)
-    return rows
 
 
 def loops_of(b: Builder, platform: Platform) -> list[Loop]:
@@ -63,7 +57,7 @@ def loops_of(b: Builder, platform: Platform) -> list[Loop]:
     loops = []
     for group, kind in enumerate(b.structure.families):
         family = FAMILIES[kind]
-        position = platform.placement.position + platform.R @ b.lane(group, "joint")
+        position = platform.position + platform.R @ b.lane(group, "joint")
         loops.append(family.loop(family.named(b.lane(group, "constants")), position))
     return loops
 

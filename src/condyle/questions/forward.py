@@ -17,15 +17,23 @@ import casadi as ca
 
 from ..dynamics.least_norm import definite_solve
 from ..graph.program import Program, Variants
-from ..kinematics.chain import FAMILIES
 from ..kinematics.constraints import indices, solve_small
 from ..status import Status
-from .builder import Builder, Lanes
+from .builder import Builder
+from .configuration import loops_of
 from .equations import Wrench
-from .friction import Contacts, contacts
 from .inertia import Affine, affine
-from .inverse import DOUBTFUL, HUGE, add_sliding
-from .platform import ANGLE_UNITS, Platform, closed, feasibility, given, normal_forces
+from .inverse import DOUBTFUL, HUGE
+from .platform import (
+    ANGLE_UNITS,
+    Contacts,
+    Platform,
+    closed,
+    contacts,
+    feasibility,
+    given,
+    normal_forces,
+)
 from .rubbing import consistent
 from .structure import Structure
 
@@ -58,14 +66,14 @@ def program(structure: Structure, wanted: Collection[str] = ()) -> Program:
         b.output("pose_rate", motion.rate, "per s")
         b.output("pose_acceleration", motion.acceleration + motion.M_J @ q2, "per s^2")
     if "joint" in wanted:
-        b.output("joint", _joints(b, platform), "rad or m")
+        b.output("joint", [loop.q_r[0] for loop in loops_of(b, platform)], "rad or m")
         b.output("joint_rate", eq.rates, "rad/s or m/s")
         turned = eq.start + eq.basis.rates(found.w)
         pairs = zip(eq.biases, eq.rows, strict=True)
         accelerations = [bias + ca.dot(row, turned) for bias, row in pairs]
         b.output("joint_acceleration", accelerations, "per s^2")
     if "sliding" in wanted:
-        add_sliding(b, touch or contacts(b, platform))
+        (touch or contacts(b, platform)).add_sliding(b)
     b.check(feasibility(b, platform, eq.discriminants), DOUBTFUL, Status.unreachable)
     finite = ca.fabs(ca.sum1(q2)) < HUGE
     b.check(2 * found.sure * finite - 1, 0.5)
@@ -81,15 +89,14 @@ def forward_system(structure: Structure) -> Program:
     platform = given(b)
     effort = b.lane_sample("effort", unit="N m or N")
     eq = affine(b, platform, Wrench.of(b), effort)
-    m, k = structure.m, len(structure.contacts)
+    m = structure.m
     b.output("H", _columns(eq), "kg, kg m, kg m^2", 6, m)
     b.output("F", eq.F + eq.H @ eq.start, "N, N m", 6)
     b.output("S", eq.S, "", m, m)
     b.output("M_J", platform.motion.M_J, "", 6, m)
     touch = contacts(b, platform)
-    b.output("normal", (eq.B.T @ touch.N).T, "", k, 6)
-    b.output("friction", (eq.B.T @ touch.T).T, "", k, 6)
-    add_sliding(b, touch)
+    touch.add_wrenches(b, eq.B)
+    touch.add_sliding(b)
     b.output("joint_rate", eq.rates, "rad/s or m/s")
     pairs = list(zip(eq.biases, eq.rows, strict=True))
     b.output("bias", [bias + ca.dot(row, eq.start) for bias, row in pairs], "per s^2")
@@ -140,13 +147,3 @@ def _solved(
             w, force = w - x[:, 1:] @ y, force + K @ y
             sure = sure * (count == 1)
     return _Solved(w, force, sure)
-
-
-def _joints(b: Builder, platform: Platform) -> Lanes:
-    """Joint coordinates, principal values."""
-    found = []
-    for group, kind in enumerate(b.structure.families):
-        family = FAMILIES[kind]
-        position = platform.placement.position + platform.R @ b.lane(group, "joint")
-        found.append(family.loop(family.named(b.lane(group, "constants")), position).q_r[0])
-    return found

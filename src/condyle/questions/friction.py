@@ -17,58 +17,16 @@ from itertools import product
 
 import casadi as ca
 
-from ..kinematics.constraints import contact_frame, indices, solve_small
+from ..kinematics.constraints import independent_indices, indices, solve_small
 from .builder import Builder, Lanes
 from .equations import Equations
-from .numbers import single_contacts
-from .platform import Basis, Platform, independent_indices
+from .platform import Basis, Contacts
 
 MOST = 2  # contacts with friction whose patterns are all solved in one kernel
 HUGE = 1e300
 FLAT = 1e-3  # part of a square below which what is left of it has lost too many digits
 
 LeastNorm = Callable[..., tuple[Lanes, ca.SX]]
-
-
-@dataclass(frozen=True)
-class Contacts:
-    """The contacts of one sample, dual to the twist [V; omega].
-
-    N: (6, k), wrench of unit normal forces;  T: (6, k), what friction takes off it.
-    slip: (3, k), velocity of the material points [m/s];  drag: (3, k), mu u.
-    """
-
-    N: ca.SX
-    T: ca.SX
-    slip: ca.SX
-    drag: ca.SX
-
-
-def contacts(b: Builder, platform: Platform) -> Contacts:
-    """Unit normals, and friction where there is some."""
-    frame = contact_frame(
-        single_contacts(b.structure, b.parameter), platform.placement.position, platform.R
-    )
-    V, omega = platform.motion.twist[:3], platform.motion.twist[3:]
-    N, T, slips, drags = [], [], [], []
-    for i, (gradient, r) in enumerate(zip(frame.gradients, frame.levers, strict=True)):
-        n = gradient / ca.norm_2(gradient)
-        mu, square, radius = ca.SX(0), ca.SX(1), ca.SX(0)
-        if i in b.structure.friction:
-            mu, square, radius = ca.vertsplit(b.parameter(f"friction_{i}"))
-        c = r - radius * n  # where the ball touches
-        v = V + ca.cross(omega, c)
-        u = mu * v / ca.sqrt(ca.dot(v, v) + square)
-        N.append(ca.vertcat(n, ca.cross(r, n)))
-        T.append(ca.vertcat(u, ca.cross(c, u)))
-        slips.append(v)
-        drags.append(u)
-    return Contacts(
-        ca.horzcat(ca.SX(6, 0), *N),
-        ca.horzcat(ca.SX(6, 0), *T),
-        ca.horzcat(ca.SX(3, 0), *slips),
-        ca.horzcat(ca.SX(3, 0), *drags),
-    )
 
 
 @dataclass(frozen=True)

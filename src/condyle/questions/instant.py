@@ -15,10 +15,9 @@ from ..kinematics.constraints import contact_frame
 from ..status import Status
 from .builder import Builder
 from .equations import Wrench, platform_body
-from .friction import contacts
 from .inertia import affine
 from .numbers import single_contacts
-from .platform import ANGLE_UNITS, Platform, closed
+from .platform import ANGLE_UNITS, Platform, closed, contacts
 from .structure import Structure
 
 CERTAIN = 0.5  # of a placement's discriminant, which is 0 or 1 where it was iterated

@@ -17,12 +17,14 @@ from ..status import Status
 from . import configuration
 from .builder import Builder, Lanes
 from .equations import Equations, Wrench, equations, total
-from .friction import Contacts, LeastNorm, contacts, least_norm_pattern
+from .friction import LeastNorm, least_norm_pattern
 from .platform import (
     ANGLE_UNITS,
+    Contacts,
     Platform,
     check_contacts,
     closed,
+    contacts,
     feasibility,
     given,
     independent_indices,
@@ -90,7 +92,7 @@ def program(
     if "configuration" in wanted:
         configuration.add(b, platform)
         if structure.friction:
-            add_sliding(b, contacts(b, platform))
+            contacts(b, platform).add_sliding(b)
     b.check(
         feasibility(b, platform, [c.dynamics.discriminant for c in eq.chains]),
         DOUBTFUL,
@@ -175,14 +177,15 @@ def system(structure: Structure) -> Program:
     b = Builder(structure)
     platform, load = given(b), Wrench.of(b)
     eq = equations(b, platform, load, route="core")
-    still = [b.at_zero(part, *_rates(eq, platform)) for part in eq.parts.values()]
+    rates = platform.motion.rate, platform.motion.acceleration
+    still = [b.at_zero(part, *rates) for part in eq.parts.values()]
     b.output("A", eq.A, "", structure.m)
     for name, parts in (("b", list(eq.parts.values())), ("b_gravity", still)):
         rows = ca.horzcat(*(eq.basis.generalized_force(p) for p in parts)).T
         b.output(name, rows, "", len(parts), structure.m)
     pulled = eq.basis.generalized_force(ca.SX.eye(eq.Q.numel()))
     b.output("Pi", pulled, "", structure.m, 6)  # Pi^T
-    add_sliding(b, _add_balance(b, platform, eq))
+    _add_balance(b, platform, eq).add_sliding(b)
     b.output("joint_rate", [c.dynamics.rate for c in eq.chains], "rad/s or m/s")
     b.output("joint_acceleration", [c.dynamics.acceleration for c in eq.chains], "per s^2")
     return b.finish()
@@ -198,20 +201,9 @@ def _add_balance(b: Builder, platform: Platform, eq: Equations) -> Contacts:
     """Q = J^T tau + sum_k lambda_k (N_k - sigma_k T_k), sample by sample."""
     b.output("Q", eq.Q, "N, N m", 6)
     b.output("J", [c.row for c in eq.chains], "")
-    touch, k = contacts(b, platform), len(b.structure.contacts)
-    b.output("normal", (eq.state.B.T @ touch.N).T, "", k, 6)
-    b.output("friction", (eq.state.B.T @ touch.T).T, "", k, 6)
+    touch = contacts(b, platform)
+    touch.add_wrenches(b, eq.state.B)
     return touch
-
-
-def add_sliding(b: Builder, touch: Contacts) -> None:
-    k = len(b.structure.contacts)
-    b.output("slip", touch.slip.T, "m/s", k, 3)
-    b.output("drag", touch.drag.T, "1", k, 3)
-
-
-def _rates(eq: Equations, platform: Platform) -> tuple[ca.SX, ca.SX]:
-    return platform.motion.rate, platform.motion.acceleration
 
 
 def _core(b: Builder, platform: Platform, load: Wrench) -> Equations:

@@ -19,9 +19,8 @@ from ..kinematics.parasitic import whole_motion
 from ..kinematics.rotation import Bryant
 from .builder import Builder
 from .equations import Wrench, equations
-from .friction import contacts
 from .numbers import contact_symbols
-from .platform import ANGLE_UNITS, Platform, independent_indices
+from .platform import ANGLE_UNITS, Platform, contacts, independent_indices
 from .structure import Structure
 
 

@@ -65,16 +65,10 @@ class Layout:
         ]
         return Layout(structure, _slots(sizes), lanes)
 
-    def values(self, mechanism: Mechanism, landmark: str | None = None) -> dict[str, Any]:
-        """Shared numbers of a mechanism, by name.
-
-        Args: landmark: the platform point whose path is given, if one is.
-        """
-        return self._values(mechanism, landmark, constants_of(mechanism))
-
     def _values(
         self, mechanism: Mechanism, landmark: str | None, constants: Sequence[ChainNumbers]
     ) -> dict[str, Any]:
+        """Shared numbers of a mechanism, by name."""
         points = [contact.point for contact in mechanism.contacts]
         masses = end_masses(mechanism, constants)
         values: dict[str, Any] = {
@@ -102,7 +96,10 @@ class Layout:
         return values
 
     def numbers(self, mechanism: Mechanism, landmark: str | None = None) -> Numbers:
-        """All of them, as backends take them."""
+        """The numbers of a mechanism, as backends take them.
+
+        Args: landmark: the platform point whose path is given, if one is.
+        """
         constants = constants_of(mechanism)
         values = self._values(mechanism, landmark, constants)
         parameters = np.concatenate([np.ravel(values[name]) for name in self.parameters])

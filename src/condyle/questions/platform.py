@@ -22,7 +22,7 @@ from ..kinematics.parasitic import WholeMotion, motion_at, whole_motion
 from ..kinematics.rotation import Bryant
 from ..status import Status
 from .builder import Builder, Lanes
-from .numbers import contact_symbols
+from .numbers import contact_symbols, single_contacts
 
 ANGLE_UNITS = "m, m, m, rad, rad, rad"
 CERTAIN = 0.5  # of a placement's discriminant, which is 0 or 1 where it was iterated
@@ -46,6 +46,11 @@ class Platform:
     @property
     def R(self) -> ca.SX:
         return self.motion.R
+
+    @property
+    def position(self) -> ca.SX:
+        """O_M, (3,)."""
+        return self.placement.position
 
 
 def closed(b: Builder, rates: int = 2) -> Platform:
@@ -106,6 +111,58 @@ def feasibility(b: Builder, platform: Platform, chains: Lanes) -> ca.SX:
         if placement.iterated
         else ca.fmin(least, placement.discriminant)
     )
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """The contacts of one sample, one a column; N and T dual to the twist [V; omega].
+
+    point, normal: centre of the ball and unit normal, (3, k).
+    N: (6, k), wrench of unit normal forces;  T: (6, k), what friction takes off it.
+    slip: (3, k), velocity of the material points [m/s];  drag: (3, k), mu u.
+    """
+
+    point: ca.SX
+    normal: ca.SX
+    N: ca.SX
+    T: ca.SX
+    slip: ca.SX
+    drag: ca.SX
+
+    def add_places(self, b: Builder) -> None:
+        """Where they are, among a question's outputs."""
+        for name, vectors, unit in (("point", self.point, "m"), ("normal", self.normal, "1")):
+            b.output(f"contact_{name}", vectors.T, unit, vectors.shape[1], 3)
+
+    def add_wrenches(self, b: Builder, B: ca.SX) -> None:
+        """N and T among a question's outputs, dual to the rates c' with [V; omega] = B c'."""
+        for name, wrenches in (("normal", self.N), ("friction", self.T)):
+            b.output(name, (B.T @ wrenches).T, "", wrenches.shape[1], 6)
+
+    def add_sliding(self, b: Builder) -> None:
+        """How they slide, among a question's outputs."""
+        for name, vectors, unit in (("slip", self.slip, "m/s"), ("drag", self.drag, "1")):
+            b.output(name, vectors.T, unit, vectors.shape[1], 3)
+
+
+def contacts(b: Builder, platform: Platform) -> Contacts:
+    """The contacts, with friction where there is some."""
+    position, V, omega = platform.position, platform.motion.twist[:3], platform.motion.twist[3:]
+    frame = contact_frame(single_contacts(b.structure, b.parameter), position, platform.R)
+    found: list[tuple[ca.SX, ...]] = []
+    for i, (gradient, r) in enumerate(zip(frame.gradients, frame.levers, strict=True)):
+        n = gradient / ca.norm_2(gradient)
+        mu, square, radius = ca.SX(0), ca.SX(1), ca.SX(0)
+        if i in b.structure.friction:
+            mu, square, radius = ca.vertsplit(b.parameter(f"friction_{i}"))
+        c = r - radius * n  # where the ball touches
+        v = V + ca.cross(omega, c)
+        u = mu * v / ca.sqrt(ca.dot(v, v) + square)
+        N, T = ca.vertcat(n, ca.cross(r, n)), ca.vertcat(u, ca.cross(c, u))
+        found.append((position + r, n, N, T, v, u))
+    columns = zip(*found, strict=True) if found else [()] * 6
+    rows = (3, 3, 6, 6, 3, 3)
+    return Contacts(*(ca.horzcat(ca.SX(n, 0), *c) for n, c in zip(rows, columns, strict=True)))
 
 
 @dataclass(frozen=True)

@@ -17,12 +17,11 @@ from ..dynamics.free_body import FreeBodies, free_bodies
 from ..dynamics.joint_space import JointState, joint_motion
 from ..graph.program import Program
 from ..kinematics.chain import FAMILIES, Constants, Family, Joint
-from ..kinematics.constraints import contact_frame, solve_small
+from ..kinematics.constraints import solve_small
 from ..kinematics.state import PointMotion, pose_state
 from ..mechanism.mechanism import Mechanism
 from .builder import Builder
-from .numbers import single_contacts
-from .platform import given
+from .platform import contacts, given
 from .structure import Structure
 
 POINT = "point of "  # what the name of a quantity's point begins with
@@ -80,12 +79,9 @@ def reactions(structure: Structure) -> Program:
     for name, own in found.items():
         b.output(name, [None if pair is None else pair[0] for pair in own], units[name])
         b.output(POINT + name, [None if pair is None else pair[1] for pair in own], "m")
-    contacts = single_contacts(structure, b.parameter)
-    frame = contact_frame(contacts, platform.pose[:3], platform.R)
-    vectors = [force[i] * n / ca.norm_2(n) for i, n in enumerate(frame.gradients)]
-    points = [platform.pose[:3] + r for r in frame.levers]
-    for name, rows, unit in (("contact", vectors, "N"), (POINT + "contact", points, "m")):
-        b.output(name, ca.horzcat(ca.SX(3, 0), *rows).T, unit, len(contacts), 3)
+    touch, k = contacts(b, platform), len(structure.contacts)
+    b.output("contact", (touch.normal @ ca.diag(force)).T, "N", k, 3)
+    b.output(POINT + "contact", touch.point.T, "m", k, 3)
     return b.finish()
 
 

@@ -111,6 +111,11 @@ class Loop:
     J_A_scale: ca.SX
     cos_gamma: ca.SX
 
+    @property
+    def transmission(self) -> ca.SX:
+        """Sine of the transmission angle."""
+        return self.J_A / self.J_A_scale
+
 
 @dataclass(frozen=True)
 class ChainDynamics:
