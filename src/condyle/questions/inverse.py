@@ -14,8 +14,8 @@ from ..dynamics import FORMULATIONS
 from ..dynamics.least_norm import gram_schmidt, normal_equations
 from ..graph.program import Program, Variants
 from ..status import Status
-from . import configuration
 from .builder import Builder, Lanes
+from .configuration import add as add_configuration
 from .equations import Equations, Wrench, equations, total
 from .friction import LeastNorm, least_norm_pattern
 from .platform import (
@@ -90,7 +90,7 @@ def program(
         b.output("joint_rate", [c.dynamics.rate for c in eq.chains], "rad/s or m/s")
         b.output("joint_acceleration", [c.dynamics.acceleration for c in eq.chains], "per s^2")
     if "configuration" in wanted:
-        configuration.add(b, platform)
+        add_configuration(b, platform)
         if structure.friction:
             contacts(b, platform).add_sliding(b)
     b.check(
