@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,8 @@ from ..errors import InputError, UnsupportedError
 from ..extras import require
 
 OPEN = 1e-3  # of the model's extent: loops that are this far open at home are not closed
+SAME = 1e-6  # of the model's extent: points this near are one
+DIGITS = 12  # of coordinates in a file [m]: below this MuJoCo's own rounding begins
 WORLD = 0
 
 
@@ -26,51 +28,65 @@ class Step:
 
     kind: str
     point: np.ndarray
-    axis: np.ndarray
+    axis: np.ndarray = field(default_factory=lambda: np.zeros(3))
     index: int = -1
     up: int = 1
 
-    def reversed(self) -> Step:
-        return Step(self.kind, self.point, self.axis, self.index, -self.up)
+
+def turned(steps: tuple[Step, ...]) -> tuple[Step, ...]:
+    """The same joints from the other end."""
+    return tuple(replace(step, up=-step.up) for step in reversed(steps))
 
 
 @dataclass(frozen=True)
 class Edge:
-    """Steps that lead from one rigid body to another."""
+    """Steps that lead from one rigid body to another; `number`: of the edge, whichever way."""
 
+    number: int
     start: int
     end: int
     steps: tuple[Step, ...]
     name: str = ""
 
-    def leaving(self, body: int) -> Edge:
-        """The same edge, seen from one of its bodies."""
-        if self.start == body:
-            return self
-        steps = tuple(step.reversed() for step in reversed(self.steps))
-        return Edge(self.end, self.start, steps, self.name)
-
 
 @dataclass(frozen=True)
 class Body:
-    """Rigidly joined bodies: mass [kg], centre (3,) [m] and inertia about it (3, 3), in {world}."""
+    """Rigidly joined bodies: mass [kg], centre (3,) [m] and inertia about it (3, 3), in {world}.
+
+    weight: their mass, but 0 for a body that is there because MuJoCo has none without mass.
+    """
 
     mass: float
     centre: np.ndarray
     inertia: np.ndarray
+    weight: float
 
 
 @dataclass
 class Graph:
-    """model: of MuJoCo;  data: at home;  edges: between rigid bodies, 0 is the world."""
+    """model: of MuJoCo;  data: at home;  edges: between rigid bodies, 0 is the world.
+
+    origin: of {S}, (3,);  notes: what a mechanism does not have of it.
+    """
 
     model: Any
     data: Any
     edges: list[Edge] = field(default_factory=list)
+    origin: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    notes: list[str] = field(default_factory=list)
 
-    def at(self, body: int) -> list[Edge]:
+    @property
+    def near(self) -> float:
+        """Points within this are one [m]."""
+        return SAME * float(self.model.stat.extent)
+
+    def at(self, body: int) -> Iterator[Edge]:
         """The edges that leave a body."""
-        return [e.leaving(body) for e in self.edges if body in (e.start, e.end)]
+        for e in self.edges:
+            if e.start == body:
+                yield e
+            elif e.end == body:
+                yield replace(e, start=e.end, end=e.start, steps=turned(e.steps))
 
     def group(self, body: int) -> int:
         """The rigid body that a body of the model belongs to."""
@@ -90,7 +106,30 @@ class Graph:
             R, r = d.ximat[i].reshape(3, 3), d.xipos[i] - centre
             inertia += R @ np.diag(m.body_inertia[i]) @ R.T
             inertia += m.body_mass[i] * (r @ r * np.eye(3) - np.outer(r, r))
-        return Body(mass, centre, (inertia + inertia.T) / 2)
+        weight = 0.0 if float(m.body_gravcomp[group]) == 1.0 else mass
+        return Body(mass, centre, (inertia + inertia.T) / 2, weight)
+
+    def sites(self, group: int | None = None) -> Iterator[tuple[str, np.ndarray]]:
+        """Names and places of sites, of one rigid body or of all, in {world}."""
+        for s in range(self.model.nsite):
+            if group is None or self.group(int(self.model.site_bodyid[s])) == group:
+                yield self.model.site(s).name, self.data.site_xpos[s]
+
+    def tendons(self) -> Iterator[tuple[int, list[int]]]:
+        """Spatial tendons, and the sites that they run by, if they run by sites alone."""
+        m = self.model
+        for t in range(m.ntendon):
+            span = slice(int(m.tendon_adr[t]), int(m.tendon_adr[t] + m.tendon_num[t]))
+            sites = [int(s) for s in m.wrap_objid[span]]
+            yield t, sites if (m.wrap_type[span] == 3).all() else []
+
+    def point(self, at: np.ndarray) -> list[float]:
+        """A point of the world in {S}."""
+        return [round(float(v), DIGITS) + 0.0 for v in at - self.origin]
+
+    def note(self, text: str) -> None:
+        if text not in self.notes:
+            self.notes.append(text)
 
 
 def read_graph(path: str | Path) -> Graph:
@@ -116,18 +155,14 @@ def read_graph(path: str | Path) -> Graph:
     data = mujoco.MjData(model)
     gaps = []
     for key in range(-1, model.nkey):
-        if key < 0:
-            mujoco.mj_resetData(model, data)
-        else:
+        if key >= 0:
             mujoco.mj_resetDataKeyframe(model, data, key)
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         ends = [_ends(model, data, i, mujoco) for i in range(model.neq)]
         gaps.append(max((float(np.linalg.norm(a - b)) for *_, a, b in ends), default=0.0))
         if gaps[-1] <= OPEN * model.stat.extent:
-            graph = Graph(model, data)
-            graph.edges = [*_tree(graph, mujoco), *_connects(graph, ends)]
-            return graph
+            return _with_edges(Graph(model, data), ends, mujoco)
     raise UnsupportedError(
         f"{path}: its loops are open at home, by {min(gaps) * 1e3:.3g} mm at least; let qpos0 or a "
         "keyframe close them"
@@ -138,36 +173,34 @@ def _ends(model: Any, data: Any, i: int, mujoco: Any) -> tuple[int, int, np.ndar
     """The bodies that a connect holds together, and where each is held."""
     ids = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
     if int(model.eq_objtype[i]) == int(mujoco.mjtObj.mjOBJ_SITE):
-        a, b = (data.site_xpos[k] for k in ids)
-        return int(model.site_bodyid[ids[0]]), int(model.site_bodyid[ids[1]]), a.copy(), b.copy()
-    anchors = model.eq_data[i, :3], model.eq_data[i, 3:6]
-    a, b = (
-        data.xpos[k] + data.xmat[k].reshape(3, 3) @ at for k, at in zip(ids, anchors, strict=True)
-    )
+        a, b = (data.site_xpos[k].copy() for k in ids)
+        return int(model.site_bodyid[ids[0]]), int(model.site_bodyid[ids[1]]), a, b
+    anchors = zip(ids, (model.eq_data[i, :3], model.eq_data[i, 3:6]), strict=True)
+    a, b = (data.xpos[k] + data.xmat[k].reshape(3, 3) @ at for k, at in anchors)
     return *ids, a, b
 
 
-def _tree(graph: Graph, mujoco: Any) -> Iterator[Edge]:
+def _with_edges(
+    graph: Graph, ends: list[tuple[int, int, np.ndarray, np.ndarray]], mujoco: Any
+) -> Graph:
+    """Joints of the tree, then connects."""
     m, d = graph.model, graph.data
+
+    def add(first: int, second: int, steps: tuple[Step, ...], name: str = "") -> None:
+        bodies = graph.group(first), graph.group(second)
+        graph.edges.append(Edge(len(graph.edges), *bodies, steps, name))
+
     for body in range(1, m.nbody):
-        first, count = int(m.body_jntadr[body]), int(m.body_jntnum[body])
-        if not count:
-            continue
+        first = int(m.body_jntadr[body])
+        joints = range(first, first + int(m.body_jntnum[body]))
+        kinds = [mujoco.mjtJoint(int(m.jnt_type[j])).name[6:].lower() for j in joints]
         steps = tuple(
-            Step(
-                mujoco.mjtJoint(int(m.jnt_type[j])).name[6:].lower(),
-                d.xanchor[j].copy(),
-                d.xaxis[j].copy(),
-                j,
-            )
-            for j in range(first, first + count)
+            Step(kind, d.xanchor[j].copy(), d.xaxis[j].copy(), j)
+            for j, kind in zip(joints, kinds, strict=True)
         )
-        yield Edge(graph.group(int(m.body_parentid[body])), body, steps)
-
-
-def _connects(graph: Graph, ends: list[tuple[int, int, np.ndarray, np.ndarray]]) -> Iterator[Edge]:
-    for i, (first, second, at, _) in enumerate(ends):
-        if graph.model.eq_active0[i]:
-            step = Step("ball", at, np.zeros(3))
-            name = graph.model.equality(i).name
-            yield Edge(graph.group(first), graph.group(second), (step,), name)
+        if steps:
+            add(int(m.body_parentid[body]), body, steps)
+    for i, (one, other, at, _) in enumerate(ends):
+        if m.eq_active0[i]:
+            add(one, other, (Step("ball", at),), m.equality(i).name)
+    return graph

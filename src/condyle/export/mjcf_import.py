@@ -26,10 +26,9 @@ from ..errors import UnsupportedError
 from ..mechanism import Mechanism
 from ..mechanism.files import from_data
 from .mjcf_contacts import contact_of, real_contacts, seat
-from .mjcf_graph import WORLD, Body, Edge, Graph, Step, read_graph
-from .mjcf_parts import Parts, across, actuator_of, cable_actuator
+from .mjcf_graph import WORLD, Graph, Step, read_graph, turned
+from .mjcf_parts import actuator_of, cable_actuator, part
 
-SAME = 1e-6  # of the model's extent: points this near are one
 PARALLEL = 1e-3  # sine
 FEWEST = 3  # chains and contacts that make a body the platform
 LINES = "ball slide ball (SPS), slide ball ball (PSS), hinge ball ball (RSS)"
@@ -51,10 +50,6 @@ class Way:
     steps: tuple[Step, ...]
     name: str
 
-    @property
-    def kinds(self) -> str:
-        return " ".join(step.kind for step in self.steps)
-
 
 def from_mjcf(path: str | Path, name: str) -> Found:
     """A mechanism called `name` from a file that MuJoCo reads.
@@ -64,112 +59,96 @@ def from_mjcf(path: str | Path, name: str) -> Found:
     """
     graph = read_graph(path)
     platform = _platform(graph, path)
-    parts = Parts(graph, graph.body(platform).centre)
+    graph.origin = graph.body(platform).centre
     chains: list[dict[str, Any]] = []
-    contacts = real_contacts(parts, platform)
-    if (held := _held(graph, platform)) is not None:
-        contacts += seat(parts, platform, held)
-    for way in _ways(parts, platform):
-        made = contact_of(parts, way.steps, way.name)
+    contacts = real_contacts(graph, platform)
+    for edge in graph.at(platform):
+        if edge.end == WORLD and edge.steps[0].index >= 0:  # it stands in the tree by itself
+            contacts += seat(graph, platform, turned(edge.steps))
+    for way in _ways(graph, platform):
+        made = contact_of(graph, way.steps, way.name)
         if made is not None:
             contacts.append(made)
         else:
-            chains.append(_chain(parts, way))
-    chains += _cables(parts, platform)
+            chains.append(_chain(graph, way))
+    chains += _cables(graph, platform)
     if not chains:
         raise UnsupportedError(f"{path}: nothing drives its platform, {graph.name(platform)}")
-    data = {
+    # As the actuators stand, so that controls are efforts in the same order.
+    order = {graph.model.actuator(i).name: i for i in range(graph.model.nu)}
+    data: dict[str, Any] = {
         "name": name,
         "gravity": [float(g) for g in graph.model.opt.gravity],
-        "platform": _platform_table(parts, platform, chains, contacts),
-        "contact": contacts,
-        "chain": _in_order(graph, chains),
+        "platform": _platform_table(graph, platform, chains, contacts),
+        **({"contact": contacts} if contacts else {}),
+        "chain": sorted(chains, key=lambda chain: order.get(chain["name"], len(order))),
     }
-    if not contacts:
-        del data["contact"]
-    return Found(from_data(data, str(path)), tuple(parts.notes))
+    return Found(from_data(data, str(path)), tuple(graph.notes))
 
 
 def _platform(graph: Graph, path: str | Path) -> int:
     """The body that most connects, joints of others and tendons hold."""
-    held: Counter[int] = Counter()
-    for edge in graph.edges:
-        for body in (edge.start, edge.end):
-            held[body] += 1
-    for ends in _tendons(graph):
-        held.update(graph.group(int(graph.model.site_bodyid[site])) for site in ends)
+    held = Counter(body for edge in graph.edges for body in (edge.start, edge.end))
+    for _, sites in graph.tendons():
+        if len(sites) == 2:
+            held.update(graph.group(int(graph.model.site_bodyid[site])) for site in sites)
     del held[WORLD]
-    best = sorted(held, key=lambda g: (-held[g], -graph.body(g).mass))
-    if not best or held[best[0]] < FEWEST:
+    best = max(held, key=lambda g: (held[g], graph.body(g).mass), default=WORLD)
+    if held[best] < FEWEST:
         raise UnsupportedError(
             f"{path}: no body is held by {FEWEST} chains or more, so there is no platform; the "
-            f"most is {held[best[0]] if best else 0} joints and connects"
-            + (f" at {graph.name(best[0])}" if best else "")
+            f"most is {held[best]} joints and connects"
+            + (f" at {graph.name(best)}" if held else "")
             + ". A mechanism file is for parallel mechanisms, whose loops `connect` closes"
         )
-    return best[0]
+    return best
 
 
-def _held(graph: Graph, platform: int) -> tuple[Step, ...] | None:
-    """The joints between world and platform, if it stands in the tree by itself."""
-    for edge in graph.at(platform):
-        if edge.end == WORLD and edge.steps[0].index >= 0:
-            steps = edge.leaving(platform).steps
-            return tuple(step.reversed() for step in reversed(steps))
-    return None
-
-
-def _ways(parts: Parts, platform: int) -> Iterator[Way]:
-    graph = parts.graph
+def _ways(graph: Graph, platform: int) -> Iterator[Way]:
     for first in graph.at(platform):
         if first.end == WORLD and first.steps[0].index >= 0:
             continue
-        path: list[Step | int] = list(first.steps)
         edge, name = first, first.name
+        path: list[tuple[int, tuple[Step, ...]]] = [(platform, first.steps)]
         while edge.end != WORLD:
             here = edge.end
-            onward = [e for e in graph.at(here) if not _same(e, edge.leaving(here))]
+            onward = [e for e in graph.at(here) if e.number != edge.number]
             if len(onward) != 1:
                 raise UnsupportedError(
                     f"{graph.name(here)} has {len(onward) + 1} neighbours; a chain goes from the "
                     "world to the platform without branches"
                 )
             edge = onward[0]
-            path += [here, *edge.steps]
+            path.append((here, edge.steps))
             name = edge.name or name
-        upward = [s if isinstance(s, int) else s.reversed() for s in reversed(path)]
-        steps, bodies = _merged(parts, upward)
+        steps, bodies = _merged(graph, [(body, turned(s)) for body, s in reversed(path)])
         yield Way(bodies, steps, _named(graph, steps, name, bodies))
 
 
-def _same(a: Edge, b: Edge) -> bool:
-    pairs = zip(a.steps, b.steps, strict=False)
-    return (a.end, len(a.steps)) == (b.end, len(b.steps)) and all(
-        s.index == t.index and np.array_equal(s.point, t.point) for s, t in pairs
-    )
+def _merged(
+    graph: Graph, path: list[tuple[int, tuple[Step, ...]]]
+) -> tuple[tuple[Step, ...], tuple[int, ...]]:
+    """Joints, and the bodies between them; hinges at one point are a ball, their cross is none.
 
-
-def _merged(parts: Parts, path: list[Step | int]) -> tuple[tuple[Step, ...], tuple[int, ...]]:
-    """Joints, and the bodies between them; hinges at one point are a ball, their cross is none."""
-    graph = parts.graph
-    near, turning = SAME * graph.model.stat.extent, ("hinge", "ball")
-    steps, bodies = list[Step](), list[int]()
+    Args: path: from the world: joints, and the body behind them.
+    """
+    turning = ("hinge", "ball")
+    found, bodies = list[Step](), list[int]()
     waiting: int | None = None
-    for item in path:
-        if isinstance(item, int):
-            waiting = item
-            continue
-        last = steps[-1] if steps else item
-        both = bool(steps) and last.kind in turning and item.kind in turning
-        if both and np.linalg.norm(last.point - item.point) < near:
-            steps[-1] = Step("ball", last.point, np.zeros(3))
-            if waiting is not None:
-                parts.note(f"{graph.name(waiting)}: the cross of a universal joint has no mass")
-        else:
-            steps.append(item)
-            bodies += [] if waiting is None else [waiting]
-        waiting = None
-    return tuple(steps), tuple(bodies)
+    for body, steps in path:
+        for step in steps:
+            last = found[-1] if found else step
+            both = bool(found) and last.kind in turning and step.kind in turning
+            if both and np.linalg.norm(last.point - step.point) < graph.near:
+                found[-1] = Step("ball", last.point)
+                if waiting is not None:
+                    graph.note(f"{graph.name(waiting)}: the cross of a universal joint has no mass")
+            else:
+                found.append(step)
+                bodies += [] if waiting is None else [waiting]
+            waiting = None
+        waiting = body
+    return tuple(found), tuple(bodies)
 
 
 def _named(graph: Graph, steps: tuple[Step, ...], connect: str, bodies: tuple[int, ...]) -> str:
@@ -182,143 +161,101 @@ def _named(graph: Graph, steps: tuple[Step, ...], connect: str, bodies: tuple[in
     return next(filter(None, [*named, connect, *map(graph.name, bodies)]), "chain")
 
 
-def _chain(parts: Parts, way: Way) -> dict[str, Any]:
+def _chain(graph: Graph, way: Way) -> dict[str, Any]:
+    kinds = " ".join(step.kind for step in way.steps)
     makers = {"ball slide ball": _sps, "slide ball ball": _pss, "hinge ball ball": _rss}
-    if way.kinds not in makers:
+    if kinds not in makers:
         raise UnsupportedError(
-            f'chain "{way.name}": from the world to the platform it has {way.kinds or "no joint"}; '
+            f'chain "{way.name}": from the world to the platform it has {kinds or "no joint"}; '
             f"expected {LINES}, where two or three hinges at one point count as a ball"
         )
-    return {"name": way.name, **makers[way.kinds](parts, way)}
+    platform = graph.point(way.steps[-1].point)
+    return {"name": way.name, "platform": platform, **makers[kinds](graph, way)}
 
 
-def _sps(parts: Parts, way: Way) -> dict[str, Any]:
+def _sps(graph: Graph, way: Way) -> dict[str, Any]:
     base, slide, top = way.steps
     leg = top.point - base.point
     n = leg / np.linalg.norm(leg)
     if np.linalg.norm(np.cross(slide.axis, n)) > PARALLEL:
         raise UnsupportedError(f'chain "{way.name}": its slide is not along the leg')
-    cylinder, piston = (parts.graph.body(b) for b in way.bodies)
+    lower, upper = way.bodies
     return {
         "kind": "SPS",
-        "base": parts.point(base.point),
-        "platform": parts.point(top.point),
-        "cylinder": _leg(parts, f"cylinder of {way.name}", cylinder, base.point, n),
-        "piston": _leg(parts, f"piston of {way.name}", piston, top.point, -n),
-        **actuator_of(parts, slide, slide.up * float(np.sign(slide.axis @ n)), way.name),
+        "base": graph.point(base.point),
+        "cylinder": part(graph, f"cylinder of {way.name}", lower, base.point, n),
+        "piston": part(graph, f"piston of {way.name}", upper, top.point, -n),
+        **actuator_of(graph, slide, slide.up * float(np.sign(slide.axis @ n)), way.name),
     }
 
 
-def _pss(parts: Parts, way: Way) -> dict[str, Any]:
+def _pss(graph: Graph, way: Way) -> dict[str, Any]:
     slide, ball, top = way.steps
-    slider, rod = (parts.graph.body(b) for b in way.bodies)
+    slider, rod = way.bodies
     return {
         "kind": "PSS",
-        "base": parts.point(ball.point),
+        "base": graph.point(ball.point),
         "axis": [float(v) for v in slide.up * slide.axis],
-        "platform": parts.point(top.point),
-        "slider": {"mass": parts.mass(way.bodies[0], slider)},
-        "rod": _rod(parts, f"rod of {way.name}", way.bodies[1], rod, ball.point, top.point),
-        **actuator_of(parts, slide, 1.0, way.name),
+        "slider": {"mass": graph.body(slider).weight},
+        "rod": part(graph, f"rod of {way.name}", rod, ball.point, top.point - ball.point, True),
+        **actuator_of(graph, slide, 1.0, way.name),
     }
 
 
-def _rss(parts: Parts, way: Way) -> dict[str, Any]:
+def _rss(graph: Graph, way: Way) -> dict[str, Any]:
     shaft, ball, top = way.steps
-    crank, coupler = (parts.graph.body(b) for b in way.bodies)
+    crank, coupler = graph.body(way.bodies[0]), way.bodies[1]
     axis = shaft.up * shaft.axis
     pivot = shaft.point + axis * (axis @ (ball.point - shaft.point))
     arm = crank.centre - pivot
     off = arm - axis * (axis @ arm)
     inertia = axis @ crank.inertia @ axis + crank.mass * (off @ off)
-    if np.linalg.norm(off) > 1e-3 * np.linalg.norm(ball.point - pivot):
-        parts.note(
-            f"crank of {way.name}: its mass centre is {np.linalg.norm(off) * 1e3:.3g} mm off the "
-            "shaft; its weight is left out"
+    line, high = top.point - ball.point, float(np.linalg.norm(off))
+    if high > 1e-3 * np.linalg.norm(ball.point - pivot):
+        graph.note(
+            f"crank of {way.name}: its mass centre is {high * 1e3:.3g} mm off the shaft; its "
+            "weight is left out"
         )
     return {
         "kind": "RSS",
-        "base": parts.point(pivot),
+        "base": graph.point(pivot),
         "axis": [float(v) for v in axis],
-        "crank_tip": parts.point(ball.point),
-        "platform": parts.point(top.point),
+        "crank_tip": graph.point(ball.point),
         "crank": {"inertia": float(inertia)},
-        "coupler": _rod(
-            parts, f"coupler of {way.name}", way.bodies[1], coupler, ball.point, top.point
-        ),
-        **actuator_of(parts, shaft, 1.0, way.name),
+        "coupler": part(graph, f"coupler of {way.name}", coupler, ball.point, line, True),
+        **actuator_of(graph, shaft, 1.0, way.name),
     }
 
 
-def _rod(
-    parts: Parts, what: str, index: int, body: Body, start: np.ndarray, end: np.ndarray
-) -> dict[str, float]:
-    length = float(np.linalg.norm(end - start))
-    made = across(parts, what, body, start, (end - start) / length)
-    com = min(max(made.pop("com") / length, 0.0), 1.0)
-    return {"mass": parts.mass(index, body), "com": com, **made}
-
-
-def _leg(parts: Parts, what: str, body: Body, start: np.ndarray, n: np.ndarray) -> dict[str, float]:
-    made = across(parts, what, body, start, n)
-    return {"mass": body.mass, "com": max(made.pop("com"), 0.0), **made}
-
-
-def _tendons(graph: Graph) -> Iterator[tuple[int, int]]:
-    """Sites of spatial tendons between two of them."""
-    m = graph.model
-    for t in range(m.ntendon):
-        first, count = int(m.tendon_adr[t]), int(m.tendon_num[t])
-        if count == 2 and int(m.wrap_type[first]) == 3:  # a site
-            yield int(m.wrap_objid[first]), int(m.wrap_objid[first + 1])
-
-
-def _cables(parts: Parts, platform: int) -> Iterator[dict[str, Any]]:
-    graph = parts.graph
-    m, d = graph.model, graph.data
-    for t in range(m.ntendon):
-        first = int(m.tendon_adr[t])
-        sites = [int(s) for s in m.wrap_objid[first : first + int(m.tendon_num[t])]]
-        name = m.tendon(t).name or f"cable {t + 1}"
-        bodies = [graph.group(int(m.site_bodyid[s])) for s in sites]
-        if sorted(bodies) != sorted((WORLD, platform)) or int(m.wrap_type[first]) != 3:
+def _cables(graph: Graph, platform: int) -> Iterator[dict[str, Any]]:
+    for t, sites in graph.tendons():
+        name = graph.model.tendon(t).name or f"cable {t + 1}"
+        bodies = [graph.group(int(graph.model.site_bodyid[s])) for s in sites]
+        if sorted(bodies) != sorted((WORLD, platform)):
             raise UnsupportedError(
                 f'tendon "{name}": a cable runs straight from a site of the world to one of the '
                 "platform"
             )
-        base, end = (d.site_xpos[sites[bodies.index(b)]] for b in (WORLD, platform))
-        yield {
-            "name": name,
-            "kind": "cable",
-            "base": parts.point(base),
-            "platform": parts.point(end),
-            **cable_actuator(parts, t),
-        }
+        base, end = (graph.data.site_xpos[sites[bodies.index(b)]] for b in (WORLD, platform))
+        ends = {"base": graph.point(base), "platform": graph.point(end)}
+        yield {"name": name, "kind": "cable", **ends, **cable_actuator(graph, t)}
 
 
 def _platform_table(
-    parts: Parts, platform: int, chains: list[dict[str, Any]], contacts: list[dict[str, Any]]
+    graph: Graph, platform: int, chains: list[dict[str, Any]], contacts: list[dict[str, Any]]
 ) -> dict[str, Any]:
-    graph = parts.graph
     body = graph.body(platform)
-    I = body.inertia
-    inertia = {"xx": I[0, 0], "yy": I[1, 1], "zz": I[2, 2]}
-    inertia |= {"xy": I[0, 1], "xz": I[0, 2], "yz": I[1, 2]}
-    scale = float(np.trace(I))
-    inertia = {k: float(v) for k, v in inertia.items() if abs(v) > 1e-12 * scale}
+    scale = 1e-12 * float(np.trace(body.inertia))
+    entries = {key: float(body.inertia[at]) for key, at in _ENTRIES.items()}
+    inertia = {key: value for key, value in entries.items() if abs(value) > scale}
     taken = [c["platform"] for c in chains] + [c["point"] for c in contacts]
-    points = {}
-    m, d = graph.model, graph.data
-    for s in range(m.nsite):
-        at = parts.point(d.site_xpos[s])
-        mine = graph.group(int(m.site_bodyid[s])) == platform and m.site(s).name
-        if mine and all(np.linalg.norm(np.subtract(at, p)) > 1e-9 for p in taken):
-            points[m.site(s).name] = at
-    table = {"mass": body.mass, "inertia": inertia}
-    return table | ({"points": points} if points else {})
+    named = [(name, graph.point(at)) for name, at in graph.sites(platform) if name]
+    points = {
+        name: at
+        for name, at in named
+        if all(np.linalg.norm(np.subtract(at, p)) > 1e-9 for p in taken)
+    }
+    return {"mass": body.mass, "inertia": inertia, **({"points": points} if points else {})}
 
 
-def _in_order(graph: Graph, chains: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """As the actuators stand, so that controls are efforts in the same order."""
-    order = {graph.model.actuator(i).name: i for i in range(graph.model.nu)}
-    return sorted(chains, key=lambda c: order.get(c["name"], len(order)))
+_ENTRIES = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}

@@ -1,79 +1,118 @@
-"""Elements of MJCF: numbers as text, frames, bodies that MuJoCo accepts, names that differ."""
+"""A document of MJCF: numbers as text, bodies that MuJoCo accepts, and names that differ.
+
+It is written as XML, not by MuJoCo's `MjSpec`, whose own writer keeps six digits of a number.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
+from importlib.resources import files
 from typing import Any
 from xml.etree import ElementTree
-from xml.etree.ElementTree import Element, SubElement
+from xml.etree.ElementTree import Comment, Element, SubElement
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..errors import UnsupportedError
+from ..mechanism import Mechanism
+from ..mechanism.home import characteristic_length
+from ..results.accessors import extend
 
-# Elements whose names MuJoCo keeps apart.
-SPACES = ("body", "joint", "geom", "site", "mesh", "actuator", "tendon", "sensor", "numeric")
-TENDONS, ACTUATORS = ("spatial",), ("motor",)
+# Elements whose names MuJoCo keeps apart by more than their tag.
+SPACES = {"spatial": "tendon", "motor": "actuator", "freejoint": "joint"}
+SPACES |= {f"{of}{what}": "sensor" for of in ("joint", "tendon") for what in ("pos", "vel")}
+
+
+class Document:
+    """A mechanism as it is written: `notes` say what is approximate, or left out."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism, self.notes = mechanism, list[str]()
+        self.size = size = characteristic_length(mechanism)
+        self.look = extend("mechanism.look", mechanism)
+        text = (files(__package__) / "mjcf_settings.xml").read_text(encoding="utf-8")
+        self.root = ElementTree.fromstring(text)
+        self.world = self.section("worldbody")
+        fixed = [point for chain in mechanism.chains for point in chain.fixed_points]
+        cloud = np.vstack([self.look.hull, *fixed])  # what a camera should see
+        low, high = cloud.min(axis=0), cloud.max(axis=0)
+        extent = 0.75 * float(np.linalg.norm(high - low))
+        self.root.set("model", mechanism.name)
+        give(self.section("option"), gravity=mechanism.gravity)
+        middle = (low + high) / 2
+        give(self.section("statistic"), center=middle, extent=extent, meansize=0.1 * size)
+        give(self.section("default/site"), size=0.02 * size)
+        give(self.section("worldbody/light"), pos=[0, 0, 4 * size])
+
+    def section(self, path: str) -> Element:
+        found = self.root.find(path)
+        assert found is not None
+        return found
+
+    def add(self, section: str, tag: str, **attributes: Any) -> Element:
+        """An element at the end of a section."""
+        return element(self.section(section), tag, **attributes)
+
+    def note(self, text: str) -> None:
+        if text not in self.notes:
+            self.notes.append(text)
+
+    def text(self) -> str:
+        """The document.
+
+        Raises: UnsupportedError: where two elements of a kind have one name, which MuJoCo refuses.
+        """
+        named = [node for node in self.root.iter() if node.get("name")]
+        counted = Counter((SPACES.get(n.tag, n.tag), n.get("name")) for n in named)
+        for (space, name), count in counted.items():
+            if count > 1:
+                raise UnsupportedError(
+                    f'two {space} elements would be called "{name}"; rename a chain, contact or '
+                    "landmark of the mechanism"
+                )
+        for node in list(self.root):
+            if not len(node) and not node.attrib:
+                self.root.remove(node)
+        lines = [
+            f"{self.mechanism.name}, written by condyle. SI; home is qpos0, and controls are "
+            "efforts.",
+            "Joints, tendons and actuators are called as the chains; keyframe home holds it there.",
+            *(f"Note: {note}." for note in self.notes),
+        ]
+        self.root.insert(0, Comment("\n" + "\n".join(lines).replace("--", "- -") + "\n"))
+        ElementTree.indent(self.root)
+        return ElementTree.tostring(self.root, encoding="unicode") + "\n"
 
 
 def element(parent: Element, tag: str, **attributes: Any) -> Element:
     """A child with attributes: numbers with all their digits; None is left out; class_ is class."""
-    kept = {k.rstrip("_"): _text(v) for k, v in attributes.items() if v is not None}
-    return SubElement(parent, tag, kept)
+    return give(SubElement(parent, tag), **attributes)
 
 
-def child(root: Element, tag: str) -> Element:
-    """The section of that name, made where there is none."""
-    found = root.find(tag)
-    return element(root, tag) if found is None else found
+def give(node: Element, **attributes: Any) -> Element:
+    """An element with more attributes."""
+    for key, value in attributes.items():
+        if value is not None:
+            node.set(key.rstrip("_"), _text(value))
+    return node
 
 
-def _text(value: Any) -> str:
-    if isinstance(value, str):
-        return value
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, int):
-        return str(value)
-    return " ".join(repr(float(v) + 0.0) for v in np.ravel(value))
+def inertial(body: Element, mass: float, com: Any, moments: Any) -> None:
+    element(body, "inertial", mass=float(mass), pos=com, diaginertia=moments)
 
 
 def quaternion(R: np.ndarray) -> np.ndarray | None:
     """(w, x, y, z) of a rotation matrix; None for the identity, which MJCF takes for granted."""
-    if np.array_equal(R, np.eye(3)):
-        return None
-    x, y, z, w = Rotation.from_matrix(R).as_quat()
-    return np.array([w, x, y, z])
+    return None if np.array_equal(R, np.eye(3)) else np.roll(Rotation.from_matrix(R).as_quat(), 1)
 
 
-def onto(direction: np.ndarray) -> np.ndarray:
-    """A rotation whose Z axis is a unit vector, (3, 3)."""
-    helper = np.eye(3)[int(np.argmin(np.abs(direction)))]
-    x = np.cross(helper, direction)
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(direction, x), direction])
+def rgba(colour: str) -> list[float]:
+    """Of "#rrggbb", opaque."""
+    return [round(int(colour[i : i + 2], 16) / 255, 4) for i in (1, 3, 5)] + [1.0]
 
 
-def rgba(colour: str, alpha: float = 1.0) -> list[float]:
-    """Of "#rrggbb"."""
-    return [round(int(colour[i : i + 2], 16) / 255, 4) for i in (1, 3, 5)] + [alpha]
-
-
-def name_problems(root: Element) -> None:
-    """Raises UnsupportedError where two elements of a kind have one name, which MuJoCo refuses."""
-    for space in SPACES:
-        tags = {"tendon": TENDONS, "actuator": ACTUATORS}.get(space, (space,))
-        nodes = list(root.find("sensor") or []) if space == "sensor" else root.iter()
-        counted = Counter(n.get("name") for n in nodes if space == "sensor" or n.tag in tags)
-        if twice := [name for name, count in counted.items() if name and count > 1]:
-            raise UnsupportedError(
-                f'two {space} elements would be called "{twice[0]}"; rename a chain, contact or '
-                "landmark of the mechanism"
-            )
-
-
-def written(root: Element) -> str:
-    """The document as text."""
-    ElementTree.indent(root)
-    return ElementTree.tostring(root, encoding="unicode") + "\n"
+def _text(value: Any) -> str:
+    if isinstance(value, str | int):
+        return str(value)
+    return " ".join(repr(float(v) + 0.0) for v in np.ravel(value))
