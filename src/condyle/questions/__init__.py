@@ -25,10 +25,13 @@ from .instant import energy, instant
 from .inverse import balance, inverse, motion, system
 from .linear import linear
 from .matrices import jacobians, matrices
+from .observer import observer
 from .pose import pose
+from .rate import rate
 from .reactions import reactions
 from .structure import Structure
 from .survey import survey
+from .tick import tick
 
 QUESTIONS: dict[str, Callable[..., Program | Variants]] = {
     "allocation": allocation,
@@ -50,6 +53,9 @@ QUESTIONS: dict[str, Callable[..., Program | Variants]] = {
     "matrices": matrices,
     "jacobians": jacobians,
     "reactions": reactions,
+    "rate": rate,
+    "observer": observer,
+    "tick": tick,
 }
 # What shapes a graph: the rooms that a question is written in.
 SOURCES = ("mechanism", "kinematics", "dynamics", "graph", "questions")

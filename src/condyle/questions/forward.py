@@ -19,7 +19,7 @@ from ..dynamics.least_norm import definite_solve
 from ..graph.program import Program, Variants
 from ..kinematics.constraints import indices, solve_small
 from ..status import Status
-from .builder import Builder
+from .builder import Builder, Lanes
 from .configuration import loops_of
 from .equations import Wrench
 from .inertia import Affine, affine
@@ -53,13 +53,11 @@ def program(structure: Structure, wanted: Collection[str] = ()) -> Program:
     b = Builder(structure)
     platform = closed(b, rates=1)
     effort = b.lane_sample("effort", unit="N m or N")
-    eq = affine(b, platform, Wrench.of(b), effort)
-    touch = contacts(b, platform) if structure.friction else None
-    found = _solved(b, platform, eq, touch, "contact" in wanted)
-    q2 = solve_small(eq.S, found.w)
+    moved = accelerated(b, platform, Wrench.of(b), effort, "contact" in wanted)
+    eq, touch, q2 = moved.equations, moved.touch, moved.q2
     b.output("acceleration", q2, "per s^2", structure.m)
     if "contact" in wanted:
-        b.output("contact_force", found.force, "N", len(structure.contacts))
+        b.output("contact_force", moved.force, "N", len(structure.contacts))
     if "motion" in wanted:
         motion = platform.motion
         b.output("pose", platform.pose, ANGLE_UNITS)
@@ -68,16 +66,41 @@ def program(structure: Structure, wanted: Collection[str] = ()) -> Program:
     if "joint" in wanted:
         b.output("joint", [loop.q_r[0] for loop in loops_of(b, platform)], "rad or m")
         b.output("joint_rate", eq.rates, "rad/s or m/s")
-        turned = eq.start + eq.basis.rates(found.w)
+        turned = eq.start + eq.basis.rates(moved.w)
         pairs = zip(eq.biases, eq.rows, strict=True)
         accelerations = [bias + ca.dot(row, turned) for bias, row in pairs]
         b.output("joint_acceleration", accelerations, "per s^2")
     if "sliding" in wanted:
         (touch or contacts(b, platform)).add_sliding(b)
+    return b.finish()
+
+
+@dataclass(frozen=True)
+class Accelerated:
+    """What efforts and a load do: q'' (m,), the contact forces (k,), and what they come from."""
+
+    q2: ca.SX
+    force: ca.SX
+    w: ca.SX
+    equations: Affine
+    touch: Contacts | None
+
+
+def accelerated(
+    b: Builder, platform: Platform, load: Wrench, effort: Lanes, forces: bool = True
+) -> Accelerated:
+    """Accelerations as a part of a question, with the checks that vouch for them.
+
+    Args: forces: whether those of the contacts are wanted.
+    """
+    eq = affine(b, platform, load, effort)
+    touch = contacts(b, platform) if b.structure.friction else None
+    found = _solved(b, platform, eq, touch, forces)
+    q2 = solve_small(eq.S, found.w)
     b.check(feasibility(b, platform, eq.discriminants), DOUBTFUL, Status.unreachable)
     finite = ca.fabs(ca.sum1(q2)) < HUGE
     b.check(2 * found.sure * finite - 1, 0.5)
-    return b.finish()
+    return Accelerated(q2, found.force, found.w, eq, touch)
 
 
 def forward_system(structure: Structure) -> Program:

@@ -40,7 +40,7 @@ def instant(structure: Structure, inertia: bool = False) -> Variants:
     b.output("pose_rate", motion.rate, "per s")
     b.output("R", platform.R, "1", 3, 3)
     b.output("T", T, "", 6, s.m)
-    joints, rates, rows, losses, discriminants = [], [], [], [], []
+    joints, rates, rows, lost, discriminants = [], [], [], [], []
     for group, kind in enumerate(s.families):
         family = FAMILIES[kind]
         r = platform.R @ b.lane(group, "joint")
@@ -52,12 +52,12 @@ def instant(structure: Structure, inertia: bool = False) -> Variants:
         joints.append(loop.q_r[0])
         rates.append(rate)
         rows.append(row)
-        losses.append(_loss(b, group, rate))
+        lost.append(losses(b, group, rate))
         discriminants.append(loop.discriminant)
     b.output("joint", joints, "rad or m")
     b.output("joint_rate", rates, "rad/s or m/s")
     b.output("A", rows, "", s.m)
-    b.output("loss", losses, "W")
+    b.output("loss", lost, "W")
     touch, k = contacts(b, platform), len(s.contacts)
     position = platform.placement.position
     frame = contact_frame(single_contacts(s, b.parameter), position, platform.R)
@@ -66,7 +66,7 @@ def instant(structure: Structure, inertia: bool = False) -> Variants:
     rubs = [ca.dot(touch.slip[:, i], touch.drag[:, i]) for i in range(k)]
     b.output("rub", ca.vertcat(ca.SX(0, 1), *rubs), "m/s", k)
     if inertia:
-        b.output("inertia_matrix", _inertia(b, platform), "kg, kg m, kg m^2", s.m, s.m)
+        b.output("inertia_matrix", inertia_matrix(b, platform), "kg, kg m, kg m^2", s.m, s.m)
     placement = platform.placement
     if placement.discriminant is not None:
         below = None if placement.iterated else Status.unreachable
@@ -110,7 +110,7 @@ def energy(structure: Structure) -> Program:
     return b.finish()
 
 
-def _loss(b: Builder, group: int, rate: ca.SX) -> ca.SX:
+def losses(b: Builder, group: int, rate: ca.SX) -> ca.SX:
     """Power that an actuator's viscous and Coulomb friction take [W]."""
     if not b.structure.losses:
         return 0 * rate
@@ -118,7 +118,8 @@ def _loss(b: Builder, group: int, rate: ca.SX) -> ca.SX:
     return (viscous + coulomb / ca.sqrt(rate * rate + square)) * rate * rate
 
 
-def _inertia(b: Builder, platform: Platform) -> ca.SX:
+def inertia_matrix(b: Builder, platform: Platform) -> ca.SX:
+    """M_r of `matrices`, (m, m), whatever the rates of the platform are."""
     zero = ca.SX.zeros(3)
     no_effort = [ca.SX(0) for _ in b.structure.families]
     eq = affine(b, platform, Wrench(zero, zero, zero), no_effort)

@@ -58,9 +58,15 @@ def closed(b: Builder, rates: int = 2) -> Platform:
 
     Args: rates: how many of q' and q'' are ports; others are zero.
     """
+    m = b.structure.m
+    zero = ca.SX.zeros(m)
+    names = enumerate(("q", "q1", "q2"))
+    return placed(b, *(b.sample(n, m) if i <= rates else zero for i, n in names))
+
+
+def placed(b: Builder, q: ca.SX, q1: ca.SX, q2: ca.SX) -> Platform:
+    """From the independent coordinates and their rates, (m,) each: the contacts give the rest."""
     s = b.structure
-    zero = ca.SX.zeros(s.m)
-    q, q1, q2 = (b.sample(n, s.m) if i <= rates else zero for i, n in enumerate(("q", "q1", "q2")))
     contacts = contact_symbols(s, b.parameter)
     if closed_form_available([form for form, _ in s.contacts], s.dependent):
         placement = closed_form(contacts, s.dependent, q, b.parameter("branch"))

@@ -1,0 +1,19 @@
+"""Controllers of a scenario by kind. A new one is a file that registers its table here."""
+
+from ...mechanism.table import Table
+from .bite_force import BiteForce
+from .computed_torque import ComputedTorque
+from .controller import Control, ControllerTable, Law
+from .impedance import Impedance
+from .joint_pd import JointPD
+from .none import Nothing
+
+CONTROLLERS: dict[str, type[Table]] = {
+    "joint_pd": JointPD,
+    "computed_torque": ComputedTorque,
+    "impedance": Impedance,
+    "bite_force": BiteForce,
+    "none": Nothing,
+}
+
+__all__ = ["CONTROLLERS", "Control", "ControllerTable", "Law"]

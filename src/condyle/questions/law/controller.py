@@ -1,0 +1,199 @@
+"""What a controller is: a table of the scenario file, and equations on the Builder.
+
+    efforts, memory = equations(state, aim, memory, gains)
+
+Everything that differs from mechanism to mechanism or from file to file is a port; what lasts from
+one period to the next is memory. So the same few lines run by numpy, as compiled code, as a batch
+of runs in lockstep and in exported files, and have exact derivatives.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import Any, ClassVar
+
+import casadi as ca
+import numpy as np
+from pydantic import Field
+
+from ...mechanism.quantities import Name
+from ...mechanism.table import Table
+from ..builder import Builder, Lanes
+from ..entries import Count, File, Frequency, Machine
+from ..equations import Wrench
+from ..instant import inertia_matrix
+from ..platform import Platform, placed
+
+EACH_COORDINATE, EACH_CHAIN = "coordinate", "chain"  # sizes of ports
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What a controller sees at a tick.
+
+    q, q1: estimated state, (m,) each;  joint, joint_rate: lanes, as encoders have it.
+    force: of the loads on the platform at the controller's point, (3,) [N] in {S}.
+    """
+
+    q: ca.SX
+    q1: ca.SX
+    joint: Lanes
+    joint_rate: Lanes
+    force: ca.SX
+
+
+@dataclass(frozen=True)
+class Aim:
+    """What it should be there: q, q1, q2 (m,), joint, joint_rate, lanes, force [N]."""
+
+    q: ca.SX
+    q1: ca.SX
+    q2: ca.SX
+    joint: Lanes
+    joint_rate: Lanes
+    force: ca.SX
+
+
+@dataclass(frozen=True)
+class Point:
+    """A point of the platform: where it is, (3,) [m] in {S}, and its Jacobian, v = J q', (3, m)."""
+
+    position: ca.SX
+    J: ca.SX
+
+
+@dataclass(frozen=True)
+class Control:
+    """What a law's equations are written with.
+
+    gains:   its ports by name, such as `c.gains.stiffness`.
+    choices: entries of its table that decide which equations they are, by name.
+    memory:  what it returned at the last tick, (size,);  period: since then [s].
+    """
+
+    b: Builder
+    now: Seen
+    aim: Aim
+    gains: Any
+    choices: Mapping[str, Any]
+    memory: ca.SX
+    period: ca.SX
+    solve: Callable[[ca.SX, ca.SX, ca.SX, Wrench], Lanes]
+
+    def inverse(
+        self,
+        q: ca.SX,
+        q1: ca.SX,
+        q2: ca.SX,
+        force: ca.SX | None = None,
+        point: ca.SX | None = None,
+    ) -> Lanes:
+        """Inverse dynamics, lanes [N m or N]: once in a law.
+
+        Args: force: that the efforts bear besides, (3,) [N] in {S}, at a point (3,) [m] of {M}.
+        """
+        zero = ca.SX.zeros(3)
+        load = Wrench(zero if force is None else force, zero, zero if point is None else point)
+        return self.solve(q, q1, q2, load)
+
+    def point(self, q: ca.SX, point: ca.SX) -> Point:
+        """Of a point (3,) [m] of {M}."""
+        platform = self._at(q)
+        T, r = platform.motion.E @ platform.motion.M_J, platform.R @ point
+        return Point(platform.placement.position + r, T[:3, :] - ca.skew(r) @ T[3:, :])
+
+    def inertia(self, q: ca.SX) -> ca.SX:
+        """Inertia matrix M_r of the independent coordinates, (m, m)."""
+        return inertia_matrix(self.b, self._at(q))
+
+    def _at(self, q: ca.SX) -> Platform:
+        zero = ca.SX.zeros(self.b.structure.m)
+        return placed(self.b, q, zero, zero)
+
+
+class ControllerTable(Table):
+    """The `[controller]`; its `kind` says which.
+
+    Of a kind of its own: `ports` and their sizes, what `numbers` gives for them, and `equations`.
+    """
+
+    ports: ClassVar[Mapping[str, str | int]] = {}
+    # Memory to begin with; laws without any can do without periods.
+    memory: ClassVar[tuple[float, ...]] = ()
+    # Numbers that a hand may turn while it runs, with their units; `force` is that of the path.
+    knobs: ClassVar[Mapping[str, str]] = {}
+    # Entries that decide which equations they are.
+    chooses: ClassVar[tuple[str, ...]] = ()
+
+    kind: Any
+    motion: File | None = Field(
+        default=None, description="CSV to follow; default: the bundled or a trial motion"
+    )
+    units: str | None = Field(default=None, description='of the motion, such as "mm,deg"')
+    landmark: Name | None = Field(default=None, description="whose path the motion gives")
+    rate: Frequency | None = Field(
+        default=1000.0, description="Hz; efforts are held between samples"
+    )
+    ideal: bool = Field(
+        default=False, description="at all times: no rate, no delay, and the state itself"
+    )
+    delay: Count = Field(default=0, description="whole periods between a sample and its efforts")
+    model: File | None = Field(
+        default=None, description="mechanism file it computes with, if it is not the plant"
+    )
+    distribution: str | None = Field(default=None, description="how it chooses efforts")
+    preload: float = Field(default=0.0, ge=0, allow_inf_nan=False, description="N")
+
+    @abstractmethod
+    def numbers(self, machine: Machine) -> Mapping[str, Any]:
+        """What its ports are given, by name.
+
+        Raises: InputError: where it does not fit the mechanism.
+        """
+
+    def place(self, machine: Machine) -> str | None:
+        """Name of the point where it measures force, or None."""
+        return None
+
+    @staticmethod
+    @abstractmethod
+    def equations(c: Control) -> tuple[Lanes, ca.SX]:
+        """Efforts, lanes [N m or N] before any limit, and the memory of the next period."""
+
+    def bind(self, machine: Machine) -> Law:
+        """The law with its numbers."""
+        numbers = {name: np.array(v, dtype=float) for name, v in self.numbers(machine).items()}
+        choices = tuple((name, getattr(self, name)) for name in self.chooses)
+        memory = np.array(self.memory)
+        return Law(self.kind, choices, numbers, memory, self.place(machine), self.knobs)
+
+
+@dataclass(frozen=True)
+class Law:
+    """A controller on one mechanism.
+
+    numbers: of its ports, one each for coordinates, or for chains in the mechanism's order.
+    memory:  to begin with.   place: name of the point where it measures force, or None.
+    """
+
+    kind: str
+    choices: tuple[tuple[str, Any], ...] = ()
+    numbers: Mapping[str, np.ndarray] = field(default_factory=dict)
+    memory: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    place: str | None = None
+    knobs: Mapping[str, str] = field(default_factory=dict)
+
+
+def gains_of(b: Builder, ports: Mapping[str, str | int]) -> SimpleNamespace:
+    """Ports of a law, by name."""
+    return SimpleNamespace(
+        **{
+            name: b.lane_sample(name)
+            if size == EACH_CHAIN
+            else b.sample(name, b.structure.m if size == EACH_COORDINATE else int(size))
+            for name, size in ports.items()
+        }
+    )

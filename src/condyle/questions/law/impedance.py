@@ -1,0 +1,97 @@
+"""Impedance at a point: it gives way to a force as a spring and a damper would.
+
+    F = stiffness (p_d - p) + damping (v_d - v),
+    effort = inverse dynamics of (q, q', q_c'') that also bears -F at the point,
+    q_c'' = q_d'' + N (Kv (q_d' - q') + Kp (q_d - q)),    N = 1 - J^# J,
+    J^# = M^-1 J^T (J M^-1 J^T)^-1,
+
+with p, v the point's position and velocity in {S} and J (3, m) its Jacobian. The apparent inertia
+is the mechanism's own, so no force has to be measured (Hogan, J. Dyn. Sys. Meas. Control 107 (1985)
+1-24). The freedoms that the point leaves are held by `posture`, without a force at the point: N is
+dynamically consistent (Khatib, IEEE J. Robotics and Automation 3 (1987) 43-53).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal
+
+import casadi as ca
+from pydantic import Field
+
+from ...dynamics.least_norm import definite_solve
+from ...mechanism.quantities import Name
+from ..builder import Lanes
+from ..entries import Gain, Gains, Machine, each
+from .controller import Control, ControllerTable
+
+RANK = 1e-10  # of the point's inverse inertia, beside its largest: below, it cannot move that way
+
+
+class Impedance(ControllerTable):
+    """A spring and a damper at a point of the platform."""
+
+    ports: ClassVar[Mapping[str, str | int]] = {
+        "stiffness": 3,
+        "damping": 3,
+        "posture": 1,
+        "posture_damping": 1,
+        "point": 3,
+    }
+    knobs: ClassVar[Mapping[str, str]] = {
+        "stiffness": "N/m",
+        "damping": "N s/m",
+        "posture": "1/s²",
+        "posture_damping": "1/s",
+    }
+
+    kind: Literal["impedance"]
+    point: Name | None = Field(default=None, description="of the platform; default right_molar")
+    stiffness: Gains = Field(description="N/m; one, or along x, y, z of {S}")
+    damping: Gains = Field(description="N s/m")
+    posture: Gain = Field(default=400.0, description="Kp of the other freedoms, 1/s^2")
+    posture_damping: Gain | None = Field(default=None, description="1/s; default 2 sqrt(posture)")
+
+    def numbers(self, machine: Machine) -> Mapping[str, Any]:
+        Kn, Kd = self.posture, self.posture_damping
+        return {
+            "stiffness": each(self.stiffness, "xyz", "controller.stiffness"),
+            "damping": each(self.damping, "xyz", "controller.damping"),
+            "posture": Kn,
+            "posture_damping": 2 * Kn**0.5 if Kd is None else Kd,
+            "point": machine.point(self.point)[1],
+        }
+
+    def place(self, machine: Machine) -> str | None:
+        return machine.place(self.point)
+
+    @staticmethod
+    def equations(c: Control) -> tuple[Lanes, ca.SX]:
+        now, aim, g = c.now, c.aim, c.gains
+        p, p_d = c.point(now.q, g.point), c.point(aim.q, g.point)
+        force = g.stiffness * (p_d.position - p.position)
+        force += g.damping * (p_d.J @ aim.q1 - p.J @ now.q1)
+        free = g.posture_damping * (aim.q1 - now.q1) + g.posture * (aim.q - now.q)
+        held = without(free, p.J, c.inertia(now.q))
+        return c.inverse(now.q, now.q1, aim.q2 + held, -force, g.point), c.memory
+
+
+def without(free: ca.SX, J: ca.SX, M: ca.SX) -> ca.SX:
+    """N free, (m,): what it does along the rows of J taken out, one direction after the other.
+
+    By Gram and Schmidt in the metric of M^-1, for which rows may depend on one another.
+    """
+    rows = ca.vertsplit(J)
+    by = ca.horzsplit(definite_solve(M, J.T, ca.diag(M))[0])
+    largest = ca.SX(0)
+    for row, w in zip(rows, by, strict=True):
+        largest = ca.fmax(largest, row @ w)
+    for i in range(len(rows)):
+        size = rows[i] @ by[i]
+        moves = size > RANK * largest
+        part = ca.if_else(moves, 1 / size, 0)
+        free = free - by[i] * (part * (rows[i] @ free))
+        for j in range(i + 1, len(rows)):
+            share = part * (rows[j] @ by[i])
+            rows[j], by[j] = rows[j] - share * rows[i], by[j] - share * by[i]
+    return free

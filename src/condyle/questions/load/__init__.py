@@ -1,0 +1,15 @@
+"""Loads of a scenario by kind. A new one is a file that registers its table here."""
+
+from .acting import Jump, Load, LoadTable
+from .food import FOODS, FoodTable
+from .given import Constant, Csv
+from .spring import Spring
+
+LOADS: dict[str, type[LoadTable]] = {
+    "constant": Constant,
+    "csv": Csv,
+    "spring": Spring,
+    "food": FoodTable,
+}
+
+__all__ = ["FOODS", "LOADS", "Jump", "Load", "LoadTable"]

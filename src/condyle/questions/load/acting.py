@@ -1,0 +1,124 @@
+"""What a load is: a table of the scenario file, and a law on the Builder.
+
+    force = wrench(s, v, mode, numbers),   s = p - p_home, v = p',
+
+in {S}, with p its point. The mode is a number that only guards change: each stays below zero while
+its mode lasts, and where it passes zero its jump says what happens.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
+from typing import Any, ClassVar
+
+import casadi as ca
+import numpy as np
+
+from ...mechanism.quantities import Name
+from ...mechanism.table import Table
+from ..entries import Machine
+
+WRENCH = "wrench"  # a port that is fed over time, (6,)
+
+
+@dataclass(frozen=True)
+class Jump:
+    """What a load does where its guard passes zero: a new mode, and what to tell."""
+
+    mode: int
+    kind: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a load's point is: displacement s and velocity v, (3,) each; its mode, its numbers."""
+
+    s: Any
+    v: Any
+    mode: Any
+    numbers: Any
+
+
+class LoadTable(Table):
+    """A `[[load]]`; its `kind` says which.
+
+    Of a kind of its own: `ports` and their sizes, what `given` says for them, and `wrench`.
+    """
+
+    ports: ClassVar[Mapping[str, int]] = {}
+    # Numbers that a hand may turn while it runs, with their units.
+    knobs: ClassVar[Mapping[str, str]] = {}
+
+    kind: Any
+    name: Name | None = None
+    point: Name | None = None
+
+    def given(self, machine: Machine) -> Mapping[str, Any]:
+        """What its ports are given, by name: the table's own entries."""
+        return {name: getattr(self, name) for name in self.ports}
+
+    @staticmethod
+    @abstractmethod
+    def wrench(at: Place) -> ca.SX:
+        """Force (3,) [N] on the platform at the point, or force and moment (6,) [N, N m]."""
+
+    @staticmethod
+    def guards(at: Place) -> Sequence[tuple[int, ca.SX]]:
+        """In which mode, and what stays below zero in it: one a jump."""
+        return ()
+
+    @staticmethod
+    def jumps(numbers: Any) -> Sequence[Jump]:
+        """What happens where the guards pass zero, in their order."""
+        return ()
+
+    @staticmethod
+    def begin(at: Place) -> Any:
+        """The mode to begin with."""
+        return 0
+
+    def bind(self, machine: Machine, name: str) -> Load:
+        """The load on a mechanism.
+
+        Raises: InputError: where it does not fit.
+        """
+        place, point = machine.point(self.point)
+        numbers = {n: np.array(v, dtype=float) for n, v in self.given(machine).items()}
+        return Load(self.kind, type(self), name, point, place, numbers)
+
+
+@dataclass(frozen=True)
+class Load:
+    """A load at a point (3,) [m] of {M}, of that name; numbers of its ports by name.
+
+    kind: by which `law` is registered.
+    times, rows: (N,) [s] and (N, 6), what `WRENCH` is between them, linearly; none outside.
+    """
+
+    kind: str
+    law: type[LoadTable]
+    name: str
+    point: np.ndarray
+    place: str | None = None
+    numbers: Mapping[str, np.ndarray] = field(default_factory=dict)
+    times: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    rows: np.ndarray = field(default_factory=lambda: np.zeros((0, 6)))
+
+    @property
+    def jumps(self) -> Sequence[Jump]:
+        """One a guard."""
+        return self.law.jumps(SimpleNamespace(**self.numbers))
+
+    def begin(self, s: np.ndarray) -> int:
+        """The mode to begin with, the point being displaced by s, (3,) [m]."""
+        numbers = SimpleNamespace(**{n: ca.DM(v) for n, v in self.numbers.items()})
+        return int(self.law.begin(Place(ca.DM(s), ca.DM.zeros(3), ca.DM(0), numbers)))
+
+    def turned(self, **numbers: Any) -> Load:
+        """The same load with other numbers."""
+        new = {name: np.array(v, dtype=float) for name, v in numbers.items()}
+        return replace(self, numbers={**self.numbers, **new})

@@ -1,0 +1,79 @@
+"""From encoders to the state: counts, the pose that they give, rates.
+
+    count = resolution round(theta / resolution)
+    pose:  that of the counts, from the last one on, carried on by its rate (`pose_from_encoders`)
+    q':    A q' ~ theta',   theta' = smoothing theta'_before + (1 - smoothing) (count - before) / T
+
+Poses follow one another within a period, so that the assembly mode is that of the last one
+(`condyle.model.forward` looks for it from afar). What lasts from one period to the next goes in and
+comes out: `BEFORE` says which result is which port of the next period.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from ..graph.program import Variants
+from .builder import Builder, Lanes
+from .platform import ANGLE_UNITS
+from .pose import pose_from_encoders
+from .structure import Structure
+
+ITERATIONS = 3  # from one period to the next
+DIFFERENCE, EXACT = "difference", "exact"  # rates of counts, or tachometers'
+BEFORE = {  # port -> result
+    "pose_before": "pose",
+    "pose_rate_before": "pose_rate",
+    "joint_before": "joint",
+    "joint_rate_before": "joint_rate",
+}
+
+
+@dataclass(frozen=True)
+class Observed:
+    """What counts give: q, q' (m,), and joints and their rates as they are read, lanes."""
+
+    q: ca.SX
+    q1: ca.SX
+    joint: Lanes
+    joint_rate: Lanes
+
+
+def observer(structure: Structure, velocity: str = DIFFERENCE) -> Variants:
+    """The state that encoders give.
+
+    Results: q, q1 (m,); joint, joint_rate: counts, and rates as filtered; pose, pose_rate (6,).
+    Ports joint and joint_rate are as they are; tachometers' rates are `EXACT`.
+    """
+    b = Builder(structure)
+    joint, rate = b.lane_sample("joint", unit="rad or m"), b.lane_sample("joint_rate")
+    found = observe(b, joint, rate, velocity, b.sample("period", 1, "s"))
+    b.output("q", found.q, "m, rad", structure.m)
+    b.output("q1", found.q1, "per s", structure.m)
+    return Variants(b.finish(), single=True)
+
+
+def observe(b: Builder, joint: Lanes, rate: Lanes, velocity: str, period: ca.SX) -> Observed:
+    """The same as a part of another question: its other ports, results of `BEFORE`, and check."""
+    resolution = b.lane_sample("resolution", unit="rad or m")
+    smoothing = b.sample("smoothing", 1)
+    pose, pose_rate = b.sample("pose_before", 6, ANGLE_UNITS), b.sample("pose_rate_before", 6)
+    before, rate_before = b.lane_sample("joint_before"), b.lane_sample("joint_rate_before")
+    groups = range(len(joint))
+    counts = [
+        joint[i] - ca.if_else(resolution[i] > 0, ca.remainder(joint[i], resolution[i]), 0)
+        for i in groups
+    ]
+    if velocity == DIFFERENCE:
+        part = (1 - smoothing) / period
+        rate = [smoothing * rate_before[i] + part * (counts[i] - before[i]) for i in groups]
+    found = pose_from_encoders(b, counts, pose + period * pose_rate, ITERATIONS)
+    q1 = found.last.rates(rate)
+    b.output("pose", found.pose, ANGLE_UNITS, 6)
+    b.output("pose_rate", found.last.M_J @ q1, "per s", 6)
+    b.output("joint", counts, "rad or m")
+    b.output("joint_rate", rate, "rad/s or m/s")
+    b.check(2 * found.sure - 1, 0.5)
+    return Observed(found.q, q1, counts, rate)

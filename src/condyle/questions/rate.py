@@ -1,0 +1,131 @@
+"""The plant as a system of first order: y' = f(y) with y = (q, q', works), and what is watched.
+
+    q'' by forward dynamics of the efforts, within limits, under the loads' wrenches,
+    works: of the actuators, of the loads, lost in actuators, rubbed off at the contacts [J].
+
+What loads, sensors, events and results ask of a state comes with it. Numbers of loads and limits
+are ports; the kinds of the loads shape the question. Every guard stays below zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+
+import casadi as ca
+
+from ..graph.program import Variants
+from ..kinematics.constraints import contact_frame
+from .builder import Builder
+from .configuration import loops_of
+from .equations import Wrench, total
+from .forward import accelerated
+from .instant import losses
+from .load import LOADS
+from .load.acting import Place
+from .numbers import single_contacts
+from .platform import ANGLE_UNITS, Platform, closed, contacts
+from .structure import Structure
+
+NEVER = -1.0  # a guard of a mode that is not on
+
+
+def rate(
+    structure: Structure,
+    loads: Sequence[str] = (),
+    felt: Sequence[int] = (),
+    bounded: Sequence[int] = (),
+    sided: Sequence[int] = (),
+) -> Variants:
+    """The rate of the state, from q, q' and efforts.
+
+    Ports: low, high, speed: limits of efforts and of joint rates; of load i its point, mode and
+    numbers, as `load_i_point`; of bounded contacts `bounds`, low then high a contact (6,), of
+    one-sided ones `push`, the sign of their normal force.
+    Results: rate (2 m + 4,); guards: of bounded contacts, of one-sided ones, of the loads' jumps;
+    too_fast, a lane's. wrench (6,) of all loads about O_M, load_force (loads, 3); felt (3,).
+
+    Args: loads: kinds;  felt: loads whose force `felt` is the sum of.
+          bounded, sided: contacts whose bounds and pushes are guarded.
+    """
+    b = Builder(structure)
+    m, k = structure.m, len(structure.contacts)
+    platform = closed(b, rates=1)
+    asked, low, high, speed = (
+        b.lane_sample(name, unit="N m or N") for name in ("effort", "low", "high", "speed")
+    )
+    effort = [ca.fmin(ca.fmax(e, lo), hi) for e, lo, hi in zip(asked, low, high, strict=True)]
+    twist = platform.motion.twist
+    acting = [_Acting(b, platform, i, kind) for i, kind in enumerate(loads)]
+    wrench = total([ca.SX.zeros(6), *(one.wrench for one in acting)])
+    zero = ca.SX.zeros(3)
+    moved = accelerated(b, platform, Wrench(wrench[:3], wrench[3:], zero), effort)
+    rates = moved.equations.rates
+    groups = range(len(structure.chains))
+    lost = [b.lane(i, "mask") * losses(b, i, rates[i]) for i in groups]
+    touch = moved.touch or contacts(b, platform)
+    rub = ca.vertcat(ca.SX(0, 1), *(ca.dot(touch.slip[:, i], touch.drag[:, i]) for i in range(k)))
+    power = b.total([b.lane(i, "mask") * effort[i] * rates[i] for i in groups])
+    works = (power, ca.dot(wrench, twist), b.total(lost), ca.dot(ca.fabs(moved.force), rub))
+    b.output("rate", ca.vertcat(platform.q1, moved.q2, *works), "per s", 2 * m + 4)
+    guards = [*_bounds(b, platform, bounded)]
+    if sided:
+        guards += ca.vertsplit(-b.sample("push", len(sided)) * moved.force[list(sided)])
+    guards += [guard for one in acting for guard in one.guards]
+    if guards:
+        b.output("guards", ca.vertcat(*guards), "", len(guards))
+    b.output("too_fast", [ca.fabs(r) - v for r, v in zip(rates, speed, strict=True)], "")
+    b.output("pose", platform.pose, ANGLE_UNITS)
+    b.output("joint", [loop.q_r[0] for loop in loops_of(b, platform)], "rad or m")
+    b.output("joint_rate", rates, "rad/s or m/s")
+    b.output("loss", lost, "W")
+    b.output("contact_force", moved.force, "N", k)
+    b.output("rub", rub, "m/s", k)
+    b.output("wrench", wrench, "N, N m", 6)
+    if acting:
+        forces = ca.horzcat(*(one.force for one in acting)).T
+        b.output("load_force", forces, "N", len(acting), 3)
+        places = ca.horzcat(*(ca.vertcat(one.place.s, one.place.v) for one in acting)).T
+        b.output("load_place", places, "m, m/s", len(acting), 6)
+    if felt:
+        b.output("felt", total([acting[i].force for i in felt]), "N", 3)
+    placement = platform.placement
+    certain = ca.SX(1) if placement.discriminant is None else placement.discriminant
+    b.output("certain", certain if placement.iterated else ca.SX(1), "1")
+    return Variants(b.finish(), single=True)
+
+
+class _Acting:
+    """A load at its place: force at the point, wrench about O_M, guards."""
+
+    def __init__(self, b: Builder, platform: Platform, i: int, kind: str) -> None:
+        law, own = LOADS[kind], f"load_{i}_"
+        point, mode = b.sample(f"{own}point", 3, "m"), b.sample(f"{own}mode", 1)
+        numbers = SimpleNamespace(
+            **{name: b.sample(own + name, size) for name, size in law.ports.items()}
+        )
+        r, twist = platform.R @ point, platform.motion.twist
+        s, v = platform.placement.position + r - point, twist[:3] + ca.cross(twist[3:], r)
+        self.place = Place(s, v, mode, numbers)
+        found = law.wrench(self.place)
+        self.force = found[:3]
+        moment = ca.cross(r, self.force)
+        self.wrench = ca.vertcat(self.force, moment + found[3:] if found.numel() == 6 else moment)
+        pairs = law.guards(self.place)
+        self.guards = [ca.if_else(mode == when, value, NEVER) for when, value in pairs]
+
+
+def _bounds(b: Builder, platform: Platform, bounded: Sequence[int]) -> list[ca.SX]:
+    """How far contact points are beyond the ends of their surfaces [m]."""
+    if not bounded:
+        return []
+    limits = b.sample("bounds", 6 * len(bounded), "m")
+    frame = contact_frame(
+        single_contacts(b.structure, b.parameter), platform.placement.position, platform.R
+    )
+    found = []
+    for j, i in enumerate(bounded):
+        point = platform.placement.position + frame.levers[i]
+        low, high = limits[6 * j : 6 * j + 3], limits[6 * j + 3 : 6 * j + 6]
+        found.append(ca.mmax(ca.vertcat(low - point, point - high)))
+    return found

@@ -1,0 +1,118 @@
+"""A tick of a controller: sensors, law and limits, from what is measured to efforts.
+
+    state = observer(joints)  or as it is,     asked, memory = law(state, aim, memory),
+    effort = asked, within limits
+
+What lasts from one tick to the next goes in and comes out: see `carried`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from functools import partial
+from typing import Any
+
+import casadi as ca
+
+from ..graph.program import Program, Variants
+from .builder import Builder, Lanes
+from .equations import Wrench
+from .inverse import HUGE, efforts, in_variants
+from .law import CONTROLLERS
+from .law.controller import Aim, Control, ControllerTable, Seen, gains_of
+from .observer import BEFORE, Observed, observe
+from .platform import placed
+from .structure import Structure
+
+FUNCTION = "function"  # a law whose efforts are given
+REQUEST = "request"  # results of ticks whose efforts are: what they have to balance
+AIMS = ("q_d", "q1_d", "q2_d", "joint_d", "joint_rate_d", "force_d")
+
+
+def tick(
+    structure: Structure,
+    law: str,
+    choices: Sequence[tuple[str, Any]] = (),
+    velocity: str | None = None,
+    apart: bool = False,
+) -> Variants:
+    """Efforts that a law asks for at what is measured, and what lasts until the next tick.
+
+    Ports: q, q1, joint, joint_rate: as they are, or joints alone where there are sensors;
+    aims `AIMS`; force at the law's point, (3,); its gains; low, high: limits, a lane's.
+    Results: effort; asked, without limits; q, q1, joint, joint_rate: what the law saw; memory.
+
+    Args: law: its kind;  choices: entries of its table, by name.
+          velocity: how the `observer` comes to rates, None without sensors.
+          apart: efforts of the inverse dynamics are a port, `given`; `REQUEST`: q, q', q'' and
+          force and point of the load that they are to balance, (3 m + 6,).
+    """
+    write = partial(_program, structure, law, choices, velocity, apart)
+    if apart or law == FUNCTION:
+        return Variants(write(False, False), single=True)
+    return in_variants(structure, write)
+
+
+def carried(results: Collection[str]) -> dict[str, str]:
+    """Which results of a tick are which ports of the next, of those that there are."""
+    pairs = {"memory_before": "memory", **BEFORE}
+    return {port: result for port, result in pairs.items() if result in results}
+
+
+def _program(
+    structure: Structure,
+    law: str,
+    choices: Sequence[tuple[str, Any]],
+    velocity: str | None,
+    apart: bool,
+    robust: bool,
+    low_latency: bool,
+) -> Program:
+    b = Builder(structure)
+    m = structure.m
+    seen = _seen(b, velocity, period := b.sample("period", 1, "s"))
+    force = b.sample("force", 3, "N")
+    q, q1, q2 = (b.sample(name, m) for name in AIMS[:3])
+    joint, rate = (b.lane_sample(name) for name in AIMS[3:5])
+    aim = Aim(q, q1, q2, joint, rate, b.sample(AIMS[5], 1, "N"))
+
+    def solve(q: ca.SX, q1: ca.SX, q2: ca.SX, load: Wrench) -> Lanes:
+        if apart:
+            b.output(REQUEST, ca.vertcat(q, q1, q2, load.force, load.point), "", 3 * m + 6)
+            return b.lane_sample("given", unit="N m or N")
+        q, q1, q2 = (b.cut(part) for part in (q, q1, q2))
+        return efforts(b, placed(b, q, q1, q2), load, robust, low_latency)
+
+    now = Seen(seen.q, seen.q1, seen.joint, seen.joint_rate, force)
+    if law == FUNCTION:
+        asked, memory = b.lane_sample("given", unit="N m or N"), ca.SX(0, 1)
+    else:
+        table: Any = CONTROLLERS[law]
+        assert issubclass(table, ControllerTable)
+        before = b.sample("memory_before", len(table.memory)) if table.memory else ca.SX(0, 1)
+        control = Control(
+            b, now, aim, gains_of(b, table.ports), dict(choices), before, period, solve
+        )
+        asked, memory = table.equations(control)
+    low, high = (b.lane_sample(name, unit="N m or N") for name in ("low", "high"))
+    limited = [ca.fmin(ca.fmax(e, lo), hi) for e, lo, hi in zip(asked, low, high, strict=True)]
+    b.output("effort", limited, "N m or N")
+    b.output("asked", asked, "N m or N")
+    b.output("q", now.q, "m, rad", m)
+    b.output("q1", now.q1, "per s", m)
+    if velocity is None:
+        b.output("joint", now.joint, "rad or m")
+        b.output("joint_rate", now.joint_rate, "rad/s or m/s")
+    if memory.numel():
+        b.output("memory", memory, "", memory.numel())
+    whole = b.total([b.lane(i, "mask") * asked[i] for i in range(len(asked))])
+    b.check(2 * (ca.fabs(whole) < HUGE) - 1, 0.5)
+    return b.finish()
+
+
+def _seen(b: Builder, velocity: str | None, period: ca.SX) -> Observed:
+    m = b.structure.m
+    joint, rate = b.lane_sample("joint", unit="rad or m"), b.lane_sample("joint_rate")
+    if velocity is not None:
+        return observe(b, joint, rate, velocity, period)
+    return Observed(b.sample("q", m), b.sample("q1", m), joint, rate)
