@@ -18,8 +18,7 @@ from ...mechanism.mechanism import COORDINATES, Mechanism
 from ...motion.column_units import dimension, unit_factor
 
 MOST_AXES, MOST_POINTS = 3, 10**10
-_OVER = re.compile(r"\s*(\w+)\s*=\s*([^:\s]+)\s*:\s*([^:\s]+)\s*:\s*(\S+)\s*(.*?)\s*")
-_VALUE = re.compile(r"\s*(\w+)\s*=\s*(\S+)\s*(.*?)\s*")
+_TEXT = re.compile(r"\s*(\S+?)\s*=\s*([^:\s]+(?:\s*:\s*[^:\s]+)*)\s*(.*?)\s*")
 
 Over = Iterable[str] | Mapping[str, tuple[float, float, int]]
 Values = str | Mapping[str, float]
@@ -92,7 +91,11 @@ def grid_of(mechanism: Mechanism, over: Over, hold: Values = "") -> Grid:
     if isinstance(over, str):
         over = [over]
     if isinstance(over, Mapping):
-        axes = [_axis(name, *_triple(name, of)) for name, of in over.items()]
+        axes = []
+        for name, of in over.items():
+            if not isinstance(of, Sequence) or isinstance(of, str) or len(of) != 3:
+                raise InputError(f"{name}: expected (low, high, count), got {of!r:.60}")
+            axes.append(_axis(name, *of))
     else:
         axes = [axis_of(text) for text in over]
     names = independent_coordinates(mechanism)
@@ -129,12 +132,21 @@ def require_independent(mechanism: Mechanism, name: str) -> None:
     raise InputError(f'"{name}" is not a coordinate.{did_you_mean(name, names)}')
 
 
+def parsed(text: str, form: str, example: str) -> tuple[str, list[str], str]:
+    """Name, numbers and unit of text such as `X=-5:5:200 mm`.
+
+    Args: form: what is expected, with as many numbers, as in "name=low:high:count unit".
+    """
+    found = _TEXT.fullmatch(text)
+    numbers = re.split(r"\s*:\s*", found[2]) if found else []
+    if found is None or len(numbers) != form.count(":") + 1:
+        raise InputError(f'"{text.strip()}": expected {form}, as in "{example}"')
+    return found[1], numbers, found[3]
+
+
 def axis_of(text: str) -> Axis:
     """`X=-5:5:200 mm` as an axis in SI."""
-    found = _OVER.fullmatch(text)
-    if found is None:
-        raise InputError(f'"{text}": expected name=low:high:count unit, as in "X=-5:5:200 mm"')
-    name, low, high, count, unit = found.groups()
+    name, (low, high, count), unit = parsed(text, "name=low:high:count unit", "X=-5:5:200 mm")
     scale = _scale(name, unit, text)
     return _axis(name, number(low, text) * scale, number(high, text) * scale, count)
 
@@ -149,9 +161,7 @@ def values_of(given: Values, known: Sequence[str]) -> dict[str, float]:
     else:
         pairs = []
         for part in given.split(",") if given.strip() else []:
-            if (found := _VALUE.fullmatch(part)) is None:
-                raise InputError(f'"{part.strip()}": expected name=value unit, as in "Y=1 mm"')
-            name, value, unit = found.groups()
+            name, (value,), unit = parsed(part, "name=value unit", "Y=1 mm")
             pairs.append((name, number(value, part) * _scale(name, unit, part)))
     for name in (names := [name for name, _ in pairs]):
         if name not in known:
@@ -180,12 +190,6 @@ def _scale(name: str, unit: str, text: str) -> float:
         return unit_factor(unit, kind)
     except InputError as error:
         raise InputError(f'"{text.strip()}": {error}') from None
-
-
-def _triple(name: str, given: object) -> tuple[object, object, object]:
-    if not isinstance(given, Sequence) or isinstance(given, str) or len(given) != 3:
-        raise InputError(f"{name}: expected (low, high, count), got {given!r:.60}")
-    return given[0], given[1], given[2]
 
 
 def _axis(name: str, low: object, high: object, count: object) -> Axis:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -23,8 +24,8 @@ from ...progress import step
 from ..workers import check_scheduler, run_parts
 from .axes import Grid, Over, Values, grid_of, number, values_of
 from .block import Asked, Block
-from .map_quantities import Mapped, Quantity, chosen, variables
-from .map_store import MARK, Kept, Memory, Sink, Zarr
+from .map_files import MARK, zarr_arrays
+from .map_quantities import Quantity, chosen, variables
 from .reach import Reach, Strokes
 
 if TYPE_CHECKING:
@@ -112,50 +113,29 @@ def mapped(
     """The map itself."""
     import xarray as xr
 
-    mechanism = asked.model.mechanism
-    found = list(variables(quantities))
-    coordinates = {axis.name: (axis.values, _unit(axis.name)) for axis in grid.axes}
-    coordinates |= {
-        dim: (np.array(entries), {})
-        for dim, entries in _entries(asked).items()
-        if any(dim in v.dims for v in found)
-    }
-    kept = {
-        v.name: Kept(
-            (*(axis.name for axis in grid.axes), *v.dims),
-            (*grid.shape, *(len(_entries(asked)[dim]) for dim in v.dims)),
-            v.dtype,
-            v.attributes(mechanism),
-        )
-        for v in found
-    }
-    attributes = _attributes(asked, grid)
+    like, entries = _like(asked, grid, quantities), _entries(asked)
+    used = {dim for dims, *_ in like.values() for dim in dims}
+    coordinates: dict[str, Any] = {a.name: (a.name, a.values, _unit(a.name)) for a in grid.axes}
+    coordinates |= {dim: (dim, np.array(entries[dim])) for dim in entries if dim in used}
+    frame = xr.Dataset(coords=coordinates, attrs=_attributes(asked, grid))
     if store is None:
-        memory = Memory(kept, grid.shape)
-        fill(Pieces(asked, grid, quantities, BLOCK), memory, workers, scheduler)
-        arrays = memory.arrays()
-        return xr.Dataset(
-            {name: (k.dims, arrays[name], dict(k.attributes)) for name, k in kept.items()},
-            {name: (name, values, about) for name, (values, about) in coordinates.items()},
-            attributes,
-        )
+        arrays = {name: np.empty(shape, dtype) for name, (_, shape, dtype, _) in like.items()}
+        flat = {n: a.reshape(grid.size, *a.shape[len(grid.axes) :]) for n, a in arrays.items()}
+        fill(Pieces(asked, grid, quantities, BLOCK), flat, 1, workers, scheduler)
+        return frame.assign({n: (like[n][0], a, like[n][3]) for n, a in arrays.items()})
     require("zarr", "maps")
     row = grid.size // grid.shape[0]
     rows = max(BLOCK // row, 1)
     with replacing_folder(store, MARK) as folder:
-        sink = Zarr(folder, kept, grid.shape, rows, coordinates, attributes)
-        fill(Pieces(asked, grid, quantities, rows * row), sink, workers, scheduler)
+        targets = zarr_arrays(folder, frame, like, rows)
+        fill(Pieces(asked, grid, quantities, rows * row), targets, row, workers, scheduler)
     return xr.open_zarr(Path(store), chunks=None, consolidated=False)
 
 
 def size_of(asked: Asked, grid: Grid, quantities: tuple[Quantity, ...]) -> int:
     """Bytes that a map takes."""
-    entries = {dim: len(names) for dim, names in _entries(asked).items()}
-    each = [
-        np.dtype(v.dtype).itemsize * int(np.prod([entries[dim] for dim in v.dims]))
-        for v in variables(quantities)
-    ]
-    return grid.size * sum(each)
+    like = _like(asked, grid, quantities).values()
+    return sum(np.dtype(dtype).itemsize * math.prod(shape) for _, shape, dtype, _ in like)
 
 
 @dataclass(frozen=True)
@@ -167,10 +147,6 @@ class Pieces:
     quantities: tuple[Quantity, ...]
     block: int
 
-    @property
-    def count(self) -> int:
-        return -(-self.grid.size // self.block)
-
     def ends(self, piece: int) -> tuple[int, int]:
         """The first pose of a piece, and the first after it."""
         start = piece * self.block
@@ -181,24 +157,43 @@ def evaluated(pieces: Pieces, piece: int) -> dict[str, np.ndarray]:
     """All variables at the poses of one piece."""
     wanted = frozenset(name for quantity in pieces.quantities for name in quantity.needs)
     here = Block(pieces.asked, pieces.grid.block(*pieces.ends(piece)), wanted)
-    return {v.name: _values(v, here) for v in variables(pieces.quantities)}
+    with np.errstate(invalid="ignore"):
+        return {v.name: v.values(here) for v in variables(pieces.quantities)}
 
 
 def fill(
-    pieces: Pieces, sink: Sink, workers: int | None = None, scheduler: str | None = None
+    pieces: Pieces,
+    targets: Mapping[str, Any],
+    row: int,
+    workers: int | None = None,
+    scheduler: str | None = None,
 ) -> None:
-    """Evaluate all poses, block by block, here or where `scheduler` says."""
-    found = run_parts(pieces, evaluated, range(pieces.count), workers, scheduler)
+    """Evaluate all poses, block by block, here or where `scheduler` says.
+
+    Args: targets: what takes the values, by name;  row: poses in one entry of theirs.
+    """
+    count = -(-pieces.grid.size // pieces.block)
     with step("mapping", pieces.grid.size) as advance:
-        for piece, arrays in found:
+        for piece, arrays in run_parts(pieces, evaluated, range(count), workers, scheduler):
             start, stop = pieces.ends(piece)
-            sink.write(start, stop, arrays)
+            for name, target in targets.items():
+                shape = (stop - start) // row, *target.shape[1:]
+                target[start // row : stop // row] = arrays[name].reshape(shape)
             advance(stop - start)
 
 
-def _values(variable: Mapped, block: Block) -> np.ndarray:
-    with np.errstate(invalid="ignore"):
-        return variable.values(block)
+def _like(asked: Asked, grid: Grid, quantities: tuple[Quantity, ...]) -> dict[str, Any]:
+    """Dimensions, shape, type and attributes of every variable, by name."""
+    entries, names = _entries(asked), [axis.name for axis in grid.axes]
+    return {
+        v.name: (
+            (*names, *v.dims),
+            (*grid.shape, *(len(entries[dim]) for dim in v.dims)),
+            v.dtype,
+            v.attributes(asked.model.mechanism),
+        )
+        for v in variables(quantities)
+    }
 
 
 def _entries(asked: Asked) -> dict[str, list[Any]]:
@@ -219,12 +214,8 @@ def _unit(name: str) -> dict[str, str]:
 
 
 def _attributes(asked: Asked, grid: Grid) -> dict[str, Any]:
-    model = asked.model
-    held = {
-        name: value
-        for name, value in zip(grid.names, grid.held, strict=True)
-        if name not in [axis.name for axis in grid.axes]
-    }
+    model, moved = asked.model, [axis.name for axis in grid.axes]
+    held = {n: value for n, value in zip(grid.names, grid.held, strict=True) if n not in moved}
     return {
         "title": "map of a mechanism at rest",
         "mechanism": dumps(model.mechanism),

@@ -1,10 +1,11 @@
-"""Maps in files: whole or not at all, and read again."""
+"""Maps in files: NetCDF, or a Zarr folder that is filled piece by piece; whole or not at all."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,11 +15,12 @@ from ...mechanism import Mechanism, parse
 from ...model.evaluator import Evaluator
 from ...results.netcdf import write_netcdf
 from .axes import Axis, Grid
-from .map_store import MARK
 from .reach import Reach
 
 if TYPE_CHECKING:
     import xarray as xr
+
+MARK = ".zgroup"  # a file that every Zarr folder has
 
 
 def save_map(dataset: xr.Dataset, file: Path) -> None:
@@ -48,6 +50,31 @@ def open_map(path: str | Path) -> xr.Dataset:
     return dataset
 
 
+def zarr_arrays(folder: Path, frame: xr.Dataset, like: Mapping[str, Any], rows: int) -> Any:
+    """Arrays of a new Zarr group by name, to be filled by so many rows of the first axis.
+
+    Args: frame: its coordinates and attributes.
+          like: name -> (dimensions, shape, type, attributes).
+    """
+    import zarr
+
+    group = zarr.open_group(str(folder), mode="w", zarr_format=2, attributes=dict(frame.attrs))
+
+    def made(
+        name: str, dims: Any, shape: Any, dtype: Any, about: Mapping[str, Any], chunks: Any
+    ) -> Any:
+        array = group.create_array(name, shape=shape, dtype=dtype, chunks=chunks, fill_value=None)
+        array.attrs.update({"_ARRAY_DIMENSIONS": list(dims), **about})
+        return array
+
+    for name, c in frame.coords.items():
+        made(str(name), c.dims, c.shape, c.dtype, c.attrs, c.shape)[...] = c.values
+    return {
+        name: made(name, dims, shape, dtype, about, (min(rows, shape[0]), *shape[1:]))
+        for name, (dims, shape, dtype, about) in like.items()
+    }
+
+
 def mechanism_of(dataset: xr.Dataset) -> Mechanism:
     """The mechanism that was mapped."""
     return parse(dataset.attrs["mechanism"], "the mechanism of the map")
@@ -55,12 +82,11 @@ def mechanism_of(dataset: xr.Dataset) -> Mechanism:
 
 def grid_and_reach(dataset: xr.Dataset, model: Evaluator) -> tuple[Grid, Reach]:
     """What it goes over, and what it took for reach."""
-    names = model.independent
+    names, held = model.independent, json.loads(dataset.attrs["held"])
     axes = []
     for name in map(str, dataset["status"].dims):
         values = dataset[name].values
         axes.append(Axis(name, float(values[0]), float(values[-1]), len(values)))
-    held = json.loads(dataset.attrs["held"])
     grid = Grid(names, tuple(axes), tuple(held.get(name, 0.0) for name in names))
     low, high = (np.array(dataset.attrs[f"stroke_{end}"], dtype=float) for end in ("low", "high"))
     return grid, Reach(model, low, high)

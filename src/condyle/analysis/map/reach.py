@@ -6,7 +6,6 @@ home, by the chains' names, `leg_*=-200:300 mm`.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -22,9 +21,7 @@ from ...model.evaluator import Evaluator
 from ...model.survey import Survey
 from ...motion.column_units import unit_factor
 from ...status import Status
-from .axes import number
-
-_STROKE = re.compile(r"\s*(\S+?)\s*=\s*([^:\s]+)\s*:\s*([^:\s]+)\s*(.*?)\s*")
+from .axes import number, parsed
 
 Strokes = Collection[str] | Mapping[str, tuple[float, float]]
 
@@ -82,7 +79,13 @@ def strokes_of(mechanism: Mechanism, given: Strokes) -> tuple[np.ndarray, np.nda
     """Least and greatest joint coordinates, (n,) each; infinite where nothing is said."""
     low = np.full(len(mechanism.chains), -np.inf)
     high = -low
-    for pattern, ends, unit in _pairs(given):
+    if isinstance(given, Mapping):
+        pairs = [(name, ends, "") for name, ends in given.items()]
+    else:
+        texts = [given] if isinstance(given, str) else given
+        form = "chain=low:high unit", "leg_*=-200:300 mm"
+        pairs = [parsed(text, *form) for text in texts]  # type: ignore[misc]
+    for pattern, ends, unit in pairs:
         text = f"{pattern}={ends[0]}:{ends[1]}"
         mine = [i for i, name in enumerate(mechanism.chain_names) if fnmatchcase(name, pattern)]
         if not mine:
@@ -97,15 +100,3 @@ def strokes_of(mechanism: Mechanism, given: Strokes) -> tuple[np.ndarray, np.nda
                     f'stroke "{text}": expected a range about home, such as "{pattern}=-0.1:0.2"'
                 )
     return low, high
-
-
-def _pairs(given: Strokes) -> list[tuple[str, tuple[object, object], str]]:
-    if isinstance(given, Mapping):
-        return [(name, (low, high), "") for name, (low, high) in given.items()]
-    found = []
-    for text in [given] if isinstance(given, str) else given:
-        if (match := _STROKE.fullmatch(text)) is None:
-            raise InputError(f'"{text}": expected chain=low:high unit, as in "leg_*=-200:300 mm"')
-        name, low, high, unit = match.groups()
-        found.append((name, (low, high), unit))
-    return found

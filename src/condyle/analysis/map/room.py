@@ -268,30 +268,25 @@ def best_box(
                 if size > best[0]:
                     best = size, [(low, high), *inner]
         return best[1]
+    left, right = _good_from(good, home[-1])
     if good.ndim == 1:
-        return [_run(good, home[0])]
-    runs = np.array(
-        [_run(row, home[1]) if row[home[1]] else (home[1] + 1, home[1]) for row in good]
+        return [(home[0] - int(left) + 1, home[0] + int(right) - 1)]
+    h, at = home
+    left, right = (
+        np.minimum.outer(np.minimum.accumulate(n[h::-1]), np.minimum.accumulate(n[h:]))
+        for n in (left, right)
     )
-    ok = runs[:, 0] <= home[1]
-    up = int(np.argmin(np.append(ok[home[0] :], False)))  # rows onward from home that are good
-    down = int(np.argmin(np.append(ok[home[0] :: -1], False)))
-    above, below = runs[home[0] : home[0] + up], runs[home[0] - down + 1 : home[0] + 1][::-1]
-    first = np.maximum.outer(np.maximum.accumulate(below[:, 0]), np.maximum.accumulate(above[:, 0]))
-    last = np.minimum.outer(np.minimum.accumulate(below[:, 1]), np.minimum.accumulate(above[:, 1]))
-    height = np.subtract.outer(
-        -sides[0][home[0] - np.arange(down)], -sides[0][home[0] + np.arange(up)]
-    )
-    area = height * (sides[1][last] - sides[1][first])
+    first, last = at - np.maximum(left, 1) + 1, at + np.maximum(right, 1) - 1
+    height = np.subtract.outer(-sides[0][h::-1], -sides[0][h:])
+    area = np.where(left > 0, height * (sides[1][last] - sides[1][first]), -1.0)
     i, j = np.unravel_index(int(np.argmax(area)), area.shape)
-    return [(home[0] - int(i), home[0] + int(j)), (int(first[i, j]), int(last[i, j]))]
+    return [(h - int(i), h + int(j)), (int(first[i, j]), int(last[i, j]))]
 
 
-def _run(good: np.ndarray, at: int) -> tuple[int, int]:
-    """First and last index of the good values around one."""
-    after = np.flatnonzero(~good[at:])
-    before = np.flatnonzero(~good[at::-1])
-    return (
-        at - (int(before[0]) - 1 if before.size else at),
-        at + (int(after[0]) - 1 if after.size else len(good) - 1 - at),
+def _good_from(good: np.ndarray, at: int) -> tuple[np.ndarray, np.ndarray]:
+    """How many values along the last axis are good from one on, downward and upward."""
+    pad = [(0, 0)] * (good.ndim - 1) + [(0, 1)]
+    down, up = (
+        np.argmin(np.pad(side, pad), axis=-1) for side in (good[..., at::-1], good[..., at:])
     )
+    return down, up
