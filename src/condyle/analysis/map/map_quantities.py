@@ -20,8 +20,8 @@ from .ability import limited
 from .block import Asked, Block
 from .reach import bounded
 
-Units = str | Callable[[Mechanism], str]
-POSE_UNITS = of_pose("{}")
+Text = str | Callable[[Mechanism], str]
+Values = Callable[[Block], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -34,18 +34,17 @@ class Mapped:
 
     name: str
     dims: tuple[str, ...]
-    units: Units
+    units: Text
     meaning: str
-    values: Callable[[Block], np.ndarray]
+    values: Values
     dtype: str = "f8"
-    flags: str | Callable[[Mechanism], str] = ""
+    flags: Text = ""
 
     def attributes(self, mechanism: Mechanism) -> dict[str, str]:
-        units = self.units if isinstance(self.units, str) else self.units(mechanism)
-        flags = self.flags if isinstance(self.flags, str) else self.flags(mechanism)
-        return {"units": units, "long_name": self.meaning} | (
-            {"flag_meanings": flags} if flags else {}
-        )
+        """Units, meaning and the words of flags."""
+        units, flags = (t if isinstance(t, str) else t(mechanism) for t in (self.units, self.flags))
+        about = {"units": units, "long_name": self.meaning}
+        return about | ({"flag_meanings": flags} if flags else {})
 
 
 @dataclass(frozen=True)
@@ -61,8 +60,8 @@ class Quantity:
     lacks: Callable[[Asked], str] = lambda asked: ""
 
 
-def _ratio(b: Block) -> np.ndarray:
-    return np.fmin(b.survey.inverse_ratio, b.survey.direct_ratio)
+def _of_survey(name: str) -> Values:
+    return lambda block: block.value(name).T
 
 
 def _kind(b: Block) -> np.ndarray:
@@ -101,10 +100,6 @@ def _stiffness(b: Block, rates: np.ndarray) -> np.ndarray:
     return rates.transpose(0, 2, 1) @ (b.asked.stiffness[:, None] * rates)
 
 
-def _stiffness_matrix(b: Block) -> np.ndarray:
-    return _stiffness(b, b.value("rates").transpose(2, 1, 0))
-
-
 def _stiffness_values(b: Block) -> np.ndarray:
     K = _stiffness(b, scaled_rates(b))
     found = np.full(K.shape[:2], np.nan)
@@ -116,15 +111,13 @@ def _stiffness_values(b: Block) -> np.ndarray:
 def _no_limits(asked: Asked) -> str:
     if asked.direction is None:
         return "which way the load acts: --direction 0,0,-1"
-    if not limited(asked.model.mechanism):
-        return "efforts with limits: torque_limit or force_limit in the mechanism file"
-    return ""
+    some = limited(asked.model.mechanism)
+    return "" if some else "efforts with limits: torque_limit or force_limit in the mechanism file"
 
 
 def _no_speeds(asked: Asked) -> str:
-    if all(np.isinf(limits(chain).speed) for chain in asked.model.mechanism.chains):
-        return "actuators with a speed_limit in the mechanism file"
-    return ""
+    some = any(np.isfinite(limits(chain).speed) for chain in asked.model.mechanism.chains)
+    return "" if some else "actuators with a speed_limit in the mechanism file"
 
 
 def _no_bounds(asked: Asked) -> str:
@@ -141,21 +134,17 @@ def _no_stiffness(asked: Asked) -> str:
 
 # Which variables every map has.
 ALWAYS = (
-    Mapped(
-        "status", (), "1", "what became of the pose",
-        lambda b: b.survey.status, "u1", " ".join(STATUS_NAMES),
-    ),
-    Mapped(
-        "cause", (), "1", "chain, contact or platform that forbids the pose",
-        lambda b: b.cause, "i2", cause_flags,
-    ),
+    Mapped("status", (), "1", "what became of the pose",
+           lambda b: b.survey.status, "u1", " ".join(STATUS_NAMES)),
+    Mapped("cause", (), "1", "chain, contact or platform that forbids the pose",
+           lambda b: b.cause, "i2", cause_flags),
 )  # fmt: skip
 
 QUANTITIES: dict[str, Quantity] = {
     "reachable": Quantity("whether a pose can be reached, and what forbids it", (), ()),
     "pose": Quantity(
         "the whole pose", ("pose",),
-        (Mapped("pose", ("coordinate",), POSE_UNITS, "pose of the platform X_EE",
+        (Mapped("pose", ("coordinate",), of_pose("{}"), "pose of the platform X_EE",
                 lambda b: b.pose),),
     ),
     "bounds": Quantity(
@@ -167,12 +156,13 @@ QUANTITIES: dict[str, Quantity] = {
     "joint": Quantity(
         "joint coordinates", ("joint",),
         (Mapped("joint", ("chain",), of_joint(), "joint coordinate, zero at home",
-                lambda b: b.value("joint").T),),
+                _of_survey("joint")),),
     ),
     "ratio": Quantity(
         "how near to a singularity, and of which kind", ("ratio", "transmission"),
         (
-            Mapped("ratio", (), "1", "smaller of both singularity ratios: 0 is singular", _ratio),
+            Mapped("ratio", (), "1", "smaller of both singularity ratios: 0 is singular",
+                   lambda b: np.fmin(b.survey.inverse_ratio, b.survey.direct_ratio)),
             Mapped("kind", (), "1", f"kind of a singularity whose ratio is below {NEAR_SINGULAR:g}",
                    _kind, "u1", " ".join(KINDS)),
         ),
@@ -184,7 +174,7 @@ QUANTITIES: dict[str, Quantity] = {
     "transmission": Quantity(
         "transmission of each chain", ("transmission",),
         (Mapped("transmission", ("chain",), "1", "transmission of the chain: 1 is best, 0 none",
-                lambda b: b.value("transmission").T),),
+                _of_survey("transmission")),),
     ),
     "effort": Quantity(
         "efforts that hold the platform under gravity and the load", (),
@@ -215,7 +205,8 @@ QUANTITIES: dict[str, Quantity] = {
             Mapped("stiffness", ("mode",), "N/m", "principal stiffnesses, rising; angles times the "
                    "characteristic length", _stiffness_values),
             Mapped("stiffness_matrix", ("row", "column"), "N/m, N/rad, N m/rad",
-                   "stiffness in q_EE", _stiffness_matrix),
+                   "stiffness in q_EE",
+                   lambda b: _stiffness(b, b.value("rates").transpose(2, 1, 0))),
         ),
         _no_stiffness,
     ),

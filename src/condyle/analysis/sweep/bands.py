@@ -21,7 +21,7 @@ from .study import Study
 from .variants import OK, Solver
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-BANDED = {"torque": "effort", "contact_force": "contact_force"}  # variable -> of an evaluation
+AS_SOLVED = ["formulation", "route", "load_point", "distribution", "preload", "contact_weight"]
 SUFFIX = "_quantile"
 
 
@@ -47,26 +47,26 @@ def with_bands(
     """
     check_scheduler(workers, scheduler)
     machine, options = mechanism or solution.mechanism, solution.options
-    same = {name: options[name] for name in ("formulation", "route", "load_point")}
-    same |= {name: options[name] for name in ("distribution", "preload", "contact_weight")}
-    own = study.model_copy(update=same)
+    own = study.model_copy(update={name: options[name] for name in AS_SOLVED})
     job = prepared(own, machine, (motion,), load)
     efforts, forces, failed = _all(job, workers, scheduler)
-    found = {"torque": _quantiles(efforts), "contact_force": _quantiles(forces)}
-    variables: dict[str, Any] = {}
-    for name, values in found.items():
-        given = solution[name]
-        about = {
-            "units": given.attrs["units"],
-            "long_name": f"quantiles of {name} over {job.design.count} variants",
-        }
-        variables[name + SUFFIX] = (("quantile", *given.dims), values, about)
+    count, variables = job.design.count, dict[str, Any]()
+    for name, values in (("torque", efforts), ("contact_force", forces)):
+        about = {"units": solution[name].attrs["units"]}
+        about["long_name"] = f"quantiles of {name} over {count} variants"
+        dims = ("quantile", *solution[name].dims)
+        variables[name + SUFFIX] = dims, _quantiles(values), about
     level = ("quantile", list(QUANTILES), {"units": "1", "long_name": "share of variants below"})
     made = solution.assign(variables).assign_coords({"quantile": level})
-    made.attrs["bands"] = json.dumps(
-        {"study": own.data(), "variants": job.design.count, "failed": failed}
-    )
-    return _told(made, failed, job.design.count)
+    made.attrs["bands"] = json.dumps({"study": own.data(), "variants": count, "failed": failed})
+    if failed:
+        text = (
+            f"{failed} of {count} variants have samples without a result; the bands are of the rest"
+        )
+        notices = [*made.notices, Notice("failed_variants", text, count=failed)]
+        made.attrs["warnings"] = json.dumps([one.text for one in notices])
+        made.attrs["notices"] = json.dumps([one.to_dict() for one in notices])
+    return made
 
 
 def _all(job: Job, workers: int | None, scheduler: str) -> tuple[np.ndarray, np.ndarray, int]:
@@ -84,8 +84,7 @@ def _all(job: Job, workers: int | None, scheduler: str) -> tuple[np.ndarray, np.
         for part, (effort, force, bad) in run_parts(
             job, curves, range(job.parts), workers, scheduler
         ):
-            rows = slice(part * job.part, part * job.part + len(effort))
-            efforts[rows], forces[rows] = effort, force
+            efforts[job.numbers(part)], forces[job.numbers(part)] = effort, force
             failed += bad
             advance(len(effort))
     return efforts, forces, failed
@@ -93,18 +92,16 @@ def _all(job: Job, workers: int | None, scheduler: str) -> tuple[np.ndarray, np.
 
 def curves(job: Job, part: int) -> tuple[np.ndarray, np.ndarray, int]:
     """Efforts and contact forces of a part's variants, NaN without a result, and who failed."""
-    start, stop = part * job.part, min((part + 1) * job.part, job.design.count)
-    N, mechanism = len(job.motions[0].t), job.mechanism
-    effort = np.full((stop - start, N, len(mechanism.chains)), np.nan)
-    force = np.full((stop - start, N, len(mechanism.contacts)), np.nan)
+    shape = len(job.numbers(part)), len(job.motions[0].t)
+    effort = np.full((*shape, len(job.mechanism.chains)), np.nan)
+    force = np.full((*shape, len(job.mechanism.contacts)), np.nan)
     failed = 0
-    with np.errstate(all="ignore"):
-        for number, _, (one,) in Solver(job).variants(start, stop):
-            failed += one.status != OK
-            if one.evaluation is not None:
-                good = one.evaluation.status == Status.ok
-                effort[number - start][good] = one.evaluation.effort[good]
-                force[number - start][good] = one.evaluation.contact_force[good]
+    for i, (_, _, (one,)) in enumerate(Solver(job).variants(part)):
+        failed += one.status != OK
+        if one.evaluation is not None:
+            good = one.evaluation.status == Status.ok
+            effort[i][good] = one.evaluation.effort[good]
+            force[i][good] = one.evaluation.contact_force[good]
     return effort, force, failed
 
 
@@ -120,15 +117,3 @@ def _quantiles(values: np.ndarray) -> np.ndarray:
         low, high = (np.take_along_axis(ordered, at[None], axis=0)[0] for at in (below, above))
         found[i] = low + (place - below) * (high - low)
     return found
-
-
-def _told(solution: Solution, failed: int, count: int) -> Solution:
-    """With a warning, if variants failed."""
-    if failed:
-        text = (
-            f"{failed} of {count} variants have samples without a result; the bands are of the rest"
-        )
-        notices = [*solution.notices, Notice("failed_variants", text, count=failed)]
-        solution.attrs["warnings"] = json.dumps([one.text for one in notices])
-        solution.attrs["notices"] = json.dumps([one.to_dict() for one in notices])
-    return solution

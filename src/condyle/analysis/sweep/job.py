@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -50,7 +50,7 @@ class Job:
     wrenches: tuple[np.ndarray, ...]
     point: str | None
     design: Design
-    readings: tuple[Reading, ...] = field(default=())
+    readings: tuple[Reading, ...] = ()
 
     @property
     def rows(self) -> int:
@@ -65,6 +65,10 @@ class Job:
     @property
     def parts(self) -> int:
         return -(-self.design.count // self.part)
+
+    def numbers(self, part: int) -> range:
+        """Of the variants of a part."""
+        return range(part * self.part, min((part + 1) * self.part, self.design.count))
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -122,10 +126,10 @@ def prepared(
     if twice := [n for n in dict.fromkeys(taken) if taken.count(n) > 1]:
         raise InputError(f'study: two columns would be called "{twice[0]}"; rename the measure')
     for path in paths:  # what does not fit the mechanism shows here, and kernels are built
-        states, _ = model.independent_motion(_beginning(path))
-        load_9 = np.zeros((len(states[0]), 9))
-        model.evaluate(states[0], states[1], states[2], load_9, 1)
-    return Job(study, machine, paths, acting, wrenches, name, design, found)
+        few: Any = {k: getattr(path, k)[:2] for k in ("t", "value", "rate", "acceleration")}
+        (q, q1, q2), _ = model.independent_motion(replace(path, **few))
+        model.evaluate(q, q1, q2, np.zeros((len(q), 9)), 1)
+    return replace(job, readings=found)
 
 
 def _numbers(study: Study, machine: Mechanism) -> Iterator[float]:
@@ -153,19 +157,17 @@ def _motion(given: MotionFile, machine: Mechanism) -> Motion:
     if given.file == REFERENCE:
         if given.units:
             raise InputError('motion: "reference" has its units; leave them out')
-        if len(machine.contacts) != 2 or not machine.platform.points.keys() & {
-            "incisor",
-            given.landmark,
-        }:
+        known = machine.platform.points.keys() & {"incisor", given.landmark}
+        if len(machine.contacts) != 2 or not known:
             names = ", ".join(independent_coordinates(machine))
             raise InputError(
                 'motion: "reference" is the path of an incisor for two contacts; '
                 f'"{machine.name}" needs a file of t, {names}, or motion = "trial"'
             )
-        source = bundled_reference()[0]
         if not any(options.values()) and given.landmark is None:
             return reference_motion()
-        return Motion.from_csv(source, landmark=given.landmark or "incisor", **options)
+        path, landmark = bundled_reference()[0], given.landmark or "incisor"
+        return Motion.from_csv(path, landmark=landmark, **options)
     return Motion.from_csv(given.file, units=given.units, landmark=given.landmark, **options)
 
 
@@ -173,11 +175,3 @@ def _load(given: str) -> Load:
     if given == NONE:
         return Load.zero()
     return reference_load() if given == REFERENCE else Load.from_csv(given)
-
-
-def _beginning(motion: Motion) -> Motion:
-    """The first two samples."""
-    arrays: Mapping[str, np.ndarray] = {
-        name: getattr(motion, name)[:2] for name in ("t", "value", "rate", "acceleration")
-    }
-    return replace(motion, **arrays)  # type: ignore[arg-type]

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -59,12 +58,8 @@ class Design:
         """Values of rows `start` to `stop`, (stop - start, len(vary)) [SI]."""
         if self.sampling.kind == "grid":
             places = np.unravel_index(np.arange(start, stop), self._levels)
-            columns = [
-                _on_grid(v, level, place, base)
-                for v, level, place, base in zip(
-                    self.vary, self._levels, places, self.base, strict=True
-                )
-            ]
+            parts = zip(self.vary, self._levels, places, self.base, strict=True)
+            columns = [_at(v, (k + 0.5) / n, base, (n, k)) for v, n, k, base in parts]
         else:
             unit = self._unit(start, stop)
             columns = [
@@ -113,29 +108,15 @@ def _latin(d: int, count: int, seed: int) -> np.ndarray:
     return qmc.LatinHypercube(d, seed=np.random.default_rng(seed)).random(count)
 
 
-def _on_grid(vary: Vary, levels: int, place: np.ndarray, base: float) -> np.ndarray:
-    """Values at places of a grid, ends included; a normal distribution in parts of equal chance."""
-    if vary.values is not None:
-        return np.array(vary.values)[place]
-    if vary.normal is not None:
-        return _at(vary, (place + 0.5) / levels, base)
-    low, high = _ends(vary, base)
-    return np.linspace(low, high, levels)[place]
-
-
-def _at(vary: Vary, unit: np.ndarray, base: float) -> np.ndarray:
-    """Values at places in [0, 1) of a distribution."""
+def _at(
+    vary: Vary, unit: np.ndarray, base: float, grid: tuple[int, np.ndarray] | None = None
+) -> np.ndarray:
+    """Values at places in [0, 1) of a distribution; or on a grid of so many, ends included."""
     if vary.values is not None:
         return np.array(vary.values)[(unit * len(vary.values)).astype(int)]
     if vary.normal is not None:
         mean, deviation = vary.normal
         return mean + deviation * ndtri(np.clip(unit, _EDGE, 1 - _EDGE))
-    low, high = _ends(vary, base)
-    return low + (high - low) * unit
-
-
-def _ends(vary: Vary, base: float) -> Sequence[float]:
-    if vary.scale is not None:
-        return sorted(factor * base for factor in vary.scale)
-    assert vary.range is not None
-    return vary.range
+    scaled = sorted(factor * base for factor in vary.scale or ())
+    low, high = scaled or vary.range or (base, base)
+    return low + (high - low) * unit if grid is None else np.linspace(low, high, grid[0])[grid[1]]

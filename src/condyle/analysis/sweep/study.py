@@ -76,12 +76,11 @@ class Vary(Table):
         if len(ways) != 1:
             got = " and ".join(ways) or "none"
             raise ValueError(f"expected one of range, values, normal and scale, got {got}")
-        for name in ("range", "scale"):
-            pair = getattr(self, name)
-            if pair is not None and not pair[0] < pair[1]:
-                raise ValueError(
-                    f"{name}: expected [lower, upper] with lower < upper, got {list(pair)}"
-                )
+        pair = self.range or self.scale
+        if pair is not None and not pair[0] < pair[1]:
+            raise ValueError(
+                f"{ways[0]}: expected [lower, upper] with lower < upper, got {list(pair)}"
+            )
         if self.normal is not None and not self.normal[1] > 0:
             raise ValueError(
                 f"normal: expected [mean, standard deviation > 0], got {list(self.normal)}"
@@ -105,9 +104,6 @@ class Sampling(Table):
         if self.kind != "grid" and self.count is None:
             raise ValueError(f"count is missing, and kind {self.kind} needs it")
         return self
-
-
-TAKES = ("min", "max", "min_abs", "max_abs", "mean", "rms", "span")
 
 
 class Measure(Table):
@@ -183,16 +179,13 @@ class Study(Table):
     def _frozen(self) -> Self:
         object.__setattr__(self, "measure", FrozenTable(self.measure))
         if self.sampling.kind == "grid":
-            for one in self.vary:
-                if one.values is None and one.count is None:
-                    raise ValueError(f"vary {one.what}: count is missing, and a grid needs it")
-        else:
-            for one in self.vary:
-                if one.count is not None:
-                    raise ValueError(
-                        f"vary {one.what}: count is for a grid; [sampling] has the count of "
-                        f"kind {self.sampling.kind}"
-                    )
+            if bare := [v.what for v in self.vary if v.values is None and v.count is None]:
+                raise ValueError(f"vary {bare[0]}: count is missing, and a grid needs it")
+        elif counted := [one.what for one in self.vary if one.count is not None]:
+            raise ValueError(
+                f"vary {counted[0]}: count is for a grid; [sampling] has the count of "
+                f"kind {self.sampling.kind}"
+            )
         return self
 
     @classmethod
@@ -207,7 +200,7 @@ class Study(Table):
             return cls.model_validate(data)
         except ValidationError as error:
             problems = [" ".join(p.split()) for p in describe(error, data, cls)]
-        raise InputError(f"{source}: {_in_one_line(problems)}")
+        raise InputError(f"{source}: {some_of(problems, MOST_SHOWN)}")
 
     def title(self) -> str:
         return "study"
@@ -253,9 +246,10 @@ def _text(path: Path) -> str:
     return read_text(path)
 
 
-def _in_one_line(problems: list[str]) -> str:
-    more = len(problems) - MOST_SHOWN
-    return "; ".join(problems[:MOST_SHOWN]) + (f"; and {more} more" if more > 0 else "")
+def some_of(problems: list[str], most: int) -> str:
+    """The first problems, in one line, and how many more there are."""
+    more = len(problems) - most
+    return "; ".join(problems[:most]) + (f"; and {more} more" if more > 0 else "")
 
 
 def json_schema() -> dict[str, Any]:

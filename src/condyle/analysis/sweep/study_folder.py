@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,8 @@ from ...atomic import replacing, write_text
 from ...errors import InputError
 from ...mechanism.files import read_tables, record
 from .job import MOTION, REASON, SECONDS, STATUS, VARIANT, Job
-from .variants import Rows
+from .study import some_of
+from .variants import Row
 
 STUDY, PART, SOLUTIONS = "study.json", "part-{:06d}.parquet", "solutions"
 _MANY = 5  # differences that a message shows
@@ -38,11 +39,9 @@ class Store:
         kept = _kept(self.folder)
         if kept is not None:
             if differences := list(_differences(kept, asked)):
-                shown = "; ".join(differences[:_MANY])
-                more = f"; and {len(differences) - _MANY} more" if differences[_MANY:] else ""
                 raise InputError(
-                    f"{folder} holds another study: {shown}{more}. Go on with the old one, or "
-                    "take another folder"
+                    f"{folder} holds another study: {some_of(differences, _MANY)}. Go on with the "
+                    "old one, or take another folder"
                 )
             if not resume:
                 raise InputError(
@@ -63,33 +62,31 @@ class Store:
         there = {path.name for path in self.folder.glob("part-*.parquet")}
         return [p for p in range(self._job.parts) if PART.format(p) not in there]
 
-    def write(self, part: int, rows: Rows) -> None:
+    def write(self, part: int, rows: Sequence[Row]) -> None:
         """Write a part, whole or not at all; solutions first, so that a row has its own.
 
         Raises: InputError: if that fails, on a full disk for one.
         """
-        if rows.solutions:
-            (self.folder / SOLUTIONS).mkdir(exist_ok=True)
-        for row, content in rows.solutions.items():
-            name = f"{rows.variant[row]:09d}-{rows.motion[row]}.nc"
-            with replacing(self.folder / SOLUTIONS / name) as temporary:
-                temporary.write_bytes(content)
+        for row in rows:
+            if row.solution is not None:
+                (self.folder / SOLUTIONS).mkdir(exist_ok=True)
+                file = self.folder / SOLUTIONS / f"{row.variant:09d}-{row.motion}.nc"
+                with replacing(file) as temporary:
+                    temporary.write_bytes(row.solution)
         with replacing(self.folder / PART.format(part)) as temporary:
             pq.write_table(_table(self._job, rows), temporary)
 
 
-def _table(job: Job, rows: Rows) -> pa.Table:
+def _table(job: Job, rows: Sequence[Row]) -> pa.Table:
     sources = [motion.source for motion in job.motions]
-    columns: dict[str, Any] = {VARIANT: pa.array(rows.variant, pa.int64())}
+    variant, motion, parameters, measures, status, reason, seconds, _ = zip(*rows, strict=True)
+    columns: dict[str, Any] = {VARIANT: pa.array(variant, pa.int64())}
     if len(sources) > 1:
-        columns[MOTION] = pa.array([sources[m] for m in rows.motion], pa.string())
-    for names, arrays in ((job.parameters, rows.parameters), (job.measures, rows.measures)):
-        for name, column in zip(names, np.array(arrays).T, strict=True):
-            columns[name] = pa.array(column, pa.float64())
-    columns[STATUS] = pa.array(rows.status, pa.string())
-    columns[REASON] = pa.array(rows.reason, pa.string())
-    columns[SECONDS] = pa.array(rows.seconds, pa.float64())
-    return pa.table(columns)
+        columns[MOTION] = pa.array([sources[m] for m in motion], pa.string())
+    columns |= dict(zip(job.parameters, np.array(parameters).T, strict=True))
+    columns |= dict(zip(job.measures, np.array(measures).T, strict=True))
+    columns |= {STATUS: pa.array(status, pa.string()), REASON: pa.array(reason, pa.string())}
+    return pa.table({**columns, SECONDS: pa.array(seconds, pa.float64())})
 
 
 def read(folder: str | os.PathLike[str]) -> xr.Dataset:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -14,7 +15,7 @@ from ...mechanism.mechanism import Mechanism
 from ...motion import Load, Motion, as_load, as_motion
 from ...progress import step
 from ..workers import PROCESSES, check_scheduler, run_parts
-from .job import Job, prepared
+from .job import prepared
 from .study import Study, read_study
 from .study_folder import Store, read
 from .variants import solve_part
@@ -48,35 +49,19 @@ def sweep(
             LostWorkerError: if a worker was killed; what was done is kept.
     """
     check_scheduler(workers, scheduler)
-    job = _job(study, mechanism, motion, load)
-    if out is not None:
-        return _filled(job, out, workers, scheduler, resume)
-    with TemporaryDirectory() as folder:
-        return _filled(job, Path(folder) / "sweep", workers, scheduler, False)
-
-
-def _job(
-    study: Study | str | os.PathLike[str] | Mapping[str, Any],
-    mechanism: Mechanism | None,
-    motion: Motion | None,
-    load: Load | None,
-) -> Job:
     asked = study if isinstance(study, Study | Mapping) else Path(study)
     motions = None if motion is None else (as_motion(motion),)
+    acting = None if load is None else as_load(load)
     with step("checking the study"):
-        return prepared(
-            read_study(asked), mechanism, motions, None if load is None else as_load(load)
-        )
-
-
-def _filled(
-    job: Job, out: str | os.PathLike[str], workers: int | None, scheduler: str, resume: bool
-) -> xr.Dataset:
-    store = Store(job, out, resume)
-    missing = store.missing()
-    with step("solving variants", job.rows) as advance:
-        advance((job.parts - len(missing)) * job.part * len(job.motions))
-        for part, rows in run_parts(job, solve_part, missing, workers, scheduler):
-            store.write(part, rows)
-            advance(len(rows.status))
-    return read(out)
+        job = prepared(read_study(asked), mechanism, motions, acting)
+    with ExitStack() as stack:
+        if out is None:
+            out = Path(stack.enter_context(TemporaryDirectory())) / "sweep"
+        store = Store(job, out, resume)
+        missing = store.missing()
+        with step("solving variants", job.rows) as advance:
+            advance((job.parts - len(missing)) * job.part * len(job.motions))
+            for part, rows in run_parts(job, solve_part, missing, workers, scheduler):
+                store.write(part, rows)
+                advance(len(rows))
+        return read(out)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,22 +25,21 @@ OK, REFUSED, FAILED = "ok", "refused", "failed"
 LONGEST_REASON = 300
 
 
-@dataclass
-class Rows:
-    """Rows of a part, column by column.
+class Row(NamedTuple):
+    """A variant along one motion.
 
-    measures: (rows, measures); NaN where a row has a reason.
-    solutions: NetCDF files by row, where they are kept.
+    measures: (measures,), NaN where the row has a reason.
+    solution: a NetCDF file, where solutions are kept.
     """
 
-    variant: list[int] = field(default_factory=list)
-    motion: list[int] = field(default_factory=list)
-    parameters: list[np.ndarray] = field(default_factory=list)
-    measures: list[np.ndarray] = field(default_factory=list)
-    status: list[str] = field(default_factory=list)
-    reason: list[str] = field(default_factory=list)
-    seconds: list[float] = field(default_factory=list)
-    solutions: dict[int, bytes] = field(default_factory=dict)
+    variant: int
+    motion: int
+    parameters: np.ndarray
+    measures: np.ndarray
+    status: str
+    reason: str
+    seconds: float
+    solution: bytes | None
 
 
 @dataclass(frozen=True)
@@ -62,11 +61,13 @@ class Solver:
         self._job = job
         self._models: dict[Structure, Evaluator] = {}
 
-    def variants(self, start: int, stop: int) -> Iterator[tuple[int, np.ndarray, list[Solved]]]:
-        """Number, values and outcomes of variants, one after the other."""
-        job = self._job
-        for number, row in enumerate(job.design.rows(start, stop), start):
-            yield number, row, self._variant(row)
+    def variants(self, part: int) -> Iterator[tuple[int, np.ndarray, list[Solved]]]:
+        """Number, values and outcomes of the variants of a part, one after the other."""
+        numbers = self._job.numbers(part)
+        with np.errstate(all="ignore"):
+            rows = self._job.design.rows(numbers.start, numbers.stop)
+            for number, row in zip(numbers, rows, strict=True):
+                yield number, row, self._variant(row)
 
     def _variant(self, row: np.ndarray) -> list[Solved]:
         motions = range(len(self._job.motions))
@@ -101,41 +102,26 @@ class Solver:
         return Solved(m, model, found, OK, "", residual)
 
 
-def solve_part(job: Job, part: int) -> Rows:
+def solve_part(job: Job, part: int) -> list[Row]:
     """The rows of one part."""
-    solver, rows = _solver(job), Rows()
-    none = np.full(len(job.measures), np.nan)
-    start, stop = part * job.part, min((part + 1) * job.part, job.design.count)
-    clock = time.perf_counter()
-    with np.errstate(all="ignore"):
-        for number, values, outcomes in solver.variants(start, stop):
-            for one in outcomes:
-                measured = none
-                if one.status == OK:
-                    measured = _measured(job, one)
-                if job.study.solutions and one.evaluation is not None:
-                    rows.solutions[len(rows.status)] = _netcdf(job, one)
-                now = time.perf_counter()
-                rows.variant.append(number)
-                rows.motion.append(one.motion)
-                rows.parameters.append(values)
-                rows.measures.append(measured)
-                rows.status.append(one.status)
-                rows.reason.append(one.reason)
-                rows.seconds.append(now - clock)
-                clock = now
+    rows, clock = [], time.perf_counter()
+    for number, values, outcomes in _solver(job).variants(part):
+        for one in outcomes:
+            measured = np.full(len(job.measures), np.nan)
+            if one.status == OK:
+                measured = _measured(job, one)
+            kept = job.study.solutions and one.evaluation is not None
+            solution = _netcdf(job, one) if kept else None
+            seconds, clock = time.perf_counter() - clock, time.perf_counter()
+            about = one.status, one.reason, seconds, solution
+            rows.append(Row(number, one.motion, values, measured, *about))
     return rows
 
 
-def derived_of(job: Job, one: Solved) -> Derived:
-    """What follows from a variant that was solved."""
-    assert one.model is not None
-    model = one.model
-    return Derived(model.mechanism, one.evaluation, job.wrenches[one.motion], model.limited)
-
-
 def _measured(job: Job, one: Solved) -> np.ndarray:
-    derived = derived_of(job, one)
+    assert one.model is not None
+    wrench = job.wrenches[one.motion]
+    derived = Derived(one.model.mechanism, one.evaluation, wrench, one.model.limited)
     return np.concatenate([reading.values(derived) for reading in job.readings])
 
 
