@@ -7,8 +7,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from condyle.markers.bryant import bryant_angles
-from condyle.markers.rigid import common_shape, fit
+from condyle.markers.rigid import common_shape, continuous_angles, fit
 
 SHAPE = np.array([[80, 30, 20], [50, 45, 25], [82, -28, 22], [48, -44, 35.0]]) * 1e-3
 
@@ -86,6 +85,6 @@ def test_angles_are_continuous_and_those_of_the_convention() -> None:
     angles = np.column_stack([9 * t, 1.2 * np.sin(9 * t), -12 * t])
     R = Rotation.from_euler("XYZ", angles).as_matrix()
     R[7] = np.nan
-    found = bryant_angles(R)
+    found = continuous_angles(R)
     assert np.isnan(found[7]).all()
     np.testing.assert_allclose(np.delete(found, 7, 0), np.delete(angles, 7, 0), atol=1e-12)

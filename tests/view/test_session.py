@@ -9,6 +9,7 @@ import pytest
 
 import condyle
 from condyle.errors import InputError
+from condyle.kinematics.bryant import bryant_angles
 from condyle.markers import Beside
 from condyle.motion import Load, Motion
 from condyle.report.scene import contact_patch, place, platform_hull, rotations
@@ -17,7 +18,7 @@ from condyle.view import open_view
 from condyle.view.playback import Playback
 from condyle.view.readout import number, status_html, tables_html
 from condyle.view.session import Session
-from condyle.view.shapes import bryant_angles, matrix, quaternion, turn_onto, unit_rod
+from condyle.view.shapes import matrix, quaternion, turn_onto, unit_rod
 
 MECHANISMS = ["masticatory", "gough-stewart", "hexaglide", "human-jaw"]
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError
+from ..kinematics.bryant import rotations
 from ..motion.column_units import Dimension, unit_factor
 from ..motion.file_words import listed, short
 from ..motion.platform_load import Load
 from ..motion.points import DEFAULT_LOAD_POINT, resolve_load_point
-from .bryant import rotations
 from .channel_tables import Forces
 from .marker_bodies import Bodies
 from .marker_labels import find_label

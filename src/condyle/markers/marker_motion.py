@@ -18,7 +18,6 @@ from ..motion.column_units import POSE
 from ..motion.file_words import listed
 from ..motion.path import Motion
 from ..motion.platform_load import Load
-from .bryant import bryant_angles
 from .channel_tables import Forces
 from .emg import envelopes
 from .forces import measured_load
@@ -32,6 +31,7 @@ from .measured_channels import Beside
 from .off_contacts import off_contacts
 from .recording import Recording, read_c3d
 from .registration import Registration, register
+from .rigid import continuous_angles
 
 MAX_RESIDUAL = 2e-3  # m
 MAX_GAP = 0.1  # s
@@ -138,7 +138,7 @@ def from_c3d(
     def why(run: slice) -> str:
         return why_none(bodies, run, max_residual)
 
-    pose = np.where(used[:, None], np.hstack([p, bryant_angles(R)]), np.nan)
+    pose = np.where(used[:, None], np.hstack([p, continuous_angles(R)]), np.nan)
     try:
         kept, whole, gaps = close_gaps(recording.source, recording.t, pose, max_gap, longest, why)
     except InputError as error:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..kinematics.bryant import bryant_angles
+
 FEWEST = 3  # markers that hold a body
 FLATTEST = 0.03  # breadth over length of a body whose turn about its length can still be told
 _ROUNDS, _SETTLED = 20, 1e-13
@@ -99,6 +101,14 @@ def common_shape(points: np.ndarray) -> np.ndarray:
             if change <= _SETTLED * np.abs(moved).max():
                 break
     return shape
+
+
+def continuous_angles(rotation: np.ndarray) -> np.ndarray:
+    """Bryant angles, (F, 3) [rad], continuous from frame to frame; NaN stays NaN."""
+    angles = bryant_angles(rotation)
+    known = np.isfinite(angles).all(axis=1)
+    angles[known] = np.unwrap(angles[known], axis=0)
+    return angles
 
 
 def _mean(points: np.ndarray) -> np.ndarray:

@@ -66,14 +66,3 @@ def matrix(q: np.ndarray) -> np.ndarray:
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
     )
-
-
-def bryant_angles(R: np.ndarray) -> np.ndarray:
-    """(alpha, beta, gamma) [rad] of R = Rx Ry Rz, with beta within 90 degrees."""
-    return np.array(
-        [
-            np.arctan2(-R[1, 2], R[2, 2]),
-            np.arcsin(np.clip(R[0, 2], -1, 1)),
-            np.arctan2(-R[0, 1], R[0, 0]),
-        ]
-    )

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import viser
 
+from ..kinematics.bryant import bryant_angles
 from ..mechanism import Contact, Mechanism
 from ..report.scene import LIGHT, Rod, contact_patch, place, platform_hull, styles
-from .shapes import bryant_angles, matrix, quaternion, turn_onto, unit_rod
+from .shapes import matrix, quaternion, turn_onto, unit_rod
 from .snapshot import Snapshot
 
 RGB = tuple[int, int, int]

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...kinematics.bryant import bryant_angles, rotations
 from ...mechanism.mechanism import Mechanism
 from .follow import CONVERGED
 from .gauss_newton import GaussNewton
-from .orientation import bryant_angles, principal, rotations
+from .orientation import principal
 from .pose_status import PoseStatus, judge
 
 STARTS = 2000  # that chains can reach, at most, of so many

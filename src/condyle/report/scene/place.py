@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...markers.bryant import rotations
+from ...kinematics.bryant import rotations
 from ...mechanism import Mechanism
 from .chains import ChainDrawing, drawing_points
 
