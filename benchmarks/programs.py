@@ -1,85 +1,102 @@
-"""Quadratic programs by other solvers, one at a time from Python, as their users call them.
-
-    least |x|^2 / 2   with   A x = b,   low <= x <= high,   least <= B x <= most
-
-No solver imports condyle. A function takes (A, b, low, high, B, least, most), arrays of numbers
-with infinite bounds, and returns x; it is imported where it is first called.
-"""
+"""Efforts within limits, beside solvers of quadratic programs that are called from Python."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-Array = np.ndarray
-Solver = Callable[[Array, Array, Array, Array, Array, Array, Array], Array]
+from condyle.distribution import Problem, distribute
+from condyle.distribution.reduced import Reduced, reduce
+from condyle.mechanism.chain import limits
+from condyle.mechanism.mechanism import Mechanism
+from condyle.model.evaluator import Evaluator
+
+from .peers.solvers import SOLVERS
+from .rows import Probe
+
+DIFFERENT = 1e-3  # of the largest effort: less, and a solver has solved the same program
+BINDING = "bounded where limits bind"
+PROGRAMS = 16  # that others solve, one after the other
 
 
-def daqp(A: Array, b: Array, low: Array, high: Array, B: Array, least: Array, most: Array) -> Array:
-    import daqp
-
-    n, m = A.shape[1], len(b)
-    sense = np.zeros(n + m + len(B), dtype=np.int32)
-    sense[n : n + m] = 5  # an equation
-    rows = np.ascontiguousarray(np.vstack([A, B]))
-    above, below = np.concatenate([high, b, most]), np.concatenate([low, b, least])
-    x, _, flag, _ = daqp.solve(np.eye(n), np.zeros(n), rows, above, below, sense)
-    assert flag == 1
-    return np.array(x)
+Given = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # q, q', q'', load
 
 
-def quadprog(
-    A: Array, b: Array, low: Array, high: Array, B: Array, least: Array, most: Array
-) -> Array:
-    import quadprog
+@dataclass(frozen=True)
+class Bites:
+    """Samples of a mechanism whose limits bind, and how they are called."""
 
-    n = A.shape[1]
-    rows = np.vstack([A, np.eye(n), -np.eye(n), B, -B])
-    right = np.concatenate([b, low, -high, least, -most])
-    kept = np.isfinite(right)
-    found = quadprog.solve_qp(np.eye(n), np.zeros(n), rows[kept].T, right[kept], meq=len(b))
-    return np.array(found[0])
+    label: str
+    model: Evaluator
+    given: Given
 
+    def ours(self) -> float:
+        """Seconds a sample of `torques`, from q to efforts."""
+        start = time.perf_counter()
+        self.model.torques(*self.given, outputs=("contact",), threads=1)
+        return (time.perf_counter() - start) / len(self.given[0])
 
-def highs(
-    A: Array, b: Array, low: Array, high: Array, B: Array, least: Array, most: Array
-) -> Array:
-    import highspy
-
-    n, rows = A.shape[1], np.vstack([A, B])
-    model = highspy.HighsModel()
-    lp, hessian = model.lp_, model.hessian_
-    lp.num_col_, lp.num_row_ = n, len(rows)
-    lp.col_cost_, lp.col_lower_, lp.col_upper_ = np.zeros(n), low, high
-    lp.row_lower_, lp.row_upper_ = np.concatenate([b, least]), np.concatenate([b, most])
-    matrix = lp.a_matrix_
-    matrix.format_ = highspy.MatrixFormat.kRowwise
-    matrix.start_ = np.arange(len(rows) + 1) * n
-    matrix.index_, matrix.value_ = np.tile(np.arange(n), len(rows)), rows.ravel()
-    hessian.dim_, hessian.format_ = n, highspy.HessianFormat.kTriangular
-    hessian.start_, hessian.index_, hessian.value_ = np.arange(n + 1), np.arange(n), np.ones(n)
-    solver = highspy.Highs()
-    solver.setOptionValue("output_flag", False)
-    solver.passModel(model)
-    solver.run()
-    return np.array(solver.getSolution().col_value)
+    def programs(self) -> tuple[Reduced, np.ndarray]:
+        """Some of the programs, contacts eliminated, and the efforts that solve them, (R, n)."""
+        rows = np.linspace(0, len(self.given[0]) - 1, PROGRAMS).astype(int)
+        q, q1, q2, load = (a[rows] for a in self.given)
+        model = self.model
+        at = model.evaluate(q, q1, q2, load)
+        ports = {"pose": at.pose, "pose_rate": at.pose_rate}
+        ports |= {"pose_acceleration": at.pose_acceleration}
+        ports |= {"force": load[:, :3], "moment": load[:, 3:6], "point": load[:, 6:]}
+        s = {k: np.moveaxis(a, -1, 0) for k, a in model.kernel("balance").run(ports).values.items()}
+        both = [limits(chain) for chain in model.mechanism.chains]
+        low, high = (np.array([getattr(x, name) for x in both]) for name in ("low", "high"))
+        push = [c.push if c.one_sided else 0.0 for c in model.mechanism.contacts]
+        J, contacts = s["J"].transpose(0, 2, 1), s["normal"]
+        problem = Problem(s["Q"], J, contacts, None, low, high, np.array(push))
+        found = distribute(problem, "bounded")
+        good = np.flatnonzero(found.status == 0)
+        problem, pattern = problem.take(good), np.zeros((len(good), problem.k))
+        return reduce(problem, pattern, np.ones(problem.n), 0.0, True), found.effort[good]
 
 
-def osqp(A: Array, b: Array, low: Array, high: Array, B: Array, least: Array, most: Array) -> Array:
-    import osqp
-    from scipy.sparse import csc_matrix, identity
+def program_probes(bites: Bites, unavailable: dict[str, str]) -> Iterator[Probe]:
+    """Our row, and one of each solver that is installed."""
+    label = f"{bites.label}: {BINDING}"
+    yield Probe(label, bites.ours, 0.0)
+    r, right = bites.programs()
+    given = [_arguments(r, i) for i in range(r.count)]
+    for name, solve in SOLVERS.items():
+        try:
+            got = np.array([solve(*one) for one in given])
+        except ImportError as problem:
+            unavailable[name] = str(problem)
+            continue
+        error = float(np.abs(got - right).max() / np.abs(right).max())
+        probe = Probe(f"{label}, {name}", partial(_seconds, solve, given), error)
+        yield replace(probe, tolerance=DIFFERENT, note="the program alone, from Python")
 
-    n = A.shape[1]
-    solver = osqp.OSQP()
-    above, below = np.concatenate([b, high, most]), np.concatenate([b, low, least])
-    options: dict[str, Any] = {"verbose": False, "eps_abs": 1e-9, "eps_rel": 1e-9}
-    rows = csc_matrix(np.vstack([A, np.eye(n), B]))
-    solver.setup(
-        identity(n, format="csc"), np.zeros(n), rows, below, above, max_iter=100_000, **options
-    )
-    return np.array(solver.solve(raise_error=True).x)
+
+def _arguments(r: Reduced, i: int) -> tuple[np.ndarray, ...]:
+    m, c = r.m, r.right[r.m :, i]
+    bounds = (c - r.contact_high[:, i], c - r.contact_low[:, i])
+    one = (r.G[:m, :, i], r.right[:m, i], r.low[:, i], r.high[:, i], r.G[m:, :, i], *bounds)
+    return tuple(np.ascontiguousarray(a) for a in one)
 
 
-SOLVERS: dict[str, Solver] = {"DAQP": daqp, "quadprog": quadprog, "HiGHS": highs, "OSQP": osqp}
+def _seconds(solve: Callable[..., np.ndarray], given: list[tuple[np.ndarray, ...]]) -> float:
+    start = time.perf_counter()
+    for one in given:
+        solve(*one)
+    return (time.perf_counter() - start) / len(given)
+
+
+def tight(mechanism: Mechanism, limit: float) -> Mechanism:
+    """The mechanism with limits on all efforts."""
+    own = {"torque_limit": limit}
+    chains = [
+        chain.model_copy(update={"actuator": chain.actuator.model_copy(update=own)})
+        for chain in mechanism.chains
+    ]
+    return mechanism.replace(chains=tuple(chains))

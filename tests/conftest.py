@@ -16,7 +16,9 @@ import pytest
 import condyle
 from condyle.mechanism import bundled_text
 
-sys.path.insert(0, str(Path(__file__).parent))  # `from oracles import ...` from any folder
+# `from oracles import ...` and `from benchmarks import ...` from any folder.
+sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parent))
 
 from support.browser import browser, open_tab  # noqa: F401 - fixtures
 from support.building import (  # noqa: F401 - fixtures

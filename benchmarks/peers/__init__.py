@@ -2,7 +2,7 @@
 
 The problem: for the reference mechanism, from independent coordinates, rates, accelerations and
 bite force to the six minimum-norm torques, closure included. No peer imports condyle; each reads
-the mechanism file's dict. `condyle bench`, started in the repository, checks and times them.
+the mechanism file's dict. `condyle bench` checks and times them.
 """
 
 from __future__ import annotations

@@ -6,17 +6,19 @@ import gc
 import weakref
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from distribution.cases import random_problem
 
-from condyle.bench import own
-from condyle.bench.motion import motion_rows
-from condyle.bench.own import Case, own_probes, thread_probes
-from condyle.bench.programs import Bites, _arguments, _solvers, program_probes, tight
-from condyle.bench.rows import TOLERANCE, Probe, Row, spread, timed
-from condyle.bench.run import Benchmark
+from benchmarks import own
+from benchmarks.motion import motion_rows
+from benchmarks.own import Case, own_probes, thread_probes
+from benchmarks.peers.solvers import SOLVERS
+from benchmarks.programs import Bites, _arguments, program_probes, tight
+from benchmarks.rows import TOLERANCE, Probe, Row, spread, timed
+from benchmarks.run import Benchmark
 from condyle.distribution import distribute
 from condyle.distribution.reduced import reduce
 from condyle.mechanism import load
@@ -92,23 +94,14 @@ def test_table_names_what_did_not_run() -> None:
     assert "200.0 ns" in text and "not run: peer (no pip)" in text
 
 
-@pytest.fixture
-def solvers(monkeypatch: pytest.MonkeyPatch) -> dict[str, Callable[..., np.ndarray]]:
-    """Those of `benchmarks`, which is found from the repository's root."""
-    monkeypatch.chdir(Path(__file__).parents[2])
-    return _solvers()
-
-
 @pytest.mark.parametrize("name", ["DAQP", "quadprog", "HiGHS", "OSQP"])
-def test_other_solvers_are_given_the_same_program(
-    name: str, solvers: dict[str, Callable[..., np.ndarray]]
-) -> None:
+def test_other_solvers_are_given_the_same_program(name: str) -> None:
     problem = random_problem(np.random.default_rng(3), 6, 2, 4, one_sided=True, tight=0.8)
     wanted = distribute(problem, "bounded")
     programs = reduce(problem, np.zeros((4, 2)), np.ones(6), 0.0, True)
     for i in np.flatnonzero(wanted.status == 0):
         try:
-            got = solvers[name](*_arguments(programs, i))
+            got = SOLVERS[name](*_arguments(programs, i))
         except ImportError as missing:
             pytest.skip(f"{missing.name} is not installed")
         size = np.abs(wanted.effort[i]).max()
@@ -116,16 +109,14 @@ def test_other_solvers_are_given_the_same_program(
     assert (wanted.status == 0).any()
 
 
-def test_solvers_that_are_missing_are_named(
-    monkeypatch: pytest.MonkeyPatch, solvers: dict[str, Callable[..., np.ndarray]]
-) -> None:
+def test_solvers_that_are_missing_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """Rows beside others, where some are missing; ours is always there."""
 
     def missing(*_: object) -> None:
         raise ImportError("no solver here")
 
-    some = {"DAQP": solvers["DAQP"], "none": missing}
-    monkeypatch.setattr("condyle.bench.programs._solvers", lambda: some)
+    some = {"DAQP": SOLVERS["DAQP"], "none": missing}
+    monkeypatch.setattr("benchmarks.programs.SOLVERS", some)
     model = Evaluator(tight(load("masticatory"), 0.2), backend="numpy", distribution="bounded")
     given = Case.of(model.mechanism).many(40)
     unavailable: dict[str, str] = {}
@@ -133,3 +124,12 @@ def test_solvers_that_are_missing_are_named(
     assert [p.name.rpartition(", ")[2] for p in probes[1:]] == ["DAQP"]
     assert unavailable == {"none": "no solver here"}
     assert all(p.error < p.tolerance and p.run() > 0 for p in probes)
+
+
+def test_the_command_outside_a_checkout(
+    condyle_command: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """An installed package has no engine to run."""
+    monkeypatch.setattr("condyle.cli.bench.__file__", str(tmp_path / "a" / "b" / "c" / "bench.py"))
+    outcome = condyle_command("bench")
+    assert outcome.status == 2 and "part of the repository" in outcome.err

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.bench import real_time, realtime
-from condyle.bench.exported import call, exported_probes
+from benchmarks import real_time, realtime
+from benchmarks.exported import call, exported_probes
 from condyle.export import export
 
 

@@ -14,7 +14,7 @@ import pytest
 from support.recorded_jaw import record
 
 import condyle
-from condyle.bench import Benchmark
+from benchmarks import Benchmark
 from condyle.cli import commands  # noqa: F401 - registers them
 from condyle.cli.answer import Answer, command_line, files_line
 from condyle.cli.command import registered

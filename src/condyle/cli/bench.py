@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import importlib
 import json
+import sys
 from contextlib import ExitStack
 from pathlib import Path
+from types import ModuleType
 from typing import Annotated
 
 import typer
 
+from ..errors import UnsupportedError
 from .answer import Answer, files_line
 from .command import UPKEEP, command
 from .inputs import output_folder
@@ -31,19 +35,41 @@ def bench(
 ) -> Answer:
     """How fast it is on this machine.
 
-    One table: every way to compute, on one core. From the repository other engines are timed too.
+    One table: every way to compute, on one core, and other engines. It runs in the repository.
     """
     from ..atomic import replacing
-    from ..bench import real_time, run_benchmark
     from ..mechanism import load
+
+    benchmarks = _benchmarks()
 
     with ExitStack() as stack:  # a file that cannot be written is found before the minutes pass
         if out is not None:
             output_folder(out.parent)
             temporary = stack.enter_context(replacing(out))
-        result = real_time(load("masticatory"), seconds) if realtime else run_benchmark(seconds)
+        if realtime:
+            result = benchmarks.real_time(load("masticatory"), seconds)
+        else:
+            result = benchmarks.run_benchmark(seconds)
         if out is not None:
             temporary.write_text(json.dumps(result.data(), indent=1), encoding="utf-8")
     files = [out] if out else []
     text = f"{result}\n{files_line(files)}" if out else str(result)
     return Answer(text, result.data() | {"files": files}, "condyle cache", "result")
+
+
+def _benchmarks() -> ModuleType:
+    """The engine, which stands beside the package in a checkout.
+
+    Raises: UnsupportedError: where the package was installed without it.
+    """
+    root = Path(__file__).parents[3]
+    if not (root / "benchmarks" / "timer.c").is_file():
+        raise UnsupportedError(
+            "condyle bench is part of the repository, not of an installation. Run it in a checkout "
+            "that is installed with pip install --editable ."
+        )
+    sys.path.insert(0, str(root))
+    try:
+        return importlib.import_module("benchmarks")
+    finally:
+        sys.path.pop(0)

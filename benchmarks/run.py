@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import importlib
 import os
 import platform
-import sys
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,17 +11,18 @@ from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from statistics import median
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from .. import __version__
-from ..backends.compiler import find_compiler
-from ..dynamics import FORMULATIONS
-from ..mechanism import bundled_text, load
-from ..model.evaluator import Evaluator
-from ..progress import step
+from condyle import __version__
+from condyle.backends.compiler import find_compiler
+from condyle.dynamics import FORMULATIONS
+from condyle.mechanism import bundled_text, load
+from condyle.model.evaluator import Evaluator
+from condyle.progress import step
+
+from . import peers
 from .exported import PORTABLE, WIDE, exported_probes
 from .motion import SECOND, motion_rows
 from .own import (
@@ -44,6 +43,7 @@ from .own import (
     ready_rows,
     thread_probes,
 )
+from .peers import closed_loops
 from .programs import BINDING
 from .rows import Probe, Row, timed
 from .simulating import LOOP, simulation_probes
@@ -123,7 +123,7 @@ def run_benchmark(seconds: float = 1.0) -> Benchmark:
         probes.append(Probe(OPERATION, timer.vector_operation, 0.0))
         rows = _timed(probes, rounds)
         with step("swinging for a second"):
-            rows += motion_rows(REFERENCE, _benchmarks("peers.closed_loops"), unavailable)
+            rows += motion_rows(REFERENCE, closed_loops, unavailable)
         with step("starting afresh"):
             rows += ready_rows(REFERENCE)
     if processors > 1:
@@ -176,23 +176,8 @@ def _heat(probe: Probe) -> int:
     return 0 if probe.name == CYCLE or probe.name.startswith("peer") else 1
 
 
-def _benchmarks(name: str) -> ModuleType | None:
-    """A module of the repository's `benchmarks`, where that is at hand."""
-    sys.path.insert(0, str(Path.cwd()))
-    try:
-        return importlib.import_module(f"benchmarks.{name}")
-    except ImportError:
-        return None
-    finally:
-        sys.path.pop(0)
-
-
 def _peer_probes(unavailable: dict[str, str]) -> Iterator[Probe]:
-    """The other engines, where the repository's `benchmarks` is at hand."""
-    peers = _benchmarks("peers")
-    if peers is None:
-        unavailable["peers"] = "run from the root of the repository"
-        return
+    """The other engines that can be had."""
     raw = tomllib.loads(bundled_text(REFERENCE))
     mechanism = load(REFERENCE)
     model = Evaluator(mechanism, backend="numpy")
@@ -210,7 +195,7 @@ def _peer_probes(unavailable: dict[str, str]) -> Iterator[Probe]:
             unavailable[name] = why
             continue
         try:
-            peer.prepare(raw, Path(str(peers.__file__)).parent / "build")
+            peer.prepare(raw, Path(__file__).parent / "peers" / "build")
             error = float(np.abs(peer.solve(q, q1, q2, force) - right).max() / np.abs(right).max())
         except (peers.PeerError, OSError) as problem:
             unavailable[name] = str(problem).splitlines()[0]

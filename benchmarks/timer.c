@@ -1,5 +1,5 @@
 /* Times a kernel from C, where a control loop would call it. */
-#include "../backends/c/vector.h"
+#include "../src/condyle/backends/c/vector.h"
 #include <time.h>
 
 typedef int (*One)(const double *, const double *, double *);

@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from ..backends.compiler import find_compiler
-from ..export import Exported, export
-from ..mechanism.mechanism import Mechanism
+from condyle.backends.compiler import find_compiler
+from condyle.export import Exported, export
+from condyle.mechanism.mechanism import Mechanism
+
 from .own import Case, Timer
 from .rows import Probe
 

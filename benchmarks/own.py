@@ -11,24 +11,24 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from importlib.resources import files
 from pathlib import Path
 
 import casadi as ca
 import numpy as np
 
-from ..analysis.map import workspace_map
-from ..backends.c.kernel import CompiledKernel
-from ..backends.compiler import find_compiler
-from ..backends.kernel import Kernel
-from ..mechanism.contact import Friction
-from ..mechanism.mechanism import Mechanism
-from ..model.evaluator import Evaluator
-from ..motion import Motion, reference_load, reference_motion
-from ..questions.inverse import inverse
-from ..questions.numbers import Layout, has_closed_form, specialised
-from ..questions.structure import structure_of
-from ..results.model import Model
+from condyle.analysis.map import workspace_map
+from condyle.backends.c.kernel import CompiledKernel
+from condyle.backends.compiler import find_compiler
+from condyle.backends.kernel import Kernel
+from condyle.mechanism.contact import Friction
+from condyle.mechanism.mechanism import Mechanism
+from condyle.model.evaluator import Evaluator
+from condyle.motion import Motion, reference_load, reference_motion
+from condyle.questions.inverse import inverse
+from condyle.questions.numbers import Layout, has_closed_form, specialised
+from condyle.questions.structure import structure_of
+from condyle.results.model import Model
+
 from .programs import Bites, program_probes, tight
 from .rows import Probe, Row, spread
 from .straight_line import torque_function
@@ -49,9 +49,8 @@ class Timer:
     """The C timing loops, built once."""
 
     def __init__(self) -> None:
-        source = files(__package__) / "timer.c"
         library = Path(tempfile.mkdtemp(prefix="condyle-bench-")) / "timer.so"
-        find_compiler().build(library, Path(str(source)))
+        find_compiler().build(library, Path(__file__).with_name("timer.c"))
         self.library = ctypes.CDLL(str(library))
         names = ("time_one", "time_batch", "time_casadi", "time_springs")
         for name in (*names, "clock_rate", "vector_operation"):

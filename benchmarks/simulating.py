@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from ..mechanism.mechanism import Mechanism
-from ..results.model import Model
-from ..simulation import simulate
-from ..simulation.bind import bind
-from ..simulation.plan import Plan
-from ..simulation.run import run
-from ..simulation.scenario import scenario_from
+from condyle.mechanism.mechanism import Mechanism
+from condyle.results.model import Model
+from condyle.simulation import simulate
+from condyle.simulation.bind import bind
+from condyle.simulation.plan import Plan
+from condyle.simulation.run import run
+from condyle.simulation.scenario import scenario_from
+
 from .rows import Probe
 
 LOOP = "a second of computed torque at 1 kHz, plant at 10 kHz"

@@ -1,7 +1,7 @@
 """The benchmark: our kernels, numpy and other engines, in one run on one core.
 
-Every row is checked against numpy before it is timed. Peers live in the repository's
-`benchmarks/peers` and take part when the command runs from its root and their packages are there.
+Every row is checked against numpy before it is timed. The other engines, in `peers`, take part
+where their packages are there. `condyle bench` runs this from a checkout.
 """
 
 from .realtime import RealTime, real_time

@@ -16,9 +16,10 @@ from types import ModuleType
 
 import numpy as np
 
-from ..backends.c.kernel import CompiledKernel
-from ..mechanism import bundled_text, load
-from ..model.evaluator import Evaluator
+from condyle.backends.c.kernel import CompiledKernel
+from condyle.mechanism import bundled_text, load
+from condyle.model.evaluator import Evaluator
+
 from .own import Timer
 from .rows import Row
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from ..graph.program import Numbers, Program
-from ..graph.write import casadi_function
+from condyle.graph.program import Numbers, Program
+from condyle.graph.write import casadi_function
 
 
 def torque_function(program: Program, numbers: Numbers, load_point: np.ndarray) -> ca.Function:

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from importlib.util import find_spec
 from typing import Any
 
-from ..analysis.sweep import Study, sweep
+from condyle.analysis.sweep import Study, sweep
+
 from .rows import Row
 
 VARIANTS, FEW = 10_000, 2_000

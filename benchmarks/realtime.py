@@ -9,15 +9,15 @@ import subprocess
 import sys
 import tempfile
 from dataclasses import asdict, dataclass
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from ..backends.compiler import find_compiler
-from ..errors import UnsupportedError
-from ..export import export
-from ..mechanism.mechanism import Mechanism
-from ..progress import step
+from condyle.backends.compiler import find_compiler
+from condyle.errors import UnsupportedError
+from condyle.export import export
+from condyle.mechanism.mechanism import Mechanism
+from condyle.progress import step
+
 from .exported import call
 
 RATES = (1_000, 5_000, 10_000, 20_000)  # Hz
@@ -106,7 +106,7 @@ def real_time(mechanism: Mechanism, seconds: float = 1.0) -> RealTime:
             f"{made.prefix.upper()}_VECTOR": 1,
         }
         flags = [flag for flag in compiler.flags if flag not in ("-shared", "-fPIC")]
-        sources = [str(files(__package__) / "realtime.c"), f"{made.prefix}.c"]
+        sources = [str(Path(__file__).with_name("realtime.c")), f"{made.prefix}.c"]
         program = [*compiler.command, *flags, *(f"-D{k}={v}" for k, v in macros.items())]
         with step("building the loop"):
             _run([*program, f"-I{folder}", *sources, "-o", "loop", "-lm"], folder)
