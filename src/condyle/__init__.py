@@ -10,7 +10,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from .results.accessors import register
+from .accessors import register
 
 __version__ = "0.1.0"
 
@@ -29,8 +29,8 @@ _HOMES = {
     "dump": "mechanism",
     "dumps": "mechanism",
     "load": "mechanism",
-    "Model": "results.model",
-    "derive": "results.model",
+    "Model": "model.model",
+    "derive": "model.model",
     "Load": "motion",
     "Motion": "motion",
     "reference_load": "motion",
@@ -63,12 +63,13 @@ if TYPE_CHECKING:
         UnsupportedError,
     )
     from .mechanism import Mechanism, bundled_mechanisms, dump, dumps, load
+    from .model.model import Model, derive
     from .motion import Load, Motion, reference_load, reference_motion, trial_motion
-    from .results.model import Model, derive
     from .results.solution import Solution, open_solution
     from .simulation import Scenario, load_scenario, simulate, simulate_all
 
-# What the report gives to results, comparisons and exports, which do not know it.
+# What later rooms give to models, solutions, comparisons and exports, which do not know them.
+register("model.solve", "condyle.results.solving:solve")
 register("solution.plot", "condyle.report.figures:SolutionPlots")
 register("comparison.text", "condyle.report.tables:comparison_text")
 register("mechanism.look", "condyle.report.scene.look:Look")

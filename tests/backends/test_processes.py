@@ -232,7 +232,7 @@ def test_a_library_that_no_longer_loads_is_built_again(
 ) -> None:
     """Whole, but of another machine, say."""
     model = Evaluator(case("gough-stewart").mechanism, backend="numpy")
-    question = Question.about(model._structure, "inverse", ())
+    question = Question.about(model.system.structure, "inverse", ())
     kernel()
     recipe = _recipe(question.key, find_compiler())
     facts = cache.find(recipe).facts

@@ -16,7 +16,8 @@ from condyle.backends.numpy import NumpyKernel
 from condyle.dynamics import FORMULATIONS
 from condyle.graph.program import Variants
 from condyle.graph.write import casadi_function
-from condyle.model.evaluator import RESULTS, Evaluator
+from condyle.model.inverse_dynamics import RESULTS
+from condyle.model.model import Model as Evaluator
 from condyle.questions import Question
 from condyle.questions.inverse import OUTPUTS
 
@@ -143,20 +144,20 @@ def test_whole_answers(name: str) -> None:
     reference = numpy.kernel("inverse", OUTPUTS).run(c.inputs)
     np.testing.assert_array_equal(got.status, reference.status)
     variants = questions_of(numpy, OUTPUTS)
-    function = casadi_function(variants.main, numpy._numbers)
+    function = casadi_function(variants.main, numpy.system.numbers)
     columns = np.hstack([np.asarray(part).T for part in function.map(len(c.q))(c.samples.T)[:-1]])
     start = 0
     for result in variants.main.interface.results:
         width = variants.main.interface.width(result)
         block = columns[:, start : start + width].T
         start += width
-        truth = arranged(variants.main.interface, result, block, numpy._numbers.order)
+        truth = arranged(variants.main.interface, result, block, numpy.system.numbers.order)
         for values in (got.values, reference.values):
             assert error(values[result.name], truth) < TOLERANCE, result.name
 
 
 def questions_of(evaluator: Evaluator, *details: Any) -> Variants:
-    return Question.about(evaluator._structure, "inverse", *details).variants()
+    return Question.about(evaluator.system.structure, "inverse", *details).variants()
 
 
 @pytest.mark.parametrize("name", ["masticatory", "hexaglide", "mixed_k2_n8", "mixed_k4_n6"])
@@ -170,7 +171,7 @@ def test_variants_agree(name: str) -> None:
     mixed = len({chain.kind for chain in c.mechanism.chains}) > 1 and variants.robust is not None
     programs = [*([] if mixed else [variants.main, variants.latency]), variants.robust]
     answers = [
-        NumpyKernel(Variants(p), evaluator._numbers).run(c.inputs)
+        NumpyKernel(Variants(p), evaluator.system.numbers).run(c.inputs)
         for p in programs
         if p is not None
     ]

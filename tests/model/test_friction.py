@@ -219,7 +219,7 @@ def test_a_kernel_is_sure_of_forces_that_are_held_at_zero(name: str) -> None:
     wrench = {"force": load[:, :3], "moment": load[:, 3:6], "point": load[:, 6:]}
     given = {"q": q, "q1": q1, "q2": q2, **wrench}
     answer = model.kernel("inverse", ("contact",)).run(given)
-    wanted, status = model._robust.evaluate(given)
+    wanted, status = model.system.robust.evaluate(given)
     assert not answer.status.any() and not status.any()
     for part in ("effort", "contact_force"):
         a, b = answer.values[part], wanted[part]
@@ -465,7 +465,7 @@ def test_the_robust_path_agrees(name: str) -> None:
     given = dict(
         zip(("q", "q1", "q2", "force", "moment", "point"), (q, q1, q2, *parts), strict=True)
     )
-    values, status = model._robust.evaluate(given)
+    values, status = model.system.robust.evaluate(given)
     assert (status == wanted.status).all()
     np.testing.assert_allclose(values["effort"].T, wanted.effort, rtol=1e-8, atol=1e-11)
     assert values["share"].shape[0] == values["gravity"].shape[0] == len(model.parts)
@@ -480,7 +480,7 @@ def test_a_kernel_vouches_only_for_the_least_of_all() -> None:
     q, q1, q2, load = case.arguments
     names = ("q", "q1", "q2", "force", "moment", "point")
     given = dict(zip(names, (q, q1, q2, *np.hsplit(load, 3)), strict=True))
-    values, status = model._robust.evaluate(given)
+    values, status = model.system.robust.evaluate(given)
     got = model.torques(*case.arguments)
     assert (got.status == status).all()
     np.testing.assert_allclose(got.effort, values["effort"].T, rtol=1e-7, atol=1e-9)

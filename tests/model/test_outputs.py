@@ -7,7 +7,8 @@ import pytest
 from support.cases import case, error
 
 from condyle.errors import InputError
-from condyle.model.evaluator import RESULTS, Evaluator
+from condyle.model.inverse_dynamics import RESULTS
+from condyle.model.model import Model as Evaluator
 
 
 @pytest.mark.usefixtures("quick")
@@ -90,7 +91,7 @@ def test_a_call_derives_nothing_again(monkeypatch: pytest.MonkeyPatch) -> None:
     def again(_: object) -> None:
         raise AssertionError("derived again")
 
-    for name in ("independent_coordinates", "dependent_coordinates"):
-        monkeypatch.setattr(f"condyle.model.derivation.{name}", again)
+    for place in ("questions.structure.dependent_coordinates", "model.system.characteristic"):
+        monkeypatch.setattr(f"condyle.{place}", again)
     model.torques(*c.arguments)
     assert len(model.independent) == 4

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..accessors import extend
 from ..dynamics import FORMULATIONS, ROUTES
 from ..dynamics import formulation as formulation_named
 from ..errors import UnsupportedError
 from ..mechanism.mechanism import Mechanism
 from ..model.evaluator import Evaluator, with_point
 from ..progress import step
-from ..results.accessors import extend
 from .runs import Run, Samples, TimedModel, run
 from .torque_indices import Indices, indices
 

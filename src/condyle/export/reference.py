@@ -68,7 +68,7 @@ def _forward(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
 
 
 def _motion(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
-    poses, reached = r.model._poses(given["q"], given["q1"], given["q2"])
+    poses, reached = r.model.poses.whole(given["q"], given["q1"], given["q2"])
     return poses, _reached(reached)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..questions.reactions import POINT, Place, reaction_places
 from ..status import Status
 from .data import Evaluation
-from .evaluator import Evaluator
+from .model import Model
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Reaction(Place):
 
 
 def reactions(
-    model: Evaluator, evaluation: Evaluation, effort: np.ndarray | None = None
+    model: Model, evaluation: Evaluation, effort: np.ndarray | None = None
 ) -> dict[str, Reaction]:
     """Reactions at the samples of an evaluation; NaN where a sample failed.
 

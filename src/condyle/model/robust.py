@@ -74,8 +74,8 @@ class Robust:
 
     def evaluate(self, inputs: Mapping[str, np.ndarray]) -> tuple[Arrays, np.ndarray]:
         """All results of inverse dynamics by name, samples last, and their statuses."""
-        poses, reached = self.motion(inputs["q"], inputs["q1"], inputs["q2"])
-        values = {name: a.T for name, a in poses.items()}
+        values, closed = self.motion({name: inputs[name] for name in ("q", "q1", "q2")})
+        poses, reached = {name: a.T for name, a in values.items()}, closed == Status.ok
         load = {name: inputs[name] for name in ("force", "moment", "point")}
         with np.errstate(all="ignore"):
             values |= self.configuration(poses["pose"])
@@ -111,7 +111,8 @@ class Robust:
     def forward(self, inputs: Mapping[str, np.ndarray]) -> tuple[Arrays, np.ndarray]:
         """All results of forward dynamics by name, samples last, and their statuses."""
         q, q1 = inputs["q"], inputs["q1"]
-        poses, reached = self.motion(q, q1, np.zeros_like(q))
+        values, closed = self.motion({"q": q, "q1": q1, "q2": np.zeros_like(q)})
+        poses, reached = {name: a.T for name, a in values.items()}, closed == Status.ok
         others = {name: inputs[name] for name in ("effort", "force", "moment", "point")}
         with np.errstate(all="ignore"):
             configuration = self.configuration(poses["pose"])
@@ -145,18 +146,16 @@ class Robust:
         """Results of the question of that name: asked for too seldom to be worth a compiler."""
         return self._linear.run(ports).values
 
-    def motion(self, q: np.ndarray, q1: np.ndarray, q2: np.ndarray) -> tuple[Arrays, np.ndarray]:
-        """X_EE and its rates, (N, 6) each, and where the contacts can be met."""
-        answer = self._motion.run({"q": q, "q1": q1, "q2": q2})
-        poses = {name: a.T.copy() for name, a in answer.values.items()}
-        reached = answer.status == Status.ok
+    def motion(self, inputs: Mapping[str, np.ndarray]) -> tuple[Arrays, np.ndarray]:
+        """X_EE and its rates by name, (6, N) each, and statuses: whether contacts can be met."""
+        answer = self._motion.run(inputs)
         doubtful = np.flatnonzero(answer.status == AGAIN)
         if doubtful.size:
-            found = self._follow.solve(q[doubtful], q1[doubtful], q2[doubtful])
-            reached[doubtful] = found.reached
+            found = self._follow.solve(*(inputs[name][doubtful] for name in ("q", "q1", "q2")))
+            answer.status[doubtful] = np.where(found.reached, Status.ok, Status.unreachable)
             for name, a in found.named().items():
-                poses[name][doubtful] = a
-        return poses, reached
+                answer.values[name][:, doubtful] = a.T
+        return answer.values, answer.status
 
     def configuration(self, pose: np.ndarray) -> Arrays:
         """The configuration's results by name, samples last; always by LAPACK."""

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ..accessors import extend
 from ..atomic import replacing
 from ..errors import InputError, no_such_file
 from ..extras import require
@@ -20,7 +21,6 @@ from ..mechanism.files import recall
 from ..mechanism.mechanism import Mechanism
 from ..motion import write_table
 from ..progress import step
-from .accessors import extend
 from .contacts import AXES, BOUND_TOLERANCE, bound_margins, lift_off, lift_off_columns
 from .failures import Failure, failures, status_columns
 from .matlab import dataset_variables, write_mat

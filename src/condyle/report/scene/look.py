@@ -1,4 +1,4 @@
-"""What other rooms may draw of a mechanism without knowing this one: see `results.accessors`."""
+"""What other rooms may draw of a mechanism without knowing this one: see `accessors`."""
 
 from __future__ import annotations
 

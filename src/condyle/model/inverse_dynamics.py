@@ -8,15 +8,18 @@ from functools import cached_property
 import numpy as np
 
 from ..backends.c.kernel import CompiledKernel
-from ..backends.kernel import AGAIN
+from ..backends.kernel import Answer
 from ..errors import InputError, did_you_mean
 from ..questions.inverse import OUTPUTS
 from ..status import Status
 from .checks import LOAD, Sample, as_samples, check_states, ports_of_load, samples_of_states
 from .data import Efforts, Evaluation
-from .derivation import Derivation
-from .one import OneByOne
+from .distributing import Distributor
+from .one_sample import OneByOne
 from .poses import configured, singularity
+from .system import System, mended
+
+Array = np.ndarray
 
 CONDITION = "condition"
 EVERYTHING = ("contact", "share", "motion", "joint", "configuration")
@@ -30,25 +33,22 @@ RESULTS = {
 }
 
 
-class InverseDynamics(Derivation):
-    """What efforts a motion takes; samples that a kernel cannot vouch for go the robust path."""
+class InverseDynamics:
+    """What efforts a motion takes; see `Model`."""
 
-    def torques(
+    def __init__(self, system: System, distributor: Distributor) -> None:
+        self._system, self.distributor = system, distributor
+
+    def efforts(
         self,
-        q: np.ndarray,
-        q1: np.ndarray,
-        q2: np.ndarray,
-        load: np.ndarray,
-        outputs: Collection[str] = (),
-        threads: int | None = None,
+        q: Array,
+        q1: Array,
+        q2: Array,
+        load: Array,
+        outputs: Collection[str],
+        threads: int | None,
     ) -> Efforts:
-        """Efforts alone, as fast as the machine.
-
-        Args:    as for `evaluate`; outputs: what is wanted besides, of contact, share, gravity
-                 (what of each share gravity and load alone ask for), motion, joint and condition:
-                 ask for less, pay for less; threads: at most so many.
-        Raises:  InputError: for an output that is none of these.
-        """
+        """As `Model.torques`."""
         known = (*RESULTS, CONDITION)
         for name in outputs:
             if name not in known:
@@ -56,72 +56,56 @@ class InverseDynamics(Derivation):
         wanted = {*outputs} - {CONDITION}
         if CONDITION in outputs:
             wanted.add("configuration")
-        values, status = self._solve(q, q1, q2, load, wanted, threads)
-        effort = values["effort"].T
+        found = self._solve(q, q1, q2, load, wanted, threads)
+        values, status, effort = found.values, found.status, found.values["effort"].T
         if status.any():
             effort[status != Status.ok] = np.nan
         others = {name: _sample_first(name, values[name]) for name in _names(outputs)}
         if CONDITION in outputs:
-            others[CONDITION] = singularity(values, self.characteristic_length).condition
+            others[CONDITION] = singularity(values, self._system.length).condition
         return Efforts(effort, others, status)
 
-    def one(self, q: np.ndarray, q1: np.ndarray, q2: np.ndarray, load: np.ndarray) -> np.ndarray:
-        """Efforts of one sample, (n,) [N m or N], at least latency: for a control loop.
-
-        Args: q, q1, q2: (m,) each, in the order of `independent`;  load: (9,), as of `evaluate`.
-              Arrays of doubles go fastest.
-        Returns: efforts in the order of the chains, a new array; NaN where there are none.
-        Raises:  InputError: for arrays that do not fit.
-        """
+    def one(self, q: Array, q1: Array, q2: Array, load: Array) -> Array:
+        """As `Model.one`."""
         if (quick := self._one_by_one) is not None:
             found = quick.call(q, q1, q2, load)
             if found is not None:
                 return found
         rows = [a[None] for a in as_samples(self._samples, q, q1, q2, load)]
-        return self.torques(rows[0], rows[1], rows[2], rows[3]).effort[0]
+        return self.efforts(rows[0], rows[1], rows[2], rows[3], (), None).effort[0]
 
     @cached_property
     def _one_by_one(self) -> OneByOne | None:
         """What `one` calls; None where a kernel alone cannot say what the efforts are."""
-        kernel = self.kernel("inverse", ())
-        if self._distributor.chooses or not isinstance(kernel, CompiledKernel):
+        kernel = self._system.kernel("inverse", ())
+        if self.distributor.chooses or not isinstance(kernel, CompiledKernel):
             return None
         return OneByOne(kernel, self._samples, np.argsort(kernel.order))
 
     @cached_property
     def _samples(self) -> tuple[Sample, ...]:
-        return (*samples_of_states(self.independent), LOAD)
+        return (*samples_of_states(self._system.independent), LOAD)
 
-    def evaluate(
-        self,
-        q: np.ndarray,
-        q1: np.ndarray,
-        q2: np.ndarray,
-        load: np.ndarray,
-        threads: int | None = None,
+    def everything(
+        self, q: Array, q1: Array, q2: Array, load: Array, threads: int | None
     ) -> Evaluation:
-        """Inverse dynamics at samples of the independent coordinates, with all that follows.
-
-        Args: q, q1, q2: (N, m) each, in the order of `independent` [m, rad; per s; per s^2].
-              load: (N, 9): force [N] and moment [N m] in {S}, and the point they act at, in {M}.
-              threads: at most so many; default: the processors at hand. Results do not depend
-              on it.
-        """
-        values, status = self._solve(q, q1, q2, load, EVERYTHING, threads)
+        """As `Model.evaluate`."""
+        found = self._solve(q, q1, q2, load, EVERYTHING, threads)
+        values, status = found.values, found.status
         return Evaluation(
             **{name: _sample_first(name, values[name]) for name in ("effort", *_names(EVERYTHING))},
-            configuration=configured(values, self.characteristic_length),
+            configuration=configured(values, self._system.length),
             status=status,
             shortfall=values.get("shortfall", np.where(status == Status.ok, 1.0, np.nan)),
             **self._rubbed(values),
         )
 
-    def _rubbed(self, values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    def _rubbed(self, values: Mapping[str, Array]) -> dict[str, Array]:
         """Sliding velocity and friction force at the contacts, (N, k, 3) each."""
         force = values["contact_force"]
         if "slip" not in values:
             # Of friction that no kernel goes through the sliding is not known.
-            known = not self._structure.friction
+            known = not self._system.structure.friction
             none = np.full((force.shape[1], force.shape[0], 3), 0.0 if known else np.nan)
             return {"slip": none, "friction_force": none}
         drag = np.moveaxis(values["drag"], -1, 0)
@@ -132,58 +116,47 @@ class InverseDynamics(Derivation):
 
     def _solve(
         self,
-        q: np.ndarray,
-        q1: np.ndarray,
-        q2: np.ndarray,
-        load: np.ndarray,
+        q: Array,
+        q1: Array,
+        q2: Array,
+        load: Array,
         wanted: Collection[str],
         threads: int | None,
-    ) -> tuple[dict[str, np.ndarray], np.ndarray]:
-        """Results by name, samples last, and their statuses."""
-        choosing = self._distributor.chooses
+    ) -> Answer:
+        system, choosing = self._system, self.distributor.chooses
         if choosing:
             wanted = {*wanted, "contact", "motion"}
-        kernel = self.kernel("inverse", tuple(o for o in OUTPUTS if o in wanted))
+        kernel = system.kernel("inverse", tuple(o for o in OUTPUTS if o in wanted))
         inputs = {"q": q, "q1": q1, "q2": q2, **ports_of_load(load)}
-        check_states(self.independent, q, q1, q2)
+        check_states(system.independent, q, q1, q2)
         answer = kernel.run(inputs, threads)
-        if self._distributor.unsolved_friction:
+        if self.distributor.unsolved_friction:
             self._make_room(answer.values)
-        again = np.flatnonzero(answer.status == AGAIN)
-        if again.size:
-            few = {name: np.asarray(a, dtype=float)[again] for name, a in inputs.items()}
-            better, answer.status[again] = self._robust.evaluate(few)
-            for name, value in answer.values.items():
-                value[..., again] = better[name]
+        mended(answer, inputs, lambda few: system.robust.evaluate(few))
         if choosing:
             self._choose(answer.values, answer.status, inputs)
-        return answer.values, answer.status
+        return answer
 
-    def _make_room(self, values: dict[str, np.ndarray]) -> None:
+    def _make_room(self, values: dict[str, Array]) -> None:
         """For what friction adds to the results of a kernel that does not know of it, in place."""
         _add_parts(values, 2)
         if "contact_force" in values:
             k, N = values["contact_force"].shape
             values["slip"], values["drag"] = np.zeros((2, k, 3, N))
 
-    def _choose(
-        self,
-        values: dict[str, np.ndarray],
-        status: np.ndarray,
-        inputs: Mapping[str, np.ndarray],
-    ) -> None:
+    def _choose(self, values: dict[str, Array], status: Array, inputs: Mapping[str, Array]) -> None:
         """Replace what the least norm does not serve, in place, by what the policy asks for."""
         values["shortfall"] = np.where(status == Status.ok, 1.0, np.nan)
-        if not self._structure.friction:
+        if not self._system.structure.friction:
             _add_parts(values, 1)
-        rows = self._distributor.rows(values, status)
+        rows = self.distributor.rows(values, status)
         if not rows.size:
             return
         ports = {name: values[name].T[rows] for name in RESULTS["motion"]}
         ports |= {name: inputs[name][rows] for name in ("force", "moment", "point")}
         # Shares cost more than all the rest.
         question = "system" if {"share", "slip"} & values.keys() else "balance"
-        better = self._distributor.solve(self.kernel(question).run(ports).values)
+        better = self.distributor.solve(self._system.kernel(question).run(ports).values)
         status[rows] = better.pop("status")
         for name, value in better.items():
             if name in values:
@@ -194,13 +167,13 @@ def _names(outputs: Collection[str]) -> list[str]:
     return [name for output in outputs for name in RESULTS.get(output, ())]
 
 
-def _add_parts(values: dict[str, np.ndarray], count: int) -> None:
+def _add_parts(values: dict[str, Array], count: int) -> None:
     """Parts more that ask for nothing, in place."""
     for name in {"share", "gravity"} & values.keys():
         zero = np.zeros((count, *values[name].shape[1:]))
         values[name] = np.concatenate([values[name], zero])
 
 
-def _sample_first(name: str, value: np.ndarray) -> np.ndarray:
+def _sample_first(name: str, value: Array) -> Array:
     """Samples last to samples first; of shares, after the parts."""
     return value.swapaxes(1, 2) if name in ("share", "gravity") else value.T

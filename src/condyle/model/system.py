@@ -1,0 +1,143 @@
+"""A mechanism's equations by one formulation and route: its numbers, and the kernels on them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from copy import copy
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..backends.choose import Backend
+from ..backends.kernel import AGAIN, Answer, Kernel
+from ..dynamics import ROUTES
+from ..dynamics import formulation as formulation_named
+from ..errors import InputError, MechanismError, did_you_mean
+from ..mechanism.home import holding_problems, home_problem
+from ..mechanism.mechanism import COORDINATES, Mechanism
+from ..progress import step
+from ..questions import Question
+from ..questions.friction import MOST
+from ..questions.numbers import Layout, characteristic, require_closed_form, specialised
+from ..questions.structure import structure_of
+from .closing import Closure
+from .distributing import LEAST, Distributor, Policy
+from .robust import Arrays, Robust
+
+
+class System:
+    """What all parts of a model ask: kernels are made when they are first wanted.
+
+    structure: of the mechanism; unless `general`, without what happens to be zero in it.
+    numbers:   of the mechanism, as backends take them.
+    """
+
+    def __init__(
+        self, mechanism: Mechanism, formulation: str, route: str, backend: str, general: bool
+    ) -> None:
+        """As of `Model`."""
+        check_home(mechanism)
+        if route not in ROUTES:
+            raise InputError(f'no route "{route}".{did_you_mean(route, ROUTES)}')
+        if route == "direct":
+            require_closed_form(mechanism)
+        start = time.perf_counter()
+        self.mechanism = mechanism
+        self.formulation, self.route = formulation_named(formulation).name, route
+        self.backend = Backend(backend)
+        with step("deriving the equations"):
+            structure = structure_of(mechanism, self.formulation, route)
+            self.numbers = Layout.of(structure).numbers(mechanism)
+            self.structure = structure if general else specialised(structure, self.numbers)
+        self.general: System | None = self if general else None  # who lends kernels
+        self._kernels: dict[Any, Kernel] = {}
+        self._closures: dict[Any, Closure] = {}
+        self.seconds = time.perf_counter() - start
+
+    def renumbered(self, mechanism: Mechanism) -> System:
+        """The same, if it is general, of another mechanism of its structure, sharing kernels."""
+        assert self.general is not None
+        other = copy(self.general)
+        for name in [n for n, of in vars(System).items() if isinstance(of, cached_property)]:
+            other.__dict__.pop(name, None)
+        other.mechanism = mechanism
+        other.numbers = Layout.of(self.structure).numbers(mechanism)
+        other._kernels, other._closures = {}, {}
+        return other
+
+    @cached_property
+    def dependent(self) -> tuple[str, ...]:
+        return tuple(self.structure.dependent)
+
+    @cached_property
+    def independent(self) -> tuple[str, ...]:
+        return tuple(name for name in COORDINATES if name not in self.dependent)
+
+    @cached_property
+    def length(self) -> float:
+        """The characteristic length [m]."""
+        return characteristic(self.structure, self.numbers)
+
+    def kernel(self, question: str, *details: Any) -> Kernel:
+        """The kernel of a question."""
+        asked = question, details
+        if asked not in self._kernels and self.general not in (None, self):
+            shared = self.general.kernel(question, *details)
+            self._kernels[asked] = shared.renumbered(self.numbers)
+        if asked not in self._kernels:
+            structure = self.structure
+            if question == "inverse" and len(structure.friction) > MOST:
+                structure = replace(structure, friction=())  # more patterns than a kernel tries
+            q = Question.about(structure, question, *details)
+            self._kernels[asked] = self.backend.kernel(q.key, q.variants, self.numbers)
+        return self._kernels[asked]
+
+    def closure(self, names: tuple[str, ...], landmark: str | None) -> Closure:
+        """What leads from other coordinates, or from a landmark's path, to whole poses."""
+        key = names, landmark
+        if key not in self._closures and self.general not in (None, self):
+            shared = self.general.closure(names, landmark)
+            self._closures[key] = shared.renumbered(self.mechanism)
+        if key not in self._closures:
+            general = self.general is not None
+            self._closures[key] = Closure(self.mechanism, names, landmark, self.backend, general)
+        return self._closures[key]
+
+    @cached_property
+    def robust(self) -> Robust:
+        """Where samples go that a kernel cannot vouch for."""
+        distributor = Distributor(self.mechanism, Policy(LEAST))
+        return Robust(self.structure, self.numbers, self.independent, distributor)
+
+
+def mended(
+    answer: Answer,
+    inputs: Mapping[str, np.ndarray],
+    robust: Callable[[Arrays], tuple[Arrays, np.ndarray | int]],
+) -> Answer:
+    """An answer whose doubtful samples are replaced, in place, by those of the robust path.
+
+    Args: robust: results by name, samples last, and statuses, from some samples' inputs.
+    """
+    again = np.flatnonzero(answer.status == AGAIN)
+    if again.size:
+        few = {name: np.asarray(a, dtype=float)[again] for name, a in inputs.items()}
+        better, answer.status[again] = robust(few)
+        for name, value in answer.values.items():
+            value[..., again] = better[name]
+    return answer
+
+
+def check_home(mechanism: Mechanism) -> None:
+    """Raises MechanismError where the contacts cannot hold the platform at home."""
+    problems = [
+        f'contact "{contact.name}": {problem}'
+        for contact in mechanism.contacts
+        if (problem := home_problem(contact)) is not None
+    ]
+    problems += [] if problems else list(holding_problems(mechanism))
+    if problems:
+        raise MechanismError(mechanism.name, problems)
