@@ -1,7 +1,7 @@
 """Chew a bolus under two controllers, on the machine they know and on one that is 10 % heavier.
 
 The plant differs from the controller's model, which stays the bundled mechanism. Prints tracking
-errors, efforts and joint loads, and draws chew.png.
+errors, efforts and joint loads, and draws results/chew.png.
 """
 
 from pathlib import Path
@@ -12,6 +12,7 @@ import numpy as np
 import condyle
 
 HERE = Path(__file__).parent
+RESULTS = Path("results")
 SECONDS = 5.0
 
 known = condyle.load("masticatory")
@@ -22,12 +23,13 @@ heavier = known.set(
         "platform.inertia": {k: 1.1 * v for k, v in platform.inertia.entries().items()},
     }
 )
-condyle.dump(known, "known.toml")
+RESULTS.mkdir(exist_ok=True)
+condyle.dump(known, RESULTS / "known.toml")
 
 figure, axes = plt.subplots(3, 1, figsize=(7, 7), sharex=True, layout="constrained")
 for controller in ("chew", "bite"):
     scenario = condyle.load_scenario(HERE / f"{controller}.toml")
-    law = scenario.controller.model_copy(update={"model": "known.toml"})
+    law = scenario.controller.model_copy(update={"model": str(RESULTS / "known.toml")})
     scenario = scenario.model_copy(update={"controller": law, "duration": SECONDS})
     for plant, dash in ((known, "-"), (heavier, ":")):
         run = condyle.simulate(plant, scenario)
@@ -47,4 +49,4 @@ axes[0].set_ylabel("error of the opening [deg]")
 axes[1].set_ylabel("force on the food [N]")
 axes[2].set(ylabel="larger joint load [N]", xlabel="time [s]")
 figure.legend(loc="outside upper center", ncols=2, fontsize="small")
-figure.savefig("chew.png", dpi=120)
+figure.savefig(RESULTS / "chew.png", dpi=120)

@@ -11,8 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from .accessors import register
-
-__version__ = "0.1.0"
+from .version import __version__
 
 # Heavy rooms open when they are entered: `import condyle` alone loads nothing.
 _HOMES = {

@@ -211,7 +211,7 @@ def test_everything_that_matters_is_in_the_recipe(monkeypatch: pytest.MonkeyPatc
     ]
     recipes = [_recipe(q.key, tool) for q in asked] + [_recipe(question.key, t) for t in tools]
     with monkeypatch.context() as patch:
-        patch.setattr(questions, "version", lambda name: "0.0")
+        patch.setattr(questions, "_casadi", lambda: "0.0")
         recipes.append(_recipe(question.key, tool))
         patch.setattr(questions, "_sources", lambda: "other sources")
         recipes.append(_recipe(question.key, tool))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -123,3 +124,18 @@ def test_odd_words_anywhere(condyle_command: Callable[..., Any], word: str) -> N
         outcome = condyle_command(*arguments)
         assert outcome.status in (0, 2), (arguments, outcome)
         assert bool(outcome.status) == (outcome.err != "") and "Traceback" not in outcome.err
+
+
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+def test_signals_are_left_as_they_were(condyle_command: Callable[..., Any], name: str) -> None:
+    """A process that runs the command and goes on can still be ended."""
+    number = getattr(signal, name)
+    before = signal.signal(number, signal.SIG_DFL)
+    try:
+        assert condyle_command("check", "masticatory").status == 0
+        assert signal.getsignal(number) == signal.SIG_DFL
+        signal.signal(number, signal.SIG_IGN)
+        assert condyle_command("check", "nope").status == 2
+        assert signal.getsignal(number) == signal.SIG_IGN
+    finally:
+        signal.signal(number, before)

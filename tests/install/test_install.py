@@ -77,7 +77,7 @@ def test_command_runs(installed: Path, tmp_path: Path) -> None:
     assert said == ""
     assert {path.suffix for path in (tmp_path / "results").iterdir()} == {".nc", ".csv"}
     version = re.search(
-        r'__version__ = "(.+)"', (ROOT / "src/condyle/__init__.py").read_text(encoding="utf-8")
+        r'__version__ = "(.+)"', (ROOT / "src/condyle/version.py").read_text(encoding="utf-8")
     )
     assert version is not None and version[1] in run(
         installed / "condyle", "--version", cwd=tmp_path

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import signal
 import sys
-from contextlib import redirect_stderr, suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr, suppress
 from typing import Any
 
 import typer
@@ -25,8 +26,7 @@ INTERRUPTED = 130  # what shells take for Ctrl-C
 
 def run() -> None:
     """Run the command that `sys.argv` names, and end the process with its exit status."""
-    _end_in_order()
-    with redirect_stderr(Forgiving(sys.stderr)):
+    with _ending_in_order(), redirect_stderr(Forgiving(sys.stderr)):
         sys.exit(_status(as_json="--json" in sys.argv[1:]))
 
 
@@ -74,10 +74,18 @@ def _terminated(number: int, frame: object) -> None:
     sys.exit(128 + number)
 
 
-def _end_in_order() -> None:
+@contextmanager
+def _ending_in_order() -> Iterator[None]:
     """End by signals as by errors, so that half-written files are removed."""
+    taken = []
     for name in ("SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) == signal.SIG_DFL:
             with suppress(ValueError):  # not the main thread
                 signal.signal(number, _terminated)
+                taken.append(number)
+    try:
+        yield
+    finally:
+        for number in taken:
+            signal.signal(number, signal.SIG_DFL)

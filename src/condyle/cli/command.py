@@ -13,7 +13,7 @@ from typing import Annotated, Any, get_type_hints
 
 import typer
 
-from .. import __version__
+from ..version import __version__
 from . import options
 from .answer import Answer
 from .bar import progress_bar

@@ -24,9 +24,6 @@ class Forgiving(io.TextIOBase):
     def flush(self) -> None:
         self._try("flush")
 
-    def writable(self) -> bool:
-        return True
-
     def isatty(self) -> bool:
         return self._stream is not None and self._stream.isatty()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from .. import __version__
+from ..version import __version__
 from .fmu_model import Fmu, Scalar
 
 # Powers of kg, m, s, rad in units of ours.

@@ -5,10 +5,10 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterator, Sequence
 
-from .. import __version__
 from ..mechanism.coordinates import COORDINATES
 from ..mechanism.home import dependent_coordinates, independent_coordinates
 from ..mechanism.mechanism import Mechanism
+from ..version import __version__
 from .context import CODES
 from .exported import Argument, Exported, Function
 from .names import in_comment

@@ -9,7 +9,6 @@ from importlib.resources import files
 
 import numpy as np
 
-from .. import __version__
 from ..dynamics import formulation as formulation_named
 from ..errors import InputError
 from ..mechanism.mechanism import Mechanism
@@ -17,6 +16,7 @@ from ..model.closing import require_independent, require_landmark
 from ..model.evaluator import Evaluator
 from ..questions.numbers import Layout, specialised
 from ..questions.structure import structure_of
+from ..version import __version__
 from . import structured
 from .catalogue import Entry, Wish, in_order, least_norm, require_question, usual
 from .context import Body, Context

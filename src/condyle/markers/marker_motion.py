@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,78 +17,23 @@ from ..mechanism.mechanism import Mechanism
 from ..motion.column_units import POSE
 from ..motion.file_words import listed
 from ..motion.path import Motion
-from ..motion.platform_load import Load
 from .channel_tables import Forces
 from .emg import envelopes
 from .forces import measured_load
-from .gaps import Gap, close_gaps
+from .gaps import close_gaps
 from .marker_bodies import Bodies, Body, find_bodies
 from .marker_checks import odd_sizes, suspects_in, why_none
 from .marker_file import MarkerFile, Place, read_markers
 from .marker_labels import find_label
-from .marker_report import in_words
+from .marker_report import MarkerMotion, MarkerResidual
 from .measured_channels import Beside
 from .off_contacts import off_contacts
 from .recording import Recording, read_c3d
-from .registration import Registration, register
+from .registration import register
 from .rigid import continuous_angles
 
 MAX_RESIDUAL = 2e-3  # m
 MAX_GAP = 0.1  # s
-
-
-@dataclass(frozen=True)
-class MarkerResidual:
-    """How well a marker moves with its body: distances from its place in it.
-
-    Attributes: name, body;  seen: part of the frames used, 0 to 1;  rms, largest: [m];
-                time: of the largest [s].
-    """
-
-    name: str
-    body: str
-    seen: float
-    rms: float
-    largest: float
-    time: float
-
-
-@dataclass(frozen=True, eq=False)
-class MarkerMotion:
-    """A motion from markers, and how well they fit.
-
-    Attributes:
-        motion: X_EE in {S}, of kind "pose", without gaps.
-        measured: (N,), where it was measured; elsewhere a gap was filled.
-        residuals: of every marker, over the frames that were used.
-        gaps: filled or cut off, in their order.
-        registration: from the laboratory to {S}.
-        off_contacts: distance of each ball from its surface, root mean square and largest [m].
-        beside: what was measured beside it, at its times: markers in {S} with the base's motion
-            taken out, their residuals, and EMG, where the marker file names channels.
-        load: from force channels or a force plate, where some were named.
-        recording: what the file holds.
-        warnings: what looks wrong, or was assumed.
-    """
-
-    motion: Motion
-    measured: np.ndarray
-    residuals: tuple[MarkerResidual, ...]
-    gaps: tuple[Gap, ...]
-    registration: Registration
-    off_contacts: dict[str, tuple[float, float]]
-    beside: Beside
-    load: Load | None
-    recording: Recording
-    warnings: tuple[str, ...]
-
-    @property
-    def markers(self) -> dict[str, np.ndarray]:
-        """The markers used, by name, in {S}, (N, 3) [m]; NaN where not seen."""
-        return dict(zip(self.beside.names, self.beside.points.transpose(1, 0, 2), strict=True))
-
-    def __str__(self) -> str:
-        return in_words(self)
 
 
 def from_c3d(

@@ -4,19 +4,77 @@ from __future__ import annotations
 
 import os
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
 from ..motion.column_units import FORCE, MOMENT, POSE
+from ..motion.path import Motion
+from ..motion.platform_load import Load
 from ..motion.table_writer import TableWriter
-
-if TYPE_CHECKING:
-    from .marker_motion import MarkerMotion
+from .gaps import Gap
+from .measured_channels import Beside
+from .recording import Recording
+from .registration import Registration
 
 _LISTED = 12  # gaps in the text; all are in the data
+
+
+@dataclass(frozen=True)
+class MarkerResidual:
+    """How well a marker moves with its body: distances from its place in it.
+
+    Attributes: name, body;  seen: part of the frames used, 0 to 1;  rms, largest: [m];
+                time: of the largest [s].
+    """
+
+    name: str
+    body: str
+    seen: float
+    rms: float
+    largest: float
+    time: float
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerMotion:
+    """A motion from markers, and how well they fit.
+
+    Attributes:
+        motion: X_EE in {S}, of kind "pose", without gaps.
+        measured: (N,), where it was measured; elsewhere a gap was filled.
+        residuals: of every marker, over the frames that were used.
+        gaps: filled or cut off, in their order.
+        registration: from the laboratory to {S}.
+        off_contacts: distance of each ball from its surface, root mean square and largest [m].
+        beside: what was measured beside it, at its times: markers in {S} with the base's motion
+            taken out, their residuals, and EMG, where the marker file names channels.
+        load: from force channels or a force plate, where some were named.
+        recording: what the file holds.
+        warnings: what looks wrong, or was assumed.
+    """
+
+    motion: Motion
+    measured: np.ndarray
+    residuals: tuple[MarkerResidual, ...]
+    gaps: tuple[Gap, ...]
+    registration: Registration
+    off_contacts: dict[str, tuple[float, float]]
+    beside: Beside
+    load: Load | None
+    recording: Recording
+    warnings: tuple[str, ...]
+
+    @property
+    def markers(self) -> dict[str, np.ndarray]:
+        """The markers used, by name, in {S}, (N, 3) [m]; NaN where not seen."""
+        return dict(zip(self.beside.names, self.beside.points.transpose(1, 0, 2), strict=True))
+
+    def __str__(self) -> str:
+        return in_words(self)
 
 
 def in_words(found: MarkerMotion) -> str:

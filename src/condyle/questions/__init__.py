@@ -99,12 +99,17 @@ class Question:
         """A text of everything that shapes the answer's graph."""
         s = self.structure
         told = replace(s, zeros=frozenset()), sorted(s.zeros)
-        return repr((self.name, told, self.details, version("casadi"), _sources()))
+        return repr((self.name, told, self.details, _casadi(), _sources()))
 
     def variants(self) -> Variants:
         """The graph."""
         found = QUESTIONS[self.name](self.structure, *self.details)
         return found if isinstance(found, Variants) else Variants(found)
+
+
+@lru_cache(maxsize=1)
+def _casadi() -> str:
+    return version("casadi")
 
 
 @lru_cache(maxsize=1)

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from .. import __version__
 from ..kinematics.chain import FAMILIES
 from ..mechanism.files import record
 from ..mechanism.mechanism import COORDINATES
@@ -16,6 +15,7 @@ from ..model.data import Evaluation
 from ..model.evaluator import Evaluator
 from ..motion import Load, Motion
 from ..questions.equations import LOAD as LOAD_PART
+from ..version import __version__
 from .contacts import AXES
 from .derived import Derived
 from .solution import Solution

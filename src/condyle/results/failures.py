@@ -13,7 +13,7 @@ from ..mechanism.mechanism import Mechanism
 from ..status import STATUS_NAMES, Status
 
 if TYPE_CHECKING:
-    from .solution import Solution
+    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Failure:
         return f"t = {when} ({count}): {self.status}, {self.cause}{needed}"
 
 
-def failures(solution: Solution) -> list[Failure]:
+def failures(solution: xr.Dataset) -> list[Failure]:
     """Every interval of failed samples of a solution, in order."""
     status, time = solution["status"].values, solution["time"].values
     if not status.any():
@@ -70,7 +70,7 @@ def failures(solution: Solution) -> list[Failure]:
     ]
 
 
-def _largest(solution: Solution, rows: slice, status: int) -> float | None:
+def _largest(solution: xr.Dataset, rows: slice, status: int) -> float | None:
     if status != Status.infeasible or "shortfall" not in solution:
         return None
     return float(solution["shortfall"].values[rows].max())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -12,8 +12,9 @@ from ..kinematics.bryant import rotations
 from ..markers import Beside, read_beside
 
 if TYPE_CHECKING:
-    from .solution import Solution
+    import xarray as xr
 
+S = TypeVar("S", bound="xr.Dataset")
 PLACE, RESIDUAL, OFFSET, EMG = "marker_place", "marker_residual", "marker_offset", "emg"
 
 _MEANINGS = {
@@ -24,7 +25,7 @@ _MEANINGS = {
 }
 
 
-def with_measured(solution: Solution, measured: Beside | str | os.PathLike[str]) -> Solution:
+def with_measured(solution: S, measured: Beside | str | os.PathLike[str]) -> S:
     """A copy with the variables above, as far as they were measured.
 
     They are linear between the samples of the measurement, NaN in its gaps and outside. An offset

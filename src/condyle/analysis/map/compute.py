@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ... import __version__
 from ...atomic import replacing_folder
 from ...errors import InputError, did_you_mean
 from ...extras import require
@@ -21,6 +20,7 @@ from ...mechanism.mechanism import COORDINATES, Mechanism
 from ...model.evaluator import Evaluator
 from ...motion.column_units import FORCE, MOMENT
 from ...progress import step
+from ...version import __version__
 from ..workers import check_scheduler, run_parts
 from .axes import Grid, Over, Values, grid_of, number, values_of
 from .block import Asked, Block

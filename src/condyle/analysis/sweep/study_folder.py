@@ -14,10 +14,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import xarray as xr
 
-from ... import __version__
 from ...atomic import replacing, write_text
 from ...errors import InputError
 from ...mechanism.files import read_tables, record
+from ...version import __version__
 from .job import MOTION, REASON, SECONDS, STATUS, VARIANT, Job
 from .study import some_of
 from .variants import Row

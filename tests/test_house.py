@@ -1,0 +1,90 @@
+"""The house as a whole: what files import, what they are called, what lies in the root."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+from collections import Counter
+from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+SOURCE = ROOT / "src"
+FILES = {
+    ".".join(path.relative_to(SOURCE).with_suffix("").parts).removesuffix(".__init__"): path
+    for path in SOURCE.rglob("*.py")
+}
+# A command is called as what it calls; a question as the mechanics that it asks about.
+NAMED_AFTER_OTHERS = ("cli", "questions")
+# Rooms that are being rebuilt; a name that stands once again goes from here.
+TWICE = {
+    *("base.py", "chains.py", "contact.py", "facts.py", "failures.py", "files.py", "follow.py"),
+    *("function.py", "kernel.py", "library.py", "limits.py", "live.py", "maps.py", "matlab.py"),
+    *("minimum_norm.py", "model.py", "panels.py", "plausibility.py", "poses.py", "program.py"),
+    *("quadratic.py", "reactions.py", "reference.py", "robust.py", "solution.py", "solve.py"),
+    *("source.py", "starter.py", "straight.py", "survey.py", "sweep.py", "table.py", "tradeoff.py"),
+    *("write.py", "accessors.py"),
+}
+# Documents and configuration.
+IN_THE_ROOT = {
+    *(".gitignore", ".pre-commit-config.yaml", "Makefile", "mkdocs.yml", "pyproject.toml"),
+    *("CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "README.md"),
+}
+
+
+def imports(name: str, path: Path) -> Iterator[str]:
+    """Files of the package that a file imports, for types too."""
+    package = name if path.name == "__init__.py" else name.rpartition(".")[0]
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (one.name for one in node.names if one.name in FILES)
+        elif isinstance(node, ast.ImportFrom):
+            above = package.split(".")[: 1 - node.level or None] if node.level else []
+            base = ".".join([*above, *([node.module] if node.module else [])])
+            found = {f"{base}.{one.name}" for one in node.names}
+            yield from found & FILES.keys() or {base} & FILES.keys()
+
+
+def test_no_circle_of_files() -> None:
+    graph = {name: set(imports(name, path)) - {name} for name, path in FILES.items()}
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        pytest.fail(" -> ".join(error.args[1]))
+
+
+def test_imports_are_relative() -> None:
+    """`import condyle` stands in commands, which call what a person calls."""
+    absolute = {
+        name
+        for name, path in FILES.items()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom) and not node.level
+        if (node.module or "").split(".")[0] == "condyle"
+    }
+    assert not absolute
+
+
+def test_one_name_one_file() -> None:
+    paths = [
+        path.relative_to(SOURCE / "condyle")
+        for suffix in ("py", "c", "h", "js", "css")
+        for path in SOURCE.rglob(f"*.{suffix}")
+        if path.name != "__init__.py"
+    ]
+    names = Counter(path.name for path in paths if path.parts[0] not in NAMED_AFTER_OTHERS)
+    assert {name for name, count in names.items() if count > 1} <= TWICE
+
+
+def test_the_root_holds_documents_and_configuration() -> None:
+    try:
+        call = ["git", "ls-files", "--", ":(glob)*"]
+        done = subprocess.run(call, cwd=ROOT, capture_output=True, text=True)
+    except FileNotFoundError:
+        pytest.skip("git is not installed")
+    if done.returncode:
+        pytest.skip("not a checkout")
+    assert set(done.stdout.splitlines()) <= IN_THE_ROOT
