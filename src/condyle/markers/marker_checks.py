@@ -107,19 +107,13 @@ def exchanged(
 
 def _orders(sizes: list[int]) -> list[list[int]]:
     """Orders of all markers: as labelled; every pair exchanged; every order of a small body."""
-    total = sum(sizes)
-    plain = list(range(total))
+    plain = list(range(sum(sizes)))
     orders = [plain]
-    for i, k in combinations(range(total), 2):
-        order = plain.copy()
-        order[i], order[k] = k, i
-        orders.append(order)
-    start = 0
-    for size in sizes:
-        if size <= _ALL_ORDERS:
-            here = permutations(range(start, start + size))
-            orders += [[*plain[:start], *p, *plain[start + size :]] for p in here]
-        start += size
+    for i, k in combinations(plain, 2):
+        orders.append([k if j == i else i if j == k else j for j in plain])
+    for start, size in zip(np.cumsum([0, *sizes]), sizes, strict=False):
+        here = permutations(plain[start : start + size]) if size <= _ALL_ORDERS else ()
+        orders += [[*plain[:start], *p, *plain[start + size :]] for p in here]
     return orders
 
 
@@ -128,16 +122,14 @@ def outlier(shape: np.ndarray, points: np.ndarray, within: float) -> tuple[int, 
 
     Args: shape: (m, 3);  points: (m, 3), NaN where not seen;  within: residual of the others [m].
     """
-    best: tuple[float, int, float] | None = None
-    for i in np.flatnonzero(np.isfinite(points).all(axis=1)):
-        others = points.copy()
-        others[i] = np.nan
-        body = fit(shape, others[None])
-        left = float(body.largest()[0])
-        if left <= within and (best is None or left < best[0]):
-            place = body.rotation[0] @ shape[i] + body.position[0]
-            best = left, int(i), float(np.linalg.norm(points[i] - place))
-    return None if best is None else best[1:]
+    one = np.eye(len(shape), dtype=bool)
+    body = fit(shape, np.where(one[..., None], np.nan, points))  # without each in turn
+    left = np.where(np.isfinite(points).all(axis=1), body.largest(), np.nan)
+    if not (left <= within).any():
+        return None
+    i = int(np.nanargmin(left))
+    place = body.rotation[i] @ shape[i] + body.position[i]
+    return i, float(np.linalg.norm(points[i] - place))
 
 
 def loose(names: list[str], points: np.ndarray) -> list[str]:
@@ -145,36 +137,23 @@ def loose(names: list[str], points: np.ndarray) -> list[str]:
 
     Args: names: of the body's markers;  points: (F, m, 3) [m], in any frame.
     """
-    change = _changes(points)
-    pairs = np.triu_indices(len(names), 1)
-    whole = _rms(change[pairs])
-    if whole < _LOOSE:
-        return []
-    rest = np.full(len(names), np.inf)
-    for i in range(len(names)):
-        others = np.delete(np.delete(change, i, 0), i, 1)
-        if len(others) >= FEWEST - 1:
-            rest[i] = _rms(others[np.triu_indices(len(others), 1)])
+    m, change = len(names), _changes(points)
+    total, own = change.sum(), change.sum(axis=0)
+    whole, its = np.sqrt(total / (m * (m - 1))), np.sqrt(own / (m - 1))
+    rest = np.sqrt(np.maximum(total - 2 * own, 0.0) / ((m - 1) * (m - 2)))
     best = int(np.argmin(rest))
-    if not rest[best] < _BETTER * whole:
+    if whole < _LOOSE or not rest[best] < _BETTER * whole:
         return []
-    its = _rms(np.delete(change[best], best))
     return [
         f"{names[best]} moves against the markers it is listed with: its distances from them vary "
-        f"by {its * 1e3:.3g} mm, theirs by {rest[best] * 1e3:.2g} mm"
+        f"by {its[best] * 1e3:.3g} mm, theirs by {rest[best] * 1e3:.2g} mm"
     ]
 
 
 def _changes(points: np.ndarray) -> np.ndarray:
-    """Standard deviations of the distances of all pairs, (m, m)."""
-    count = points.shape[1]
-    change = np.zeros((count, count))
-    for i, k in combinations(range(count), 2):
-        distance = np.linalg.norm(points[:, i] - points[:, k], axis=-1)
-        known = distance[np.isfinite(distance)]
-        change[i, k] = change[k, i] = known.std() if len(known) else 0.0
-    return change
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
+    """Variances of the distances of all pairs where both are seen, (m, m)."""
+    distance = np.linalg.norm(points[:, :, None] - points[:, None], axis=-1)
+    known = np.isfinite(distance)
+    count = np.maximum(known.sum(axis=0), 1)
+    mean = np.where(known, distance, 0.0).sum(axis=0) / count
+    return np.where(known, (distance - mean) ** 2, 0.0).sum(axis=0) / count

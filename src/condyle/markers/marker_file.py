@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -10,11 +9,12 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
-from ..errors import InputError, few, no_such_file, shortened
+from ..errors import InputError, ProblemsError, few
 from ..mechanism.messages import describe, shown
 from ..mechanism.table import Table
 from ..mechanism.toml import LARGEST_FILE, read_tables
-from ..motion.file_words import listed, short
+from ..motion.file_words import listed
+from ..motion.input_file import content_of
 from .channel_tables import Emg, Forces
 from .rigid import FEWEST
 
@@ -114,31 +114,18 @@ def read_markers(source: str | os.PathLike[str] | Mapping[str, Any] | MarkerFile
         return _checked(source, "markers")
     if not isinstance(source, str | os.PathLike):
         raise InputError(f"markers: expected the path of a marker file (TOML), got {shown(source)}")
-    return _checked(read_tables(_text(source), os.fspath(source)), os.fspath(source))
+    try:
+        text = content_of(source, LARGEST_FILE + 1).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{source}: is no text (UTF-8 expected); a marker file is TOML") from None
+    return _checked(read_tables(text, os.fspath(source)), os.fspath(source))
 
 
 def _checked(data: Mapping[str, Any], source: str) -> MarkerFile:
     try:
         return MarkerFile.model_validate(dict(data))
     except ValidationError as error:
-        problems = [shortened(p, 380) for p in describe(error, data, MarkerFile)]
-        count = "1 problem" if len(problems) == 1 else f"{len(problems)} problems"
-        lines = "".join(f"\n  - {p}" for p in problems[:8])
-        raise InputError(f"{shortened(source, 200)}: {count}{lines}") from None
-
-
-def _text(path: str | os.PathLike[str]) -> str:
-    try:
-        with open(path, "rb") as file:
-            content = file.read(LARGEST_FILE + 1)
-        return content.decode("utf-8-sig")
-    except FileNotFoundError:
-        raise no_such_file(path) from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: is no text (UTF-8 expected); a marker file is TOML") from None
-    except (OSError, ValueError) as error:
-        why = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"{short(os.fspath(path))}: cannot be read ({why})") from None
+        raise ProblemsError(source, describe(error, data, MarkerFile)) from None
 
 
 def _problems(places: Mapping[str, Any]) -> Iterator[str]:
@@ -148,35 +135,27 @@ def _problems(places: Mapping[str, Any]) -> Iterator[str]:
         words = "" if name in DIRECTIONS else "the label of a marker, or "
         if isinstance(value, str) and words and value:
             continue
-        if not (
-            isinstance(value, list | tuple) and len(value) == 3 and all(map(_is_number, value))
-        ):
+        three = isinstance(value, list | tuple) and len(value) == 3
+        if not (three and all(map(_is_number, value))):
             yield f"{name}: expected {words}three numbers, got {shown(value)}"
         elif name in DIRECTIONS and not any(value):
             yield f"{name}: a direction cannot be the zero vector"
     if not directed:
         if len(places) < FEWEST:
-            yield (
-                f"got {len(places)} points of the mechanism, expected {FEWEST} or more; or "
-                "forward, up and origin"
-            )
+            got = f"got {len(places)} points of the mechanism, expected {FEWEST} or more"
+            yield f"{got}; or forward, up and origin"
         return
     if missing := [name for name in (*DIRECTIONS, ORIGIN) if name not in places]:
         yield f"{listed(missing, '')} missing: directions need forward, up and origin"
         return
-    others = places.keys() - {*DIRECTIONS, ORIGIN, places[ORIGIN] if _named(places) else ""}
-    if others:
+    named = places[ORIGIN] if isinstance(places[ORIGIN], str) else ""
+    if others := places.keys() - {*DIRECTIONS, ORIGIN, named}:
         yield (
             f"{few(sorted(others))} beside forward and up; give points alone (three or more), or "
             "directions with the one point that origin names"
         )
 
 
-def _named(places: Mapping[str, Any]) -> bool:
-    return isinstance(places[ORIGIN], str)
-
-
 def _is_number(value: Any) -> bool:
-    return (
-        isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= 1e12
-    ) and math.isfinite(value)
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return number and abs(value) <= 1e12  # which no NaN is

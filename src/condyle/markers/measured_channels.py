@@ -7,8 +7,9 @@ in its body, `<marker>_residual_fixed` or `<marker>_residual_platform` [m]; of e
 
 from __future__ import annotations
 
+import math
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -55,24 +56,13 @@ class Beside:
         """The same at other times, linear between the samples; NaN beside a gap and outside."""
 
         def along(values: np.ndarray) -> np.ndarray:
-            columns = values.reshape(len(self.t), -1).T
-            found = [np.interp(times, self.t, c, np.nan, np.nan) for c in columns]
-            return (
-                np.array(found)
-                .reshape(len(found), len(times))
-                .T.reshape(len(times), *values.shape[1:])
-            )
+            columns = values.reshape(len(self.t), math.prod(values.shape[1:])).T
+            found = np.array([np.interp(times, self.t, c, np.nan, np.nan) for c in columns])
+            return found.T.reshape(len(times), *values.shape[1:])
 
-        markers = bool(self.names)
-        return Beside(
-            times,
-            self.names,
-            self.bodies,
-            along(self.points) if markers else np.empty((len(times), 0, 3)),
-            along(self.residual) if markers else np.empty((len(times), 0)),
-            {chain: along(values) for chain, values in self.emg.items()},
-            self.source,
-        )
+        emg = {chain: along(values) for chain, values in self.emg.items()}
+        points, residual = along(self.points), along(self.residual)
+        return replace(self, t=times, points=points, residual=residual, emg=emg)
 
 
 def read_beside(source: Beside | str | os.PathLike[str]) -> Beside:

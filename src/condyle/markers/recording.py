@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import CondyleError, InputError, no_such_file
+from ..errors import CondyleError, InputError
 from ..extras import require
 from ..motion.column_units import LENGTH_UNITS
-from ..motion.digest import digest
 from ..motion.file_words import short
+from ..motion.input_file import content_of, digest
 from .plates import Plate, read_plates
 
 ASSUMED = "mm"  # what laboratories mean that name no unit
@@ -89,14 +89,7 @@ def read_c3d(path: str | os.PathLike[str], unit: str | None = None) -> Recording
 
 
 def _content(path: str | os.PathLike[str]) -> bytes:
-    try:
-        with open(path, "rb") as file:
-            content = file.read()
-    except FileNotFoundError:
-        raise no_such_file(path) from None
-    except (OSError, ValueError) as error:
-        why = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"{short(os.fspath(path))}: cannot be read ({why})") from None
+    content = content_of(path)
     if len(content) < 1024 or content[1] != 0x50:
         raise InputError(
             f"{path}: is no C3D file: its second byte is not 80, or it is shorter than a header. "
