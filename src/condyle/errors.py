@@ -209,7 +209,7 @@ def did_you_mean(name: str, available: Iterable[str]) -> str:
     """' Did you mean "x"? Available: ...' for a name that is not among `available`."""
     choices = sorted(available)
     near = nearest(name, choices)
-    guess = f' Did you mean "{near[0]}"?' if near else ""
+    guess = f' Did you mean "{few(near[:1])}"?' if near else ""
     listed = f" Available: {few(choices)}." if choices else " None is available."
     return guess + listed
 
@@ -218,7 +218,7 @@ def few(names: Iterable[str]) -> str:
     """'a, b, c' of names, and of many the first ten."""
     names = list(names)
     more = f" and {len(names) - MANY} more" if len(names) > MANY else ""
-    return ", ".join(shortened(name, 80) for name in names[:MANY]) + more
+    return ", ".join(shortened(printable(name, lines=False), 80) for name in names[:MANY]) + more
 
 
 def printable(text: object, lines: bool = True) -> str:

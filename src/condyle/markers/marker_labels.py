@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..errors import InputError
-from ..motion.file_words import guess, listed
+from ..errors import InputError, did_you_mean
+from ..motion.file_words import listed
 
 
 def find_label(name: str, labels: Sequence[str], where: str, what: str = "marker") -> int:
@@ -25,7 +25,7 @@ def find_label(name: str, labels: Sequence[str], where: str, what: str = "marker
             cure = "rename one of them in the file" if alike else "give the whole label"
             raise InputError(f'{where}: {what} "{name}" may be any of {several}; {cure}')
     present = [label for label in labels if label and not label.startswith("*")]
-    raise InputError(f'{where}: has no {what} "{name}".{guess(name, present)}')
+    raise InputError(f'{where}: has no {what} "{name}".{did_you_mean(name, present)}')
 
 
 def _spaced(label: str) -> str:

@@ -8,9 +8,9 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from .column_units import Dimension, dimension, is_unit, unit_factor
-from .file_words import columns_are, guess, listed, short
+from .file_words import columns_are, listed, short
 
 MAX_COLUMNS = 10_000
 
@@ -119,5 +119,5 @@ def _refuse_misspelt(where: str, extra: Sequence[str], absent: Sequence[str]) ->
         alike = [text for text in by_letter.get(name[0].casefold(), ()) if len(text) < 40]
         if near := get_close_matches(name, alike, 1, cutoff):
             raise InputError(
-                f"{where}: {columns_are(near)} not known here.{guess(near[0], absent)}"
+                f"{where}: {columns_are(near)} not known here.{did_you_mean(near[0], absent)}"
             )

@@ -6,8 +6,8 @@ import math
 import re
 from dataclasses import dataclass, field
 
-from ..errors import InputError
-from .file_words import guess, short
+from ..errors import InputError, did_you_mean
+from .file_words import short
 
 POSE = ("X", "Y", "Z", "alpha", "beta", "gamma")
 LANDMARK = ("x", "y", "z")
@@ -123,7 +123,7 @@ def parse_units(text: str | Units | None) -> Units:
     for word in (part.strip() for part in text.split(",")):
         kind = next((kind for kind, table in tables.items() if word in table), None)
         if kind is None:
-            hint = guess(word, [unit for table in tables.values() for unit in table])
+            hint = did_you_mean(word, [unit for table in tables.values() for unit in table])
             raise InputError(f'units "{short(text)}": "{short(word)}" is not a unit.{hint}')
         if kind in found:
             raise InputError(

@@ -22,8 +22,8 @@ import numpy as np
 from ..errors import InputError
 from .column_names import Header, read_header
 from .csv_head import NUMBER, Head, Source, opened, read_head, read_line, split
-from .file_words import listed, printable, short
-from .number_table import Known, Table
+from .file_words import listed, short, shown_path
+from .number_table import Known, Table, table_of
 
 _CELL = 20  # bytes that a number takes with its separator
 
@@ -40,7 +40,7 @@ def iter_csv(
 
     Args: gaps: empty cells are NaN, and no error.
     """
-    source = printable(os.fspath(path))
+    source = shown_path(path)
     with opened(path) as file:
         head = read_head(source, file)
         header = read_header(f"{source}, line {head.line}", head.names, known)
@@ -48,18 +48,13 @@ def iter_csv(
         line, block, found = head.first_line, head.rows, False
         while block := block + _block(file, chunk_rows * len(head.names) * _CELL, source):
             values, lines, count = parser.parse(block, line)
-            columns = {
-                name: column * header.scale.get(name, 1.0)
-                for name, column in zip(header.index, values, strict=True)
-            }
             line += count
-            rows = len(lines)
-            for start in range(0, rows, chunk_rows):
+            for start in range(0, len(lines), chunk_rows):
                 found = True
                 part = slice(start, start + chunk_rows)
-                chunk = {name: column[part] for name, column in columns.items()}
-                share = len(block) * len(lines[part]) // rows
-                yield Table(source, chunk, lines[part], header.scale, header.ignored), share
+                share = len(block) * len(lines[part]) // len(lines)
+                columns = [column[part] for column in values]
+                yield table_of(source, header, columns, lines[part], checked=False), share
             block = b""
         if not found:
             raise InputError(f"{source}: has column names but no rows of numbers")

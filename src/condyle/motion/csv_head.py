@@ -12,7 +12,7 @@ from io import BufferedReader, FileIO, TextIOWrapper
 from typing import Protocol
 
 from ..errors import InputError, no_such_file
-from .file_words import printable, short
+from .file_words import short, shown_path
 
 LONGEST = 1 << 24  # bytes of a line: beyond, it is no table
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
@@ -116,7 +116,7 @@ def opened(path: str | os.PathLike[str]) -> Iterator[Source]:
     """The file as UTF-8, or an InputError that says why not."""
     if "\0" in os.fspath(path):
         raise InputError(f"{os.fspath(path)!r}: is not the name of a file")
-    shown = printable(os.fspath(path))
+    shown = shown_path(path)
     try:
         with FileIO(path) as bare, BufferedReader(bare, 1 << 17) as raw:
             head = raw.peek(1 << 16)

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from .column_names import read_header
+from .column_names import Header, read_header
 from .file_words import short
-from .number_table import Known, Table, checked_columns
+from .number_table import Known, Table, table_of
 
 
 def is_frame(data: Any) -> bool:
@@ -26,24 +26,21 @@ def table_from_frame(frame: Any, known: Known, source: str) -> Table:
         raise InputError(f"{source}: got a {type(frame).__name__}, expected a pandas DataFrame")
     names = [str(name) for name in frame.columns]
     header = read_header(source, names, known)
-    columns = {
-        name: _numbers(frame.iloc[:, i], f'{source}, column "{short(names[i])}"')
-        * header.scale.get(name, 1.0)
-        for name, i in header.index.items()
-    }
-    scale = dict(header.scale)
-    if "t" not in columns and "t" in known:
-        name = str(frame.index.name or "t")
+    columns = [
+        _numbers(frame.iloc[:, i], f'{source}, column "{short(names[i])}"')
+        for i in header.index.values()
+    ]
+    if "t" not in header.index and "t" in known:
         try:
-            index = read_header("index", [name], ("t",))
+            index = read_header("index", [str(frame.index.name or "t")], ("t",))
         except InputError as error:
             raise InputError(
                 f'{source}: has no column "t", nor is its index one ({error})'
             ) from None
-        t = _numbers(frame.index, f"{source}, index") * index.scale.get("t", 1.0)
-        columns, scale = {"t": t, **columns}, scale | index.scale
-    rows = np.arange(1, len(frame) + 1)
-    return checked_columns(Table(source, columns, rows, scale, header.ignored, "row"))
+        columns.insert(0, _numbers(frame.index, f"{source}, index"))
+        places, scale = {"t": -1} | header.index, header.scale | index.scale
+        header = Header(places, scale, header.ignored)
+    return table_of(source, header, columns, np.arange(1, len(frame) + 1), "row")
 
 
 def _numbers(values: Any, where: str) -> np.ndarray:

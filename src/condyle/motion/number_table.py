@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
+from .column_names import Header
 from .column_units import Dimension, Units, dimension
-from .file_words import columns_are, guess
+from .file_words import columns_are
 
 Known = Collection[str] | Mapping[str, Dimension]
 
@@ -64,7 +65,7 @@ class Table:
         """
         names = list(names)
         if missing := [name for name in names if name not in self.columns]:
-            hint = guess(missing[0], [*self.columns, *self.ignored])
+            hint = did_you_mean(missing[0], [*self.columns, *self.ignored])
             raise InputError(f"{self.source}: {columns_are(missing)} missing.{hint}")
         return np.column_stack([self.columns[name] for name in names])
 
@@ -86,11 +87,25 @@ class Table:
         }
 
 
-def checked_columns(table: Table) -> Table:
-    """The table, if all its numbers are finite.
+def table_of(
+    source: str,
+    header: Header,
+    values: Iterable[np.ndarray],
+    lines: np.ndarray,
+    counted: str = "line",
+    checked: bool = True,
+) -> Table:
+    """The table of the columns that a header names, in its order, as they stand in the file.
 
-    Raises: InputError: for the first that is not.
+    Raises: InputError: for the first number that is not finite, if that is to be checked.
     """
+    columns = {
+        name: column * header.scale.get(name, 1.0)
+        for name, column in zip(header.index, values, strict=True)
+    }
+    table = Table(source, columns, lines, header.scale, header.ignored, counted)
+    if not checked:
+        return table
     for name, column in table.columns.items():
         bad = np.flatnonzero(~np.isfinite(column))
         if len(bad):

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..errors import InputError, no_such_file
 from .column_names import read_header
-from .file_words import printable, short
-from .number_table import Known, Table, checked_columns
+from .file_words import short, shown_path
+from .number_table import Known, Table, table_of
 
 _BUFFER = 1 << 20  # bytes of a column at once; the library's own choice keeps whole files
 
@@ -28,7 +28,7 @@ def iter_parquet(
 
     if not os.path.exists(path):
         raise no_such_file(path)
-    source = printable(os.fspath(path))
+    source = shown_path(path)
     try:
         with pq.ParquetFile(path, pre_buffer=False, buffer_size=_BUFFER) as file:
             names = file.schema_arrow.names
@@ -40,16 +40,13 @@ def iter_parquet(
             size, first = os.path.getsize(path), 1
             for batch in file.iter_batches(chunk_rows, columns=wanted, use_threads=False):
                 rows = batch.num_rows
-                columns = {
-                    name: _numbers(
-                        batch.column(text), f'{source}, column "{short(text)}"', first, gaps
-                    )
-                    * header.scale.get(name, 1.0)
-                    for name, text in zip(header.index, wanted, strict=True)
-                }
+                columns = [
+                    _numbers(batch.column(text), f'{source}, column "{short(text)}"', first, gaps)
+                    for text in wanted
+                ]
                 lines = np.arange(first, first + rows)
-                table = Table(source, columns, lines, header.scale, header.ignored, "row")
-                yield table if gaps else checked_columns(table), size * rows // total
+                table = table_of(source, header, columns, lines, "row", checked=not gaps)
+                yield table, size * rows // total
                 first += rows
             if first != total + 1:
                 raise InputError(f"{source}: says it has {total} rows, but {first - 1} came")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ..errors import InputError
-from .file_words import guess, listed
+from ..errors import InputError, did_you_mean
+from .file_words import listed
 
 DEFAULT_LANDMARK = "incisor"
 DEFAULT_LOAD_POINT = "right_molar"
@@ -31,7 +31,7 @@ def _resolve(name: str | None, points: Iterable[str], default: str, what: str, o
     points = list(points)
     if name is not None:
         if name not in points:
-            raise InputError(f'the mechanism has no {what} "{name}".{guess(name, points)}')
+            raise InputError(f'the mechanism has no {what} "{name}".{did_you_mean(name, points)}')
         return name
     if default in points:
         return default
