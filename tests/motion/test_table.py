@@ -46,7 +46,7 @@ PLAIN = "t,x,y\n0,1.5,-2\n0.5,2.5e-3,+.25\n"
 )
 def test_the_ways_programs_and_spreadsheets_write_a_table(csv_file, content):
     table = read_table(csv_file(content))
-    assert table.names == ("t", "x", "y") and table.rows == 2
+    assert tuple(table.columns) == ("t", "x", "y") and table.rows == 2
     np.testing.assert_array_equal(table.require("yxt"), [[-2, 1.5, 0], [0.25, 2.5e-3, 0.5]])
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,26 @@ from ..errors import InputError
 from .column_names import Header, read_header
 from .file_words import short
 from .number_table import Known, Table, table_of
+
+
+def as_sampled(given: Any, kind: type, arrays: str) -> Any:
+    """A motion or load from what people give for one: itself, the path of a file, a DataFrame.
+
+    Raises: InputError: for anything else; `arrays` is how arrays become one.
+    """
+    made: Any = kind
+    if isinstance(given, kind):
+        return given
+    if isinstance(given, str | os.PathLike):
+        return made.from_csv(given)
+    if is_frame(given):
+        return made.from_frame(given)
+    got, name = type(given).__name__, kind.__name__
+    raise InputError(
+        f"{name.lower()}: got a {got}, expected a condyle.{name}, the path of a file, or a "
+        f"DataFrame. Arrays become one by {name}.from_arrays({arrays})"
+        + (". The order is solve(motion, load)" if got in ("Motion", "Load") else "")
+    )
 
 
 def is_frame(data: Any) -> bool:

@@ -40,14 +40,6 @@ class Table:
         return len(self.lines)
 
     @property
-    def names(self) -> tuple[str, ...]:
-        return tuple(self.columns)
-
-    @property
-    def first_line(self) -> int:
-        return int(self.lines[0])
-
-    @property
     def warnings(self) -> tuple[str, ...]:
         """What the reader of the results should know about the file."""
         if not self.ignored:

@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from ..errors import InputError
 from .arrays import as_samples, check_rising
 from .column_units import LANDMARK, POSE, Units, parse_units
 from .file_words import listed
-from .frame import is_frame, table_from_frame
+from .frame import as_sampled, table_from_frame
 from .input_file import digest
 from .memory import memory_at_hand
 from .number_table import Table
@@ -30,6 +30,16 @@ Kind = Literal["coordinates", "pose", "landmark"]
 MIN_ROWS = 6
 _SAMPLE_BYTES = 3000  # that a sample takes until its results are written
 _SLACK = 1e-9  # [s], by which output times may miss the input's ends through rounding
+
+
+class Options(TypedDict, total=False):
+    """Of `Motion.from_arrays`, which says what they are."""
+
+    landmark: str | None
+    cutoff: float | str | None
+    rate: float | None
+    times: Any
+    trim: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,21 +85,14 @@ class Motion:
         path: str | os.PathLike[str],
         *,
         units: str | Units | None = None,
-        landmark: str | None = None,
-        cutoff: float | str | None = None,
-        rate: float | None = None,
-        times: Any = None,
-        trim: float = 0.0,
+        **options: Unpack[Options],
     ) -> Motion:
         """Read a motion file: `t` and pose coordinates, or `t,x,y,z`; see `from_arrays`.
 
         CSV, or Parquet if the name ends in .parquet. Where the header names units, those hold.
         """
         table = read_table(path, known=("t", *POSE, *LANDMARK))
-        motion = cls._from_table(
-            table, units, landmark=landmark, cutoff=cutoff, rate=rate, times=times, trim=trim
-        )
-        return replace(motion, sha256=digest(path))
+        return replace(cls._from_table(table, units, **options), sha256=digest(path))
 
     @classmethod
     def from_frame(
@@ -97,21 +100,17 @@ class Motion:
         frame: Any,
         *,
         units: str | Units | None = None,
-        landmark: str | None = None,
-        cutoff: float | str | None = None,
-        rate: float | None = None,
-        times: Any = None,
-        trim: float = 0.0,
         source: str = "motion",
+        **options: Unpack[Options],
     ) -> Motion:
         """The same from a pandas DataFrame; its index is the time if no column is."""
         table = table_from_frame(frame, ("t", *POSE, *LANDMARK), source)
-        return cls._from_table(
-            table, units, landmark=landmark, cutoff=cutoff, rate=rate, times=times, trim=trim
-        )
+        return cls._from_table(table, units, **options)
 
     @classmethod
-    def _from_table(cls, table: Table, units: str | Units | None, **options: Any) -> Motion:
+    def _from_table(
+        cls, table: Table, units: str | Units | None, **options: Unpack[Options]
+    ) -> Motion:
         table.require(["t"])
         values = table.si(parse_units(units))
         t = values.pop("t")
@@ -181,18 +180,8 @@ class Motion:
         if not np.isfinite(second).all():
             raise InputError(f"{source}: times or values are too extreme to differentiate")
         warnings = motion_warnings(source, names, t, value, first)
-        return cls(
-            kind,
-            names,
-            landmark,
-            out,
-            value,
-            first,
-            second,
-            source,
-            smoothing,
-            warnings=warnings,
-        )
+        derivatives = value, first, second
+        return cls(kind, names, landmark, out, *derivatives, source, smoothing, warnings=warnings)
 
 
 def as_motion(motion: Any) -> Motion:
@@ -200,17 +189,7 @@ def as_motion(motion: Any) -> Motion:
 
     Raises: InputError: for anything else.
     """
-    if isinstance(motion, Motion):
-        return motion
-    if isinstance(motion, str | os.PathLike):
-        return Motion.from_csv(motion)
-    if is_frame(motion):
-        return Motion.from_frame(motion)
-    raise InputError(
-        f"motion: got a {type(motion).__name__}, expected a condyle.Motion, the path of a file, or "
-        "a DataFrame. Arrays become one by Motion.from_arrays(t, values, names)"
-        + (". The order is solve(motion, load)" if type(motion).__name__ == "Load" else "")
-    )
+    return as_sampled(motion, Motion, "t, values, names")
 
 
 def _by_name(values: Any, names: Sequence[str] | None, source: str) -> dict[str, np.ndarray]:
@@ -256,12 +235,7 @@ def _interpolant(t: np.ndarray, values: np.ndarray, source: str) -> BSpline:
         raise InputError(f"{source}: no spline goes through the samples ({error})") from error
 
 
-def _output_times(
-    t: np.ndarray,
-    rate: float | None,
-    times: Any,
-    source: str,
-) -> np.ndarray:
+def _output_times(t: np.ndarray, rate: float | None, times: Any, source: str) -> np.ndarray:
     if rate is not None and times is not None:
         raise InputError(f"{source}: both a rate and times were given; expected one of them")
     if times is not None:

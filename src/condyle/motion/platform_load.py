@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import InputError
 from .arrays import as_samples, check_rising
 from .column_units import FORCE, MOMENT
-from .frame import is_frame, table_from_frame
+from .frame import as_sampled, table_from_frame
 from .input_file import digest
 from .number_table import Table
 from .table_reader import read_table
@@ -138,19 +138,7 @@ def as_load(load: Any) -> Load:
 
     Raises: InputError: for anything else.
     """
-    if isinstance(load, Load):
-        return load
-    if load is None:
-        return Load.zero()
-    if isinstance(load, str | os.PathLike):
-        return Load.from_csv(load)
-    if is_frame(load):
-        return Load.from_frame(load)
-    raise InputError(
-        f"load: got a {type(load).__name__}, expected a condyle.Load, the path of a file, or a "
-        "DataFrame. Arrays become one by Load.from_arrays(t, force, moment)"
-        + (". The order is solve(motion, load)" if type(load).__name__ == "Motion" else "")
-    )
+    return Load.zero() if load is None else as_sampled(load, Load, "t, force, moment")
 
 
 def _vectors(values: Any, name: str, source: str, rows: int) -> np.ndarray:
