@@ -22,12 +22,12 @@ CONVERGED = 0.0  # what the quality of singular values must be at least
 def configuration(structure: Structure) -> Program:
     """The configuration at whole poses that meet the contacts."""
     b = Builder(structure)
-    rows = add(b, given(b, still=True))
+    rows = add_configuration(b, given(b, still=True))
     b.output("J_W", rows, "1", structure.m)
     return b.finish()
 
 
-def add(b: Builder, platform: Platform) -> Lanes:
+def add_configuration(b: Builder, platform: Platform) -> Lanes:
     """The configuration among a question's outputs; returns the dimensionless rows of J_W."""
     loops = loops_of(b, platform)
     rows = on_rates(b, platform, [loop.rod / loop.rod_length for loop in loops], scaled=True)

@@ -214,7 +214,11 @@ def _angle_sine(forms: tuple[tuple[str, int], ...], dependent: tuple[str, ...]) 
 
 def constants_of(mechanism: Mechanism) -> list[ChainNumbers]:
     """Constants of every chain, by the names of its family."""
-    return [FAMILIES[chain.kind].constants(chain) for chain in mechanism.chains]
+    found = ((FAMILIES[chain.kind], chain) for chain in mechanism.chains)
+    return [
+        {name: np.asarray(v, dtype=float) for name, v in family.constants(chain).items()}
+        for family, chain in found
+    ]
 
 
 def end_masses(mechanism: Mechanism, constants: Sequence[ChainNumbers]) -> dict[Vector, float]:

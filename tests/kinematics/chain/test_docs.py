@@ -19,7 +19,7 @@ def test_quotes_are_in_the_sources() -> None:
     package = Path(condyle.__file__).parent
     sources = [(package / name).read_text() for name in SOURCES]
     quotes = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
-    assert len(quotes) == 6
+    assert len(quotes) == 5
     for quote in quotes:
         assert any(quote in source for source in sources), quote
 

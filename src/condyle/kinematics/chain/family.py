@@ -111,6 +111,13 @@ class Loop:
     J_A_scale: ca.SX
     cos_gamma: ca.SX
 
+    @staticmethod
+    def of(N: ca.SX, joint: ca.SX, rod: ca.SX, length: ca.SX, **rest: ca.SX) -> Loop:
+        """From the rod vector, whose angles in N_i0 are the other joint coordinates."""
+        beta, gamma, cos_gamma = rod_angles(N, rod, length)
+        q_r = ca.vertcat(joint, beta, gamma)
+        return Loop(q_r=q_r, rod=rod, rod_length=length, cos_gamma=cos_gamma, **rest)
+
     @property
     def transmission(self) -> ca.SX:
         """Sine of the transmission angle."""
@@ -171,8 +178,8 @@ class Family(ABC):
     padding: ClassVar[tuple[str, ...]] = ()
 
     @abstractmethod
-    def constants(self, chain: Any) -> dict[str, np.ndarray]:
-        """Numbers of one chain, by the names of `shapes`."""
+    def constants(self, chain: Any) -> dict[str, Any]:
+        """Numbers of one chain, by the names of `shapes`: arrays, or what makes them."""
 
     @abstractmethod
     def end_point(self, c: Constants, q_r: ca.SX) -> ca.SX:
@@ -219,7 +226,7 @@ class Family(ABC):
         return sum(cls.shapes.values())
 
     @classmethod
-    def vector(cls, values: dict[str, np.ndarray]) -> np.ndarray:
+    def vector(cls, values: dict[str, Any]) -> np.ndarray:
         """Constants in the order of `shapes`, (size,)."""
         return np.concatenate([np.ravel(values[name]) for name in cls.shapes])
 

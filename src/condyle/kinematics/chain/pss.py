@@ -11,105 +11,43 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from .family import (
-    ChainDynamics,
-    Constants,
-    Cut,
-    Family,
-    Joint,
-    Link,
-    Loop,
-    axial_force,
-    joint_position,
-    rod_angles,
-    rod_direction,
-    rod_frame,
-    rod_guide,
-    rod_inertia,
-    rod_masses,
-    rod_spin,
-)
+from .family import ChainDynamics, Constants, Cut, Joint, Link, Loop, joint_position
+from .rod import ROD, RodFamily
 
 
-class PSSFamily(Family):
+class PSSFamily(RodFamily):
     kind = "PSS"
     bodies = ("sliders", "rods")
+    ball = ("slider_joint", "slider's joint S")
     joint_unit = "m"
     effort_unit = "N"
-    # S is the slider's joint at home; N is N_i0 and Y its second axis.
+    # S is the slider's joint at home.
     padding = ("branch", "mass", "transverse", "axial", "slider")
-    shapes = {
-        "S": 3,
-        "axis": 3,
-        "L": 1,
-        "branch": 1,
-        "Y": 3,
-        "mass": 1,
-        "com": 1,
-        "transverse": 1,
-        "axial": 1,
-        "slider": 1,
-        "N": 9,
-    }
+    shapes = {"S": 3, "axis": 3, **ROD, "slider": 1, "N": 9}
 
-    def constants(self, chain: Any) -> dict[str, np.ndarray]:
-        rod = np.subtract(chain.platform, chain.base)
+    def constants(self, chain: Any) -> dict[str, Any]:
         axis = np.asarray(chain.axis) / np.linalg.norm(chain.axis)
-        N = rod_frame(rod)
-        values = {
+        return {
             "S": chain.base,
             "axis": axis,
-            "L": np.linalg.norm(rod),
-            "branch": np.sign(rod @ axis),
-            "Y": N[:, 1],
-            "mass": chain.rod.mass,
-            "com": chain.rod.com,
-            "transverse": chain.rod.transverse,
-            "axial": chain.rod.axial,
+            "branch": np.sign(np.subtract(chain.platform, chain.base) @ axis),
             "slider": chain.slider.mass,
-            "N": N,
+            **self.rod_constants(chain.rod, chain.base, chain.platform),
         }
-        return {name: np.asarray(value, dtype=float) for name, value in values.items()}
 
-    def end_point(self, c: Constants, q_r: ca.SX) -> ca.SX:
-        return c.S + q_r[0] * c.axis + c.L * rod_direction(c.N, q_r)
+    def tip(self, c: Constants, q_r: ca.SX) -> ca.SX:
+        return c.S + q_r[0] * c.axis
 
-    def links(self, c: Constants, q_r: ca.SX) -> list[Link]:
-        S, n = c.S + q_r[0] * c.axis, rod_direction(c.N, q_r)
-        return [
-            Link("sliders", c.slider, S, ca.SX(3, 3), ca.SX(3, 3)),
-            Link(
-                "rods",
-                c.mass,
-                S + c.com * c.L * n,
-                rod_spin(c.N, q_r),
-                rod_inertia(n, c.transverse, c.axial),
-            ),
-        ]
-
-    def joints(self, c: Constants, q_r: ca.SX) -> list[Joint]:
-        S = c.S + q_r[0] * c.axis
-        return [
-            Joint.slide("rail", "slider's joint S", S, c.axis),
-            Joint.ball("slider_joint", "slider's joint S", S, rod_guide(c.N, q_r)),
-        ]
+    def driven(self, c: Constants, q_r: ca.SX) -> tuple[Link, Joint]:
+        S = self.tip(c, q_r)
+        link = Link("sliders", c.slider, S, ca.SX(3, 3), ca.SX(3, 3))
+        return link, Joint.slide("rail", "slider's joint S", S, c.axis)
 
     def loop(self, c: Constants, M: ca.SX) -> Loop:
         x, root, e, e_a = self._close(c, M)
-        beta, gamma, cos_gamma = rod_angles(c.N, e, c.L)
-        return Loop(
-            q_r=ca.vertcat(x, beta, gamma),
-            discriminant=root / c.L**2,
-            J=e / e_a,
-            rod=e,
-            rod_length=c.L,
-            J_A=-2 * e_a,
-            J_A_scale=2 * c.L,
-            cos_gamma=cos_gamma,
+        return Loop.of(
+            c.N, x, e, c.L, discriminant=root / c.L**2, J=e / e_a, J_A=-2 * e_a, J_A_scale=2 * c.L
         )
-
-    def end_masses(self, c: Constants) -> dict[str, ca.SX]:
-        return {"rods": rod_masses(c.mass, c.com, c.transverse, c.L)[0]}
 
     def dynamics(
         self, c: Constants, M: ca.SX, V: ca.SX, A: ca.SX, g: ca.SX, cut: Cut = ca.SX
@@ -123,8 +61,7 @@ class PSSFamily(Family):
         acceleration = cut(ca.dot(J, A) + ca.dot(e_rate, e_rate) * inverse)
         S_acceleration = c.axis * acceleration
 
-        _, m_SM, m_SS = rod_masses(c.mass, c.com, c.transverse, c.L)
-        axial = axial_force(e, e_rate, A - S_acceleration, c.Y, c.L, c.axial)
+        m_SM, m_SS, axial = self.rod_inertias(c, e, e_rate, A - S_acceleration)
         # m (1 - com) = m_SM + m_SS splits the weight that the slider carries.
         return ChainDynamics(
             forces={"rods": m_SM * S_acceleration - m_SM * g + axial},

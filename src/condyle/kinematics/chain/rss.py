@@ -14,56 +14,24 @@ import numpy as np
 
 from ...mechanism.bodies import cross
 from ..rotation import rotation_z
-from .family import (
-    ChainDynamics,
-    Constants,
-    Cut,
-    Family,
-    Joint,
-    Link,
-    Loop,
-    axial_force,
-    joint_position,
-    rod_angles,
-    rod_direction,
-    rod_frame,
-    rod_guide,
-    rod_inertia,
-    rod_masses,
-    rod_spin,
-)
+from .family import ChainDynamics, Constants, Cut, Joint, Link, Loop, joint_position
+from .rod import ROD, RodFamily
 
 LEVEL = 1e-15  # sine of a shaft's tilt below which its crank plane is plane_1 to rounding
 
 
-class RSSFamily(Family):
+class RSSFamily(RodFamily):
     kind = "RSS"
     bodies = ("cranks", "couplers")
+    ball = ("crank_tip", "crank tip S")
     joint_unit = "rad"
     effort_unit = "N m"
-    # `plane_1` and `plane_2` span the crank plane; plane_1[2] = 0 saves a constant.
-    # C and N are C_i0 and N_i0; Y is the second axis of N.
+    # `plane_1` and `plane_2` span the crank plane; plane_1[2] = 0 saves a constant. C is C_i0.
     padding = ("branch", "mass", "transverse", "axial", "crank")
-    shapes = {
-        "G": 3,
-        "plane_1": 2,
-        "plane_2": 3,
-        "l": 1,
-        "L": 1,
-        "branch": 1,
-        "Y": 3,
-        "mass": 1,
-        "com": 1,
-        "transverse": 1,
-        "axial": 1,
-        "crank": 1,
-        "C": 9,
-        "N": 9,
-    }
+    shapes = {"G": 3, "plane_1": 2, "plane_2": 3, "l": 1, **ROD, "crank": 1, "C": 9, "N": 9}
 
-    def constants(self, chain: Any) -> dict[str, np.ndarray]:
+    def constants(self, chain: Any) -> dict[str, Any]:
         crank = np.subtract(chain.crank_tip, chain.base)
-        coupler = np.subtract(chain.platform, chain.crank_tip)
         x = crank / np.linalg.norm(crank)
         z = np.asarray(chain.axis) - np.dot(chain.axis, x) * x
         z /= np.linalg.norm(z)
@@ -73,49 +41,26 @@ class RSSFamily(Family):
         plane_1 = plane_1 / size if size > LEVEL else np.array([1.0, 0.0])
         if size <= LEVEL:
             z = np.array([0.0, 0.0, np.sign(z[2])])  # the crank plane is plane_1 to rounding
-        N = rod_frame(coupler)
-        values = {
+        return {
             "G": chain.base,
             "plane_1": plane_1,
             "plane_2": cross(z, [*plane_1, 0.0]),
             "l": np.linalg.norm(crank),
-            "L": np.linalg.norm(coupler),
-            "branch": -np.sign(coupler @ y),
-            "Y": N[:, 1],
-            "mass": chain.coupler.mass,
-            "com": chain.coupler.com,
-            "transverse": chain.coupler.transverse,
-            "axial": chain.coupler.axial,
+            "branch": -np.sign(np.subtract(chain.platform, chain.crank_tip) @ y),
             "crank": chain.crank.inertia,
             "C": np.column_stack([x, y, z]),
-            "N": N,
+            **self.rod_constants(chain.coupler, chain.crank_tip, chain.platform),
         }
-        return {name: np.asarray(value, dtype=float) for name, value in values.items()}
 
-    def end_point(self, c: Constants, q_r: ca.SX) -> ca.SX:
-        return self._crank_tip(c, q_r) + c.L * rod_direction(c.N, q_r)
+    def tip(self, c: Constants, q_r: ca.SX) -> ca.SX:
+        return c.G + (c.C @ rotation_z(ca.cos(q_r[0]), ca.sin(q_r[0])))[:, 0] * c.l
 
-    def links(self, c: Constants, q_r: ca.SX) -> list[Link]:
-        n = rod_direction(c.N, q_r)
+    def driven(self, c: Constants, q_r: ca.SX) -> tuple[Link, Joint]:
         Z_C = c.C[:, 2]
-        crank_spin = ca.horzcat(Z_C, ca.SX(3, 2))
-        return [
-            # The crank's mass centre is on its shaft, so its mass never matters (eq. 39).
-            Link("cranks", ca.SX(0), c.G, crank_spin, c.crank * (Z_C @ Z_C.T)),
-            Link(
-                "couplers",
-                c.mass,
-                self._crank_tip(c, q_r) + c.com * c.L * n,
-                rod_spin(c.N, q_r),
-                rod_inertia(n, c.transverse, c.axial),
-            ),
-        ]
-
-    def joints(self, c: Constants, q_r: ca.SX) -> list[Joint]:
-        return [
-            Joint.shaft("shaft", "crank pivot G", c.G, c.C[:, 2]),
-            Joint.ball("crank_tip", "crank tip S", self._crank_tip(c, q_r), rod_guide(c.N, q_r)),
-        ]
+        # The crank's mass centre is on its shaft, so its mass never matters (eq. 39).
+        spin = ca.horzcat(Z_C, ca.SX(3, 2))
+        link = Link("cranks", ca.SX(0), c.G, spin, c.crank * (Z_C @ Z_C.T))
+        return link, Joint.shaft("shaft", "crank pivot G", c.G, Z_C)
 
     def loop(self, c: Constants, M: ca.SX) -> Loop:
         d = M - c.G
@@ -127,21 +72,16 @@ class RSSFamily(Family):
         cosine, sine = (a * k - b * s) / h, (b * k + a * s) / h
         tangent = c.l * (c.C[:, 1] * cosine - c.C[:, 0] * sine)
         e = d - c.l * (c.C[:, 0] * cosine + c.C[:, 1] * sine)
-        e_t = -c.l * s
-        beta, gamma, cos_gamma = rod_angles(c.N, e, c.L)
-        return Loop(
-            q_r=ca.vertcat(ca.atan2(b * k + a * s, a * k - b * s), beta, gamma),
+        return Loop.of(
+            c.N,
+            ca.atan2(b * k + a * s, a * k - b * s),
+            e,
+            c.L,
             discriminant=root / c.L**2,
             J=e / ca.dot(e, tangent),
-            rod=e,
-            rod_length=c.L,
-            J_A=-2 * e_t,
+            J_A=2 * c.l * s,
             J_A_scale=2 * c.l * c.L,
-            cos_gamma=cos_gamma,
         )
-
-    def end_masses(self, c: Constants) -> dict[str, ca.SX]:
-        return {"couplers": rod_masses(c.mass, c.com, c.transverse, c.L)[0]}
 
     def dynamics(
         self, c: Constants, M: ca.SX, V: ca.SX, A: ca.SX, g: ca.SX, cut: Cut = ca.SX
@@ -170,8 +110,7 @@ class RSSFamily(Family):
         acceleration = cut(ca.dot(J, A) + square * inverse_e_t)
         S_acceleration = t * acceleration - r * rate2
 
-        _, m_SM, m_SS = rod_masses(c.mass, c.com, c.transverse, c.L)
-        axial = axial_force(e, e_rate, A - S_acceleration, c.Y, c.L, c.axial)
+        m_SM, m_SS, axial = self.rod_inertias(c, e, e_rate, A - S_acceleration)
         # m (1 - com) = m_SM + m_SS splits the weight that the crank carries.
         return ChainDynamics(
             forces={"couplers": m_SM * S_acceleration - m_SM * g + axial},
@@ -185,28 +124,20 @@ class RSSFamily(Family):
         )
 
     def explain(self, chain: Any, pose: np.ndarray) -> str:
-        near, far = self._distances(chain, pose)
+        near, far, length = (f"{v * 1e3:.1f}" for v in self._distances(chain, pose))
         return (
-            f'chain "{chain.name}" cannot reach M: its crank tip is {near * 1e3:.1f} to '
-            f"{far * 1e3:.1f} mm from M, the coupler is {self._length(chain) * 1e3:.1f} mm long"
+            f'chain "{chain.name}" cannot reach M: its crank tip is {near} to {far} mm from M, '
+            f"the coupler is {length} mm long"
         )
 
     def span(self, chain: Any, pose: np.ndarray) -> tuple[float, float]:
-        near, far = self._distances(chain, pose)
-        length = self._length(chain)
+        near, far, length = self._distances(chain, pose)
         return (near if near > length else far), length
 
-    def _length(self, chain: Any) -> float:
-        return float(self.constants(chain)["L"])
-
-    def _distances(self, chain: Any, pose: np.ndarray) -> tuple[float, float]:
-        """Least and largest distance of the crank tip from M, over a turn of the crank [m]."""
+    def _distances(self, chain: Any, pose: np.ndarray) -> tuple[float, float, float]:
+        """The crank tip's distances from M over a turn, least and largest, and L [m]."""
         c = self.constants(chain)
         d = joint_position(chain, pose) - c["G"]
         across, along = np.linalg.norm(c["C"][:, :2].T @ d), c["C"][:, 2] @ d
         near, far = np.hypot(across - c["l"], along), np.hypot(across + c["l"], along)
-        return float(near), float(far)
-
-    @staticmethod
-    def _crank_tip(c: Constants, q_r: ca.SX) -> ca.SX:
-        return c.G + (c.C @ rotation_z(ca.cos(q_r[0]), ca.sin(q_r[0])))[:, 0] * c.l
+        return float(near), float(far), float(c["L"])

@@ -16,52 +16,29 @@ from .family import (
     ChainDynamics,
     Constants,
     Cut,
-    Family,
     Joint,
     Link,
-    Loop,
-    rod_angles,
     rod_direction,
-    rod_frame,
     rod_guide,
     rod_inertia,
     rod_spin,
 )
+from .rod import LineFamily
 
-BODY = ("mass", "com", "transverse", "axial")
+# Of both bodies; cylinder_com is the distance from B, piston_com that from M, along the leg.
+BODIES = [(b, n) for b in ("cylinder", "piston") for n in ("mass", "com", "transverse", "axial")]
 
 
-class SPSFamily(Family):
+class SPSFamily(LineFamily):
     kind = "SPS"
     bodies = ("cylinders", "pistons")
-    joint_unit = "m"
-    effort_unit = "N"
-    # cylinder_com is the distance from B, piston_com the distance from M, both along the leg.
-    # `present` is 1; at 0 the leg has no row.
-    padding = ("present", "piston_mass")
-    shapes = {
-        "B": 3,
-        "home": 1,
-        "present": 1,
-        "Y": 3,
-        **{f"{body}_{name}": 1 for body in ("cylinder", "piston") for name in BODY},
-        "N": 9,
-    }
+    sign = 1
+    padding = ("present", "piston_mass")  # `present` is 1; at 0 the leg has no row
+    shapes = {"B": 3, "home": 1, "present": 1, "Y": 3, **{f"{b}_{n}": 1 for b, n in BODIES}, "N": 9}
 
-    def constants(self, chain: Any) -> dict[str, np.ndarray]:
-        leg = np.subtract(chain.platform, chain.base)
-        N = rod_frame(leg)
-        bodies = {
-            f"{body}_{name}": getattr(getattr(chain, body), name)
-            for body in ("cylinder", "piston")
-            for name in BODY
-        }
-        home = {"B": chain.base, "home": np.linalg.norm(leg), "present": 1.0}
-        values = {**home, "Y": N[:, 1], **bodies, "N": N}
-        return {name: np.asarray(value, dtype=float) for name, value in values.items()}
-
-    def end_point(self, c: Constants, q_r: ca.SX) -> ca.SX:
-        return c.B + (c.home + q_r[0]) * rod_direction(c.N, q_r)
+    def constants(self, chain: Any) -> dict[str, Any]:
+        own = {f"{body}_{name}": getattr(getattr(chain, body), name) for body, name in BODIES}
+        return super().constants(chain) | own
 
     def links(self, c: Constants, q_r: ca.SX) -> list[Link]:
         n, spin = rod_direction(c.N, q_r), rod_spin(c.N, q_r)
@@ -81,21 +58,6 @@ class SPSFamily(Family):
                 "sleeve", "platform joint M", self.end_point(c, q_r), rod_direction(c.N, q_r)
             ),
         ]
-
-    def loop(self, c: Constants, M: ca.SX) -> Loop:
-        e = M - c.B
-        r = ca.norm_2(e)
-        beta, gamma, cos_gamma = rod_angles(c.N, e, r)
-        return Loop(
-            q_r=ca.vertcat(r - c.home, beta, gamma),
-            discriminant=ca.dot(e, e) / c.home**2,  # a leg reaches everywhere
-            J=e / r,
-            rod=e,
-            rod_length=r,
-            J_A=-2 * r,
-            J_A_scale=2 * r,
-            cos_gamma=cos_gamma,
-        )
 
     def end_masses(self, c: Constants) -> dict[str, ca.SX]:
         return {"pistons": c.piston_mass}

@@ -1,0 +1,112 @@
+"""What families with rods share: a rod of constant length, and a line whose length changes."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Any, ClassVar
+
+import casadi as ca
+import numpy as np
+
+from .family import (
+    Constants,
+    Family,
+    Joint,
+    Link,
+    Loop,
+    axial_force,
+    rod_direction,
+    rod_frame,
+    rod_guide,
+    rod_inertia,
+    rod_masses,
+    rod_spin,
+)
+
+# Constants of every rod: N is N_i0 and Y its second axis; `branch` is that of home.
+ROD = {"L": 1, "branch": 1, "Y": 3, "mass": 1, "com": 1, "transverse": 1, "axial": 1}
+
+
+class RodFamily(Family):
+    """A driven link of the base, and a rod of constant length with ball joints S on it and M."""
+
+    ball: ClassVar[tuple[str, str]]  # name and place of the joint S
+
+    @abstractmethod
+    def tip(self, c: Constants, q_r: ca.SX) -> ca.SX:
+        """S, (3,)."""
+
+    @abstractmethod
+    def driven(self, c: Constants, q_r: ca.SX) -> tuple[Link, Joint]:
+        """The link that the actuator drives, and its joint."""
+
+    @staticmethod
+    def rod_constants(rod: Any, start: Any, end: Any) -> dict[str, Any]:
+        """Those of `ROD` but the branch, and N."""
+        line = np.subtract(end, start)
+        N = rod_frame(line)
+        bodies = {name: getattr(rod, name) for name in ("mass", "com", "transverse", "axial")}
+        return {"L": np.linalg.norm(line), "Y": N[:, 1], **bodies, "N": N}
+
+    def end_point(self, c: Constants, q_r: ca.SX) -> ca.SX:
+        return self.tip(c, q_r) + c.L * rod_direction(c.N, q_r)
+
+    def links(self, c: Constants, q_r: ca.SX) -> list[Link]:
+        n = rod_direction(c.N, q_r)
+        centre, inertia = self.tip(c, q_r) + c.com * c.L * n, rod_inertia(n, c.transverse, c.axial)
+        rod = Link(self.bodies[1], c.mass, centre, rod_spin(c.N, q_r), inertia)
+        return [self.driven(c, q_r)[0], rod]
+
+    def joints(self, c: Constants, q_r: ca.SX) -> list[Joint]:
+        ball = Joint.ball(*self.ball, self.tip(c, q_r), rod_guide(c.N, q_r))
+        return [self.driven(c, q_r)[1], ball]
+
+    def end_masses(self, c: Constants) -> dict[str, ca.SX]:
+        return {self.bodies[1]: rod_masses(c.mass, c.com, c.transverse, c.L)[0]}
+
+    @staticmethod
+    def rod_inertias(
+        c: Constants, e: ca.SX, e_rate: ca.SX, e_acceleration: ca.SX
+    ) -> tuple[ca.SX, ca.SX, ca.SX]:
+        """m_SM, m_SS and the force of the axial inertia, at a motion of the rod vector e."""
+        _, m_SM, m_SS = rod_masses(c.mass, c.com, c.transverse, c.L)
+        return m_SM, m_SS, axial_force(e, e_rate, e_acceleration, c.Y, c.L, c.axial)
+
+
+class LineFamily(Family):
+    """A straight line from B on the base to M; its length |M - B| closes no loop.
+
+    sign: of the joint coordinate in the length, home + sign joint.
+    """
+
+    joint_unit = "m"
+    effort_unit = "N"
+    sign: ClassVar[int]
+
+    def constants(self, chain: Any) -> dict[str, Any]:
+        line = np.subtract(chain.platform, chain.base)
+        N = rod_frame(line)
+        return {
+            "B": chain.base,
+            "home": np.linalg.norm(line),
+            "present": 1.0,
+            "Y": N[:, 1],
+            "N": N,
+        }
+
+    def end_point(self, c: Constants, q_r: ca.SX) -> ca.SX:
+        return c.B + (c.home + self.sign * q_r[0]) * rod_direction(c.N, q_r)
+
+    def loop(self, c: Constants, M: ca.SX) -> Loop:
+        e = M - c.B
+        r = ca.norm_2(e)
+        return Loop.of(
+            c.N,
+            r - c.home if self.sign > 0 else c.home - r,
+            e,
+            r,
+            discriminant=ca.dot(e, e) / c.home**2,  # it reaches everywhere
+            J=self.sign * e / r,
+            J_A=-2 * self.sign * r,
+            J_A_scale=2 * r,
+        )
