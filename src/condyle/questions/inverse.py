@@ -5,7 +5,7 @@ From the independent coordinates q, q', q'' and the load; the contacts are close
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import casadi as ca
@@ -39,22 +39,9 @@ HUGE = 1e300
 
 
 def inverse(structure: Structure, wanted: Collection[str] = ()) -> Variants:
-    """Efforts alone, or with some of `OUTPUTS`.
-
-    Efforts alone come by normal equations, with a robust variant for samples where those lose
-    digits, and with one for least latency.
-    """
+    """Efforts alone, or with some of `OUTPUTS`."""
     lean = not {"share", "gravity", "configuration"} & set(wanted)
-    robust = program(structure, wanted, robust=True)
-    if not lean:
-        return Variants(robust)
-    latency = None
-    if FORMULATIONS[structure.formulation].lumps:
-        quick = structure.n > structure.m
-        latency = program(structure, wanted, robust=not quick, low_latency=True)
-    if structure.n == structure.m:
-        return Variants(robust, None, latency, single=True)
-    return Variants(program(structure, wanted), robust, latency, single=True)
+    return in_variants(structure, lambda *how: program(structure, wanted, *how), lean)
 
 
 def program(
@@ -93,14 +80,52 @@ def program(
         add_configuration(b, platform)
         if structure.friction:
             contacts(b, platform).add_sliding(b)
-    b.check(
-        feasibility(b, platform, [c.dynamics.discriminant for c in eq.chains]),
-        DOUBTFUL,
-        Status.unreachable,
-    )
+    _vouch(b, platform, eq, best)
+    return b.finish()
+
+
+def efforts(
+    b: Builder, platform: Platform, load: Wrench, robust: bool = False, low_latency: bool = False
+) -> Lanes:
+    """Efforts of least norm as a part of another question, with the checks that vouch for them.
+
+    Args: as of `program`.
+    """
+    lump = FORMULATIONS[b.structure.formulation].lumps
+    route = "core" if b.structure.friction else b.structure.route
+    eq = equations(b, platform, load, route=route, lump=lump, low_latency=low_latency)
+    solve = gram_schmidt if robust else normal_equations
+    best = _least_norm(b, platform, load, eq, solve, False, ())
+    _vouch(b, platform, eq, best)
+    return best.effort
+
+
+def in_variants(
+    structure: Structure, program: Callable[[bool, bool], Program], lean: bool = True
+) -> Variants:
+    """How a program with efforts of least norm is run.
+
+    By normal equations, with a robust variant for samples where those lose digits, and with one for
+    least latency.
+
+    Args: program: (robust, low_latency) -> the program;  lean: without what takes a robust one.
+    """
+    robust = program(True, False)
+    if not lean:
+        return Variants(robust)
+    latency = None
+    if FORMULATIONS[structure.formulation].lumps:
+        latency = program(structure.n <= structure.m, True)
+    if structure.n == structure.m:
+        return Variants(robust, None, latency, single=True)
+    return Variants(program(False, False), robust, latency, single=True)
+
+
+def _vouch(b: Builder, platform: Platform, eq: Equations, best: _Best) -> None:
+    discriminants = [c.dynamics.discriminant for c in eq.chains]
+    b.check(feasibility(b, platform, discriminants), DOUBTFUL, Status.unreachable)
     finite = ca.fabs(b.total(best.effort)) < HUGE
     b.check(best.quality * finite * _every_rate_is_felt(b, eq), WEAK)
-    return b.finish()
 
 
 @dataclass(frozen=True)
