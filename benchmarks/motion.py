@@ -16,7 +16,7 @@ from types import ModuleType
 
 import numpy as np
 
-from condyle.backends.c.kernel import CompiledKernel
+from condyle.backends.c.compiled_kernel import CompiledKernel
 from condyle.mechanism import bundled_text, load
 from condyle.model.evaluator import Evaluator
 

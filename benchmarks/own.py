@@ -17,7 +17,7 @@ import casadi as ca
 import numpy as np
 
 from condyle.analysis.map import workspace_map
-from condyle.backends.c.kernel import CompiledKernel
+from condyle.backends.c.compiled_kernel import CompiledKernel
 from condyle.backends.compiler import find_compiler
 from condyle.backends.kernel import Kernel
 from condyle.mechanism.contact import Friction

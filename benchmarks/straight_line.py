@@ -6,7 +6,8 @@ import casadi as ca
 import numpy as np
 
 from condyle.graph.program import Numbers, Program
-from condyle.graph.write import casadi_function
+
+from .casadi_function import casadi_function
 
 
 def torque_function(program: Program, numbers: Numbers, load_point: np.ndarray) -> ca.Function:

@@ -13,10 +13,10 @@ import pytest
 from support.cases import error
 from support.programs import LANES, no_numbers, program
 
+from condyle.backends.c.compiled_kernel import CompiledKernel
 from condyle.backends.c.emit import fused
-from condyle.backends.c.kernel import CompiledKernel
 from condyle.backends.c.loops import LONG, Loops
-from condyle.backends.numpy import NumpyKernel
+from condyle.backends.numpy_kernel import NumpyKernel
 from condyle.graph.graph import Graph
 from condyle.graph.operations import REDUCTIONS
 from condyle.graph.program import Numbers, Output, Port, Program, Variants

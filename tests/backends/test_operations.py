@@ -7,8 +7,8 @@ import pytest
 from support.cases import ones
 from support.programs import LANES, by_casadi
 
-from condyle.backends.c.kernel import CompiledKernel
-from condyle.backends.numpy import NumpyKernel
+from condyle.backends.c.compiled_kernel import CompiledKernel
+from condyle.backends.numpy_kernel import NumpyKernel
 from condyle.graph.graph import Graph, Value
 from condyle.graph.operations import OPERATIONS
 from condyle.graph.program import Numbers, Output, Port, Program, Variants

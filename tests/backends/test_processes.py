@@ -17,7 +17,7 @@ from support.interpreter import Interpreter
 
 from condyle.backends import cache
 from condyle.backends.c.build import _recipe
-from condyle.backends.c.kernel import CompiledKernel
+from condyle.backends.c.compiled_kernel import CompiledKernel
 from condyle.backends.compiler import find_compiler
 from condyle.model.evaluator import Evaluator
 from condyle.questions import Question

@@ -11,7 +11,7 @@ from support.cases import Case, case
 
 from condyle.backends import numpy
 from condyle.backends.c import kernel as compiled
-from condyle.backends.c.kernel import CompiledKernel
+from condyle.backends.c.compiled_kernel import CompiledKernel
 from condyle.backends.kernel import Answer
 from condyle.backends.threads import shared_out
 from condyle.errors import InputError

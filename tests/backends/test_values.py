@@ -11,11 +11,11 @@ import pytest
 from support.cases import case, error, errors, ones
 from support.interpreter import Found, Interpreter
 
+from benchmarks.casadi_function import casadi_function
 from condyle.backends.kernel import Answer, arranged
-from condyle.backends.numpy import NumpyKernel
+from condyle.backends.numpy_kernel import NumpyKernel
 from condyle.dynamics import FORMULATIONS
 from condyle.graph.program import Variants
-from condyle.graph.write import casadi_function
 from condyle.model.inverse_dynamics import RESULTS
 from condyle.model.model import Model as Evaluator
 from condyle.questions import Question

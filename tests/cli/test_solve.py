@@ -12,7 +12,7 @@ import pytest
 
 import condyle
 from condyle.backends.c import kernel
-from condyle.backends.c.kernel import CompiledKernel
+from condyle.backends.c.compiled_kernel import CompiledKernel
 from condyle.backends.compiler import CompilerError, find_compiler
 from condyle.mechanism import COORDINATES
 from condyle.model.evaluator import with_point

@@ -9,7 +9,7 @@ import pytest
 from backends.test_operations import ARITY, columns
 from support.programs import LANES, no_numbers, program
 
-from condyle.backends.numpy import NumpyKernel
+from condyle.backends.numpy_kernel import NumpyKernel
 from condyle.graph.graph import Graph, Value, reachable
 from condyle.graph.operations import OPERATIONS
 from condyle.graph.program import Numbers, Output, Port, Program, Variants

@@ -12,7 +12,7 @@ import pytest
 from support.cases import case, error
 
 import condyle
-from condyle.backends.c.kernel import CompiledKernel, Single
+from condyle.backends.c.compiled_kernel import CompiledKernel, Single
 from condyle.backends.kernel import AGAIN, Answer
 from condyle.errors import InputError
 from condyle.model.evaluator import Evaluator

@@ -10,9 +10,9 @@ import pytest
 from support.cases import case, ones
 from support.programs import by_casadi
 
-from condyle.backends.c.kernel import CompiledKernel
+from condyle.backends.c.compiled_kernel import CompiledKernel
 from condyle.backends.kernel import AGAIN, Answer
-from condyle.backends.numpy import NumpyKernel
+from condyle.backends.numpy_kernel import NumpyKernel
 from condyle.errors import InputError
 from condyle.graph.program import Program, Variants
 from condyle.questions.builder import Builder

@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 from support.cases import case
 
 from condyle.backends.kernel import AGAIN, Kernel
-from condyle.backends.numpy import NumpyKernel
+from condyle.backends.numpy_kernel import NumpyKernel
 from condyle.graph.program import Variants
 from condyle.kinematics.chain import FAMILIES
 from condyle.model.evaluator import Evaluator

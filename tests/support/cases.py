@@ -10,7 +10,7 @@ import numpy as np
 from oracles import description
 from oracles.random_mechanism import random_mechanism, random_state, toml_text
 
-from condyle.backends.c.kernel import CompiledKernel
+from condyle.backends.c.compiled_kernel import CompiledKernel
 from condyle.backends.kernel import arranged
 from condyle.mechanism import Mechanism, load, parse
 

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from benchmarks.casadi_function import casadi_function
 from condyle.backends.kernel import arranged
 from condyle.graph.graph import Graph, Value
 from condyle.graph.program import Check, Numbers, Output, Port, Program
-from condyle.graph.write import casadi_function
 
 LANES = 3  # no whole number of vectors
 

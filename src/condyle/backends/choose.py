@@ -7,11 +7,11 @@ from collections.abc import Callable
 
 from ..errors import InputError, did_you_mean
 from ..graph.program import Numbers, Variants
-from .c.kernel import CompiledKernel
+from .c.compiled_kernel import CompiledKernel
 from .compiler import REMEDY, CompilerError, find_compiler
 from .kernel import Kernel
 from .notice import notice
-from .numpy import NumpyKernel
+from .numpy_kernel import NumpyKernel
 
 BACKENDS = ("auto", "compiled", "numpy")
 ALIASES = {"interpreted": "numpy"}  # an older name

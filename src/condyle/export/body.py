@@ -1,6 +1,6 @@
 """A program as the body of a C99 function: portable scalar code, or chains in vector types.
 
-Both are straight lines of `backends.c.straight`, with arrays of their own for what goes in and out.
+Both are straight lines of the backend, with arrays of their own for what goes in and out.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from functools import cached_property
 
 from ..backends.c.printer import nested, number
-from ..backends.c.straight import Straight
+from ..backends.c.straight_line import Straight
 from ..graph.graph import Value
 from ..graph.program import Output, Program
 from .places import Places

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..backends.numpy import NumpyKernel
+from ..backends.numpy_kernel import NumpyKernel
 from ..mechanism.home import characteristic_length, independent_coordinates
 from ..mechanism.mechanism import Mechanism
 from ..questions import Question

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..backends.numpy import NumpyKernel
+from ..backends.numpy_kernel import NumpyKernel
 from ..graph.program import Numbers
 from ..kinematics.constraints import closed_form_available
 from ..mechanism.mechanism import COORDINATES

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..backends.c.kernel import CompiledKernel
+from ..backends.c.compiled_kernel import CompiledKernel
 from ..backends.kernel import Kernel
 from ..errors import InputError, did_you_mean
 from ..questions.forward import OUTPUTS

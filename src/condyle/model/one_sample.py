@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..backends.c.kernel import CompiledKernel, Single
+from ..backends.c.compiled_kernel import CompiledKernel, Single
 from ..backends.kernel import AGAIN, OK
 from .checks import Sample, as_samples
 

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from ..backends.kernel import AGAIN
-from ..backends.numpy import NumpyKernel
+from ..backends.numpy_kernel import NumpyKernel
 from ..dynamics.minimum_norm import minimum_norm
 from ..graph.program import Numbers
 from ..kinematics.singularities import SINGULAR, ratio

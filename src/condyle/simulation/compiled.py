@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from ..backends import cache
-from ..backends.c.kernel import CompiledKernel, Single
-from ..backends.c.library import obtained, tool
+from ..backends.c.compiled_kernel import CompiledKernel, Single
+from ..backends.c.shared_library import obtained, tool
 from ..backends.compiler import CompilerError, find_compiler
 from ..model.evaluator import Evaluator
 from .controllers.bite_force import BiteForceLaw

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ..backends.c.kernel import CompiledKernel
+from ..backends.c.compiled_kernel import CompiledKernel
 from ..backends.kernel import Kernel
 from ..graph.program import Interface, Result
 

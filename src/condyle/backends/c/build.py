@@ -15,7 +15,7 @@ from ...progress import step
 from .. import cache
 from ..compiler import Compiler, find_compiler
 from .emit import emit
-from .library import load, obtained, tool
+from .shared_library import load, obtained, tool
 
 
 def loaded(key: str, build: Callable[[], Variants]) -> tuple[cache.Entry, ctypes.CDLL]:

@@ -18,7 +18,7 @@ from ...graph.program import Interface, Program, Variants
 from ..kernel import AGAIN
 from .loops import Loops
 from .prepare import prepare
-from .straight import Straight
+from .straight_line import Straight
 
 CHAIN = 5  # terms above which a sum becomes two that run side by side
 

@@ -16,7 +16,7 @@ from ...progress import step
 from .. import cache
 from ..compiler import find_compiler
 from ..kernel import AGAIN
-from .library import obtained, tool
+from .shared_library import obtained, tool
 
 FREE = 2  # efforts more than equations, at most
 MOST_CONTACTS = 5

@@ -18,7 +18,7 @@ from ...graph.program import Interface, Numbers, Variants
 from ..kernel import Answer, arranged, columns_of
 from ..threads import shared_out, workers
 from .build import loaded
-from .library import aligned, prepared
+from .shared_library import aligned, prepared
 
 # Vector operations that are worth a thread of their own: some 0.3 ms.
 WORTH_A_THREAD = 1_000_000

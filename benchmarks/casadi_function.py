@@ -9,9 +9,9 @@ from typing import Any
 
 import casadi as ca
 
-from .graph import Value
-from .operations import BY_CASADI, REDUCTIONS
-from .program import Numbers, Program
+from condyle.graph.graph import Value
+from condyle.graph.operations import BY_CASADI, REDUCTIONS
+from condyle.graph.program import Numbers, Program
 
 _NUMBER = {name: number for number, name in BY_CASADI.items() if number != ca.OP_CONSTPOW}
 
