@@ -25,8 +25,7 @@ TWICE = {
     *("function.py", "limits.py", "live.py", "maps.py", "matlab.py"),
     *("minimum_norm.py", "model.py", "panels.py", "plausibility.py", "poses.py", "program.py"),
     *("quadratic.py", "reactions.py", "reference.py", "robust.py", "solution.py", "solve.py"),
-    *("source.py", "starter.py", "survey.py", "sweep.py", "table.py", "tradeoff.py"),
-    *("accessors.py"),
+    *("source.py", "starter.py", "sweep.py", "table.py", "tradeoff.py", "accessors.py"),
 }
 # Documents and configuration.
 IN_THE_ROOT = {

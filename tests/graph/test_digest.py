@@ -117,8 +117,9 @@ from support.cases import case
 from condyle.questions import QUESTIONS, Prescribed, Question
 from condyle.questions.structure import structure_of
 structure = structure_of(case("mixed_k2_n8").mechanism)
+given = dict.fromkeys(("closure", "conditions"), Prescribed()) | {"tick": "impedance"}
 for name in QUESTIONS:
-    details = (Prescribed(),) if name in ("closure", "conditions") else ()
+    details = (given[name],) if name in given else ()
     question = Question.about(structure, name, *details)
     print(name, question.variants().digest, question.key)
 """
