@@ -7,7 +7,7 @@ import pytest
 import condyle
 from condyle.analysis import paper
 from condyle.analysis.comparison import Comparison
-from condyle.analysis.torque_indices import solution_indices
+from condyle.analysis.torque_indices import indices
 
 
 @pytest.mark.parametrize("contacts", [True, False], ids=["RAPM", "6RSS"])
@@ -22,7 +22,8 @@ def test_table_2_within_a_fifth(reference: Comparison, contacts: bool, part: str
 
 def test_table_2_does_not_depend_on_the_model(comparison: Comparison) -> None:
     (first,) = comparison.indices()
-    (again,) = solution_indices(comparison.solution)
+    share, parts, units = (comparison.solution[n].values for n in ("share", "part", "effort_unit"))
+    (again,) = indices(share, list(parts), list(units))
     assert first.values == pytest.approx(again.values, rel=1e-12)
     assert first.values["all"] == pytest.approx(0.0209, abs=1e-4)
 

@@ -78,22 +78,17 @@ class Comparison:
 
     def run(self, formulation: str, route: str, contacts: bool = True) -> Run | None:
         """The run of that model, or None."""
-        for one in self.runs if contacts else self.free_runs:
-            if (one.formulation, one.route) == (formulation, route):
-                return one
-        return None
+        runs, wanted = self.runs if contacts else self.free_runs, (formulation, route)
+        return next((one for one in runs if (one.formulation, one.route) == wanted), None)
 
     def differences(self, contacts: bool = True) -> list[Difference]:
         """Every two runs against each other."""
-        return [
-            Difference(
-                a,
-                b,
-                relative_difference(a.torque, b.torque, self.units),
-                relative_difference(a.contact_force, b.contact_force),
-            )
-            for a, b in combinations(self.runs if contacts else self.free_runs, 2)
-        ]
+        found = []
+        for a, b in combinations(self.runs if contacts else self.free_runs, 2):
+            torque = relative_difference(a.torque, b.torque, self.units)
+            force = relative_difference(a.contact_force, b.contact_force)
+            found.append(Difference(a, b, torque, force))
+        return found
 
     def indices(self, contacts: bool = True) -> list[Indices]:
         """The indices of eq. (67), from the first run; one entry for each effort unit."""

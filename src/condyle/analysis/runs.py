@@ -10,7 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..mechanism.mechanism import COORDINATES, Mechanism
+from ..kinematics.constraints import indices
+from ..mechanism.mechanism import Mechanism
+from ..model.evaluator import Evaluator
 from ..results.model import Model
 from .paper import Seconds
 
@@ -71,6 +73,11 @@ class Samples:
     acceleration: np.ndarray
     load: np.ndarray
 
+    def states(self, model: Evaluator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """q, q1, q2 of a model, (N, m) each."""
+        own = indices(model.independent)
+        return self.pose[:, own], self.rate[:, own], self.acceleration[:, own]
+
 
 @dataclass(frozen=True)
 class Run:
@@ -99,13 +106,12 @@ def run(model: TimedModel, samples: Samples) -> Run:
 
     Contact forces, shares and configurations are not in the seconds.
     """
-    columns = [COORDINATES.index(name) for name in model.independent]
-    q, q1, q2 = (a[:, columns] for a in (samples.pose, samples.rate, samples.acceleration))
+    states = samples.states(model)
     with without_collection():
         start = clock()
-        model.torques(q, q1, q2, samples.load)
+        model.torques(*states, samples.load)
         numeric = clock() - start
-    found = model.torques(q, q1, q2, samples.load, ("contact", "share"))
+    found = model.torques(*states, samples.load, ("contact", "share"))
     return Run(
         model.formulation,
         model.route,

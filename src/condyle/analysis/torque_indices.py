@@ -12,14 +12,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..questions.equations import LOAD
-
-if TYPE_CHECKING:
-    from ..results.solution import Solution
 
 LOAD_PARTS = (LOAD, "bite")  # as older solutions call it
 ALL = "all"
@@ -54,13 +50,6 @@ def indices(share: np.ndarray, parts: Sequence[str], units: Sequence[str]) -> li
         values |= {str(parts[i]): mean_norm(efforts[i]) for i in own}
         found.append(Indices(str(unit), values, count))
     return found
-
-
-def solution_indices(solution: Solution) -> list[Indices]:
-    """The indices of a solution."""
-    names = ("share", "part", "effort_unit")
-    share, parts, units = (solution[name].values for name in names)
-    return indices(share, list(parts), list(units))
 
 
 def mean_norm(efforts: np.ndarray) -> float:

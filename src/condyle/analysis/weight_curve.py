@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from ..kinematics.constraints import indices
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
 from ..progress import step
@@ -83,13 +82,12 @@ def tradeoff(
     one = first.choosing("weighted", preload, asked[0] / unit)
     solution = one.solve(motion, load, load_point)
     samples = samples_of(one, solution)
-    columns = indices(one.independent)
-    states = [a[:, columns] for a in (samples.pose, samples.rate, samples.acceleration)]
+    states = samples.states(one)
     efforts, forces, good = [], [], np.ones(len(samples.pose), dtype=bool)
     with step("solving at every weight", len(asked)) as advance:
         for weight in asked:
             one = first.choosing("weighted", preload, weight / unit)
-            found = one.torques(states[0], states[1], states[2], samples.load, ("contact",))
+            found = one.torques(*states, samples.load, ("contact",))
             efforts.append(found.effort)
             forces.append(found["contact_force"])
             good &= found.status == Status.ok

@@ -122,14 +122,13 @@ def grid_of(mechanism: Mechanism, over: Over, hold: Values = "") -> Grid:
 def require_independent(mechanism: Mechanism, name: str) -> None:
     """Raises InputError for a coordinate that cannot be given."""
     names = independent_coordinates(mechanism)
-    if name in names:
-        return
     if name in dependent_coordinates(mechanism):
         raise InputError(
             f'{name} is determined by the contacts of "{mechanism.name}"; its independent '
             f"coordinates are {', '.join(names)}"
         )
-    raise InputError(f'"{name}" is not a coordinate.{did_you_mean(name, names)}')
+    if name not in names:
+        raise InputError(f'"{name}" is not a coordinate.{did_you_mean(name, names)}')
 
 
 def parsed(text: str, form: str, example: str) -> tuple[str, list[str], str]:

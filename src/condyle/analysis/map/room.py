@@ -101,11 +101,6 @@ class Free:
         ]
 
 
-def scale_of(grid: Grid, length: float) -> np.ndarray:
-    """What turns a radius [m] into each axis' unit, (d,)."""
-    return np.array([1.0 if a.name in COORDINATES[:3] else 1.0 / length for a in grid.axes])
-
-
 def greatest_ball(free: Free, grid: Grid, points: int = POINTS) -> Ball:
     """Around home, within the range of the axes; the other coordinates are held.
 
@@ -113,7 +108,8 @@ def greatest_ball(free: Free, grid: Grid, points: int = POINTS) -> Ball:
 
     Raises: InputError: if home is outside the range.
     """
-    scale, d = scale_of(grid, free.asked.model.characteristic_length), len(grid.axes)
+    d, length = len(grid.axes), free.asked.model.characteristic_length
+    scale = np.array([1.0 if a.name in COORDINATES[:3] else 1.0 / length for a in grid.axes])
     radius = _room_in_range(grid, scale)
     points = min(points, 5 * FEW) if free.costly else points
     rng = np.random.default_rng(0)
@@ -227,19 +223,16 @@ def greatest_box(free: Free, grid: Grid) -> Box | None:
     for axis in grid.axes:
         n = (BOX[len(grid.axes)] - 1) // (4 if free.costly else 1)
         below = min(max(round(-axis.low / axis.span * n), 1), n - 1)
-        sides.append(
-            np.r_[
-                np.linspace(axis.low, 0, below + 1)[:-1], np.linspace(0, axis.high, n - below + 1)
-            ]
-        )
+        after = np.linspace(0, axis.high, n - below + 1)
+        sides.append(np.append(np.linspace(axis.low, 0, below + 1)[:-1], after))
         homes.append(below)
     points = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1)
     good = free_of(free.margins(grid.states(points.reshape(-1, len(sides)))))
     ends = best_box(good.reshape(points.shape[:-1]), homes, sides)
     if ends is None:
         return None
-    low = tuple(float(s[a]) for s, (a, _) in zip(sides, ends, strict=True))
-    high = tuple(float(s[b]) for s, (_, b) in zip(sides, ends, strict=True))
+    both = [s[list(ab)].tolist() for s, ab in zip(sides, ends, strict=True)]
+    low, high = zip(*both, strict=True)
     return Box(low, high, tuple(float(np.diff(s).max()) for s in sides))
 
 

@@ -6,6 +6,13 @@ import numpy as np
 
 # A cube in six tetrahedra around its diagonal, corners as (x, y, z) in bits.
 TETRAHEDRA = ((0, 1, 3, 7), (0, 3, 2, 7), (0, 2, 6, 7), (0, 6, 4, 7), (0, 4, 5, 7), (0, 5, 1, 7))
+# With so many corners inside: edges from those inside to those outside that a triangle cuts.
+TRIANGLES = (
+    (1, ((0, 1), (0, 2), (0, 3))),
+    (3, ((0, 3), (1, 3), (2, 3))),
+    (2, ((0, 2), (0, 3), (1, 3))),
+    (2, ((0, 2), (1, 3), (1, 2))),
+)
 
 
 def skin(margin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -18,11 +25,9 @@ def skin(margin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """
     size = float(np.nanmax(np.abs(margin), initial=1e-300))
     field = np.pad(np.where(np.isnan(margin), -size, margin), 1, constant_values=-size)
-    n = np.array(field.shape)
-    cubes = np.stack(np.meshgrid(*(np.arange(k - 1) for k in n), indexing="ij"), -1).reshape(-1, 3)
-    offsets = np.array([[i & 1, i >> 1 & 1, i >> 2] for i in range(8)])
-    at = cubes[:, None] + offsets
-    values = field[at[..., 0], at[..., 1], at[..., 2]]
+    cubes = np.argwhere(np.ones(np.array(field.shape) - 1, dtype=bool))
+    at = cubes[:, None] + np.array([[i & 1, i >> 1 & 1, i >> 2] for i in range(8)])
+    values = field[tuple(np.moveaxis(at, -1, 0))]
     border = (values >= 0).any(axis=1) & (values < 0).any(axis=1)
     at, values = at[border].astype(float), values[border]
     triangles = [part for t in TETRAHEDRA for part in _tetrahedra(at[:, t], values[:, t])]
@@ -30,10 +35,7 @@ def skin(margin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     vertices = np.clip(corners.reshape(-1, 3) / (np.array(margin.shape) - 1), 0.0, 1.0)
     vertices, names = np.unique(vertices.round(9), axis=0, return_inverse=True)
     faces = names.reshape(-1, 3)
-    whole = (
-        (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-    )
-    return vertices, faces[whole]
+    return vertices, faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
 
 
 def _tetrahedra(at: np.ndarray, values: np.ndarray) -> list[np.ndarray]:
@@ -49,12 +51,10 @@ def _tetrahedra(at: np.ndarray, values: np.ndarray) -> list[np.ndarray]:
         part = (a / (a - b))[:, None]
         return at[rows, i] + part * (at[rows, j] - at[rows, i])
 
-    one, two, three = (np.flatnonzero(count == k) for k in (1, 2, 3))
-    found = [np.stack([cut(one, 0, j) for j in (1, 2, 3)], axis=1)]
-    found.append(np.stack([cut(three, i, 3) for i in (0, 1, 2)], axis=1))
-    a, b, c, d = (cut(two, i, j) for i, j in ((0, 2), (0, 3), (1, 3), (1, 2)))
-    found += [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
-    return found
+    return [
+        np.stack([cut(np.flatnonzero(count == k), i, j) for i, j in edges], axis=1)
+        for k, edges in TRIANGLES
+    ]
 
 
 def sheet(good: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -63,13 +63,12 @@ def sheet(good: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Returns: vertices (n1 n2, 3), of which the middle entry is 0.5, and faces (F, 3).
     """
     n1, n2 = good.shape
-    first, second = np.meshgrid(np.linspace(0, 1, n1), np.linspace(0, 1, n2), indexing="ij")
-    vertices = np.column_stack([first.ravel(), np.full(n1 * n2, 0.5), second.ravel()])
+    first, second = np.indices((n1, n2)).reshape(2, -1)
+    vertices = np.column_stack([first / (n1 - 1), np.full(n1 * n2, 0.5), second / (n2 - 1)])
     name = np.arange(n1 * n2).reshape(n1, n2)
-    a, b, c, d = name[:-1, :-1], name[1:, :-1], name[1:, 1:], name[:-1, 1:]
-    whole = good[:-1, :-1] & good[1:, :-1] & good[1:, 1:] & good[:-1, 1:]
-    a, b, c, d = (corner[whole] for corner in (a, b, c, d))
-    return vertices, np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    corners = np.array([name[:-1, :-1], name[1:, :-1], name[1:, 1:], name[:-1, 1:]])
+    cells = corners[:, good.ravel()[corners].all(axis=0)].T
+    return vertices, np.vstack([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
 
 
 def first_hit(

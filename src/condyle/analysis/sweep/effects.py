@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -61,28 +62,20 @@ def good(table: xr.Dataset) -> xr.Dataset:
 
 def main_effects(table: xr.Dataset) -> list[Effect]:
     """Of every parameter on every measure."""
-    rows = good(table)
+    rows, found = good(table), []
     if rows.sizes["row"] < FEWEST:
         return []
-    return [
-        _effect(parameter, measure, rows[parameter].values, rows[measure].values)
-        for measure in _finite(rows)
-        for parameter in table.attrs["parameters"]
-    ]
-
-
-def _effect(parameter: str, measure: str, x: np.ndarray, y: np.ndarray) -> Effect:
-    levels, which = np.unique(x, return_inverse=True)
-    if len(levels) > 2 * BINS:
-        rank = np.argsort(np.argsort(x, kind="stable"), kind="stable")
-        which = rank * BINS // len(x)
-    counts = np.bincount(which)
-    place, mean = (np.bincount(which, a) / counts for a in (x, y))
-    variance = np.var(y)
-    between = np.sum(counts * (mean - y.mean()) ** 2) / len(y)
-    return Effect(
-        parameter, measure, place, mean, float(between / variance) if variance else np.nan
-    )
+    for measure, parameter in product(_finite(rows), table.attrs["parameters"]):
+        x, y = rows[parameter].values, rows[measure].values
+        levels, which = np.unique(x, return_inverse=True)
+        if len(levels) > 2 * BINS:
+            which = np.argsort(np.argsort(x, kind="stable"), kind="stable") * BINS // len(x)
+        counts = np.bincount(which)
+        place, mean = (np.bincount(which, a) / counts for a in (x, y))
+        between, variance = np.sum(counts * (mean - y.mean()) ** 2) / len(y), np.var(y)
+        share = float(between / variance) if variance else np.nan
+        found.append(Effect(parameter, measure, place, mean, share))
+    return found
 
 
 def sensitivities(table: xr.Dataset) -> list[Sensitivity]:
@@ -98,23 +91,18 @@ def sensitivities(table: xr.Dataset) -> list[Sensitivity]:
     if "motion" in table:
         raise InputError("Sobol indices need one motion; this study has several")
     size = len(table.attrs["parameters"]) + 2
-    blocks = table.sizes["row"] // size
-    whole = table.isel(row=slice(0, blocks * size))
-    usable = (whole["status"].values == OK).reshape(blocks, size).all(axis=1)
-    if usable.sum() < FEWEST:
+    whole = table.isel(row=slice(0, table.sizes["row"] // size * size))
+    usable = (whole["status"].values == OK).reshape(-1, size).all(axis=1)
+    if (count := int(usable.sum())) < FEWEST:
         raise InputError(
             f"Sobol indices need {FEWEST} base rows whose variants all have results; "
-            f"there are {int(usable.sum())}"
+            f"there are {count}"
         )
-    return [
-        Sensitivity(
-            measure,
-            *sobol_indices(whole[measure].values.reshape(blocks, size)[usable]),
-            int(usable.sum()),
-            int((~usable).sum()),
-        )
-        for measure in _finite(good(whole))
-    ]
+    found = []
+    for measure in _finite(good(whole)):
+        both = sobol_indices(whole[measure].values.reshape(-1, size)[usable])
+        found.append(Sensitivity(measure, *both, count, len(usable) - count))
+    return found
 
 
 def sobol_indices(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -167,17 +155,11 @@ def pareto(table: xr.Dataset, measures: Sequence[str] = ()) -> xr.Dataset:
 
 def front(cost: np.ndarray) -> np.ndarray:
     """Indices of the points (N, m) that none dominates, in the order of their first coordinate."""
-    order = np.lexsort(cost.T[::-1])
     kept: list[int] = []
-    best_so_far = np.empty((0, cost.shape[1]))
-    for i in order:
-        point = cost[i]
-        if not np.isfinite(point).all():
-            continue
+    for i in np.lexsort(cost.T[::-1]):
         # Those before it are no worse in the first coordinate, so that only they can dominate it.
-        if not (best_so_far <= point).all(axis=1).any():
+        if np.isfinite(cost[i]).all() and not (cost[kept] <= cost[i]).all(axis=1).any():
             kept.append(int(i))
-            best_so_far = np.vstack([best_so_far, point])
     return np.array(kept, dtype=int)
 
 

@@ -24,7 +24,7 @@ from ...motion import (
     trial_motion,
 )
 from ...motion.reference_case import bundled_reference
-from .measure import Reading, columns, readings
+from .measure import Reading, reading
 from .sampling import Design
 from .study import NONE, REFERENCE, TRIAL, MotionFile, Study
 
@@ -76,7 +76,7 @@ class Job:
 
     @property
     def measures(self) -> tuple[str, ...]:
-        return tuple(columns(self.readings))
+        return tuple(name for one in self.readings for name in one.names)
 
     def changes(self, row: np.ndarray) -> dict[str, float]:
         """Path -> number of one row of the design."""
@@ -121,15 +121,16 @@ def prepared(
     wrenches = tuple(acting.at(path.t) for path in paths)
     job = Job(study, machine, paths, acting, wrenches, name, design)
     model = job.model(machine)
-    found = readings(study.measure, model)
-    taken = [*OWN, *job.parameters, *columns(found)]
+    found = tuple(reading(name, measure, model) for name, measure in study.measure.items())
+    job = replace(job, readings=found)
+    taken = [*OWN, *job.parameters, *job.measures]
     if twice := [n for n in dict.fromkeys(taken) if taken.count(n) > 1]:
         raise InputError(f'study: two columns would be called "{twice[0]}"; rename the measure')
     for path in paths:  # what does not fit the mechanism shows here, and kernels are built
         few: Any = {k: getattr(path, k)[:2] for k in ("t", "value", "rate", "acceleration")}
         (q, q1, q2), _ = model.independent_motion(replace(path, **few))
         model.evaluate(q, q1, q2, np.zeros((len(q), 9)), 1)
-    return replace(job, readings=found)
+    return job
 
 
 def _numbers(study: Study, machine: Mechanism) -> Iterator[float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import product
 
@@ -87,10 +87,9 @@ def reading(name: str, measure: Measure, model: Evaluator) -> Reading:
     names = tuple(".".join((name, *entries)) for entries in product(*kept))
     if not names:
         raise InputError(f"measure {name}: this mechanism has nothing along {', '.join(left)}")
-    axes = tuple(left.index(d) for d in over)
-    empty = [d for d in over if d in labels and not labels[d]]
-    if empty:
+    if empty := [d for d in over if d in labels and not labels[d]]:
         raise InputError(f"measure {name}: this mechanism has no {empty[0]}")
+    axes = tuple(left.index(d) for d in over)
     units = variable.attributes(model.mechanism)["units"]
     return Reading(variable.name, measure.take, place, axes, names, units)
 
@@ -123,17 +122,3 @@ def labels_of(model: Evaluator) -> Mapping[str, tuple[str, ...]]:
         "component": WRENCH,
         "independent": model.independent,
     }
-
-
-def readings(measures: Mapping[str, Measure], model: Evaluator) -> tuple[Reading, ...]:
-    """All measures of a study.
-
-    Raises: InputError: as of `reading`.
-    """
-    return tuple(reading(name, measure, model) for name, measure in measures.items())
-
-
-def columns(found: tuple[Reading, ...]) -> Iterator[str]:
-    """Names of the columns of some readings."""
-    for one in found:
-        yield from one.names
