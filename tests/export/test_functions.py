@@ -13,7 +13,7 @@ from support.tools import run
 
 import condyle
 from condyle.export import Exported, export
-from condyle.model.forward import ForwardKinematics
+from condyle.model.forward_kinematics import ForwardKinematics
 
 Folders = Callable[[str], Folder]
 OK, UNREACHABLE, SINGULAR, OUT_OF_BOUNDS, INFEASIBLE = range(5)

@@ -33,7 +33,7 @@ from condyle.mechanism.home import (
     usable_sets,
 )
 from condyle.model.closing import Closure
-from condyle.model.follow import solve_samples
+from condyle.model.continuation import least_squares
 
 
 def coordinate_closure(mechanism: Mechanism, names: Sequence[str]) -> Closure:
@@ -164,8 +164,8 @@ def test_a_pose_out_of_reach_is_not_a_number_and_alone() -> None:
 def test_a_singular_matrix_does_not_touch_its_neighbours() -> None:
     nearly = np.diag([1.0, 1, 1, 1, 1, 1e-17]) + 1e-3
     b = np.arange(12.0).reshape(2, 6)
-    together = solve_samples(np.stack([nearly, np.zeros((6, 6))]), b)
-    np.testing.assert_array_equal(together[0], solve_samples(nearly[None], b[:1])[0])
+    together = least_squares(np.stack([nearly, np.zeros((6, 6))]), b[..., None])
+    np.testing.assert_array_equal(together[0], least_squares(nearly[None], b[:1, :, None])[0])
     assert np.isfinite(together[0]).all() and np.isnan(together[1]).all()
 
 

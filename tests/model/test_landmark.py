@@ -13,8 +13,7 @@ import condyle
 from condyle.backends.choose import Backend
 from condyle.backends.kernel import AGAIN
 from condyle.mechanism import Mechanism, parse
-from condyle.model.closing import Closure
-from condyle.model.follow import Follow
+from condyle.model.closing import Closure, FollowedClosure
 
 COUNT = 400
 SURFACES = ("plane", "quadratic", "sphere", "ellipsoid")
@@ -87,7 +86,9 @@ def test_compiled_is_numpy() -> None:
 
 def test_the_reference_path_is_certified_by_the_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
     """Not one sample has to be followed from home."""
-    monkeypatch.setattr(Follow, "solve", lambda *given: pytest.fail("a sample was followed"))
+    monkeypatch.setattr(
+        FollowedClosure, "solve", lambda *given: pytest.fail("a sample was followed")
+    )
     m, motion = condyle.load("masticatory"), condyle.reference_motion()
     assert motion.kind == "landmark" and motion.landmark == "incisor"
     model = condyle.derive(m, backend="numpy")

@@ -14,7 +14,7 @@ from condyle.backends.numpy_kernel import NumpyKernel
 from condyle.graph.program import Variants
 from condyle.kinematics.chain import FAMILIES
 from condyle.model.evaluator import Evaluator
-from condyle.model.forward import ForwardKinematics
+from condyle.model.forward_kinematics import ForwardKinematics
 from condyle.questions.builder import Builder
 from condyle.questions.numbers import Layout
 from condyle.questions.pose import pose_from_encoders

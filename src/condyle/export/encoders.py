@@ -1,6 +1,6 @@
 """`pose`: the pose that joint coordinates belong to, by a bounded number of Gauss-Newton steps.
 
-As `model.forward.follow` with fewer pieces: a start that is too far off is unreachable, never
+As `model.continuation` with fewer pieces: a start that is too far off is unreachable, never
 another assembly mode without a word.
 """
 

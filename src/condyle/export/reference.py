@@ -10,7 +10,7 @@ import numpy as np
 from ..mechanism.mechanism import Mechanism
 from ..model.closing import Closure
 from ..model.evaluator import Evaluator
-from ..model.forward import ForwardKinematics
+from ..model.forward_kinematics import ForwardKinematics
 from ..status import Status
 from .catalogue import Wish, least_norm
 

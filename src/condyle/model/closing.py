@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..backends.choose import Backend
-from ..backends.kernel import AGAIN
+from ..backends.kernel import AGAIN, Kernel
+from ..backends.numpy_kernel import NumpyKernel
 from ..errors import InputError, did_you_mean
+from ..graph.program import Numbers
+from ..kinematics.constraints import closed_form_available
 from ..mechanism.home import (
     MAX_CONDITION,
     condition_of,
@@ -19,13 +22,110 @@ from ..mechanism.home import (
 )
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..questions import Prescribed, Question
-from ..questions.numbers import Layout, specialised
-from ..questions.structure import structure_of
+from ..questions.numbers import Layout, characteristic, specialised
+from ..questions.structure import Structure, structure_of
 from ..status import Status
-from .follow import Follow, PlatformMotion
+from .continuation import Conditions, Steps, follow, least_squares, nearest
 
-if TYPE_CHECKING:
-    from ..backends.kernel import Kernel
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class PlatformMotion:
+    """X_EE and its rates, (N, 6) each; `reached` tells where the conditions were met, (N,)."""
+
+    pose: Array
+    rate: Array
+    acceleration: Array
+    reached: Array
+
+    def named(self) -> dict[str, Array]:
+        """The arrays, by the names that questions have for them."""
+        return {
+            "pose": self.pose,
+            "pose_rate": self.rate,
+            "pose_acceleration": self.acceleration,
+        }
+
+
+class FollowedClosure:
+    """Poses followed from home to where six conditions hold: k contacts, phi = 0, and g = s.
+
+    Each sample alone; rates come by the chain rule (see `questions.closure`).
+    """
+
+    def __init__(
+        self,
+        conditions: Callable[[Array, Array], tuple[Array, Array, Array]],
+        angles: Array,
+        length: float,
+        two_branches: bool,
+    ) -> None:
+        """Args: conditions: of poses and rates, (N, 6) each: (phi, g), K (N, 6, 6) and K' X'.
+        angles: which of g are angles, (6 - k,).   length: the characteristic one [m].
+        two_branches: whether there are no more than two poses: home's can be told by det K.
+        """
+        self._conditions, self._two_branches = conditions, two_branches
+        self._k = 6 - len(angles)
+
+        def at(pose: Array) -> Conditions:
+            value, K, _ = conditions(pose, np.zeros_like(pose))
+            none, N = np.zeros_like(pose), len(pose)
+            whole = np.broadcast_to(np.eye(6), (N, 6, 6))
+            return Conditions(value, np.ascontiguousarray(K), whole, none, none, none[:, :0])
+
+        rows = np.concatenate([np.zeros(self._k, dtype=bool), angles])
+        self._steps = Steps(at, length, rows, np.arange(6))
+        self._branch = self._side(np.zeros((1, 6)))[0]
+
+    @staticmethod
+    def of(structure: Structure, numbers: Numbers, prescribed: Prescribed) -> FollowedClosure:
+        """By numpy, from the question `conditions`."""
+        kernel = NumpyKernel(
+            Question.about(structure, "conditions", prescribed).variants(), numbers
+        )
+
+        def conditions(pose: Array, rate: Array) -> tuple[Array, Array, Array]:
+            found = kernel.run({"pose": pose, "pose_rate": rate}).values
+            return found["values"].T, np.moveaxis(found["K"], -1, 0), found["bias"].T
+
+        names = prescribed.names
+        angles = np.array([name in COORDINATES[3:] for name in names])
+        if not names:  # a landmark's path: lengths
+            angles = np.zeros(structure.m, dtype=bool)
+        dependent = [name for name in COORDINATES if name not in names]
+        closed = closed_form_available([form for form, _ in structure.contacts], dependent)
+        length = characteristic(structure, numbers)
+        return FollowedClosure(conditions, angles, length, bool(names) and closed)
+
+    def solve(self, s: Array, s1: Array, s2: Array) -> PlatformMotion:
+        """Poses and rates where g = s, g' = s1, g'' = s2, (N, 6 - k) each."""
+        home = np.zeros((len(s), 6))
+        pose, reached = follow(self._steps, home, self._padded(s))
+        if self._two_branches:
+            # The straight way may leave the surfaces where another would not: one bold leap, to
+            # be judged by its branch.
+            left = np.flatnonzero(~reached & np.isfinite(s).all(axis=1))
+            pose[left], reached[left] = nearest(
+                self._steps, home[left], self._padded(s[left]), bold=True
+            )
+            reached[left] &= self._side(pose[left]) == self._branch
+        # Contacts that hold badly magnify rounding in the steps: one more, down to the residual's.
+        pose[reached] += self._steps.step(pose[reached], self._padded(s[reached])).move
+        pose[~reached] = np.nan
+        _, K, _ = self._conditions(pose, home)
+        rate = least_squares(K, self._padded(s1)[..., None])[..., 0]
+        bias = self._conditions(pose, rate)[2]
+        acceleration = least_squares(K, (self._padded(s2) - bias)[..., None])[..., 0]
+        return PlatformMotion(pose, rate, acceleration, reached)
+
+    def _side(self, pose: Array) -> Array:
+        """The sign of det K: branches meet where it changes."""
+        with np.errstate(invalid="ignore"):
+            return np.linalg.slogdet(self._conditions(pose, np.zeros_like(pose))[1]).sign
+
+    def _padded(self, s: Array) -> Array:
+        return np.hstack([np.zeros((len(s), self._k)), s])
 
 
 class Closure:
@@ -58,7 +158,7 @@ class Closure:
         backend = backend or Backend()
         self._kernel: Kernel = backend.kernel(question.key, question.variants, self._numbers)
         self._robust = (structure, self._numbers, prescribed)
-        self._follow: Follow | None = None
+        self._followed: FollowedClosure | None = None
 
     def renumbered(self, mechanism: Mechanism) -> Closure:
         """The same, if it is general, of another mechanism of the structure.
@@ -73,7 +173,7 @@ class Closure:
         structure, _, prescribed = self._robust
         other._numbers = Layout.of(structure).numbers(mechanism, self._landmark)
         other._kernel = self._kernel.renumbered(other._numbers)
-        other._robust, other._follow = (structure, other._numbers, prescribed), None
+        other._robust, other._followed = (structure, other._numbers, prescribed), None
         return other
 
     def solve(
@@ -88,8 +188,8 @@ class Closure:
         reached = answer.status == Status.ok
         again = np.flatnonzero(answer.status == AGAIN)
         if again.size:
-            self._follow = self._follow or Follow(*self._robust)
-            better = self._follow.solve(s[again], s1[again], s2[again])
+            self._followed = self._followed or FollowedClosure.of(*self._robust)
+            better = self._followed.solve(s[again], s1[again], s2[again])
             reached[again] = better.reached
             for target, a in zip(found, better.named().values(), strict=True):
                 target[again] = a

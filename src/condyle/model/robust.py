@@ -20,8 +20,8 @@ from ..questions import Prescribed, Question
 from ..questions.numbers import characteristic
 from ..questions.structure import Structure
 from ..status import Status, judge
+from .closing import FollowedClosure
 from .distributing import Distributor
-from .follow import Follow
 from .jamming import balanced, solved_rows
 
 Arrays = dict[str, np.ndarray]
@@ -69,8 +69,9 @@ class Robust:
         return self._kernel("configuration")
 
     @cached_property
-    def _follow(self) -> Follow:
-        return Follow(self._structure, self._numbers, Prescribed(self._independent))
+    def _followed(self) -> FollowedClosure:
+        prescribed = Prescribed(self._independent)
+        return FollowedClosure.of(self._structure, self._numbers, prescribed)
 
     def evaluate(self, inputs: Mapping[str, np.ndarray]) -> tuple[Arrays, np.ndarray]:
         """All results of inverse dynamics by name, samples last, and their statuses."""
@@ -151,7 +152,7 @@ class Robust:
         answer = self._motion.run(inputs)
         doubtful = np.flatnonzero(answer.status == AGAIN)
         if doubtful.size:
-            found = self._follow.solve(*(inputs[name][doubtful] for name in ("q", "q1", "q2")))
+            found = self._followed.solve(*(inputs[name][doubtful] for name in ("q", "q1", "q2")))
             answer.status[doubtful] = np.where(found.reached, Status.ok, Status.unreachable)
             for name, a in found.named().items():
                 answer.values[name][:, doubtful] = a.T

@@ -19,14 +19,13 @@ from ..graph.program import Program, Variants
 from .allocation import allocation
 from .closure import Prescribed, closure, conditions
 from .configuration import configuration
-from .encoders import encoders
 from .forward import forward, forward_system
 from .instant import energy, instant
 from .inverse import balance, inverse, motion, system
 from .linear import linear
 from .matrices import jacobians, matrices
 from .observer import observer
-from .pose import pose
+from .pose import encoders, pose
 from .rate import rate
 from .reactions import reactions
 from .structure import Structure

@@ -5,8 +5,8 @@
     q':    A q' ~ theta',   theta' = smoothing theta'_before + (1 - smoothing) (count - before) / T
 
 Poses follow one another within a period, so that the assembly mode is that of the last one
-(`condyle.model.forward` looks for it from afar). What lasts from one period to the next goes in and
-comes out: `BEFORE` says which result is which port of the next period.
+(`condyle.model.forward_kinematics` looks for it from afar). What lasts from one period to the next
+goes in and comes out: `BEFORE` says which result is which port of the next period.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ whole turns. Angles of the pose count as lengths in the same way: A and steps ha
 
 The start decides the assembly mode. Steps that shrink to a quarter each time lead to the pose
 nearest to it; where they do not, the certificate is 0, and the sample goes to
-`condyle.model.forward`, which follows it in pieces.
+`condyle.model.forward_kinematics`, which follows it in pieces.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from ..dynamics.least_norm import definite_solve
-from ..graph.program import Variants
+from ..graph.program import Program, Variants
 from ..kinematics.chain import FAMILIES
 from ..kinematics.constraints import (
     ContactSymbols,
@@ -50,7 +50,7 @@ class Step:
 
     pose, move: X_EE and the step, (6,).   square: of the move, without dimension.
     M_J: (6, m).   A: (m,) a group, lane values, without dimension; `weight` of each group's.
-    residual: readings less joint coordinates, lane values [rad or m].   phi: (k,) [m].
+    residual: readings less joint coordinates, lane values [rad or m].
     regular: 1, or 0 where A has not full rank, or a chain cannot reach the pose.
     """
 
@@ -63,7 +63,6 @@ class Step:
     weight: Lanes
     unit: ca.SX
     residual: Lanes
-    phi: ca.SX
     regular: ca.SX
 
     @property
@@ -130,8 +129,45 @@ def step_at(
     weight: Lanes | None = None,
 ) -> Step:
     """The Gauss-Newton step from any pose, also from one that does not meet the contacts."""
-    s, length = b.structure, b.parameter("length")
-    position, bryant = pose[:3], Bryant.of(pose[3:])
+    at, length = joints_at(b, pose, contacts), b.parameter("length")
+    unit = ca.vertcat(length, length, length, 1, 1, 1)
+    free = independent_indices(b.structure.dependent)
+    residual, rows, right, weights = [], [], [], []
+    for group, kind in enumerate(b.structure.families):
+        turns = FAMILIES[kind].joint_unit == "rad"
+        left = joint[group] - at.joint[group]
+        residual.append(_without_turns(left) if turns else left)
+        own = b.lane(group, "mask") * (ca.SX(1) if turns else 1 / length)
+        weights.append(own if weight is None else own * weight[group])
+        rows.append(weights[-1] * (unit[free] * (at.M_J.T @ at.J[group])))
+        right.append(weights[-1] * (residual[-1] - ca.dot(at.J[group], at.back)))
+    dq, regular = least_squares(b, rows, right)
+    move = at.back + at.M_J @ (unit[free] * dq)
+    regular = regular * (b.least(at.discriminant) >= 0)
+    square = ca.sumsqr(move / unit)
+    return Step(b, pose, move, square, at.M_J, rows, weights, unit, residual, regular)
+
+
+@dataclass(frozen=True)
+class JointsAt:
+    """What joints and contacts say of a pose.
+
+    joint, discriminant: lane values.   J: (6,) a group, theta' = J . X_EE'.
+    M_J: (6, m).   back: (6,), moves the dependent coordinates back onto the surfaces.
+    phi: (k,) [m], how far the contacts are off them.
+    """
+
+    joint: Lanes
+    discriminant: Lanes
+    J: Lanes
+    M_J: ca.SX
+    back: ca.SX
+    phi: ca.SX
+
+
+def joints_at(b: Builder, pose: ca.SX, contacts: Sequence[ContactSymbols]) -> JointsAt:
+    """At any pose, also at one that does not meet the contacts."""
+    s, position, bryant = b.structure, pose[:3], Bryant.of(pose[3:])
     R, E = bryant.rotation(), ca.diagcat(ca.SX.eye(3), bryant.angular_velocity())
     dep = indices(s.dependent)
     phi = ca.vertcat(ca.SX(0, 1), *(c.phi(c.at(position, R)) for c in contacts))
@@ -139,26 +175,16 @@ def step_at(
     M_J, back = parasitic_jacobian(C, s.dependent), ca.SX.zeros(6)
     if dep:
         back[dep] = -solve_small(C[:, dep], phi)
-    unit = ca.vertcat(length, length, length, 1, 1, 1)
-    free = independent_indices(s.dependent)
-    residual, rows, right, weights, reach = [], [], [], [], []
+    levers = [R @ b.lane(group, "joint") for group in range(len(s.families))]
+    loops = []
     for group, kind in enumerate(s.families):
-        family, lever = FAMILIES[kind], R @ b.lane(group, "joint")
-        loop = family.loop(family.named(b.lane(group, "constants")), position + lever)
-        turns = family.joint_unit == "rad"
-        left = joint[group] - loop.q_r[0]
-        residual.append(_without_turns(left) if turns else left)
-        J = E.T @ ca.vertcat(loop.J, ca.cross(lever, loop.J))
-        own = b.lane(group, "mask") * (ca.SX(1) if turns else 1 / length)
-        weights.append(own if weight is None else own * weight[group])
-        rows.append(weights[-1] * (unit[free] * (M_J.T @ J)))
-        right.append(weights[-1] * (residual[-1] - ca.dot(J, back)))
-        reach.append(loop.discriminant)
-    dq, regular = least_squares(b, rows, right)
-    move = back + M_J @ (unit[free] * dq)
-    regular = regular * (b.least(reach) >= 0)
-    square = ca.sumsqr(move / unit)
-    return Step(b, pose, move, square, M_J, rows, weights, unit, residual, phi, regular)
+        family = FAMILIES[kind]
+        constants = family.named(b.lane(group, "constants"))
+        loops.append(family.loop(constants, position + levers[group]))
+    pairs = zip(loops, levers, strict=True)
+    J = [E.T @ ca.vertcat(loop.J, ca.cross(lever, loop.J)) for loop, lever in pairs]
+    reach = [loop.discriminant for loop in loops]
+    return JointsAt([loop.q_r[0] for loop in loops], reach, J, M_J, back, phi)
 
 
 def least_squares(b: Builder, A: Lanes, right: Lanes) -> tuple[ca.SX, ca.SX]:
@@ -194,6 +220,19 @@ def pose(structure: Structure, iterations: int = ITERATIONS) -> Variants:
     b.output("residual", found.last.residual, "rad or m")
     b.check(2 * found.sure - 1, 0.5)
     return Variants(b.finish(), single=True)
+
+
+def encoders(structure: Structure) -> Program:
+    """What following a pose asks of it: at any pose, port pose, the results of `JointsAt`."""
+    b = Builder(structure)
+    contacts = single_contacts(structure, b.parameter)
+    at = joints_at(b, b.sample("pose", 6, ANGLE_UNITS), contacts)
+    b.output("joint", at.joint, "rad or m")
+    b.output("J_theta", at.J, "")
+    b.output("M_J", at.M_J, "", 6, structure.m)
+    b.output("correction", at.back, "m, rad", 6)
+    b.output("phi", at.phi, "m", len(contacts))
+    return b.finish()
 
 
 def _near(contacts: Sequence[ContactSymbols], pose: ca.SX) -> list[ContactSymbols]:

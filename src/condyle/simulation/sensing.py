@@ -6,7 +6,7 @@
 
 n joints over-determine m coordinates: ~ is least squares, with turning joints multiplied by the
 characteristic length. Poses follow one another within a period, so that the assembly mode is that
-of the last one (`condyle.model.forward` looks for it from afar).
+of the last one (`condyle.model.forward_kinematics` looks for it from afar).
 """
 
 from __future__ import annotations

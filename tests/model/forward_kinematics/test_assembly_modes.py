@@ -9,7 +9,7 @@ import pytest
 from oracles.rotations import bryant
 
 import condyle
-from condyle.model.forward import ForwardKinematics
+from condyle.model.forward_kinematics import ForwardKinematics
 from condyle.motion import read_table, write_table
 from condyle.results.poses import modes_file, pose_file
 

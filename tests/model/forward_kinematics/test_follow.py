@@ -16,10 +16,10 @@ import condyle
 from condyle.errors import LostError
 from condyle.mechanism import bundled_text
 from condyle.mechanism.files import from_data
-from condyle.model.forward import ForwardKinematics
-from condyle.model.forward.follow import follow
-from condyle.model.forward.gauss_newton import GaussNewton
-from condyle.model.forward.pose_status import PoseStatus
+from condyle.model.continuation import Steps, follow
+from condyle.model.forward_kinematics import ForwardKinematics
+from condyle.model.forward_kinematics.joint_steps import joint_steps
+from condyle.model.forward_kinematics.pose_status import PoseStatus
 from condyle.motion import write_table
 from condyle.results.poses import pose_file
 from condyle.status import Status
@@ -112,7 +112,7 @@ def test_far_from_home_rows_follow_the_row_before() -> None:
 def test_paths_through_singularities_are_lost_there() -> None:
     """Encoders cannot tell passing a singularity from turning back: no row behind it has a pose."""
     forward, d = stewart()
-    newton = GaussNewton(condyle.load("gough-stewart"))
+    steps = joint_steps(condyle.load("gough-stewart"))
     rng, passed = np.random.default_rng(1), 0
     for rows in (81, 301):
         for _ in range(25):
@@ -120,7 +120,7 @@ def test_paths_through_singularities_are_lost_there() -> None:
             bow = rng.uniform(-0.5, 0.5, 6) * np.sin(np.linspace(0, np.pi, rows))[:, None] ** 2
             given = encoders(d, poses + bow)
             found = forward.solve(given, np.arange(float(rows)))
-            sign = np.linalg.slogdet(newton.step(poses + bow, given).A).sign
+            sign = np.linalg.slogdet(steps.step(poses + bow, given).A).sign
             behind = int(np.argmax(sign != sign[0])) if (sign != sign[0]).any() else rows
             np.testing.assert_allclose(
                 found.pose[found.found], (poses + bow)[found.found], rtol=0, atol=1e-7
@@ -191,15 +191,15 @@ def test_candidates_of_another_mode_are_followed_anew(monkeypatch: pytest.Monkey
     poses = line((-0.1, 0.2, 0.1, 0.3, -0.2, 0.4), 60)
     calls: list[int] = []
 
-    def leaping(newton: GaussNewton, start: np.ndarray, joints: np.ndarray) -> Reached:
+    def leaping(steps: Steps, start: np.ndarray, joints: np.ndarray) -> Reached:
         calls.append(len(start))
-        found, reached = follow(newton, start, joints)
+        found, reached = follow(steps, start, joints)
         if len(calls) == 1:
             found[20:, 2] = -4.0 - found[20:, 2]
             found[20:, 3:5] *= -1
         return found, reached
 
-    monkeypatch.setattr("condyle.model.forward.track.follow", leaping)
+    monkeypatch.setattr("condyle.model.forward_kinematics.track.follow", leaping)
     found = forward.solve(encoders(d, poses), np.arange(60.0))
     assert found.found.all() and len(calls) > 2
     np.testing.assert_allclose(found.pose, poses, rtol=0, atol=1e-12)
@@ -209,10 +209,10 @@ def test_solutions_have_principal_angles(monkeypatch: pytest.MonkeyPatch) -> Non
     forward, d = stewart()
     poses = line((-0.1, 0.2, 0.1, 0.3, -0.2, 0.4), 3)
 
-    def turning(newton: GaussNewton, start: np.ndarray, joints: np.ndarray) -> Reached:
-        found, reached = follow(newton, start, joints)
+    def turning(steps: Steps, start: np.ndarray, joints: np.ndarray) -> Reached:
+        found, reached = follow(steps, start, joints)
         return found + 2 * np.pi * np.array([0, 0, 0, 1, 0, -2]), reached
 
-    monkeypatch.setattr("condyle.model.forward.follow", turning)
+    monkeypatch.setattr("condyle.model.forward_kinematics.solver.follow", turning)
     found = forward.solve(encoders(d, poses))
     np.testing.assert_allclose(found.pose, poses, rtol=0, atol=1e-12)

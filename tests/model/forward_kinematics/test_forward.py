@@ -14,9 +14,9 @@ from condyle.errors import InconsistentError, InputError, UnreachableError
 from condyle.kinematics.bryant import bryant_angles, rotations
 from condyle.mechanism import bundled_mechanisms
 from condyle.mechanism.files import from_data
-from condyle.model.forward import ForwardKinematics
-from condyle.model.forward.orientation import principal
-from condyle.model.forward.pose_status import PoseStatus
+from condyle.model.forward_kinematics import ForwardKinematics
+from condyle.model.forward_kinematics.orientation import principal
+from condyle.model.forward_kinematics.pose_status import PoseStatus
 from condyle.motion import read_table, write_table
 from condyle.results.poses import pose_file
 from condyle.status import Status

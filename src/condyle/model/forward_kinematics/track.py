@@ -18,8 +18,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from .follow import ALIKE, CONVERGED, LONGEST, SHRINK, follow, nearest, unlikeness
-from .gauss_newton import GaussNewton, Step
+from ..continuation import (
+    ALIKE,
+    CONVERGED,
+    LONGEST,
+    SHRINK,
+    Step,
+    Steps,
+    follow,
+    nearest,
+    unlikeness,
+)
 from .pose_status import PoseStatus, judge
 
 FEW = 32  # rows followed at once behind a broken link; four times as many after each success
@@ -29,7 +38,7 @@ BETTER = 0.5  # distance from what is expected, over that of the pose followed
 
 
 def track(
-    newton: GaussNewton, joints: np.ndarray, time: np.ndarray, tolerance: float
+    steps: Steps, joints: np.ndarray, time: np.ndarray, tolerance: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Poses (N, 6) and statuses (N,) of joint coordinates (N, n) at rising times (N,) [s].
 
@@ -42,18 +51,18 @@ def track(
     while row < count:
         rows = np.arange(row, min(row + few, count))
         anchor = pose[found[-1]] if found.size else np.zeros(6)
-        X, reached = follow(newton, np.tile(anchor, (len(rows), 1)), joints[rows])
-        at = newton.step(X, joints[rows])
+        X, reached = follow(steps, np.tile(anchor, (len(rows), 1)), joints[rows])
+        at = steps.step(X, joints[rows])
         verdict = judge(reached, at.residual, tolerance)
         good = verdict == PoseStatus.OK
         first = int(np.argmax(good)) if good.any() else len(rows)
         stop = first + _leading(good[first:])
-        linked = first + _linked(newton, X[first:stop], at, joints[rows], first)
+        linked = first + _linked(steps, X[first:stop], at, joints[rows], first)
         # From the same anchor, rows before the first good one stay without a pose.
         taken = rows[:linked]
         pose[taken], status[taken] = X[:linked], verdict[:linked]
         new = np.concatenate([found[-2:], taken[first:]])
-        unsure = _unsure(newton, pose[new], joints[new], time[new], tolerance)
+        unsure = _unsure(steps, pose[new], joints[new], time[new], tolerance)
         unsure[: len(new) - len(taken[first:])] = False
         if unsure.any():
             # The row before is the one that may have been next to the singularity.
@@ -65,7 +74,7 @@ def track(
     return pose, status
 
 
-def _linked(newton: GaussNewton, pose: np.ndarray, at: Step, joints: np.ndarray, first: int) -> int:
+def _linked(steps: Steps, pose: np.ndarray, at: Step, joints: np.ndarray, first: int) -> int:
     """How many poses from the first on are each followed from the one before.
 
     Args: at, joints: of more rows, of which `pose` are those from `first` on.
@@ -74,18 +83,18 @@ def _linked(newton: GaussNewton, pose: np.ndarray, at: Step, joints: np.ndarray,
     before, after, given = pose[:-1], pose[1:], joints[run]
     if not len(after):
         return len(pose)
-    move, way = newton.step(before, given).move, newton.between(before, after)
-    size = newton.size(move)
-    linked = newton.size(move - way) <= SHRINK * size + CONVERGED
+    move, way = steps.step(before, given).move, steps.between(before, after)
+    size = steps.size(move)
+    linked = steps.size(move - way) <= SHRINK * size + CONVERGED
     linked &= (size <= LONGEST) & (unlikeness(at.A[first : run.stop - 1], at.A[run]) <= ALIKE)
     doubtful = np.flatnonzero(~linked)
-    end, reached = follow(newton, before[doubtful], given[doubtful])
-    linked[doubtful] = reached & (newton.size(newton.between(end, after[doubtful])) <= SAME)
+    end, reached = follow(steps, before[doubtful], given[doubtful])
+    linked[doubtful] = reached & (steps.size(steps.between(end, after[doubtful])) <= SAME)
     return 1 + _leading(linked)
 
 
 def _unsure(
-    newton: GaussNewton, pose: np.ndarray, joints: np.ndarray, time: np.ndarray, tolerance: float
+    steps: Steps, pose: np.ndarray, joints: np.ndarray, time: np.ndarray, tolerance: float
 ) -> np.ndarray:
     """Where another pose fits and is nearer to what the two poses before let expect, (N,)."""
     unsure = np.zeros(len(pose), dtype=bool)
@@ -93,16 +102,16 @@ def _unsure(
         return unsure
     ratio = np.diff(time)[1:] / np.diff(time)[:-1]
     here, given = pose[2:], joints[2:]
-    expected = pose[1:-1] + newton.between(pose[:-2], pose[1:-1]) * ratio[:, None]
-    off = newton.size(newton.between(expected, here))
-    other, fits = nearest(newton, expected, given)
-    residual = newton.step(other, given).residual
+    expected = pose[1:-1] + steps.between(pose[:-2], pose[1:-1]) * ratio[:, None]
+    off = steps.size(steps.between(expected, here))
+    other, fits = nearest(steps, expected, given)
+    residual = steps.step(other, given).residual
     fits &= judge(fits, residual, tolerance) == PoseStatus.OK
-    fits &= newton.size(newton.between(here, other)) > SAME
-    another = fits & (newton.size(newton.between(expected, other)) < BETTER * off)
+    fits &= steps.size(steps.between(here, other)) > SAME
+    another = fits & (steps.size(steps.between(expected, other)) < BETTER * off)
     # Next to a singularity, A changes altogether within less than what is expected is off by.
-    A = newton.step(pose[1:], joints[1:]).A
-    step = newton.size(newton.between(pose[1:-1], here))
+    A = steps.step(pose[1:], joints[1:]).A
+    step = steps.size(steps.between(pose[1:-1], here))
     at_border = unlikeness(A[:-1], A[1:]) * off > step
     sigma = np.linalg.svd(A[:-1][at_border], compute_uv=False)[:, -1]
     fallen = np.linalg.svd(A[1:][at_border], compute_uv=False)[:, -1]

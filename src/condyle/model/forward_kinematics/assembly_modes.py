@@ -13,8 +13,7 @@ import numpy as np
 
 from ...kinematics.bryant import bryant_angles, rotations
 from ...mechanism.mechanism import Mechanism
-from .follow import CONVERGED
-from .gauss_newton import GaussNewton
+from ..continuation import CONVERGED, Steps
 from .orientation import principal
 from .pose_status import PoseStatus, judge
 
@@ -45,25 +44,25 @@ class AssemblyModes:
 
 
 def search(
-    mechanism: Mechanism, newton: GaussNewton, joints: np.ndarray, seed: int, tolerance: float
+    mechanism: Mechanism, steps: Steps, joints: np.ndarray, seed: int, tolerance: float
 ) -> AssemblyModes:
     """Poses of joint coordinates, (n,), that fit within `tolerance` [rad or m]."""
     starts = _starts(mechanism, np.random.default_rng(seed))
-    starts = starts[np.isfinite(newton.joints(starts)).all(axis=1)][:STARTS]
+    starts = starts[np.isfinite(steps.conditions(starts).value).all(axis=1)][:STARTS]
     given = np.tile(joints, (len(starts), 1))
-    pose, converged = _descend(newton, starts, given)
+    pose, converged = _descend(steps, starts, given)
     pose, given = principal(pose[converged]), given[converged]
-    residual = newton.step(pose, given).residual
+    residual = steps.step(pose, given).residual
     pose = pose[judge(np.ones(len(pose), bool), residual, tolerance) == PoseStatus.OK]
     R = rotations(pose[:, 3:])
     turn = np.arccos(np.clip((np.trace(R, axis1=1, axis2=2) - 1) / 2, -1, 1))
-    distance = np.hypot(np.linalg.norm(pose[:, :3], axis=1) / newton.length, turn)
-    place = np.hstack([pose[:, :3] / newton.length, R.reshape(-1, 9)])
+    distance = np.hypot(np.linalg.norm(pose[:, :3], axis=1) / steps.length, turn)
+    place = np.hstack([pose[:, :3] / steps.length, R.reshape(-1, 9)])
     kept: list[int] = []
     for i in np.argsort(distance, kind="stable"):
         if not kept or (np.abs(place[kept] - place[i]).max(axis=1) > SAME).all():
             kept.append(int(i))
-    at = newton.step(pose[kept], given[: len(kept)])
+    at = steps.step(pose[kept], given[: len(kept)])
     condition = np.linalg.cond(at.A) if kept else np.zeros(0)
     return AssemblyModes(pose[kept], distance[kept], at.residual, condition)
 
@@ -86,13 +85,11 @@ def _starts(mechanism: Mechanism, rng: np.random.Generator) -> np.ndarray:
     return starts
 
 
-def _descend(
-    newton: GaussNewton, x: np.ndarray, joints: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _descend(steps: Steps, x: np.ndarray, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Damped Gauss-Newton from poses x, (N, 6); where it converged, (N,)."""
     x, converged = x.copy(), np.zeros(len(x), dtype=bool)
     active = np.arange(len(x))
-    step = newton.step(x, joints)
+    step = steps.step(x, joints)
     for _ in range(ITERATIONS):
         finite = np.isfinite(step.size) & np.isfinite(step.error)
         small = finite & ((step.size <= CONVERGED) | step.settled)
@@ -105,13 +102,13 @@ def _descend(
         part = np.minimum(1.0, LONGEST / step.size)
         given = joints[active]
         tried = x[active] + step.move * part[:, None]
-        new = newton.step(tried, given)
+        new = steps.step(tried, given)
         for _ in range(HALVINGS):
             worse = np.flatnonzero(~(new.error <= 2 * step.error))
             if not worse.size:
                 break
             part[worse] /= 2
             tried[worse] = x[active[worse]] + step.move[worse] * part[worse, None]
-            new.put(worse, newton.step(tried[worse], given[worse]))
+            new.put(worse, steps.step(tried[worse], given[worse]))
         x[active], step = tried, new
     return x, converged

@@ -14,9 +14,9 @@ import numpy as np
 
 from ...errors import InputError
 from ...mechanism.mechanism import Mechanism
+from ..continuation import follow
 from .assembly_modes import AssemblyModes, search
-from .follow import follow
-from .gauss_newton import GaussNewton
+from .joint_steps import joint_steps
 from .orientation import principal
 from .pose_status import PoseStatus, judge
 from .track import track
@@ -50,7 +50,7 @@ class ForwardKinematics:
 
     def __init__(self, mechanism: Mechanism) -> None:
         self._mechanism = mechanism
-        self._newton = GaussNewton(mechanism)
+        self._steps = joint_steps(mechanism)
 
     def solve(
         self,
@@ -69,8 +69,8 @@ class ForwardKinematics:
         joints = np.asarray(joints, dtype=float)
         _check(tolerance)
         if time is None:
-            pose, reached = follow(self._newton, np.zeros((len(joints), 6)), joints)
-            status = judge(reached, self._newton.step(pose, joints).residual, tolerance)
+            pose, reached = follow(self._steps, np.zeros((len(joints), 6)), joints)
+            status = judge(reached, self._steps.step(pose, joints).residual, tolerance)
         else:
             time = np.asarray(time, dtype=float)
             if not (np.diff(time) > 0).all():
@@ -79,8 +79,8 @@ class ForwardKinematics:
                     f"times must rise: {time[at + 1]:g} s follows {time[at]:g} s (row {at + 2}). "
                     "Without times, rows stand alone"
                 )
-            pose, status = track(self._newton, joints, time, tolerance)
-        at_pose = self._newton.step(pose, joints)
+            pose, status = track(self._steps, joints, time, tolerance)
+        at_pose = self._steps.step(pose, joints)
         found = status == PoseStatus.OK
         condition = np.full(len(joints), np.nan)
         condition[found] = np.linalg.cond(at_pose.A[found])
@@ -94,7 +94,7 @@ class ForwardKinematics:
     ) -> AssemblyModes:
         """Assembly modes of one sample, (n,), that a seeded search finds; it may miss some."""
         _check(tolerance)
-        return search(self._mechanism, self._newton, np.asarray(joints, float), seed, tolerance)
+        return search(self._mechanism, self._steps, np.asarray(joints, float), seed, tolerance)
 
 
 def _check(tolerance: float) -> None:
