@@ -15,7 +15,7 @@ import tomli_w
 from oracles.random_mechanism import SURFACES, random_mechanism, random_surface, toml_text
 
 from condyle.mechanism import bundled_mechanisms, bundled_text
-from condyle.mechanism.starter import starter_text
+from condyle.mechanism.library import starter_text
 
 HOME = np.array([-26.65, 72, 42.53])
 STRANGE = [

@@ -17,7 +17,7 @@ from condyle.kinematics.chain import FAMILIES
 from condyle.mechanism import Mechanism, bundled_text, dump, dumps, load, parse
 from condyle.mechanism.files import from_data
 from condyle.mechanism.home import home_warnings
-from condyle.mechanism.starter import starter_text
+from condyle.mechanism.library import starter_text
 
 ORACLES = Path(__file__).parents[1] / "oracles"
 LENGTHS = {"base", "crank_tip", "platform", "point", "offset", "x", "y", "z"}

@@ -10,8 +10,8 @@ import pytest
 
 import condyle
 from condyle.mechanism import Mechanism, bundled_text, parse
+from condyle.mechanism.library import starter_text
 from condyle.mechanism.plausibility import extent, length_text, plausibility_warnings
-from condyle.mechanism.starter import starter_text
 
 TEXT = bundled_text("masticatory")
 

@@ -13,7 +13,7 @@ from oracles.random_mechanism import SURFACES, random_mechanism, random_surface
 
 from condyle.mechanism import bundled_text, json_schema
 from condyle.mechanism.files import from_data
-from condyle.mechanism.starter import starter_text
+from condyle.mechanism.library import starter_text
 
 Schema = dict[str, Any]
 TYPES: dict[str, Any] = {"object": dict, "array": list, "string": str, "boolean": bool}

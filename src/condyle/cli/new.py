@@ -32,8 +32,8 @@ def new(
     """
     from ..atomic import write_text
     from ..mechanism import parse
+    from ..mechanism.library import starter_text
     from ..mechanism.quantities import NAME_CHARACTERS
-    from ..mechanism.starter import starter_text
 
     path = Path(name if name.endswith(".toml") else f"{name}.toml")
     stem = path.name.removesuffix(".toml")

@@ -8,8 +8,9 @@ alone, so that one text serves every route, every family and any number of conta
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import casadi as ca
 
@@ -29,20 +30,20 @@ class Body:
     inertia: ca.SX
 
 
-class Formulation(Protocol):
+class Formulation(ABC):
     """One way to write the equations of motion."""
 
     name: ClassVar[str]
-    uses_twist: ClassVar[bool]  # whether route `core` works in twist coordinates
+    uses_twist: ClassVar[bool] = False  # whether route `core` works in twist coordinates
     # Whether a chain's bodies can act as one, with end masses that are part of the platform, and
     # whether idle constants (`Family.idle`) alone make a lane do nothing.
     lumps: ClassVar[bool] = False
     pads: ClassVar[bool] = False
 
+    @abstractmethod
     def platform(self, state: State, body: Body, g: ca.SX) -> ca.SX:
         """Inertia less gravity of the platform, dual to the state's c', (m,)."""
-        ...
 
+    @abstractmethod
     def chain(self, family: Family, c: Constants, M: PointMotion, g: ca.SX) -> ChainDynamics:
         """Forces of a chain's bodies on its platform joint, and the joint's motion."""
-        ...

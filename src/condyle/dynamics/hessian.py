@@ -21,48 +21,38 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ..kinematics.chain import ChainDynamics, Constants, Family, Link
-from ..kinematics.state import PointMotion, State
+from ..kinematics.chain import Link
+from ..kinematics.state import State
 from .formulation import Body
-from .joint_space import JointState, joint_space_dynamics
+from .joint_space import JointSpace, JointState, weight
 
 
-class Hessian:
+class Hessian(JointSpace):
     name: ClassVar[str] = "hessian"
-    uses_twist: ClassVar[bool] = False
-    lumps: ClassVar[bool] = False
-    pads: ClassVar[bool] = False
 
     def platform(self, state: State, body: Body, g: ca.SX) -> ca.SX:
         V, omega_M = state.twist[:3], state.R.T @ state.twist[3:]
         kinetic = (body.mass * ca.dot(V, V) + ca.dot(omega_M, body.inertia @ omega_M)) / 2
-        potential = -body.mass * ca.dot(g, state.pose[:3])
         c = state.coordinates
-        return hessian_force(kinetic, potential, c, state.rate, state.acceleration)
+        force = hessian_force(kinetic, c, state.rate, state.acceleration)
+        return force + weight(body.mass, state.pose[:3], g, c)
 
-    def chain(self, family: Family, c: Constants, M: PointMotion, g: ca.SX) -> ChainDynamics:
-        return joint_space_dynamics(family, c, M, g, link_force, constraint_bias)
+    def link_force(self, link: Link, s: JointState, g: ca.SX) -> ca.SX:
+        V, omega = ca.jacobian(link.centre, s.q) @ s.rate, link.spin @ s.rate
+        kinetic = (link.mass * ca.dot(V, V) + ca.dot(omega, link.inertia @ omega)) / 2
+        force = hessian_force(kinetic, s.q, s.rate, s.acceleration)
+        return force + weight(link.mass, link.centre, g, s.q)
 
-
-def constraint_bias(end_point: ca.SX, s: JointState) -> ca.SX:
-    """q_r'^T H_a q_r' of the three loop constraints, (3,)."""
-    hessians = [ca.hessian(end_point[a], s.q)[0] for a in range(3)]
-    return ca.vertcat(*(ca.bilin(H, s.rate, s.rate) for H in hessians))
-
-
-def link_force(link: Link, s: JointState, g: ca.SX) -> ca.SX:
-    """One moving link, dual to q_r', (3,)."""
-    V, omega = ca.jacobian(link.centre, s.q) @ s.rate, link.spin @ s.rate
-    kinetic = (link.mass * ca.dot(V, V) + ca.dot(omega, link.inertia @ omega)) / 2
-    potential = -link.mass * ca.dot(g, link.centre)
-    return hessian_force(kinetic, potential, s.q, s.rate, s.acceleration)
+    @staticmethod
+    def bias(end_point: ca.SX, s: JointState) -> ca.SX:
+        """q_r'^T H_a q_r' of the three loop constraints, (3,)."""
+        hessians = [ca.hessian(end_point[a], s.q)[0] for a in range(3)]
+        return ca.vertcat(*(ca.bilin(H, s.rate, s.rate) for H in hessians))
 
 
-def hessian_force(
-    kinetic: ca.SX, potential: ca.SX, c: ca.SX, rate: ca.SX, acceleration: ca.SX
-) -> ca.SX:
-    """T_c'c' c'' + T_c'c c' - T_c of one body, and the gradient of its potential, (m,)."""
+def hessian_force(kinetic: ca.SX, c: ca.SX, rate: ca.SX, acceleration: ca.SX) -> ca.SX:
+    """T_c'c' c'' + T_c'c c' - T_c of one body, (m,)."""
     m = c.numel()
     H, gradient = ca.hessian(kinetic, ca.vertcat(c, rate))
     mixed, mass_matrix = H[m:, :m], H[m:, m:]
-    return mass_matrix @ acceleration + mixed @ rate - gradient[:m] + ca.gradient(potential, c)
+    return mass_matrix @ acceleration + mixed @ rate - gradient[:m]

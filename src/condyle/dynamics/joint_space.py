@@ -8,6 +8,7 @@ coordinates, M_3 = M_1^-1 M_2.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -16,6 +17,7 @@ import casadi as ca
 from ..kinematics.chain import ChainDynamics, Constants, Family, Link, Loop
 from ..kinematics.constraints import solve_small
 from ..kinematics.state import PointMotion
+from .formulation import Formulation
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,6 @@ def chain_jacobians(family: Family, c: Constants, q_r: ca.SX) -> tuple[ca.SX, ca
     return M_1, solve_small(M_1, ca.SX.eye(3))
 
 
-LinkForce = Callable[[Link, JointState, ca.SX], ca.SX]
 Bias = Callable[[ca.SX, JointState], ca.SX]
 
 
@@ -90,20 +91,26 @@ def joint_motion(
     return JointMotion(loop, rate, acceleration, inverse)
 
 
-def joint_space_dynamics(
-    family: Family,
-    c: Constants,
-    M: PointMotion,
-    g: ca.SX,
-    link_force: LinkForce,
-    bias: Bias = rate_bias,
-) -> ChainDynamics:
-    """The dynamics of a chain whose links' forces are derived in joint space.
+class JointSpace(Formulation):
+    """Formulations whose forces on links are derived in joint space."""
 
-    Args: link_force: (link, joint state, gravity) -> force dual to q_r', (3,).
-    """
-    s = JointState.symbols()
-    links = family.links(c, s.q)
-    motion = joint_motion(family, c, M, bias)
-    forces = motion.insert(s, [link_force(link, s, g) for link in links])
-    return motion.dynamics({link.name: f for link, f in zip(links, forces, strict=True)})
+    @staticmethod
+    def bias(end_point: ca.SX, s: JointState) -> ca.SX:
+        """M_1' q_r', (3,)."""
+        return rate_bias(end_point, s)
+
+    @abstractmethod
+    def link_force(self, link: Link, s: JointState, g: ca.SX) -> ca.SX:
+        """Inertia less gravity of one moving link, dual to q_r', (3,)."""
+
+    def chain(self, family: Family, c: Constants, M: PointMotion, g: ca.SX) -> ChainDynamics:
+        s = JointState.symbols()
+        links = family.links(c, s.q)
+        motion = joint_motion(family, c, M, self.bias)
+        forces = motion.insert(s, [self.link_force(link, s, g) for link in links])
+        return motion.dynamics({link.name: f for link, f in zip(links, forces, strict=True)})
+
+
+def weight(mass: ca.SX, centre: ca.SX, g: ca.SX, c: ca.SX) -> ca.SX:
+    """Gradient of a body's potential in coordinates c, (m,): gravity's force, negative."""
+    return ca.gradient(-mass * ca.dot(g, centre), c)

@@ -19,16 +19,14 @@ import casadi as ca
 from ..kinematics.chain import ChainDynamics, Constants, Family
 from ..kinematics.constraints import solve_small
 from ..kinematics.state import PointMotion, State
-from .formulation import Body
+from .formulation import Body, Formulation
 from .free_body import free_bodies
 from .joint_space import JointState, joint_motion
 
 
-class NewtonEuler:
+class NewtonEuler(Formulation):
     name: ClassVar[str] = "newton_euler"
     uses_twist: ClassVar[bool] = True
-    lumps: ClassVar[bool] = False
-    pads: ClassVar[bool] = False
 
     def platform(self, state: State, body: Body, g: ca.SX) -> ca.SX:
         """Newton, and Euler about O_M, which the mass centre is S / m away from."""

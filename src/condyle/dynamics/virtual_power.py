@@ -12,10 +12,10 @@ import casadi as ca
 
 from ..kinematics.chain import ChainDynamics, Constants, Family
 from ..kinematics.state import PointMotion, State
-from .formulation import Body
+from .formulation import Body, Formulation
 
 
-class VirtualPower:
+class VirtualPower(Formulation):
     name: ClassVar[str] = "virtual_power"
     uses_twist: ClassVar[bool] = True
     lumps: ClassVar[bool] = True

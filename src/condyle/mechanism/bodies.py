@@ -128,8 +128,3 @@ def cross(a: Sequence[float] | np.ndarray, b: Sequence[float] | np.ndarray) -> n
     """Cross product of two vectors, (3,): numpy's own takes ten times as long for one."""
     (a0, a1, a2), (b0, b1, b2) = map(float, a), map(float, b)
     return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
-
-
-def check_rod_length(rod: np.ndarray, name: str, start: str) -> None:
-    if not np.linalg.norm(rod):
-        raise ValueError(f"the {name} has zero length: {start} and platform are the same point")

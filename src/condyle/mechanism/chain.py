@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from .actuator import CableActuator, Limits, LinearActuator, RotaryActuator
-from .bodies import Crank, LegBody, Rod, Slider, across, check_rod_length, cross, distance
+from .bodies import Crank, LegBody, Rod, Slider, across, cross, distance
 from .quantities import Direction, Name, Point
 from .table import Table
 
@@ -22,29 +22,54 @@ NO_BRANCH = 1e-9  # sine of the transmission angle below which home has no branc
 
 
 class ChainTable(Table):
-    """What every family has: a name and a joint on the platform."""
+    """What every family has: a name and a joint on the platform.
+
+    links: the ends of its links at home, by the keys of the table; the last leads to the platform.
+    rod:   what messages call the last one.
+    """
 
     name: Name
+
+    links: ClassVar[dict[str, tuple[str, str]]] = {}
+    rod_name: ClassVar[str] = "rod"
 
     @property
     def lengths(self) -> dict[str, float]:
         """Of its links at home [m]."""
-        return {}
+        return {k: distance(*(getattr(self, end) for end in v)) for k, v in self.links.items()}
 
     @property
     def masses(self) -> dict[str, float]:
         """Of its moving bodies [kg], those that have one."""
-        return {}
+        return {name: b.mass for name, b in self if isinstance(b, Rod | LegBody | Slider)}
 
     @property
     def radii_of_gyration(self) -> dict[str, float]:
         """Radii of gyration of its bodies across themselves [m], by the link they belong to."""
-        return {}
+        radii = [across(body) for _, body in self if isinstance(body, Rod | LegBody)]
+        return {list(self.links)[-1]: max(radii)} if radii else {}
 
     @property
     def fixed_points(self) -> tuple[tuple[float, ...], ...]:
         """Where it is at home, in {S} [m]; its joint on the platform apart."""
-        return ()
+        return tuple(getattr(self, start) for start, _ in self.links.values())
+
+    @field_validator("platform", check_fields=False)
+    @classmethod
+    def _last_link(cls, joint: Any, info: ValidationInfo) -> Any:
+        start = list(cls.links.values())[-1][0]
+        if (point := info.data.get(start)) is not None:
+            rod = np.subtract(joint, point)
+            if not np.linalg.norm(rod):
+                raise ValueError(
+                    f"the {cls.rod_name} has zero length: {start} and platform are the same point"
+                )
+            cls._at_home(rod, info.data)
+        return joint
+
+    @classmethod
+    def _at_home(cls, rod: np.ndarray, data: Mapping[str, Any]) -> None:
+        """Refuses a chain whose home has no branch; `rod` is its last link."""
 
 
 class RSS(ChainTable):
@@ -59,22 +84,8 @@ class RSS(ChainTable):
     coupler: Rod
     actuator: RotaryActuator = RotaryActuator()
 
-    @property
-    def lengths(self) -> dict[str, float]:
-        crank, coupler = (self.base, self.crank_tip), (self.crank_tip, self.platform)
-        return {"crank": distance(*crank), "coupler": distance(*coupler)}
-
-    @property
-    def masses(self) -> dict[str, float]:
-        return {"coupler": self.coupler.mass}
-
-    @property
-    def radii_of_gyration(self) -> dict[str, float]:
-        return {"coupler": across(self.coupler)}
-
-    @property
-    def fixed_points(self) -> tuple[tuple[float, ...], ...]:
-        return self.base, self.crank_tip
+    links = {"crank": ("base", "crank_tip"), "coupler": ("crank_tip", "platform")}
+    rod_name = "coupler"
 
     @field_validator("crank_tip")
     @classmethod
@@ -83,11 +94,10 @@ class RSS(ChainTable):
         if base is None:
             return tip
         crank = np.subtract(tip, base)
-        if not (length := np.linalg.norm(crank)):
+        if not np.linalg.norm(crank):
             raise ValueError("the crank has zero length: base and crank_tip are the same point")
         if axis is not None:
-            sine = abs(np.dot(axis, crank)) / (np.linalg.norm(axis) * length)
-            off = math.asin(min(sine, 1.0))
+            off = math.asin(min(_sine(axis, crank), 1.0))
             if off > AXIS_TOLERANCE:
                 raise ValueError(
                     f"axis is {math.degrees(off):.2f} degrees off the perpendicular to the crank "
@@ -95,24 +105,16 @@ class RSS(ChainTable):
                 )
         return tip
 
-    @field_validator("platform")
     @classmethod
-    def _coupler(cls, joint: Any, info: ValidationInfo) -> Any:
-        data = info.data
-        tip, base, axis = data.get("crank_tip"), data.get("base"), data.get("axis")
-        if tip is None:
-            return joint
-        coupler = np.subtract(joint, tip)
-        check_rod_length(coupler, "coupler", "crank_tip")
+    def _at_home(cls, rod: np.ndarray, data: Mapping[str, Any]) -> None:
+        base, axis = data.get("base"), data.get("axis")
         if base is not None and axis is not None:
-            tangent = cross(axis, np.subtract(tip, base))
-            sine = abs(coupler @ tangent) / (np.linalg.norm(coupler) * np.linalg.norm(tangent))
-            if sine < NO_BRANCH:
+            tangent = cross(axis, np.subtract(data["crank_tip"], base))
+            if _sine(rod, tangent) < NO_BRANCH:
                 raise ValueError(
                     "crank and coupler are in line at home: there the crank has no branch, and "
                     "its torque no hold on the platform; move crank_tip or platform"
                 )
-        return joint
 
 
 class PSS(ChainTable):
@@ -126,38 +128,16 @@ class PSS(ChainTable):
     rod: Rod
     actuator: LinearActuator = LinearActuator()
 
-    @property
-    def lengths(self) -> dict[str, float]:
-        return {"rod": distance(self.base, self.platform)}
+    links = {"rod": ("base", "platform")}
 
-    @property
-    def masses(self) -> dict[str, float]:
-        return {"slider": self.slider.mass, "rod": self.rod.mass}
-
-    @property
-    def radii_of_gyration(self) -> dict[str, float]:
-        return {"rod": across(self.rod)}
-
-    @property
-    def fixed_points(self) -> tuple[tuple[float, ...], ...]:
-        return (self.base,)
-
-    @field_validator("platform")
     @classmethod
-    def _rod(cls, joint: Any, info: ValidationInfo) -> Any:
-        base, axis = info.data.get("base"), info.data.get("axis")
-        if base is None:
-            return joint
-        rod = np.subtract(joint, base)
-        check_rod_length(rod, "rod", "base")
-        if axis is not None:
-            sine = abs(np.dot(axis, rod)) / (np.linalg.norm(axis) * np.linalg.norm(rod))
-            if sine < NO_BRANCH:
-                raise ValueError(
-                    "the rod is perpendicular to the rail at home: there the slider has no "
-                    "branch, and its force no hold on the platform; move base or platform"
-                )
-        return joint
+    def _at_home(cls, rod: np.ndarray, data: Mapping[str, Any]) -> None:
+        axis = data.get("axis")
+        if axis is not None and _sine(rod, axis) < NO_BRANCH:
+            raise ValueError(
+                "the rod is perpendicular to the rail at home: there the slider has no "
+                "branch, and its force no hold on the platform; move base or platform"
+            )
 
 
 class SPS(ChainTable):
@@ -170,28 +150,8 @@ class SPS(ChainTable):
     piston: LegBody = Field(description="the body at M")
     actuator: LinearActuator = LinearActuator()
 
-    @property
-    def lengths(self) -> dict[str, float]:
-        return {"leg": distance(self.base, self.platform)}
-
-    @property
-    def masses(self) -> dict[str, float]:
-        return {"cylinder": self.cylinder.mass, "piston": self.piston.mass}
-
-    @property
-    def radii_of_gyration(self) -> dict[str, float]:
-        return {"leg": max(across(self.cylinder), across(self.piston))}
-
-    @property
-    def fixed_points(self) -> tuple[tuple[float, ...], ...]:
-        return (self.base,)
-
-    @field_validator("platform")
-    @classmethod
-    def _leg(cls, joint: Any, info: ValidationInfo) -> Any:
-        if (base := info.data.get("base")) is not None:
-            check_rod_length(np.subtract(joint, base), "leg", "base")
-        return joint
+    links = {"leg": ("base", "platform")}
+    rod_name = "leg"
 
 
 class Cable(ChainTable):
@@ -202,13 +162,8 @@ class Cable(ChainTable):
     platform: Point = Field(description="where it holds the platform, M, in {M}")
     actuator: CableActuator = CableActuator()
 
-    @property
-    def lengths(self) -> dict[str, float]:
-        return {"line": distance(self.base, self.platform)}
-
-    @property
-    def fixed_points(self) -> tuple[tuple[float, ...], ...]:
-        return (self.base,)
+    links = {"line": ("base", "platform")}
+    rod_name = "cable"
 
     @model_validator(mode="before")
     @classmethod
@@ -223,15 +178,13 @@ class Cable(ChainTable):
             )
         return data
 
-    @field_validator("platform")
-    @classmethod
-    def _line(cls, joint: Any, info: ValidationInfo) -> Any:
-        if (base := info.data.get("base")) is not None:
-            check_rod_length(np.subtract(joint, base), "cable", "base")
-        return joint
-
 
 Chain = Annotated[RSS | PSS | SPS | Cable, Field(discriminator="kind")]
+
+
+def _sine(a: Any, b: Any) -> float:
+    """|a . b| over their lengths: sine of the angle by which they are off the perpendicular."""
+    return float(abs(np.dot(a, b)) / (np.linalg.norm(a) * np.linalg.norm(b)))
 
 
 def limits(chain: RSS | PSS | SPS | Cable) -> Limits:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import casadi as ca
@@ -13,7 +14,7 @@ from pydantic import BeforeValidator, Field, StrictBool, model_validator
 from .actuator import SMOOTHING_SPEED
 from .quantities import Coefficient, Interval, Name, Point, PositiveLength, SmoothingSpeed
 from .schema import SIDE_OPTIONS
-from .surface import Surface, sides
+from .surface import Surface, of_form, sides
 from .table import Table
 
 Side = Literal["below", "above", "inside", "outside"]
@@ -109,14 +110,18 @@ class Contact(Table):
             return self.surface
         return self.surface.parallel(self.push * self.ball_radius, self.point)
 
+    def gradient(self) -> tuple[float, np.ndarray]:
+        """phi [m] and its gradient, (3,) [1], at home."""
+        locus = self.offset_surface
+        value, *gradient = _at(locus.form, (*self.point, *locus.constants()))
+        return value, np.array(gradient)
+
     @property
     def touching_point(self) -> tuple[float, ...]:
         """Where the ball touches the surface at home, (3,) [m] in {S}; without a ball its point."""
         if self.ball_radius is None:
             return self.point
-        p = ca.SX.sym("p", 3)
-        gradient = ca.Function("n", [p], [ca.gradient(self.offset_surface.phi(p), p)])(self.point)
-        n = np.asarray(gradient).ravel()
+        _, n = self.gradient()
         away = self.push * self.ball_radius * n / np.linalg.norm(n)
         return tuple(map(float, np.subtract(self.point, away)))
 
@@ -124,3 +129,18 @@ class Contact(Table):
     def push(self) -> int:
         """Sign of a contact force lambda with which the surface pushes the ball; 0 if unknown."""
         return {None: 0, "above": 1, "outside": 1, "below": -1, "inside": -1}[self.side]
+
+
+@lru_cache(maxsize=256)
+def _at(form: str, numbers: tuple[float, ...]) -> tuple[float, ...]:
+    """phi and the entries of its gradient, from a point and the constants of a surface."""
+    return tuple(map(float, _equation(form, len(numbers) - 3)(*numbers)))
+
+
+@lru_cache(maxsize=256)
+def _equation(form: str, count: int) -> ca.Function:
+    """phi and the entries of its gradient, from the entries of a point and `count` constants."""
+    p, c = ca.SX.sym("p", 3), ca.SX.sym("c", count)
+    phi = of_form(form).phi(p, c)
+    found = [phi, *ca.vertsplit(ca.gradient(phi, p))]
+    return ca.Function("phi", [*ca.vertsplit(p), *ca.vertsplit(c)], found)

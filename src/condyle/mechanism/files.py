@@ -14,30 +14,12 @@ from .chain import Chain
 from .contact import Contact
 from .coordinates import COORDINATES
 from .home import holding_problems, off_surface
-from .library import bundled_mechanisms, bundled_text
 from .mechanism import Mechanism
 from .messages import describe, shown, unknown_key
 from .quantities import PER_METRE
 from .rules import structural_problems
 from .schema import schema_of
 from .toml import nests_too_deep, read_tables, read_text, too_deep
-from .writing import dump, dumps, record, written_in_python
-
-__all__ = [
-    "bundled_mechanisms",
-    "bundled_text",
-    "dump",
-    "dumps",
-    "from_data",
-    "json_schema",
-    "load",
-    "parse",
-    "read_tables",
-    "read_text",
-    "recall",
-    "record",
-    "written_in_python",
-]
 
 
 def load(source: str | Path) -> Mechanism:

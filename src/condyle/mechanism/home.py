@@ -4,18 +4,16 @@ the contacts hold at all."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from functools import lru_cache
 from itertools import combinations
 from typing import Protocol
 
-import casadi as ca
 import numpy as np
 
 from .bodies import cross
 from .chain import Chain
 from .contact import Contact
 from .coordinates import COORDINATES
-from .surface import Parallel, of_form
+from .surface import Parallel
 
 DEPENDENT_ORDER = ("Z", "gamma", "alpha", "beta", "Y", "X")
 MAX_CONDITION = 1e4
@@ -44,35 +42,13 @@ def characteristic_length(mechanism: Parts) -> float:
     return float(np.mean(np.linalg.norm(points, axis=1))) or 1.0
 
 
-def contact_gradient(contact: Contact) -> tuple[float, np.ndarray]:
-    """phi [m] and its gradient, (3,) [1], of one contact at home."""
-    locus = contact.offset_surface
-    value, *gradient = _at(locus.form, (*contact.point, *locus.constants()))
-    return value, np.array(gradient)
-
-
-@lru_cache(maxsize=256)
-def _at(form: str, numbers: tuple[float, ...]) -> tuple[float, ...]:
-    """phi and the entries of its gradient, from a point and the constants of a surface."""
-    return tuple(map(float, _equation(form, len(numbers) - 3)(*numbers)))
-
-
-@lru_cache(maxsize=256)
-def _equation(form: str, count: int) -> ca.Function:
-    """phi and the entries of its gradient, from the entries of a point and `count` constants."""
-    p, c = ca.SX.sym("p", 3), ca.SX.sym("c", count)
-    phi = of_form(form).phi(p, c)
-    found = [phi, *ca.vertsplit(ca.gradient(phi, p))]
-    return ca.Function("phi", [*ca.vertsplit(p), *ca.vertsplit(c)], found)
-
-
 def home_residuals(mechanism: Parts) -> np.ndarray:
     """Distance of each contact point from its surface at home, (k,) [m]."""
     return np.array([home_residual(contact) for contact in mechanism.contacts])
 
 
 def home_residual(contact: Contact) -> float:
-    value, gradient = contact_gradient(contact)
+    value, gradient = contact.gradient()
     steepness = float(np.linalg.norm(gradient))
     return value / steepness if steepness else value
 
@@ -82,7 +58,7 @@ def constraint_jacobian(mechanism: Parts) -> np.ndarray:
     length = characteristic_length(mechanism)
     rows = []
     for contact in mechanism.contacts:
-        _, gradient = contact_gradient(contact)
+        _, gradient = contact.gradient()
         # At home R_omega is the identity, so angles act as rotations about the axes of {S}.
         rows.append(np.concatenate([gradient, cross(contact.point, gradient) / length]))
     return np.array(rows).reshape(-1, 6)

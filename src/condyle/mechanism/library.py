@@ -1,4 +1,4 @@
-"""The mechanisms that come with the package."""
+"""The mechanisms that come with the package, and the starter of `condyle new`."""
 
 from __future__ import annotations
 
@@ -26,3 +26,8 @@ def bundled_text(name: str) -> str:
             f"{did_you_mean(str(name), known)}"
         )
     return (_BUNDLED / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def starter_text(name: str) -> str:
+    """A complete, commented mechanism file for a mechanism called `name`."""
+    return (files(__package__) / "starter.toml").read_text(encoding="utf-8").replace("NAME", name)

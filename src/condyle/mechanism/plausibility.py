@@ -72,6 +72,19 @@ def length_text(metres: float) -> str:
     return f"{metres:.4g} m" if abs(metres) >= LARGE else f"{metres * 1e3:.4g} mm"
 
 
+def _beyond(
+    kind: str, text: str, found: Mapping[str, Any], show: str, key: str, what: str = "chain"
+) -> Iterator[Implausible]:
+    """What several parts of a mechanism have in common, if they do.
+
+    Args: text: of the message, with {} for the list;  show: a name and its numbers in it.
+    """
+    if found:
+        numbers = {n: v if isinstance(v, list) else [v] for n, v in found.items()}
+        listed = few(show.format(*v, name=f'{what} "{n}"') for n, v in numbers.items())
+        yield Implausible(kind, text.format(listed), {key: found})
+
+
 def _sizes(mechanism: Mechanism) -> Iterator[Implausible]:
     whole = {"the characteristic length": characteristic_length(mechanism)}
     parts = {
@@ -83,20 +96,19 @@ def _sizes(mechanism: Mechanism) -> Iterator[Implausible]:
         for contact in mechanism.contacts
         if contact.ball_radius is not None
     }
+    slips = {
+        "length_large": 'are these millimetres in a file of length_unit "m"?',
+        "length_small": 'are these metres in a file of length_unit "mm"?',
+    }
     for lengths in (whole, parts):
         large = {name: v for name, v in lengths.items() if v > LARGE}
         small = {name: v for name, v in lengths.items() if v < SMALL}
-        if large:
-            yield _size("length_large", large, 'are these millimetres in a file of length_unit "m"')
-        if small:
-            yield _size("length_small", small, 'are these metres in a file of length_unit "mm"')
+        for (kind, question), some in zip(slips.items(), (large, small), strict=True):
+            if some:
+                listed = few(f"{name} {length_text(v)}" for name, v in some.items())
+                yield Implausible(kind, f"lengths: {listed}; {question}", {"lengths": some})
         if large or small:
             return
-
-
-def _size(kind: str, lengths: Mapping[str, float], question: str) -> Implausible:
-    listed = few(f"{name} {length_text(v)}" for name, v in list(lengths.items()))
-    return Implausible(kind, f"lengths: {listed}; {question}?", {"lengths": dict(lengths)})
 
 
 def _platform(mechanism: Mechanism) -> Iterator[Implausible]:
@@ -164,17 +176,11 @@ def _gravity(mechanism: Mechanism) -> Iterator[Implausible]:
 
 
 def _speeds(mechanism: Mechanism) -> Iterator[Implausible]:
-    beyond = {}
-    for chain in mechanism.chains:
-        if (limit := chain.actuator.speed_limit) is not None:
-            speed = limit * chain.lengths.get("crank", 1.0)  # rad/s of a crank, else m/s
-            if speed > SOUND:
-                beyond[chain.name] = speed
-    if beyond:
-        listed = few(f'chain "{name}" {speed:.4g} m/s' for name, speed in beyond.items())
-        yield Implausible(
-            "speed_limit", f"speed_limit: beyond the speed of sound: {listed}", {"speeds": beyond}
-        )
+    # rad/s of a crank, else m/s
+    speeds = {c.name: limits(c).speed * c.lengths.get("crank", 1.0) for c in mechanism.chains}
+    beyond = {name: v for name, v in speeds.items() if SOUND < v < np.inf}
+    text = "speed_limit: beyond the speed of sound: {}"
+    yield from _beyond("speed_limit", text, beyond, "{name} {:.4g} m/s", "speeds")
 
 
 def _losses(mechanism: Mechanism) -> Iterator[Implausible]:
@@ -186,35 +192,18 @@ def _losses(mechanism: Mechanism) -> Iterator[Implausible]:
             stuck[chain.name] = [own.coulomb, limit.greatest]
         if own.coulomb and own.smoothing_speed >= limit.speed:
             fading[chain.name] = [own.smoothing_speed, limit.speed]
-    if stuck:
-        listed = few(f'chain "{n}" {own:g} of {most:g}' for n, (own, most) in stuck.items())
-        yield Implausible(
-            "coulomb_large",
-            f"coulomb: no less than the greatest effort: {listed}; such an actuator moves nothing",
-            {"chains": stuck},
-        )
-    if fading:
-        listed = few(f'chain "{n}" {own:g} of {most:g}' for n, (own, most) in fading.items())
-        yield Implausible(
-            "smoothing_large",
-            f"smoothing_speed: no less than the speed limit: {listed}; friction never acts in full",
-            {"chains": fading},
-        )
+    show = "{name} {:g} of {:g}"
+    text = "coulomb: no less than the greatest effort: {}; such an actuator moves nothing"
+    yield from _beyond("coulomb_large", text, stuck, show, "chains")
+    text = "smoothing_speed: no less than the speed limit: {}; friction never acts in full"
+    yield from _beyond("smoothing_large", text, fading, show, "chains")
 
 
 def _friction(mechanism: Mechanism) -> Iterator[Implausible]:
-    large = {
-        contact.name: contact.friction.coefficient
-        for contact in mechanism.contacts
-        if contact.friction.coefficient > ROUGHEST
-    }
-    if large:
-        listed = few(f'contact "{name}" {mu:g}' for name, mu in large.items())
-        yield Implausible(
-            "friction_large",
-            f"friction: a coefficient above {ROUGHEST:g}: {listed}; is it a percentage?",
-            {"contacts": large},
-        )
+    found = {contact.name: contact.friction.coefficient for contact in mechanism.contacts}
+    large = {name: mu for name, mu in found.items() if mu > ROUGHEST}
+    text = f"friction: a coefficient above {ROUGHEST:g}: {{}}; is it a percentage?"
+    yield from _beyond("friction_large", text, large, "{name} {:g}", "contacts", "contact")
 
 
 def _bounds(mechanism: Mechanism) -> Iterator[Implausible]:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..kinematics.chain import FAMILIES
-from ..mechanism.files import record
 from ..mechanism.mechanism import COORDINATES
+from ..mechanism.writing import record
 from ..model.data import Evaluation
 from ..model.evaluator import Evaluator
 from ..motion import Load, Motion

@@ -16,7 +16,8 @@ import xarray as xr
 
 from ...atomic import replacing, write_text
 from ...errors import InputError
-from ...mechanism.files import read_tables, record
+from ...mechanism.toml import read_tables
+from ...mechanism.writing import record
 from ...version import __version__
 from .job import MOTION, REASON, SECONDS, STATUS, VARIANT, Job
 from .study import some_of

@@ -23,7 +23,8 @@ import casadi as ca
 import numpy as np
 
 from ...mechanism.bodies import cross
-from ..rotation import rotation, rotation_y, rotation_z
+from ..bryant import rotations
+from ..rotation import rotation_y, rotation_z
 
 Cut = Callable[[ca.SX], ca.SX]
 
@@ -245,8 +246,7 @@ class Family(ABC):
 
 def joint_position(chain: Any, pose: np.ndarray) -> np.ndarray:
     """M in {S}, (3,), at a pose X_EE, (6,)."""
-    R = np.asarray(ca.DM(ca.evalf(rotation(ca.SX(ca.DM(pose[3:]))))))
-    return pose[:3] + R @ np.asarray(chain.platform)
+    return pose[:3] + rotations(np.asarray(pose[3:])) @ np.asarray(chain.platform)
 
 
 def rod_frame(direction: np.ndarray) -> np.ndarray:
