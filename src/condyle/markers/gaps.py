@@ -68,15 +68,12 @@ def close_gaps(
             f"{reason}"
         )
     kept = slice(kept.start + held[0].start, kept.start + held[-1].stop)
-    gaps = [
-        Gap(float(t[r.start]), float(t[r.stop - 1]), r.stop - r.start, why(r), _made(r, kept))
-        for r in runs
-    ]
+    gaps = []
+    for r in runs:
+        inside = kept.start <= r.start and r.stop <= kept.stop
+        ends = float(t[r.start]), float(t[r.stop - 1])
+        gaps.append(Gap(*ends, r.stop - r.start, why(r), "filled" if inside else "cut"))
     return kept, _filled(t[kept], values[kept]), gaps
-
-
-def _made(run: slice, kept: slice) -> Literal["filled", "cut"]:
-    return "filled" if kept.start <= run.start and run.stop <= kept.stop else "cut"
 
 
 def _longest_between(runs: list[slice], count: int) -> slice:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,15 +61,9 @@ def find_bodies(recording: Recording, file: MarkerFile) -> Bodies:
     """
     home = home_frames(recording, file.home)
     warnings: list[str] = []
-    names, points = _taken(recording, file.fixed)
-    shape, names, points = _shape(recording, "fixed", names, points, points[home], warnings)
-    base = fit(shape, points)
-    fixed = Body("fixed", names, points, shape, base)
-    names, points = _taken(recording, file.platform)
-    steady = base.back(points)
-    shape, names, points = _shape(recording, "platform", names, points, steady[home], warnings)
-    moved = fit(shape, base.back(points))
-    platform = Body("platform", names, points, shape, moved)
+    fixed = _body(recording, "fixed", file.fixed, home, lambda points: points, warnings)
+    platform = _body(recording, "platform", file.platform, home, fixed.fit.back, warnings)
+    moved, shape = platform.fit, platform.shape
     centre = moved.rotation[home] @ shape.mean(axis=0) + moved.position[home]
     apart = float(np.nanmax(np.linalg.norm(centre - np.nanmean(centre, axis=0), axis=1)))
     if apart > _STILL:
@@ -87,11 +82,8 @@ def home_frames(recording: Recording, home: tuple[float, float]) -> np.ndarray:
     t, half = recording.t, 0.5 / recording.rate
     start, end = home
     if start < t[0] - half or end > t[-1] + half:
-        first = (
-            f"; its first frame is number {recording.first_frame}, and frame 1 is at 0 s"
-            if recording.first_frame > 1
-            else ""
-        )
+        number = recording.first_frame
+        first = f"; its first frame is number {number}, and frame 1 is at 0 s" * (number > 1)
         raise InputError(
             f"home: {start:g} to {end:g} s is not within {recording.source}, which runs from "
             f"{t[0]:.6g} to {t[-1]:.6g} s{first}"
@@ -102,44 +94,41 @@ def home_frames(recording: Recording, home: tuple[float, float]) -> np.ndarray:
     return within
 
 
-def _taken(recording: Recording, names: tuple[str, ...]) -> tuple[list[str], np.ndarray]:
-    places = [find_label(name, recording.labels, recording.source) for name in names]
-    if len(set(places)) < len(places):
-        raise InputError(f"{recording.source}: {listed(names)} do not name different markers")
-    return list(names), recording.points[:, places]
-
-
-def _shape(
+def _body(
     recording: Recording,
     what: str,
-    names: list[str],
-    points: np.ndarray,
+    wanted: Sequence[str],
     home: np.ndarray,
+    steadied: Callable[[np.ndarray], np.ndarray],
     warnings: list[str],
-) -> tuple[np.ndarray, list[str], np.ndarray]:
-    """The shape at home, of the markers seen there; those, and where they were seen."""
-    shape = common_shape(home)
+) -> Body:
+    """The body of the markers that are seen at home, fitted to its shape there."""
+    source = recording.source
+    places = [find_label(name, recording.labels, source) for name in wanted]
+    if len(set(places)) < len(places):
+        raise InputError(f"{source}: {listed(wanted)} do not name different markers")
+    points = recording.points[:, places]
+    shape = common_shape(steadied(points)[home])
     there = np.isfinite(shape).all(axis=1)
-    unseen = [name for name, seen in zip(names, there, strict=True) if not seen]
-    if there.sum() < FEWEST:
+    names, unseen = ([n for n, t in zip(wanted, there, strict=True) if t == k] for k in (1, 0))
+    if len(names) < FEWEST:
         raise InputError(
-            f"{recording.source}: {there.sum()} of {len(names)} {what} markers are seen while the "
+            f"{source}: {len(names)} of {len(wanted)} {what} markers are seen while the "
             f"mechanism is at home, expected {FEWEST} or more; not seen: {listed(unseen)}. Choose "
             "another stretch for home"
         )
     if unseen:
-        warnings.append(
-            f"{recording.source}: {listed(unseen)} ({what}) not seen at home and left out"
-        )
-    names, shape, points = [n for n in names if n not in unseen], shape[there], points[:, there]
+        warnings.append(f"{source}: {listed(unseen)} ({what}) not seen at home and left out")
+    shape, points = shape[there], points[:, there]
     if breadth(shape - shape.mean(axis=0)) <= FLATTEST:
         raise InputError(
-            f"{recording.source}: the {what} markers {listed(names)} are on one line, so a turn "
+            f"{source}: the {what} markers {listed(names)} are on one line, so a turn "
             "about it cannot be told; use one that stands off it"
         )
-    if not fit(shape, home[:, there]).found.any():
+    body = Body(what, names, points, shape, fit(shape, steadied(points)))
+    if not body.fit.found[home].any():
         raise InputError(
-            f"{recording.source}: at no time of home are {FEWEST} of the {what} markers "
+            f"{source}: at no time of home are {FEWEST} of the {what} markers "
             f"{listed(names)} seen together. Choose another stretch for home"
         )
-    return shape, names, points
+    return body

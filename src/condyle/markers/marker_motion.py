@@ -163,13 +163,11 @@ def _residuals(recording: Recording, body: Body, used: np.ndarray) -> list[Marke
     found = []
     for name, residual in zip(body.names, body.fit.residual.T, strict=True):
         known = np.flatnonzero(used & np.isfinite(residual))
-        values = residual[known] if len(known) else np.full(1, np.nan)
-        worst = int(np.argmax(values))
-        when = float(recording.t[known[worst]]) if len(known) else math.nan
-        seen = len(known) / max(int(used.sum()), 1)
-        found.append(
-            MarkerResidual(name, body.what, seen, _rms(values), float(values[worst]), when)
-        )
+        seen, about = len(known) / max(int(used.sum()), 1), (math.nan,) * 3
+        if len(known):
+            worst = known[np.argmax(residual[known])]
+            about = _rms(residual[known]), float(residual[worst]), float(recording.t[worst])
+        found.append(MarkerResidual(name, body.what, seen, *about))
     return found
 
 

@@ -93,19 +93,22 @@ def in_words(found: MarkerMotion) -> str:
         f"(at {r.time:.4g} s), seen {100 * r.seen:.4g} % of the time"
         for r in found.residuals
     ]
-    if found.registration.residual:
-        given = found.registration.residual.items()
+    if given := found.registration.residual:
+        points = ", ".join(f"{name} {_mm(value)}" for name, value in given.items())
         lines.append(
-            "Registration, distance of each point from its place in the mechanism: "
-            + ", ".join(f"{name} {_mm(value)}" for name, value in given)
+            f"Registration, distance of each point from its place in the mechanism: {points}"
         )
-    if found.off_contacts:
-        given_contacts = found.off_contacts.items()
-        lines.append(
-            "Contacts will take away: "
-            + ", ".join(f"{n} {_mm(rms)} RMS, {_mm(m)} at most" for n, (rms, m) in given_contacts)
-        )
-    lines += _channels(found)
+    if off := found.off_contacts.items():
+        balls = ", ".join(f"{n} {_mm(rms)} RMS, {_mm(m)} at most" for n, (rms, m) in off)
+        lines.append(f"Contacts will take away: {balls}")
+    if (load := found.load) is not None:
+        force, moment = (np.linalg.norm(part, axis=1).max() for part in np.split(load.wrench, 2, 1))
+        at = f" at {load.point}" if load.point else ""
+        about = f", moment up to {moment:.4g} N m there" if moment else ""
+        lines.append(f"Load: force up to {force:.4g} N{at}{about}")
+    if emg := found.beside.emg.items():
+        peaks = [f"{n} {v.max():.3g} at {motion.t[v.argmax()]:.4g} s" for n, v in emg]
+        lines.append(f"EMG, largest of each: {', '.join(peaks)}")
     lines.append(f"Gaps: {len(found.gaps) or 'none'}")
     lines += [f"  {gap}" for gap in found.gaps[:_LISTED]]
     if len(found.gaps) > _LISTED:
@@ -113,26 +116,9 @@ def in_words(found: MarkerMotion) -> str:
     return "\n".join(lines)
 
 
-def _channels(found: MarkerMotion) -> list[str]:
-    """What came of the other channels."""
-    lines = []
-    if (load := found.load) is not None:
-        force, moment = (np.linalg.norm(part, axis=1).max() for part in np.split(load.wrench, 2, 1))
-        at = f" at {load.point}" if load.point else ""
-        about = f", moment up to {moment:.4g} N m there" if moment else ""
-        lines.append(f"Load: force up to {force:.4g} N{at}{about}")
-    if emg := found.beside.emg:
-        peaks = ", ".join(
-            f"{chain} {values.max():.3g} at {found.motion.t[values.argmax()]:.4g} s"
-            for chain, values in emg.items()
-        )
-        lines.append(f"EMG, largest of each: {peaks}")
-    return lines
-
-
 def as_data(found: MarkerMotion) -> dict[str, Any]:
     """The same in SI, as JSON has it."""
-    recording = found.recording
+    recording, load = found.recording, found.load
     return {
         "frames": len(recording.t),
         "rate": recording.rate,
@@ -142,13 +128,10 @@ def as_data(found: MarkerMotion) -> dict[str, Any]:
         "residuals": [vars(r) for r in found.residuals],
         "registration": found.registration.residual,
         "off_contacts": {
-            name: {"rms": rms, "largest": largest}
-            for name, (rms, largest) in found.off_contacts.items()
+            n: {"rms": rms, "largest": most} for n, (rms, most) in found.off_contacts.items()
         },
         "gaps": [vars(gap) for gap in found.gaps],
-        "load": None
-        if found.load is None
-        else {"point": found.load.point, "largest": np.abs(found.load.wrench).max(axis=0).tolist()},
+        "load": load and {"point": load.point, "largest": np.abs(load.wrench).max(axis=0).tolist()},
         "emg": {chain: float(values.max()) for chain, values in found.beside.emg.items()},
         "warnings": list(found.warnings),
     }

@@ -58,14 +58,8 @@ class Plate:
         if self.type == 3:  # sensors 1 to 4 at (a, b), (-a, b), (-a, -b), (a, -b)
             x12, x34, y14, y23, z1, z2, z3, z4 = np.moveaxis(s, -1, 0)
             force = np.stack([x12 + x34, y14 + y23, z1 + z2 + z3 + z4], -1)
-            moment = np.stack(
-                [
-                    b * (z1 + z2 - z3 - z4),
-                    a * (-z1 + z2 + z3 - z4),
-                    b * (x34 - x12) + a * (y14 - y23),
-                ],
-                -1,
-            )
+            mx, my = b * (z1 + z2 - z3 - z4), a * (-z1 + z2 + z3 - z4)
+            moment = np.stack([mx, my, b * (x34 - x12) + a * (y14 - y23)], -1)
             return force, moment + np.cross(force, [0.0, 0.0, self.origin[2]])
         if self.type == 1:  # force, where it acts on the surface, and the moment left over there
             force, at = s[..., :3], np.concatenate([s[..., 3:5], np.zeros_like(s[..., :1])], -1)
@@ -84,18 +78,12 @@ def read_plates(file: Any, metres: float) -> tuple[Plate, ...]:
     rows = np.clip(np.nan_to_num(_numbers(file, "CHANNEL", -1)), 0, 1e6).astype(int) - 1
     rows = rows.reshape(used, -1) if rows.size % used == 0 else np.zeros((used, 0), int)
     corners = _numbers(file, "CORNERS", 12 * used).reshape(used, 4, 3) * metres
-    origins = _numbers(file, "ORIGIN", 3 * used).reshape(used, 3) * metres
+    origins = np.nan_to_num(_numbers(file, "ORIGIN", 3 * used).reshape(used, 3) * metres)
     matrices = _numbers(file, "CAL_MATRIX", 36 * used).reshape(used, 6, 6).transpose(0, 2, 1)
-    return tuple(
-        Plate(
-            int(types[i]),
-            tuple(rows[i, : CHANNELS.get(int(types[i]), 0)].tolist()),
-            corners[i],
-            np.nan_to_num(origins[i]),
-            matrices[i],
-        )
-        for i in range(used)
-    )
+    found = []
+    for kind, row, *places in zip(types.tolist(), rows, corners, origins, matrices, strict=True):
+        found.append(Plate(kind, tuple(row[: CHANNELS.get(kind, 0)].tolist()), *places))
+    return tuple(found)
 
 
 def _numbers(file: Any, key: str, count: int) -> np.ndarray:
@@ -111,6 +99,4 @@ def _numbers(file: Any, key: str, count: int) -> np.ndarray:
     else:
         found = np.frombuffer(param.bytes, np.int8 if param.bytes_per_element == 1 else "<i2")
     found = np.ravel(found).astype(float)
-    if count < 0:
-        return found
-    return found[:count] if found.size >= count else np.zeros(count)
+    return found[: None if count < 0 else count] if found.size >= count else np.zeros(count)

@@ -47,12 +47,6 @@ class Registration:
         return turned, position @ A.T + b - turned @ b
 
 
-def points_of(mechanism: Mechanism) -> dict[str, tuple[float, ...]]:
-    """Points of the mechanism by name, (3,) [m] in {M}: contacts' ball centres and landmarks."""
-    contacts = {contact.name: contact.point for contact in mechanism.contacts}
-    return {**contacts, **mechanism.platform.points}
-
-
 def register(
     file: MarkerFile,
     mechanism: Mechanism,
@@ -65,11 +59,8 @@ def register(
     """
     if file.directed:
         return _by_directions(file.places, mechanism, place)
-    points = points_of(mechanism)
-    for name in file.places:
-        _require(name, points, mechanism)
+    here = np.array([_point(name, mechanism) for name in file.places])
     there = np.array([place(value, name) for name, value in file.places.items()])
-    here = np.array([points[name] for name in file.places])
     for what, some in (("in the laboratory", there), ("in the mechanism", here)):
         if breadth(some - some.mean(axis=0)) < FLATTEST:
             raise InputError(
@@ -115,18 +106,15 @@ def _by_directions(
     rotation = np.array([x, np.cross(up, x), up])
     origin, name = np.zeros(3), places[ORIGIN]
     if isinstance(name, str):
-        points = points_of(mechanism)
-        origin = np.array(_require(name, points, mechanism))
+        origin = _point(name, mechanism)
     where = places.get(name, name) if isinstance(name, str) else name
     return Registration(rotation, origin - rotation @ place(where, ORIGIN), {})
 
 
-def _require(
-    name: str, points: Mapping[str, tuple[float, ...]], mechanism: Mechanism
-) -> tuple[float, ...]:
+def _point(name: str, mechanism: Mechanism) -> np.ndarray:
+    """A contact's ball centre or a landmark, (3,) [m] in {M}."""
+    points = {c.name: c.point for c in mechanism.contacts} | mechanism.platform.points
     if name not in points:
-        raise InputError(
-            f'register: "{mechanism.name}" has no point or contact "{name}".'
-            + did_you_mean(name, points)
-        )
-    return points[name]
+        known = did_you_mean(name, points)
+        raise InputError(f'register: "{mechanism.name}" has no point or contact "{name}".{known}')
+    return np.array(points[name])
