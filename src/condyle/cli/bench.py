@@ -20,22 +20,20 @@ from .inputs import output_folder
 
 @command(UPKEEP, example="condyle bench --seconds 0.2 --out bench.json")
 def bench(
-    out: Annotated[Path | None, typer.Option(help="JSON file for the results.")] = None,
+    out: Path | None = None,
     seconds: Annotated[
         float, typer.Option(help="How long each row of the table is timed (s).", min=0.01, max=600)
     ] = 1.0,
-    realtime: Annotated[
-        bool,
-        typer.Option(
-            "--realtime",
-            help="Instead: exported C in a loop of 1, 5, 10 and 20 kHz, beside an empty one: how "
-            "late ticks are, the longest, and those missed.",
-        ),
-    ] = False,
+    realtime: bool = False,
 ) -> Answer:
     """How fast it is on this machine.
 
     One table: every way to compute, on one core, and other engines. It runs in the repository.
+
+    Options:
+        out: JSON file for the results.
+        realtime: Instead: exported C in a loop of 1, 5, 10 and 20 kHz, beside an empty one: how
+            late ticks are, the longest, and those missed.
     """
     from ..atomic import replacing
     from ..mechanism import load

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import typer
-
 from .answer import Answer
 from .command import UPKEEP, command
 
 
 @command(UPKEEP, example="condyle cache --clear")
 def cache(
-    clear: Annotated[bool, typer.Option("--clear", help="Remove all of it.")] = False,
+    clear: bool = False,
 ) -> Answer:
     """Compiled code kept on disk: show or clear it.
 
     It is built when it is first needed, in a second or two, and then found again.
+
+    Options:
+        clear: Remove all of it.
     """
     from ..backends import cache as kernels
 

@@ -7,6 +7,7 @@ work is, is the same for all and stands here.
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable, Iterator
 from functools import wraps
 from typing import Annotated, Any, get_type_hints
@@ -14,7 +15,7 @@ from typing import Annotated, Any, get_type_hints
 import typer
 
 from ..version import __version__
-from . import options
+from . import completion, options
 from .answer import Answer
 from .bar import progress_bar
 
@@ -35,6 +36,7 @@ app = typer.Typer(
 )
 
 Command = Callable[..., Answer]
+OPTION = re.compile(r"^ {4}(\w+): (.+(?:\n {8}.+)*)", re.MULTILINE)  # of a docstring
 
 
 def group(name: str, chapter: str, help: str) -> typer.Typer:
@@ -49,6 +51,9 @@ def command(
 ) -> Callable[[Command], Command]:
     """Register a function as the command of its name, with `--quiet` and `--json` as well.
 
+    Its docstring says what its options are for, below "Options:"; those that several commands
+    share are in `options`.
+
     Args: chapter: of the help page;  example: one line to copy, shown below the options.
           of: the family it belongs to;  name: where it is not the function's.
     """
@@ -61,9 +66,10 @@ def command(
             answer.give(quiet, as_json)
 
         # The help page breaks lines where the terminal ends, not where the source does.
-        paragraphs = inspect.cleandoc(work.__doc__ or "").split("\n\n")
-        shown.__doc__ = "\n\n".join(" ".join(text.split()) for text in paragraphs)
-        _take(shown, work, quiet=options.Quiet, as_json=options.Json)
+        text, _, told = inspect.cleandoc(work.__doc__ or "").partition("\n\nOptions:\n")
+        shown.__doc__ = "\n\n".join(" ".join(part.split()) for part in text.split("\n\n"))
+        helps = {name: " ".join(words.split()) for name, words in OPTION.findall(told)}
+        _take(shown, work, helps, quiet=options.Quiet, as_json=options.Json)
         of.command(name, rich_help_panel=chapter, epilog=f"Example: {example}")(shown)
         return work
 
@@ -79,17 +85,28 @@ def registered() -> Iterator[tuple[str, Any]]:
             yield family + (one.name or one.callback.__name__), one
 
 
-def _take(shown: Callable[..., None], work: Command, **switches: Any) -> None:
-    """Give `shown` the parameters of `work`, and some switches."""
+def _take(
+    shown: Callable[..., None], work: Command, helps: dict[str, str], **switches: Any
+) -> None:
+    """Give `shown` the parameters of `work` as options, and some switches."""
     hints = get_type_hints(work, include_extras=True) | switches
-    parameters = [
-        *inspect.signature(work).parameters.values(),
-        *(inspect.Parameter(s, inspect.Parameter.KEYWORD_ONLY, default=False) for s in switches),
-    ]
-    parameters = [one.replace(annotation=hints[one.name]) for one in parameters]
     hints.pop("return", None)
+    parameters = list(inspect.signature(work).parameters.values())
+    for one in parameters:
+        if not hasattr(hints[one.name], "__metadata__"):
+            hints[one.name] = Annotated[hints[one.name], _option(one, helps)]
+    switch = inspect.Parameter.KEYWORD_ONLY
+    parameters += [inspect.Parameter(name, switch, default=False) for name in switches]
+    parameters = [one.replace(annotation=hints[one.name]) for one in parameters]
     shown.__annotations__ = hints
     shown.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+
+
+def _option(one: inspect.Parameter, helps: dict[str, str]) -> Any:
+    """A switch that is off has no opposite."""
+    names = [f"--{one.name.replace('_', '-')}"] if one.default is False else []
+    text = helps.get(one.name) or options.HELP[one.name]
+    return typer.Option(*names, help=text, autocompletion=completion.OFFERED.get(one.name))
 
 
 def _version(value: bool) -> None:

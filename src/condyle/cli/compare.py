@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from . import options
 from .answer import Answer, command_line, files_line
@@ -20,35 +18,33 @@ if TYPE_CHECKING:
 @command(COMPUTE, example="condyle compare jaw.toml --motion path.csv --load bite.csv")
 def compare(
     mechanism: options.Mechanism = "masticatory",
-    motion: options.Motion = None,
-    load: options.Load = None,
-    load_point: options.LoadPoint = None,
-    distribution: options.Distribution = None,
-    preload: options.Preload = 0.0,
-    contact_weight: options.ContactWeight = 0.0,
-    tradeoff: Annotated[
-        bool,
-        typer.Option(
-            "--tradeoff",
-            help="Instead of models, compare weights: the curve between least effort and least "
-            "load on the contacts.",
-        ),
-    ] = False,
-    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("results"),
-    units: options.Units = None,
-    landmark: options.Landmark = None,
-    smooth: options.Smooth = None,
-    rate: options.Rate = None,
+    motion: Path | None = None,
+    load: Path | None = None,
+    load_point: str | None = None,
+    distribution: str | None = None,
+    preload: float = 0.0,
+    contact_weight: float = 0.0,
+    tradeoff: bool = False,
+    out: Path = Path("results"),
+    units: str | None = None,
+    landmark: str | None = None,
+    smooth: str | None = None,
+    rate: float | None = None,
     trim: options.Trim = 0.0,
-    figures: Annotated[bool, typer.Option(help="Draw Figures 5 to 9 of the paper.")] = True,
-    report: Annotated[
-        bool, typer.Option("--report", help="Write the page of condyle report, with the tables.")
-    ] = False,
+    figures: bool = True,
+    report: bool = False,
 ) -> Answer:
     """Every way to derive the equations, side by side.
 
     How far their numbers differ and what they cost, with and without the contacts: Tables 1 and 2
     and Figures 5 to 9 of the paper.
+
+    Options:
+        tradeoff: Instead of models, compare weights: the curve between least effort and least load
+            on the contacts.
+        out: Folder for the results.
+        figures: Draw Figures 5 to 9 of the paper.
+        report: Write the page of condyle report, with the tables.
     """
     require_drawing(figures, report)
     import condyle

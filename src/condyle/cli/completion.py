@@ -24,6 +24,7 @@ DISTRIBUTIONS = {  # name -> what is least, and subject to what
 }
 BACKENDS = ("auto", "compiled", "numpy")
 FMUS = ("plant", "inverse", "controller")
+FORMATS = ("auto", "netcdf", "zarr")
 STYLES = ("screen", "journal", "journal-wide")
 EXPORTS = (
     "inverse",
@@ -103,6 +104,25 @@ def bundled() -> list[str]:
     return sorted(path.name[:-5] for path in _BUNDLED.iterdir() if path.name.endswith(".toml"))
 
 
+# Parameter of a command -> what is offered for it.
+OFFERED: dict[str, Callable[..., list[str]]] = {
+    "formulation": one_of(*FORMULATIONS),
+    "route": one_of(*ROUTES),
+    "distribution": one_of(*DISTRIBUTIONS),
+    "backend": one_of(*BACKENDS),
+    "units": one_of(*UNITS),
+    "smooth": one_of("auto"),
+    "load_point": points,
+    "landmark": points,
+    "figure": one_of(*FIGURES),
+    "style": one_of(*STYLES),
+    "question": one_of(*EXPORTS),
+    "quantity": one_of(*QUANTITIES),
+    "kind": one_of(*FMUS),
+    "precision": one_of("double", "float"),
+    "constants": one_of("inside", "struct"),
+    "format": one_of(*FORMATS),
+}
 _BUNDLED = files("condyle") / "mechanism" / "bundled"
 
 

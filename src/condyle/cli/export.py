@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from . import completion, options
+from . import options
 from .answer import Answer
 from .command import COMPUTE, command, group
 from .inputs import output_folder, warn
@@ -19,56 +19,36 @@ export = group("export", COMPUTE, "A mechanism for controllers and other program
 @command(COMPUTE, example="condyle export c masticatory --out masticatory-c", of=export, name="c")
 def c(
     mechanism: options.Mechanism,
-    out: Annotated[Path, typer.Option(help="Folder for source, header, example and tests.")],
-    question: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="What to export; repeat for more: inverse, contact (with contact forces), bounded "
-            "(within limits), forward (accelerations), motion, closure, pose (from encoders), "
-            "computed_torque. Default: all but bounded, and but closure, which needs --from or "
-            "--landmark.",
-            autocompletion=completion.one_of(*completion.EXPORTS),
-        ),
-    ] = None,
+    out: Path,
+    question: list[str] | None = None,
     coordinates: Annotated[
         str | None,
         typer.Option("--from", help="Coordinates that closure starts from, as in X,Y,Z,alpha."),
     ] = None,
-    landmark: Annotated[
-        str | None,
-        typer.Option(
-            help="Platform point whose path closure starts from.",
-            autocompletion=completion.points,
-        ),
-    ] = None,
-    precision: Annotated[
-        str,
-        typer.Option(
-            help="double, or float for processors that compute in it alone.",
-            autocompletion=completion.one_of("double", "float"),
-        ),
-    ] = "double",
-    constants: Annotated[
-        str,
-        typer.Option(
-            help="inside, or struct: in a structure that a program fills at run time.",
-            autocompletion=completion.one_of("inside", "struct"),
-        ),
-    ] = "inside",
-    prefix: Annotated[
-        str | None,
-        typer.Option(help="What all names in C begin with. Default: the mechanism's name."),
-    ] = None,
-    lanes: Annotated[
-        int, typer.Option(help="Width of GCC's vector types: 2, 4 or 8 doubles; 0: none.")
-    ] = 8,
-    formulation: options.Formulation = "virtual_power",
-    route: options.Route = "core",
+    landmark: str | None = None,
+    precision: str = "double",
+    constants: str = "inside",
+    prefix: str | None = None,
+    lanes: int = 8,
+    formulation: str = "virtual_power",
+    route: str = "core",
 ) -> Answer:
     """C99 source and header for a controller.
 
     No heap, no globals, no input or output, bounded time. With it come an example, recorded test
     vectors, a Makefile whose `make check` compares with them, and a page of measured facts.
+
+    Options:
+        out: Folder for source, header, example and tests.
+        question: What to export; repeat for more: inverse, contact (with contact forces), bounded
+            (within limits), forward (accelerations), motion, closure, pose (from encoders),
+            computed_torque. Default: all but bounded, and but closure, which needs --from or
+            --landmark.
+        landmark: Platform point whose path closure starts from.
+        precision: double, or float for processors that compute in it alone.
+        constants: inside, or struct: in a structure that a program fills at run time.
+        prefix: What all names in C begin with. Default: the mechanism's name.
+        lanes: Width of GCC's vector types: 2, 4 or 8 doubles; 0: none.
     """
     import condyle
 

@@ -17,7 +17,7 @@ from .inputs import file_stem, output_folder, warn
 @command(COMPUTE, example="condyle export fmu masticatory --out fmu", of=export, name="fmu")
 def fmu(
     mechanism: options.Mechanism,
-    out: Annotated[Path, typer.Option(help="Folder for the files.")],
+    out: Path,
     kind: Annotated[
         list[str] | None,
         typer.Option(
@@ -25,12 +25,16 @@ def fmu(
             autocompletion=completion.one_of(*completion.FMUS),
         ),
     ] = None,
-    fmi: Annotated[int, typer.Option(help="Version of the standard: 2 or 3.")] = 3,
+    fmi: int = 3,
 ) -> Answer:
     """Functional mock-up units (FMI 2.0 or 3.0), for model exchange and co-simulation.
 
     The plant (efforts in, motion out), the inverse model and a computed-torque controller. They
     hold their sources, and a binary for this machine where there is a C compiler.
+
+    Options:
+        out: Folder for the files.
+        fmi: Version of the standard: 2 or 3.
     """
     import condyle
 

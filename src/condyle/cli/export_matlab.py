@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from . import options
 from .answer import Answer, command_line, files_line
@@ -19,9 +16,13 @@ from .inputs import output_folder
 )
 def matlab(
     mechanism: options.Mechanism,
-    out: Annotated[Path, typer.Option(help="Folder for the files.")],
+    out: Path,
 ) -> Answer:
-    """Functions for MATLAB and Octave (MEX): C, help texts, build.m and an example."""
+    """Functions for MATLAB and Octave (MEX): C, help texts, build.m and an example.
+
+    Options:
+        out: Folder for the files.
+    """
     import condyle
 
     from ..export.matlab import write_matlab

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from . import options
 from .answer import Answer, command_line
@@ -17,12 +14,15 @@ from .inputs import file_stem, output_folder, warn
 @command(COMPUTE, example="condyle export mjcf masticatory --out mujoco", of=export, name="mjcf")
 def mjcf(
     mechanism: options.Mechanism,
-    out: Annotated[Path, typer.Option(help="Folder for the file.")],
+    out: Path,
 ) -> Answer:
     """A model for MuJoCo (MJCF): loops, contacts, actuators with limits and losses, sensors.
 
     Controls are efforts in N m or N, joints are zero at home. What of the mechanism is only
     approximate there is said on stderr and in the file.
+
+    Options:
+        out: Folder for the file.
     """
     import condyle
 

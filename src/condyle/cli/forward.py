@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from . import options
 from .answer import Answer, command_line
@@ -16,26 +13,24 @@ from .inputs import warn
 @command(COMPUTE, example="condyle forward jaw.toml --states states.csv --out accelerations.csv")
 def forward(
     mechanism: options.Mechanism,
-    states: Annotated[
-        Path,
-        typer.Option(
-            help="States and efforts (CSV or Parquet), one a row: pose coordinates such as X, Y "
-            "(m), alpha, beta (rad), their rates dX ... (per s), tau_CHAIN of every chain (N m, or "
-            "N where it slides or pulls), and if you like some of Fx, Fy, Fz (N), Mx, My, Mz "
-            "(N m)."
-        ),
-    ],
-    out: Annotated[Path, typer.Option(help="File for the results (.csv or .parquet).")],
-    load_point: options.LoadPoint = None,
-    formulation: options.Formulation = "virtual_power",
-    backend: options.Backend = "auto",
+    states: Path,
+    out: Path,
+    load_point: str | None = None,
+    formulation: str = "virtual_power",
+    backend: str = "auto",
     threads: options.Threads = None,
-    flag: options.Flag = False,
+    flag: bool = False,
 ) -> Answer:
     """Accelerations from efforts and load, one state a row.
 
     Forward dynamics: what the mechanism does under given efforts, and what its contacts carry.
     Rows never influence each other.
+
+    Options:
+        states: States and efforts (CSV or Parquet), one a row: pose coordinates such as X, Y (m),
+            alpha, beta (rad), their rates dX ... (per s), tau_CHAIN of every chain (N m, or N where
+            it slides or pulls), and if you like some of Fx, Fy, Fz (N), Mx, My, Mz (N m).
+        out: File for the results (.csv or .parquet).
     """
     import condyle
 

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from ..analysis.map.axes import Grid
     from ..analysis.map.block import Asked
 
-FORMATS = ("auto", "netcdf", "zarr")
 LARGE = 200_000_000  # bytes above which auto streams to Zarr
 
 
@@ -32,16 +31,8 @@ LARGE = 200_000_000  # bytes above which auto streams to Zarr
 )
 def map_(
     mechanism: options.Mechanism = "masticatory",
-    over: Annotated[
-        list[str] | None,
-        typer.Option(
-            help='Coordinate to go over, "X=-5:5:200 mm": from, to, how many; one to three. '
-            "Default: the first two, widely."
-        ),
-    ] = None,
-    hold: Annotated[
-        str, typer.Option(help='The others, "Y=1 mm,alpha=2 deg". Default: 0, which is home.')
-    ] = "",
+    over: list[str] | None = None,
+    hold: str = "",
     quantity: Annotated[
         list[str] | None,
         typer.Option(
@@ -50,57 +41,51 @@ def map_(
             autocompletion=completion.one_of(*completion.QUANTITIES),
         ),
     ] = None,
-    load: Annotated[str, typer.Option(help='On the platform at rest, "Fz=-50 N,My=2 N m".')] = "",
-    load_point: options.LoadPoint = None,
-    direction: Annotated[
-        str | None, typer.Option(help="Of the further load for load_limit, in {S}: 0,0,-1.")
-    ] = None,
-    stiffness: Annotated[
-        float | None, typer.Option(help="Of every actuator (N m/rad or N/m), for that quantity.")
-    ] = None,
-    stroke: Annotated[
-        list[str] | None,
-        typer.Option(help='Range of joint coordinates that counts as reach, "leg_*=-200:300 mm".'),
-    ] = None,
+    load: str = "",
+    load_point: str | None = None,
+    direction: str | None = None,
+    stiffness: float | None = None,
+    stroke: list[str] | None = None,
     margin: Annotated[
         float, typer.Option(min=0.0, max=1.0, help="Least singularity ratio in ball and box.")
     ] = 1e-3,
-    distribution: options.Distribution = None,
-    preload: options.Preload = 0.0,
-    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("maps"),
-    format: Annotated[
-        str,
-        typer.Option(
-            help="netcdf; zarr (a folder, streamed: for more than memory holds); or auto, by size.",
-            autocompletion=completion.one_of(*FORMATS),
-        ),
-    ] = "auto",
-    figures: Annotated[bool, typer.Option(help="Draw the pictures too.")] = True,
-    run: Annotated[
-        Path | None, typer.Option(help="Results (.nc) whose motion is drawn on top.")
-    ] = None,
-    backend: options.Backend = "auto",
+    distribution: str | None = None,
+    preload: float = 0.0,
+    out: Path = Path("maps"),
+    format: str = "auto",
+    figures: bool = True,
+    run: Path | None = None,
+    backend: str = "auto",
     threads: options.Threads = None,
     workers: Annotated[
         int | None, typer.Option(min=1, help="With --scheduler: so many. Default: all processors.")
     ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            help="Who computes, as for sweep: processes, threads, dask, or the address of a Dask "
-            "scheduler. Default: this process. Same numbers."
-        ),
-    ] = None,
+    scheduler: str | None = None,
 ) -> Answer:
     """Where a mechanism can go, and what it can do there at rest.
 
     Over one, two or three independent coordinates: reach and what forbids it, singularities,
     efforts, loads, speeds, stiffness; how large the reach is, and how much room is around home.
+
+    Options:
+        over: Coordinate to go over, "X=-5:5:200 mm": from, to, how many; one to three. Default: the
+            first two, widely.
+        hold: The others, "Y=1 mm,alpha=2 deg". Default: 0, which is home.
+        load: On the platform at rest, "Fz=-50 N,My=2 N m".
+        direction: Of the further load for load_limit, in {S}: 0,0,-1.
+        stiffness: Of every actuator (N m/rad or N/m), for that quantity.
+        stroke: Range of joint coordinates that counts as reach, "leg_*=-200:300 mm".
+        out: Folder for the results.
+        format: netcdf; zarr (a folder, streamed: for more than memory holds); or auto, by size.
+        figures: Draw the pictures too.
+        run: Results (.nc) whose motion is drawn on top.
+        scheduler: Who computes, as for sweep: processes, threads, dask, or the address of a Dask
+            scheduler. Default: this process. Same numbers.
     """
     if figures:
         require("matplotlib", "figures")
-    if format not in FORMATS:
-        raise InputError(f'no format "{format}"; expected {", ".join(FORMATS)}')
+    if format not in completion.FORMATS:
+        raise InputError(f'no format "{format}"; expected {", ".join(completion.FORMATS)}')
     import condyle
 
     from ..analysis.map.axes import grid_of

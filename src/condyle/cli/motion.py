@@ -24,14 +24,7 @@ motion = group("motion", BEGIN, "Motions from what laboratories record.")
 )
 def from_c3d(
     recording: Annotated[Path, typer.Argument(help="Recording of markers (C3D).")],
-    markers: Annotated[
-        Path,
-        typer.Option(
-            help="Marker file (TOML): which markers are fixed and which move with the platform, "
-            "when the mechanism is at home (s), points of it in the laboratory (register), and "
-            "channels of force (forces) and muscles (emg)."
-        ),
-    ],
+    markers: Path,
     mechanism: Annotated[
         str,
         typer.Option(
@@ -39,13 +32,7 @@ def from_c3d(
             autocompletion=completion.mechanisms,
         ),
     ],
-    out: Annotated[
-        Path,
-        typer.Option(
-            help="File for the motion (.csv or .parquet): t (s), X, Y, Z (m), alpha, beta, "
-            "gamma (rad)."
-        ),
-    ],
+    out: Path,
     max_residual: Annotated[
         float,
         typer.Option(
@@ -56,12 +43,7 @@ def from_c3d(
     max_gap: Annotated[
         float, typer.Option(min=0.0, help="Fill gaps up to so many seconds by a spline.")
     ] = 0.1,
-    longest: Annotated[
-        bool,
-        typer.Option(
-            "--longest", help="Of longer gaps take the longest stretch without one, not an error."
-        ),
-    ] = False,
+    longest: bool = False,
     units: Annotated[
         str | None,
         typer.Option(
@@ -69,29 +51,26 @@ def from_c3d(
             autocompletion=completion.one_of("mm", "m", "cm", "um"),
         ),
     ] = None,
-    measured: Annotated[
-        Path | None,
-        typer.Option(
-            help="File for what was measured beside it (.csv or .parquet), to be shown by run "
-            "--measured: markers in the mechanism's frame, their residuals (m), EMG (emg)."
-        ),
-    ] = None,
-    load: Annotated[
-        Path | None,
-        typer.Option(help="File for the load that the marker file names (forces), or --force."),
-    ] = None,
-    force: Annotated[
-        str | None,
-        typer.Option(
-            help="Three channels, as in Fx,Fy,Fz: a force on the platform (N, kN, mN) along the "
-            "laboratory's axes, in place of what the marker file names."
-        ),
-    ] = None,
+    measured: Path | None = None,
+    load: Path | None = None,
+    force: str | None = None,
 ) -> Answer:
     """Markers of a C3D file as a motion.
 
     Fits both bodies, takes the motion of the fixed one out and gives the pose of the platform in
     the mechanism's frame. Gaps are filled up to --max-gap and listed.
+
+    Options:
+        markers: Marker file (TOML): which markers are fixed and which move with the platform, when
+            the mechanism is at home (s), points of it in the laboratory (register), and channels of
+            force (forces) and muscles (emg).
+        out: File for the motion (.csv or .parquet): t (s), X, Y, Z (m), alpha, beta, gamma (rad).
+        longest: Of longer gaps take the longest stretch without one, not an error.
+        measured: File for what was measured beside it (.csv or .parquet), to be shown by run
+            --measured: markers in the mechanism's frame, their residuals (m), EMG (emg).
+        load: File for the load that the marker file names (forces), or --force.
+        force: Three channels, as in Fx,Fy,Fz: a force on the platform (N, kN, mN) along the
+            laboratory's axes, in place of what the marker file names.
     """
     import condyle
 

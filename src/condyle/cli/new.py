@@ -16,19 +16,18 @@ from .inputs import warn
 @command(BEGIN, example="condyle new my-robot")
 def new(
     name: Annotated[str, typer.Argument(help="Name of the mechanism; the file is NAME.toml.")],
-    from_mjcf: Annotated[
-        Path | None,
-        typer.Option(
-            help="Take the mechanism from a model of MuJoCo, if its chains and contacts are of "
-            "the kinds that a mechanism file has."
-        ),
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+    from_mjcf: Path | None = None,
+    force: bool = False,
 ) -> Answer:
     """A mechanism file to start from.
 
     A small mechanism that works, with a comment on every number, to change step by step; or, with
     --from-mjcf, a parallel mechanism of MuJoCo's world.
+
+    Options:
+        from_mjcf: Take the mechanism from a model of MuJoCo, if its chains and contacts are of the
+            kinds that a mechanism file has.
+        force: Replace an existing file.
     """
     from ..atomic import write_text
     from ..mechanism import parse

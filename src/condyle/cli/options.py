@@ -1,14 +1,48 @@
-"""Options that several commands share."""
+"""Options that several commands share: what they are for, and what the shell offers for them."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from . import completion
 
+HELP = {
+    "formulation": f"How the equations are derived: {', '.join(completion.FORMULATIONS)}. "
+    "All give the same numbers.",
+    "route": "How the contacts enter the equations: core (afterwards; any contacts) or direct "
+    "(at once; flat contacts only). Both give the same numbers.",
+    "distribution": "Which of all efforts that balance are chosen, by what is least. "
+    + "; ".join(f"{name}: {least}" for name, least in completion.DISTRIBUTIONS.items())
+    + ". Default: bounded with cables, else minimum_norm. Where N m and N mix: weighted or "
+    "minimax.",
+    "preload": "Least push of one-sided contacts (N), where efforts are chosen within limits.",
+    "contact_weight": "With weighted: adds W (force/N_ref)^2 of every contact to what is least, "
+    "from least effort (0) to least load on the contacts. N_ref is the largest limit of the "
+    "chains, as a force.",
+    "load_point": "Platform point the load acts at. Default: that of the load, right_molar, or the "
+    "only point.",
+    "motion": "Motion to follow (CSV or Parquet): t (s) and pose coordinates such as X, Y (m), "
+    "alpha, beta (rad), or the path x, y, z (m) of a landmark. Default: the bundled chewing "
+    "path, or a trial motion about home for mechanisms that it does not fit (both synthetic).",
+    "load": "Load on the platform (CSV or Parquet): t (s), some of Fx, Fy, Fz (N), Mx, My, Mz "
+    "(N m). Default: the bundled load (synthetic) with the bundled motion, else none.",
+    "measured": "What was measured beside the motion (.csv or .parquet), to be shown with the "
+    "results: markers and EMG, as condyle motion from-c3d --measured writes them.",
+    "units": "Units of the motion's times (s, ms, us, min), lengths (m, cm, mm, um) and angles "
+    "(rad, deg, mrad), as in ms,mm,deg. A header such as x (mm) says so too.",
+    "landmark": "Platform point whose path x, y, z is given. Default: incisor if there is one, "
+    "else the only point.",
+    "smooth": "Smooth a measured motion: what is quicker than so many Hz goes; auto is 10 Hz.",
+    "rate": "Samples a second (Hz) of the results. Default: those of the motion.",
+    "reactions": "Forces and moments in every joint too.",
+    "mat": "Write results for MATLAB (.mat) too.",
+    "backend": "compiled, numpy (the same numbers, slower), or auto: compiled where there is "
+    "a C compiler.",
+    "flag": "Keep samples that cannot be computed: empty, with a status.",
+    "strict": "A contact outside its bounds is an error.",
+}
 Mechanism = Annotated[
     str,
     typer.Argument(
@@ -18,103 +52,6 @@ Mechanism = Annotated[
         autocompletion=completion.mechanisms,
     ),
 ]
-Formulation = Annotated[
-    str,
-    typer.Option(
-        help=f"How the equations are derived: {', '.join(completion.FORMULATIONS)}. "
-        "All give the same numbers.",
-        autocompletion=completion.one_of(*completion.FORMULATIONS),
-    ),
-]
-Route = Annotated[
-    str,
-    typer.Option(
-        help="How the contacts enter the equations: core (afterwards; any contacts) or direct "
-        "(at once; flat contacts only). Both give the same numbers.",
-        autocompletion=completion.one_of(*completion.ROUTES),
-    ),
-]
-Distribution = Annotated[
-    str | None,
-    typer.Option(
-        help="Which of all efforts that balance are chosen, by what is least. "
-        + "; ".join(f"{name}: {least}" for name, least in completion.DISTRIBUTIONS.items())
-        + ". Default: bounded with cables, else minimum_norm. Where N m and N mix: weighted or "
-        "minimax.",
-        autocompletion=completion.one_of(*completion.DISTRIBUTIONS),
-    ),
-]
-Preload = Annotated[
-    float,
-    typer.Option(
-        help="Least push of one-sided contacts (N), where efforts are chosen within limits.",
-    ),
-]
-ContactWeight = Annotated[
-    float,
-    typer.Option(
-        help="With weighted: adds W (force/N_ref)^2 of every contact to what is least, from least "
-        "effort (0) to least load on the contacts. N_ref is the largest limit of the chains, as "
-        "a force.",
-    ),
-]
-LoadPoint = Annotated[
-    str | None,
-    typer.Option(
-        help="Platform point the load acts at. Default: that of the load, right_molar, or the only "
-        "point.",
-        autocompletion=completion.points,
-    ),
-]
-Motion = Annotated[
-    Path | None,
-    typer.Option(
-        help="Motion to follow (CSV or Parquet): t (s) and pose coordinates such as X, Y (m), "
-        "alpha, beta (rad), or the path x, y, z (m) of a landmark. Default: the bundled chewing "
-        "path, or a trial motion about home for mechanisms that it does not fit (both synthetic)."
-    ),
-]
-Load = Annotated[
-    Path | None,
-    typer.Option(
-        help="Load on the platform (CSV or Parquet): t (s), some of Fx, Fy, Fz (N), Mx, My, Mz "
-        "(N m). Default: the bundled load (synthetic) with the bundled motion, else none."
-    ),
-]
-Measured = Annotated[
-    Path | None,
-    typer.Option(
-        help="What was measured beside the motion (.csv or .parquet), to be shown with the "
-        "results: markers and EMG, as condyle motion from-c3d --measured writes them."
-    ),
-]
-Units = Annotated[
-    str | None,
-    typer.Option(
-        help="Units of the motion's times (s, ms, us, min), lengths (m, cm, mm, um) and angles "
-        "(rad, deg, mrad), as in ms,mm,deg. A header such as x (mm) says so too.",
-        autocompletion=completion.one_of(*completion.UNITS),
-    ),
-]
-Landmark = Annotated[
-    str | None,
-    typer.Option(
-        help="Platform point whose path x, y, z is given. Default: incisor if there is one, else "
-        "the only point.",
-        autocompletion=completion.points,
-    ),
-]
-Smooth = Annotated[
-    str | None,
-    typer.Option(
-        help="Smooth a measured motion: what is quicker than so many Hz goes; auto is 10 Hz.",
-        autocompletion=completion.one_of("auto"),
-    ),
-]
-Rate = Annotated[
-    float | None,
-    typer.Option(help="Samples a second (Hz) of the results. Default: those of the motion."),
-]
 Trim = Annotated[
     float,
     typer.Option(
@@ -123,27 +60,10 @@ Trim = Annotated[
         "certain: 0.2 with --smooth auto.",
     ),
 ]
-Reactions = Annotated[
-    bool, typer.Option("--reactions", help="Forces and moments in every joint too.")
-]
-Mat = Annotated[bool, typer.Option("--mat", help="Write results for MATLAB (.mat) too.")]
-Backend = Annotated[
-    str,
-    typer.Option(
-        help="compiled, numpy (the same numbers, slower), or auto: compiled where there is "
-        "a C compiler.",
-        autocompletion=completion.one_of(*completion.BACKENDS),
-    ),
-]
 Threads = Annotated[
     int | None,
     typer.Option(min=1, help="At most so many threads. Default: all processors. Same results."),
 ]
-Flag = Annotated[
-    bool,
-    typer.Option("--flag", help="Keep samples that cannot be computed: empty, with a status."),
-]
-Strict = Annotated[bool, typer.Option("--strict", help="A contact outside its bounds is an error.")]
 Quiet = Annotated[
     bool, typer.Option("--quiet", "-q", help="Print only what was asked for, and errors.")
 ]

@@ -10,7 +10,6 @@ import typer
 
 from ..errors import InputError, did_you_mean
 from ..extras import require
-from . import completion
 from .answer import Answer, command_line
 from .command import LOOK, command
 from .inputs import output_folder
@@ -23,27 +22,21 @@ def plot(
     solution: Annotated[
         Path | None, typer.Argument(help="Results (.nc) of a run. Without: list the figures.")
     ] = None,
-    figure: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Figure to draw; repeat for more. Default: all.",
-            autocompletion=completion.one_of(*completion.FIGURES),
-        ),
-    ] = None,
-    out: Annotated[Path, typer.Option(help="Folder for PNG and SVG files.")] = Path("figures"),
-    style: Annotated[
-        str,
-        typer.Option(
-            help="screen; journal (85 mm wide, letters of 8 pt); or journal-wide (175 mm).",
-            autocompletion=completion.one_of(*completion.STYLES),
-        ),
-    ] = "screen",
-    title: Annotated[
-        bool, typer.Option(help="Draw the heading, and where the data come from.")
-    ] = True,
-    letters: Annotated[bool, typer.Option("--letters", help="Mark panels (a), (b) ...")] = False,
+    figure: list[str] | None = None,
+    out: Path = Path("figures"),
+    style: str = "screen",
+    title: bool = True,
+    letters: bool = False,
 ) -> Answer:
-    """Figures of a run, to look at or to print."""
+    """Figures of a run, to look at or to print.
+
+    Options:
+        figure: Figure to draw; repeat for more. Default: all.
+        out: Folder for PNG and SVG files.
+        style: screen; journal (85 mm wide, letters of 8 pt); or journal-wide (175 mm).
+        title: Draw the heading, and where the data come from.
+        letters: Mark panels (a), (b) ...
+    """
     require("matplotlib", "figures")
     import condyle
 

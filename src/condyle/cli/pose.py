@@ -16,16 +16,9 @@ from .command import COMPUTE, command
 @command(COMPUTE, example="condyle pose jaw.toml --joints encoders.csv --out poses.csv")
 def pose(
     mechanism: options.Mechanism,
-    joints: Annotated[
-        Path,
-        typer.Option(
-            help="Joint coordinates (CSV or Parquet): joint_CHAIN for each chain (rad, or m for a "
-            "slider), zero at home. With a column t (s) each row follows the one before, else each "
-            "stands alone and follows from home."
-        ),
-    ],
-    out: Annotated[Path, typer.Option(help="File for the poses (.csv or .parquet).")],
-    flag: options.Flag = False,
+    joints: Path,
+    out: Path,
+    flag: bool = False,
     tolerance: Annotated[
         float,
         typer.Option(
@@ -47,6 +40,12 @@ def pose(
 
     Every row of joint coordinates gives the pose X, Y, Z (m), alpha, beta, gamma (rad): forward
     kinematics.
+
+    Options:
+        joints: Joint coordinates (CSV or Parquet): joint_CHAIN for each chain (rad, or m for a
+            slider), zero at home. With a column t (s) each row follows the one before, else each
+            stands alone and follows from home.
+        out: File for the poses (.csv or .parquet).
     """
     import condyle
 

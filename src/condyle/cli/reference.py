@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from .answer import Answer, command_line
 from .command import BEGIN, command
@@ -14,11 +11,14 @@ from .inputs import output_folder
 
 @command(BEGIN, example="condyle reference --out case")
 def reference(
-    out: Annotated[Path, typer.Option(help="Folder for the files.")] = Path(),
+    out: Path = Path(),
 ) -> Answer:
     """The bundled motion and bite force as files.
 
     Examples of the tables that condyle run reads. Both are synthetic, not measured.
+
+    Options:
+        out: Folder for the files.
     """
     from ..motion import write_reference
 

@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from ..extras import require
-from . import options
 from .answer import Answer, command_line
 from .command import LOOK, command
 
@@ -16,22 +15,20 @@ from .command import LOOK, command
 @command(LOOK, example="condyle report results/masticatory.nc")
 def report(
     solution: Annotated[Path, typer.Argument(help="Results (.nc) of a run.")],
-    out: Annotated[
-        Path | None, typer.Option(help="HTML file. Default: beside the results.")
-    ] = None,
-    measured: options.Measured = None,
-    file: Annotated[
-        list[Path] | None,
-        typer.Option(help="Input of the run to name with its hash; repeat for more."),
-    ] = None,
-    sweep: Annotated[
-        Path | None, typer.Option(help="Folder of a sweep, to show on the page too.")
-    ] = None,
+    out: Path | None = None,
+    measured: Path | None = None,
+    file: list[Path] | None = None,
+    sweep: Path | None = None,
 ) -> Answer:
     """A run as one web page to send.
 
     One HTML file that opens without a network: the moving mechanism, linked plots, tables and
     every warning.
+
+    Options:
+        out: HTML file. Default: beside the results.
+        file: Input of the run to name with its hash; repeat for more.
+        sweep: Folder of a sweep, to show on the page too.
     """
     require("plotly", "report")
     from ..report.page import write_report

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from . import options
 from .answer import Answer, command_line, files_line
@@ -27,41 +24,40 @@ from .inputs import (
 )
 def run(
     mechanism: options.Mechanism = "masticatory",
-    motion: options.Motion = None,
-    load: options.Load = None,
-    load_point: options.LoadPoint = None,
-    formulation: options.Formulation = "virtual_power",
-    route: options.Route = "core",
-    distribution: options.Distribution = None,
-    preload: options.Preload = 0.0,
-    contact_weight: options.ContactWeight = 0.0,
-    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("results"),
-    units: options.Units = None,
-    landmark: options.Landmark = None,
-    smooth: options.Smooth = None,
-    rate: options.Rate = None,
+    motion: Path | None = None,
+    load: Path | None = None,
+    load_point: str | None = None,
+    formulation: str = "virtual_power",
+    route: str = "core",
+    distribution: str | None = None,
+    preload: float = 0.0,
+    contact_weight: float = 0.0,
+    out: Path = Path("results"),
+    units: str | None = None,
+    landmark: str | None = None,
+    smooth: str | None = None,
+    rate: float | None = None,
     trim: options.Trim = 0.0,
-    figures: Annotated[bool, typer.Option("--figures", help="Draw figures too.")] = False,
-    reactions: options.Reactions = False,
-    mat: options.Mat = False,
-    report: Annotated[
-        bool, typer.Option("--report", help="Write the page of condyle report too.")
-    ] = False,
-    backend: options.Backend = "auto",
+    figures: bool = False,
+    reactions: bool = False,
+    mat: bool = False,
+    report: bool = False,
+    backend: str = "auto",
     threads: options.Threads = None,
-    measured: options.Measured = None,
-    strict: options.Strict = False,
-    flag: options.Flag = False,
-    vary: Annotated[
-        Path | None,
-        typer.Option(
-            help="Study (TOML) whose numbers vary: quantiles of efforts and contact forces too."
-        ),
-    ] = None,
+    measured: Path | None = None,
+    strict: bool = False,
+    flag: bool = False,
+    vary: Path | None = None,
 ) -> Answer:
     """Torques and contact forces along a motion.
 
     Without arguments: the bundled chewing robot, a synthetic chewing path and bite force.
+
+    Options:
+        out: Folder for the results.
+        figures: Draw figures too.
+        report: Write the page of condyle report too.
+        vary: Study (TOML) whose numbers vary: quantiles of efforts and contact forces too.
     """
     require_drawing(figures, report)
     import condyle

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from . import options
 from .answer import Answer, command_line, files_line
@@ -18,37 +15,28 @@ FEW = 8  # events that a screen shows
 @command(COMPUTE, example="condyle simulate jaw.toml --scenario chew.toml --out results --report")
 def simulate(
     mechanism: options.Mechanism = "masticatory",
-    scenario: Annotated[
-        Path | None,
-        typer.Option(
-            help="What happens (TOML): start, efforts or controller, sensors, loads, duration. "
-            "Default: computed torque along the bundled chewing path, or a trial motion. "
-            "condyle simulate --new FILE writes one to start from.",
-        ),
-    ] = None,
-    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("results"),
-    stop_at_bounds: Annotated[
-        bool, typer.Option("--stop-at-bounds", help="End where a contact leaves its surface.")
-    ] = False,
-    check_gains: Annotated[
-        bool,
-        typer.Option(
-            "--check-gains",
-            help="Only say whether the controller's loop is stable, at home and along its path.",
-        ),
-    ] = False,
-    new: Annotated[
-        Path | None, typer.Option("--new", help="Write a first scenario there, and stop.")
-    ] = None,
-    report: Annotated[
-        bool, typer.Option("--report", help="Write the page of condyle report too.")
-    ] = False,
-    backend: options.Backend = "auto",
+    scenario: Path | None = None,
+    out: Path = Path("results"),
+    stop_at_bounds: bool = False,
+    check_gains: bool = False,
+    new: Path | None = None,
+    report: bool = False,
+    backend: str = "auto",
 ) -> Answer:
     """Forward in time, under efforts or a controller.
 
     The contacts are kept exactly; food breaks, efforts saturate, encoders count. Results are those
     of condyle run, with what was commanded, measured and lost besides.
+
+    Options:
+        scenario: What happens (TOML): start, efforts or controller, sensors, loads, duration.
+            Default: computed torque along the bundled chewing path, or a trial motion. condyle
+            simulate --new FILE writes one to start from.
+        out: Folder for the results.
+        stop_at_bounds: End where a contact leaves its surface.
+        check_gains: Only say whether the controller's loop is stable, at home and along its path.
+        new: Write a first scenario there, and stop.
+        report: Write the page of condyle report too.
     """
     if new is not None:
         return _new(new, mechanism)

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from ..errors import InputError
 from . import options
@@ -17,31 +14,30 @@ from .inputs import chosen_model, warn
 @command(COMPUTE, example="condyle solve jaw.toml --states states.csv --out torques.csv")
 def solve(
     mechanism: options.Mechanism,
-    states: Annotated[
-        Path,
-        typer.Option(
-            help="States to solve (CSV or Parquet), one a row: pose coordinates such as X, Y (m), "
-            "alpha, beta (rad), their rates dX ... (per s) and accelerations ddX ... (per s^2; "
-            "without both: at rest), and if you like some of Fx, Fy, Fz (N), Mx, My, Mz (N m)."
-        ),
-    ],
-    out: Annotated[Path, typer.Option(help="File for the results (.csv or .parquet).")],
-    load_point: options.LoadPoint = None,
-    formulation: options.Formulation = "virtual_power",
-    route: options.Route = "core",
-    distribution: options.Distribution = None,
-    preload: options.Preload = 0.0,
-    contact_weight: options.ContactWeight = 0.0,
-    reactions: options.Reactions = False,
-    mat: options.Mat = False,
-    backend: options.Backend = "auto",
+    states: Path,
+    out: Path,
+    load_point: str | None = None,
+    formulation: str = "virtual_power",
+    route: str = "core",
+    distribution: str | None = None,
+    preload: float = 0.0,
+    contact_weight: float = 0.0,
+    reactions: bool = False,
+    mat: bool = False,
+    backend: str = "auto",
     threads: options.Threads = None,
-    strict: options.Strict = False,
-    flag: options.Flag = False,
+    strict: bool = False,
+    flag: bool = False,
 ) -> Answer:
     """The same for separate states, one a row.
 
     For tables of any length: rows never influence each other.
+
+    Options:
+        states: States to solve (CSV or Parquet), one a row: pose coordinates such as X, Y (m),
+            alpha, beta (rad), their rates dX ... (per s) and accelerations ddX ... (per s^2;
+            without both: at rest), and if you like some of Fx, Fy, Fz (N), Mx, My, Mz (N m).
+        out: File for the results (.csv or .parquet).
     """
     import condyle
 

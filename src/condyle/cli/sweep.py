@@ -20,33 +20,26 @@ if TYPE_CHECKING:
 @command(COMPUTE, example="condyle sweep study.toml --out sweep")
 def sweep(
     study: Annotated[Path | None, typer.Argument(help="Study file (TOML).")] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder for the rows. Default: as the study is called.")
-    ] = None,
-    workers: Annotated[
-        int | None, typer.Option(help="Processes. Default: the processors at hand.")
-    ] = None,
-    scheduler: Annotated[
-        str,
-        typer.Option(
-            help="Who does it: processes; threads; dask (a cluster on this machine); or the "
-            "address of a Dask scheduler, tcp://..."
-        ),
-    ] = "processes",
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with what the folder holds of this study.")
-    ] = False,
-    show: Annotated[
-        Path | None, typer.Option(help="Instead: show what the folder of a sweep tells.")
-    ] = None,
-    figures: Annotated[
-        bool, typer.Option("--figures", help="Draw figures into the folder too.")
-    ] = False,
+    out: Path | None = None,
+    workers: int | None = None,
+    scheduler: str = "processes",
+    resume: bool = False,
+    show: Path | None = None,
+    figures: bool = False,
 ) -> Answer:
     """Many variants of a mechanism: a row of measures for each.
 
     A study names the numbers that vary, how they are sampled, and what is measured. Rows are
     written in parts, so that a study that was stopped goes on with --resume.
+
+    Options:
+        out: Folder for the rows. Default: as the study is called.
+        workers: Processes. Default: the processors at hand.
+        scheduler: Who does it: processes; threads; dask (a cluster on this machine); or the address
+            of a Dask scheduler, tcp://...
+        resume: Go on with what the folder holds of this study.
+        show: Instead: show what the folder of a sweep tells.
+        figures: Draw figures into the folder too.
     """
     require_drawing(figures, False)
     if (study is None) == (show is None):
