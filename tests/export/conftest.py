@@ -31,11 +31,9 @@ def written(name: str, path: Path, **options: Any) -> Folder:
         mechanism = condyle.load(name)
     else:
         mechanism = CHANGED[name]() if name in CHANGED else case(name).mechanism
-    landmark = options.get("landmark")
-    questions = options.pop("questions", (*DEFAULT, *(("closure",) if landmark else ())))
-    exported = export(mechanism, questions, **options)
+    exported = export(mechanism, options.pop("questions", DEFAULT), **options)
     path.mkdir()
-    write_package(exported, mechanism, Wish((), landmark), path)
+    write_package(exported, mechanism, Wish((), options.get("landmark")), path)
     return Folder(exported, path)
 
 
@@ -56,9 +54,19 @@ def rubbing() -> condyle.Mechanism:
 
 CHANGED = {"limited": limited, "rubbing": rubbing}
 FOLDERS: dict[str, tuple[str, dict[str, Any]]] = {
-    "jaw": ("masticatory", {"landmark": "incisor", "prefix": "jaw"}),
+    "jaw": (
+        "masticatory",
+        {
+            "landmark": "incisor",
+            "prefix": "jaw",
+            "questions": (*DEFAULT, "closure", "observer", "impedance", "bite_force"),
+        },
+    ),
     "single": ("gough-stewart", {"precision": "float", "questions": ("inverse", "pose")}),
-    "curved": ("masticatory-curved", {"precision": "float", "questions": ("inverse", "motion")}),
+    "curved": (
+        "masticatory-curved",
+        {"precision": "float", "questions": ("inverse", "motion", "pose", "joint_pd")},
+    ),
     "struct": (
         "gough-stewart",
         {"constants": "struct", "prefix": "hexapod", "questions": ("inverse", "motion", "pose")},

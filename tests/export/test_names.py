@@ -16,6 +16,7 @@ from condyle.errors import InputError, UnsupportedError
 from condyle.export import CATALOGUE, export
 from condyle.export.names import identifier, identifiers, require_prefix
 from condyle.export.pick import picked
+from condyle.questions.law import CONTROLLERS
 
 
 @pytest.mark.parametrize(
@@ -115,7 +116,7 @@ def test_the_command(condyle_command: Any, tmp_path: Path) -> None:
 
 
 def test_completion_knows_every_question() -> None:
-    assert tuple(CATALOGUE) == completion.EXPORTS
+    assert {*CATALOGUE, *CONTROLLERS} - {"none"} == set(completion.EXPORTS)
 
 
 def test_only_what_is_used_is_taken() -> None:

@@ -34,7 +34,11 @@ EXPORTS = (
     "motion",
     "closure",
     "pose",
+    "observer",
     "computed_torque",
+    "impedance",
+    "joint_pd",
+    "bite_force",
 )
 UNITS = ("m,rad", "m,deg", "mm,rad", "mm,deg", "cm,rad", "cm,deg")
 QUANTITIES = (

@@ -41,8 +41,9 @@ def c(
     Options:
         out: Folder for source, header, example and tests.
         question: What to export; repeat for more: inverse, contact (with contact forces), bounded
-            (within limits), forward (accelerations), motion, closure, pose (from encoders),
-            computed_torque. Default: all but bounded, and but closure, which needs --from or
+            (within limits), forward (accelerations), motion, closure, pose and observer (from
+            encoders), and controllers: computed_torque, impedance, joint_pd, bite_force. Default:
+            inverse, contact, forward, motion, pose, computed_torque, and closure with --from or
             --landmark.
         landmark: Platform point whose path closure starts from.
         precision: double, or float for processors that compute in it alone.

@@ -1,22 +1,25 @@
-"""What can be exported, by name: the function's arguments, its body and what may go wrong.
+"""What can be exported, by name: a question, its arguments in C, and what may go wrong.
 
-A new one is an entry of `CATALOGUE`.
+A new one is an entry of `CATALOGUE`. Every controller of `condyle.questions.law` is one without.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
-from ..errors import InputError, UnsupportedError, did_you_mean
+from ..errors import InputError, did_you_mean
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..model.distributing import LEAST
 from ..questions import Prescribed
-from ..questions.friction import MOST
-from . import encoders, limited
+from ..questions.law import CONTROLLERS, ControllerTable
+from ..questions.observer import ITERATIONS as OBSERVER_STEPS
+from . import limited
 from .context import Body, Context
 from .exported import Argument
-from .straight import function
+
+POSE_STEPS = 8  # as many as a start that is off by a third of what steps may be takes
 
 
 @dataclass(frozen=True)
@@ -43,25 +46,42 @@ def in_order(coordinates: Sequence[str]) -> tuple[str, ...]:
     return tuple(sorted(coordinates, key=COORDINATES.index))
 
 
-Arguments = Callable[[Context, Wish], list[Argument]]
-
-
 @dataclass(frozen=True)
 class Entry:
     """One question in C.
 
-    text:       what it answers.
-    needs:      questions that its code calls.
-    statuses:   what it may return besides ok and out_of_bounds.
-    iterations: at most so many steps.
+    text:     what it answers.
+    given:    its arguments in turn, each as `port` or `port>name in C`; "": all ports that matter.
+              Ports that are not among them are 0, efforts' limits those of the mechanism.
+    results:  what it writes, likewise.
+    question, details: of `condyle.questions`, where not of the entry's own name.
+    doubt:    the status where a sample cannot be vouched for;  rubbing: with friction.
+    quick:    whether it is worth vector types.
+    within:   result -> bound by precision, beyond which nothing fits.
+    steps:    so many, a fixed number; 0 for none.
+    told:     name in C -> what it is and its unit, where `arguments` knows nothing of it.
+    limited:  whether efforts are within limits.
+    needs:    questions that its code calls;  body: what writes that, where it is more than a graph.
     """
 
     text: str
-    arguments: Arguments
-    body: Callable[[Context, Wish], Body]
-    statuses: tuple[str, ...]
+    given: str = ""
+    results: str = "effort"
+    question: str = ""
+    details: Callable[[Wish], tuple[Any, ...]] = lambda wish: ()
+    doubt: str = "SINGULAR"
+    rubbing: str = ""
+    quick: bool = False
+    within: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    steps: int = 0
+    told: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    limited: bool = False
     needs: tuple[str, ...] = ()
-    iterations: int = 0
+    body: Callable[[Context, Sequence[Argument]], Body] | None = None
+
+    def unsure(self, c: Context) -> str:
+        """The status of what cannot be vouched for."""
+        return self.rubbing if self.rubbing and c.structure.friction else self.doubt
 
 
 def least_norm(mechanism: Mechanism) -> str | None:
@@ -70,161 +90,90 @@ def least_norm(mechanism: Mechanism) -> str | None:
     return LEAST if cables else None
 
 
-def _inverse_arguments(c: Context, wish: Wish) -> list[Argument]:
-    return [*c.arguments.states(), *c.arguments.load(), c.arguments.effort()]
-
-
-def _contact_arguments(c: Context, wish: Wish) -> list[Argument]:
-    return [*_inverse_arguments(c, wish), *c.arguments.contact_force()]
-
-
-def _inverse(c: Context, wish: Wish) -> Body:
-    return _efforts(c, "inverse", (), _inverse_arguments(c, wish))
-
-
-def _contact(c: Context, wish: Wish) -> Body:
-    return _efforts(c, "contact", ("contact",), _contact_arguments(c, wish))
-
-
-def _efforts(c: Context, name: str, wanted: tuple[str, ...], own: list[Argument]) -> Body:
-    if len(c.structure.friction) > MOST:
-        raise UnsupportedError(
-            f"friction at {len(c.structure.friction)} contacts has no efforts in closed form; at "
-            f"most {MOST} have"
-        )
-    found = c.variants("inverse", wanted)
-    weak = "UNCERTIFIED" if c.structure.friction else "SINGULAR"
-    program = found.robust or found.main
-    quick = found.latency or (found.main if found.robust else None)
-    return function(c, name, program, own, ("UNREACHABLE", weak), quick)
-
-
-def _forward_arguments(c: Context, wish: Wish) -> list[Argument]:
-    a = c.arguments
-    found = replace(a.states()[2], name="acceleration", given=False, port="acceleration")
-    return [*a.states()[:2], a.effort(given=True), *a.load(), found, *a.contact_force()]
-
-
-def _forward(c: Context, wish: Wish) -> Body:
-    program = c.variants("forward", ("contact",)).main
-    weak = "JAMMED" if c.structure.friction else "SINGULAR"
-    own = _forward_arguments(c, wish)
-    return function(c, "forward", program, own, ("UNREACHABLE", weak), program)
-
-
-def _motion_arguments(c: Context, wish: Wish) -> list[Argument]:
-    return [*c.arguments.states(), *c.arguments.pose()]
-
-
-def _motion(c: Context, wish: Wish) -> Body:
-    return _placed(c, "motion", (), _motion_arguments(c, wish))
-
-
-def _closure_arguments(c: Context, wish: Wish) -> list[Argument]:
-    a = c.arguments
-    if wish.landmark is None:
-        names, what = wish.coordinates, "prescribed coordinates"
-    else:
-        names, what = ("x", "y", "z"), f'displacement of "{wish.landmark}" from home, in {{S}}'
-    found = []
-    for name, text, per in (
-        ("s", what, ""),
-        ("s1", "rates of s", "/s"),
-        ("s2", "accelerations of s", "/s^2"),
-    ):
-        units = tuple(f"{'m' if n in 'XYZxyz' else 'rad'}{per}" for n in names)
-        found.append(Argument(name, text, tuple(names), units, True, name))
-    return [*found, *a.pose()]
-
-
-def _closure(c: Context, wish: Wish) -> Body:
-    # With a landmark a fourth number is given: the middle of the contacts keeps its home Y.
-    rest = () if wish.landmark is None else tuple(f"{s}[3]" for s in ("s", "s1", "s2"))
-    details = (Prescribed(wish.coordinates),)
-    return _placed(c, "closure", details, _closure_arguments(c, wish), rest)
-
-
-def _placed(
-    c: Context,
-    name: str,
-    details: tuple[object, ...],
-    own: list[Argument],
-    rest: tuple[str, ...] = (),
-) -> Body:
-    program = c.variants(name, *details).main
-    return function(c, name, program, own, ("UNREACHABLE",) * len(program.checks), zero=rest)
-
-
-def _torque_arguments(c: Context, wish: Wish) -> list[Argument]:
-    a = c.arguments
-    names = a.independent
-    wanted = [
-        a.coordinates("q_d", "wanted independent coordinates", names),
-        a.coordinates("q1_d", "wanted rates", names, "/s"),
-        a.coordinates("q2_d", "wanted accelerations", names, "/s^2"),
-    ]
-    gains = [
-        Argument(name, text, names, (unit,) * len(names), True)
-        for name, text, unit in (
-            ("kp", "stiffness: acceleration by deviation", "1/s^2"),
-            ("kd", "damping: acceleration by deviation of rate", "1/s"),
-        )
-    ]
-    return [*wanted, *a.states()[:2], *gains, *a.load(), a.effort()]
-
-
-def _torque(c: Context, wish: Wish) -> Body:
-    m = len(c.arguments.independent)
-    words = ["q", "q1", "q2", "force", "moment", "point", "effort"]
-    code = f"""int {c.prefix}_computed_torque({c.parameters(_torque_arguments(c, wish))})
-{{
-    {c.precision} q2[{m}];
-    for (int i = 0; i < {m}; i++)
-        q2[i] = q2_d[i] + kd[i] * (q1_d[i] - q1[i]) + kp[i] * (q_d[i] - q[i]);
-    return {c.call(f"{c.prefix}_inverse", words)};
-}}
-"""
-    return Body(code, 6 * m)
-
-
-_EFFORTS = ("UNREACHABLE", "SINGULAR")
+STATE, LOAD = "q q1 q2", "force moment point"
+BORNE = "borne_force>force borne_moment>moment borne_point>point"
+WHOLE = "pose pose_rate pose_acceleration"
 CATALOGUE: dict[str, Entry] = {
     "inverse": Entry(
         "Efforts of least norm that make a motion under a load.",
-        _inverse_arguments, _inverse, _EFFORTS,
+        f"{STATE} {LOAD}",
+        rubbing="UNCERTIFIED",
+        quick=True,
     ),
     "contact": Entry(
         "Efforts of least norm that make a motion under a load, and the contact forces.",
-        _contact_arguments, _contact, _EFFORTS,
+        f"{STATE} {LOAD}",
+        "effort contact_force",
+        question="inverse",
+        details=lambda wish: (("contact",),),
+        rubbing="UNCERTIFIED",
+        quick=True,
     ),
     "bounded": Entry(
         "Efforts of least norm within the actuators' limits, and the contact forces.",
-        _contact_arguments, lambda c, wish: limited.body(c, _contact_arguments(c, wish)),
-        (*_EFFORTS, "INFEASIBLE", "UNCERTIFIED"), ("contact", "motion"), limited.ROUNDS,
+        f"{STATE} {LOAD}",
+        "effort contact_force",
+        question="inverse",
+        details=lambda wish: (("contact",),),
+        rubbing="UNCERTIFIED",
+        limited=True,
+        needs=("contact", "motion"),
+        body=limited.body,
+        steps=limited.ROUNDS,
     ),
     "forward": Entry(
         "Accelerations that efforts and a load make, and the contact forces.",
-        _forward_arguments, _forward, _EFFORTS,
+        f"q q1 effort {LOAD}",
+        "acceleration contact_force",
+        details=lambda wish: (("contact",),),
+        rubbing="JAMMED",
+        quick=True,
     ),
     "motion": Entry(
         "The whole pose and its rates, from the independent coordinates.",
-        _motion_arguments, _motion, ("UNREACHABLE",),
+        STATE,
+        WHOLE,
+        doubt="UNREACHABLE",
     ),
     "closure": Entry(
         "The whole pose and its rates, from other coordinates or a landmark's path.",
-        _closure_arguments, _closure, ("UNREACHABLE",),
+        "s s1 s2",
+        WHOLE,
+        details=lambda wish: (Prescribed(wish.coordinates),),
+        doubt="UNREACHABLE",
     ),
     "pose": Entry(
         "The pose that joint coordinates belong to, as encoders give them.",
-        lambda c, wish: encoders.arguments(c), lambda c, wish: encoders.body(c),
-        ("UNREACHABLE", "SINGULAR", "INFEASIBLE"), iterations=encoders.ITERATIONS,
+        "joint start",
+        "pose residual",
+        details=lambda wish: (POSE_STEPS,),
+        doubt="UNREACHABLE",
+        within={"residual": {"double": 1e-6, "float": 1e-4}},
+        steps=POSE_STEPS,
+    ),
+    "observer": Entry(
+        "The state that encoders give from one period to the next: pose, and rates of counts.",
+        "joint period resolution smoothing pose_before pose_rate_before joint_before "
+        "joint_rate_before",
+        "q q1 pose pose_rate joint>joint_read joint_rate>joint_rate_read",
+        doubt="UNREACHABLE",
+        steps=OBSERVER_STEPS,
+        told={
+            "period": ("between calls", "s"),
+            "smoothing": ("part of the last rates that is kept, 0 to below 1", "1"),
+        },
     ),
     "computed_torque": Entry(
         "A controller: efforts that follow a wanted motion, by "
         "q'' = q2_d + kd (q1_d - q1) + kp (q_d - q).",
-        _torque_arguments, _torque, _EFFORTS, needs=("inverse",),
+        f"q_d q1_d q2_d q q1 stiffness>kp damping>kd {BORNE}",
+        "asked>effort",
+        question="tick",
+        details=lambda wish: ("computed_torque", (), None, False, True),
+        rubbing="UNCERTIFIED",
+        quick=True,
     ),
-}  # fmt: skip
+}
 DEFAULT = ("inverse", "contact", "forward", "motion", "pose", "computed_torque")
 
 
@@ -235,6 +184,36 @@ def usual(mechanism: Mechanism) -> tuple[str, ...]:
 
 def require_question(name: str) -> Entry:
     """Raises InputError for what cannot be exported."""
-    if name not in CATALOGUE:
-        raise InputError(f'no question "{name}" to export.{did_you_mean(name, CATALOGUE)}')
-    return CATALOGUE[name]
+    if name in CATALOGUE:
+        return CATALOGUE[name]
+    table = CONTROLLERS.get(name)
+    if table is None or not issubclass(table, ControllerTable):
+        known = [*CATALOGUE, *CONTROLLERS]
+        raise InputError(f'no question "{name}" to export.{did_you_mean(name, known)}')
+    return _law(name, table)
+
+
+def _law(kind: str, table: type[ControllerTable]) -> Entry:
+    """A controller, for a processor that reads its state and its aims."""
+    fields = {name: given.description or name for name, given in table.model_fields.items()}
+    units = {name: table.knobs.get(name, "1").replace("²", "^2") for name in table.ports}
+    told = {name: (fields.get(name, name), unit) for name, unit in units.items()}
+    words = ", ".join(str(number) for number in table.memory)
+    choices = tuple((name, table.model_fields[name].default) for name in table.chooses)
+    return Entry(
+        f"A controller: {(table.__doc__ or kind).splitlines()[0]} Inverse dynamics is of "
+        "least norm; of efforts, what is beyond the actuators' limits is cut off.",
+        results="effort memory",
+        question="tick",
+        details=lambda wish: (kind, choices),
+        rubbing="UNCERTIFIED",
+        limited=True,
+        told={
+            **told,
+            "period": ("between calls", "s"),
+            "force": ("of the load on the platform at the law's point, axes of {S}", "N"),
+            "force_d": ("wanted force", "N"),
+            "memory_before": (f"memory that the last call gave; at first {words}", "1"),
+            "memory": ("what the next call is given as memory_before", "1"),
+        },
+    )

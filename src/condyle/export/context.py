@@ -16,11 +16,9 @@ from ..questions import Question
 from ..questions.structure import Structure
 from ..status import Status
 from .arguments import Arguments
-from .body import Scalar, Wide
 from .constants import table as constants_table
 from .exported import Argument, Precision
-from .precision import ANGLES, LARGEST, threshold
-from .rescale import rescaled
+from .precision import rescaled
 
 # Statuses in C, and where they come from.
 CODES = {
@@ -40,12 +38,14 @@ class Body:
 
     code:       its definition in portable C.
     operations: floating-point operations of that.
+    statuses:   what it may return besides ok.
     wide:       the quick variant with vector types, and
     dispatch:   what chooses between both; nothing where there is one alone.
     """
 
     code: str
     operations: int
+    statuses: tuple[str, ...]
     wide: str = ""
     dispatch: str = ""
 
@@ -64,12 +64,10 @@ class Context:
     prefix: str
     precision: Precision
     lanes: int
+    arguments: Arguments
     struct: bool = False
     tables: dict[str, np.ndarray] = field(default_factory=dict)
     printers: dict[str, Printer] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        self.arguments = Arguments(self.mechanism)
 
     @property
     def pulls(self) -> bool:
@@ -99,40 +97,6 @@ class Context:
         where = f"constants->{name}" if self.struct else f"{self.prefix}_{name}_table"
         return f"    const {real} *const table = {where};"
 
-    def floats(self, program: Program) -> Program:
+    def floats(self, program: Program, question: str) -> Program:
         """A program with its sums fused, and the thresholds of this precision."""
-        return fused(rescaled(program, self.precision))
-
-    def judged(
-        self, body: Scalar | Wide, doubts: Sequence[str], given: Sequence[Argument]
-    ) -> list[tuple[str, str, str]]:
-        """What decides on a sample, in turn: a value, what it must not break, and the status else.
-
-        Args: doubts: what a check that is not certain means, one a check.
-        """
-        p = self.prefix.upper()
-        found = [(size, f"<= {limit}", f"{p}_OUT_OF_BOUNDS") for size, limit in _sizes(body, given)]
-        for i, (check, doubt) in enumerate(zip(body.program.checks, doubts, strict=True)):
-            limit = body.number(threshold(check.tolerance, self.precision))
-            found.append((body.check(i), f">= {limit}", f"{p}_{doubt}"))
-        return found
-
-
-def _sizes(body: Scalar | Wide, given: Sequence[Argument]) -> list[tuple[str, str]]:
-    """Sums of sizes, and what they must not exceed: false for what is no number."""
-    every = [_sum([f"fabs_s({a.name}[{i}])" for i in range(a.size)]) for a in given]
-    angles = [
-        f"fabs_s({a.name}[{i}])" for a in given for i, unit in enumerate(a.units) if unit == "rad"
-    ]
-    found = [(_sum(every), body.number(LARGEST[body.precision]))]
-    if angles and isinstance(body, Scalar):  # vector code takes far angles from the library
-        found.append((_sum(angles), body.number(ANGLES[body.precision])))
-    return found
-
-
-def _sum(terms: Sequence[str]) -> str:
-    """Two halves side by side, which wait less for each other."""
-    if len(terms) == 1:
-        return terms[0]
-    half = len(terms) // 2
-    return f"({_sum(terms[:half])} + {_sum(terms[half:])})"
+        return fused(rescaled(program, question, self.precision))

@@ -53,8 +53,8 @@ class Function:
     name:       in C.
     question:   in the catalogue (`inverse`, `motion` ..).
     text:       what it answers.
-    iterations: at most so many steps; 0 where nothing is iterated.
-    operations: floating-point operations, sine and cosine as one; of one step, if it has steps.
+    iterations: so many steps, or at most; 0 where nothing is iterated.
+    operations: floating-point operations, sine and cosine as one.
     statuses:   what it may return besides ok: name -> why.
     """
 

@@ -167,18 +167,18 @@ def _page(e: Exported, rows: dict[str, dict[str, Any]], how: str) -> str:
         if how
         else "Not measured: no C compiler was at hand. `condyle export` again where there is one.",
         "",
-        "| function | operations | looks at most | code [bytes] | stack [bytes] | worst error |",
+        "| function | operations | steps at most | code [bytes] | stack [bytes] | worst error |",
         "|---|---|---|---|---|---|",
     ]
     for name, row in rows.items():
-        looks = str(row["iterations"] or "no iteration")
+        steps = str(row["iterations"] or "no iteration")
         error = "" if row["error"] is None else f"{row['error']:.1e}"
-        cells = [name, row["operations"], looks, row["code"], row["stack"], error]
+        cells = [name, row["operations"], steps, row["code"], row["stack"], error]
         lines.append(f"| {' | '.join('' if cell is None else str(cell) for cell in cells)} |")
     lines += [
         "",
         "- Operations: additions, products, roots and quotients of one call, a fused multiply-add, "
-        "or a sine with its cosine, as one; of one look at a pose where there are several.",
+        "or a sine with its cosine, as one.",
         "- Code and stack: of a function with all that it calls, but the C library.",
         "- Worst error: over the recorded samples, of the largest entry of each result.",
         f"- Of the C library it may call {', '.join(e.symbols) or 'nothing'}.",

@@ -15,12 +15,10 @@ import numpy as np
 from ..backends.c.limits import WithinLimits
 from ..errors import UnsupportedError
 from ..mechanism.chain import limits
-from .body import Scalar
+from .c_body import Places, Scalar
 from .context import Body, Context
 from .exported import Argument
 from .pick import picked
-from .places import Places
-from .straight import operations
 
 ROUNDS = 64  # of the routine: sides of its polygon are taken and left so often at the most
 RESULTS = ("Q", "J", "normal", "friction")
@@ -43,10 +41,13 @@ def body(c: Context, own: Sequence[Argument]) -> Body:
         raise UnsupportedError("efforts within limits are exported in double alone")
     program = c.variants("balance").main
     results = {name: name for name in RESULTS}
-    places = Places.of(program.interface, c.numbers.order, {p: p for p in PORTS}, results)
-    scalar = Scalar(c.floats(program), places, c.precision)
+    order = c.numbers.order
+    places = Places.of(program.interface, order, lambda port, i: f"{port}[{i}]", results)
+    scalar = Scalar(c.floats(program, "bounded"), places, c.precision)
     code = _routine(c).replace("@public", _public(c, own))
-    return Body(_balance(c, scalar) + code, operations(scalar))
+    weak = ("UNCERTIFIED",) if c.structure.friction else ("SINGULAR", "UNCERTIFIED")
+    statuses = ("UNREACHABLE", *weak, "INFEASIBLE", "OUT_OF_BOUNDS")
+    return Body(_balance(c, scalar) + code, scalar.operations, statuses)
 
 
 def _balance(c: Context, body: Scalar) -> str:

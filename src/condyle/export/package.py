@@ -144,7 +144,7 @@ def _checked(e: Exported, f: Function) -> Iterator[str]:
     yield f"        wrong += status != {f.name}_status[i];"
     yield f"        if (status != {p}_OK || {f.name}_status[i] != {p}_OK) continue;"
     for a in f.outputs:
-        if a.port:  # a residual is rounding
+        if a.name != "residual":  # which is rounding
             right = f"&{f.name}_{a.name}[0][0]"
             yield (
                 f"        worst = larger(worst, error({a.name}, {right}, i, {a.size}, "

@@ -7,12 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..backends.kernel import AGAIN
+from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
 from ..model.closing import Closure
 from ..model.evaluator import Evaluator
 from ..model.forward_kinematics import ForwardKinematics
 from ..status import Status
-from .catalogue import Wish, least_norm
+from .c_function import LIMITS, renamed
+from .catalogue import Wish, least_norm, require_question
 
 Arrays = dict[str, np.ndarray]
 Given = Mapping[str, np.ndarray]  # argument -> (N, size)
@@ -37,8 +40,9 @@ class Reference:
         Results of samples that are not ok mean nothing.
         """
         good = np.isfinite(np.hstack(list(given.values()))).all(axis=1)
+        answer = _ANSWERS.get(question, lambda r, given: _graph(r, question, given))
         with np.errstate(all="ignore"):
-            found, own = _ANSWERS[question](self, {name: a[good] for name, a in given.items()})
+            found, own = answer(self, {name: a[good] for name, a in given.items()})
         status = np.full(len(good), Status.overflow)
         status[good] = own
         results = {name: np.full((len(good), *a.shape[1:]), np.nan) for name, a in found.items()}
@@ -47,17 +51,42 @@ class Reference:
         return results, status
 
 
-def _inverse(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
+def _graph(r: Reference, question: str, given: Given) -> tuple[Arrays, np.ndarray]:
+    """By numpy's kernel of the same question."""
+    entry = require_question(question)
+    kernel = r.model.kernel(entry.question or question, *entry.details(r.wish))
+    names = renamed(entry.given)
+    ports = {}
+    for port in kernel.interface.ports:
+        size = port.size * (kernel.interface.lanes if port.lanes else 1)
+        ports[port.name] = np.zeros((len(next(iter(given.values()))), size))
+        name = names.get(port.name, port.name)
+        if name in given and (not names or port.name in names):
+            ports[port.name] = given[name]
+        elif port.name in LIMITS:
+            ends = [limits(chain)[LIMITS.index(port.name)] for chain in r.model.mechanism.chains]
+            ports[port.name] += ends
+    found = kernel.run(ports)
+    results = {
+        name: found.values[result].reshape(-1, len(found.status)).T
+        for result, name in renamed(entry.results).items()
+        if result in found.values
+    }
+    unsure = Status.unreachable if entry.doubt == "UNREACHABLE" else Status.singular
+    return results, np.where(found.status == AGAIN, unsure, found.status)
+
+
+def _inverse(
+    r: Reference, given: Given, distribution: str | None = None
+) -> tuple[Arrays, np.ndarray]:
+    model = r.model if distribution is None else r.model.choosing(distribution)
     load = np.hstack([given[name] for name in ("force", "moment", "point")])
-    found = r.model.torques(given["q"], given["q1"], given["q2"], load, outputs=("contact",))
+    found = model.torques(given["q"], given["q1"], given["q2"], load, outputs=("contact",))
     return {"effort": found.effort, "contact_force": found["contact_force"]}, found.status
 
 
 def _bounded(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
-    model = r.model.choosing("bounded")
-    load = np.hstack([given[name] for name in ("force", "moment", "point")])
-    found = model.torques(given["q"], given["q1"], given["q2"], load, outputs=("contact",))
-    return {"effort": found.effort, "contact_force": found["contact_force"]}, found.status
+    return _inverse(r, given, "bounded")
 
 
 def _forward(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
@@ -69,7 +98,7 @@ def _forward(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
 
 def _motion(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
     poses, reached = r.model.poses.whole(given["q"], given["q1"], given["q2"])
-    return poses, _reached(reached)
+    return poses, np.where(reached, Status.ok, Status.unreachable)
 
 
 def _closure(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
@@ -79,7 +108,7 @@ def _closure(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
     rest = np.zeros((len(given["s"]), int(not closure.names)))
     s, s1, s2 = (np.hstack([given[name], rest]) for name in ("s", "s1", "s2"))
     found = closure.solve(s, s1, s2)
-    return dict(found.named()), _reached(found.reached)
+    return dict(found.named()), np.where(found.reached, Status.ok, Status.unreachable)
 
 
 def _pose(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
@@ -87,16 +116,6 @@ def _pose(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
     # A residual beyond the tolerance is infeasible in C.
     codes = np.array([Status.ok, Status.unreachable, Status.unreachable, Status.infeasible])
     return {"pose": found.pose, "residual": found.residual}, codes[found.status]
-
-
-def _computed_torque(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
-    g = given
-    q2 = g["q2_d"] + g["kd"] * (g["q1_d"] - g["q1"]) + g["kp"] * (g["q_d"] - g["q"])
-    return _inverse(r, {**given, "q2": q2})
-
-
-def _reached(reached: np.ndarray) -> np.ndarray:
-    return np.where(reached, Status.ok, Status.unreachable)
 
 
 _ANSWERS: dict[str, Callable[[Reference, Given], tuple[Arrays, np.ndarray]]] = {
@@ -107,5 +126,4 @@ _ANSWERS: dict[str, Callable[[Reference, Given], tuple[Arrays, np.ndarray]]] = {
     "motion": _motion,
     "closure": _closure,
     "pose": _pose,
-    "computed_torque": _computed_torque,
 }

@@ -18,9 +18,11 @@ from ..questions.numbers import Layout, specialised
 from ..questions.structure import structure_of
 from ..version import __version__
 from . import structured
+from .arguments import Arguments
+from .c_function import function
 from .catalogue import Entry, Wish, in_order, least_norm, require_question, usual
 from .context import Body, Context
-from .exported import Exported, Function
+from .exported import Argument, Exported, Function
 from .header import WHY, header_text
 from .names import identifier, identifiers, in_comment, require_prefix
 from .pick import picked, used
@@ -70,13 +72,12 @@ def export(
         raise InputError(f"lanes: expected 0, 2, 4 or 8, got {lanes}")
     plain = struct or real != "double"
     name = require_prefix(prefix or identifier(mechanism.name).lower())
-    c = Context(mechanism, structure, numbers, name, real, 0 if plain else lanes, struct)
     wish = Wish(in_order(coordinates), landmark)
-    functions, bodies = [], []
-    for question, entry in entries.items():
-        body = entry.body(c, wish)
-        bodies.append(body)
-        functions.append(_function(c, question, entry, body, wish))
+    arguments = Arguments(mechanism, wish.coordinates, landmark)
+    c = Context(mechanism, structure, numbers, name, real, 0 if plain else lanes, arguments, struct)
+    made = {question: function(c, question, entry, wish) for question, entry in entries.items()}
+    functions = [_function(c, q, entries[q], *own) for q, own in made.items()]
+    bodies = [body for _, body in made.values()]
     named = [*(chain.name for chain in mechanism.chains), *mechanism.contact_names]
     portable = _portable(c, bodies)
     source = _source(c, bodies, portable)
@@ -121,21 +122,20 @@ def _is_struct(constants: str) -> bool:
     return constants == "struct"
 
 
-def _function(c: Context, question: str, entry: Entry, body: Body, wish: Wish) -> Function:
-    codes = (*entry.statuses, "OUT_OF_BOUNDS")
-    if c.structure.friction and "SINGULAR" in codes:
-        codes = (*codes, "UNCERTIFIED")
+def _function(
+    c: Context, question: str, entry: Entry, arguments: tuple[Argument, ...], body: Body
+) -> Function:
     text = entry.text
-    if "effort" in {a.name for a in entry.arguments(c, wish) if not a.given} and c.pulls:
+    if c.pulls and not entry.limited and any(a.name == "effort" and not a.given for a in arguments):
         text += " Limits are not regarded: a cable's effort may be negative."
     return Function(
         f"{c.prefix}_{question}",
         question,
         text,
-        tuple(entry.arguments(c, wish)),
-        entry.iterations,
+        arguments,
+        entry.steps,
         body.operations,
-        {name: WHY[name] for name in codes},
+        {name: WHY[name] for name in body.statuses},
     )
 
 

@@ -18,6 +18,9 @@ from .exported import Exported, Function
 from .reference import Reference
 
 COUNT = 40
+SIZES = {"force": 20.0, "moment": 0.5, "point": 0.05, "kp": 400.0, "kd": 40.0, "period": 1e-3}
+SIZES |= {"resolution": 1e-5, "smoothing": 0.9, "stiffness": 100.0, "damping": 10.0}
+SIGNED = ("force", "moment", "point", "direction")
 WIDTH = 0.1  # of states about home, in characteristic lengths and radians, halved until most reach
 
 
@@ -106,13 +109,14 @@ class Samples:
             return known[name].copy()
         if name in ("s", "s1", "s2"):
             return self._prescribed(name, f)
-        if name == "joint":
-            return self._joints()
-        if name == "start":
+        if name.startswith("joint") and "rate" not in name:
+            return self._joints() * (0.98 if name == "joint_before" else 1.0)
+        if name == "pose_before":  # where `joint` is, but for the last period's way
+            return 0.98 * self._near()["pose"]
+        if name in ("start", "pose_rate_before", "memory_before"):
             return np.zeros(shape)
-        sizes = {"force": 20.0, "moment": 0.5, "point": 0.05, "kp": 400.0, "kd": 40.0}
-        low = 0.0 if name in ("kp", "kd") else -1.0
-        return rng.uniform(low, 1.0, shape) * sizes.get(name, 1.0)
+        low = -1.0 if name in SIGNED or "rate" in name else 0.0
+        return rng.uniform(low, 1.0, shape) * SIZES.get(name, 1.0)
 
     def _prescribed(self, name: str, f: Function) -> np.ndarray:
         quantity = {"s": "pose", "s1": "pose_rate", "s2": "pose_acceleration"}[name]
@@ -123,12 +127,15 @@ class Samples:
         order = ["X", "Y", "Z", "alpha", "beta", "gamma"]
         return self.pose[quantity][:, [order.index(label) for label in labels]].copy()
 
+    def _near(self) -> dict[str, np.ndarray]:
+        """Poses on the way to those of `q`."""
+        zero = np.zeros_like(self.q)
+        return self._reference("motion", {"q": 0.3 * self.q, "q1": zero, "q2": zero})[0]
+
     def _joints(self) -> np.ndarray:
         """Joint coordinates of poses half-way to home: Newton's reach."""
-        zero = np.zeros_like(self.q)
-        near = self._reference("motion", {"q": 0.3 * self.q, "q1": zero, "q2": zero})[0]
         structure = structure_of(self._mechanism)
         numbers = Layout.of(structure).numbers(self._mechanism)
         question = Question.about(specialised(structure, numbers), "encoders")
         kernel = NumpyKernel(question.variants(), numbers)
-        return kernel.run({"pose": near["pose"]}).values["joint"].T.copy()
+        return kernel.run({"pose": self._near()["pose"]}).values["joint"].T.copy()

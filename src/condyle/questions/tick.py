@@ -35,6 +35,7 @@ def tick(
     choices: Sequence[tuple[str, Any]] = (),
     velocity: str | None = None,
     apart: bool = False,
+    borne: bool = False,
 ) -> Variants:
     """Efforts that a law asks for at what is measured, and what lasts until the next tick.
 
@@ -46,8 +47,9 @@ def tick(
           velocity: how the `observer` comes to rates, None without sensors.
           apart: efforts of the inverse dynamics are a port, `given`; `REQUEST`: q, q', q'' and
           force and point of the load that they are to balance, (3 m + 6,).
+          borne: efforts bear a known load besides, ports borne_force, borne_moment, borne_point.
     """
-    write = partial(_program, structure, law, choices, velocity, apart)
+    write = partial(_program, structure, law, choices, velocity, apart, borne)
     if apart or law == FUNCTION:
         return Variants(write(False, False), single=True)
     return in_variants(structure, write)
@@ -65,6 +67,7 @@ def _program(
     choices: Sequence[tuple[str, Any]],
     velocity: str | None,
     apart: bool,
+    borne: bool,
     robust: bool,
     low_latency: bool,
 ) -> Program:
@@ -76,12 +79,22 @@ def _program(
     joint, rate = (b.lane_sample(name) for name in AIMS[3:5])
     aim = Aim(q, q1, q2, joint, rate, b.sample(AIMS[5], 1, "N"))
 
+    known = (
+        Wrench(*(b.sample(f"borne_{x}", 3) for x in ("force", "moment", "point")))
+        if borne
+        else None
+    )
+
     def solve(q: ca.SX, q1: ca.SX, q2: ca.SX, load: Wrench) -> Lanes:
         if apart:
             b.output(REQUEST, ca.vertcat(q, q1, q2, load.force, load.point), "", 3 * m + 6)
             return b.lane_sample("given", unit="N m or N")
         q, q1, q2 = (b.cut(part) for part in (q, q1, q2))
-        return efforts(b, placed(b, q, q1, q2), load, robust, low_latency)
+        platform = placed(b, q, q1, q2)
+        if known is not None:
+            both = load.about_centre(platform.R) + known.about_centre(platform.R)
+            load = Wrench(both[:3], both[3:], ca.SX.zeros(3))
+        return efforts(b, platform, load, robust, low_latency)
 
     now = Seen(seen.q, seen.q1, seen.joint, seen.joint_rate, force)
     if law == FUNCTION:

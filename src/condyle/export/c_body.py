@@ -6,16 +6,50 @@ Both are straight lines of the backend, with arrays of their own for what goes i
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import cached_property
 
 from ..backends.c.printer import nested, number
 from ..backends.c.straight_line import Straight
 from ..graph.graph import Value
-from ..graph.program import Output, Program
-from .places import Places
+from ..graph.program import Interface, Output, Program
 
 HUGE = {"double": 1e300, "float": 1e37}  # numbers of a program are kept within
+
+
+@dataclass(frozen=True)
+class Places:
+    """Arrays in the order of the mechanism file; a program's lanes stand family by family.
+
+    columns: C for each input of the program.
+    names:   result -> its array in C; what is not there is not wanted.
+    order:   where each lane of the program stands in the mechanism file.
+    """
+
+    columns: tuple[str, ...]
+    names: Mapping[str, str]
+    order: tuple[int, ...]
+
+    @staticmethod
+    def of(
+        interface: Interface,
+        order: tuple[int, ...],
+        place: Callable[[str, int], str],
+        results: Mapping[str, str],
+    ) -> Places:
+        """Args: place: (port, entry) -> C;  results: names there -> arrays in C."""
+        columns = []
+        for port in interface.ports:
+            where = [(i, k) for i in range(port.size) for k in (order if port.lanes else (0,))]
+            stride = interface.lanes if port.lanes else 1
+            columns += [place(port.name, i * stride + k) for i, k in where]
+        return Places(tuple(columns), results, order)
+
+    def result(self, name: str, entry: int, lane: int | None) -> str:
+        """C for one number of a result, of a lane if it has lanes."""
+        at = entry if lane is None else entry * len(self.order) + self.order[lane]
+        return f"{self.names[name]}[{at}]"
 
 
 class _Body(Straight):
@@ -100,6 +134,18 @@ class Scalar(_Body):
 
     def bundles(self) -> list[list[Value]]:
         return []
+
+    @property
+    def operations(self) -> int:
+        """Floating-point operations; a fused multiply-add counts one, sine with cosine too."""
+        total = 0
+        for v in self.varying:
+            node = self.g.nodes[v]
+            if node.op in ("sum", "least"):
+                total += sum(self.counts[g] for g, _ in self.lane_terms(v)) - 1
+            elif node.op not in ("input", "lane_input", "neg"):
+                total += 1 if node.group is None else self.counts[node.group]
+        return total
 
     def reduction(self, v: Value) -> str:
         lanes = self._lane_names(v)
