@@ -49,14 +49,14 @@ def drawing_points(chain: Any, joint: np.ndarray, M: np.ndarray) -> ChainDrawing
 
 def _rss(chain: Any, joint: np.ndarray, M: np.ndarray) -> ChainDrawing:
     c = FAMILIES["RSS"].constants(chain)
-    x, y, z = c["C"].T
+    G, (x, y, z) = np.asarray(c["G"]), np.asarray(c["C"]).T
     crank = np.cos(joint)[:, None] * x + np.sin(joint)[:, None] * y
     shaft = 0.25 * c["l"] * z
     points = {
-        "G": c["G"],
-        "shaft_start": c["G"] - shaft,
-        "shaft_end": c["G"] + shaft,
-        "S": c["G"] + c["l"] * crank,
+        "G": G,
+        "shaft_start": G - shaft,
+        "shaft_end": G + shaft,
+        "S": G + c["l"] * crank,
         "M": M,
     }
     rods = (
