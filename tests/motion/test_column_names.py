@@ -10,7 +10,7 @@ import pytest
 from condyle.errors import InputError
 from condyle.motion import Load, Motion, read_table, write_table
 from condyle.motion.column_names import read_header
-from condyle.motion.column_units import dimension, unit_factor
+from condyle.motion.column_units import Units, dimension, parse_units, unit_factor
 
 KNOWN = ("t", "X", "Y", "alpha", "x", "y", "z", "dX", "ddX", "dalpha", "Fx", "Mx")
 
@@ -144,3 +144,40 @@ def test_what_is_not_a_parquet_table_is_refused(tmp_path):
     write_table(path, {"t": np.zeros(0)})
     with pytest.raises(InputError, match="no rows"):
         read_table(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "length", "angle"),
+    [
+        ("m,rad", 1, 1),
+        ("mm,deg", 1e-3, math.pi / 180),
+        (" deg , cm ", 1e-2, math.pi / 180),
+        ("mm", 1e-3, 1),
+        ("deg", 1, math.pi / 180),
+    ],
+)
+def test_units_are_read_in_either_order(text, length, angle):
+    assert parse_units(text) == Units(length, angle)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("mm,degs", '"degs" is not a unit. Did you mean "deg"'),
+        ("mm,cm", "two units of length"),
+        ("deg,rad", "two units of angle"),
+        ("", '"" is not a unit'),
+    ],
+)
+def test_other_units_are_refused(text, message):
+    with pytest.raises(InputError, match=message):
+        parse_units(text)
+
+
+def test_lengths_and_angles_scale_with_their_rates_and_all_else_stays():
+    units = Units(2.0, 3.0)
+    lengths = ["X", "Y", "Z", "x", "y", "z", "dX", "ddZ", "dx"]
+    angles = ["alpha", "beta", "gamma", "dalpha", "ddgamma"]
+    assert {units.scale(name) for name in lengths} == {2.0}
+    assert {units.scale(name) for name in angles} == {3.0}
+    assert {units.scale(name) for name in ["t", "Fx", "Mz"]} == {1.0}

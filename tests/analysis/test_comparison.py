@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import gc
+
 import numpy as np
 import pytest
 
 import condyle
 from condyle.analysis.comparison import Comparison, compare, relative_difference
+from condyle.analysis.runs import TimedModel, without_collection
 from condyle.dynamics import FORMULATIONS, ROUTES
 from condyle.mechanism import Mechanism
 from condyle.mechanism.home import independent_coordinates
@@ -126,3 +129,27 @@ def test_relative_difference() -> None:
     assert relative_difference(a, hole) == 0.0
     assert relative_difference(np.zeros((2, 0)), np.zeros((2, 0))) == 0.0
     assert relative_difference(np.zeros((2, 2)), np.zeros((2, 2))) == 0.0
+
+
+def test_no_garbage_is_collected_while_a_model_is_derived() -> None:
+    """A collection would be one model's seconds for what all models have left."""
+    runs: list[str] = []
+    gc.callbacks.append(lambda phase, info: runs.append(phase))
+    before = gc.get_threshold()
+    gc.set_threshold(10)
+    try:
+        mechanism = condyle.load("masticatory")
+        TimedModel(mechanism, "momentum", "core")
+        runs.clear()
+        TimedModel(mechanism, "lagrange", "core")
+        assert len(runs) <= 4  # between the derivation and this line
+    finally:
+        gc.set_threshold(*before)
+        gc.callbacks.pop()
+
+
+def test_collection_goes_on_after_an_error() -> None:
+    with pytest.raises(ValueError, match="wrong"), without_collection():
+        assert not gc.isenabled()
+        raise ValueError("wrong")
+    assert gc.isenabled()
