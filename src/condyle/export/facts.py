@@ -7,6 +7,8 @@ import re
 import shutil
 import subprocess
 import tempfile
+from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -36,15 +38,22 @@ class Facts:
 
 def write_facts(exported: Exported, folder: Path) -> Facts:
     """Measure and write FACTS.md."""
-    measured, how = _measured(exported, folder.resolve())
     rows = {
-        f.name: {
-            "operations": f.operations,
-            "iterations": f.iterations,
-            **measured.get(f.name, NOTHING),
-        }
+        f.name: {"operations": f.operations, "iterations": f.iterations, **NOTHING}
         for f in exported.functions
     }
+    how = ""
+    with (
+        tempfile.TemporaryDirectory(prefix="condyle-facts-") as place,
+        suppress(CompilerError, OSError, subprocess.SubprocessError),
+    ):
+        command = list(find_compiler().command)
+        found = _sizes(exported, command, folder.resolve(), Path(place))
+        errors = _errors(exported, command, folder.resolve(), Path(place))
+        version = _run([*command, "--version"], folder).splitlines()[0]
+        how = f"{version}, {' '.join(FLAGS)}, {platform.machine()}"
+        for name, row in rows.items():
+            row |= found.get(name, {}) | errors.get(name, {})
     path = folder / "FACTS.md"
     write_text(path, _page(exported, rows, how))
     warnings = [
@@ -56,55 +65,40 @@ def write_facts(exported: Exported, folder: Path) -> Facts:
     return Facts(path, {"functions": rows, "measured_by": how}, warnings)
 
 
-def _measured(e: Exported, folder: Path) -> tuple[dict[str, dict[str, Any]], str]:
-    """Bytes of code and stack, and the worst error, by function; and by what."""
-    try:
-        command = list(find_compiler().command)
-    except CompilerError:
-        return {}, ""
-    with tempfile.TemporaryDirectory(prefix="condyle-facts-") as place:
-        try:
-            code = _code(e, command, folder, Path(place))
-            errors = _errors(e, command, folder, Path(place))
-        except (OSError, subprocess.SubprocessError):
-            return {}, ""
-    version = _run([*command, "--version"], folder).splitlines()[0]
-    how = f"{version}, {' '.join(FLAGS)}, {platform.machine()}"
-    found = {f.name: dict(NOTHING) for f in e.functions}
-    for name in found:
-        found[name] |= code.get(name, {}) | errors.get(name, {})
-    return found, how
-
-
-def _code(e: Exported, command: list[str], folder: Path, place: Path) -> dict[str, dict[str, Any]]:
+def _sizes(
+    e: Exported, command: list[str], folder: Path, place: Path
+) -> dict[str, dict[str, int | None]]:
     """Bytes of machine code and of stack of each function, with those that it alone calls."""
-    source = folder / f"{e.prefix}.c"
-    call = [*command, *FLAGS, "-c", str(source), "-o", str(place / "code.o")]
+    call = [*command, *FLAGS, "-c", str(folder / f"{e.prefix}.c"), "-o", str(place / "code.o")]
     try:
         _run([*call, "-fstack-usage"], place)
     except subprocess.SubprocessError:
         _run(call, place)
-    sizes: dict[str, int] = {}
+    sizes, stacks = Counter[str](), dict[str, int]()
     if shutil.which("nm"):
         for line in _run(["nm", "-S", "-t", "d", str(place / "code.o")], place).splitlines():
             parts = line.split()
             if len(parts) == 4 and parts[2] in "tT":
-                name = parts[3].partition(".")[0]  # GCC names parts and copies after it
-                sizes[name] = sizes.get(name, 0) + int(parts[1])
-    stacks: dict[str, int] = {}
+                sizes[parts[3].partition(".")[0]] += int(parts[1])  # GCC names parts after it
     for usage in place.glob("*.su"):
         for line in usage.read_text(encoding="utf-8").splitlines():
             where, size, *_ = line.split("\t")
             stacks[where.rpartition(":")[2].partition(".")[0]] = int(size)
     calls = _calls(e.source, {*sizes, *stacks})
-    found: dict[str, dict[str, Any]] = {}
-    for f in e.functions:
-        inner = _reached(calls, f.name)
-        found[f.name] = {
-            "code": sum(sizes.get(n, 0) for n in inner) if sizes else None,
-            "stack": _deepest(calls, stacks, f.name) if stacks else None,
+
+    def reached(name: str) -> set[str]:
+        return {name}.union(*map(reached, calls.get(name, ())))
+
+    def deepest(name: str) -> int:
+        return stacks.get(name, 0) + max(map(deepest, calls.get(name, ())), default=0)
+
+    return {
+        f.name: {
+            "code": sum(sizes[n] for n in reached(f.name)) if sizes else None,
+            "stack": deepest(f.name) if stacks else None,
         }
-    return found
+        for f in e.functions
+    }
 
 
 def _calls(source: str, names: set[str]) -> dict[str, set[str]]:
@@ -120,21 +114,9 @@ def _calls(source: str, names: set[str]) -> dict[str, set[str]]:
     return found
 
 
-def _reached(calls: dict[str, set[str]], name: str) -> set[str]:
-    found = {name}
-    for inner in calls.get(name, set()):
-        found |= _reached(calls, inner)
-    return found
-
-
-def _deepest(calls: dict[str, set[str]], stacks: dict[str, int], name: str) -> int:
-    inner = (_deepest(calls, stacks, n) for n in calls.get(name, set()))
-    return stacks.get(name, 0) + max(inner, default=0)
-
-
 def _errors(
     e: Exported, command: list[str], folder: Path, place: Path
-) -> dict[str, dict[str, Any]]:
+) -> dict[str, dict[str, float]]:
     """The worst error over the recorded samples."""
     program = place / "checker"
     sources = [str(folder / "check.c"), str(folder / f"{e.prefix}.c")]
@@ -147,16 +129,8 @@ def _errors(
 
 
 def _run(call: list[str], place: Path) -> str:
-    done = subprocess.run(
-        call,
-        capture_output=True,
-        text=True,
-        errors="replace",
-        timeout=SECONDS,
-        cwd=place,
-        check=True,
-    )
-    return done.stdout
+    done = subprocess.run(call, capture_output=True, timeout=SECONDS, cwd=place, check=True)
+    return done.stdout.decode(errors="replace")
 
 
 def _page(e: Exported, rows: dict[str, dict[str, Any]], how: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from ..version import __version__
+from .. import __version__
 from .fmu_model import Fmu, Scalar
 
 # Powers of kg, m, s, rad in units of ours.
@@ -16,50 +16,46 @@ BASE = {
     "N": {"kg": 1, "m": 1, "s": -2},
     "s": {"s": 1},
 }
-HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
+STEP = {"canHandleVariableCommunicationStepSize": "true"}
 
 
 def description(fmu: Fmu, version: int) -> str:
     """The XML of an FMU."""
     three = version == 3
-    token = {"instantiationToken" if three else "guid": fmu.token}
-    root = Element(
-        "fmiModelDescription",
-        {
-            "fmiVersion": "3.0" if three else "2.0",
-            "modelName": fmu.name,
-            **token,
-            "description": fmu.text,
-            "generationTool": f"condyle {__version__}",
-            "variableNamingConvention": "structured",
-            **({} if three else {"numberOfEventIndicators": "0"}),
-        },
-    )
-    state = "State" if three else "state"
-    abilities = {
-        "modelIdentifier": fmu.name,
-        f"canGetAndSetFMU{state}": "true",
-        f"canSerializeFMU{state}": "true",
+    about = {
+        "fmiVersion": f"{version}.0",
+        "modelName": fmu.name,
+        "instantiationToken" if three else "guid": fmu.token,
+        "description": fmu.text,
+        "generationTool": f"condyle {__version__}",
+        "variableNamingConvention": "structured",
+        **({} if three else {"numberOfEventIndicators": "0"}),
     }
-    step = {"canHandleVariableCommunicationStepSize": "true"}
-    exchange = SubElement(root, "ModelExchange", abilities)
-    together = SubElement(root, "CoSimulation", abilities | step)
-    if not three:
-        for one in (exchange, together):
-            files = SubElement(one, "SourceFiles")
-            SubElement(files, "File", {"name": "fmu.c"})
+    root = Element("fmiModelDescription", about)
+    state = "State" if three else "state"
+    able = {"modelIdentifier": fmu.name}
+    able |= {f"can{what}FMU{state}": "true" for what in ("GetAndSet", "Serialize")}
+    for kind, more in (("ModelExchange", {}), ("CoSimulation", STEP)):
+        interface = SubElement(root, kind, able | more)
+        if not three:
+            SubElement(SubElement(interface, "SourceFiles"), "File", {"name": "fmu.c"})
     units = SubElement(root, "UnitDefinitions")
     for name in sorted({v.unit for v in fmu.variables} | {"s"}):
-        unit = SubElement(units, "Unit", {"name": name})
         powers = {base: str(n) for base, n in exponents(name).items() if n}
-        SubElement(unit, "BaseUnit", powers)
+        SubElement(SubElement(units, "Unit", {"name": name}), "BaseUnit", powers)
     SubElement(root, "DefaultExperiment", {"startTime": "0", "stopTime": "1", "stepSize": "0.001"})
     variables = SubElement(root, "ModelVariables")
-    (_three if three else _two)(variables, fmu)
-    structure = SubElement(root, "ModelStructure")
-    (_structure_3 if three else _structure_2)(structure, fmu)
-    indent(root)
-    return HEAD + tostring(root, encoding="unicode") + "\n"
+    time = {"name": "time", "valueReference": str(len(fmu.variables)), "causality": "independent"}
+    for said, quantity in (
+        *((_said(v), _quantity(v, three)) for v in fmu.variables),
+        (time | {"variability": "continuous"}, {"unit": "s"}),
+    ):
+        if three:
+            SubElement(variables, "Float64", said | quantity)
+        else:
+            SubElement(SubElement(variables, "ScalarVariable", said), "Real", quantity)
+    _structure(SubElement(root, "ModelStructure"), fmu, three)
+    return _text(root)
 
 
 def build_description(fmu: Fmu) -> str:
@@ -68,8 +64,7 @@ def build_description(fmu: Fmu) -> str:
     build = SubElement(root, "BuildConfiguration", {"modelIdentifier": fmu.name})
     files = SubElement(build, "SourceFileSet", {"language": "C99"})
     SubElement(files, "SourceFile", {"name": "fmu.c"})
-    indent(root)
-    return HEAD + tostring(root, encoding="unicode") + "\n"
+    return _text(root)
 
 
 def exponents(unit: str) -> dict[str, int]:
@@ -86,62 +81,39 @@ def exponents(unit: str) -> dict[str, int]:
     return found
 
 
-def _kind(v: Scalar) -> dict[str, str]:
-    causality = {"input": "input", "parameter": "parameter"}.get(v.role, "output")
-    said = {"causality": causality}
+def _said(v: Scalar) -> dict[str, str]:
+    said = {"name": v.name, "valueReference": str(v.index), "description": v.text}
+    said["causality"] = v.role if v.role in ("input", "parameter") else "output"
     said["variability"] = "tunable" if v.role == "parameter" else "continuous"
-    if v.role in ("state", "parameter"):
-        said["initial"] = "exact"
-    elif v.role != "input":
-        said["initial"] = "calculated"
+    if v.role != "input":
+        said["initial"] = "exact" if v.role in ("state", "parameter") else "calculated"
     return said
 
 
-def _named(v: Scalar) -> dict[str, str]:
-    return {"name": v.name, "valueReference": str(v.index), "description": v.text}
+def _quantity(v: Scalar, three: bool) -> dict[str, str]:
+    """Versions count variables from 0 and from 1."""
+    of = {} if v.of is None else {"derivative": str(v.of + (not three))}
+    return {"unit": v.unit} | of | ({} if v.start is None else {"start": repr(v.start)})
 
 
-def _start(v: Scalar) -> dict[str, str]:
-    return {} if v.start is None else {"start": repr(v.start)}
-
-
-def _two(parent: Element, fmu: Fmu) -> None:
-    for v in fmu.variables:
-        scalar = SubElement(parent, "ScalarVariable", _named(v) | _kind(v))
-        of = {} if v.of is None else {"derivative": str(v.of + 1)}
-        SubElement(scalar, "Real", {"unit": v.unit} | of | _start(v))
-    time = {"name": "time", "valueReference": str(len(fmu.variables)), "causality": "independent"}
-    scalar = SubElement(parent, "ScalarVariable", time | {"variability": "continuous"})
-    SubElement(scalar, "Real", {"unit": "s"})
-
-
-def _three(parent: Element, fmu: Fmu) -> None:
-    for v in fmu.variables:
-        of = {} if v.of is None else {"derivative": str(v.of)}
-        SubElement(parent, "Float64", _named(v) | _kind(v) | {"unit": v.unit} | of | _start(v))
-    time = {"name": "time", "valueReference": str(len(fmu.variables)), "causality": "independent"}
-    SubElement(parent, "Float64", time | {"variability": "continuous", "unit": "s"})
-
-
-def _structure_2(parent: Element, fmu: Fmu) -> None:
+def _structure(parent: Element, fmu: Fmu, three: bool) -> None:
     outputs = [v for v in fmu.variables if v.role not in ("input", "parameter")]
     rates = [v for v in outputs if v.role == "rate"]
     unknown = [v for v in outputs if v.role != "state"]
-    for tag, found in (("Outputs", outputs), ("Derivatives", rates), ("InitialUnknowns", unknown)):
-        if found:
-            listed = SubElement(parent, tag)
+    for tag, state, found in (
+        ("Output", "", outputs),
+        ("Derivative", "ContinuousState", rates),
+        ("InitialUnknown", "", unknown),
+    ):
+        if three:
+            for v in found:
+                SubElement(parent, f"{state}{tag}", {"valueReference": str(v.index)})
+        elif found:
+            listed = SubElement(parent, f"{tag}s")
             for v in found:
                 SubElement(listed, "Unknown", {"index": str(v.index + 1)})
 
 
-def _structure_3(parent: Element, fmu: Fmu) -> None:
-    outputs = [v for v in fmu.variables if v.role not in ("input", "parameter")]
-    rates = [v for v in outputs if v.role == "rate"]
-    unknown = [v for v in outputs if v.role != "state"]
-    for tag, found in (
-        ("Output", outputs),
-        ("ContinuousStateDerivative", rates),
-        ("InitialUnknown", unknown),
-    ):
-        for v in found:
-            SubElement(parent, tag, {"valueReference": str(v.index)})
+def _text(root: Element) -> str:
+    indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, encoding="unicode") + "\n"

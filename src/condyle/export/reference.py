@@ -96,11 +96,6 @@ def _forward(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
     return results, found.status
 
 
-def _motion(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
-    poses, reached = r.model.poses.whole(given["q"], given["q1"], given["q2"])
-    return poses, np.where(reached, Status.ok, Status.unreachable)
-
-
 def _closure(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
     closure = Closure(
         r.model.mechanism, r.wish.coordinates, r.wish.landmark, backend=r.model.backend
@@ -123,7 +118,6 @@ _ANSWERS: dict[str, Callable[[Reference, Given], tuple[Arrays, np.ndarray]]] = {
     "contact": _inverse,
     "bounded": _bounded,
     "forward": _forward,
-    "motion": _motion,
     "closure": _closure,
     "pose": _pose,
 }
