@@ -1,17 +1,12 @@
-"""Inverse dynamics by MuJoCo: mj_inverse on the cut-open tree, projected on the constraints.
-
-The same cut as in pinocchio_engine.py, but rod positions are measured along N_i0, and the loops
-are closed by point Jacobians and mj_jacDot.
-"""
+"""The cut-open tree in MuJoCo: mj_inverse, mj_crb, and mj_jacDot for the loops."""
 
 from __future__ import annotations
 
 import mujoco
 import numpy as np
 
-from .closure import contact_normals, distribute
-from .description import Chain, Description, Raw, Rod, joint, read, rod_angles
-from .rotations import platform_motion
+from .cut_tree import CutTree
+from .description import Chain, Description, Raw, Rod
 
 Array = np.ndarray
 TINY = 1e-14  # MuJoCo refuses massless bodies
@@ -81,11 +76,12 @@ def mjcf(d: Description) -> str:
       </worldbody></mujoco>"""
 
 
-class MujocoEngine:
-    """The tree of one mechanism; one call, one sample."""
+class MujocoEngine(CutTree):
+    along_rod = True
 
     def __init__(self, description: Raw | Description) -> None:
-        self.d = d = read(description)
+        super().__init__(description)
+        d = self.d
         self.model = mujoco.MjModel.from_xml_string(mjcf(d))
         self.data = mujoco.MjData(self.model)
         self.drives, at = [], 6
@@ -110,69 +106,36 @@ class MujocoEngine:
         mujoco.mj_jacDot(self.model, self.data, J, None, point, body)
         return J
 
-    def coordinates(self, pose: Array) -> Array:
-        motion = platform_motion(pose)
-        parts: list[Array | list[float]] = [pose]
-        for chain in self.d.chains:
-            P = motion.point(chain.M)[0]
-            travel, S = joint(chain, P)
-            angles = rod_angles(chain, P - S)
-            if chain.kind == "SPS":
-                parts.append([*angles, travel])
-            else:
-                parts.append([travel, *(chain.N0.T @ (S - chain.S)), *angles])
-        return np.concatenate(parts)
+    def place(self, q: Array) -> Array:
+        self.data.qpos[:] = q
+        mujoco.mj_kinematics(self.model, self.data)
+        mujoco.mj_comPos(self.model, self.data)
+        sites = self.data.site_xpos
+        return np.array([sites[a] - sites[b] for a, b in self.closed])
 
-    def inverse_dynamics(
-        self,
-        pose: Array,
-        pose_rate: Array,
-        pose_acceleration: Array,
-        wrench: Array,
-        load_point: str | Array | None = "right_molar",
-    ) -> dict[str, Array]:
-        """As PinocchioEngine.inverse_dynamics, without the angles of the rods."""
-        model, data = self.model, self.data
-        data.qpos[:] = self.coordinates(np.asarray(pose, float))
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        gaps = [data.site_xpos[a] - data.site_xpos[b] for a, b in self.closed]
-        if not np.abs(gaps).max() < 1e-12 * max(1, self.d.size):
-            raise ValueError("the pose is out of reach")
-        closed = np.vstack([self._jacobian(a) - self._jacobian(b) for a, b in self.closed])
-        K = -np.linalg.solve(closed[:, 6:], closed[:, :6])
-        data.qvel[:] = v = np.concatenate([pose_rate, K @ pose_rate])
-        mujoco.mj_comVel(model, data)
-        rates = [self._jacobian_rate(a) - self._jacobian_rate(b) for a, b in self.closed]
-        chains = K @ pose_acceleration - np.linalg.solve(closed[:, 6:], np.vstack(rates) @ v)
-        data.qacc[:] = a = np.concatenate([pose_acceleration, chains])
-        mujoco.mj_inverse(model, data)
-        forces = data.qfrc_inverse
-        linear, turning = np.zeros((2, 3, model.nv))
-        body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "platform")
-        point = data.xpos[body] + data.xmat[body].reshape(3, 3) @ self.d.load_point(load_point)
-        mujoco.mj_jac(model, data, linear, turning, point, body)
-        load = linear.T @ wrench[:3] + turning.T @ wrench[3:]
-        Q = forces[:6] + K.T @ forces[6:] - load[:6]
-        J = K[[drive - 6 for drive in self.drives]]
+    def loops(self) -> Array:
+        return np.vstack([self._jacobian(a) - self._jacobian(b) for a, b in self.closed])
+
+    def points(self) -> Array:
         sites = [self._site(f"contact {i}") for i in range(len(self.d.contacts))]
-        normals = contact_normals(self.d, platform_motion(np.asarray(pose, float)))
-        N = np.array([n @ self._jacobian(s)[:, :6] for n, s in zip(normals, sites, strict=True)])
-        N = N.reshape(-1, 6)
-        tau, contact = distribute(Q, J, N, self.d.size)
-        motion = {"joint": data.qpos, "joint_rate": v, "joint_acceleration": a}
-        named = {name: x[self.drives].copy() for name, x in motion.items()}
-        return {"tau": tau, "contact": contact, "Q": Q, "J_theta": J, "C_normal": N} | named
+        return np.array([self._jacobian(s)[:, :6] for s in sites]).reshape(-1, 3, 6)
 
+    def drift(self, q: Array, v: Array) -> Array:
+        self.data.qvel[:] = v
+        mujoco.mj_comVel(self.model, self.data)
+        rates = [self._jacobian_rate(a) - self._jacobian_rate(b) for a, b in self.closed]
+        return np.vstack(rates) @ v
 
-def inverse_dynamics(
-    description: Raw | Description,
-    pose: Array,
-    pose_rate: Array,
-    pose_acceleration: Array,
-    wrench: Array,
-    load_point: str | Array | None = "right_molar",
-) -> dict[str, Array]:
-    """One sample; see MujocoEngine.inverse_dynamics."""
-    engine = MujocoEngine(description)
-    return engine.inverse_dynamics(pose, pose_rate, pose_acceleration, wrench, load_point)
+    def inverse(self, q: Array, v: Array, a: Array) -> Array:
+        self.data.qvel[:], self.data.qacc[:] = v, a
+        mujoco.mj_inverse(self.model, self.data)
+        return self.data.qfrc_inverse.copy()
+
+    def matrices(self, q: Array, v: Array) -> tuple[Array, Array]:
+        model, data = self.model, self.data
+        mujoco.mj_crb(model, data)
+        M, h = np.zeros((model.nv, model.nv)), np.zeros(model.nv)
+        for column, unit in zip(M, np.eye(model.nv), strict=True):
+            mujoco.mj_mulM(model, data, column, unit)
+        mujoco.mj_rne(model, data, 0, h)
+        return M, h

@@ -215,12 +215,7 @@ def inverse_dynamics(
     """
     d = read(description)
     motion = platform_motion(*(np.asarray(x, float) for x in (pose, pose_rate, pose_acceleration)))
-    bodies = [_platform(d, motion, wrench, load_point)]
-    joints: list[Array] = []
-    links: list[Link] = []
-    for chain in d.chains:
-        more, joined, x = _chain(chain, Path(*motion.point(chain.M)), d.gravity)
-        bodies, links, joints = bodies + more, links + joined, [*joints, x]
+    bodies, links, joints = cut_free(d, motion, wrench, load_point)
     for contact, n in zip(d.contacts, contact_normals(d, motion), strict=True):
         point = motion.point(contact.point)[0]
         links.append(Link(contact.name, "platform", "base", point, force=n[:, None]))
@@ -235,7 +230,7 @@ def inverse_dynamics(
     gap = np.abs(A @ x + A_tau @ tau - b).max() / max(np.abs(b).max(), np.abs(x).max(initial=0.0))
     forces = _named(reactions, x)
     pushes = np.array([forces[c.name][0] for c in d.contacts]).reshape(-1, 3)
-    position, rate, second = np.array(joints).T
+    position, rate, second = joints
     return {
         "tau": tau,
         "contact": np.sum(pushes * contact_normals(d, motion), axis=1),
@@ -245,6 +240,17 @@ def inverse_dynamics(
         "reactions": forces,
         "residual": float(gap),
     }
+
+
+def cut_free(
+    d: Description, motion: Motion, wrench: Array, where: str | Array | None
+) -> tuple[list[Body], list[Link], Array]:
+    """Platform and chains: bodies, links, and joint coordinates, rates, accelerations, (3, n)."""
+    bodies, links, joints = [_platform(d, motion, wrench, where)], [], []
+    for chain in d.chains:
+        more, joined, x = _chain(chain, Path(*motion.point(chain.M)), d.gravity)
+        bodies, links, joints = bodies + more, links + joined, [*joints, x]
+    return bodies, links, np.array(joints).T
 
 
 def _platform(d: Description, motion: Motion, wrench: Array, where: str | Array | None) -> Body:

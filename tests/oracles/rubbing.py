@@ -48,9 +48,12 @@ class Balance:
         return [i for i, u in enumerate(self.drag) if np.any(u)]
 
     def patterns(self) -> list[tuple[int, ...]]:
-        rubs = self.rubbing()
-        choices = [(1, -1) if i in rubs else (0,) for i in range(len(self.drag))]
-        return list(product(*choices))
+        return patterns(self.drag)
+
+
+def patterns(drag: Array) -> list[tuple[int, ...]]:
+    """Signs of the contact forces, (k,) each; 0 where nothing rubs."""
+    return list(product(*((1, -1) if np.any(u) else (0,) for u in drag)))
 
 
 def losses(raw: Raw, rate: Array, acceleration: Array) -> Array:
@@ -89,11 +92,7 @@ def balance(
     """The equations of one sample; wrench: force and moment on the platform at `where`."""
     d = read(raw)
     motion = platform_motion(pose, rate, second)
-    bodies = [ne._platform(d, motion, wrench, where)]
-    links, joints = [], []
-    for chain in d.chains:
-        more, joined, x = ne._chain(chain, ne.Path(*motion.point(chain.M)), d.gravity)
-        bodies, links, joints = bodies + more, links + joined, [*joints, x]
+    bodies, links, (_, x1, x2) = ne.cut_free(d, motion, wrench, where)
     touch, slip, drag = touching(d, raw, pose, rate)
     pushes, rubs = [], []
     normals = contact_normals(d, motion)
@@ -107,6 +106,5 @@ def balance(
     b = np.concatenate([np.append(body.force, body.moment / d.size) for body in bodies])
     free = np.linalg.qr(A, mode="complete")[0][:, A.shape[1] :] if A.shape[1] else np.eye(len(b))
     C, N, T, b = (free.T @ part for part in (C, N, T, b))
-    _, x1, x2 = np.array(joints).T
     loss = losses(raw, x1, x2)
     return Balance(C, N, T, b + C @ loss, loss, touch, slip, drag)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from oracles.forward_tree import MujocoTree, PinocchioTree, forward_dynamics
+from oracles.forward_tree import forward_dynamics
+from oracles.mujoco_engine import MujocoEngine
+from oracles.pinocchio_engine import PinocchioEngine
 
 from .cases import BUNDLED, CASES, by_numpy, case, close, efforts, load_of, state
 
@@ -13,8 +15,8 @@ TOLERANCE = 1e-9
 @pytest.mark.parametrize("name", CASES)
 def test_tree_with_its_loops_closed(name: str) -> None:
     c, model = case(name), by_numpy(name)
-    engines = [PinocchioTree(c.raw)]
-    engines += [MujocoTree(c.raw)] if name in BUNDLED or "n8" in name else []
+    engines = [PinocchioEngine(c.raw)]
+    engines += [MujocoEngine(c.raw)] if name in BUNDLED or "n8" in name else []
     effort, load, s = efforts(c), load_of(c), c.states
     ours = model.forward(*state(c, model), effort, load, ("motion",))
     assert not ours.status.any()

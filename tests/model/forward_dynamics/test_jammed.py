@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from oracles.forward_tree import PinocchioTree, forward_dynamics
+from oracles.forward_tree import forward_dynamics
+from oracles.pinocchio_engine import PinocchioEngine
 from support.rubbing import drawn
 
 from condyle.errors import InputError
@@ -19,7 +20,7 @@ def test_patterns_are_those_of_the_tree(contacts: int, mu: float, seed: int) -> 
     c = drawn(seed, count=25, mu=mu, lossy=False, contacts=contacts)
     model, effort = Evaluator(c.mechanism, backend="numpy"), efforts(c)
     found = model.forward(*state(c, model), effort, load_of(c), ("motion",))
-    engine, s, counts = PinocchioTree(c.raw), c.states, []
+    engine, s, counts = PinocchioEngine(c.raw), c.states, []
     for i in range(len(effort)):
         given = s["pose"][i], s["pose_rate"][i], effort[i], s["wrench"][i], s["load_point"]
         patterns = forward_dynamics(engine, c.raw, *given)
