@@ -16,8 +16,8 @@ from condyle.backends.kernel import Answer
 from condyle.backends.threads import shared_out
 from condyle.errors import InputError
 from condyle.model.evaluator import Evaluator
-from condyle.results import states
-from condyle.results.states import solve_file
+from condyle.results import state_rows
+from condyle.results.inverse_rows import solve_file
 
 
 @pytest.fixture(scope="module", params=["masticatory", "masticatory-curved"])
@@ -144,7 +144,7 @@ def test_rows_of_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     model = Evaluator(c.mechanism, backend="compiled")
     texts = []
     for rows in (65536, 100, 33):
-        monkeypatch.setattr(states, "CHUNK_ROWS", rows)
+        monkeypatch.setattr(state_rows, "CHUNK_ROWS", rows)
         solve_file(model, path, tmp_path / "out.csv")
         texts.append((tmp_path / "out.csv").read_text())
     assert texts[1] == texts[0] and texts[2] == texts[0]

@@ -23,7 +23,7 @@ from condyle.motion import Motion, iter_table
 from condyle.progress import Advance, step, watched_by
 from condyle.report.figures import save_figures, save_solution_figures
 from condyle.report.page import write_report
-from condyle.results.states import solve_file
+from condyle.results.inverse_rows import solve_file
 
 pty = pytest.importorskip("pty", reason="terminals of this kind are on Unix only")
 PATIENCE = 60  # seconds for a picture that never comes
@@ -130,7 +130,7 @@ def test_a_bar_of_a_command(
                 terminal.wait_for("40%")
         return 10, [], None
 
-    monkeypatch.setattr("condyle.results.states.solve_file", solve)
+    monkeypatch.setattr("condyle.results.inverse_rows.solve_file", solve)
     on_terminal()
     words = ("solve", "masticatory", "--states", "a.csv", "--out", "b.csv")
     outcome = condyle_command(*words, *([switch] if switch else ()))
@@ -238,7 +238,7 @@ def test_building_a_kernel(
 
 
 def test_finding_poses(watcher: Watcher, tmp_path: Path) -> None:
-    from condyle.results.poses import pose_file
+    from condyle.results.pose_rows import pose_file
 
     mechanism = condyle.load("masticatory")
     joints = tmp_path / "joints.csv"

@@ -17,8 +17,8 @@ from support.children import PATIENCE, end, start, wait_for
 
 from condyle.errors import CondyleError
 from condyle.model.evaluator import Evaluator
-from condyle.results import states
-from condyle.results.states import solve_file
+from condyle.results import inverse_rows, state_rows
+from condyle.results.inverse_rows import solve_file
 
 NAME = "masticatory"
 CHUNK = 200
@@ -26,8 +26,8 @@ HEADER = ",".join(p + n for p in ("", "d", "dd") for n in ("X", "Y", "alpha", "b
 
 SOLVE = f"""
 import sys
-from condyle.results import states
-states.CHUNK_ROWS = {CHUNK}
+from condyle.results import inverse_rows, state_rows
+state_rows.CHUNK_ROWS = {CHUNK}
 from condyle.cli import main
 sys.argv = ["condyle", "solve", "{NAME}", *sys.argv[1:]]
 main()
@@ -41,7 +41,7 @@ def model() -> Evaluator:
 
 @pytest.fixture(autouse=True)
 def short_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(states, "CHUNK_ROWS", CHUNK)
+    monkeypatch.setattr(state_rows, "CHUNK_ROWS", CHUNK)
 
 
 def rows(count: int) -> list[str]:
@@ -88,7 +88,7 @@ def test_memory_does_not_grow(backend: str, tmp_path: Path) -> None:
 def test_as_in_one_piece(model: Evaluator, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write(tmp_path / "states.csv", 2 * CHUNK + 7)
     solve_file(model, path, tmp_path / "pieces.csv")
-    monkeypatch.setattr(states, "CHUNK_ROWS", 65536)
+    monkeypatch.setattr(state_rows, "CHUNK_ROWS", 65536)
     solve_file(model, path, tmp_path / "whole.csv")
     assert (tmp_path / "pieces.csv").read_bytes() == (tmp_path / "whole.csv").read_bytes()
     assert names(tmp_path) == ["pieces.csv", "states.csv", "whole.csv"]
@@ -142,7 +142,7 @@ def test_warnings_count_rows_of_the_file(model: Evaluator, tmp_path: Path) -> No
 def test_interrupted(
     model: Evaluator, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException
 ) -> None:
-    real, calls = states.solve_table, []
+    real, calls = inverse_rows.solve_table, []
 
     def stops(*arguments: Any) -> Any:
         calls.append(names(tmp_path))
@@ -150,7 +150,7 @@ def test_interrupted(
             raise error
         return real(*arguments)
 
-    monkeypatch.setattr(states, "solve_table", stops)
+    monkeypatch.setattr(inverse_rows, "solve_table", stops)
     path = write(tmp_path / "states.csv", 900)
     (tmp_path / "out.csv").write_text("old")
     with pytest.raises(type(error)):

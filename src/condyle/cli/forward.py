@@ -34,7 +34,7 @@ def forward(
     """
     import condyle
 
-    from ..results.forward import forward_file
+    from ..results.forward_rows import forward_file
 
     model = condyle.derive(condyle.load(mechanism), formulation, backend=backend)
     rows, warnings = forward_file(model, states, out, load_point, flag, threads)

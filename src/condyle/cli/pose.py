@@ -50,7 +50,7 @@ def pose(
     import condyle
 
     from ..errors import UnsupportedError
-    from ..results.poses import ModesReport, PoseReport, modes_file, pose_file
+    from ..results.pose_rows import ModesReport, PoseReport, modes_file, pose_file
 
     if every and flag:
         raise UnsupportedError("--all lists all poses of a row, be it none; leave out --flag")

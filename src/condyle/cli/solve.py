@@ -41,7 +41,7 @@ def solve(
     """
     import condyle
 
-    from ..results.states import solve_file
+    from ..results.inverse_rows import solve_file
 
     if mat and out.suffix.lower() == ".mat":
         raise InputError(f"--out {out}: --mat writes that file; give the table another name")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -25,7 +24,7 @@ from .contacts import AXES, BOUND_TOLERANCE, bound_margins, lift_off, lift_off_c
 from .failures import Failure, failures, status_columns
 from .matlab import dataset_variables, write_mat
 from .netcdf import write_netcdf
-from .variables import VARIABLES, WRENCH
+from .variables import VARIABLES, WRENCH, named_columns, variable_columns
 from .warnings import Notice
 
 __all__ = [
@@ -127,14 +126,10 @@ class Solution(xr.Dataset):
         status, cause and, where efforts were chosen within limits, shortfall, if a sample failed.
         """
         columns: dict[str, np.ndarray | list[str]] = {"t": self["time"].values}
+        labels = {str(name): along.values for name, along in self.coords.items()}
         for variable in VARIABLES:
             if variable.column is not None and variable.name in self:
-                if len(variable.dims) == 1:
-                    columns[variable.column] = self[variable.name].values
-                    continue
-                entries, values = self[variable.dims[1]].values, self[variable.name].values
-                values = np.linalg.norm(values, axis=-1) if variable.sizes else values
-                columns |= named_columns(variable.column, entries, values)
+                columns |= variable_columns(variable, self[variable.name].values, labels)
         for name in map(str, self.data_vars):
             if name.startswith("reaction_") or name == "contact_force_vector":
                 entries, values = self[self[name].dims[1]].values, self[name].values
@@ -148,10 +143,6 @@ class Solution(xr.Dataset):
             shortfall = self["shortfall"].values if "shortfall" in self else None
             columns |= status_columns(self.mechanism, status, cause, shortfall)
         return columns
-
-
-def named_columns(prefix: str, names: Iterable[str], values: np.ndarray) -> dict[str, np.ndarray]:
-    return {f"{prefix}{name}": values[:, i] for i, name in enumerate(names)}
 
 
 def open_solution(path: str | Path) -> Solution:

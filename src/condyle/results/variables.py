@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,6 +85,22 @@ class Variable:
         flags = self.flags if isinstance(self.flags, str) else self.flags(mechanism)
         named = {"flag_meanings": flags} if flags else {}
         return {"units": units, "long_name": self.meaning, **named}
+
+
+def variable_columns(
+    variable: Variable, values: np.ndarray, labels: Mapping[str, Iterable[str]]
+) -> dict[str, np.ndarray]:
+    """Columns of a variable that has some, by labels along its dimensions; sizes of vectors."""
+    assert variable.column is not None
+    if len(variable.dims) == 1:
+        return {variable.column: values}
+    values = np.linalg.norm(values, axis=-1) if variable.sizes else values
+    return named_columns(variable.column, labels[variable.dims[1]], values)
+
+
+def named_columns(prefix: str, names: Iterable[str], values: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns (N, entries) by their names."""
+    return {f"{prefix}{name}": values[:, i] for i, name in enumerate(names)}
 
 
 def _simulated(

@@ -11,7 +11,7 @@ from oracles.rotations import bryant
 import condyle
 from condyle.model.forward_kinematics import ForwardKinematics
 from condyle.motion import read_table, write_table
-from condyle.results.poses import modes_file, pose_file
+from condyle.results.pose_rows import modes_file, pose_file
 
 
 def test_modes_of_a_stewart_platform() -> None:
@@ -70,7 +70,14 @@ def test_modes_of_a_file(tmp_path: Path) -> None:
     pose_file(mechanism, tmp_path / "in.csv", tmp_path / "poses.csv", flag=True)
     table = read_table(tmp_path / "modes.csv")
     coordinates = ("X", "Y", "Z", "alpha", "beta", "gamma")
-    assert table.names == ("row", "mode", *coordinates, "distance", "residual", "condition")
+    assert tuple(table.columns) == (
+        "row",
+        "mode",
+        *coordinates,
+        "distance",
+        "residual",
+        "condition",
+    )
     counts = [int((table.columns["row"] == row).sum()) for row in (1, 2, 3)]
     assert report.modes == counts and counts[0] >= 8 and counts[1] >= 2 and counts[2] == 0
     assert str(report).startswith(f"0 to {max(counts)} assembly modes found for 3 rows")

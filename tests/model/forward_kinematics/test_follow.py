@@ -21,7 +21,7 @@ from condyle.model.forward_kinematics import ForwardKinematics
 from condyle.model.forward_kinematics.joint_steps import joint_steps
 from condyle.model.forward_kinematics.pose_status import PoseStatus
 from condyle.motion import write_table
-from condyle.results.poses import pose_file
+from condyle.results.pose_rows import pose_file
 from condyle.status import Status
 
 Reached = tuple[np.ndarray, np.ndarray]

@@ -18,7 +18,7 @@ from condyle.model.forward_kinematics import ForwardKinematics
 from condyle.model.forward_kinematics.orientation import principal
 from condyle.model.forward_kinematics.pose_status import PoseStatus
 from condyle.motion import read_table, write_table
-from condyle.results.poses import pose_file
+from condyle.results.pose_rows import pose_file
 from condyle.status import Status
 
 
@@ -94,8 +94,9 @@ def test_file_in_file_out(tmp_path: Path) -> None:
     report = pose_file(mechanism, tmp_path / "joints.csv", tmp_path / "poses.csv")
     assert (report.rows, report.missing) == (20, 0)
     table = read_table(tmp_path / "poses.csv")
-    assert table.names == ("t", "X", "Y", "Z", "alpha", "beta", "gamma", "residual", "condition")
-    np.testing.assert_allclose(table.require(table.names[1:7]), pose, rtol=0, atol=1e-12)
+    names = list(table.columns)
+    assert names == ["t", "X", "Y", "Z", "alpha", "beta", "gamma", "residual", "condition"]
+    np.testing.assert_allclose(table.require(names[1:7]), pose, rtol=0, atol=1e-12)
 
 
 def test_residuals_of_chains_that_turn_and_slide(tmp_path: Path) -> None:
@@ -110,7 +111,7 @@ def test_residuals_of_chains_that_turn_and_slide(tmp_path: Path) -> None:
     assert error.value.samples == [1] and not files[1].exists()
     report = pose_file(mechanism, *files, tolerance=1e-3)
     table = read_table(files[1])
-    assert table.names[6:] == ("residual_m", "residual_rad", "condition")
+    assert list(table.columns)[6:] == ["residual_m", "residual_rad", "condition"]
     joints = np.array([[0.0] * 6, [1e-4] + [0.0] * 5])
     found = ForwardKinematics(mechanism).solve(joints, tolerance=1e-3)
     for unit, kind in (("rad", "RSS"), ("m", "PSS")):

@@ -19,9 +19,9 @@ from condyle.model.data import Evaluation
 from condyle.model.reactions import reactions
 from condyle.motion import read_table, write_table
 from condyle.questions.reactions import reaction_places
+from condyle.results.inverse_rows import solve_file
 from condyle.results.model import Model
 from condyle.results.reactions import reaction_variables
-from condyle.results.states import solve_file
 
 # Our joint -> the oracle's link and whether it is its force or its moment.
 JOINTS = {
@@ -191,7 +191,7 @@ def test_columns_of_files_have_the_names_of_the_reactions(tmp_path: Path) -> Non
     write_table(tmp_path / "states.csv", states)
     solve_file(model, tmp_path / "states.csv", tmp_path / "out.csv", reactions=True)
     table = read_table(tmp_path / "out.csv")
-    assert {name for name in table.names if name.startswith("reaction_")} == wanted
+    assert {name for name in table.columns if name.startswith("reaction_")} == wanted
     for name in wanted:
         np.testing.assert_array_equal(table.columns[name], columns[name])
 

@@ -10,8 +10,8 @@ import numpy as np
 from ..errors import InconsistentError, LostError, SampleError, UnreachableError
 from ..kinematics.chain import FAMILIES
 from ..mechanism.mechanism import COORDINATES, Mechanism
-from ..model.evaluator import check_home
 from ..model.forward_kinematics import TOLERANCE, ForwardKinematics, PoseStatus
+from ..model.system import check_home
 from ..motion import Table, read_table, write_table
 from ..progress import step
 

@@ -1,4 +1,4 @@
-"""Independent states, one a row: a file in, a file out, in flat memory."""
+"""Efforts of states, one a row: a file in, a file out."""
 
 from __future__ import annotations
 
@@ -11,20 +11,17 @@ import numpy as np
 from ..atomic import replacing
 from ..errors import InputError
 from ..mechanism.mechanism import COORDINATES
-from ..model.evaluator import Evaluator, with_point
 from ..model.judge import require_ok
+from ..model.model import Model
 from ..model.reactions import reactions as joint_reactions
-from ..motion import Table, TableWriter, iter_table
+from ..motion import Table
 from .contacts import AXES, lift_off_columns
 from .derived import Derived
 from .failures import status_columns
 from .matlab import table_variables, write_mat
-from .solution import named_columns
-from .variables import VARIABLES, WRENCH
+from .state_rows import Columns, StateColumns
+from .variables import VARIABLES, WRENCH, variable_columns
 from .warnings import Watch, refuse
-
-CHUNK_ROWS = 16384
-AT_REST = "no rates (dX ...) and no accelerations (ddX ...) are given: the states are at rest"
 
 
 class Activation(NamedTuple):
@@ -43,8 +40,14 @@ class Solved(NamedTuple):
     greatest: Activation | None
 
 
+def state_columns(model: Model) -> StateColumns:
+    """What a file of states has."""
+    missing = "no rates (dX ...) and no accelerations (ddX ...) are given"
+    return StateColumns(model, ("d", "dd"), missing, "(dX ...) and accelerations (ddX ...)")
+
+
 def solve_file(
-    model: Evaluator,
+    model: Model,
     states: str | Path,
     out: str | Path,
     load_point: str | None = None,
@@ -69,37 +72,33 @@ def solve_file(
     Returns: number of rows, warnings, and the greatest activation.
     Raises:  InputError, UnreachableError, SingularError, BoundsError: nothing is written then.
     """
-    known = [p + name for p in ("", "d", "dd") for name in COORDINATES] + list(WRENCH)
     watch = Watch(model.mechanism, rows=True)
-    rows, unused, greatest = 0, list[str](), None
-    kept: list[dict[str, np.ndarray | list[str]]] = []
-    with ExitStack() as stack:
-        matlab = None if mat is None else stack.enter_context(replacing(mat))
-        writer = stack.enter_context(TableWriter(out))
-        for table in iter_table(states, CHUNK_ROWS, known=known, doing="solving"):
-            columns, derived = solve_table(model, table, load_point, flag, rows, reactions, threads)
-            watch.see(derived, np.arange(rows, rows + table.rows) + 1)
-            writer.write(columns)
-            if matlab is not None:
-                kept.append(columns)
-            greatest = _greater(greatest, derived, rows)
-            rows += table.rows
-            unused = list(table.warnings)
-            if at_rest(table):
-                unused.append(f"{table.source}: {AT_REST}")
-        notices = watch.notices()
+    greatest: Activation | None = None
+    kept: list[Columns] = []
+
+    def solved(table: Table, first_row: int) -> Columns:
+        nonlocal greatest
+        columns, derived = solve_table(
+            model, table, load_point, flag, first_row, reactions, threads
+        )
+        watch.see(derived, np.arange(first_row, first_row + table.rows) + 1)
+        greatest = _greater(greatest, derived, first_row)
+        if mat is not None:
+            kept.append(columns)
+        return columns
+
+    def done() -> None:
         if strict:
-            refuse(notices)
+            refuse(watch.notices())
         if matlab is not None:
             names = kept[0] if kept else {}
             whole = {name: np.concatenate([part[name] for part in kept]) for name in names}
             write_mat(matlab, table_variables(model.mechanism, whole))
-    return Solved(rows, [*unused, *(notice.text for notice in notices)], greatest)
 
-
-def at_rest(table: Table) -> bool:
-    """Whether a states file has neither rates nor accelerations."""
-    return not any(p + name in table.columns for p in ("d", "dd") for name in COORDINATES)
+    with ExitStack() as stack:
+        matlab = None if mat is None else stack.enter_context(replacing(mat))
+        rows, said = state_columns(model).stream(states, out, solved, done)
+    return Solved(rows, [*said, *(notice.text for notice in watch.notices())], greatest)
 
 
 def _greater(before: Activation | None, derived: Derived, first_row: int) -> Activation | None:
@@ -114,26 +113,27 @@ def _greater(before: Activation | None, derived: Derived, first_row: int) -> Act
 
 
 def solve_table(
-    model: Evaluator,
+    model: Model,
     table: Table,
     load_point: str | None,
     flag: bool,
     first_row: int,
     reactions: bool = False,
     threads: int | None = None,
-) -> tuple[dict[str, np.ndarray | list[str]], Derived]:
+) -> tuple[Columns, Derived]:
     """Output columns for the rows of one table, and what follows from its evaluation."""
-    names = state_coordinates(model, table)
-    q = table.require(names)
-    if at_rest(table):
-        q1 = q2 = np.zeros_like(q)
-    else:
-        q1, q2 = (table.require([p + name for name in names]) for p in ("d", "dd"))
-    q, q1, q2 = model.independent_states(names, q, q1, q2, threads=threads)
-    wrench, point = loads(model, table, load_point)
-    evaluation = model.evaluate(q, q1, q2, with_point(wrench, point), threads)
-    mechanism = model.mechanism
-    derived = Derived(mechanism, evaluation, wrench, model.limited)
+    given, mechanism = state_columns(model), model.mechanism
+    names = given.names(table)
+    used = {prefix + name for prefix in ("", *given.rates) for name in names} | {*WRENCH}
+    if idle := [name for name in table.columns if name not in used]:
+        raise InputError(
+            f"{table.source}: {', '.join(idle)} would not be used: the state is given by "
+            f"{', '.join(names)}, their rates and accelerations. Remove what is not of these"
+        )
+    states = given.states(table, names, threads)
+    load = given.loads(table, load_point)
+    evaluation = model.evaluate(*states, load, threads)
+    derived = Derived(mechanism, evaluation, load[:, :6], model.limited)
     if not flag:
         require_ok(mechanism, evaluation, row_offset=first_row)
 
@@ -145,12 +145,11 @@ def solve_table(
         "contact": mechanism.contact_names,
         "coordinate": COORDINATES,
     }
-    columns: dict[str, np.ndarray | list[str]] = {}
+    columns: Columns = {}
     for variable in VARIABLES:
         if variable.column is not None and variable.when(derived):
-            array = variable.values(derived)
-            array = np.linalg.norm(array, axis=-1) if variable.sizes else array
-            columns |= named_columns(variable.column, labels[variable.dims[1]], filled(array))
+            found = variable_columns(variable, variable.values(derived), labels)
+            columns |= {name: filled(a[:, None])[:, 0] for name, a in found.items()}
     if reactions:
         for name, reaction in joint_reactions(model, evaluation).items():
             array = filled(reaction.array)
@@ -160,33 +159,3 @@ def solve_table(
         shortfall = derived.shortfall if derived.limited else None
         columns |= status_columns(mechanism, evaluation.status, derived.cause, shortfall)
     return columns, derived
-
-
-def loads(model: Evaluator, table: Table, load_point: str | None) -> tuple[np.ndarray, np.ndarray]:
-    """Wrenches of a table, (N, 6), zero where it has none, and where they act, (3,)."""
-    wrench, point = np.zeros((table.rows, 6)), np.zeros(3)
-    given = [name for name in WRENCH if name in table.columns]
-    for name in given:
-        wrench[:, WRENCH.index(name)] = table.columns[name]
-    if load_point is not None or set(given) & set(WRENCH[:3]):
-        point = model.load_point(load_point)
-    return wrench, point
-
-
-def state_coordinates(model: Evaluator, table: Table) -> list[str]:
-    """The pose coordinates that a states file gives."""
-    names = [name for name in COORDINATES if name in table.columns]
-    m = model.mechanism.degrees_of_freedom
-    if len(names) != m:
-        raise InputError(
-            f"{table.source}: got the pose coordinates {', '.join(names) or 'none'}; a state of "
-            f"this mechanism has {m}, such as {', '.join(model.independent)}, with their rates "
-            "(dX ...) and accelerations (ddX ...)"
-        )
-    used = {prefix + name for prefix in ("", "d", "dd") for name in names} | {*WRENCH}
-    if idle := [name for name in table.columns if name not in used]:
-        raise InputError(
-            f"{table.source}: {', '.join(idle)} would not be used: the state is given by "
-            f"{', '.join(names)}, their rates and accelerations. Remove what is not of these"
-        )
-    return names

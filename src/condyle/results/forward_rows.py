@@ -1,0 +1,127 @@
+"""Accelerations from states and efforts, one sample a row: a file in, a file out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import JammedError, NumberRangeError, SampleError, SingularError
+from ..kinematics.causes import FLAG, Owner, cause_text, causes, owners, sample_error
+from ..kinematics.chain import FAMILIES
+from ..kinematics.constraints import indices
+from ..mechanism.mechanism import COORDINATES
+from ..model.data import Accelerations
+from ..model.model import Model
+from ..motion import Table
+from ..status import Status
+from .contacts import lift_off, lift_off_columns
+from .failures import status_columns
+from .state_rows import Columns, StateColumns
+from .variables import named_columns
+
+KINDS = {"N m": "moment", "N": "force"}
+
+
+def forward_file(
+    model: Model,
+    states: str | Path,
+    out: str | Path,
+    load_point: str | None = None,
+    flag: bool = False,
+    threads: int | None = None,
+) -> tuple[int, list[str]]:
+    """Forward dynamics of every row of a file; the output appears whole or not at all.
+
+    Rows never influence each other.
+
+    Args:    states: CSV, or Parquet if its name ends in .parquet, with 6 - k pose coordinates,
+             their rates dX... (none: at rest), tau_<chain> of every chain, and optionally some of
+             Fx, Fy, Fz, Mx, My, Mz. Other columns are named in a warning.
+             out: ddX... of the given coordinates, contact_<contact>, the pose, joint_<chain>, and
+             lift_off_<contact> of one-sided contacts; with `flag` also status and cause.
+             flag: keep rows that have no accelerations, empty, with a status.
+    Returns: number of rows, and warnings.
+    Raises:  InputError, SampleError: nothing is written then.
+    """
+    mechanism = model.mechanism
+    efforts = [f"tau_{name}" for name in mechanism.chain_names]
+    units = [FAMILIES[chain.kind].effort_unit for chain in mechanism.chains]
+    given = StateColumns(
+        model,
+        ("d",),
+        "no rates (dX ...) are given",
+        "(dX ...), and efforts tau_<chain>",
+        {name: (KINDS[unit], 0) for name, unit in zip(efforts, units, strict=True)},
+    )
+    pulled = np.zeros(len(mechanism.contacts), dtype=int)
+
+    def solved(table: Table, first_row: int) -> Columns:
+        names = given.names(table)
+        q, q1, _ = given.states(table, names, threads)
+        effort, load = table.require(efforts), given.loads(table, load_point)
+        found = model.forward(q, q1, effort, load, ("motion", "joint"), threads)
+        cause = _causes(model, found, flag, first_row)
+        good = (found.status == Status.ok)[:, None]
+        pose, joint = (np.where(good, found[name], np.nan) for name in ("pose", "joint"))
+        columns: Columns = {}
+        columns |= named_columns("dd", names, found["pose_acceleration"][:, indices(names)])
+        columns |= named_columns("contact_", mechanism.contact_names, found.contact_force)
+        columns |= named_columns("", COORDINATES, pose)
+        columns |= named_columns("joint_", mechanism.chain_names, joint)
+        lifted = lift_off(mechanism, np.nan_to_num(found.contact_force))
+        pulled[:] += lifted.sum(axis=0)
+        columns |= lift_off_columns(mechanism, lifted)
+        return columns | status_columns(mechanism, found.status, cause) if flag else columns
+
+    rows, said = given.stream(states, out, solved)
+    return rows, [
+        *said,
+        *(
+            f'one-sided contact "{name}" would have to pull in {count} of {rows} rows'
+            for name, count in zip(mechanism.contact_names, pulled, strict=True)
+            if count
+        ),
+    ]
+
+
+def _causes(model: Model, found: Accelerations, flag: bool, first_row: int) -> np.ndarray:
+    """What each row fails by, (N,), as `causes` counts.
+
+    Raises: SampleError: for rows that fail, unless they are kept.
+    """
+    if not found.status.any():
+        return np.zeros(len(found.status), dtype=np.int16)
+    c = model.configuration(found["pose"])
+    about = found.status, found["pose"], c.discriminant, c.singularity
+    cause = causes(*about)
+    if flag:
+        return cause
+    bad = np.flatnonzero(found.status)
+    status = list(Status)[found.status[bad[0]]]
+    if status == Status.unreachable:
+        error = sample_error(model.mechanism, *about, first_row=first_row)
+        assert error is not None
+        raise error
+    raise _error(status, owners(model.mechanism)[cause[bad[0]]], bad, first_row)
+
+
+def _error(status: Status, owner: Owner, bad: np.ndarray, first_row: int) -> SampleError:
+    """Why the first of the rows `bad` has no accelerations."""
+    row = first_row + int(bad[0]) + 1
+    more = f" {bad.size - 1} more rows fail too." if bad.size > 1 else ""
+    if status == Status.jammed:
+        kind: type[SampleError] = JammedError
+        text = f"the mechanism jams at row {row}: friction at the contacts has no consistent "
+        text += "pattern of signs under these efforts, or several"
+        hint = "There is no one answer with rigid bodies; less friction or other efforts have one"
+    elif status == Status.singular:
+        kind, text = SingularError, f"the mechanism is singular at row {row}"
+        if owner.kind == "chain":
+            text += f" ({cause_text(status, owner)})"
+        hint = "Accelerations are not determined there; avoid the pose"
+    else:
+        kind, text = NumberRangeError, f"the accelerations at row {row} are not finite"
+        hint = "Its rates, efforts or load are too large for numbers"
+    chain = owner.name if owner.kind == "chain" else None
+    return kind(f"{text}.{more}", bad.tolist(), hint=f"{hint}, {FLAG}", row=row, chain=chain)

@@ -1,0 +1,107 @@
+"""States of a mechanism, one a row: a file in, a file out, in flat memory.
+
+Rows never influence each other. What is made of a row is another file's concern: see `inverse_rows`
+and `forward_rows`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..mechanism.mechanism import COORDINATES
+from ..model.model import Model, with_point
+from ..model.poses import States
+from ..motion import Table, TableWriter, iter_table
+from ..motion.column_units import Dimension, dimension
+from .variables import WRENCH
+
+CHUNK_ROWS = 16384
+
+Columns = dict[str, np.ndarray | list[str]]
+
+
+@dataclass(frozen=True)
+class StateColumns:
+    """What columns of a file give of a state.
+
+    rates:  prefixes of its derivatives: d, dd;  missing: what is said where there are none.
+    wanted: what a state has besides its coordinates, in words.
+    others: further columns, with what they are.
+    """
+
+    model: Model
+    rates: tuple[str, ...]
+    missing: str
+    wanted: str
+    others: Mapping[str, Dimension] = field(default_factory=dict)
+
+    def known(self) -> dict[str, Dimension]:
+        """What columns there may be."""
+        names = [prefix + name for prefix in ("", *self.rates) for name in COORDINATES]
+        own = {name: kind for name in (*names, *WRENCH) if (kind := dimension(name)) is not None}
+        return own | dict(self.others)
+
+    def names(self, table: Table) -> list[str]:
+        """The pose coordinates that a file gives, 6 - k."""
+        names, independent = [n for n in COORDINATES if n in table.columns], self.model.independent
+        if len(names) != len(independent):
+            raise InputError(
+                f"{table.source}: got the pose coordinates {', '.join(names) or 'none'}; a state "
+                f"of this mechanism has {len(independent)}, such as {', '.join(independent)}, with "
+                f"their rates {self.wanted}"
+            )
+        return names
+
+    def at_rest(self, table: Table) -> bool:
+        """Whether a file has no derivatives at all."""
+        return not any(p + name in table.columns for p in self.rates for name in COORDINATES)
+
+    def states(self, table: Table, names: list[str], threads: int | None) -> States:
+        """q_EE and its rates; zero where they are not given."""
+        given = [table.require(names)]
+        for prefix in self.rates:
+            rest = self.at_rest(table)
+            own = np.zeros_like(given[0]) if rest else table.require([prefix + n for n in names])
+            given.append(own)
+        q, q1, q2 = [*given, np.zeros_like(given[0])][:3]
+        return self.model.independent_states(names, q, q1, q2, threads=threads)
+
+    def loads(self, table: Table, load_point: str | None) -> np.ndarray:
+        """Loads of a table, (N, 9): zero where it has none, at a point where there is a force."""
+        wrench, point = np.zeros((table.rows, 6)), np.zeros(3)
+        given = [name for name in WRENCH if name in table.columns]
+        for name in given:
+            wrench[:, WRENCH.index(name)] = table.columns[name]
+        if load_point is not None or set(given) & set(WRENCH[:3]):
+            point = self.model.load_point(load_point)
+        return with_point(wrench, point)
+
+    def stream(
+        self,
+        source: str | Path,
+        out: str | Path,
+        solved: Callable[[Table, int], Columns],
+        done: Callable[[], None] = lambda: None,
+    ) -> tuple[int, list[str]]:
+        """Every row of a file solved; the output appears whole or not at all.
+
+        Args:    source: CSV, or Parquet if its name ends in .parquet;  out: likewise.
+                 solved: output columns for the rows of a table, from the number of its first row.
+                 done: called before the output appears; may raise.
+        Returns: number of rows, and what is to be said of the file.
+        """
+        rows, said = 0, list[str]()
+        with TableWriter(out) as writer:
+            for table in iter_table(source, CHUNK_ROWS, known=self.known(), doing="solving"):
+                writer.write(solved(table, rows))
+                rows += table.rows
+                said = list(table.warnings)
+                if self.at_rest(table):
+                    said.append(f"{table.source}: {self.missing}: the states are at rest")
+            done()
+        return rows, said
