@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from support.cases import Case, case
 
-from condyle.backends import numpy
-from condyle.backends.c import kernel as compiled
+from condyle.backends import numpy_kernel as numpy
+from condyle.backends.c import compiled_kernel as compiled
 from condyle.backends.c.compiled_kernel import CompiledKernel
 from condyle.backends.kernel import Answer
 from condyle.backends.threads import shared_out

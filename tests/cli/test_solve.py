@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.backends.c import kernel
+from condyle.backends.c import compiled_kernel as kernel
 from condyle.backends.c.compiled_kernel import CompiledKernel
 from condyle.backends.compiler import CompilerError, find_compiler
 from condyle.mechanism import COORDINATES
