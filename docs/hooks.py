@@ -76,7 +76,7 @@ def draw_studies(folder: Path) -> None:
     from condyle.analysis.sweep import read_study, with_bands
     from condyle.motion import Motion, bundled_reference
     from condyle.report.figures import PLOTS
-    from condyle.report.figures.sweep import SWEEP_PLOTS
+    from condyle.report.figures.sweep_figures import SWEEP_PLOTS
 
     base = "chain.masseter_{}.base[2]"
     own = {"what": base.format("left"), "mirror": base.format("right"), "scale": [0.97, 1.03]}
@@ -127,7 +127,7 @@ def draw_maps(folder: Path, solution: Any) -> None:
     from condyle.analysis.map.axes import grid_of
     from condyle.analysis.map.compute import asked_of
     from condyle.analysis.map.slices import slices_of
-    from condyle.report.figures.map import map_figure
+    from condyle.report.figures.map_figures import map_figure
 
     run = solution["pose"].sel(coordinate=["X", "beta"]).values
     jaw = ["X=-5:15:120 mm", "beta=-15:25:120 deg"]

@@ -9,7 +9,7 @@ import condyle
 from condyle.analysis.comparison import compare
 from condyle.analysis.weight_curve import Tradeoff, tradeoff
 from condyle.motion import Motion
-from condyle.report.figures.tradeoff import apart, tradeoff_figure
+from condyle.report.figures.tradeoff_figure import apart, tradeoff_figure
 from condyle.report.tables.tradeoff import tradeoff_table
 
 WEIGHTS = (0.0, 0.1, 1.0, 10.0, 1e3)

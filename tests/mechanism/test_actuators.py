@@ -17,7 +17,7 @@ from condyle.mechanism.actuator import Limits
 from condyle.mechanism.chain import limits
 from condyle.mechanism.files import from_data, json_schema
 from condyle.mechanism.plausibility import plausibility_warnings
-from condyle.report.check import describe
+from condyle.report.description import describe
 
 INF, NAN = math.inf, math.nan
 MOTOR = "chain.masseter_left.actuator"

@@ -154,7 +154,7 @@ def test_values_shown_equal_the_data(tab: Tab, solution: Solution) -> None:
     for panel, variable, scale in (
         ("torque-Nm", "torque", 1.0),
         ("joint-rad", "joint", 180 / np.pi),
-        ("joint_rate-rad", "joint_rate", 1.0),
+        ("joint_rate-rad", "joint_rate", 180 / np.pi),
         ("transmission", "transmission", 1.0),
     ):
         shown = legend(tab, panel)
@@ -170,7 +170,7 @@ def test_values_shown_equal_the_data(tab: Tab, solution: Solution) -> None:
     for i, chain in enumerate(solution["chain"].values):
         joint, speed, torque = readout(tab, str(chain))
         assert joint == pytest.approx(np.degrees(float(at["joint"].values[i])), abs=0.0051)
-        assert speed == pytest.approx(float(at["joint_rate"].values[i]), abs=0.00051)
+        assert speed == pytest.approx(np.degrees(float(at["joint_rate"].values[i])), abs=0.051)
         assert torque == pytest.approx(float(at["torque"].values[i]), abs=0.000051)
 
 

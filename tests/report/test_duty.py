@@ -17,8 +17,8 @@ from condyle.mechanism.actuator import Limits
 from condyle.motion import Load, Motion, bundled_reference
 from condyle.report.actuators import DutyMeter, activations, duty, edges, joint_loads
 from condyle.report.figures import PLOTS, save_solution_figures
+from condyle.report.naming import parts_in_use
 from condyle.report.page import report_html
-from condyle.report.words import parts_in_use
 from condyle.results.solution import Solution
 
 INF = float("inf")
@@ -186,14 +186,19 @@ def test_joint_load_of_a_contact_that_may_pull_has_no_sign(robot: Solution) -> N
 
 def test_page_has_every_plane_and_activation(page: dict[str, Any], jaw: Solution) -> None:
     names = [str(name) for name in jaw["chain"].values]
-    assert len(page["planes"]) == 12
-    lines = [(p, line) for p in page["planes"] for line in p["lines"]]
+    planes = [panel for panel in page["panels"] if panel["kind"] == "plane"]
+    assert len(planes) == 12
+    lines = [(p, line) for p in planes for line in p["sets"][0]["lines"]]
     assert len(lines) == 24
     for i, (plane, line) in enumerate(lines):
-        speed, effort = (column(page, number) for number in line["columns"])
+        speed, effort = (column(page, line[key]) for key in ("across", "column"))
         np.testing.assert_allclose(speed, jaw["joint_rate"].values[:, i], rtol=1e-6, atol=1e-9)
         np.testing.assert_allclose(effort, jaw["torque"].values[:, i], rtol=1e-6, atol=1e-9)
-        assert plane["units"] == ["m/s", "N"] and names[i].endswith(line["label"])
+        assert (
+            plane["axes"] == ["speed [m/s]", "force"]
+            and plane["unit"] == "N"
+            and names[i].endswith(line["label"])
+        )
     field = next(p for p in page["panels"] if p["id"] == "activation")
     greatest = {c.name: c.actuator.effort_range[1] for c in jaw.mechanism.chains}
     assert field["kind"] == "field" and len(field["sets"][0]["lines"]) == 24
@@ -223,7 +228,8 @@ def test_a_thinned_page_keeps_tracks_and_the_duty_of_every_sample(jaw: Solution)
     data = payload(report_html(long))
     assert data["columns"]["total"] == count
     assert 500 < data["columns"]["samples"] < count
-    texts = [line["text"] for plane in data["planes"] for line in plane["lines"]]
+    planes = [panel for panel in data["panels"] if panel["kind"] == "plane"]
+    texts = [line["text"] for plane in planes for line in plane["sets"][0]["lines"]]
     assert texts == [one.text for one in duty(long)]
 
 

@@ -9,9 +9,10 @@ import condyle
 from condyle.motion import trial_motion
 from condyle.report.figures import PLOTS
 from condyle.report.page.alerts import alerts
-from condyle.report.page.columns import Columns
-from condyle.report.page.facts import chain_table
-from condyle.report.page.panels import time_panels
+from condyle.report.page.page_columns import Columns
+from condyle.report.page.page_facts import chain_table
+from condyle.report.page.panel_data import panel_data
+from condyle.report.panel_list import torque
 from condyle.results.solution import Solution
 from condyle.view.session import state_messages
 
@@ -52,10 +53,9 @@ def test_what_is_beyond_a_limit_is_told_of_on_its_side(solution: Solution) -> No
 
 
 def test_panels_draw_both_levels(solution: Solution) -> None:
-    panels = {
-        panel["id"]: panel for panel in time_panels(solution, Columns(solution["time"].values))
-    }
-    found = {tuple(one["of"]): one for one in panels["torque-Nm"]["limits"]}
+    [panel] = torque(solution)
+    data = panel_data("chains", panel, Columns(solution["time"].values), {})
+    found = {one["of"]: one for one in data["limits"]}
     first, second = found[(FIRST,)], found[(SECOND,)]
     assert (first["low"], first["high"]) == (LOW, HIGH)
     assert first["label"] == f"limit -0.0005 to 0.003 N m ({FIRST})"

@@ -9,7 +9,7 @@ import condyle
 from condyle.analysis.map.axes import grid_of
 from condyle.analysis.map.compute import asked_of
 from condyle.analysis.map.slices import slices_of
-from condyle.report.figures.map import LINES, drawn, grown, map_figure
+from condyle.report.figures.map_figures import LINES, drawn, grown, map_figure
 
 
 @pytest.fixture(scope="module")

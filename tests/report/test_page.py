@@ -18,12 +18,12 @@ import pytest
 import condyle
 from condyle.errors import InputError
 from condyle.motion import Motion, bundled_reference
-from condyle.report.failures import at_sample, failures
+from condyle.report.gaps import at_sample, gaps
 from condyle.report.page import report_html, write_report
 from condyle.report.page.html import fill, json_for_script, tag
-from condyle.report.page.panels import reaction_magnitudes
 from condyle.report.page.reduce import BUDGET, reduced
-from condyle.report.page.source import opened
+from condyle.report.page.report_page import opened
+from condyle.report.panel_list import magnitudes
 from condyle.report.scene import DARK, LIGHT, styles
 from condyle.report.tables import Table, kept_tables, with_tables
 from condyle.results.solution import Solution
@@ -129,8 +129,9 @@ def test_every_kind_of_plot_is_there(page: str) -> None:
     assert expected | {"ratio", "condition"} <= found
     torque = next(panel for panel in data["panels"] if panel["id"] == "torque-Nm")
     assert [(limit["low"], limit["high"]) for limit in torque["limits"]] == [(-3.0, 3.0)]
-    assert [t["view"] for t in data["tracks"]] == ["above", "side"] * 2
-    assert data["tracks"][0]["bounds"] == [pytest.approx([-27.65, -14.65]), pytest.approx([69, 75])]
+    tracks = [panel for panel in data["panels"] if panel["kind"] == "track"]
+    assert [t["title"].split()[-1] for t in tracks] == ["above", "side"] * 2
+    assert tracks[0]["bounds"] == [pytest.approx([-27.65, -14.65]), pytest.approx([69, 75])]
 
 
 def test_names_are_text_and_never_markup(reference: condyle.Mechanism, solution: Solution) -> None:
@@ -146,7 +147,7 @@ def test_names_are_text_and_never_markup(reference: condyle.Mechanism, solution:
     assert "img" not in {name for name, _ in elements.found}
     assert len(elements.scripts) == 3, "the data, plotly and the page's own script"
     assert ATTACK in elements.text
-    assert ATTACK in payload(page)["panels"][4]["sets"][0]["lines"][0]["label"]
+    assert ATTACK in payload(page)["panels"][6]["sets"][0]["lines"][0]["label"]
 
 
 def test_warnings_stand_at_the_top(reference: condyle.Mechanism) -> None:
@@ -237,8 +238,7 @@ def test_tables_and_reactions_stand_on_the_page(solution: Solution) -> None:
     assert "Largest force at the ball joints" in text and "7 N" in text
     panel = next(p for p in payload(page)["panels"] if p["id"] == "reaction_ball")
     assert len(panel["sets"][0]["lines"]) == 6
-    magnitudes = reaction_magnitudes(added, "reaction_ball")[""]
-    assert np.allclose(magnitudes["masseter_left"], 7.0)
+    assert np.allclose(magnitudes(added, "reaction_ball")["masseter_left"], 7.0)
 
 
 def test_solution_keeps_its_tables_for_any_later_page(solution: Solution, tmp_path: Path) -> None:
@@ -294,7 +294,7 @@ def test_moment_of_the_load_is_plotted(reference: condyle.Mechanism) -> None:
 def test_surface_that_cannot_be_drawn_is_named(
     solution: Solution, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("condyle.report.page.machine._surfaces", lambda *_: iter(()))
+    monkeypatch.setattr("condyle.report.page.stage_data._surfaces", lambda *_: iter(()))
     assert payload(report_html(solution))["machine"]["undrawn"] == ["left_condyle", "right_condyle"]
 
 
@@ -402,7 +402,7 @@ def test_causes_come_from_the_solution(long_run: Solution) -> None:
             ]
 
     knowing = Knowing(long_run.data_vars, long_run.coords, long_run.attrs)
-    [found] = failures(knowing)
+    [found] = gaps(knowing)
     assert (found.first, found.last, str(found)) == (20_000, 20_039, "unreachable: why")
     assert at_sample([found], 20_010) is found and at_sample([found], 20_040) is None
 

@@ -30,7 +30,7 @@ def check(mechanism: options.Mechanism, project: Project = False) -> Answer:
     import condyle
 
     from ..mechanism.home import home_warnings
-    from ..report.check import describe
+    from ..report.description import describe
 
     if project and (nearest := _projection(mechanism)) is not None:
         return nearest

@@ -94,7 +94,7 @@ def map_(
     from ..analysis.map.map_files import save_map
     from ..analysis.map.map_quantities import chosen
     from ..analysis.workers import check_scheduler
-    from ..report.maps import numbers_text
+    from ..report.map_text import numbers_text
 
     machine = condyle.load(mechanism)
     grid = grid_of(machine, over or default_over(machine), hold)
@@ -150,7 +150,7 @@ def _run_path(run: Path, grid: Grid) -> Any:
 def _draw(asked: Asked, grid: Grid, dataset: xr.Dataset, stem: Path, path: Any) -> list[Path]:
     from ..analysis.map.slices import slices_of
     from ..report.figures import save
-    from ..report.figures.map import drawn, map_figure
+    from ..report.figures.map_figures import drawn, map_figure
 
     slices = list(slices_of(asked.reach, grid))
     files = []

@@ -72,7 +72,7 @@ def _shown(table: xr.Dataset, folder: Path, figures: bool) -> Answer:
         one.write_csv(files[-1])
     if figures:
         from ..report.figures import save
-        from ..report.figures.sweep import sweep_plots
+        from ..report.figures.sweep_figures import sweep_plots
 
         for name, draw in sweep_plots(table).items():
             files += save(draw(table), folder, name)

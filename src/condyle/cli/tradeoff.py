@@ -41,7 +41,7 @@ def weigh(
     solution.save(files[-1])
     if figures:
         from ..report.figures import save
-        from ..report.figures.tradeoff import tradeoff_figure
+        from ..report.figures.tradeoff_figure import tradeoff_figure
 
         files += save(tradeoff_figure(found), out, table.name)
     if report:

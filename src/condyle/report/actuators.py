@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..mechanism.chain import limits
-from .words import stem
+from .naming import stem
 
 if TYPE_CHECKING:
     from ..mechanism.actuator import Limits
@@ -106,6 +106,12 @@ def edges(box: Limits, speed: float, effort: float) -> list[Edge]:
     if wide == box.speed and np.isfinite(wide):
         found += [([side, side], [low, high]) for side in (-wide, wide)]
     return [edge for edge in found if np.isfinite(edge).all()]
+
+
+def drawn_limits(solution: Solution, variable: str) -> list[Limits]:
+    """Limits of each chain's torque or force, or of its speed, as those of an effort."""
+    found = [limits(chain) for chain in solution.mechanism.chains]
+    return found if variable == "torque" else [one.of_speed for one in found]
 
 
 def limits_text(box: Limits, effort_unit: str, speed_unit: str) -> str:

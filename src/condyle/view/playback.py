@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..kinematics.singularities import KINDS
-from ..report.failures import Failure, at_sample, failures
+from ..report.gaps import Gap, at_sample, gaps
 from ..report.scene import place
 from ..results.solution import Solution
 from .session import force_vectors, over_limits, state_messages
@@ -27,7 +27,7 @@ class Playback:
         self.speed = 1.0
         self._clock = 0.0
         self._good = np.flatnonzero(solution["status"].values == 0)
-        self._failures = failures(solution)
+        self._failures = gaps(solution)
         names = ("pose", "joint", "joint_rate", "torque", "contact_force", "bound_margin", "load")
         self._values = {name: solution[name].values for name in names}
 
@@ -118,7 +118,7 @@ class Playback:
         return int(self._good[max(int(np.searchsorted(self._good, sample)) - 1, 0)])
 
     def _messages(
-        self, failed: Failure | None, drawn: int, here: dict[str, np.ndarray]
+        self, failed: Gap | None, drawn: int, here: dict[str, np.ndarray]
     ) -> tuple[Level, tuple[str, ...]]:
         if failed is not None:
             return "unreachable", (

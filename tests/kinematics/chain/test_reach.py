@@ -88,7 +88,7 @@ def test_extension_pushes() -> None:
     [("gough-stewart", "m", "N"), ("hexaglide", "m", "N"), ("masticatory", "rad", "N m")],
 )
 def test_units_in_the_check(name: str, joint: str, effort: str) -> None:
-    from condyle.report.check import describe
+    from condyle.report.description import describe
 
     text = str(describe(condyle.load(name)))
     assert f"joint [{joint}], effort [{effort}]" in text

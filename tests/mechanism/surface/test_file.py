@@ -13,7 +13,7 @@ import condyle
 from condyle.errors import MechanismError
 from condyle.mechanism import Mechanism, dumps, json_schema, parse
 from condyle.mechanism.home import home_residuals
-from condyle.report.check import describe
+from condyle.report.description import describe
 
 HOME = np.array([-26.65, 72, 42.53])
 

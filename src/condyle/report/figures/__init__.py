@@ -10,22 +10,18 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..actuators import activations
-from .accessor import SolutionPlots
-from .files import save, save_each
-from .load import load as figure_7
-from .motion import figure_5
-from .registry import PLOTS, find_figures, plot
-from .share import figure_9
-from .singularity import jacobian as figure_6
+from ..panel import PANEL_GROUPS
+from .drawing import figure_of
+from .paper_figures import figure_5, figure_6, figure_7, figure_8, figure_9
+from .registry import PLOTS, SolutionPlots, find_figures, plot
+from .saving import save, save_each
 from .style import STYLES
-from .torque import figure_8
 
 if TYPE_CHECKING:
     from ...analysis.comparison import Comparison
     from ...results.solution import Solution
 
-find_figures()
+find_figures(figure_of)
 
 __all__ = [
     "PLOTS",
@@ -63,9 +59,11 @@ def save_figures(
 def save_solution_figures(solution: Solution, folder: str | os.PathLike[str]) -> list[Path]:
     """Write the plots of `PLOTS` as PNG and SVG into a folder that exists; returns the paths.
 
-    Without contacts there are no plots of them, and without limits none of activations.
+    Those that the solution has nothing for are left out, such as of contacts or of activations.
     """
-    missing = [] if solution.sizes["contact"] else [n for n in PLOTS if n.startswith("contact")]
-    missing += [] if activations(solution) else ["activation"]
-    plots = {name: draw for name, draw in PLOTS.items() if name not in missing}
+    plots = {
+        name: draw
+        for name, draw in PLOTS.items()
+        if name not in PANEL_GROUPS or any(PANEL_GROUPS[name].panels(solution))
+    }
     return save_each(plots, solution, folder)

@@ -1,4 +1,4 @@
-"""The figures by name. A file that registers one is all that a new figure needs:
+"""The figures by name, those of panels (`condyle.report.panel_list`) and others:
 
 @plot()
 def power(solution: Solution) -> Figure:
@@ -6,20 +6,21 @@ def power(solution: Solution) -> Figure:
     made = new_figure("Power of the actuators", caption(solution), 7.5, 3.0)
     ...
 
-Files in this folder are found by themselves; a package elsewhere names its module as an entry
-point of the group `condyle.figures`.
+A package elsewhere names its module as an entry point of the group `condyle.figures`.
 """
 
 from __future__ import annotations
 
-import pkgutil
 from collections.abc import Callable
-from importlib import import_module
+from functools import update_wrapper
 from importlib.metadata import entry_points
-from typing import Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from matplotlib.figure import Figure
+from xarray.plot.accessor import DatasetPlotAccessor
 
+from ...errors import did_you_mean
+from ..panel import PanelGroup, known_groups, listeners
 from .style import house
 
 P = ParamSpec("P")
@@ -47,13 +48,37 @@ def plot(
     return register
 
 
-def find_figures() -> None:
-    """Import every file that registers figures, those of this folder first."""
-    folder = __name__.rpartition(".")[0]
-    for module in pkgutil.iter_modules(import_module(folder).__path__):
-        import_module(f"{folder}.{module.name}")
+def find_figures(figure_of: Callable[[PanelGroup], Any]) -> None:
+    """Register the figures of panels, now and later, and those of other packages."""
+    for group in known_groups():
+        figure_of(group)
+    listeners.append(figure_of)
     for point in entry_points(group=GROUP):
         point.load()
     found = sorted(PLOTS.items())  # in whatever order the files were imported
     PLOTS.clear()
     PLOTS.update(found)
+
+
+class SolutionPlots(DatasetPlotAccessor):
+    """Figures of a solution: `solution.plot.torque()` returns a matplotlib Figure.
+
+    There is a method for every figure that is registered. xarray's own plots of datasets, such as
+    `solution.plot.scatter`, stay where they were.
+    """
+
+    __slots__ = ()
+
+    def __getattr__(self, name: str) -> Callable[..., Figure]:
+        if name not in PLOTS:
+            known = did_you_mean(name, PLOTS)
+            raise AttributeError(f'a solution has no figure "{name}".{known}')
+        draw, solution = PLOTS[name], self._ds
+
+        def method(*args: Any, **kwargs: Any) -> Figure:
+            return draw(solution, *args, **kwargs)
+
+        return update_wrapper(method, draw)
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *PLOTS})

@@ -3,6 +3,6 @@
 condyle.report.page.write_report(solution, "report.html")
 """
 
-from .write import report_html, write_report
+from .report_page import report_html, write_report
 
 __all__ = ["report_html", "write_report"]

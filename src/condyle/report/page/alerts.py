@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...results.solution import BOUND_TOLERANCE
-from .columns import Columns
-from .panels import drawn_limits
+from ..actuators import drawn_limits
+from .page_columns import Columns
 
 if TYPE_CHECKING:
     from ...results.solution import Solution

@@ -14,12 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..actuators import Duty, DutyMeter, duty
-from .beside import marker_panels
-from .columns import Columns
-from .duty import activation_panels
-from .envelope import Envelope
-from .panels import time_panels
-from .tracks import track_panels
+from ..panel import panels_of
+from .page_columns import Envelope
 
 if TYPE_CHECKING:
     from ...results.solution import Solution
@@ -97,15 +93,14 @@ def reduced(solution: Solution) -> Reduced:
 
 
 def curve_values(solution: Solution) -> dict[str, np.ndarray]:
-    """Every curve of the page, (N,) by name, and the tracks, whose extremes count too."""
-    columns = Columns(solution["time"].values)
-    time_panels(solution, columns, every=True)
-    list(activation_panels(solution, columns))
-    list(marker_panels(solution, columns))
-    for number in {n for panel in track_panels(solution, columns) for n in panel["columns"]}:
-        name = list(columns.values)[number]
-        columns.lines[name] = number
-    return {name: columns.values[name] for name in columns.lines}
+    """What every panel of the page draws, (N,) by name of its column."""
+    found: dict[str, np.ndarray] = {}
+    for _, panel in panels_of(solution, every=True):
+        for curve in panel.curves:
+            found[curve.column] = curve.values
+            if curve.across is not None:
+                found[curve.across[0]] = curve.across[1]
+    return found
 
 
 def pieces(starts: np.ndarray) -> Iterator[tuple[int, int]]:

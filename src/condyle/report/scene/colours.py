@@ -6,15 +6,14 @@ measure it. A line's dash is the second sign, so nothing rests on colour alone.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+
+from ..naming import stem
 
 LIGHT = ("#105DCA", "#D97A03", "#07A973", "#693804", "#745F8A", "#1E1B19")
 DARK = ("#4491E5", "#D06A05", "#4CEE8D", "#F4EC46", "#A98AA0", "#DDF6FA")
 DASHES = ("solid", "dash", "dot", "dashdot")
-
-_SIDE = re.compile(r"^(left|right|l|r)[_\- ]|[_\- ](left|right|l|r)$", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -31,15 +30,15 @@ def styles(names: Sequence[str]) -> list[Style]:
     Where there is one pair alone, they differ in colour too; names without pairs differ in both,
     and a dashed line over a solid one hides nothing.
     """
-    stems = [_SIDE.sub("", name) for name in names]
+    stems = [stem(name) for name in names]
     paired = any(stems.count(stem) == 2 for stem in stems)
     if paired and len(names) == 2:
         return [Style(0, DASHES[0]), Style(1, DASHES[1])]
     groups = list(dict.fromkeys(stems)) if paired else list(names)
     seen: dict[str, int] = {}
     result = []
-    for name, stem in zip(names, stems, strict=True):
-        group = stem if paired else name
+    for name, without_side in zip(names, stems, strict=True):
+        group = without_side if paired else name
         number, twin = groups.index(group), seen.get(group, 0)
         seen[group] = twin + 1
         lap = number // len(LIGHT)

@@ -1,37 +1,28 @@
 // Put the page together.
 
+const KINDS = { time: Panel, field: Field, plane: Plane, track: Plane };
 const frame = () => new Promise((done) => requestAnimationFrame(done));
 
 async function start() {
   for (const spec of payload.panels) {
-    const panel = new (spec.kind === "field" ? Field : Panel)(spec);
+    const panel = new KINDS[spec.kind](spec);
     panels.push(panel);
-    document.querySelector(`#${spec.section} .grid`).append(panel.card);
-  }
-  for (const spec of payload.tracks) {
-    const track = new Track(spec);
-    tracks.push(track);
-    document.querySelector("#tracks .grid").append(track.card);
-  }
-  for (const spec of payload.planes) {
-    const plane = new Plane(spec);
-    planes.push(plane);
-    document.querySelector("#actuators .planes").append(plane.card);
+    document.querySelector(`#${spec.section} .${spec.kind === "plane" ? "planes" : "grid"}`).append(panel.card);
   }
   setUpControls();
   setUpSections();
   fillReadout();
   document.getElementById("stage-note").textContent = stageNote();
   clockListeners.push(moveControls, moveStage, moveReadout);
-  clockListeners.push((index) => { for (const part of [...panels, ...planes, ...tracks]) part.move(index); });
+  clockListeners.push((index) => { for (const part of panels) part.move(index); });
   applyTheme();
   announce();
   await drawStage();
-  for (const part of [...panels, ...planes, ...tracks]) {
+  for (const part of panels) {
     await part.draw();
     await frame();  // the page answers while it is still drawing
   }
-  themeListeners.push(() => { drawStage(); for (const part of [...panels, ...planes, ...tracks]) part.draw(); });
+  themeListeners.push(() => { drawStage(); for (const part of panels) part.draw(); });
   window.addEventListener("resize", later(resizePlots, 120));
   setUpPrinting();
   document.documentElement.dataset.ready = "true";

@@ -18,6 +18,11 @@ function axisLook() {
   };
 }
 
+const plotLook = (node) => ({
+  ...sizeOf(node), margin: { ...MARGIN, autoexpand: false }, showlegend: false, hovermode: false,
+  paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { family: "system-ui, sans-serif", color: css("--ink") },
+});
+
 // Grey where there is no result.
 function failureShapes() {
   return payload.failures.map(([x0, x1]) => ({
@@ -108,8 +113,7 @@ class Panel {
     // One label a limit; a level of 0 is the axis.
     const levels = !this.spec.limitsDrawn ? [] : this.spec.limits.flatMap(({ low, high, label }) => [[high, label], [low, high ? "" : label]]).filter(([value]) => value);
     return {
-      ...sizeOf(this.plot), margin: { ...MARGIN, autoexpand: false }, showlegend: false, hovermode: false, dragmode: coarse ? false : "zoom",
-      paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { family: "system-ui, sans-serif", color: css("--ink") },
+      ...plotLook(this.plot), dragmode: coarse ? false : "zoom",
       modebar: { bgcolor: "rgba(0,0,0,0)", color: css("--soft"), activecolor: css("--accent") },
       xaxis: { ...look, range: this.zoom ?? [time[0], time[samples - 1]], ticksuffix: " s", zeroline: false },
       yaxis: range ? { ...y, range } : { ...y, autorange: true },
@@ -167,7 +171,7 @@ class Panel {
     const range = axis.range.map(Number);
     const whole = event["xaxis.autorange"] || (range[0] <= time[0] && range[1] >= time[samples - 1]);
     const next = whole ? null : range;
-    for (const other of panels) {
+    for (const other of panels.filter((panel) => panel instanceof Panel)) {
       if (String(other.zoom ?? "") === String(next ?? "") && other !== this) continue;
       other.zoom = next;
       if (other !== this && other.linked) Plotly.relayout(other.graph, { "xaxis.range": next ?? [time[0], time[samples - 1]] });

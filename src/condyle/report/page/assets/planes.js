@@ -1,59 +1,85 @@
-// Effort against speed of every actuator, with the limits that are near and where it is now.
-
-const planes = [];
+// Curves over something else than time, with a dot where they are now: efforts against speeds in the
+// box of their limits, and tracks of contact balls against their bounds, on equal scales.
 
 class Plane {
   constructor(spec) {
     this.spec = spec;
+    this.lines = spec.sets[0].lines;
+    this.track = spec.kind === "track";
+    this.axes = this.track ? spec.axes.map((name) => `${name} [${spec.unit}]`) : [spec.axes[0], ""];
     this.graph = element("div", { style: "height:100%" });
-    this.dots = spec.lines.map(() => element("div", { class: "dot", "aria-hidden": "true" }));
-    const names = spec.lines.map((l) => l.label).join(", ");
-    this.plot = element("div", { class: "plot", role: "img", "aria-label": `Effort against speed of ${spec.title}: ${names}` }, this.graph, ...this.dots);
-    const unit = element("span", {}, ` [${spec.units[1]}]`);
-    this.card = element("article", { class: "card plane", id: `panel-${spec.id}` },
-      element("div", { class: "card-head" }, element("h3", {}, spec.title, unit)), this.plot);
-    this.keys = element("div", { class: "duties" });
-    this.card.append(this.keys, element("p", { class: "note" }, `Limits: ${spec.limits}`));
+    this.dots = this.lines.map(() => element("div", { class: "dot", "aria-hidden": "true" }));
+    const names = this.lines.map((line) => line.label).join(", ");
+    const what = this.track ? `Track of ${spec.title}` : `Effort against speed of ${spec.title}: ${names}`;
+    this.plot = element("div", { class: "plot", role: "img", "aria-label": what }, this.graph, ...this.dots);
+    this.keys = element(this.track ? "p" : "div", { class: this.track ? "note" : "duties" });
+    this.card = element("article", { class: `card ${spec.kind}`, id: `panel-${spec.id}` },
+      element("div", { class: "card-head" }, element("h3", {}, spec.title, element("span", {}, ` [${spec.unit}]`))), this.plot, this.keys);
+    if (!this.track) this.card.append(element("p", { class: "note" }, `Limits: ${spec.note}`));
   }
 
-  fillKeys() {
-    this.keys.replaceChildren(...this.spec.lines.map((line) => element("p", {}, swatch(line), ` ${line.label}: ${line.text}`)));
-  }
+  // Numbers of a line's columns, across and up, with their scales.
+  numbers(line) { return [[line.across, this.track ? line.scale : 1], [line.column, line.scale]]; }
 
   layout() {
-    const look = axisLook();
-    return {
-      ...sizeOf(this.plot), margin: { ...MARGIN, b: 38, autoexpand: false }, showlegend: false, hovermode: false, dragmode: false,
-      paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { family: "system-ui, sans-serif", color: css("--ink") },
-      xaxis: { ...look, nticks: 5, zeroline: true, title: { text: `speed [${this.spec.units[0]}]`, standoff: 4, font: { size: 12 } } },
-      yaxis: { ...look, nticks: 6, zeroline: true },
-    };
+    const look = axisLook(), title = (text) => ({ text, standoff: 4, font: { size: 12 } });
+    const found = { ...plotLook(this.plot), margin: { ...MARGIN, b: 38, autoexpand: false }, dragmode: false };
+    found.xaxis = { ...look, nticks: 5, zeroline: true, title: title(this.axes[0]) };
+    found.yaxis = { ...look, nticks: 6, zeroline: true };
+    if (this.track) {
+      Object.assign(found.xaxis, this.range(0), { nticks: 0, zeroline: false });
+      Object.assign(found.yaxis, this.range(1), { nticks: 0, zeroline: false, scaleanchor: "x", title: title(this.axes[1]) });
+      found.shapes = this.bounds();
+    }
+    return found;
+  }
+
+  // A rectangle, or two lines where only one of the two axes is bounded.
+  bounds() {
+    const [x, y] = this.spec.bounds;
+    const edge = { line: { color: css("--cursor"), width: 1.5, dash: "longdash" } };
+    if (x && y) return [{ type: "rect", x0: x[0], x1: x[1], y0: y[0], y1: y[1], ...edge }];
+    if (x) return x.map((v) => ({ type: "line", x0: v, x1: v, yref: "paper", y0: 0, y1: 1, ...edge }));
+    return (y ?? []).map((v) => ({ type: "line", y0: v, y1: v, xref: "paper", x0: 0, x1: 1, ...edge }));
+  }
+
+  // Track, bounds and fixed lines with a margin.
+  range(n) {
+    let low = Infinity, high = -Infinity;
+    const see = (v) => { if (v !== null && Number.isFinite(v)) { low = Math.min(low, v); high = Math.max(high, v); } };
+    for (const line of this.lines) {
+      const [number, scale] = this.numbers(line)[n];
+      for (const v of column(number)) see(v * scale);
+    }
+    (this.spec.bounds[n] ?? []).forEach(see);
+    for (const fixed of this.spec.fixed) fixed[n].forEach(see);
+    if (!(high >= low)) return {};
+    const spare = 0.07 * (high - low) || 1;
+    return { range: [low - spare, high + spare] };
   }
 
   async draw() {
-    this.fillKeys();
-    const traces = this.spec.lines.map((line) => {
-      const [x, y] = line.columns.map((c) => column(c));
-      return { x, y, type: "scatter", mode: "lines", hoverinfo: "skip", line: { color: colour(line.colour), dash: line.dash, width: 1.6 } };
-    });
-    for (const [x, y] of this.spec.edges) {
-      traces.push({ x, y, type: "scatter", mode: "lines", hoverinfo: "skip", line: { color: css("--cursor"), dash: "longdash", width: 1.5 } });
-    }
-    await Plotly.react(this.graph, traces, this.layout(), { displayModeBar: false, responsive: false });
+    const trace = ([x, y], line) => ({ x, y, type: "scatter", mode: "lines", hoverinfo: "skip", line });
+    const limit = this.track ? { color: css("--soft"), width: 1.2 } : { color: css("--cursor"), dash: "longdash", width: 1.5 };
+    const traces = this.lines.map((line) => trace(this.numbers(line).map(([n, scale]) => scaled(n, scale)),
+      { color: colour(line.colour), dash: line.dash, width: this.track ? 2 : 1.6 }));
+    const fixed = this.spec.fixed.map((pair) => trace(pair, limit));
+    if (!this.track) this.keys.replaceChildren(...this.lines.map((line) => element("p", {}, swatch(line), ` ${line.label}: ${line.text}`)));
+    await Plotly.react(this.graph, this.track ? [...fixed, ...traces] : [...traces, ...fixed], this.layout(), { displayModeBar: false, responsive: false });
     this.move(clock.index);
   }
 
   move(index) {
-    const layout = this.graph._fullLayout;
-    if (!layout) return;
-    const { xaxis, yaxis } = layout;
-    this.spec.lines.forEach((line, n) => {
-      const [x, y] = line.columns.map((c) => column(c)[index]);
+    const axes = this.graph._fullLayout;
+    this.lines.forEach((line, n) => {
+      const at = this.numbers(line).map(([number, scale]) => column(number)[index] * scale);
+      if (this.track) this.keys.textContent = `${this.spec.axes.map((name, k) => `${name} ${shown(at[k], 3)}`).join(", ")} ${this.spec.unit}`;
       const dot = this.dots[n];
-      dot.hidden = !Number.isFinite(x) || !Number.isFinite(y);
-      dot.style.left = `${xaxis._offset + xaxis.d2p(x)}px`;
-      dot.style.top = `${yaxis._offset + yaxis.d2p(y)}px`;
-      dot.style.background = colour(line.colour);
+      dot.hidden = !axes || !at.every(Number.isFinite);
+      if (dot.hidden) return;
+      dot.style.left = `${axes.xaxis._offset + axes.xaxis.d2p(at[0])}px`;
+      dot.style.top = `${axes.yaxis._offset + axes.yaxis.d2p(at[1])}px`;
+      if (!this.track) dot.style.background = colour(line.colour);
     });
   }
 }

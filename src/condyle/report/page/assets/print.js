@@ -3,8 +3,7 @@
 const PAGE_WIDTH = 700;  // CSS pixels of an A4 page within its margins
 
 function resizePlots() {
-  const parts = [...panels, ...planes, ...tracks];
-  for (const part of parts) {
+  for (const part of panels) {
     if (part.graph._fullLayout) Plotly.relayout(part.graph, sizeOf(part.plot));
     part.move(clock.index);
   }

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from .chains import readable
-from .labels import caption
+from ..naming import readable
+from .caption import caption
 from .style import DARK, house, look, new_figure
 
 if TYPE_CHECKING:

@@ -14,8 +14,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from ...mechanism.mechanism import COORDINATES
-from .chains import readable
-from .labels import COORDINATE, shown
+from ..naming import readable
+from ..panel import shown
+from .caption import COORDINATE
 from .style import ALERT, DARK, DASHES, GREY, PALETTE, house, look, new_figure
 
 if TYPE_CHECKING:

@@ -5,20 +5,21 @@ from __future__ import annotations
 import base64
 import hashlib
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from importlib.resources import files as package_files
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
 from ...atomic import write_text
 from ...progress import step
-from ..failures import failures, longest
-from ..scene import DARK, LIGHT
+from ..gaps import gaps, longest
+from ..panel import panels_of
+from ..scene import DARK, LIGHT, styles
 from .alerts import alerts
-from .beside import marker_panels
-from .columns import Columns
-from .duty import activation_panels, plane_panels
-from .facts import (
+from .html import Markup, fill, json_for_script, tag, text
+from .page_columns import Columns
+from .page_facts import (
     chain_table,
     fact_cards,
     failure_table,
@@ -27,13 +28,10 @@ from .facts import (
     reaction_tables,
     warnings_box,
 )
-from .html import Markup, fill, json_for_script, tag, text
-from .machine import machine
-from .panels import time_panels
+from .panel_data import panel_data
+from .pictures import bands_section, sweep_section
 from .reduce import Reduced, reduced
-from .source import opened
-from .sweep import bands_section, sweep_section
-from .tracks import track_panels
+from .stage_data import machine
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -51,14 +49,38 @@ _SCRIPTS = (
     "geometry",
     "stage",
     "panels",
-    "field",
+    "fields",
     "planes",
-    "tracks",
     "readout",
     "controls",
     "print",
     "main",
 )
+
+
+NEEDED = ("torque", "lift_off", "status")
+
+
+@contextmanager
+def opened(path: str | os.PathLike[str]) -> Iterator[Solution]:
+    """The solution in a NetCDF file, whose arrays stay there until they are read.
+
+    Raises: InputError: if the file is missing or is not a condyle solution.
+    """
+    import xarray as xr
+
+    from ...results.solution import Solution, open_solution
+
+    try:
+        dataset = xr.open_dataset(path, engine="h5netcdf", cache=False)
+    except Exception:
+        yield open_solution(str(path))  # which says what is wrong
+        return
+    with dataset:
+        if "mechanism" in dataset.attrs and all(name in dataset for name in NEEDED):
+            yield Solution(dataset.data_vars, dataset.coords, dataset.attrs)
+        else:
+            yield open_solution(str(path))
 
 
 def write_report(
@@ -84,22 +106,17 @@ def write_report(
     Returns: the path.
     Raises: InputError: if a file cannot be read or the report cannot be written.
     """
+
     with step("writing the report"):
-        if isinstance(solution, str | os.PathLike):
-            with opened(solution) as found:
-                page = _html_of(found, measured, tables=tables, files=files, sweep=sweep)
-        else:
-            page = _html_of(solution, measured, tables=tables, files=files, sweep=sweep)
+        with (
+            opened(solution)
+            if isinstance(solution, str | os.PathLike)
+            else nullcontext(solution) as found
+        ):
+            shown = found if measured is None else found.with_measured(measured)
+            page = report_html(shown, tables=tables, files=files, sweep=sweep)
         write_text(path, page)
     return Path(path)
-
-
-def _html_of(
-    solution: Solution, measured: Beside | str | os.PathLike[str] | None, **options: Any
-) -> str:
-    return report_html(
-        solution if measured is None else solution.with_measured(measured), **options
-    )
 
 
 def report_html(
@@ -151,20 +168,17 @@ def _payload(page: Reduced) -> dict[str, Any]:
     solution = page.solution
     columns = Columns(solution["time"].values)
     drawn = machine(solution, columns)
+    names = solution.mechanism.chain_names
+    looks = dict(zip(names, styles(names), strict=True))
     panels = [
-        *time_panels(solution, columns),
-        *activation_panels(solution, columns),
-        *marker_panels(solution, columns),
+        panel_data(section, panel, columns, looks)
+        for section, panel in panels_of(solution, page.duties)
     ]
-    planes = plane_panels(solution, columns, page.duties)
-    tracks = track_panels(solution, columns)
     told = alerts(solution, columns)
-    failed = failures(solution, page.time, page.status)
+    failed = gaps(solution, page.time, page.status)
     return {
         "machine": drawn,
         "panels": panels,
-        "planes": planes,
-        "tracks": tracks,
         "alerts": told,
         "failures": [[one.start, one.end, str(one)] for one in longest(failed)],
         "palette": {"light": LIGHT, "dark": DARK},

@@ -1,4 +1,4 @@
-"""When and why a run has no result, as the figures, the page and the live view say it."""
+"""When and why a run has no result, as figures, page and live view say it."""
 
 from __future__ import annotations
 
@@ -12,12 +12,11 @@ import numpy as np
 if TYPE_CHECKING:
     from ..results.solution import Solution
 
-
 MOST = 500
 
 
 @dataclass(frozen=True)
-class Failure:
+class Gap:
     """Samples in a row without a result.
 
     first, last: their numbers;  start, end: their times [s];  status: its word;  cause: or "".
@@ -34,9 +33,9 @@ class Failure:
         return f"{self.status}: {self.cause}" if self.cause else self.status
 
 
-def failures(
+def gaps(
     solution: Solution, time: np.ndarray | None = None, status: np.ndarray | None = None
-) -> list[Failure]:
+) -> list[Gap]:
     """Runs of failed samples, in the order of time.
 
     Args: time, status: of the whole run, (N,), where the solution has fewer samples.
@@ -44,37 +43,30 @@ def failures(
     time = solution["time"].values if time is None else time
     status = solution["status"].values if status is None else status
     words = solution["status"].attrs["flag_meanings"].split()
-    known = [_fields(record) for record in getattr(solution, "failures", ())]
-    edges = np.flatnonzero(np.diff(status, prepend=0, append=0))
+    known: list[Any] = [
+        one if isinstance(one, Mapping) else vars(one) for one in getattr(solution, "failures", ())
+    ]
     found = []
-    for first, after in pairwise(edges):
+    for first, after in pairwise(np.flatnonzero(np.diff(status, prepend=0, append=0))):
         if status[first] == 0:
             continue
         start, end = float(time[first]), float(time[after - 1])
-        word = words[int(status[first])]
         causes = [
             str(one["cause"])
             for one in known
             if one["cause"] and one["start"] <= end and start <= one["end"]
         ]
-        cause = "; ".join(dict.fromkeys(causes))
-        found.append(Failure(int(first), int(after) - 1, start, end, word, cause))
+        why = "; ".join(dict.fromkeys(causes))
+        found.append(Gap(int(first), int(after) - 1, start, end, words[int(status[first])], why))
     return found
 
 
-def longest(found: list[Failure], most: int = MOST) -> list[Failure]:
+def longest(found: list[Gap], most: int = MOST) -> list[Gap]:
     """The longest ones, in the order of time: more could not be told apart on a screen."""
     kept = sorted(found, key=lambda one: one.start - one.end)[:most]
     return sorted(kept, key=lambda one: one.first)
 
 
-def at_sample(found: list[Failure], sample: int) -> Failure | None:
-    """The failure that a sample is in, or None."""
+def at_sample(found: list[Gap], sample: int) -> Gap | None:
+    """The gap that a sample is in, or None."""
     return next((one for one in found if one.first <= sample <= one.last), None)
-
-
-def _fields(record: Any) -> Mapping[str, Any]:
-    """A record of `solution.failures`: a mapping, or an object with such attributes."""
-    if isinstance(record, Mapping):
-        return record
-    return {name: getattr(record, name) for name in ("start", "end", "cause")}

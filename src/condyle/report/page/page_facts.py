@@ -13,9 +13,10 @@ import numpy as np
 
 from ...errors import InputError
 from ...results.summary import summarize
-from ..failures import failures, longest
+from ..actuators import drawn_limits
+from ..gaps import gaps, longest
+from ..panel_list import reaction
 from .html import Markup, table, tag
-from .panels import drawn_limits, reaction_magnitudes, reaction_variables
 
 if TYPE_CHECKING:
     from ...mechanism.actuator import Limits
@@ -120,7 +121,7 @@ def _facts(page: Reduced) -> Iterator[Fact]:
 
 def failure_table(page: Reduced) -> Markup:
     """When there is no result, and why."""
-    found = failures(page.solution, page.time, page.status)
+    found = gaps(page.solution, page.time, page.status)
     if not found:
         return Markup("")
     rows = [
@@ -184,20 +185,15 @@ def _peak_cells(
 
 def reaction_tables(solution: Solution) -> Markup:
     """Largest magnitude of every reaction: a table for each kind, a row for each joint."""
-    found = []
-    time = solution["time"].values
-    for name in reaction_variables(solution):
-        unit = solution[name].attrs.get("units", "")
-        title = str(solution[name].attrs.get("long_name", name))
+    found, time = [], solution["time"].values
+    for panel in reaction(solution):
         rows = []
-        for group, lines in reaction_magnitudes(solution, name).items():
-            for label, values in lines.items():
-                if np.isfinite(values).any():
-                    k = int(np.nanargmax(values))
-                    what = f"{group} {label}".strip()
-                    rows.append([what, f"{values[k]:.4g} {unit}", f"{time[k]:g} s"])
+        for curve in panel.curves:
+            if np.isfinite(curve.values).any():
+                k = int(np.nanargmax(curve.values))
+                rows.append([curve.label, f"{curve.values[k]:.4g} {panel.unit}", f"{time[k]:g} s"])
         if rows:
-            caption = f"Largest {title[:1].lower() + title[1:]}"
+            caption = f"Largest {panel.title[:1].lower() + panel.title[1:]}"
             found.append(table(["Where", "Largest", "at"], rows, caption))
     return tag("div", *found, class_="grid tables") if found else Markup("")
 

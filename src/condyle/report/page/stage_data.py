@@ -15,8 +15,7 @@ import numpy as np
 
 from ..scene import Scene, contact_normals, contact_patch, place, platform_hull, styles
 from ..scene.chains import PLATFORM_JOINT
-from .beside import markers, reach
-from .columns import Columns
+from .page_columns import Columns
 
 if TYPE_CHECKING:
     from ...mechanism import Mechanism
@@ -27,6 +26,7 @@ ARROW = 0.9  # longest arrow
 ONE_SCALE = 0.4  # of loads and contact forces, if the smaller ones are at least this part
 TRIAD = 0.4  # arms of the coordinate triad, before they are rounded
 ROUND = (1.0, 2.0, 5.0, 10.0)
+WIDE = (1.0, 99.0)  # percent of its samples that the picture must hold of each marker
 
 
 def machine(solution: Solution, columns: Columns) -> dict[str, Any]:
@@ -249,3 +249,28 @@ def _rounded(length: float) -> float:
     """The nearest of 1, 2, 5 times a power of ten."""
     power = 10.0 ** np.floor(np.log10(length))
     return float(power * min(ROUND, key=lambda digit: abs(digit - length / power)))
+
+
+def markers(solution: Solution, columns: Columns) -> list[dict[str, Any]]:
+    """Measured markers: name, body, and the numbers of the columns of its place."""
+    if "marker_place" not in solution:
+        return []
+    places, names = solution["marker_place"].values, solution["marker"].values
+    return [
+        {
+            "name": str(name),
+            "body": str(body),
+            "columns": columns.add_vector(f"marker.{name}", places[:, i]),
+        }
+        for i, (name, body) in enumerate(zip(names, solution["marker_body"].values, strict=True))
+    ]
+
+
+def reach(solution: Solution) -> np.ndarray:
+    """Corners, (2 m, 3) [m], between which each marker mostly is."""
+    if "marker_place" not in solution:
+        return np.empty((0, 3))
+    places = solution["marker_place"].values
+    seen = [p[np.isfinite(p).all(axis=1)] for p in places.transpose(1, 0, 2)]
+    corners = [c for p in seen if len(p) for c in np.percentile(p, WIDE, axis=0)]
+    return np.array(corners).reshape(-1, 3)

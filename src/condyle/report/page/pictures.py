@@ -23,7 +23,7 @@ def sweep_section(found: xr.Dataset | None) -> Markup:
     if found is None:
         return Markup("")
     require("matplotlib", "figures")
-    from ..figures.sweep import sweep_plots
+    from ..figures.sweep_figures import sweep_plots
     from ..tables.sweep import sweep_tables
 
     pictures = [

@@ -1,4 +1,4 @@
-"""Motion of the platform: its path in space, and its coordinates over time (the paper's Fig. 5)."""
+"""The path of a platform point in space."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure, FigureBase
 
-from ...mechanism.mechanism import COORDINATES
-from .labels import COORDINATE, caption, shown
-from .panels import finish, legend, lines
+from ..scene import rotations
+from .caption import caption
 from .registry import plot
-from .style import PALETTE, XYZ, house, narrow, new_figure
+from .style import PALETTE, narrow, new_figure
 
 if TYPE_CHECKING:
     from ...results.solution import Solution
@@ -21,21 +20,7 @@ VIEWS = (
     ("front (frontal)", "Y", "Z"),
     ("above (horizontal)", "X", "Y"),
 )
-VARIABLES = ("pose", "pose_rate", "pose_acceleration")
-KINDS = (
-    ("position", "angle"),
-    ("velocity", "angular rate"),
-    ("acceleration", "angular acceleration"),
-)
 DEFAULT_LANDMARK = "incisor"
-
-
-@plot()
-def motion(solution: Solution) -> Figure:
-    """Pose coordinates, their rates and accelerations over time."""
-    figure = new_figure("Motion of the platform", caption(solution), 8, 6.2)
-    draw_coordinates(figure, solution)
-    return figure
 
 
 @plot()
@@ -45,35 +30,6 @@ def path(solution: Solution) -> Figure:
     figure = new_figure(f"Path of {landmark(solution)[0]}", caption(solution), 10, height)
     draw_path(figure, solution)
     return figure
-
-
-@house
-def figure_5(solution: Solution) -> Figure:
-    """The paper's Fig. 5: path and coordinates."""
-    title = f"Motion of the platform: path of {landmark(solution)[0]}, and coordinates"
-    figure = new_figure(title, caption(solution), 10, 9)
-    [above], [below] = figure.subfigures(2, 1, squeeze=False, height_ratios=(1, 2.4))
-    draw_path(above, solution)
-    draw_coordinates(below, solution)
-    return figure
-
-
-def draw_coordinates(figure: FigureBase, solution: Solution) -> None:
-    grid = figure.subplots(3, 2, sharex=True)
-    labels = []
-    for order, (row, variable) in enumerate(zip(grid, VARIABLES, strict=True)):
-        row_labels = []
-        for axes, names, unit, kind in zip(
-            row, (COORDINATES[:3], COORDINATES[3:]), ("m", "rad"), KINDS[order], strict=True
-        ):
-            unit, factor = shown(unit, order)
-            values = solution[variable].sel(coordinate=list(names)).values * factor
-            written = [COORDINATE.get(name, name) + "′" * order for name in names]
-            lines(axes, solution, values, written, XYZ)
-            legend(axes, 3)
-            row_labels.append(f"{kind} [{unit}]")
-        labels.append(row_labels)
-    finish(grid, labels)
 
 
 def draw_path(figure: FigureBase, solution: Solution) -> None:
@@ -117,11 +73,6 @@ def landmark(solution: Solution) -> tuple[str, np.ndarray]:
 
 
 def track(solution: Solution, point: np.ndarray) -> np.ndarray:
-    """Places of a platform point in {S}, (N, 3) [m]; R = Rx(alpha) Ry(beta) Rz(gamma)."""
+    """Places of a platform point in {S}, (N, 3) [m]."""
     pose = solution["pose"].values
-    (ca, cb, cg), (sa, sb, sg) = np.cos(pose[:, 3:].T), np.sin(pose[:, 3:].T)
-    x, y, z = point
-    x, y = cg * x - sg * y, sg * x + cg * y
-    x, z = cb * x + sb * z, cb * z - sb * x
-    y, z = ca * y - sa * z, sa * y + ca * z
-    return pose[:, :3] + np.column_stack([x, y, z])
+    return pose[:, :3] + rotations(pose[:, 3:]) @ point

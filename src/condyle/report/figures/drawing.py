@@ -1,0 +1,498 @@
+"""Panels by matplotlib: each kind of panel on axes, and the axes of a figure in their grid."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from functools import wraps
+from textwrap import fill
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, FigureBase
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import MaxNLocator
+
+from ..actuators import EMG_ROW, REACH
+from ..gaps import gaps, longest
+from ..naming import groups, heading, readable, short, stem
+from ..panel import Curve, Panel, PanelGroup
+from .caption import TIME, caption, written
+from .registry import plot
+from .style import (
+    ALERT,
+    DARK,
+    GREY,
+    PALETTE,
+    XYZ,
+    figsize_is_free,
+    look,
+    narrow,
+    new_figure,
+    nothing_to_draw,
+)
+
+if TYPE_CHECKING:
+    from ...results.solution import Solution
+
+Columns = Mapping[str, Mapping[str, tuple[Curve, Panel]]]
+
+NO_RESULT = "no result"
+MOST_ROWS = 6  # of panels one above the other
+MOST_COLUMNS = 4
+MOST_BESIDE = 4  # curves whose names stand above the axes
+NAME, LONG = 16, 76  # letters of a line: of a name, and of what a panel means
+ORDER = ("first named", "second named")
+COLOURS = "YlGnBu"
+VIEW_RATIO = 0.7  # height over width of a track's view
+BESIDE, BELOW, ABOVE = 0.65, 0.75, 0.7  # labels of a view, and the heading [inch]
+LIMIT: dict[str, Any] = {"color": DARK, "lw": 1, "ls": (0, (6, 3))}
+
+
+def figure_of(group: PanelGroup) -> Callable[..., Figure]:
+    """The figure of a group of panels, registered by the group's name."""
+
+    @wraps(group.panels)
+    def draw(solution: Solution, *args: Any, **options: Any) -> Figure:
+        found, title = list(group.panels(solution, *args, **options)), group.title(solution)
+        if not found:
+            return nothing_to_draw(title, caption(solution), group.empty)
+        if group.split is not None and solution.sizes["chain"] > group.split:
+            columns = split_columns(found, [str(name) for name in solution["chain"].values])
+            return draw_pairs(mathematics(title), solution, columns, group.same)
+        found = [one for panel in found for one in one_set_each(panel)]
+        width, height, columns_ = grid_size(found)
+        figure = new_figure(mathematics(title), caption(solution), width, height, columns_)
+        draw_grid(figure, solution, found)
+        return figure
+
+    return plot(group.name)(draw)
+
+
+def mathematics(text: str) -> str:
+    """J_A and J_W as they are printed."""
+    return re.sub(r"\bJ_([AW])\b", r"$J_\1$", text)
+
+
+# -- panels in a grid
+
+
+def places(panels: Sequence[Panel]) -> tuple[list[tuple[int, int]], int, int]:
+    """Row and column of each panel by its `place`, else row by row; and how many there are."""
+    rows, columns = (list(dict.fromkeys(panel.place[k] for panel in panels)) for k in (0, 1))
+    if len({panel.place for panel in panels}) == len(panels):
+        return (
+            [(rows.index(p.place[0]), columns.index(p.place[1])) for p in panels],
+            len(rows),
+            len(columns),
+        )
+    across = min(MOST_COLUMNS, max(2, int(np.ceil(np.sqrt(len(panels))))), len(panels))
+    across = 1 if narrow() else across
+    return [divmod(i, across) for i in range(len(panels))], -(-len(panels) // across), across
+
+
+def row_heights(panels: Sequence[Panel]) -> list[float]:
+    """Of a grid's rows [inch]."""
+    tall = {"time": 1.95, "plane": 2.5, "track": 2.6}
+    at, rows, _ = places(panels)
+    found = [0.0] * rows
+    for panel, (row, _) in zip(panels, at, strict=True):
+        field = 0.35 + 0.19 * len(panel.curves)
+        found[row] = max(found[row], tall.get(panel.kind, field))
+    return found
+
+
+def grid_size(panels: Sequence[Panel]) -> tuple[float, float, int]:
+    """Width and height of a grid's figure [inch], and its columns."""
+    columns = places(panels)[2]
+    wide = {"plane": 0.6 + 3.1 * columns, "track": 0.3 + 3.7 * columns}
+    width = wide.get(panels[0].kind, max(7.0, 4.1 * columns))
+    journal = {"plane": 1, "track": 1}.get(panels[0].kind, columns)
+    return width, 1.0 + sum(row_heights(panels)), journal
+
+
+def draw_grid(figure: FigureBase, solution: Solution, panels: Sequence[Panel]) -> None:
+    """Draw panels, each on axes of its own."""
+    at, rows, columns = places(panels)
+    over_time = panels[0].kind in ("time", "field")
+    heights = {"height_ratios": row_heights(panels)}
+    grid = figure.subplots(rows, columns, sharex=over_time, squeeze=False, gridspec_kw=heights)
+    for panel, place in zip(panels, at, strict=True):
+        DRAW[panel.kind](grid[place], solution, panel)
+    used = [grid[place] for place in at]
+    for axes in set(grid.ravel()) - set(used):
+        axes.remove()
+    if panels[0].kind == "track":
+        lay_out_tracks(figure, grid)
+    elif over_time:
+        label_time(grid, used)
+        timed = [axes for axes, panel in zip(used, panels, strict=True) if panel.kind == "time"]
+        add_legends(figure, timed)
+
+
+def one_set_each(panel: Panel) -> list[Panel]:
+    """The panel, or one for each of its sets."""
+    if len(panel.choices) == 1:
+        return [panel]
+    return [
+        replace(panel, note=label, sets=curves, place=(f"{panel.id} {label}", ""))
+        for label, curves in panel.choices.items()
+    ]
+
+
+def label_time(grid: np.ndarray, used: Sequence[Axes]) -> None:
+    """Time below the last panel of each column."""
+    for column in grid.T:
+        own = [axes for axes in column if axes in used]
+        for axes in own:
+            axes.tick_params(labelbottom=axes is own[-1])
+        own[-1].set_xlabel(TIME)
+    grid[0, 0].figure.align_ylabels(list(used))
+
+
+def add_legends(figure: FigureBase, axes: Sequence[Axes]) -> None:
+    """One legend for all where their curves have the same names; beside them where many have."""
+    names = [
+        [name for name in one.get_legend_handles_labels()[1] if name != NO_RESULT] for one in axes
+    ]
+    if len(axes) > 1 and all(own == names[0] for own in names) and isinstance(figure, Figure):
+        legend_above(figure, axes)
+        return
+    titled = any(len(one.get_title(loc="left")) > LONG / 2 for one in axes)
+    beside = titled or max(map(len, names), default=0) > MOST_BESIDE
+    for one, own in zip(axes, names, strict=True):
+        if own:
+            legend_beside(one) if beside else legend(one, min(3, len(own)))
+
+
+# -- pairs of chains
+
+
+def split_columns(panels: Sequence[Panel], chains: Sequence[str]) -> Columns:
+    """Column -> chain -> its curve: of what a panel draws, or of each line that a chain has."""
+    columns: dict[str, dict[str, tuple[Curve, Panel]]] = {}
+    for panel in panels:
+        for label, curves in panel.choices.items():
+            for curve in curves:
+                if label in chains:
+                    columns.setdefault(curve.label, {})[label] = curve, panel
+                elif not label:
+                    columns.setdefault(panel.place[0], {})[curve.label] = curve, panel
+    return columns
+
+
+def draw_pairs(title: str, solution: Solution, columns: Columns, same: bool) -> Figure:
+    """A row for each pair of chains; with `same`, one scale in a column for those of one unit."""
+    first = next(iter(columns.values()))
+    names = list(first)
+    units = [first[name][1].unit for name in names]
+    rows = [[names[i] for i in members] for members in groups(names, units)]
+    dense, alone = len(rows) > MOST_ROWS and len(columns) > 1, list(columns) == [""]
+    many = alone and len(rows) > MOST_ROWS and not narrow()
+    count, across = -(-len(rows) // 2) if many else len(rows), 2 if many else len(columns)
+    if alone:
+        size = (12.0, 0.9 + 1.45 * count, 2) if many else (7.5, 0.9 + 1.7 * count, 1)
+    elif dense:
+        size = (8.5, 1.4 + 0.62 * count, across)
+    else:
+        size = (max(6.0, 1.8 + 2.7 * across), 1.1 + 1.7 * count, across)
+    figure = new_figure(title, caption(solution), *size)
+    grid = figure.subplots(count, across, sharex=True, squeeze=False)
+    cells = grid.ravel()[: len(rows)][:, None] if alone else grid
+    sides = [short(row) for row in rows]
+    paired = all(own == sides[0] for own in sides)
+    one_unit = len({*units}) == 1
+    for row, (line, own, told) in enumerate(zip(cells, rows, sides, strict=True)):
+        labels = list(map(readable, own))
+        if dense or many:
+            labels = told if many or paired else list(ORDER[: len(own)])
+        panel = first[own[0]][1]
+        for axes, (word, column) in zip(line, columns.items(), strict=True):
+            panel = column[own[0]][1]
+            if alone:
+                axes.set_title(heading(own))
+            elif row == 0:
+                unit = f" [{panel.shown.unit}]" if dense and one_unit else ""
+                axes.set_title(word + unit, pad=8 if dense else 20)
+            draw_curves(axes, solution, panel, [column[name][0] for name in own], labels)
+            if not dense:
+                draw_limits(axes, panel, own)
+        if alone:
+            legend(line[0], 2)
+        elif not dense:
+            legend_beside(line[-1])
+        panel = first[own[0]][1]
+        if dense:
+            unit = "" if one_unit else f" [{panel.shown.unit}]"
+            text = fill(heading(own), NAME) + unit
+            line[0].set_ylabel(text, rotation=0, ha="right", va="center", fontsize=7)
+        else:
+            line[0].set_ylabel(axis_label(panel))
+    if same:
+        for unit in set(units):
+            mine = [k for k, own in enumerate(rows) if first[own[0]][1].unit == unit]
+            for one in cells.T:
+                same_scale([one[k] for k in mine])
+    label_time(grid, list(cells.ravel()))
+    for axes in set(grid.ravel()) - set(cells.ravel()):
+        axes.remove()
+    if dense:
+        draw_near_limits(cells, rows, columns)
+        for axes in cells.ravel():
+            axes.tick_params(labelsize=6)
+            axes.yaxis.set_major_locator(MaxNLocator(3))
+        legend_above(figure, cells[0])
+    return figure
+
+
+def draw_near_limits(cells: np.ndarray, rows: Sequence[Sequence[str]], columns: Columns) -> None:
+    """Limits in the panels whose scale reaches so far."""
+    for column, found in zip(cells.T, columns.values(), strict=True):
+        for axes, own in zip(column, rows, strict=True):
+            panel, (low, high) = found[own[0]][1], axes.get_ylim()
+            limits = [one for one in panel.limits if {*own} & {*one.of}]
+            for level in {v * panel.shown.scale for one in limits for v in (one.low, one.high)}:
+                if low <= level <= high:
+                    axes.axhline(level, **LIMIT | {"lw": 0.8})
+
+
+def same_scale(column: Sequence[Axes]) -> None:
+    """Give axes one vertical scale with zero on it, so that their curves can be compared."""
+    curves = [np.asarray(line.get_ydata()) for axes in column for line in axes.get_lines()]
+    low = min(float(np.nanmin(curve, initial=0.0)) for curve in curves)
+    high = max(float(np.nanmax(curve, initial=0.0)) for curve in curves)
+    margin = 0.06 * (high - low)
+    for axes in column:
+        if margin > 0:
+            axes.set_ylim(low - margin, high + margin)
+
+
+# -- curves over time
+
+
+def axis_label(panel: Panel) -> str:
+    return mathematics(f"{panel.axis} [{panel.shown.unit}]")
+
+
+def looks(panel: Panel, curves: Sequence[Curve]) -> Sequence[dict[str, Any]]:
+    """A pair has one colour, and every line dashes of its own; bands differ in colour."""
+    if panel.components:
+        return XYZ
+    names = [curve.label for curve in curves]
+    stems = list(dict.fromkeys(map(stem, names)))
+    banded = any(curve.bands is not None for curve in curves)
+    return [look(i if banded else stems.index(stem(name)), i) for i, name in enumerate(names)]
+
+
+def draw_time(axes: Axes, solution: Solution, panel: Panel) -> None:
+    """Curves over time, with what they mean."""
+    curves = panel.curves
+    labels = [written(c.label) if panel.components else readable(c.label) for c in curves]
+    draw_curves(axes, solution, panel, curves, labels, looks(panel, curves))
+    values = np.concatenate([c.values[np.isfinite(c.values)] for c in curves])
+    if values.size and values.min() < 0 < values.max():
+        axes.axhline(0, color=GREY, lw=0.8, zorder=1)
+    if panel.note:
+        note = f"{panel.title}: {panel.note[0].lower()}{panel.note[1:].rstrip('.')}"
+        axes.set_title(fill(mathematics(note), LONG))
+    axes.set_ylabel(axis_label(panel))
+    if panel.log and (values > 0).any():
+        axes.set_yscale("log")
+    draw_limits(axes, panel, [curve.label for curve in curves])
+
+
+def draw_curves(
+    axes: Axes,
+    solution: Solution,
+    panel: Panel,
+    curves: Sequence[Curve],
+    labels: Sequence[str],
+    styles: Sequence[dict[str, Any]] | None = None,
+) -> None:
+    """Curves with their bands, the outer ones paler; samples without a result are shaded."""
+    time, scale = solution["time"].values, panel.shown.scale
+    styles = styles or [look(i) for i in range(len(curves))]
+    for curve, label, style in zip(curves, labels, styles, strict=True):
+        axes.plot(time, curve.values * scale, label=label, **style)
+        bands = np.empty((0, 0)) if curve.bands is None else curve.bands * scale
+        for low, high in zip(bands[: len(bands) // 2], bands[::-1], strict=False):
+            axes.fill_between(time, low, high, color=style["color"], alpha=0.18, lw=0)
+    if len(time) > 1:
+        axes.set_xlim(time[0], time[-1])
+    for i, gap in enumerate(longest(gaps(solution))):
+        named = NO_RESULT if i == 0 else None
+        axes.axvspan(gap.start, gap.end, color=GREY, alpha=0.2, lw=1, label=named)
+
+
+def draw_limits(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
+    """Limits as lines, or in the title where the data stay far below; one at 0 is the axis."""
+    peak = max(float(np.nanmax(np.abs(curve.values), initial=0.0)) for curve in panel.curves)
+    for limit in panel.limits:
+        if limit.of and not {*names} & {*limit.of}:
+            continue
+        text = readable(limit.label(names))
+        levels = [level for level in (limit.high, limit.low) if level and np.isfinite(level)]
+        if levels and min(map(abs, levels)) > REACH * peak:
+            title = axes.get_title(loc="left")
+            axes.set_title(f"{title + ', ' if title else ''}{text} is outside the view")
+            continue
+        levels = [level * panel.shown.scale for level in levels]
+        for level in levels:
+            axes.axhline(level, **LIMIT)
+        place, at = axes.get_yaxis_transform(), max(levels, default=0.0)
+        small: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "color": DARK}
+        axes.annotate(text, (0, at), (3, 2), xycoords=place, **small)
+
+
+# -- the other kinds
+
+
+def draw_field(axes: Axes, solution: Solution, panel: Panel) -> None:
+    """Rows of colour from 0 to 1; beyond 1 and without a result they have colours of their own."""
+    names = [curve.label for curve in panel.curves]
+    values = np.array([np.abs(c.values) * (c.scale or 1.0) for c in panel.curves])
+    colours = colormaps[COLOURS].with_extremes(bad="#DDDDDD", over=ALERT)
+    edges, rows = boundaries(solution["time"].values), np.arange(len(names) + 1)
+    look: dict[str, Any] = {"cmap": colours, "vmin": 0.0, "vmax": 1.0, "rasterized": True}
+    drawn = axes.pcolormesh(edges, rows, np.ma.masked_invalid(values), **look)
+    axes.set_yticks(rows[:-1] + 0.5, list(map(readable, names)), fontsize=7)
+    for name, label in zip(names, axes.get_yticklabels(), strict=True):
+        if name.endswith(EMG_ROW):
+            label.set(style="italic", color=GREY)
+    axes.invert_yaxis()
+    axes.grid(False)
+    # A line between pairs, so that rows can be followed to their names.
+    stems = [stem(name.removesuffix(EMG_ROW)) for name in names]
+    for level in [i for i in range(1, len(stems)) if stems[i] != stems[i - 1]]:
+        axes.axhline(level, color=GREY, lw=0.6)
+    over = bool(np.nanmax(values, initial=0.0) > 1.0)
+    beside = axes.inset_axes((1.015, 0.0, 0.018, 1.0))  # no panel of its own
+    axes.figure.colorbar(drawn, cax=beside, extend="max" if over else "neither")
+    axes.set_ylabel(f"{panel.axis} [{panel.unit}]")
+    if over:
+        axes.set_title("orange: beyond the greatest effort")
+
+
+def boundaries(time: np.ndarray) -> np.ndarray:
+    """Where one sample's colour ends and the next begins, (N + 1,) [s]."""
+    if len(time) < 2:
+        return time[0] + np.array([-0.5, 0.5])
+    return np.concatenate([time[:1], 0.5 * (time[1:] + time[:-1]), time[-1:]])
+
+
+def draw_plane(axes: Axes, solution: Solution, panel: Panel) -> None:
+    """Curves over what is across, and the box of their limits as far as it is near."""
+    names = short([curve.label for curve in panel.curves])
+    for i, (curve, name) in enumerate(zip(panel.curves, names, strict=True)):
+        assert curve.across is not None
+        axes.plot(curve.across[1], curve.values, label=f"{name}: {curve.text}", **look(i))
+    for xs, ys in panel.lines:
+        axes.plot(xs, ys, **LIMIT)
+    axes.margins(0.06)
+    axes.locator_params(nbins=5)
+    axes.legend(
+        title=f"limits: {panel.note}", loc="lower right" if narrow() else "lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        borderaxespad=0.0, borderpad=0.2, alignment="left", title_fontsize="small",
+    )  # fmt: skip
+    axes.set_title(panel.title, pad=13 * (1 + len(names)))
+    axes.set(xlabel=panel.across, ylabel=f"{panel.axis} [{panel.unit}]")
+
+
+def draw_track(axes: Axes, solution: Solution, panel: Panel) -> None:
+    """A track on equal scales with its bounds; where it is out of them stands out."""
+    [curve], scale = panel.curves, panel.shown.scale
+    assert curve.across is not None and panel.outside is not None
+    x, y = curve.across[1] * scale, curve.values * scale
+    axes.plot(x, y, color=PALETTE[0], lw=1.5, label=curve.label)
+    axes.plot(x[:1], y[:1], "o", color=PALETTE[0], ms=4, label="start")
+    if (out := panel.outside).any():
+        axes.plot(x[out], y[out], ".", color=ALERT, ms=4, label="out of bounds")
+    across, up = (None if one is None else np.multiply(one, scale) for one in panel.bounds)
+    look: dict[str, Any] = {"color": GREY, "lw": 1.0, "ls": (0, (4, 2)), "label": "bounds"}
+    if across is not None and up is not None:
+        (x0, x1), (y0, y1) = across, up
+        axes.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, **look))
+    else:
+        for interval, line in zip((across, up), (axes.axvline, axes.axhline), strict=True):
+            for value in () if interval is None else interval:
+                line(value, **look)
+                look.pop("label", None)
+    frame(axes)
+    for xs, ys in panel.lines:
+        axes.plot(xs * scale, ys * scale, color=PALETTE[2], lw=1.0, zorder=1, label=panel.note)
+    unit = panel.shown.unit
+    axes.set(xlabel=f"{panel.across} [{unit}]", ylabel=f"{panel.axis} [{unit}]")
+    axes.set_title(readable(panel.title))
+
+
+def frame(axes: Axes) -> None:
+    """Equal scales, with room around everything drawn."""
+    axes.autoscale_view()
+    (x0, x1), (y0, y1) = axes.get_xlim(), axes.get_ylim()
+    width = 1.15 * max(x1 - x0, (y1 - y0) / VIEW_RATIO)
+    x, y, height = (x0 + x1) / 2, (y0 + y1) / 2, VIEW_RATIO * width
+    axes.set(xlim=(x - width / 2, x + width / 2), ylim=(y - height / 2, y + height / 2))
+    axes.locator_params(axis="x", nbins=5)
+    axes.set_aspect("equal", adjustable="box")
+
+
+def lay_out_tracks(figure: FigureBase, grid: np.ndarray) -> None:
+    """The views have a shape of their own, and the figure follows."""
+    assert isinstance(figure, Figure)
+    if figsize_is_free():
+        wide = figure.get_figwidth() / grid.shape[1] - BESIDE
+        figure.set_figheight(2 * (VIEW_RATIO * wide + BELOW) + (2 if narrow() else 1) * ABOVE)
+    figure.set_layout_engine("compressed", w_pad=0.12)  # made for axes of fixed shape
+    legend_above(figure, grid.ravel(), 4 if grid.shape[1] > 1 else 2)
+
+
+DRAW: dict[str, Callable[[Axes, Any, Panel], None]] = {
+    "time": draw_time,
+    "field": draw_field,
+    "plane": draw_plane,
+    "track": draw_track,
+}
+
+
+# -- legends
+
+
+def legend_beside(axes: Axes) -> None:
+    """A legend to the right of the axes, above them where there is no room."""
+    if narrow():
+        legend(axes, 2)
+    else:
+        axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+
+
+def legend(axes: Axes, columns: int = 1) -> None:
+    """A legend above the axes' right end, where no curve runs."""
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=columns, borderaxespad=0.0)
+
+
+def legend_above(figure: Figure, panels: Iterable[Axes], columns: int = 3) -> None:
+    """One legend between the heading and all panels, each label once."""
+    entries: dict[str, Any] = {}
+    for axes in panels:
+        handles, labels = axes.get_legend_handles_labels()
+        entries |= dict(zip(labels, handles, strict=True))
+    columns = 2 if narrow() else columns
+    rows = -(-len(entries) // columns)
+    # The heading keeps the room: blank lines below it.
+    large, small = mpl.rcParams["figure.titlesize"], mpl.rcParams["legend.fontsize"]
+    title = figure.get_suptitle()
+    blank = -(-int(rows * 2.0 * small) // int(1.2 * large))
+    figure.suptitle(title + "\n" * blank, x=0.01, ha="left")
+    below = 1.9 * large if title else 0.0
+    figure.legend(
+        list(entries.values()),
+        list(entries),
+        loc="upper left",
+        bbox_to_anchor=(0.0, 1.0 - below / (72 * figure.get_figheight())),
+        ncols=columns,
+    )

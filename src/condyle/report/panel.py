@@ -1,0 +1,215 @@
+"""What a panel is: one plot as data, that figures draw by matplotlib and the page by plotly."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.metadata import entry_points
+from inspect import signature
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+
+import numpy as np
+
+from ..mechanism.actuator import Limits
+
+if TYPE_CHECKING:
+    from ..results.solution import Solution
+    from .actuators import Duty
+
+GROUP = "condyle.panels"
+
+
+class Shown(NamedTuple):
+    """How people see an SI unit: theirs, and the factor to it."""
+
+    unit: str
+    scale: float = 1.0
+
+
+_PEOPLE = {
+    "m": Shown("mm", 1e3),
+    "rad": Shown("°", 180 / math.pi),
+    "m²/rad": Shown("mm²/rad", 1e6),
+    "m²/m": Shown("mm", 1e3),
+}
+
+
+def shown(unit: str, order: int = 0) -> Shown:
+    """Millimetres and degrees for people, SI for the rest; also of derivatives over time."""
+    found = _PEOPLE.get(unit, Shown(unit))
+    return Shown(found.unit + ("", "/s", "/s²")[order], found.scale)
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One curve: a name of the file, its samples (N,) in SI, and the column that holds them.
+
+    across: column and samples (N,) of what it runs over, where that is not time.
+    bands: quantiles over variants, (Q, N), from the least.   scale: its own, in place of the
+    panel's.   text: what a legend adds.
+    """
+
+    label: str
+    column: str
+    values: np.ndarray
+    across: tuple[str, np.ndarray] | None = None
+    bands: np.ndarray | None = None
+    scale: float | None = None
+    text: str = ""
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Levels `low` and `high` (SI; infinite: none), in words, and the curves that they hold for."""
+
+    low: float
+    high: float
+    text: str
+    of: tuple[str, ...] = ()
+
+    def label(self, names: Sequence[str]) -> str:
+        """'limit ±3 N m', with the curves that have it unless all of `names` do."""
+        own = [name for name in names if name in self.of]
+        return self.text + ("" if len(own) == len(names) or not own else f" ({', '.join(own)})")
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One plot as data.
+
+    axis: what is drawn, in a word;  unit: of the values in SI, of derivative `order` over time.
+    sets: curves by the label of their set; several sets are a choice.
+    kind: "time": curves over time;  "field": rows of colour, |value| from 0 to 1 and beyond;
+          "plane": curves over `across`, with fixed `lines`;  "track": likewise on equal scales.
+    place: row and column within its group.   components: the curves are those of a vector.
+    lines: fixed ones, (x, y) each.   bounds: intervals across and up, of a track, in SI.
+    outside: samples of a track, (N,), that are out of them.
+    """
+
+    id: str
+    title: str
+    axis: str
+    unit: str
+    sets: Mapping[str, Sequence[Curve]] | Sequence[Curve]
+    kind: str = "time"
+    order: int = 0
+    place: tuple[str, str] = ("", "")
+    note: str = ""
+    limits: Sequence[Limit] = ()
+    log: bool = False
+    components: bool = False
+    across: str = ""
+    lines: Sequence[Any] = ()
+    bounds: Sequence[tuple[float, float] | None] = (None, None)
+    outside: np.ndarray | None = None
+
+    @property
+    def shown(self) -> Shown:
+        return shown(self.unit, self.order)
+
+    @property
+    def choices(self) -> Mapping[str, Sequence[Curve]]:
+        return self.sets if isinstance(self.sets, Mapping) else {"": self.sets}
+
+    @property
+    def curves(self) -> list[Curve]:
+        return [curve for curves in self.choices.values() for curve in curves]
+
+
+Give = TypeVar("Give", bound=Callable[..., Iterator[Panel]])
+
+
+@dataclass(frozen=True)
+class PanelGroup:
+    """Panels that belong together: one figure, or a part of the page's `section`.
+
+    name: of its figure;  heading: of that.   panels: gives them for a solution.
+    split: with more chains than so many, a figure draws each pair in a panel of its own; None:
+    never.   same: then all of one unit have one scale.   empty: said where there are no panels.
+    """
+
+    name: str
+    section: str
+    heading: str | Callable[[Solution], str]
+    panels: Callable[..., Iterator[Panel]]
+    split: int | None = None
+    same: bool = False
+    empty: str = "this solution has nothing of it"
+
+    def title(self, solution: Solution) -> str:
+        return self.heading if isinstance(self.heading, str) else self.heading(solution)
+
+
+PANEL_GROUPS: dict[str, PanelGroup] = {}
+listeners: list[Callable[[PanelGroup], Any]] = []
+
+
+def panels(
+    section: str, heading: str | Callable[[Solution], str], **options: Any
+) -> Callable[[Give], Give]:
+    """Register a function that gives panels of a solution; see `PanelGroup` for the options."""
+
+    def register(give: Give) -> Give:
+        group = PanelGroup(give.__name__, section, heading, give, **options)
+        PANEL_GROUPS[group.name] = group
+        for listener in listeners:
+            listener(group)
+        return give
+
+    return register
+
+
+def known_groups() -> list[PanelGroup]:
+    """All that are registered, other packages' last."""
+    import_module(".panel_list", __package__)
+    for point in entry_points(group=GROUP):
+        point.load()
+    return list(PANEL_GROUPS.values())
+
+
+def panels_of(
+    solution: Solution, duties: Sequence[Duty] | None = None, every: bool = False
+) -> Iterator[tuple[str, Panel]]:
+    """Every panel of a solution with its section of the page, in the page's order.
+
+    Args: duties: of every sample, where the solution has fewer.
+          every: those too in which there is nothing but zeros, as in one piece of a run.
+    """
+    given = {"duties": duties, "every": every}
+    for group in known_groups():
+        takes = given.keys() & signature(group.panels).parameters
+        for panel in group.panels(solution, **{name: given[name] for name in takes}):
+            yield group.section, panel
+
+
+def of_names(
+    solution: Solution, variable: str, dimension: str, values: np.ndarray | None = None
+) -> list[Curve]:
+    """A curve for each entry of `dimension` of a variable (time, dimension), with its bands."""
+    values = solution[variable].values if values is None else values
+    name = f"{variable}_quantile"
+    bands = np.moveaxis(solution[name].values, -1, 0) if name in solution else None
+    return [
+        Curve(
+            str(entry),
+            f"{variable}.{entry}",
+            values[:, i],
+            bands=None if bands is None else bands[i],
+        )
+        for i, entry in enumerate(solution[dimension].values)
+    ]
+
+
+def distinct(bounds: Sequence[Limits], names: Sequence[str], people: Shown) -> list[Limit]:
+    """Each limit once, with the chains it is for."""
+    pairs = {(one.low, one.high): one for one in bounds if one.limited}
+    return [
+        Limit(
+            *pair,
+            f"limit {one.effort_text(people.unit, people.scale, 4)}",
+            tuple(n for n, b in zip(names, bounds, strict=True) if (b.low, b.high) == pair),
+        )
+        for pair, one in pairs.items()
+    ]

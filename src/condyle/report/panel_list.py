@@ -1,0 +1,424 @@
+"""The panels of a solution, each stated once; figures and the page draw them.
+
+A function that gives panels is all that another one needs: it is a figure and a part of the page.
+
+@panels("actuators", "Power of the actuators")
+def power(solution: Solution) -> Iterator[Panel]:
+    '''Power of each actuator over time.'''
+    watts = solution["torque"].values * solution["joint_rate"].values
+    curves = of_names(solution, "power", "chain", watts)
+    yield Panel("power", "Actuator power", "power", "W", curves)
+
+A package elsewhere names its module as an entry point of the group `condyle.panels`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import InputError, did_you_mean
+from ..kinematics.singularities import NEAR_SINGULAR
+from ..mechanism.chain import limits as actuator_limits
+from .actuators import (
+    EMG_ROW,
+    Duty,
+    activations,
+    drawn_limits,
+    duty,
+    edges,
+    emg,
+    joint_loads,
+    limits_text,
+)
+from .naming import LOAD_PARTS, by_unit, groups, heading, part_word, parts_in_use, readable
+from .panel import Curve, Limit, Panel, Shown, distinct, of_names, panels, shown
+from .scene import contact_profile
+
+if TYPE_CHECKING:
+    from ..mechanism.mechanism import Contact
+    from ..results.solution import Solution
+
+MOST = 8  # chains in one panel of a figure; beyond, no curve can be followed
+ORDERS = ("", "_rate", "_acceleration")  # of a variable's derivatives
+NORM = "all chains (2-norm)"
+VIEWS = {"above": (0, 1), "side": (0, 2)}  # of a track: the coordinates across and up
+BODIES = {"fixed": "base", "platform": "platform"}
+DISTANCES = {
+    "marker_residual": "from their places in the body",
+    "marker_offset": "from where the computed motion has them",
+}
+
+
+def effort_word(unit: str) -> str:
+    """What an effort in this unit is."""
+    return "force" if unit == "N" else "torque"
+
+
+def chains_of(solution: Solution) -> tuple[list[str], list[str], list[str]]:
+    """Names of the chains, and units of their efforts and joints."""
+    keys = ("chain", "effort_unit", "joint_unit")
+    names, efforts, joints = ([str(value) for value in solution[key].values] for key in keys)
+    return names, efforts, joints
+
+
+@panels("motion", "Motion of the platform")
+def motion(solution: Solution) -> Iterator[Panel]:
+    """Pose coordinates, their rates and accelerations over time."""
+    words = (
+        ("position", "velocity", "acceleration"),
+        ("angle", "angular rate", "angular acceleration"),
+    )
+    for order, suffix in enumerate(ORDERS):
+        curves = of_names(solution, f"pose{suffix}", "coordinate")
+        curves = [replace(curve, label=curve.label + "′" * order) for curve in curves]
+        for k, (what, unit) in enumerate((("position", "m"), ("angles", "rad"))):
+            yield Panel(
+                f"pose{suffix}-{what}",
+                f"Platform {what}{suffix.replace('_', ' ')}",
+                words[k][order],
+                unit,
+                curves[3 * k : 3 * k + 3],
+                order=order,
+                place=(suffix, what),
+                components=True,
+            )
+
+
+@panels("chains", "Joint coordinates", split=MOST, same=True)
+def joint(solution: Solution) -> Iterator[Panel]:
+    """Joint coordinates from home, their rates with the limits, and accelerations."""
+    names, _, units = chains_of(solution)
+    for order, (suffix, word) in enumerate(
+        zip(ORDERS, ("coordinate", "rate", "acceleration"), strict=True)
+    ):
+        curves = of_names(solution, f"joint{suffix}", "chain")
+        for unit, mine in by_unit(units).items():
+            own = [names[i] for i in mine]
+            bounds = [drawn_limits(solution, "joint_rate")[i] for i in mine] if order == 1 else []
+            titles = (
+                "Joint angle" if unit == "rad" else "Joint travel",
+                "Joint speed",
+                "Joint acceleration",
+            )
+            yield Panel(
+                f"joint{suffix}-{unit}",
+                titles[order],
+                word,
+                unit,
+                [curves[i] for i in mine],
+                order=order,
+                place=(word, unit),
+                limits=distinct(bounds, own[: len(bounds)], shown(unit, order)),
+            )
+
+
+@panels("chains", "Efforts of the actuators", split=0, same=True)
+def torque(solution: Solution) -> Iterator[Panel]:
+    """Effort of each chain over time, with its actuator's limit."""
+    names, units, _ = chains_of(solution)
+    curves, bounds = of_names(solution, "torque", "chain"), drawn_limits(solution, "torque")
+    for unit, mine in by_unit(units).items():
+        own = [names[i] for i in mine]
+        yield Panel(
+            f"torque-{unit}".replace(" ", ""),
+            f"Actuator {effort_word(unit)}",
+            effort_word(unit),
+            unit,
+            [curves[i] for i in mine],
+            limits=distinct([bounds[i] for i in mine], own, Shown(unit)),
+        )
+
+
+NO_LIMITS = "no actuator of this mechanism states a limit of its effort"
+
+
+@panels("actuators", "Activation: effort over greatest effort", empty=NO_LIMITS)
+def activation(solution: Solution) -> Iterator[Panel]:
+    """Activation, effort over greatest effort, of each actuator or muscle; joint loads below.
+
+    Where EMG was measured (`Solution.with_measured`), its envelope stands under its muscle's row.
+    """
+    computed, measured = activations(solution), emg(solution)
+    chains = {chain.name: i for i, chain in enumerate(solution.mechanism.chains)}
+    effort, rows = solution["torque"].values, []
+    for name in dict.fromkeys([*computed, *measured]):
+        if name in computed:  # |effort| times a scale: the page has the efforts already
+            scale = 1.0 / actuator_limits(solution.mechanism.chains[chains[name]]).greatest
+            rows.append(Curve(name, f"torque.{name}", effort[:, chains[name]], scale=scale))
+        if name in measured:
+            rows.append(Curve(f"{name}{EMG_ROW}", f"emg.{name}", measured[name]))
+    if not rows:
+        return
+    note = "Effort over greatest effort; orange: beyond 1, a limit is exceeded."
+    note += " EMG: its measured envelope over its greatest." if measured else ""
+    yield Panel(
+        "activation", "Activation", "activation", "1", rows, "field", place=("field", ""), note=note
+    )
+    loads = [Curve(n, f"joint_load.{n}", v) for n, v in joint_loads(solution).items()]
+    if loads:
+        note = "Along the normal; negative: the joint would have to pull."
+        yield Panel(
+            "load-on-joints", "Joint load", "joint load", "N", loads, place=("load", ""), note=note
+        )
+
+
+@panels("actuators", "Efforts against speeds, with limits")
+def effort_speed(solution: Solution, duties: Sequence[Duty] | None = None) -> Iterator[Panel]:
+    """Effort of each actuator against its speed, in the box of its limits; rms and peak power."""
+    names, efforts, joints = chains_of(solution)
+    duties = duties or duty(solution)
+    rates, values = solution["joint_rate"].values, solution["torque"].values
+    boxes = [actuator_limits(chain) for chain in solution.mechanism.chains]
+    for number, mine in enumerate(groups(names, efforts)):
+        unit, speed = efforts[mine[0]], f"{joints[mine[0]]}/s"
+        size = [float(np.nanmax(np.abs(v[:, mine]), initial=0.0)) for v in (rates, values)]
+        within = list(dict.fromkeys(boxes[i] for i in mine))
+        curves = [
+            Curve(
+                names[i],
+                f"torque.{names[i]}",
+                values[:, i],
+                across=(f"joint_rate.{names[i]}", rates[:, i]),
+                text=duties[i].text,
+            )
+            for i in mine
+        ]
+        yield Panel(
+            f"plane-{number}",
+            heading([names[i] for i in mine]),
+            effort_word(unit),
+            unit,
+            curves,
+            "plane",
+            across=f"speed [{speed}]",
+            note="; ".join(limits_text(box, unit, speed) or "none" for box in within),
+            lines=[edge for box in within for edge in edges(box, *size)],
+        )
+
+
+@panels("shares", "Efforts by the part of the mechanism that needs them", split=0, same=True)
+def share(
+    solution: Solution, parts: Sequence[str] | None = None, every: bool = False
+) -> Iterator[Panel]:
+    """Efforts by part: a column a part, a row a pair of chains.
+
+    Args: parts: names; by default all that there are.
+    """
+    there = [str(part) for part in solution["part"].values]
+    in_use = there if every else parts_in_use(solution)
+    wanted = [there.index(named_part(solution, part)) for part in parts or in_use]
+    names, units, _ = chains_of(solution)
+    values = solution["share"].values
+
+    def curves(owner: str, of: np.ndarray) -> list[Curve]:
+        return [Curve(part_word(there[p]), f"share.{owner}.{there[p]}", of[p]) for p in wanted]
+
+    for unit, mine in by_unit(units).items():
+        norms = curves(unit, np.linalg.norm(values[:, :, mine], axis=2))
+        yield Panel(
+            f"share-{unit}".replace(" ", ""),
+            "Share of each part in the effort",
+            effort_word(unit),
+            unit,
+            {NORM: norms} | {names[i]: curves(names[i], values[:, :, i]) for i in mine},
+            note="The parts of one chain add up to its effort; norms over chains do not add up.",
+        )
+
+
+def named_part(solution: Solution, part: str) -> str:
+    """The part in the solution that a caller means; the load has two names."""
+    there = [str(name) for name in solution["part"].values]
+    meant = [name for name in there if name == part or {name, part} <= set(LOAD_PARTS)]
+    if not meant:
+        raise InputError(f'no part "{part}".{did_you_mean(part, there)}')
+    return meant[0]
+
+
+NO_CONTACTS = "this mechanism has no contacts"
+FORCES = "Contact forces on the platform, along the unit normals"
+
+
+@panels("contacts", FORCES, empty=NO_CONTACTS)
+def contact_force(solution: Solution) -> Iterator[Panel]:
+    """Force of each contact on the platform along the unit normal, and how far its bounds are."""
+    if not solution.sizes["contact"]:
+        return
+    forces = of_names(solution, "contact_force", "contact")
+    note = "Negative: against the normal, the surface pushes the ball along -n."
+    title = "Contact force along the normal"
+    yield Panel("contact-force", title, "force", "N", forces, place=("force", ""), note=note)
+    margins = of_names(solution, "bound_margin", "contact")
+    margins = [curve for curve in margins if not np.isposinf(curve.values).any()]
+    if margins:
+        note, title = "Negative: outside the bounds.", "Distance to the nearest bound"
+        yield Panel("bound-margin", title, "to a bound", "m", margins, place=("b", ""), note=note)
+
+
+def _load_heading(solution: Solution) -> str:
+    point = solution.options.get("load_point")
+    return "Load on the platform" + (f" at {readable(point)}" if point else "")
+
+
+@panels("contacts", _load_heading)
+def load(solution: Solution, every: bool = False) -> Iterator[Panel]:
+    """Force on the platform over time, and its moment where there is one."""
+    point, curves = solution.options.get("load_point"), of_names(solution, "load", "component")
+    some = [any(np.nan_to_num(c.values).any() for c in part) for part in (curves[:3], curves[3:])]
+    at = f" at {point}" if point else ""
+    if every or some[0] or not any(some):
+        place = ("force", "")
+        yield Panel("load", f"Load{at}", "force", "N", curves[:3], place=place, components=True)
+    if every or some[1]:
+        title, place = f"Moment of the load{at}", ("moment", "")
+        yield Panel("moment", title, "moment", "N m", curves[3:], place=place, components=True)
+
+
+@panels("tracks", "Tracks of the contact points", empty=NO_CONTACTS)
+def contact_track(solution: Solution) -> Iterator[Panel]:
+    """Track of each contact point, from above and from the side, against its bounds."""
+    points, outside = solution["contact_point"].values, solution["bound_margin"].values < 0
+    for k, contact in enumerate(solution.mechanism.contacts):
+        track, own = points[:, k], [contact.bounds.x, contact.bounds.y, contact.bounds.z]
+        columns = [(f"contact_point.{contact.name}.{i}", track[:, i]) for i in range(3)]
+        for view, (across, up) in VIEWS.items():
+            line = contact_line(contact, track) if view == "side" else None
+            less = "" if contact.ball_radius is None else ", less the ball's radius"
+            yield Panel(
+                f"track-{k}-{view}",
+                f"{contact.name}, from {'the ' * (view == 'side')}{view}",
+                "xyz"[up],
+                "m",
+                [Curve("contact point", *columns[up], across=columns[across])],
+                "track",
+                place=(view, contact.name),
+                across="xyz"[across],
+                note=f"surface at the home y{less}",
+                lines=[] if line is None else [(line[:, 0], line[:, 2])],
+                bounds=(own[across], own[up]),
+                outside=outside[:, k],
+            )
+
+
+def contact_line(contact: Contact, track: np.ndarray) -> np.ndarray | None:
+    """Where the surface lets the centre of the ball be, through home, seen from the side [m]."""
+    x = track[np.isfinite(track).all(axis=1), 0]
+    reach = [*x, contact.point[0], *(contact.bounds.x or ())]
+    spare = 0.1 * (max(reach) - min(reach))
+    return contact_profile(contact, min(reach) - spare, max(reach) + spare, contact.point[1])
+
+
+@panels("singularity", "Distance from singularities")
+def singularity(solution: Solution) -> Iterator[Panel]:
+    """Dimensionless measures: transmission of each chain, singular values of J_W, their ratio."""
+    condition = solution["condition"].values
+    sigma = solution["J_W_sigma"].values
+    near = Limit(NEAR_SINGULAR, math.inf, f"near: {NEAR_SINGULAR:g}")
+    for name, title, axis, curves, note, more in (
+        (
+            "transmission",
+            "Transmission (J_A, dimensionless)",
+            "transmission",
+            of_names(solution, "transmission", "chain"),
+            "±1 is best; 0 is an inverse singularity of that chain.",
+            {},
+        ),
+        (
+            "sigma",
+            "Singular values of J_W (dimensionless)",
+            "σ",
+            [Curve(f"σ{i + 1}", f"J_W_sigma.{i}", one) for i, one in enumerate(sigma.T)],
+            "The smallest at 0 is a direct singularity.",
+            {"log": True},
+        ),
+        (
+            "ratio",
+            "Distance from a singularity",
+            "ratio",
+            [Curve("ratio", "singularity_ratio", solution["singularity_ratio"].values)],
+            "Smallest over largest singular value of J_A or J_W; 0 is singular.",
+            {"log": True, "limits": [near]},
+        ),
+        (
+            "condition",
+            "Condition number of J_W",
+            "condition",
+            [Curve("condition", "condition", np.where(np.isfinite(condition), condition, np.nan))],
+            "",
+            {"log": True},
+        ),
+    ):
+        yield Panel(name, title, axis, "1", curves, place=(name, ""), note=note, **more)
+
+
+@panels("singularity", "Diagonal of J_A", split=0)
+def jacobian(solution: Solution) -> Iterator[Panel]:
+    """Diagonal of J_A, eq. (26): a chain is at an inverse singularity where its entry is zero."""
+    curves = of_names(solution, "J_A", "chain")
+    for unit, mine in by_unit(chains_of(solution)[2]).items():
+        own = [curves[i] for i in mine]
+        yield Panel(f"J_A-{unit}", "Diagonal of J_A", "J_A", f"m²/{unit}", own)
+
+
+@panels("markers", "Distances of the markers", empty="no markers were measured")
+def marker(solution: Solution) -> Iterator[Panel]:
+    """Distances of measured markers from where the body and the computed motion have them."""
+    if "marker_place" not in solution:
+        return
+    bodies = [str(body) for body in solution["marker_body"].values]
+    sets = {}
+    for variable, told in DISTANCES.items():
+        curves = of_names(solution, variable, "marker")
+        for body, word in BODIES.items():
+            own = [c for c, of in zip(curves, bodies, strict=True) if of == body]
+            if own:
+                sets[f"{word}: {told}"] = own
+    if sets:
+        yield Panel(
+            "marker-residual",
+            "Distances of the markers",
+            "distance",
+            "m",
+            sets,
+            note="From their places in the body: how rigid it is, and how well they were seen. "
+            "From where the computed motion has them: what smoothing and the contacts took away "
+            "too.",
+        )
+
+
+@panels("reactions", "Reactions", empty="this solution has no reactions; run with reactions")
+def reaction(solution: Solution) -> Iterator[Panel]:
+    """Magnitudes of joint reactions and contact forces, where a run was asked for them."""
+    for name in map(str, solution.data_vars):
+        if not (name.startswith("reaction_") or name == "contact_force_vector"):
+            continue
+        if solution[name].dims[:1] != ("time",):
+            continue
+        about = solution[name].attrs
+        title = str(about.get("long_name", name.replace("_", " ")))
+        yield Panel(
+            name,
+            title[:1].upper() + title[1:],
+            "magnitude",
+            str(about.get("units", "")),
+            [Curve(label, f"{name}.{label}", v) for label, v in magnitudes(solution, name).items()],
+            place=(name, ""),
+            note="Magnitudes.",
+        )
+
+
+def magnitudes(solution: Solution, name: str) -> dict[str, np.ndarray]:
+    """Magnitudes (N,) of a reaction by the labels of the dimensions between time and axes."""
+    variable = solution[name]
+    values, dimensions = variable.values, list(variable.dims[1:])
+    if dimensions and dimensions[-1] == "axis":
+        values = np.linalg.norm(values, axis=-1)
+        dimensions.pop()
+    labels = product(*([str(v) for v in solution[d].values] for d in dimensions))
+    columns = values.reshape(len(values), -1).T
+    return {" ".join(label) or name: c for label, c in zip(labels, columns, strict=True)}
