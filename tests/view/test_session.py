@@ -238,7 +238,8 @@ def test_a_stale_pose_is_drawn_grey_and_without_arrows(reference: condyle.Mechan
             view.playback.seek(when)
             for _ in range(100):  # the view draws meanwhile, perhaps the time before
                 view.stage.show(view.playback.snapshot())
-                parts = [view.stage._body, *view.stage._balls, *view.stage._rods.values()]
+                parts = [view.stage._body, *view.stage._balls]
+                parts += [node for _, _, node in view.stage._bars]
                 tints = {tuple(part.color) for part in parts}
                 arrows = any(arrow.visible for arrow in view.stage._arrows.values())
                 if (arrows, len(tints) == 1) == (when == 0.02, when == 0.3):
@@ -297,7 +298,9 @@ def test_turns_agree_with_each_other() -> None:
         assert np.allclose(matrix(quaternion(R)), R)
     for direction in (*rng.normal(size=(20, 3)), [0, 0, 1], [0, 0, -1]):
         unit = np.asarray(direction) / np.linalg.norm(direction)
-        assert np.allclose(matrix(turn_onto(unit)) @ [0, 0, 1], unit)
+        assert np.allclose(
+            matrix(turn_onto(unit)) @ [0, 0, 1], unit
+        )
 
 
 def volume(vertices: np.ndarray, faces: np.ndarray) -> float:

@@ -41,7 +41,6 @@ from .panel import Curve, Limit, Panel, Shown, distinct, of_names, panels, shown
 from .scene import contact_profile
 
 if TYPE_CHECKING:
-    from ..mechanism.mechanism import Contact
     from ..results.solution import Solution
 
 MOST = 8  # chains in one panel of a figure; beyond, no curve can be followed
@@ -287,7 +286,7 @@ def contact_track(solution: Solution) -> Iterator[Panel]:
         track, own = points[:, k], [contact.bounds.x, contact.bounds.y, contact.bounds.z]
         columns = [(f"contact_point.{contact.name}.{i}", track[:, i]) for i in range(3)]
         for view, (across, up) in VIEWS.items():
-            line = contact_line(contact, track) if view == "side" else None
+            line = contact_profile(contact, track) if view == "side" else None
             less = "" if contact.ball_radius is None else ", less the ball's radius"
             yield Panel(
                 f"track-{k}-{view}",
@@ -303,14 +302,6 @@ def contact_track(solution: Solution) -> Iterator[Panel]:
                 bounds=(own[across], own[up]),
                 outside=outside[:, k],
             )
-
-
-def contact_line(contact: Contact, track: np.ndarray) -> np.ndarray | None:
-    """Where the surface lets the centre of the ball be, through home, seen from the side [m]."""
-    x = track[np.isfinite(track).all(axis=1), 0]
-    reach = [*x, contact.point[0], *(contact.bounds.x or ())]
-    spare = 0.1 * (max(reach) - min(reach))
-    return contact_profile(contact, min(reach) - spare, max(reach) + spare, contact.point[1])
 
 
 @panels("singularity", "Distance from singularities")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 Mesh = tuple[np.ndarray, np.ndarray]
 
@@ -34,35 +35,9 @@ def turn_onto(direction: np.ndarray) -> np.ndarray:
 
 def quaternion(R: np.ndarray) -> np.ndarray:
     """(w, x, y, z) of a rotation matrix (3, 3)."""
-    # The largest of the four squares keeps its accuracy.
-    squares = np.array(
-        [
-            1 + R[0, 0] + R[1, 1] + R[2, 2],
-            1 + R[0, 0] - R[1, 1] - R[2, 2],
-            1 - R[0, 0] + R[1, 1] - R[2, 2],
-            1 - R[0, 0] - R[1, 1] + R[2, 2],
-        ]
-    )
-    k = int(np.argmax(squares))
-    a, b, c = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
-    d, e, f = R[0, 1] + R[1, 0], R[0, 2] + R[2, 0], R[1, 2] + R[2, 1]
-    rows = [
-        (squares[0], a, b, c),
-        (a, squares[1], d, e),
-        (b, d, squares[2], f),
-        (c, e, f, squares[3]),
-    ]
-    q = np.array(rows[k])
-    return q / np.linalg.norm(q)
+    return np.roll(Rotation.from_matrix(R).as_quat(), 1)
 
 
 def matrix(q: np.ndarray) -> np.ndarray:
     """Rotation matrix (3, 3) of a unit quaternion (w, x, y, z)."""
-    w, x, y, z = q
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    return Rotation.from_quat(np.roll(q, -1)).as_matrix()

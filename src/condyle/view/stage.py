@@ -8,8 +8,9 @@ import numpy as np
 import viser
 
 from ..kinematics.bryant import bryant_angles
-from ..mechanism import Contact, Mechanism
-from ..report.scene import LIGHT, Rod, contact_patch, place, platform_hull, styles
+from ..mechanism import Mechanism
+from ..report.scene import LIGHT, MARKERS, ROLES, VIEWS, Bar, Scene, cloud, parts_of, place
+from ..report.scene.parts import JOINT, ROD
 from .shapes import matrix, quaternion, turn_onto, unit_rod
 from .snapshot import Snapshot
 
@@ -19,28 +20,23 @@ EXTENT = 3.0  # scene units across the mechanism
 ARROW = EXTENT / 3  # of the largest load or contact force,
 LEAST_WEIGHTS = {"load": 5.0, "contact": 0.5}  # unless less than so many weights of the platform
 AMBIENT = 2.0
-NEUTRAL: RGB = (125, 136, 148)
-PLATFORM: RGB = (176, 190, 205)
-SURFACE: RGB = (229, 181, 103)
-BALL: RGB = (194, 24, 91)
-ALARM: RGB = (201, 42, 42)
-WARNING: RGB = (224, 160, 74)
-LOAD: RGB = (70, 80, 92)
-HAND: RGB = (16, 93, 202)
-MARKERS: dict[str, RGB] = {"fixed": (7, 169, 115), "platform": (16, 93, 202), "": (116, 95, 138)}
-MARKER = 2.4  # radius of a measured marker, over that of a rod
-BODY = {"calm": PLATFORM, "warning": WARNING, "unreachable": ALARM}
-VIEWS = {
-    "Front": ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-    "Side": ((0.0, -1.0, 0.0), (0.0, 0.0, 1.0)),
-    "Top": ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0)),
-    "Oblique": ((0.7, -0.7, 0.4), (0.0, 0.0, 1.0)),
-}
 
 
 def rgb(colour: str) -> RGB:
     red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
     return red, green, blue
+
+
+NEUTRAL, PLATFORM, SURFACE, BALL = (
+    rgb(ROLES[n][0]) for n in ("neutral", "platform", "surface", "ball")
+)
+ALARM: RGB = (201, 42, 42)
+WARNING: RGB = (224, 160, 74)
+LOAD: RGB = (70, 80, 92)
+HAND: RGB = (16, 93, 202)
+MARKER = 2.4  # radius of a measured marker, over that of a slender rod
+BODY = {"calm": PLATFORM, "warning": WARNING, "unreachable": ALARM}
+SCREEN: Any = {"thickness": 2.0, "thickness_units": "screen"}
 
 
 class Stage:
@@ -50,19 +46,16 @@ class Stage:
         self.mechanism = mechanism
         self._scene = server.scene
         home = place(mechanism, np.zeros((1, 6)), np.zeros((1, len(mechanism.chains))))
-        self._hull = platform_hull(mechanism)
-        points = [p.reshape(-1, 3) for d in home.chains.values() for p in d.points.values()]
-        cloud = np.vstack([*points, self._hull[0]])
-        low, high = cloud.min(axis=0), cloud.max(axis=0)
+        self._parts = parts = parts_of(mechanism, home)
+        points = cloud(home, parts.hull[0])
+        low, high = points.min(axis=0), points.max(axis=0)
         self.scale = EXTENT / float(np.linalg.norm(high - low))
         self.centre = self.scale * (low + high) / 2
-        self._radius = 0.017
+        self._slender = self.scale * ROD * parts.size
         weight = mechanism.platform.mass * float(np.linalg.norm(mechanism.gravity))
         # Force of the longest arrow of each kind [N].
         self.largest_force = {kind: n * weight or 1.0 for kind, n in LEAST_WEIGHTS.items()}
-        self._rods: dict[tuple[str, str], Any] = {}
-        self._drawings = home.chains
-        self._add_static(home)
+        self._add_static()
         self._add_platform()
         self._add_chains()
         self._arrows = {
@@ -90,82 +83,62 @@ class Stage:
             visible=False,
         )
 
-    def _add_static(self, home: Any) -> None:
+    def _add_static(self) -> None:
         """Lights and contact surfaces."""
         self._scene.set_up_direction("+z")
         self._scene.configure_default_lights(cast_shadow=False)
         self._scene.add_light_ambient("/light", intensity=AMBIENT)
-        for i, contact in enumerate(self.mechanism.contacts):
-            patch = contact_patch(contact, home.contacts[contact.name], 1.0 / self.scale)
+        for i, patch in enumerate(self._parts.surfaces.values()):
+            vertices = self.scale * np.nan_to_num(patch.vertices)
             self._scene.add_mesh_simple(
-                f"/surfaces/{i}",
-                self.scale * np.nan_to_num(patch.vertices),
-                patch.faces,
-                color=SURFACE,
-                opacity=0.6,
-                side="double",
+                f"/surfaces/{i}", vertices, patch.faces, color=SURFACE, opacity=0.6, side="double"
             )
             if patch.bounded and len(patch.outline):
-                self._scene.add_line_segments(
-                    f"/bounds/{i}",
-                    self.scale * patch.outline,
-                    colors=(90, 90, 90),
-                    thickness=2.0,
-                    thickness_units="screen",
-                )
+                border = self.scale * patch.outline
+                self._scene.add_line_segments(f"/bounds/{i}", border, colors=(90, 90, 90), **SCREEN)
 
     def _add_platform(self) -> None:
         """The platform with its balls and landmarks; the ghost shows a pose that cannot be."""
-        vertices, faces = self._hull
-        self._platform = self._scene.add_frame("/platform", show_axes=False)
-        self._ghost = self._scene.add_frame("/ghost", show_axes=False, visible=False)
-        self._body = self._scene.add_mesh_simple(
-            "/platform/body",
-            self.scale * vertices,
-            faces,
-            color=PLATFORM,
-            opacity=0.6,
-            flat_shading=True,
-            side="double",
-        )
-        self._scene.add_mesh_simple(
-            "/ghost/body", self.scale * vertices, faces, color=ALARM, wireframe=True
-        )
-        self._balls: list[Any] = []
-        for i, contact in enumerate(self.mechanism.contacts):
-            radius = self._ball_radius(contact)
-            at = self.scale * np.asarray(contact.point)
-            ball = self._scene.add_icosphere(f"/platform/ball{i}", radius, BALL, position=at)
-            self._balls.append(ball)
-            self._scene.add_label(f"/platform/ball{i}/name", contact.name)
+        vertices, faces = self.scale * self._parts.hull[0], self._parts.hull[1]
+        add = self._scene
+        self._platform = add.add_frame("/platform", show_axes=False)
+        self._ghost = add.add_frame("/ghost", show_axes=False, visible=False)
+        look: Any = {"opacity": 0.6, "flat_shading": True, "side": "double"}
+        self._body = add.add_mesh_simple("/platform/body", vertices, faces, color=PLATFORM, **look)
+        add.add_mesh_simple("/ghost/body", vertices, faces, color=ALARM, wireframe=True)
+        self._balls = [
+            self._named(
+                f"ball{i}",
+                contact.name,
+                contact.point,
+                self.scale * self._parts.balls[contact.name],
+                BALL,
+            )
+            for i, contact in enumerate(self.mechanism.contacts)
+        ]
         for i, (name, point) in enumerate(self.mechanism.platform.points.items()):
-            at = self.scale * np.asarray(point)
-            self._scene.add_icosphere(f"/platform/landmark{i}", self._radius, LOAD, position=at)
-            self._scene.add_label(f"/platform/landmark{i}/name", name)
+            self._named(f"landmark{i}", name, point, self._slender, LOAD)
 
-    def _ball_radius(self, contact: Contact) -> float:
-        """In scene units: its own, where the file gives one."""
-        return self.scale * contact.ball_radius if contact.ball_radius else 3.5 * self._radius
+    def _named(self, node: str, name: str, point: Any, radius: float, colour: RGB) -> Any:
+        """A ball with a name, fixed to the platform."""
+        at = self.scale * np.asarray(point)
+        ball = self._scene.add_icosphere(f"/platform/{node}", radius, colour, position=at)
+        self._scene.add_label(f"/platform/{node}/name", name)
+        return ball
 
     def _add_chains(self) -> None:
         vertices, faces = unit_rod()
-        self._colours: dict[tuple[str, str], RGB] = {}
-        self._joints: dict[tuple[str, str], Any] = {}
-        looks = styles(self.mechanism.chain_names)
-        for i, (chain, look) in enumerate(zip(self.mechanism.chains, looks, strict=True)):
-            drawing = self._drawings[chain.name]
-            for rod in drawing.rods:
-                colour = rgb(LIGHT[look.colour]) if rod.moving else NEUTRAL
-                radius = self._radius * rod.thickness
-                thin = vertices * [radius, radius, 1.0]
-                name = f"/chains/{i}/{rod.body}"
-                key = (chain.name, rod.body)
-                self._rods[key] = self._scene.add_mesh_simple(name, thin, faces, color=colour)
-                self._colours[key] = colour
-            for point in drawing.balls:
-                self._joints[chain.name, point] = self._scene.add_icosphere(
-                    f"/chains/{i}/joint_{point}", 1.9 * self._radius, NEUTRAL
-                )
+        self._bars: list[tuple[Bar, RGB, Any]] = []
+        for i, bar in enumerate(self._parts.bars):
+            colour = NEUTRAL if bar.colour is None else rgb(LIGHT[bar.colour])
+            thin = vertices * [self.scale * bar.radius, self.scale * bar.radius, 1.0]
+            node = self._scene.add_mesh_simple(f"/chains/{i}/{bar.body}", thin, faces, color=colour)
+            self._bars.append((bar, colour, node))
+        radius = self.scale * JOINT * self._parts.size
+        self._joints = {
+            key: self._scene.add_icosphere(f"/joints/{i}", radius, NEUTRAL)
+            for i, key in enumerate(self._parts.joints)
+        }
 
     def show(self, snapshot: Snapshot, dragging: bool = False) -> None:
         """Move everything to a snapshot; the drag control stays where it is held."""
@@ -185,18 +158,13 @@ class Stage:
             )
             self._ghost.position = self.scale * wanted.position[0]
             self._ghost.wxyz = quaternion(wanted.rotation[0])
-        for chain in self.mechanism.chains:
-            drawing = scene.chains[chain.name]
-            points = {n: self.scale * np.atleast_2d(p)[0] for n, p in drawing.points.items()}
-            for rod in drawing.rods:
-                tint = self._colours[chain.name, rod.body]
-                if snapshot.stale:
-                    tint = NEUTRAL
-                elif rod.moving and chain.name in (*snapshot.broken, *snapshot.over):
-                    tint = ALARM
-                self._lay(chain.name, rod, points, tint)
-            for name in drawing.balls:
-                self._joints[chain.name, name].position = points[name]
+        wrong = (*snapshot.broken, *snapshot.over)
+        for bar, colour, node in self._bars:
+            ill = bar.colour is not None and bar.chain in wrong
+            node.color = NEUTRAL if snapshot.stale else ALARM if ill else colour
+            self._lay(node, *(self._at(scene, bar.chain, name) for name in (bar.start, bar.end)))
+        for (chain, name), node in self._joints.items():
+            node.position = self._at(scene, chain, name)
         self._show_forces(snapshot)
         self._show_pushes(snapshot)
         places = np.full((len(self._markers), 3), np.nan)
@@ -207,15 +175,18 @@ class Stage:
             if handle.visible:
                 handle.position = at
 
-    def _lay(self, chain: str, rod: Rod, points: dict[str, np.ndarray], tint: RGB) -> None:
-        handle = self._rods[chain, rod.body]
-        start, along = points[rod.start], points[rod.end] - points[rod.start]
-        length = float(np.linalg.norm(along))
-        handle.visible = bool(np.isfinite(length)) and length > 0
-        if handle.visible:
-            handle.position, handle.wxyz = start, turn_onto(along / length)
-            handle.scale = (1.0, 1.0, length)
-        handle.color = tint
+    def _at(self, scene: Scene, chain: str, point: str) -> np.ndarray:
+        """A point of a chain in scene units."""
+        found: np.ndarray = self.scale * np.atleast_2d(scene.chains[chain].points[point])[0]
+        return found
+
+    def _lay(self, node: Any, start: np.ndarray, end: np.ndarray) -> None:
+        """Put a rod of length 1 between two points."""
+        length = float(np.linalg.norm(end - start))
+        node.visible = bool(np.isfinite(length)) and length > 0
+        if node.visible:
+            node.position, node.wxyz = start, turn_onto((end - start) / length)
+            node.scale = (1.0, 1.0, length)
 
     def _show_forces(self, snapshot: Snapshot) -> None:
         """A load leaves its point; a contact force points at the skin of the ball it pushes."""
@@ -224,7 +195,7 @@ class Stage:
         if "contact" in self._arrows:
             balls = [snapshot.scene.contacts[c.name][0] for c in self.mechanism.contacts]
             forces["contact"] = snapshot.force_vector, self.scale * np.array(balls)
-        radii = np.array([[self._ball_radius(c)] for c in self.mechanism.contacts])
+        radii = self.scale * np.array([[r] for r in self._parts.balls.values()])
         for name, (force, at) in forces.items():
             handle = self._arrows[name]
             handle.visible = bool(np.isfinite(force).all()) and bool(force.any())
@@ -271,8 +242,7 @@ class Stage:
                 f"/paths/{i}",
                 self.scale * np.stack([path[:-1], path[1:]], axis=1),
                 colors=BALL,
-                thickness=2.0,
-                thickness_units="screen",
+                **SCREEN,
             )
             for i, path in enumerate(paths)
             if len(path) > 1
@@ -284,7 +254,7 @@ class Stage:
             handle.remove()
         self._markers = [
             self._scene.add_icosphere(
-                f"/markers/{i}", MARKER * self._radius, MARKERS[body], visible=False
+                f"/markers/{i}", MARKER * self._slender, rgb(LIGHT[MARKERS[body][0]]), visible=False
             )
             for i, body in enumerate(bodies)
         ]
@@ -296,7 +266,7 @@ class Stage:
 
     def look_from(self, camera: Any, view: str) -> None:
         """Put a camera (a client's, or the first one of new clients) at one of `VIEWS`."""
-        direction, up = VIEWS[view]
+        direction, up, _ = VIEWS[view]
         away = 0.8 * EXTENT * np.asarray(direction) / np.linalg.norm(direction)
         set_up = "up" if hasattr(camera, "up") else "up_direction"
         setattr(camera, set_up, up)

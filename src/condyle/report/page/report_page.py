@@ -15,7 +15,7 @@ from ...atomic import write_text
 from ...progress import step
 from ..gaps import gaps, longest
 from ..panel import panels_of
-from ..scene import DARK, LIGHT, styles
+from ..scene import styles
 from .alerts import alerts
 from .html import Markup, fill, json_for_script, tag, text
 from .page_columns import Columns
@@ -181,7 +181,6 @@ def _payload(page: Reduced) -> dict[str, Any]:
         "panels": panels,
         "alerts": told,
         "failures": [[one.start, one.end, str(one)] for one in longest(failed)],
-        "palette": {"light": LIGHT, "dark": DARK},
         "columns": columns.packed(page.total, page.envelope),  # last, when all are in
     }
 

@@ -13,15 +13,27 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..scene import Scene, contact_normals, contact_patch, place, platform_hull, styles
-from ..scene.chains import PLATFORM_JOINT
+from ..scene import (
+    DARK,
+    LIGHT,
+    MARKERS,
+    ROLES,
+    VIEWS,
+    Parts,
+    Scene,
+    cloud,
+    contact_normals,
+    parts_of,
+    place,
+)
+from ..scene.chain_drawings import PLATFORM_JOINT
+from ..scene.parts import JOINT
 from .page_columns import Columns
 
 if TYPE_CHECKING:
     from ...mechanism import Mechanism
     from ...results.solution import Solution
 
-SIZE = 0.26  # the size that radii and arrows are stated in, over the diagonal of everything
 ARROW = 0.9  # longest arrow
 ONE_SCALE = 0.4  # of loads and contact forces, if the smaller ones are at least this part
 TRIAD = 0.4  # arms of the coordinate triad, before they are rounded
@@ -33,20 +45,26 @@ def machine(solution: Solution, columns: Columns) -> dict[str, Any]:
     """Everything the 3D view draws."""
     mechanism = solution.mechanism
     scene = place(mechanism, solution["pose"].values, solution["joint"].values)
-    vertices, faces = platform_hull(mechanism)
-    cloud = _cloud(scene, vertices)
-    size = SIZE * float(np.linalg.norm(np.nanmax(cloud, axis=0) - np.nanmin(cloud, axis=0)))
-    rods, joints = _chains(mechanism, scene, columns)
-    arrows = [*_contact_arrows(solution, scene, columns, size), *_load_arrow(solution, columns)]
+    parts = parts_of(mechanism, scene)
+    size, (vertices, faces) = parts.size, parts.hull
+    rods, joints = _chains(mechanism, parts, scene, columns)
+    arrows = [*_contact_arrows(solution, scene, parts, columns), *_load_arrow(solution, columns)]
     scales = _scales(arrows, size)
     ends = [a.far_end(scene.on_platform(a.at), scales[a.kind]["metresPerNewton"]) for a in arrows]
-    everything = np.vstack([cloud, reach(solution), *ends])
+    everything = np.vstack([cloud(scene, vertices), reach(solution), *ends])
     low, high = _box(everything, size)
     arm = _rounded(TRIAD * size)
     triad = low + arm * np.vstack([np.zeros(3), np.eye(3)])
-    surfaces = list(_surfaces(mechanism, scene, size))
+    surfaces = list(_surfaces(parts))
     return {
         "size": size,
+        "views": {n: {"from": a, "up": up, "flat": flat} for n, (a, up, flat) in VIEWS.items()},
+        "palette": {"light": LIGHT, "dark": DARK},
+        "roles": ROLES,
+        "markerLooks": {
+            body: dict(zip(("colour", "symbol", "sign", "text"), look, strict=True))
+            for body, look in MARKERS.items()
+        },
         "pose": [
             columns.add(f"pose.{name}", solution["pose"].values[:, i])
             for i, name in enumerate(solution["coordinate"].values)
@@ -55,7 +73,7 @@ def machine(solution: Solution, columns: Columns) -> dict[str, Any]:
         "rods": rods,
         "joints": joints,
         "balls": [
-            {"name": c.name, "at": {"platform": list(c.point)}, "radius": ball_radius(c, size)}
+            {"name": c.name, "at": {"platform": list(c.point)}, "radius": parts.balls[c.name]}
             for c in mechanism.contacts
         ],
         "landmarks": [
@@ -74,50 +92,39 @@ def machine(solution: Solution, columns: Columns) -> dict[str, Any]:
     }
 
 
-def ball_radius(contact: Any, size: float) -> float:
-    """Radius of a contact's ball as drawn [m]: its own, where the file gives one."""
-    return contact.ball_radius or 0.08 * size
-
-
 def _chains(
-    mechanism: Mechanism, scene: Scene, columns: Columns
+    mechanism: Mechanism, parts: Parts, scene: Scene, columns: Columns
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    rods, joints = [], []
-    looks = styles(mechanism.chain_names)
-    for chain, look in zip(mechanism.chains, looks, strict=True):
-        drawing = scene.chains[chain.name]
-        at: dict[str, dict[str, Any]] = {}
-        for name, point in drawing.points.items():
+    """Rods, and the places of joints with their radius."""
+    at: dict[tuple[str, str], dict[str, Any]] = {}
+    for chain in mechanism.chains:
+        for name, point in scene.chains[chain.name].points.items():
             if name == PLATFORM_JOINT:
-                at[name] = {"platform": list(chain.platform)}
+                found: dict[str, Any] = {"platform": list(chain.platform)}
             elif point.ndim == 1:
-                at[name] = {"fixed": point.tolist()}
+                found = {"fixed": point.tolist()}
             else:
-                at[name] = {"columns": columns.add_vector(f"point.{chain.name}.{name}", point)}
-        rods += [
-            {
-                "chain": chain.name,
-                "body": rod.body,
-                "from": at[rod.start],
-                "to": at[rod.end],
-                "thickness": rod.thickness,
-                "colour": look.colour if rod.moving else None,
-            }
-            for rod in drawing.rods
-        ]
-        joints += [at[name] for name in drawing.balls]
-    return rods, joints
+                found = {"columns": columns.add_vector(f"point.{chain.name}.{name}", point)}
+            at[chain.name, name] = found
+    rods = [
+        {
+            "chain": bar.chain,
+            "body": bar.body,
+            "from": at[bar.chain, bar.start],
+            "to": at[bar.chain, bar.end],
+            "radius": bar.radius,
+            "colour": bar.colour,
+        }
+        for bar in parts.bars
+    ]
+    return rods, [at[key] | {"radius": JOINT * parts.size} for key in parts.joints]
 
 
-def _surfaces(mechanism: Mechanism, scene: Scene, size: float) -> Iterator[dict[str, Any]]:
-    for contact in mechanism.contacts:
-        if not contact.surface.known:
-            continue
-        patch = contact_patch(contact, scene.contacts[contact.name], size)
-        finite = np.where(np.isfinite(patch.vertices), patch.vertices, 0.0)
+def _surfaces(parts: Parts) -> Iterator[dict[str, Any]]:
+    for name, patch in parts.surfaces.items():
         yield {
-            "name": contact.name,
-            "vertices": finite.tolist(),
+            "name": name,
+            "vertices": np.where(np.isfinite(patch.vertices), patch.vertices, 0.0).tolist(),
             "faces": patch.faces.tolist(),
             "outline": patch.outline.tolist(),
             "bounded": patch.bounded,
@@ -188,7 +195,7 @@ def _scales(arrows: Sequence[Arrow], size: float) -> dict[str, dict[str, float]]
 
 
 def _contact_arrows(
-    solution: Solution, scene: Scene, columns: Columns, size: float
+    solution: Solution, scene: Scene, parts: Parts, columns: Columns
 ) -> Iterator[Arrow]:
     forces = solution["contact_force"].values
     for i, contact in enumerate(solution.mechanism.contacts):
@@ -199,7 +206,7 @@ def _contact_arrows(
         vector = forces[:, i, None] * normals
         numbers = columns.add_vector(f"contact_vector.{contact.name}", vector)
         # From the ball's skin, or a small force would hide in it.
-        yield Arrow("contact", contact.point, vector, ball_radius(contact, size), numbers)
+        yield Arrow("contact", contact.point, vector, parts.balls[contact.name], numbers)
 
 
 def _load_arrow(solution: Solution, columns: Columns) -> Iterator[Arrow]:
@@ -222,14 +229,6 @@ def _traces(solution: Solution) -> Iterator[dict[str, Any]]:
     yield {"name": guide or "platform centre", "at": list(points.get(guide, (0.0, 0.0, 0.0)))}
     for contact in mechanism.contacts:
         yield {"name": contact.name, "at": list(contact.point)}
-
-
-def _cloud(scene: Scene, hull: np.ndarray) -> np.ndarray:
-    """Every place that a point of the mechanism is ever at, (P, 3) [m]."""
-    clouds = [p.reshape(-1, 3) for d in scene.chains.values() for p in d.points.values()]
-    step = max(len(scene.position) // 200, 1)
-    corners = scene.position[::step, None] + np.einsum("nij,vj->nvi", scene.rotation[::step], hull)
-    return np.vstack([*clouds, corners.reshape(-1, 3), *scene.contacts.values(), hull])
 
 
 def _box(cloud: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:

@@ -1,25 +1,33 @@
 """Where everything of a mechanism stands, as numbers: the geometry that every picture draws."""
 
-from .chains import DRAWINGS, ChainDrawing, Rod, drawing_points
-from .colours import DARK, DASHES, LIGHT, Style, styles
+from .chain_drawings import DRAWINGS, ChainDrawing, Rod, drawing_points
+from .colours import DARK, DASHES, LIGHT, MARKERS, ROLES, Style, styles
 from .hull import platform_hull
+from .parts import VIEWS, Bar, Parts, cloud, parts_of
+from .patches import Patch, contact_normals, contact_patch, contact_profile
 from .place import Scene, place, rotations
-from .surface import Patch, contact_normals, contact_patch, contact_profile
 
 __all__ = [
     "DARK",
     "DASHES",
     "DRAWINGS",
     "LIGHT",
+    "MARKERS",
+    "ROLES",
+    "VIEWS",
+    "Bar",
     "ChainDrawing",
+    "Parts",
     "Patch",
     "Rod",
     "Scene",
     "Style",
+    "cloud",
     "contact_normals",
     "contact_patch",
     "contact_profile",
     "drawing_points",
+    "parts_of",
     "place",
     "platform_hull",
     "rotations",

@@ -13,6 +13,19 @@ from ..naming import stem
 
 LIGHT = ("#105DCA", "#D97A03", "#07A973", "#693804", "#745F8A", "#1E1B19")
 DARK = ("#4491E5", "#D06A05", "#4CEE8D", "#F4EC46", "#A98AA0", "#DDF6FA")
+# What is no chain, on light and on dark grounds.
+ROLES = {
+    "neutral": ("#7d8894", "#8d98a5"),
+    "platform": ("#c9d3de", "#5b6877"),
+    "surface": ("#e5b567", "#b98a3c"),
+    "ball": ("#c2185b", "#ff6f9f"),
+}
+# Measured markers by the body that they are on: colour, plotly's symbol, a sign, and words.
+MARKERS = {
+    "fixed": (2, "square", "■", "markers measured on the base"),
+    "platform": (0, "diamond", "◆", "on the platform"),
+    "": (4, "circle", "●", "of no stated body"),
+}
 DASHES = ("solid", "dash", "dot", "dashdot")
 
 

@@ -8,7 +8,7 @@ from ...mechanism import Contact, Mechanism
 from ...mechanism.home import characteristic_length
 from .colours import LIGHT, styles
 from .hull import platform_hull
-from .surface import contact_patch
+from .patches import contact_patch
 
 
 class Look:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...kinematics.bryant import rotations
 from ...mechanism import Mechanism
-from .chains import ChainDrawing, drawing_points
+from .chain_drawings import ChainDrawing, drawing_points
 
 
 @dataclass(frozen=True)

@@ -2,13 +2,7 @@
 
 const stageNode = document.getElementById("stage");
 const drawn = payload.machine;
-// Front, side and top are drawn without perspective, as on an engineer's sheet.
-const CAMERAS = {
-  Front: { from: [1, 0, 0], up: [0, 0, 1], flat: true },
-  Side: { from: [0, -1, 0], up: [0, 0, 1], flat: true },
-  Top: { from: [0, 0, 1], up: [1, 0, 0], flat: true },
-  Oblique: { from: [1.15, -1.15, 0.6], up: [0, 0, 1], flat: false },
-};
+const CAMERAS = drawn.views;
 const HALF_FIELD = Math.tan(Math.PI / 8);  // of plotly's perspective
 const FILL = 0.86;  // of the canvas
 const FLAT_DISTANCE = 3;
@@ -60,25 +54,18 @@ const layersShown = Object.fromEntries(
   ["platform", "chains", "surfaces", "forces", "traces", "markers", "labels", "axes"]
     .filter((layer) => !(layer in NEEDS) || NEEDS[layer].length)
     .map((layer) => [layer, true]));
-const NEUTRAL = { light: "#7d8894", dark: "#8d98a5" };
-const PLATFORM = { light: "#c9d3de", dark: "#5b6877" };
-const SURFACE = { light: "#e5b567", dark: "#b98a3c" };
 const FORCE = { contact: "--cursor", load: "--ink" };
-
-const rodRadius = 0.022 * drawn.size;
 
 // Solids at a sample; grey and without forces where they stand for one that has no result.
 function bodies(index, grey) {
-  const theme = themeName();
-  const tinted = (tint) => (grey ? NEUTRAL[theme] : tint);
+  const tinted = (tint) => (grey ? role("neutral") : tint);
   const chains = new Solids(), joints = new Solids(), balls = new Solids(), forces = new Solids();
   for (const rod of drawn.rods) {
-    const tint = rod.colour === null ? NEUTRAL[theme] : colour(rod.colour);
-    const radius = rodRadius * rod.thickness;
-    chains.cone(position(rod.from, index), position(rod.to, index), radius, radius, tinted(tint));
+    const tint = rod.colour === null ? role("neutral") : colour(rod.colour);
+    chains.cone(position(rod.from, index), position(rod.to, index), rod.radius, rod.radius, tinted(tint));
   }
-  for (const joint of drawn.joints) joints.sphere(position(joint, index), 1.9 * rodRadius, NEUTRAL[theme], 12);
-  for (const ball of drawn.balls) balls.sphere(position(ball.at, index), ball.radius, tinted(css("--cursor")), 18);
+  for (const joint of drawn.joints) joints.sphere(position(joint, index), joint.radius, role("neutral"), 12);
+  for (const ball of drawn.balls) balls.sphere(position(ball.at, index), ball.radius, tinted(role("ball")), 18);
   for (const arrow of drawn.arrows) {
     const perNewton = drawn.scales[arrow.kind]?.metresPerNewton ?? 0;
     const vector = arrow.columns.map((c) => grey ? 0 : column(c)[index] * perNewton);
@@ -88,7 +75,7 @@ function bodies(index, grey) {
   }
   const platform = new Solids();
   for (const v of drawn.hull.vertices) platform.vertex(onPlatform(v));
-  for (const [a, b, c] of drawn.hull.faces) platform.face(a, b, c, tinted(PLATFORM[theme]));
+  for (const [a, b, c] of drawn.hull.faces) platform.face(a, b, c, tinted(role("platform")));
   return { platform, chains, joints, balls, forces };
 }
 
@@ -105,12 +92,11 @@ function solidTrace(name, solids) {
 }
 
 function surfaceTraces() {
-  const theme = themeName();
   const solids = new Solids();
   for (const surface of drawn.surfaces) {
     const start = solids.x.length;
     for (const v of surface.vertices) solids.vertex(v);
-    for (const [a, b, c] of surface.faces) solids.face(start + a, start + b, start + c, SURFACE[theme]);
+    for (const [a, b, c] of surface.faces) solids.face(start + a, start + b, start + c, role("surface"));
   }
   const border = { x: [], y: [], z: [] };
   for (const surface of drawn.surfaces.filter((s) => s.bounded)) {
@@ -168,11 +154,7 @@ function labelTrace(index) {
 }
 
 // Measured markers: a sign and a colour for each body, nothing where one was not seen.
-const MARKERS = {
-  fixed: { symbol: "square", sign: "■", colour: 2, text: "markers measured on the base" },
-  platform: { symbol: "diamond", sign: "◆", colour: 0, text: "on the platform" },
-  "": { symbol: "circle", sign: "●", colour: 4, text: "of no stated body" },
-};
+const MARKERS = drawn.markerLooks;
 
 function markerTrace(index) {
   const places = drawn.markers.map((marker) => marker.columns.map((c) => {

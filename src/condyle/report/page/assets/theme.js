@@ -8,7 +8,8 @@ let printing = false;
 const themeName = () =>
   printing ? "light" : chosenTheme ?? (darkSystem.matches ? "dark" : "light");
 
-const colour = (number) => payload.palette[themeName()][number];
+const colour = (number) => payload.machine.palette[themeName()][number];
+const role = (name) => payload.machine.roles[name][themeName() === "dark" ? 1 : 0];
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 function applyTheme() {

@@ -69,18 +69,21 @@ def contact_patch(contact: Contact, track: np.ndarray, size: float) -> Patch:
     return Patch(vertices, faces, vertices[_border(faces)], bounded)
 
 
-def contact_profile(contact: Contact, low: float, high: float, y: float) -> np.ndarray | None:
-    """The locus of the centre over x = low..high at `y`, (M, 3) [m].
+def contact_profile(contact: Contact, track: np.ndarray) -> np.ndarray | None:
+    """The locus of the centre seen from the side at the y of home, past a track: (M, 3) [m].
 
-    None where it is upright, and for a surface whose equation is not known.
+    Over x, or where it is upright over z. None for a surface whose equation is not known.
     """
     if not contact.surface.known:
         return None
-    frame = _frame(contact)
-    if not np.array_equal(frame, np.eye(3)):
-        return None
-    x = np.linspace(low, high, 61)
-    flat = np.column_stack([x, np.full_like(x, y)]) - np.asarray(contact.point)[:2]
+    n = contact_normals(contact, np.array([contact.point]))[0]
+    along, up = (0, 2) if abs(n[2]) > LEVEL else (2, 0)
+    seen = track[np.isfinite(track).all(axis=1), along]
+    reach = [*seen, contact.point[along], *((contact.bounds.x, contact.bounds.z)[along // 2] or ())]
+    spare = 0.1 * (max(reach) - min(reach))
+    frame = np.eye(3)[[along, 1, up]]
+    flat = np.zeros((61, 2))
+    flat[:, 0] = np.linspace(min(reach) - spare, max(reach) + spare, 61) - contact.point[along]
     return _solve(contact.offset_surface, contact.point, frame, flat)
 
 
