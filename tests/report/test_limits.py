@@ -14,7 +14,7 @@ from condyle.report.page.page_facts import chain_table
 from condyle.report.page.panel_data import panel_data
 from condyle.report.panel_list import torque
 from condyle.results.solution import Solution
-from condyle.view.session import state_messages
+from condyle.view.snapshot import state_messages
 
 LOW, HIGH = -0.0005, 0.003  # N m, of efforts from -0.001 to 0.0036
 FIRST, SECOND, THIRD = "pterygoid_left", "pterygoid_right", "masseter_left"

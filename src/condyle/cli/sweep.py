@@ -63,7 +63,7 @@ def sweep(
 
 def _shown(table: xr.Dataset, folder: Path, figures: bool) -> Answer:
     """The tables of a sweep, as text and as CSV, and its figures."""
-    from ..report.tables.sweep import sweep_tables
+    from ..report.tables.sweep_tables import sweep_tables
 
     tables = sweep_tables(table)
     files = []

@@ -28,7 +28,7 @@ def weigh(
     from ..analysis.weight_curve import tradeoff
     from ..atomic import write_text
     from ..report.tables import with_tables
-    from ..report.tables.tradeoff import tradeoff_table
+    from ..report.tables.tradeoff_table import tradeoff_table
 
     found = tradeoff(machine, motion, load, load_point, preload=preload)
     table = tradeoff_table(found)

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..kinematics.singularities import KINDS
 from ..mechanism import Mechanism
 from ..motion.points import DEFAULT_LOAD_POINT
 from ..report.scene import place
@@ -15,8 +14,8 @@ from ..results.contacts import bound_margins
 from ..simulation.integrators import Stuck
 from ..simulation.live import Live, Moment
 from ..simulation.plan import Plan
-from .session import CENTRE, force_vectors, over_limits, state_messages
-from .snapshot import Level, Snapshot
+from .session import CENTRE
+from .snapshot import Level, Snapshot, measured, state_messages
 
 SLICE = 2e-3  # seconds of the simulation between two looks at the clock
 BUDGET = 0.04  # seconds of work between two pictures
@@ -135,37 +134,27 @@ class LivePlayer:
         except Stuck:
             stale = True
         now = self._last
-        scene = place(self.mechanism, now.pose[None], now.joint[None])
         found = self._model.configuration(now.pose[None])
         margin = bound_margins(self.mechanism, found.contact_point)[0]
-        measures = found.singularity
-        ratio = float(measures.ratio[0])
         level, messages = self._messages(now, margin)
-        return Snapshot(
-            mechanism=self.mechanism,
-            pose=now.pose,
-            wanted=None,
-            scene=scene,
-            broken=(),
+        return Snapshot.at(
+            self.mechanism,
+            now.pose,
+            now.joint,
             joint=now.joint,
             rate=now.joint_rate,
             torque=now.effort,
-            reach=None,
             contact_force=now.contact_force,
-            force_vector=force_vectors(self.mechanism, scene.contacts, now.contact_force),
             margin=margin,
             load=np.zeros(3),
             load_at=np.zeros(3),
-            ratio=ratio,
-            condition=float(measures.condition[0]),
-            near=KINDS[int(measures.kind()[0])] if np.isfinite(ratio) else KINDS[0],
             level=level,
             messages=messages,
             time=self.live.t,
             stale=stale,
-            over=over_limits(self.mechanism, now.effort),
             pushes=now.forces,
             pushes_at=now.points,
+            **measured(found.singularity),
         )
 
     def _messages(self, now: Moment, margin: np.ndarray) -> tuple[Level, tuple[str, ...]]:

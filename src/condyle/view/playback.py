@@ -8,8 +8,7 @@ from ..kinematics.singularities import KINDS
 from ..report.gaps import Gap, at_sample, gaps
 from ..report.scene import place
 from ..results.solution import Solution
-from .session import force_vectors, over_limits, state_messages
-from .snapshot import Level, Snapshot
+from .snapshot import Level, Snapshot, state_messages
 
 
 class Playback:
@@ -79,24 +78,18 @@ class Playback:
         here = {name: values[i] for name, values in self._values.items()}
         pose, joint = self._values["pose"][drawn], self._values["joint"][drawn]
         pose = np.nan_to_num(pose)  # home, where there is not one good sample
-        scene = place(self.mechanism, pose[None], np.nan_to_num(joint)[None])
         points = self.mechanism.platform.points
         at = points.get(s.options["load_point"] or "", (0.0, 0.0, 0.0))
-        force = here["contact_force"]
         load = here["load"][:3] if failed is None else np.full(3, np.nan)
         level, messages = self._messages(failed, drawn, here)
-        return Snapshot(
-            mechanism=self.mechanism,
-            pose=pose,
-            wanted=None,
-            scene=scene,
-            broken=(),
+        return Snapshot.at(
+            self.mechanism,
+            pose,
+            np.nan_to_num(joint),
             joint=here["joint"],
             rate=here["joint_rate"],
             torque=here["torque"],
-            reach=None,
-            contact_force=force,
-            force_vector=force_vectors(self.mechanism, scene.contacts, force),
+            contact_force=here["contact_force"],
             margin=here["bound_margin"],
             load=load,
             load_at=np.array(at),
@@ -107,7 +100,6 @@ class Playback:
             messages=messages,
             time=self.now,
             stale=failed is not None,
-            over=over_limits(self.mechanism, here["torque"]),
             markers=s["marker_place"].values[i] if "marker_place" in s else None,
         )
 

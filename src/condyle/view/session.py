@@ -18,11 +18,10 @@ from ..model.data import Evaluation
 from ..model.evaluator import Evaluator
 from ..model.judge import unreachable_cause
 from ..motion.points import DEFAULT_LOAD_POINT
-from ..report.scene import contact_normals, place
-from ..results.solution import BOUND_TOLERANCE, bound_margins, lift_off
+from ..results.contacts import bound_margins
 from ..status import Status
 from .internal import Directions, Internal
-from .snapshot import Level, Snapshot
+from .snapshot import Level, Snapshot, bound_messages, measured, state_messages
 
 CENTRE = "mass centre"  # where the load acts besides the platform's points
 SPAN_ANGLE = np.radians(60)  # how far from home the reach is looked for
@@ -31,7 +30,6 @@ BEYOND = 1.25  # sliders go this much further than the reach, to show where it e
 STEPS = 6  # of Gauss-Newton towards a dragged pose
 MOST_INTERNAL = 6  # directions of internal efforts that have a slider
 WIDE = 25  # the sliders of actuators without limits: so many times the largest effort at home
-MOST_NAMED = 4  # cables that one message names
 NUDGE = 1e-6  # [m, rad], for differences
 
 NO_EFFORTS: dict[int, str] = {
@@ -178,39 +176,33 @@ class Session:
         ]
         if met:
             self._joint = np.where(in_reach, joint, self._joint)
-        scene = place(self.mechanism, self._pose[None], self._joint[None])
         force = _or_nan(found.contact_force, len(self.mechanism.contacts), status == Status.ok)
         torque = _or_nan(found.effort, len(in_reach), status == Status.ok)
         if met and self.internal.any():
             directions = self.directions()
             torque = torque + directions.effort @ self.internal
             force = force + directions.contact @ self.internal
-        measures = found.configuration.singularity
-        ratio = float(measures.ratio[0])
-        near = KINDS[int(measures.kind()[0])] if np.isfinite(ratio) else KINDS[0]
+        measures = measured(found.configuration.singularity)
         margin = bound_margins(self.mechanism, found.configuration.contact_point)[0]
-        level, messages = self._messages(found, met, broken, margin, torque, force, near)
-        return Snapshot(
-            mechanism=self.mechanism,
-            pose=self._pose,
+        level, messages = self._messages(
+            found, met, broken, margin, torque, force, measures["near"]
+        )
+        return Snapshot.at(
+            self.mechanism,
+            self._pose,
+            self._joint,
             wanted=wanted,
-            scene=scene,
             broken=tuple(broken) if met else (),
             joint=np.where(in_reach, joint, np.nan),
-            rate=None,
             torque=torque,
-            over=over_limits(self.mechanism, torque),
             reach=reach,
             contact_force=force,
-            force_vector=force_vectors(self.mechanism, scene.contacts, force),
             margin=margin,
             load=self.load,
             load_at=self._load_at(),
-            ratio=ratio,
-            condition=float(measures.condition[0]),
-            near=near,
             level=level,
             messages=messages,
+            **measures,
         )
 
     def _evaluate(self, q: np.ndarray) -> Evaluation:
@@ -254,68 +246,6 @@ class Session:
                 f"Near a singularity of the kind {near} (ratio below {NEAR_SINGULAR:g})"
             )
         return ("warning" if messages else "calm"), tuple(messages)
-
-
-def state_messages(
-    mechanism: Mechanism,
-    margin: np.ndarray,
-    force: np.ndarray,
-    torque: np.ndarray,
-    rate: np.ndarray | None,
-) -> list[str]:
-    """Contacts out of bounds or lifting off, and actuators above a limit."""
-    messages = bound_messages(mechanism, margin)
-    lifted = lift_off(mechanism, force[None])[0] if len(force) else []
-    messages += [
-        f"{name} lifts off: its surface would have to pull"
-        for name, up in zip(mechanism.contact_names, lifted, strict=True)
-        if up
-    ]
-    slack: list[str] = []
-    for i, chain in enumerate(mechanism.chains):
-        low, high, speed = limits(chain)
-        if chain.kind == "cable" and torque[i] < 0:
-            slack.append(f"{chain.name} ({-torque[i]:.3g} N)")
-        elif torque[i] > high or (low == -high and torque[i] < low):
-            messages.append(f"{chain.name} is above its effort limit of {high:g}")
-        elif torque[i] < low:
-            messages.append(f"{chain.name} is below its least effort of {low:g}")
-        if rate is not None and abs(rate[i]) > speed:
-            messages.append(f"{chain.name} is above its speed limit of {speed:g}")
-    if slack:
-        more = f" and {len(slack) - MOST_NAMED} more" if len(slack) > MOST_NAMED else ""
-        messages.append(f"Slack, would have to push: {', '.join(slack[:MOST_NAMED])}{more}")
-    return messages
-
-
-def over_limits(mechanism: Mechanism, torque: np.ndarray) -> tuple[str, ...]:
-    """Chains whose effort, of (n,), is outside its limits."""
-    with np.errstate(invalid="ignore"):
-        return tuple(
-            chain.name
-            for chain, effort in zip(mechanism.chains, torque, strict=True)
-            if limits(chain).beyond(effort)
-        )
-
-
-def bound_messages(mechanism: Mechanism, margin: np.ndarray) -> list[str]:
-    """Contacts outside their bounds by margins (k,) [m], NaN where a pose has none."""
-    return [
-        f"{name} is {-m * 1e3:.3g} mm outside its bounds"
-        for name, m in zip(mechanism.contact_names, margin, strict=True)
-        if m < -BOUND_TOLERANCE
-    ]
-
-
-def force_vectors(
-    mechanism: Mechanism, points: dict[str, np.ndarray], force: np.ndarray
-) -> np.ndarray:
-    """Contact forces (k,) along the normals at ball centres (1, 3) each, as vectors (k, 3) [N]."""
-    vectors = [
-        value * contact_normals(contact, points[contact.name])[0]
-        for contact, value in zip(mechanism.contacts, force, strict=True)
-    ]
-    return np.array(vectors).reshape(-1, 3)
 
 
 def _around_home(value: np.ndarray, reached: np.ndarray) -> tuple[float, float]:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
+from ..kinematics.singularities import KINDS, Singularity
 from ..mechanism import Mechanism
-from ..report.scene import Scene
+from ..mechanism.chain import limits
+from ..report.scene import Scene, contact_normals, place
+from ..results.contacts import BOUND_TOLERANCE, lift_off
 
 Level = Literal["calm", "warning", "unreachable"]
+MOST_NAMED = 4  # cables that one message names
 
 
 @dataclass(frozen=True)
@@ -38,13 +42,9 @@ class Snapshot:
 
     mechanism: Mechanism
     pose: np.ndarray
-    wanted: np.ndarray | None
     scene: Scene
-    broken: tuple[str, ...]
     joint: np.ndarray
-    rate: np.ndarray | None
     torque: np.ndarray
-    reach: np.ndarray | None
     contact_force: np.ndarray
     force_vector: np.ndarray
     margin: np.ndarray
@@ -55,9 +55,91 @@ class Snapshot:
     near: str
     level: Level
     messages: tuple[str, ...]
+    wanted: np.ndarray | None = None
+    broken: tuple[str, ...] = ()
+    rate: np.ndarray | None = None
+    reach: np.ndarray | None = None
     time: float | None = None
     stale: bool = False
     over: tuple[str, ...] = ()
     pushes: np.ndarray | None = None
     pushes_at: np.ndarray | None = None
     markers: np.ndarray | None = None
+
+    @classmethod
+    def at(
+        cls, mechanism: Mechanism, pose: np.ndarray, drawn: np.ndarray, **numbers: Any
+    ) -> Snapshot:
+        """The scene at X_EE, (6,), and joints `drawn`, (n,), with forces as vectors; `numbers`:
+        the other fields."""
+        scene = place(mechanism, pose[None], drawn[None])
+        vectors = [
+            force * contact_normals(contact, scene.contacts[contact.name])[0]
+            for contact, force in zip(mechanism.contacts, numbers["contact_force"], strict=True)
+        ]
+        return cls(
+            mechanism=mechanism,
+            pose=pose,
+            scene=scene,
+            force_vector=np.array(vectors).reshape(-1, 3),
+            over=over_limits(mechanism, numbers["torque"]),
+            **numbers,
+        )
+
+
+def measured(found: Singularity) -> dict[str, Any]:
+    """How near to a singularity the first pose is, as a snapshot's fields."""
+    ratio = float(found.ratio[0])
+    near = KINDS[int(found.kind()[0])] if np.isfinite(ratio) else KINDS[0]
+    return {"ratio": ratio, "condition": float(found.condition[0]), "near": near}
+
+
+def state_messages(
+    mechanism: Mechanism,
+    margin: np.ndarray,
+    force: np.ndarray,
+    torque: np.ndarray,
+    rate: np.ndarray | None,
+) -> list[str]:
+    """Contacts out of bounds or lifting off, and actuators above a limit."""
+    messages = bound_messages(mechanism, margin)
+    lifted = lift_off(mechanism, force[None])[0] if len(force) else []
+    messages += [
+        f"{name} lifts off: its surface would have to pull"
+        for name, up in zip(mechanism.contact_names, lifted, strict=True)
+        if up
+    ]
+    slack: list[str] = []
+    for i, chain in enumerate(mechanism.chains):
+        low, high, speed = limits(chain)
+        if chain.kind == "cable" and torque[i] < 0:
+            slack.append(f"{chain.name} ({-torque[i]:.3g} N)")
+        elif torque[i] > high or (low == -high and torque[i] < low):
+            messages.append(f"{chain.name} is above its effort limit of {high:g}")
+        elif torque[i] < low:
+            messages.append(f"{chain.name} is below its least effort of {low:g}")
+        if rate is not None and abs(rate[i]) > speed:
+            messages.append(f"{chain.name} is above its speed limit of {speed:g}")
+    if slack:
+        more = f" and {len(slack) - MOST_NAMED} more" if len(slack) > MOST_NAMED else ""
+        messages.append(f"Slack, would have to push: {', '.join(slack[:MOST_NAMED])}{more}")
+    return messages
+
+
+def over_limits(mechanism: Mechanism, torque: np.ndarray) -> tuple[str, ...]:
+    """Chains whose effort, of (n,), is outside its limits."""
+    with np.errstate(invalid="ignore"):
+        return tuple(
+            chain.name
+            for chain, effort in zip(mechanism.chains, torque, strict=True)
+            if limits(chain).beyond(effort)
+        )
+
+
+def bound_messages(mechanism: Mechanism, margin: np.ndarray) -> list[str]:
+    """Contacts outside their bounds by margins (k,) [m], NaN where a pose has none."""
+    return [
+        f"{name} is {-m * 1e3:.3g} mm outside its bounds"
+        for name, m in zip(mechanism.contact_names, margin, strict=True)
+        if m < -BOUND_TOLERANCE
+    ]

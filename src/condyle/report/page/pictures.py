@@ -24,7 +24,7 @@ def sweep_section(found: xr.Dataset | None) -> Markup:
         return Markup("")
     require("matplotlib", "figures")
     from ..figures.sweep_figures import sweep_plots
-    from ..tables.sweep import sweep_tables
+    from ..tables.sweep_tables import sweep_tables
 
     pictures = [
         tag("p", _image(draw(found), (draw.__doc__ or "").splitlines()[0]))

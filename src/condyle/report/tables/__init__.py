@@ -8,10 +8,9 @@ from pathlib import Path
 from ...analysis.comparison import Comparison
 from ...atomic import write_text
 from .differences import differences
-from .indices import table_2
-from .keep import kept_tables, with_tables
-from .seconds import table_1
-from .table import Table
+from .index_table import table_2
+from .report_table import Table, kept_tables, with_tables
+from .seconds_table import table_1
 
 __all__ = [
     "Table",

@@ -7,7 +7,7 @@ from pathlib import PurePath
 
 from ...analysis.comparison import Comparison, Difference
 from ...analysis.runs import Run
-from .table import NOTHING, Table
+from .report_table import NOTHING, Table
 
 
 def differences(comparison: Comparison) -> Table:

@@ -6,31 +6,33 @@ from pathlib import PurePath
 from typing import Any
 
 from ...analysis.weight_curve import Tradeoff
-from .table import Table
+from .report_table import Table
 
 
 def tradeoff_table(found: Tradeoff) -> Table:
     """A row a weight: effort, greatest activation, and the load on the contacts."""
-    names = found.solution.mechanism.contact_names
-    rows, records = [], []
+    solution = found.solution
+    names = solution.mechanism.contact_names
+    records: list[dict[str, Any]] = []
     for p, weight in enumerate(found.weights):
-        record: dict[str, Any] = {
+        record = {
             "weight": float(weight),
             "effort": float(found.effort[p]),
             "greatest_activation": float(found.activation[p]),
             "contact_load": float(found.load[p]),
         }
-        row = [f"{weight:.3g}", f"{found.effort[p]:.4g}", f"{found.activation[p]:.4g}"]
-        row.append(f"{found.load[p]:.4g}")
         for k, name in enumerate(names):
-            record |= {
-                f"mean_{name}": float(found.mean[p, k]),
-                f"peak_{name}": float(found.peak[p, k]),
-            }
-            row.append(f"{found.mean[p, k]:.4g} ({found.peak[p, k]:.4g})")
-        rows.append(row)
+            record[f"mean_{name}"] = float(found.mean[p, k])
+            record[f"peak_{name}"] = float(found.peak[p, k])
         records.append(record)
-    solution = found.solution
+    cells: dict[str, Any] = {
+        "W": "weight:.3g",
+        "Effort": "effort:.4g",
+        "Greatest use": "greatest_activation:.4g",
+        "Contact load [N]": "contact_load:.4g",
+    }
+    for name in names:
+        cells[f"{name} [N]"] = lambda r, n=name: f"{r[f'mean_{n}']:.4g} ({r[f'peak_{n}']:.4g})"
     title = (
         f"Effort against load on the contacts: {solution.attrs['mechanism_name']}, "
         f"{PurePath(solution.options['motion']).name}, {found.samples} samples"
@@ -42,5 +44,4 @@ def tradeoff_table(found: Tradeoff) -> Table:
         "of sqrt(sum force^2). Greatest use: the largest effort over its limit.",
         "Of every contact the mean of |force| along the motion, and the largest in brackets.",
     ]
-    heads = ("W", "Effort", "Greatest use", "Contact load [N]", *(f"{n} [N]" for n in names))
-    return Table("tradeoff", title, heads, rows, records, notes)
+    return Table.of("tradeoff", title, records, cells, notes)

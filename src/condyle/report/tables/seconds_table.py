@@ -10,7 +10,7 @@ from ...analysis import paper
 from ...analysis.comparison import Comparison
 from ...analysis.processor import processor
 from ...analysis.runs import Run
-from .table import NOTHING, Table, cell
+from .report_table import NOTHING, Table
 
 
 def table_1(comparison: Comparison) -> Table:
@@ -35,32 +35,16 @@ def table_1(comparison: Comparison) -> Table:
         gm1 = paper.TABLE_1["momentum", "direct"].total
         record["of_gm1_paper"] = None if published is None else published.total / gm1
         records.append(record)
-    columns = {
-        "Model": ("model", "{}"),
-        "In the paper": ("paper_name", "{}"),
-        "Symbolic s": ("symbolic", "{:.3f}"),
-        "paper": ("symbolic_paper", "{:.3f}"),
-        "ratio": ("symbolic_ratio", "{:.4f}"),
-        "Numeric s": ("numeric", "{:.3f}"),
-        "paper ": ("numeric_paper", "{:.3f}"),
-        "ratio ": ("numeric_ratio", "{:.4f}"),
-        "Total s": ("total", "{:.3f}"),
-        "paper  ": ("total_paper", "{:.3f}"),
-        "ratio  ": ("total_ratio", "{:.4f}"),
-        "of GM 1": ("of_gm1", "{:.0%}"),
-        "paper   ": ("of_gm1_paper", "{:.0%}"),
-    }
-    if not beside:
-        columns = {
-            name: column
-            for name, column in columns.items()
-            if name.strip() not in ("paper", "ratio", "In the paper", "of GM 1")
-        }
-    rows = [[cell(r[key], form) for key, form in columns.values()] for r in records]
-    names = tuple(name.strip() for name in columns)
+    cells = {"Model": "model"} | ({"In the paper": "paper_name"} if beside else {})
+    for k, part in enumerate(("symbolic", "numeric", "total")):
+        cells[f"{part.capitalize()} s"] = f"{part}:.3f"
+        if beside:  # headings that are equal for people
+            cells["paper" + " " * k] = f"{part}_paper:.3f"
+            cells["ratio" + " " * k] = f"{part}_ratio:.4f"
+    if beside:
+        cells |= {"of GM 1": "of_gm1:.0%", "paper   ": "of_gm1_paper:.0%"}
     title = f"Table 1. Computational time, {comparison.samples} samples"
-    notes = list(_notes_1(comparison, beside))
-    return Table("table-1", title, names, rows, records, notes)
+    return Table.of("table-1", title, records, cells, list(_notes_1(comparison, beside)))
 
 
 def in_paper_order(comparison: Comparison) -> list[Run]:

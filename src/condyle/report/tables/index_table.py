@@ -9,7 +9,7 @@ from typing import Any
 from ...analysis import paper
 from ...analysis.comparison import Comparison
 from ...analysis.torque_indices import Indices
-from .table import NOTHING, Table
+from .report_table import NOTHING, Table
 
 
 def table_2(comparison: Comparison) -> Table:
