@@ -298,9 +298,7 @@ def test_turns_agree_with_each_other() -> None:
         assert np.allclose(matrix(quaternion(R)), R)
     for direction in (*rng.normal(size=(20, 3)), [0, 0, 1], [0, 0, -1]):
         unit = np.asarray(direction) / np.linalg.norm(direction)
-        assert np.allclose(
-            matrix(turn_onto(unit)) @ [0, 0, 1], unit
-        )
+        assert np.allclose(matrix(turn_onto(unit)) @ [0, 0, 1], unit)
 
 
 def volume(vertices: np.ndarray, faces: np.ndarray) -> float:

@@ -17,7 +17,7 @@ from .registry import PLOTS
 from .style import house, new_figure
 
 if TYPE_CHECKING:
-    from ...analysis.compare import Comparison
+    from ...analysis.comparison import Comparison
     from ...analysis.runs import Run
     from ...results.solution import Solution
 
