@@ -19,7 +19,7 @@ _SAMPLES = 12  # frames looked at of a stretch
 _ALL_ORDERS = 5  # markers of a body, of which all orders are tried
 
 
-def why_none(bodies: Bodies, run: slice, max_residual: float) -> str:
+def why_none(bodies: Bodies, max_residual: float, run: slice) -> str:
     """Why there is no pose in a run of frames."""
     for body in bodies.both:
         seen = np.isfinite(body.points[run]).all(axis=-1)

@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -71,20 +72,15 @@ def from_c3d(
     activity = {} if file.emg is None else envelopes(file.emg, recording, machine)
     bodies = find_bodies(recording, file)
 
-    def place(where: Place, key: str) -> np.ndarray:
-        return _place(recording, bodies, where, key)
-
-    registration = register(file, machine, place)
+    registration = register(file, machine, partial(_place, recording, bodies))
     R, p = registration.pose(bodies.platform.fit.rotation, bodies.platform.fit.position)
     worst = np.maximum(*(body.fit.largest() for body in bodies.both))  # NaN where either is
     used = worst <= max_residual
     suspects = suspects_in(recording, bodies, ~used & np.isfinite(worst))
 
-    def why(run: slice) -> str:
-        return why_none(bodies, run, max_residual)
-
     pose = np.where(used[:, None], np.hstack([p, continuous_angles(R)]), np.nan)
     try:
+        why = partial(why_none, bodies, max_residual)
         kept, whole, gaps = close_gaps(recording.source, recording.t, pose, max_gap, longest, why)
     except InputError as error:
         if not suspects:
@@ -109,6 +105,16 @@ def from_c3d(
         *motion.warnings,
         *(() if load is None else load.warnings),
     )
+    markers_there = np.concatenate([body.points for body in bodies.both], axis=1)
+    beside = Beside(
+        t=motion.t,
+        names=tuple(name for body in bodies.both for name in body.names),
+        bodies=tuple(body.what for body in bodies.both for _ in body.names),
+        points=registration.to_base(bodies.steadied(markers_there)[kept]),
+        residual=np.hstack([body.fit.residual for body in bodies.both])[kept],
+        emg={chain: values[kept] for chain, values in activity.items()},
+        source=recording.source,
+    )
     return MarkerMotion(
         motion=replace(motion, sha256=recording.sha256, warnings=warnings),
         measured=used[kept],
@@ -116,17 +122,7 @@ def from_c3d(
         gaps=tuple(gaps),
         registration=registration,
         off_contacts={n: (_rms(d), float(np.abs(d).max())) for n, d in off.items()},
-        beside=Beside(
-            t=motion.t,
-            names=tuple(name for body in bodies.both for name in body.names),
-            bodies=tuple(body.what for body in bodies.both for _ in body.names),
-            points=registration.to_base(
-                bodies.steadied(np.concatenate([body.points for body in bodies.both], axis=1))[kept]
-            ),
-            residual=np.hstack([body.fit.residual for body in bodies.both])[kept],
-            emg={chain: values[kept] for chain, values in activity.items()},
-            source=recording.source,
-        ),
+        beside=beside,
         load=load,
         recording=recording,
         warnings=warnings,

@@ -85,13 +85,12 @@ def read_beside(source: Beside | str | os.PathLike[str]) -> Beside:
     names = [
         n[:-2] for n in columns if n[-2:] == "_x" and {f"{n[:-2]}_y", f"{n[:-2]}_z"} <= {*columns}
     ]
-    points = [np.column_stack([columns.pop(f"{name}_{axis}") for axis in AXES]) for name in names]
-    bodies, residual = [], []
-    for name in names:
-        body = next((b for b in BODIES if f"{name}_residual_{b}" in columns), "")
-        nothing = np.full(len(t), np.nan)
-        bodies.append(body)
-        residual.append(columns.pop(f"{name}_residual_{body}") if body else nothing)
+    points, residual = np.empty((len(t), len(names), 3)), np.full((len(t), len(names)), np.nan)
+    bodies = [next((b for b in BODIES if f"{n}_residual_{b}" in columns), "") for n in names]
+    for i, (name, body) in enumerate(zip(names, bodies, strict=True)):
+        points[:, i] = np.column_stack([columns.pop(f"{name}_{axis}") for axis in AXES])
+        if body:
+            residual[:, i] = columns.pop(f"{name}_residual_{body}")
     emg = {n[len(EMG) :]: columns.pop(n) for n in list(columns) if n.startswith(EMG)}
     if columns:
         raise InputError(
@@ -100,12 +99,4 @@ def read_beside(source: Beside | str | os.PathLike[str]) -> Beside:
         )
     if not names and not emg:
         raise InputError(f"{where}: has no markers (<marker>_x, _y, _z) and no EMG (emg_<chain>)")
-    return Beside(
-        t,
-        tuple(names),
-        tuple(bodies),
-        np.stack(points, axis=1) if names else np.empty((len(t), 0, 3)),
-        np.column_stack(residual) if names else np.empty((len(t), 0)),
-        emg,
-        where,
-    )
+    return Beside(t, tuple(names), tuple(bodies), points, residual, emg, where)

@@ -115,7 +115,8 @@ def _read(content: bytes, path: str | os.PathLike[str], unit: str | None) -> Rec
             f"{path}: is cut short: it says {count} frames and holds {len(points)}. Copy or export "
             "it again"
         )
-    known, metres, assumed = _unit(path, _text(file, "POINT:UNITS"), unit)
+    said = file.get("POINT:UNITS")
+    known, metres, assumed = _unit(path, "" if said is None else _plain(said.bytes), unit)
     first = max(int(file.first_frame), 1)
     channels = _labels(file, "ANALOG:LABELS", analog[0].shape[1])
     return Recording(
@@ -144,15 +145,13 @@ def _reader() -> Any:
 
         def _check_metadata(self) -> None:
             header = self._header
+            analog = self.analog_used * self.analog_per_frame if self.analog_used else 0
             for what, a, b in (
                 ("markers", header.point_count, self.point_used),
-                ("analog samples", header.analog_count, self._samples()),
+                ("analog samples", header.analog_count, analog),
             ):
                 if a != b:
                     raise ValueError(f"{what} a frame: {a} in the header, {b} in parameters")
-
-        def _samples(self) -> int:
-            return self.analog_used * self.analog_per_frame if self.analog_used else 0
 
         @property
         def first_frame(self) -> int:
@@ -194,19 +193,12 @@ def _unit(
     return name, LENGTH_UNITS[name], ()
 
 
-def _text(file: Any, key: str) -> str:
-    param = file.get(key)
-    return "" if param is None else _plain(param.bytes)
-
-
 def _labels(file: Any, key: str, count: int) -> tuple[str, ...]:
     """Texts of a parameter and of those that go on from it: LABELS2, LABELS3 [255 each]."""
     found: list[str] = []
-    number = 1
-    while len(found) < count and number < 256:
-        param = file.get(key if number == 1 else f"{key}{number}")
-        number += 1
-        if param is None or not param.dimensions or not param.dimensions[0]:
+    for number in ("", *range(2, 256)):
+        param = file.get(f"{key}{number}")
+        if len(found) >= count or param is None or not (param.dimensions and param.dimensions[0]):
             break
         # Texts of one length, one after the other.
         size = param.dimensions[0]

@@ -24,23 +24,17 @@ def motion_warnings(
     warnings = []
     slow = True
     for name, x, v in zip(names, value.T, np.abs(rate).max(axis=0), strict=True):
-        kind = (dimension(name) or ("length", 0))[0]
+        kind, span, most = (dimension(name) or ("length", 0))[0], np.ptp(x), np.abs(x).max()
         slow = slow and v < _SLOW[kind]
-        span = np.ptp(x)
         if kind == "length" and v > SOUND:
-            warnings.append(
-                f"{source}: {name} moves at {v:.4g} m/s, faster than sound. Are lengths in mm "
-                "(--units mm) or times in other units?"
-            )
+            said = f"moves at {v:.4g} m/s, faster than sound. Are lengths in mm (--units mm) or "
+            warnings.append(f"{source}: {name} {said}times in other units?")
         elif kind == "length" and span > _PATH:
-            warnings.append(
-                f"{source}: {name} goes over {span:.4g} m; if lengths are in mm, say --units mm"
-            )
-        elif kind == "angle" and np.abs(x).max() > 2 * np.pi:
-            warnings.append(
-                f"{source}: {name} reaches {np.abs(x).max():.4g} rad, more than a turn; if angles "
-                "are in degrees, say --units deg"
-            )
+            said = f"goes over {span:.4g} m; if lengths are in mm, say --units mm"
+            warnings.append(f"{source}: {name} {said}")
+        elif kind == "angle" and most > 2 * np.pi:
+            said = f"reaches {most:.4g} rad, more than a turn; if angles are in degrees, say"
+            warnings.append(f"{source}: {name} {said} --units deg")
     return (*warnings, *(time_warnings(source, t) if slow else ()))
 
 

@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import BrokenExecutor, CancelledError
 from pathlib import Path
 from typing import Any
 
@@ -148,6 +149,13 @@ def test_a_worker_that_is_killed_is_told_and_loses_nothing(
         condyle.sweep(tables, tmp_path / "sweep", workers=2)
     assert not kill.exists()
     same(alone, condyle.sweep(tables, tmp_path / "sweep", workers=2, resume=True))
+
+
+def test_a_part_that_nobody_does_is_told() -> None:
+    errors = {"enough memory": BrokenExecutor(), "gave up on a part: gone": CancelledError("gone")}
+    for said, error in errors.items():
+        with pytest.raises(LostWorkerError, match=said), pool._pool(None, 1, "threads"):
+            raise error
 
 
 class _Deadly:
