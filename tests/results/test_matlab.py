@@ -13,7 +13,7 @@ from support.tools import run
 
 import condyle
 from condyle.motion import bundled_reference
-from condyle.results.matlab import matlab_name
+from condyle.results.mat_file import matlab_name
 
 OCTAVE = ("octave-cli", "--quiet", "--no-init-file", "--eval")
 

@@ -31,7 +31,7 @@ from .forward_dynamics import ForwardDynamics
 from .inverse_dynamics import InverseDynamics
 from .poses import Poses, States
 from .reference_force import reference_force
-from .survey import Survey
+from .surveying import Survey
 from .system import System
 
 Array = np.ndarray

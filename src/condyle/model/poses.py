@@ -14,7 +14,7 @@ from ..motion import Motion, resolve_landmark
 from ..status import Status
 from .checks import POSE_COLUMNS, check_array, check_states
 from .data import Configuration
-from .survey import SURVEYED, Survey, judged
+from .surveying import SURVEYED, Survey, judged
 from .system import System, mended
 
 Array = np.ndarray

@@ -25,7 +25,7 @@ from ..questions.numbers import Layout, characteristic, require_closed_form, spe
 from ..questions.structure import structure_of
 from .closing import Closure
 from .distributing import LEAST, Distributor, Policy
-from .robust import Arrays, Robust
+from .robust_path import Arrays, Robust
 
 
 class System:

@@ -16,7 +16,7 @@ from ..model.model import Model
 from ..motion import Table
 from ..status import Status
 from .contacts import lift_off, lift_off_columns
-from .failures import status_columns
+from .failed_samples import status_columns
 from .state_rows import Columns, StateColumns
 from .variables import named_columns
 

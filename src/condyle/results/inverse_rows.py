@@ -11,14 +11,14 @@ import numpy as np
 from ..atomic import replacing
 from ..errors import InputError
 from ..mechanism.mechanism import COORDINATES
+from ..model.joint_reactions import reactions as joint_reactions
 from ..model.judge import require_ok
 from ..model.model import Model
-from ..model.reactions import reactions as joint_reactions
 from ..motion import Table
 from .contacts import AXES, lift_off_columns
 from .derived import Derived
-from .failures import status_columns
-from .matlab import table_variables, write_mat
+from .failed_samples import status_columns
+from .mat_file import table_variables, write_mat
 from .state_rows import Columns, StateColumns
 from .variables import VARIABLES, WRENCH, variable_columns
 from .warnings import Watch, refuse

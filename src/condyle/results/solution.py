@@ -21,8 +21,8 @@ from ..mechanism.mechanism import Mechanism
 from ..motion import write_table
 from ..progress import step
 from .contacts import AXES, BOUND_TOLERANCE, bound_margins, lift_off, lift_off_columns
-from .failures import Failure, failures, status_columns
-from .matlab import dataset_variables, write_mat
+from .failed_samples import Failure, failures, status_columns
+from .mat_file import dataset_variables, write_mat
 from .netcdf import write_netcdf
 from .variables import VARIABLES, WRENCH, named_columns, variable_columns
 from .warnings import Notice

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..kinematics.causes import shortfall_text
 from .contacts import BOUND_TOLERANCE
-from .failures import Failure
+from .failed_samples import Failure
 
 if TYPE_CHECKING:
     from .solution import Solution

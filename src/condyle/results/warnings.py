@@ -218,24 +218,6 @@ class Watch:
         about |= {"row": int(tally.first)} if self.rows else {"time": tally.first}
         when, worst, size = self._when(tally), self._at(tally.worst_at), tally.worst
         count = f"{tally.count} {'row' if self.rows else 'sample'}{'s' * (tally.count != 1)}"
-        if kind in ("bounds", "lift_off"):
-            name = self.mechanism.contact_names[i]
-            if kind == "lift_off":
-                text = f'contact "{name}" lifts off {when}: there its surface would have to pull'
-                return Notice(
-                    kind, f"{text} the ball", name, value=size, bound=0.0, unit="N", **about
-                )
-            text = (
-                f'contact "{name}" leaves its bounds {when}, by up to {size * 1e3:.3g} mm {worst}'
-            )
-            return Notice(kind, text, name, value=size, bound=0.0, unit="m", **about)
-        if kind == "near_singularity":
-            are = "is" if tally.count == 1 else "are"
-            text = (
-                f"{count} {are} near a singularity (ratio below {NEAR_SINGULAR:g}), closest "
-                f"{-size:.3g} {worst}"
-            )
-            return Notice(kind, text, value=-size, bound=NEAR_SINGULAR, unit="1", **about)
         if kind == "failed_samples":
             owner = owners(self.mechanism)[i]
             text = f"{count} left empty, first {self._at(tally.first)}: {cause_text(status, owner)}"
@@ -245,36 +227,40 @@ class Watch:
                 # What no limits would do for has no number: JSON knows none that is infinite.
                 about |= {"value": size if np.isfinite(size) else None, "bound": 1.0, "unit": "1"}
             return Notice(kind, text, named, status=STATUS_NAMES[status], **about)
-        chain = self.mechanism.chains[i]
-        if kind == "rod_angles":
-            text = (
-                f'chain "{chain.name}": its rod comes near gamma_i = +-90 degrees {worst}, where '
-                "its two angles lose their meaning; that is a singularity of the description, not "
-                "of the mechanism"
-            )
-            return Notice(
-                kind, text, chain.name, value=-size, bound=NEAR_SINGULAR, unit="1", **about
-            )
-        family, limit = FAMILIES[chain.kind], limits(chain)
-        if kind == LOW:
-            unit, bound = family.effort_unit, limit.low
-            text = (
-                f'chain "{chain.name}": effort falls to {-size:.4g} {unit} {worst}, below its '
-                f"least of {bound:g}"
-            )
-            return Notice(
-                "effort_limit", text, chain.name, value=-size, bound=bound, unit=unit, **about
-            )
-        what, unit, bound = (
-            ("effort", family.effort_unit, limit.high)
-            if kind == "effort_limit"
-            else ("speed", f"{family.joint_unit}/s", limit.speed)
-        )
-        text = (
-            f'chain "{chain.name}": {what} reaches {size:.4g} {unit} {worst}, above its limit of '
-            f"{bound:g}"
-        )
-        return Notice(kind, text, chain.name, value=size, bound=bound, unit=unit, **about)
+        # Whose it is, what is said of it, what was met, and what it is held against.
+        name: str | None
+        if kind in ("bounds", "lift_off"):
+            name, value, bound = self.mechanism.contact_names[i], size, 0.0
+            if kind == "lift_off":
+                unit = "N"
+                text = f"lifts off {when}: there its surface would have to pull the ball"
+            else:
+                unit, text = "m", f"leaves its bounds {when}, by up to {size * 1e3:.3g} mm {worst}"
+            text = f'contact "{name}" {text}'
+        elif kind == "near_singularity":
+            name, value, bound, unit = None, -size, NEAR_SINGULAR, "1"
+            are = "is" if tally.count == 1 else "are"
+            text = f"{count} {are} near a singularity (ratio below {NEAR_SINGULAR:g}), closest "
+            text += f"{-size:.3g} {worst}"
+        else:
+            chain = self.mechanism.chains[i]
+            name, family, limit = chain.name, FAMILIES[chain.kind], limits(chain)
+            if kind == "rod_angles":
+                value, bound, unit = -size, NEAR_SINGULAR, "1"
+                text = (
+                    f"its rod comes near gamma_i = +-90 degrees {worst}, where its two angles lose "
+                    "their meaning; that is a singularity of the description, not of the mechanism"
+                )
+            elif kind == LOW:
+                kind, value, bound, unit = "effort_limit", -size, limit.low, family.effort_unit
+                text = f"effort falls to {-size:.4g} {unit} {worst}, below its least of {bound:g}"
+            else:
+                what, unit, bound, value = "effort", family.effort_unit, limit.high, size
+                if kind == "speed_limit":
+                    what, unit, bound = "speed", f"{family.joint_unit}/s", limit.speed
+                text = f"{what} reaches {size:.4g} {unit} {worst}, above its limit of {bound:g}"
+            text = f'chain "{name}": {text}'
+        return Notice(kind, text, name, value=value, bound=bound, unit=unit, **about)
 
     def _at(self, place: float) -> str:
         return f"in row {int(place)}" if self.rows else f"at t = {place:g} s"

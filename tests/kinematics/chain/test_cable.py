@@ -20,7 +20,7 @@ from condyle.mechanism import Mechanism, parse
 from condyle.mechanism.chain import limits
 from condyle.model.data import Evaluation
 from condyle.model.evaluator import Evaluator
-from condyle.model.reactions import reactions
+from condyle.model.joint_reactions import reactions
 from condyle.motion import trial_motion
 from condyle.report.scene import place
 

@@ -119,7 +119,7 @@ def test_efforts(wanted: list[dict[str, Any]], formulation: str) -> None:
 
 
 def test_reactions(wanted: list[dict[str, Any]]) -> None:
-    from condyle.model.reactions import reactions
+    from condyle.model.joint_reactions import reactions
 
     model = Model(condyle.load("gough-stewart"), backend="numpy")
     q, q1, q2, wrench = states()
@@ -134,7 +134,7 @@ def test_reactions(wanted: list[dict[str, Any]]) -> None:
 
 def test_weight_alone_at_home() -> None:
     """At rest the vertical forces at the base carry the whole weight."""
-    from condyle.model.reactions import reactions
+    from condyle.model.joint_reactions import reactions
 
     mechanism = condyle.load("gough-stewart")
     model = Model(mechanism, backend="numpy")

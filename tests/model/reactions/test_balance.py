@@ -9,7 +9,7 @@ from oracles.jets import Jet
 from oracles.random_mechanism import random_mechanism
 from support.families import MECHANISMS, Case, case, of_raw
 
-from condyle.model.reactions import Reaction, reactions
+from condyle.model.joint_reactions import Reaction, reactions
 from condyle.results.model import Model
 
 SURFACES = {

@@ -16,12 +16,12 @@ from support.families import MECHANISMS, Case, case, close
 import condyle
 from condyle.mechanism import Mechanism
 from condyle.model.data import Evaluation
-from condyle.model.reactions import reactions
+from condyle.model.joint_reactions import reactions
 from condyle.motion import read_table, write_table
 from condyle.questions.reactions import reaction_places
 from condyle.results.inverse_rows import solve_file
 from condyle.results.model import Model
-from condyle.results.reactions import reaction_variables
+from condyle.results.solving import reaction_variables
 
 # Our joint -> the oracle's link and whether it is its force or its moment.
 JOINTS = {

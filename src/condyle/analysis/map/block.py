@@ -10,7 +10,7 @@ import numpy as np
 from ...kinematics.singularities import SINGULAR
 from ...model.data import Efforts
 from ...model.evaluator import Evaluator
-from ...model.survey import Survey
+from ...model.surveying import Survey
 from ...results.contacts import bound_margins
 from ...status import Status
 from .ability import Ability

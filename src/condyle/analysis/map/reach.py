@@ -18,7 +18,7 @@ from ...kinematics.chain import FAMILIES
 from ...mechanism.contact import Bounds
 from ...mechanism.mechanism import Mechanism
 from ...model.evaluator import Evaluator
-from ...model.survey import Survey
+from ...model.surveying import Survey
 from ...motion.column_units import unit_factor
 from ...status import Status
 from .axes import number, parsed
