@@ -12,7 +12,7 @@ from support.families import case
 
 import condyle
 from condyle.export import DEFAULT, Exported, Wish, export
-from condyle.export.package import write_package
+from condyle.export.c_package import write_package
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,9 @@
 A target is a file that writes what it is for from an `Exported`.
 """
 
+from .c_source import export
 from .catalogue import CATALOGUE, DEFAULT, Wish, in_order, usual
 from .exported import Argument, Exported, Function
-from .source import export
 
 __all__ = [
     "CATALOGUE",

@@ -11,10 +11,10 @@ from ..graph.program import Program
 from ..mechanism.chain import limits
 from ..questions.friction import MOST
 from .c_body import HUGE, Places, Scalar, Wide
+from .c_context import CODES, Body, Context
+from .c_precision import ANGLES, LARGEST, threshold
 from .catalogue import Entry, Wish
-from .context import CODES, Body, Context
 from .exported import Argument
-from .precision import ANGLES, LARGEST, threshold
 
 NAMES = {int(code): name for name, code in CODES.items()}
 LIMITS = ("low", "high")  # ports of actuators' limits: the mechanism's own

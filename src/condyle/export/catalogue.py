@@ -16,7 +16,7 @@ from ..questions import Prescribed
 from ..questions.law import CONTROLLERS, ControllerTable
 from ..questions.observer import ITERATIONS as OBSERVER_STEPS
 from . import limited
-from .context import Body, Context
+from .c_context import Body, Context
 from .exported import Argument
 
 POSE_STEPS = 8  # as many as a start that is off by a third of what steps may be takes

@@ -17,9 +17,9 @@ from ..atomic import replacing
 from ..backends.compiler import CompilerError, find_compiler
 from ..errors import InputError
 from ..mechanism import Mechanism
+from .c_names import in_comment
 from .fmu_description import build_description, description
 from .fmu_model import Fmu, fmu_model
-from .names import in_comment
 
 VERSIONS = (2, 3)
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")

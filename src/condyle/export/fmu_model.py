@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 from ..errors import InputError, did_you_mean
 from ..kinematics.chain import FAMILIES
 from ..mechanism import Mechanism
-from . import source
+from .c_names import identifier
+from .c_source import export
 from .exported import Argument, Exported
-from .names import identifier
 
 KINDS = {
     "plant": ("forward", "motion"),
@@ -83,7 +83,7 @@ def fmu_model(mechanism: Mechanism, kind: str) -> Fmu:
     """
     if kind not in KINDS:
         raise InputError(f'there is no FMU "{kind}".{did_you_mean(kind, KINDS)}')
-    e = source.export(mechanism, KINDS[kind], constants="struct", lanes=0)
+    e = export(mechanism, KINDS[kind], constants="struct", lanes=0)
     plant = kind == "plant"
     calls = [e[question] for question in KINDS[kind]]
     arrays = {a.name: a for f in calls for a in f.arguments}

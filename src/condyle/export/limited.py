@@ -16,9 +16,9 @@ from ..backends.c.limits import WithinLimits
 from ..errors import UnsupportedError
 from ..mechanism.chain import limits
 from .c_body import Places, Scalar
-from .context import Body, Context
+from .c_context import Body, Context
+from .c_pick import picked
 from .exported import Argument
-from .pick import picked
 
 ROUNDS = 64  # of the routine: sides of its polygon are taken and left so often at the most
 RESULTS = ("Q", "J", "normal", "friction")

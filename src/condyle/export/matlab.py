@@ -13,9 +13,9 @@ from pathlib import Path
 
 from ..atomic import write_text
 from ..mechanism import Mechanism
-from . import source
+from .c_names import identifier
+from .c_source import export
 from .exported import Argument, Exported, Function
-from .names import identifier
 
 DEFAULT = ("contact", "inverse", "forward", "motion", "pose", "computed_torque")
 LONGEST = 63  # letters of a name in MATLAB
@@ -29,7 +29,7 @@ def write_matlab(
     Raises: InputError, UnsupportedError: for what cannot be exported to C, or a file that cannot be
             written.
     """
-    e = source.export(mechanism, questions, lanes=0, prefix=_prefix(mechanism))
+    e = export(mechanism, questions, lanes=0, prefix=_prefix(mechanism))
     texts = {f"{e.prefix}.c": e.source, f"{e.prefix}.h": e.header}
     for f in e.functions:
         texts[f"{f.name}_mex.c"] = gateway(e, f)

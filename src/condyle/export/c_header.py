@@ -9,9 +9,9 @@ from ..mechanism.coordinates import COORDINATES
 from ..mechanism.home import dependent_coordinates, independent_coordinates
 from ..mechanism.mechanism import Mechanism
 from ..version import __version__
-from .context import CODES
+from .c_context import CODES
+from .c_names import in_comment
 from .exported import Argument, Exported, Function
-from .names import in_comment
 
 WHY = {
     "OK": "results are written",

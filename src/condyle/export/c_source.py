@@ -17,16 +17,16 @@ from ..model.evaluator import Evaluator
 from ..questions.numbers import Layout, specialised
 from ..questions.structure import structure_of
 from ..version import __version__
-from . import structured
+from . import c_struct
 from .arguments import Arguments
+from .c_context import Body, Context
 from .c_function import function
+from .c_header import WHY, header_text
+from .c_names import identifier, identifiers, in_comment, require_prefix
+from .c_pick import picked, used
+from .c_precision import require_precision
 from .catalogue import Entry, Wish, in_order, least_norm, require_question, usual
-from .context import Body, Context
 from .exported import Argument, Exported, Function
-from .header import WHY, header_text
-from .names import identifier, identifiers, in_comment, require_prefix
-from .pick import picked, used
-from .precision import require_precision
 
 # Functions of the C library that a source may call, in `double`.
 LIBRARY = """sqrt fabs floor ceil atan2 pow fmod remainder hypot exp expm1 log log1p tan asin acos
@@ -93,7 +93,7 @@ def export(
         symbols=_symbols(c, portable),
         recipe={"formulation": model.formulation, "route": route},
     )
-    extra = structured.declared(c) if struct else ""
+    extra = c_struct.declared(c) if struct else ""
     return replace(exported, header=header_text(exported, mechanism, extra))
 
 
@@ -143,10 +143,10 @@ def _portable(c: Context, bodies: Sequence[Body]) -> str:
     """Scalar code, with what it uses."""
     code = "\n".join(body.code for body in bodies)
     if c.struct:
-        constants = structured.prepared(c)
+        constants = c_struct.prepared(c)
     else:
         constants = "\n".join(_table(c, name) for name in c.tables if not _is_quick(name))
-    helpers = picked(_text(f"{c.precision}.h") + _text("scalar.h"), constants + code)
+    helpers = picked(_text(f"c_{c.precision}.h") + _text("c_scalar.h"), constants + code)
     return "\n".join([helpers, constants, code])
 
 

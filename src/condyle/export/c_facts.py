@@ -15,8 +15,8 @@ from typing import Any
 
 from ..atomic import write_text
 from ..backends.compiler import CompilerError, find_compiler
+from .c_package import TOLERANCE
 from .exported import Exported
-from .package import TOLERANCE
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=fast", "-fno-math-errno")
 SECONDS = 300

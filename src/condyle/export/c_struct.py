@@ -13,8 +13,8 @@ from ..backends.c.prepare import prepare
 from ..backends.c.printer import Printer
 from ..kinematics.chain import FAMILIES
 from ..questions.numbers import Layout
-from .context import Context
-from .pick import picked
+from .c_context import Context
+from .c_pick import picked
 
 # What the shared numbers are; of contacts and chains `FIELDS` says it once for all.
 FIELDS = {
@@ -73,7 +73,7 @@ def declared(c: Context) -> str:
 def prepared(c: Context) -> str:
     """`prepare` and what it is made of, for the source."""
     code = "\n".join(_prepare(c, name, printer) for name, printer in c.printers.items())
-    text = (files(__package__) / "scalar.h").read_text(encoding="utf-8")
+    text = (files(__package__) / "c_scalar.h").read_text(encoding="utf-8")
     text = re.sub(r"\breal\b", "double", text)
     text = re.sub(r"\bF\((\w+)\)", r"\1", re.sub(r"\bR\(([^()]*)\)", r"\1", text))
     text = picked(re.sub(r"\b(\w+)_s\b", r"\1_d", text), code)

@@ -14,8 +14,8 @@ from ..questions import Question
 from ..questions.numbers import Layout, specialised
 from ..questions.structure import structure_of
 from ..status import Status
+from .c_expected import Reference
 from .exported import Exported, Function
-from .reference import Reference
 
 COUNT = 40
 SIZES = {"force": 20.0, "moment": 0.5, "point": 0.05, "kp": 400.0, "kd": 40.0, "period": 1e-3}

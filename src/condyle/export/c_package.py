@@ -10,11 +10,11 @@ import numpy as np
 
 from ..atomic import write_text
 from ..mechanism.mechanism import Mechanism
+from .c_expected import Reference
+from .c_names import in_format
+from .c_samples import Vectors, vectors
 from .catalogue import Wish
 from .exported import Exported, Function
-from .names import in_format
-from .reference import Reference
-from .vectors import Vectors, vectors
 
 # By precision: what results may differ from the library's by, over the largest entry of each.
 TOLERANCE = {"double": 1e-12, "float": 1e-4}
@@ -43,7 +43,7 @@ def write_package(
 
 def makefile(e: Exported) -> str:
     """Targets all, check and clean."""
-    text = (files(__package__) / "package.mk").read_text(encoding="utf-8")
+    text = (files(__package__) / "c_package.mk").read_text(encoding="utf-8")
     vector = f"-D{e.prefix.upper()}_VECTOR -march=native" if e.lanes else ""
     return text.replace("@prefix@", e.prefix).replace("@vector@", vector)
 
@@ -115,7 +115,7 @@ def check(e: Exported, made: list[Vectors]) -> str:
         "",
         f"#define TOLERANCE {TOLERANCE[e.precision]!r}",
         "",
-        (files(__package__) / "check.h").read_text(encoding="utf-8").replace("real", e.precision),
+        (files(__package__) / "c_check.h").read_text(encoding="utf-8").replace("real", e.precision),
     ]
     for v in made:
         lines += _checked(e, v.function)

@@ -16,9 +16,9 @@ from ..questions import Question
 from ..questions.structure import Structure
 from ..status import Status
 from .arguments import Arguments
-from .constants import table as constants_table
+from .c_constants import table as constants_table
+from .c_precision import rescaled
 from .exported import Argument, Precision
-from .precision import rescaled
 
 # Statuses in C, and where they come from.
 CODES = {
