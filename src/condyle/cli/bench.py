@@ -8,9 +8,6 @@ import sys
 from contextlib import ExitStack
 from pathlib import Path
 from types import ModuleType
-from typing import Annotated
-
-import typer
 
 from ..errors import UnsupportedError
 from .answer import Answer, files_line
@@ -21,9 +18,7 @@ from .inputs import output_folder
 @command(UPKEEP, example="condyle bench --seconds 0.2 --out bench.json")
 def bench(
     out: Path | None = None,
-    seconds: Annotated[
-        float, typer.Option(help="How long each row of the table is timed (s).", min=0.01, max=600)
-    ] = 1.0,
+    seconds: float = 1.0,
     realtime: bool = False,
 ) -> Answer:
     """How fast it is on this machine.
@@ -34,6 +29,7 @@ def bench(
         out: JSON file for the results.
         realtime: Instead: exported C in a loop of 1, 5, 10 and 20 kHz, beside an empty one: how
             late ticks are, the longest, and those missed.
+        seconds: How long each row of the table is timed (s).
     """
     from ..atomic import replacing
     from ..mechanism import load

@@ -2,30 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import typer
-
 from . import options
 from .answer import Answer, command_line
 from .command import BEGIN, command
 from .inputs import warn
 
-Project = Annotated[
-    bool,
-    typer.Option(
-        "--project",
-        help="Where contact points are off their surfaces: show the nearest home on them.",
-    ),
-]
-
 
 @command(BEGIN, example="condyle check jaw.toml")
-def check(mechanism: options.Mechanism, project: Project = False) -> Answer:
+def check(mechanism: options.Mechanism, project: bool = False) -> Answer:
     """What a mechanism is, or all that is wrong with its file.
 
     Its chains, contacts and freedoms, sizes, masses, gravity and limits, how near it is to a
     singular pose where it starts, and a warning where numbers do not go together.
+
+    Options:
+        project: Where contact points are off their surfaces: show the nearest home on them.
     """
     import condyle
 

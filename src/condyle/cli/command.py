@@ -104,9 +104,11 @@ def _take(
 
 def _option(one: inspect.Parameter, helps: dict[str, str]) -> Any:
     """A switch that is off has no opposite."""
-    names = [f"--{one.name.replace('_', '-')}"] if one.default is False else []
+    usual = f"--{one.name.replace('_', '-')}" if one.default is False else None
+    names = [name for name in (options.NAMES.get(one.name, usual),) if name]
     text = helps.get(one.name) or options.HELP[one.name]
-    return typer.Option(*names, help=text, autocompletion=completion.OFFERED.get(one.name))
+    offered, numbers = completion.OFFERED.get(one.name), options.RANGE.get(one.name, {})
+    return typer.Option(*names, help=text, autocompletion=offered, **numbers)
 
 
 def _version(value: bool) -> None:

@@ -30,7 +30,7 @@ def compare(
     landmark: str | None = None,
     smooth: str | None = None,
     rate: float | None = None,
-    trim: options.Trim = 0.0,
+    trim: float = 0.0,
     figures: bool = True,
     report: bool = False,
 ) -> Answer:

@@ -27,47 +27,18 @@ FMUS = ("plant", "inverse", "controller")
 FORMATS = ("auto", "netcdf", "zarr")
 STYLES = ("screen", "journal", "journal-wide")
 EXPORTS = (
-    "inverse",
-    "contact",
-    "bounded",
-    "forward",
-    "motion",
-    "closure",
-    "pose",
-    "observer",
-    "computed_torque",
-    "impedance",
-    "joint_pd",
-    "bite_force",
+    *("inverse", "contact", "bounded", "forward"),
+    *("motion", "closure", "pose", "observer"),
+    *("computed_torque", "impedance", "joint_pd", "bite_force"),
 )
 UNITS = ("m,rad", "m,deg", "mm,rad", "mm,deg", "cm,rad", "cm,deg")
 QUANTITIES = (
-    "reachable",
-    "pose",
-    "bounds",
-    "joint",
-    "ratio",
-    "condition",
-    "transmission",
-    "effort",
-    "contact_force",
-    "load_limit",
-    "speed",
-    "stiffness",
+    *("reachable", "pose", "bounds", "joint", "ratio", "condition"),
+    *("transmission", "effort", "contact_force", "load_limit", "speed", "stiffness"),
 )
 FIGURES = (
-    "activation",
-    "contact_force",
-    "contact_track",
-    "effort_speed",
-    "jacobian",
-    "joint",
-    "load",
-    "motion",
-    "path",
-    "share",
-    "singularity",
-    "torque",
+    *("activation", "contact_force", "contact_track", "effort_speed", "jacobian", "joint"),
+    *("load", "motion", "path", "share", "singularity", "torque"),
 )
 
 

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from . import options
 from .answer import Answer
@@ -21,10 +18,7 @@ def c(
     mechanism: options.Mechanism,
     out: Path,
     question: list[str] | None = None,
-    coordinates: Annotated[
-        str | None,
-        typer.Option("--from", help="Coordinates that closure starts from, as in X,Y,Z,alpha."),
-    ] = None,
+    coordinates: str | None = None,
     landmark: str | None = None,
     precision: str = "double",
     constants: str = "inside",
@@ -39,6 +33,7 @@ def c(
     vectors, a Makefile whose `make check` compares with them, and a page of measured facts.
 
     Options:
+        coordinates: Coordinates that closure starts from, as in X,Y,Z,alpha.
         out: Folder for source, header, example and tests.
         question: What to export; repeat for more: inverse, contact (with contact forces), bounded
             (within limits), forward (accelerations), motion, closure, pose and observer (from

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from . import completion, options
 from .answer import Answer, command_line, files_line
@@ -18,13 +15,7 @@ from .inputs import file_stem, output_folder, warn
 def fmu(
     mechanism: options.Mechanism,
     out: Path,
-    kind: Annotated[
-        list[str] | None,
-        typer.Option(
-            help=f"What to export; repeat for more: {', '.join(completion.FMUS)}. Default: all.",
-            autocompletion=completion.one_of(*completion.FMUS),
-        ),
-    ] = None,
+    kind: list[str] | None = None,
     fmi: int = 3,
 ) -> Answer:
     """Functional mock-up units (FMI 2.0 or 3.0), for model exchange and co-simulation.

@@ -18,7 +18,7 @@ def forward(
     load_point: str | None = None,
     formulation: str = "virtual_power",
     backend: str = "auto",
-    threads: options.Threads = None,
+    threads: int | None = None,
     flag: bool = False,
 ) -> Answer:
     """Accelerations from efforts and load, one state a row.

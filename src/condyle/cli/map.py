@@ -33,22 +33,13 @@ def map_(
     mechanism: options.Mechanism = "masticatory",
     over: list[str] | None = None,
     hold: str = "",
-    quantity: Annotated[
-        list[str] | None,
-        typer.Option(
-            help=f"What to map, of {', '.join(completion.QUANTITIES)}; repeat for more, or "
-            "separate by commas. Default: ratio.",
-            autocompletion=completion.one_of(*completion.QUANTITIES),
-        ),
-    ] = None,
+    quantity: list[str] | None = None,
     load: str = "",
     load_point: str | None = None,
     direction: str | None = None,
     stiffness: float | None = None,
     stroke: list[str] | None = None,
-    margin: Annotated[
-        float, typer.Option(min=0.0, max=1.0, help="Least singularity ratio in ball and box.")
-    ] = 1e-3,
+    margin: float = 1e-3,
     distribution: str | None = None,
     preload: float = 0.0,
     out: Path = Path("maps"),
@@ -56,7 +47,7 @@ def map_(
     figures: bool = True,
     run: Path | None = None,
     backend: str = "auto",
-    threads: options.Threads = None,
+    threads: int | None = None,
     workers: Annotated[
         int | None, typer.Option(min=1, help="With --scheduler: so many. Default: all processors.")
     ] = None,
@@ -81,6 +72,7 @@ def map_(
         run: Results (.nc) whose motion is drawn on top.
         scheduler: Who computes, as for sweep: processes, threads, dask, or the address of a Dask
             scheduler. Default: this process. Same numbers.
+        margin: Least singularity ratio in ball and box.
     """
     if figures:
         require("matplotlib", "figures")

@@ -33,16 +33,8 @@ def from_c3d(
         ),
     ],
     out: Path,
-    max_residual: Annotated[
-        float,
-        typer.Option(
-            min=0.0,
-            help="A frame in which a marker is farther (mm) from its place in its body is a gap.",
-        ),
-    ] = 2.0,
-    max_gap: Annotated[
-        float, typer.Option(min=0.0, help="Fill gaps up to so many seconds by a spline.")
-    ] = 0.1,
+    max_residual: float = 2.0,
+    max_gap: float = 0.1,
     longest: bool = False,
     units: Annotated[
         str | None,
@@ -71,6 +63,8 @@ def from_c3d(
         load: File for the load that the marker file names (forces), or --force.
         force: Three channels, as in Fx,Fy,Fz: a force on the platform (N, kN, mN) along the
             laboratory's axes, in place of what the marker file names.
+        max_residual: A frame in which a marker is farther (mm) from its place in its body is a gap.
+        max_gap: Fill gaps up to so many seconds by a spline.
     """
     import condyle
 

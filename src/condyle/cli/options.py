@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -41,7 +41,22 @@ HELP = {
     "backend": "compiled, numpy (the same numbers, slower), or auto: compiled where there is "
     "a C compiler.",
     "flag": "Keep samples that cannot be computed: empty, with a status.",
+    "quantity": f"What to map, of {', '.join(completion.QUANTITIES)}; repeat for more, or "
+    "separate by commas. Default: ratio.",
+    "kind": f"What to export; repeat for more: {', '.join(completion.FMUS)}. Default: all.",
     "strict": "A contact outside its bounds is an error.",
+    "threads": "At most so many threads. Default: all processors. Same results.",
+    "trim": "Leave out so many seconds of the motion at either end, where smoothing is least "
+    "certain: 0.2 with --smooth auto.",
+}
+NAMES = {"coordinates": "--from", "every": "--all"}  # of parameters that Python does not like so
+# Parameter of a command -> the numbers that it takes.
+RANGE: dict[str, dict[str, Any]] = {
+    **{name: {"min": 0.0} for name in ("max_gap", "max_residual", "tolerance", "trim")},
+    "margin": {"min": 0.0, "max": 1.0},
+    "seconds": {"min": 0.01, "max": 600},
+    "seed": {"min": 0},
+    "threads": {"min": 1},
 }
 Mechanism = Annotated[
     str,
@@ -51,18 +66,6 @@ Mechanism = Annotated[
         + ".",
         autocompletion=completion.mechanisms,
     ),
-]
-Trim = Annotated[
-    float,
-    typer.Option(
-        min=0.0,
-        help="Leave out so many seconds of the motion at either end, where smoothing is least "
-        "certain: 0.2 with --smooth auto.",
-    ),
-]
-Threads = Annotated[
-    int | None,
-    typer.Option(min=1, help="At most so many threads. Default: all processors. Same results."),
 ]
 Quiet = Annotated[
     bool, typer.Option("--quiet", "-q", help="Print only what was asked for, and errors.")

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from . import options
 from .answer import Answer, command_line, files_line
@@ -19,22 +16,9 @@ def pose(
     joints: Path,
     out: Path,
     flag: bool = False,
-    tolerance: Annotated[
-        float,
-        typer.Option(
-            min=0.0,
-            help="Largest difference of a joint of the pose from the given one (rad, or m).",
-        ),
-    ] = 1e-6,
-    every: Annotated[
-        bool,
-        typer.Option(
-            "--all", help="List the assembly modes that a search finds; it may miss some."
-        ),
-    ] = False,
-    seed: Annotated[
-        int | None, typer.Option(min=0, help="Of the search of --all. Default: 0.")
-    ] = None,
+    tolerance: float = 1e-6,
+    every: bool = False,
+    seed: int | None = None,
 ) -> Answer:
     """Where the platform is, from what encoders read.
 
@@ -46,6 +30,9 @@ def pose(
             slider), zero at home. With a column t (s) each row follows the one before, else each
             stands alone and follows from home.
         out: File for the poses (.csv or .parquet).
+        tolerance: Largest difference of a joint of the pose from the given one (rad, or m).
+        every: List the assembly modes that a search finds; it may miss some.
+        seed: Of the search of --all. Default: 0.
     """
     import condyle
 

@@ -25,7 +25,7 @@ def solve(
     reactions: bool = False,
     mat: bool = False,
     backend: str = "auto",
-    threads: options.Threads = None,
+    threads: int | None = None,
     strict: bool = False,
     flag: bool = False,
 ) -> Answer:
