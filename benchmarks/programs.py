@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from condyle.distribution import Problem, distribute
-from condyle.distribution.reduced import Reduced, reduce
+from condyle.distribution.eliminated import Sample
 from condyle.mechanism.chain import limits
 from condyle.mechanism.mechanism import Mechanism
 from condyle.model.evaluator import Evaluator
@@ -40,8 +40,8 @@ class Bites:
         self.model.torques(*self.given, outputs=("contact",), threads=1)
         return (time.perf_counter() - start) / len(self.given[0])
 
-    def programs(self) -> tuple[Reduced, np.ndarray]:
-        """Some of the programs, contacts eliminated, and the efforts that solve them, (R, n)."""
+    def programs(self) -> tuple[list[Sample], np.ndarray]:
+        """Some of the programs, contacts eliminated, and the x that solve them, (R, n)."""
         rows = np.linspace(0, len(self.given[0]) - 1, PROGRAMS).astype(int)
         q, q1, q2, load = (a[rows] for a in self.given)
         model = self.model
@@ -54,19 +54,23 @@ class Bites:
         low, high = (np.array([getattr(x, name) for x in both]) for name in ("low", "high"))
         push = [c.push if c.one_sided else 0.0 for c in model.mechanism.contacts]
         J, contacts = s["J"].transpose(0, 2, 1), s["normal"]
-        problem = Problem(s["Q"], J, contacts, None, low, high, np.array(push))
+        problem = Problem(s["Q"], J, contacts, low=low, high=high, push=np.array(push))
         found = distribute(problem, "bounded")
+        none, one = np.zeros(problem.k), np.ones(problem.n)
         good = np.flatnonzero(found.status == 0)
-        problem, pattern = problem.take(good), np.zeros((len(good), problem.k))
-        return reduce(problem, pattern, np.ones(problem.n), 0.0, True), found.effort[good]
+        samples = [Sample.of(problem, int(i), none, one, 0.0, True) for i in good]
+        regular = [s for s in samples if s is not None]
+        assert len(regular) == len(good)
+        units = np.array([s.unit for s in regular])
+        return regular, found.effort[good] / units[:, None]
 
 
 def program_probes(bites: Bites, unavailable: dict[str, str]) -> Iterator[Probe]:
     """Our row, and one of each solver that is installed."""
     label = f"{bites.label}: {BINDING}"
     yield Probe(label, bites.ours, 0.0)
-    r, right = bites.programs()
-    given = [_arguments(r, i) for i in range(r.count)]
+    programs, right = bites.programs()
+    given = [_arguments(s) for s in programs]
     for name, solve in SOLVERS.items():
         try:
             got = np.array([solve(*one) for one in given])
@@ -78,10 +82,10 @@ def program_probes(bites: Bites, unavailable: dict[str, str]) -> Iterator[Probe]
         yield replace(probe, tolerance=DIFFERENT, note="the program alone, from Python")
 
 
-def _arguments(r: Reduced, i: int) -> tuple[np.ndarray, ...]:
-    m, c = r.m, r.right[r.m :, i]
-    bounds = (c - r.contact_high[:, i], c - r.contact_low[:, i])
-    one = (r.G[:m, :, i], r.right[:m, i], r.low[:, i], r.high[:, i], r.G[m:, :, i], *bounds)
+def _arguments(s: Sample) -> tuple[np.ndarray, ...]:
+    m, c = s.m, s.right[s.m :]
+    bounds = c - s.contact_high, c - s.contact_low
+    one = (s.G[:m], s.right[:m], s.low, s.high, s.G[m:], *bounds)
     return tuple(np.ascontiguousarray(a) for a in one)
 
 

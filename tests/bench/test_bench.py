@@ -20,7 +20,7 @@ from benchmarks.programs import Bites, _arguments, program_probes, tight
 from benchmarks.rows import TOLERANCE, Probe, Row, spread, timed
 from benchmarks.run import Benchmark
 from condyle.distribution import distribute
-from condyle.distribution.reduced import reduce
+from condyle.distribution.eliminated import Sample
 from condyle.mechanism import load
 from condyle.model.evaluator import Evaluator
 
@@ -98,10 +98,11 @@ def test_table_names_what_did_not_run() -> None:
 def test_other_solvers_are_given_the_same_program(name: str) -> None:
     problem = random_problem(np.random.default_rng(3), 6, 2, 4, one_sided=True, tight=0.8)
     wanted = distribute(problem, "bounded")
-    programs = reduce(problem, np.zeros((4, 2)), np.ones(6), 0.0, True)
     for i in np.flatnonzero(wanted.status == 0):
+        one = Sample.of(problem, int(i), np.zeros(2), np.ones(6), 0.0, True)
+        assert one is not None
         try:
-            got = SOLVERS[name](*_arguments(programs, i))
+            got = one.unit * SOLVERS[name](*_arguments(one))
         except ImportError as missing:
             pytest.skip(f"{missing.name} is not installed")
         size = np.abs(wanted.effort[i]).max()

@@ -1,78 +1,82 @@
 """The certificate itself: each of its parts sees what it is there to see."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from condyle.distribution.certificate import excess, residual, settle, slack
-from condyle.distribution.law import Square
-from condyle.distribution.quadratic import least_squares
-from condyle.distribution.reduced import reduce
-from condyle.distribution.result import CERTIFIED
+from condyle.distribution import CERTIFIED, OBJECTIVES
+from condyle.distribution.certificate import certified, excess, residual
+from condyle.distribution.eliminated import Sample
 
 from .cases import random_problem
 
 LITTLE = 1e-7
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def solved():
+    """Samples and their answers."""
     problem = random_problem(np.random.default_rng(0), 7, 2, 20, tight=1.0, one_sided=True)
-    r = reduce(problem, np.zeros((20, 2), int), np.ones(7), 0.0, True)
-    answer = least_squares(r, np.zeros((6, 20)), np.full(20, np.inf))
-    rows = np.flatnonzero(answer.found)
-    assert len(rows) > 10
-    return r.take(rows), answer.take(rows)
+    samples = [Sample.of(problem, i, np.zeros(2), np.ones(7), 0.0, True) for i in range(20)]
+    answers = [OBJECTIVES["bounded"].solve(s) for s in samples]
+    pairs = [(s, a) for s, a in zip(samples, answers, strict=True) if a is not None]
+    assert len(pairs) > 10
+    return pairs
 
 
 def test_an_answer_is_proved(solved):
-    r, answer = solved
-    for part in (residual(r, answer), excess(r, answer), slack(r, Square(), answer)):
-        assert part.max() <= CERTIFIED
+    for s, a in solved:
+        again = certified(s, a.x, a.u, a.x)
+        assert max(again.residual, again.excess, again.slack) <= CERTIFIED and again.proved
 
 
 def test_equations_not_met(solved):
-    r, answer = solved
-    size = np.abs(answer.x).max(axis=0)
-    answer.x[0] += LITTLE * size
-    assert (residual(r, answer) > CERTIFIED).all()
-    assert not settle(r, Square(), answer).found.any()
+    for s, a in solved:
+        x = a.x + LITTLE * np.abs(a.x).max() * np.eye(7)[0]
+        assert residual(s, x, a.force) > CERTIFIED
 
 
 def test_contact_force_that_is_not_that_of_the_equations(solved):
-    r, answer = solved
-    answer.force = answer.force + LITTLE * (1 + np.abs(answer.force))
-    assert (residual(r, answer) > CERTIFIED).all()
+    for s, a in solved:
+        assert residual(s, a.x, a.force + LITTLE * (1 + np.abs(a.force))) > CERTIFIED
 
 
 def test_limits_exceeded(solved):
-    r, answer = solved
-    answer.x[0] = r.high[0] + LITTLE * np.abs(answer.x).max(axis=0)
-    assert (excess(r, answer) > CERTIFIED).all()
+    for s, a in solved:
+        over = LITTLE * np.abs(a.x).max()
+        for side in (s.high + over, s.low - over):
+            x = np.where(np.eye(7)[0] > 0, side, a.x)
+            assert excess(s, x, a.force) > CERTIFIED
+            assert not certified(s, x, a.u, x).proved
 
 
 def test_contacts_that_do_not_push(solved):
-    r, answer = solved
-    big = np.abs(answer.force).max(axis=0) + np.abs(answer.x).max(axis=0)
-    for contact in range(2):
-        low, high = r.contact_low[contact], r.contact_high[contact]
-        answer.force[contact] = np.where(np.isfinite(low), low - 1e-6 * big, high + 1e-6 * big)
-    assert (excess(r, answer) > CERTIFIED).all()
+    for s, a in solved:
+        big = 1e-6 * (np.abs(a.force).max() + np.abs(a.x).max())
+        low = np.where(np.isfinite(s.contact_low), s.contact_low - big, s.contact_high + big)
+        for contact in range(2):
+            force = np.where(np.arange(2) == contact, low, a.force)
+            assert excess(s, a.x, force) > CERTIFIED
 
 
 def test_efforts_that_balance_but_are_not_least(solved):
-    r, answer = solved
-    for i in range(r.count):
+    seen = []
+    for s, a in solved:
         # Along the null space of the equations, away from the least.
-        null = np.linalg.svd(r.G[: r.m, :, i])[2][-1]
-        answer.x[:, i] += 1e-6 * np.abs(answer.x[:, i]).max() * null
-    answer.force = r.forces(answer.x)
-    assert (residual(r, answer) <= CERTIFIED).all()
-    assert (slack(r, Square(), answer) > CERTIFIED).mean() > 0.8
+        null = np.linalg.svd(s.G[: s.m])[2][-1]
+        x = a.x + 1e-6 * np.abs(a.x).max() * null
+        any_ = np.full(2, np.inf)
+        wide = replace(s, low=s.low - 1, high=s.high + 1, contact_low=-any_, contact_high=any_)
+        found = certified(wide, x, a.u, x)
+        assert found.residual <= CERTIFIED
+        seen.append(found.slack > CERTIFIED)
+    assert np.mean(seen) > 0.8
 
 
 def test_multipliers_of_the_wrong_sign(solved):
-    r, answer = solved
-    acts = (answer.u[r.m :] != 0).any(axis=0)
-    assert acts.any()
-    answer.u[r.m :] *= -1
-    assert (slack(r, Square(), answer)[acts] > CERTIFIED).all()
+    acting = [(s, a) for s, a in solved if np.abs(a.u[s.m :]).max() > 1e-9]
+    assert acting
+    for s, a in acting:
+        u = np.concatenate([a.u[: s.m], -a.u[s.m :]])
+        assert certified(s, a.x, u, a.x).slack > CERTIFIED

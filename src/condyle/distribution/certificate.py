@@ -2,83 +2,87 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from .law import Law
-from .newton import Answer
-from .reduced import Reduced
+from .eliminated import Sample
 from .result import CERTIFIED
 
-AT_BOUND = CERTIFIED  # of the largest effort: this near a bound, a multiplier may act
+
+@dataclass(frozen=True)
+class Answer:
+    """x and contact forces y of a sample, multipliers u (6,) of its equations, and its certificate.
+
+    residual, excess, slack: how far equations are from met, constraints exceeded, and the part of
+    the gradient that no multiplier of the right sign explains, relative.
+    """
+
+    x: np.ndarray
+    force: np.ndarray
+    u: np.ndarray
+    residual: float
+    excess: float
+    slack: float
+
+    @property
+    def proved(self) -> bool:
+        return max(self.residual, self.excess, self.slack) <= CERTIFIED
 
 
-def ratio(part: np.ndarray, whole: np.ndarray) -> np.ndarray:
-    """part / whole, 0 where both are."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(part == 0, 0.0, part / whole)
+def certified(
+    s: Sample, x: np.ndarray, u: np.ndarray, slope: np.ndarray, slack: float | None = None
+) -> Answer:
+    """An answer whose efforts are put within their limits exactly.
+
+    Args: slope: gradient of the objective in x;  slack: where it is known otherwise.
+    """
+    x = np.clip(x, s.low, s.high)
+    force = s.force(x)
+    known = _slack(s, x, force, u, slope) if slack is None else slack
+    return Answer(x, force, u, residual(s, x, force), excess(s, x, force), known)
 
 
-def residual(r: Reduced, answer: Answer) -> np.ndarray:
-    """How far the equations are from met, (R,): relative to the terms of each kind of row."""
-    force = np.concatenate([np.zeros((r.m, r.count)), answer.force])
-    products = r.G * answer.x
-    error = np.abs(r.right - products.sum(axis=1) - force)
-    x = np.abs(answer.x).max(axis=0, initial=0.0)
-    steepest, known = r.size
-    size = steepest * x
-    size = np.where(size > 0, size, known + np.abs(force))
-    return ratio(error, size).max(axis=0)
+def residual(s: Sample, x: np.ndarray, force: np.ndarray) -> float:
+    """How far the equations are from met, relative to the terms of each kind of row."""
+    G, *_ = s.whole()
+    error = np.abs(s.right - G @ np.concatenate([x, force]))
+    size = np.abs(s.G).max(axis=1, initial=0.0) * np.abs(x).max(initial=0.0)
+    others = np.abs(s.right) + np.concatenate([np.zeros(s.m), np.abs(force)])
+    return float(_ratio(error, np.where(size > 0, size, others)).max())
 
 
-def excess(r: Reduced, answer: Answer) -> np.ndarray:
-    """How far efforts and contact forces exceed their bounds, (R,), relative to the largest."""
-    x, force = answer.x, answer.force
-    largest = np.abs(x).max(axis=0, initial=0.0)
-    over = np.maximum(r.low - x, x - r.high).max(axis=0, initial=0.0)
-    beyond = np.maximum(r.contact_low - force, force - r.contact_high).max(axis=0, initial=0.0)
-    return np.maximum(
-        ratio(over, largest), ratio(beyond, np.abs(force).max(axis=0, initial=0.0) + largest)
-    )
+def excess(s: Sample, x: np.ndarray, force: np.ndarray) -> float:
+    """How far efforts and contact forces exceed their bounds, relative to the largest."""
+    largest = np.abs(x).max(initial=0.0)
+    over = np.maximum(s.low - x, x - s.high).max(initial=0.0)
+    beyond = np.maximum(s.contact_low - force, force - s.contact_high).max(initial=0.0)
+    parts = _ratio(over, largest), _ratio(beyond, np.abs(force).max(initial=0.0) + largest)
+    return float(max(parts))
 
 
-def slack(r: Reduced, law: Law, answer: Answer) -> np.ndarray:
-    """The part of the gradient that no multiplier of the right sign explains, (R,), relative."""
-    x, force, s = answer.x, answer.force, answer.u[r.m :]
-    slope = law.slope(x)
-    g = (r.G * answer.u[:, None]).sum(axis=0)
-    largest = np.abs(slope).max(axis=0, initial=0.0)
-    largest = np.where(largest > 0, largest, np.abs(g).max(axis=0, initial=0.0))
-    wrong = _wrong(slope - g, x, r.low, r.high, np.abs(x).max(axis=0, initial=0.0))
-    worst = ratio(wrong.max(axis=0, initial=0.0), largest)
-    if r.k:
-        # A multiplier of a contact counts by what it adds to the price of efforts.
-        size = np.abs(force).max(axis=0) + np.abs(x).max(axis=0, initial=0.0)
-        wrong = _wrong(r.weight * force - s, force, r.contact_low, r.contact_high, size)
-        effect = r.size[0][r.m :]
-        worst = np.maximum(worst, ratio((wrong * effect).max(axis=0), largest))
-    return worst
+def _slack(s: Sample, x: np.ndarray, force: np.ndarray, u: np.ndarray, slope: np.ndarray) -> float:
+    g, greatest = s.G.T @ u, np.abs(x).max(initial=0.0)
+    largest = np.abs(slope).max(initial=0.0) or np.abs(g).max(initial=0.0)
+    wrong = unexplained(slope - g, x, s.low, s.high, greatest)
+    # A multiplier of a contact counts by what it adds to the price of efforts.
+    size = np.abs(force).max(initial=0.0) + greatest
+    z = s.weight * force - u[s.m :]
+    acting = unexplained(z, force, s.contact_low, s.contact_high, size)
+    effect = acting * np.abs(s.G[s.m :]).max(axis=1, initial=0.0)
+    return float(_ratio(max(wrong.max(initial=0.0), effect.max(initial=0.0)), largest))
 
 
-def _wrong(
-    z: np.ndarray, x: np.ndarray, low: np.ndarray, high: np.ndarray, largest: np.ndarray
+def unexplained(
+    z: np.ndarray, x: np.ndarray, low: np.ndarray, high: np.ndarray, largest: float
 ) -> np.ndarray:
     """|z| where no bound is near, and where z has the sign that the bound cannot give."""
-    near = AT_BOUND * largest
+    near = CERTIFIED * largest
     up, down = np.maximum(z, 0.0), np.maximum(-z, 0.0)
     return np.maximum(np.where(x - low <= near, 0.0, up), np.where(high - x <= near, 0.0, down))
 
 
-def settle(r: Reduced, law: Law, answer: Answer) -> Answer:
-    """The answer with bounds met exactly, `found` only where it is proved to be least."""
-    answer.x = np.minimum(np.maximum(answer.x, r.low), r.high)
-    answer.error = slack(r, law, answer)
-    return accept(r, answer)
-
-
-def accept(r: Reduced, answer: Answer) -> Answer:
-    """`found` only where equations, constraints and the conditions of optimality are met."""
-    with np.errstate(invalid="ignore"):
-        answer.residual, answer.excess = residual(r, answer), excess(r, answer)
-        parts = (answer.residual, answer.excess, answer.error)
-        answer.found &= np.all([part <= CERTIFIED for part in parts], axis=0)
-    return answer
+def _ratio(part: np.ndarray | float, whole: np.ndarray | float) -> np.ndarray:
+    """part / whole, 0 where both are."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(np.equal(part, 0), 0.0, np.divide(part, whole))

@@ -36,12 +36,12 @@ class Problem:
     Q: np.ndarray
     J: np.ndarray
     normal: np.ndarray
-    friction: np.ndarray | None = None
-    low: np.ndarray | None = None
-    high: np.ndarray | None = None
-    push: np.ndarray | None = None
+    friction: np.ndarray = None  # type: ignore[assignment]
+    low: np.ndarray = None  # type: ignore[assignment]
+    high: np.ndarray = None  # type: ignore[assignment]
+    push: np.ndarray = None  # type: ignore[assignment]
     preload: float = 0.0
-    offset: np.ndarray | None = None
+    offset: np.ndarray = None  # type: ignore[assignment]
     contact_weight: float = 0.0
 
     def __post_init__(self) -> None:
@@ -70,7 +70,7 @@ class Problem:
         self._check_numbers()
 
     def _check_numbers(self) -> None:
-        low, high, push = self.limits[0], self.limits[1], self.pushes
+        low, high, push = self.low, self.high, self.push
         if self.k > MOST_CONTACTS:
             raise InputError(f"at most {MOST_CONTACTS} contacts; got {self.k}")
         if not (low <= high).all() or (low == np.inf).any() or (high == -np.inf).any():
@@ -102,38 +102,14 @@ class Problem:
         return self.normal.shape[1]
 
     @property
-    def limits(self) -> tuple[np.ndarray, np.ndarray]:
-        """low and high, (n,) each."""
-        assert self.low is not None and self.high is not None
-        return self.low, self.high
-
-    @property
-    def pushes(self) -> np.ndarray:
-        """push, (k,)."""
-        assert self.push is not None
-        return self.push
-
-    @property
-    def frictions(self) -> np.ndarray:
-        """friction, (N, k, 6)."""
-        assert self.friction is not None
-        return self.friction
-
-    @property
-    def offsets(self) -> np.ndarray:
-        """offset, (N, n)."""
-        assert self.offset is not None
-        return self.offset
-
-    @property
     def scale(self) -> np.ndarray:
         """max_i, the larger of |limits|, (n,)."""
-        return np.maximum(*np.abs(self.limits))
+        return np.maximum(np.abs(self.low), np.abs(self.high))
 
     @property
     def finite(self) -> np.ndarray:
         """Samples whose numbers are all finite, (N,)."""
-        parts = (self.Q, self.J, self.normal, self.frictions, self.offsets)
+        parts = (self.Q, self.J, self.normal, self.friction, self.offset)
         return np.all([np.isfinite(a).all(axis=tuple(range(1, a.ndim))) for a in parts], axis=0)
 
     def take(self, rows: np.ndarray) -> Problem:

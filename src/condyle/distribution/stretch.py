@@ -13,9 +13,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import daqp
 import numpy as np
 
-from .program import Program, Sample
+from .active_set import EQUATION, TOLERANCES
+from .certificate import unexplained
+from .eliminated import Sample
 
 SMALL = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-2)  # multiples that are tried
 GAP = 1e-10  # of t, between what was found and the bound of duality
@@ -25,7 +28,7 @@ GAP = 1e-10  # of t, between what was found and the bound of duality
 class Stretch:
     """t, inf where nothing fits; x (n,) of least sum of squares there; multipliers u, (6,).
 
-    gap: relative to t, by which t may exceed the least.
+    gap:    relative to t, by which t may exceed the least.
     spread: violation of the conditions of the least sum of squares, relative to the largest x.
     """
 
@@ -41,24 +44,20 @@ class Stretch:
 
 
 def least_stretch(s: Sample, lower: np.ndarray, upper: np.ndarray) -> Stretch:
-    """Solve for one sample; limits `lower` <= 0 <= `upper` or not, infinite where there is none.
-
-    lower, upper, t are in the unit of x before `Sample` divided it, so t is t of the caller.
-    """
-    lower, upper = lower / s.unit, upper / s.unit
-    program = Program.of(s, lower, upper)
+    """Solve for one sample; limits `lower` <= 0 <= `upper` or not, infinite where there is none."""
+    program = _Program.of(s, lower, upper)
     best: Stretch | None = None
     for small in SMALL:
         first, second = program.regularised(small), program.regularised(0.5 * small)
         if first is None or second is None:
             continue
-        x, t = second.x, second.t
+        x, t = second[0][:-1], float(second[0][-1])
         # Multipliers are linear in the multiple: its limit at 0, and its rate.
-        u, alpha = 2 * second.u - first.u, 2 * second.alpha - first.alpha
-        rate = (first.u - second.u) / (0.5 * small)
+        u, alpha = (2 * b - a for a, b in zip(first[1:], second[1:], strict=True))
+        rate = (first[1] - second[1]) / (0.5 * small)
         gap = abs(t - _bound(s, lower, upper, u, alpha)) / max(t, 1e-12)
         spread = _spread(s, times(t, lower), times(t, upper), x, u, rate)
-        found = Stretch(t, x * s.unit, u, gap, spread)
+        found = Stretch(t, x, u, gap, spread)
         if best is None or found.error < best.error:
             best = found
         if best.error <= GAP:
@@ -66,9 +65,10 @@ def least_stretch(s: Sample, lower: np.ndarray, upper: np.ndarray) -> Stretch:
     exact = program.exact()
     if exact is None:
         return Stretch(np.inf, np.full(len(lower), np.nan), np.full(6, np.nan), np.inf, np.inf)
-    if best is not None and abs(best.t - exact[1]) <= 1e-9 * exact[1]:
-        return replace(best, gap=abs(best.t - exact[1]) / max(exact[1], 1e-12))
-    return Stretch(exact[1], exact[0] * s.unit, np.full(6, np.nan), 0.0, np.inf)
+    x, t = exact[:-1], float(exact[-1])
+    if best is not None and abs(best.t - t) <= 1e-9 * t:
+        return replace(best, gap=abs(best.t - t) / max(t, 1e-12))
+    return Stretch(t, x, np.full(6, np.nan), 0.0, np.inf)
 
 
 def times(t: float, limit: np.ndarray) -> np.ndarray:
@@ -76,21 +76,87 @@ def times(t: float, limit: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(limit), t * np.where(np.isfinite(limit), limit, 0.0), limit)
 
 
+@dataclass(frozen=True)
+class _Program:
+    """Constraints on z = (x, t): low <= z <= high, least <= matrix z <= most.
+
+    who: the effort of each stretched limit, in the first rows of the matrix; then come the
+         m equations, then the contacts.
+    """
+
+    matrix: np.ndarray
+    least: np.ndarray
+    most: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    who: np.ndarray
+    equations: slice
+
+    @classmethod
+    def of(cls, s: Sample, lower: np.ndarray, upper: np.ndarray) -> _Program:
+        n, m = s.G.shape[1], s.m
+        up, down = np.isfinite(upper).nonzero()[0], np.isfinite(lower).nonzero()[0]
+        who, none = np.concatenate([up, down]), np.zeros((6, 1))
+        q = len(who)
+        sides = -np.concatenate([upper[up], lower[down]])[:, None]
+        matrix = np.block([[np.eye(n)[who], sides], [s.G, none]])
+        free = np.full(q, np.inf)
+        b, c = s.right[:m], s.right[m:]
+        least = np.concatenate([-free[: len(up)], 0 * down, b, c - s.contact_high])
+        most = np.concatenate([0.0 * up, free[len(up) :], b, c - s.contact_low])
+        low, high = np.append(s.low, 0.0), np.append(s.high, np.inf)
+        return cls(matrix, least, most, low, high, who, slice(q, q + m))
+
+    def regularised(self, small: float) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+        """z of the least t + small |z|^2 / 2, u (6,) and prices of stretched limits, (n,)."""
+        size, q = len(self.low), len(self.who)
+        sense = np.zeros(size + len(self.least), dtype=np.int32)
+        sense[size:][self.equations] = EQUATION
+        cost = np.append(np.zeros(size - 1), 1.0 / small)
+        high, low = np.concatenate([self.high, self.most]), np.concatenate([self.low, self.least])
+        z, _, flag, info = daqp.solve(
+            np.eye(size), cost, self.matrix, high, low, sense, **TOLERANCES
+        )
+        if flag != 1:
+            return None
+        price = -small * np.asarray(info["lam"])[size:]
+        return np.array(z), price[q:], np.bincount(self.who, -price[:q], minlength=size - 1)
+
+    def exact(self) -> np.ndarray | None:
+        """z by HiGHS; None where nothing fits."""
+        from scipy.optimize import linprog
+
+        equal = np.zeros(len(self.least), dtype=bool)
+        equal[self.equations] = True
+        sides = [self.matrix[~equal], -self.matrix[~equal]]
+        A, b = np.vstack(sides), np.concatenate([self.most[~equal], -self.least[~equal]])
+        kept = np.isfinite(b)
+        found = linprog(
+            np.append(np.zeros(len(self.low) - 1), 1.0),
+            A[kept],
+            b[kept],
+            self.matrix[equal],
+            self.least[equal],
+            list(zip(self.low, self.high, strict=True)),
+            method="highs",
+            options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
+        )
+        return None if found.status != 0 or found.x is None else np.array(found.x)
+
+
 def _bound(
     s: Sample, lower: np.ndarray, upper: np.ndarray, u: np.ndarray, alpha: np.ndarray
 ) -> float:
     """What t cannot be less than, from prices u of the equations, shared by both kinds of limit."""
     g = s.G.T @ u
-    beta = g - alpha
-    price = np.concatenate([beta, u[s.m :]])
+    price = np.concatenate([g - alpha, u[s.m :]])
     low, high = np.concatenate([s.low, s.contact_low]), np.concatenate([s.high, s.contact_high])
     bounds = np.where(price > 0, high, low)
     noise = 1e-10 * np.abs(np.concatenate([g, u])).max(initial=0.0)
     bounds = np.where(np.abs(price) <= noise, np.clip(0.0, low, high), bounds)
     stretched = np.where(alpha > 0, upper, lower)
     stretched = np.where(np.abs(alpha) <= noise, 0.0, stretched)
-    worth = float(s.right @ u - price @ bounds)
-    most = float(alpha @ stretched)
+    worth, most = float(s.right @ u - price @ bounds), float(alpha @ stretched)
     return max(worth / most, 0.0) if most > 0 and np.isfinite(worth) else 0.0
 
 
@@ -101,14 +167,8 @@ def _spread(
 
     Those solutions keep every effort with a price at its bound; the others must balance `rate`.
     """
+    g, largest = s.G.T @ u, np.abs(x).max(initial=0.0)
     low, high = np.maximum(lower, s.low), np.minimum(upper, s.high)
-    g = s.G.T @ u
-    largest = np.abs(x).max(initial=0.0)
-    near = 1e-9 * largest
-    z = x - s.G.T @ rate
-    wrong = np.maximum(
-        np.where(x - low <= near, 0.0, np.maximum(z, 0.0)),
-        np.where(high - x <= near, 0.0, np.maximum(-z, 0.0)),
-    )
+    wrong = unexplained(x - s.G.T @ rate, x, low, high, largest)
     wrong = np.where(np.abs(g) > 1e-9 * np.abs(g).max(initial=0.0), 0.0, wrong)
     return float(wrong.max(initial=0.0) / largest) if largest else 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -17,7 +18,8 @@ from .catalogue import Entry, Wish
 from .exported import Argument
 
 NAMES = {int(code): name for name, code in CODES.items()}
-LIMITS = ("low", "high")  # ports of actuators' limits: the mechanism's own
+# Ports that are numbers of the mechanism: limits, and by what efforts are measured.
+LIMITS = ("low", "high", "scale", "contact_low", "contact_high")
 
 
 def renamed(words: str) -> dict[str, str]:
@@ -35,13 +37,13 @@ def function(c: Context, name: str, entry: Entry, wish: Wish) -> tuple[tuple[Arg
             f"friction at {len(c.structure.friction)} contacts has no efforts in closed form; at "
             f"most {MOST} have"
         )
+    if entry.question == "limited" and c.precision != "double":
+        raise UnsupportedError("efforts within limits are exported in double alone")
     found = c.variants(entry.question or name, *entry.details(wish))
     results = renamed(entry.results)
     program = _pruned(found.robust or found.main, results)
     given = renamed(entry.given or " ".join(_used(program)))
     arguments = tuple(_arguments(c, entry, program, given, results))
-    if entry.body is not None:
-        return arguments, entry.body(c, arguments)
     parameters, p = c.parameters(arguments), c.prefix.upper()
     public = f"int {c.prefix}_{name}({parameters})"
     scalar = Scalar(c.floats(program, name), _places(c, program, given, arguments), c.precision)
@@ -116,20 +118,29 @@ def _places(
 ) -> Places:
     """Where numbers are; of ports without an argument, or beyond its end, what they are."""
     sizes = {a.name: a.size for a in arguments if a.given}
-    ends = [limits(chain) for chain in c.mechanism.chains]
-    huge = HUGE[c.precision]
+    known, huge = _limits(c), HUGE[c.precision]
     suffix = "" if c.precision == "double" else "f"
 
     def place(port: str, i: int) -> str:
         name, value = given.get(port, ""), 0.0
         if i < sizes.get(name, 0):
             return f"{name}[{i}]"
-        if port in LIMITS:
-            value = max(-huge, min(huge, ends[i][LIMITS.index(port)]))
+        if port in known:
+            value = max(-huge, min(huge, known[port][i]))
         return f"({value!r}{suffix})"
 
     results = {a.port: a.name for a in arguments if not a.given}
     return Places.of(program.interface, c.numbers.order, place, results)
+
+
+def _limits(c: Context) -> dict[str, list[float]]:
+    """Numbers of the ports `LIMITS`, in their order."""
+    low, high = zip(*(limits(chain) for chain in c.mechanism.chains), strict=True)
+    push = [contact.push if contact.one_sided else 0 for contact in c.mechanism.contacts]
+    least = [0.0 if side > 0 else -math.inf for side in push]
+    most = [0.0 if side < 0 else math.inf for side in push]
+    rows = low, high, [1.0] * len(low), least, most
+    return {name: list(row) for name, row in zip(LIMITS, rows, strict=True)}
 
 
 def _judged(

@@ -100,12 +100,8 @@ def export(
 def _entries(
     mechanism: Mechanism, questions: Sequence[str], coordinates: Sequence[str], landmark: str | None
 ) -> dict[str, Entry]:
-    """The questions, after those that they need."""
-    found: dict[str, Entry] = {}
-    for question in questions:
-        entry = require_question(question)
-        for name in (*entry.needs, question):
-            found.setdefault(name, require_question(name))
+    """The questions, each once."""
+    found = {question: require_question(question) for question in questions}
     if not found:
         raise InputError("no question to export")
     if "closure" in found:

@@ -13,11 +13,10 @@ from ..errors import InputError, did_you_mean
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..model.distributing import LEAST
 from ..questions import Prescribed
+from ..questions.allocation import TERMS
 from ..questions.law import CONTROLLERS, ControllerTable
 from ..questions.observer import ITERATIONS as OBSERVER_STEPS
-from . import limited
-from .c_context import Body, Context
-from .exported import Argument
+from .c_context import Context
 
 POSE_STEPS = 8  # as many as a start that is off by a third of what steps may be takes
 
@@ -61,7 +60,6 @@ class Entry:
     steps:    so many, a fixed number; 0 for none.
     told:     name in C -> what it is and its unit, where `arguments` knows nothing of it.
     limited:  whether efforts are within limits.
-    needs:    questions that its code calls;  body: what writes that, where it is more than a graph.
     """
 
     text: str
@@ -76,8 +74,6 @@ class Entry:
     steps: int = 0
     told: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     limited: bool = False
-    needs: tuple[str, ...] = ()
-    body: Callable[[Context, Sequence[Argument]], Body] | None = None
 
     def unsure(self, c: Context) -> str:
         """The status of what cannot be vouched for."""
@@ -113,13 +109,11 @@ CATALOGUE: dict[str, Entry] = {
         "Efforts of least norm within the actuators' limits, and the contact forces.",
         f"{STATE} {LOAD}",
         "effort contact_force",
-        question="inverse",
-        details=lambda wish: (("contact",),),
+        question="limited",
+        doubt="UNCERTIFIED",
         rubbing="UNCERTIFIED",
         limited=True,
-        needs=("contact", "motion"),
-        body=limited.body,
-        steps=limited.ROUNDS,
+        steps=TERMS["square"].turns,
     ),
     "forward": Entry(
         "Accelerations that efforts and a load make, and the contact forces.",

@@ -11,11 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..backends.c.limits import WithinLimits
 from ..backends.choose import Backend
-from ..backends.compiler import CompilerError
 from ..backends.notice import notice
-from ..distribution import OBJECTIVES, Objective, Problem, Quadratic, distribute
+from ..distribution import OBJECTIVES, Objective, Problem, distribute
 from ..distribution import Status as Outcome
 from ..dynamics.minimum_norm import minimum_norm
 from ..errors import InputError, did_you_mean, few
@@ -70,8 +68,8 @@ class Policy:
                 f"preload {preload:g} N is for efforts within limits, and distribution {objective} "
                 f"knows none: take one of {_those(lambda o: o.limits)}"
             )
-        if contact_weight and type(OBJECTIVES[objective]).weight is Objective.weight:
-            weighing = _those(lambda o: type(o).weight is not Objective.weight)
+        if contact_weight and not OBJECTIVES[objective].weighs:
+            weighing = _those(lambda o: o.weighs)
             raise InputError(
                 f"distribution {objective} does not weigh contact forces: take {weighing}, or "
                 "leave the contact weight out"
@@ -111,7 +109,7 @@ class Distributor:
     def __init__(
         self, mechanism: Mechanism, policy: Policy, backend: Backend | None = None
     ) -> None:
-        """Args: backend: whose compiler serves where few efforts are free; else numpy does all."""
+        """Args: backend: what the question of efforts runs by; None: the robust solver alone."""
         self.policy = policy
         self._backend = backend
         self._rubs = [contact.friction.coefficient > 0 for contact in mechanism.contacts]
@@ -167,62 +165,18 @@ class Distributor:
             self.policy.preload,
             contact_weight=self.policy.contact_weight,
         )
-        found = self._compiled(system, problem)
-        left = np.arange(problem.count) if found is None else np.flatnonzero(found.pop("unsure"))
-        if found is None or left.size:
-            part = problem if found is None else problem.take(left)
-            result = distribute(part, self.policy.objective)
-            others = {
-                "effort": result.effort.T,
-                "contact_force": result.contact_force.T,
-                "status": _STATUS[result.status],
-                "shortfall": result.shortfall,
-            }
-            found = others if found is None else found
-            for name, value in others.items():
-                found[name][..., left] = value
+        result = distribute(problem, self.policy.objective, self._backend)
+        found = {
+            "effort": result.effort.T,
+            "contact_force": result.contact_force.T,
+            "status": _STATUS[result.status],
+            "shortfall": result.shortfall,
+        }
         if "A" in system:
             rubbing = found["contact_force"].T if self.friction else None
             found["share"] = shares(s, found["effort"].T, rubbing).transpose(2, 1, 0)
             found |= {name: system[name] for name in ("slip", "drag")}
         return found
-
-    def _compiled(
-        self, system: Mapping[str, np.ndarray], problem: Problem
-    ) -> dict[str, np.ndarray] | None:
-        """What compiled code finds, with `unsure` samples; None where it cannot be asked."""
-        objective = OBJECTIVES[self.policy.objective]
-        asked = self._backend is not None and self._backend.name == "compiled"
-        if not (asked and isinstance(objective, Quadratic)):
-            return None
-        if not WithinLimits.fits(problem.n, problem.k):
-            return None
-        low, high, push = self._low, self._high, self._push
-        if not objective.limits:
-            low, high, push = np.full_like(low, -np.inf), np.full_like(high, np.inf), 0 * push
-        contact_low = np.where(push > 0, self.policy.preload, -np.inf)
-        contact_high = np.where(push < 0, -self.policy.preload, np.inf)
-        try:
-            solver = WithinLimits(problem.n, problem.k)
-        except CompilerError:
-            return None
-        found = solver.solve(
-            system["Q"],
-            system["J"],
-            system["normal"],
-            system["friction"],
-            self._rubs,
-            (low, high, objective.scale(problem), contact_low, contact_high),
-            objective.weight(problem),
-        )
-        status = np.where(found.infeasible, Status.infeasible, Status.ok).astype(np.uint8)
-        return {
-            "effort": found.effort,
-            "contact_force": found.force,
-            "shortfall": found.shortfall,
-            "status": status,
-            "unsure": found.unsure,
-        }
 
 
 def shares(

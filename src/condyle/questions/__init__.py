@@ -22,6 +22,7 @@ from .configuration import configuration
 from .forward import forward, forward_system
 from .instant import energy, instant
 from .inverse import balance, inverse, motion, system
+from .limited import limited
 from .linear import linear
 from .matrices import jacobians, matrices
 from .observer import observer
@@ -35,6 +36,7 @@ from .tick import tick
 QUESTIONS: dict[str, Callable[..., Program | Variants]] = {
     "allocation": allocation,
     "inverse": inverse,
+    "limited": limited,
     "forward": forward,
     "forward_system": forward_system,
     "motion": motion,

@@ -35,7 +35,7 @@ FARKAS = 1e-9  # of its terms, by which a proof that there are no efforts must h
 TIE = 1e-12  # of a value: patterns of friction nearer than this are equal, and the first counts
 ENOUGH = 0.1  # part of the first slope that may be left at the end of a step
 SOFT = 1e-12  # curvature of a cube at 0, of the efforts: less than a certificate shows
-HUGE = 1e300
+HUGE = 1e290  # more is infinite
 PROBES = 2  # of the slope along a step
 
 
@@ -115,7 +115,7 @@ class Allocated:
     """Efforts (lanes), contact forces (k,), and the value of the objective.
 
     sure: 1 where they are proved to be the least, else 0;  none: 1 where it is proved that there
-    are none, else 0.
+    are none, else 0;  residual: what the equations miss, of their terms.
     """
 
     effort: Lanes
@@ -123,6 +123,7 @@ class Allocated:
     value: ca.SX
     sure: ca.SX
     none: ca.SX
+    residual: ca.SX
 
 
 def allocate(
@@ -143,10 +144,16 @@ def allocate(
     value = b.total([term.value(x) for x in here.x])
     if limits.weight is not None:
         value += limits.weight * ca.sumsqr(force) / 2
-    sure = r.regular * (quality > CONDITIONED) * here.met
-    none = 1 - (1 - _empty(b, r, here.u)) * (1 - _empty(b, r, change))
+    possible = ca.SX(1)
+    for low, high in zip(
+        *map(ca.vertsplit, (limits.contact_low, limits.contact_high)), strict=True
+    ):
+        possible *= low <= high
+    sure = possible * r.regular * (quality > CONDITIONED) * here.met
+    none = r.regular * (1 - (1 - _empty(b, r, here.u)) * (1 - _empty(b, r, change)))
+    none = 1 - possible * (1 - none * (1 - here.met))
     effort = [x * s for x, s in zip(here.x, limits.scale, strict=True)]
-    return Allocated(effort, force, value, sure, none * r.regular * (1 - here.met))
+    return Allocated(effort, force, value, sure, none, here.missed)
 
 
 def least_pattern(
@@ -180,6 +187,7 @@ def least_pattern(
             ca.if_else(taken, one.value, best.value),
             known * ca.fmax(one.sure, best.sure),
             one.none * best.none,
+            ca.if_else(taken, one.residual, best.residual),
         )
     assert best is not None
     return best
@@ -199,6 +207,7 @@ def allocation(structure: Structure, term: str = "square", weighs: bool = False)
     b.output("contact_force", found.force, "N", k)
     b.output("value", found.value, "")
     b.output("none", found.none, "")
+    b.output("residual", found.residual, "")
     b.check(found.sure, 0.5)
     return b.finish()
 
@@ -284,7 +293,8 @@ class _Point:
     """Efforts at multipliers u, contact forces, and what the equations then miss.
 
     inside: 1 where an effort is between its limits, lanes;  free: 1 where a contact's multiplier
-    may move, (k,);  yields: d lambda / ds, (k,);  met: whether the equations are met.
+    may move, (k,);  yields: d lambda / ds, (k,);  missed: what equations miss, of their terms;
+    met: whether that is rounding.
     """
 
     u: ca.SX
@@ -293,6 +303,7 @@ class _Point:
     gradient: ca.SX
     free: ca.SX
     yields: ca.SX
+    missed: ca.SX
     met: ca.SX
 
 
@@ -327,10 +338,10 @@ def _point(b: Builder, r: _Reduced, term: Term, u: ca.SX) -> _Point:
     gradient = b.cut(ca.vertcat(gradient[:m], natural - force))
     size = ca.fabs(r.right) + r.steepest * b.total([ca.fabs(own) for own in x])
     size += ca.vertcat(ca.SX.zeros(m), ca.fabs(force))
-    met = ca.SX(1)
+    missed = ca.SX(0)
     for i in range(6):
-        met *= ca.fabs(gradient[i]) <= ROUNDING * size[i]
-    return _Point(u, x, force, gradient, free, yields, met)
+        missed = ca.fmax(missed, ca.fabs(gradient[i]) / ca.if_else(size[i] > 0, size[i], 1))
+    return _Point(u, x, force, gradient, free, yields, missed, missed <= ROUNDING)
 
 
 def _gram(b: Builder, G: Lanes, weight: Lanes, size: int) -> ca.SX:

@@ -1,0 +1,234 @@
+"""Efforts and contact forces of N samples: the public function of this room.
+
+The question `allocation` finds nearly all, as fast as its backend is; what it cannot prove, DAQP
+solves one sample at a time, and says why there is no answer where there is none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+from itertools import product
+
+import numpy as np
+
+from ..backends.c.compiled_kernel import CompiledKernel
+from ..backends.choose import Backend
+from ..backends.compiler import CompilerError
+from ..backends.kernel import OK, Kernel
+from ..backends.numpy_kernel import NumpyKernel
+from ..graph.program import Numbers
+from ..questions import Question
+from ..questions.allocation import TIE
+from ..questions.numbers import Layout
+from ..questions.structure import Structure
+from .certificate import Answer
+from .eliminated import Sample
+from .objectives import Objective, named
+from .problem import Problem
+from .result import CERTIFIED, Result, Status
+from .stretch import least_stretch
+
+
+def distribute(
+    problem: Problem, distribution: str = "bounded", backend: Backend | str | None = "auto"
+) -> Result:
+    """Share every sample's force among efforts and contacts.
+
+        least objective(effort)  with  Q = J^T (effort - offset) + sum_k lambda_k D_k
+
+    Args:    distribution: name of an objective, see `OBJECTIVES`.
+             backend: what runs the question, or its name; None: the robust solver alone.
+    Returns: efforts, contact forces, a status a sample, and a certificate.
+    Raises:  InputError: if the objective has no meaning with these limits.
+    """
+    objective = named(distribution)
+    objective.check(problem)
+    result = Result.empty(problem.count, problem.n, problem.k)
+    signs = patterns(problem)
+    left = np.arange(problem.count)
+    determined = problem.n >= 6 - problem.k
+    if objective.term is not None and backend is not None and left.size and determined:
+        chosen = Backend(backend) if isinstance(backend, str) else backend
+        left = _by_kernel(problem, objective, signs, result, chosen)
+    finite = problem.finite
+    for i in left:
+        if not finite[i] or not determined:
+            result.status[i] = Status.singular if finite[i] else Status.unreachable
+        else:
+            _alone(problem, int(i), objective, signs, result)
+    return result
+
+
+def within(problem: Problem, effort: np.ndarray, contact_force: np.ndarray) -> np.ndarray:
+    """Samples whose efforts keep the limits and whose one-sided contacts push enough, (N,).
+
+    Where efforts of least norm do, they are what `bounded` would give: only the others have to be
+    distributed. Friction's signs are not looked at.
+
+    Args: effort: (N, n).   contact_force: (N, k) [N].
+    """
+    kept = ((effort >= problem.low) & (effort <= problem.high)).all(axis=1)
+    pushing = contact_force * problem.push >= problem.preload
+    return kept & (pushing | (problem.push == 0)).all(axis=1)
+
+
+def patterns(problem: Problem) -> np.ndarray:
+    """All signs of the contacts that have friction in any sample, 0 for others, (P, k)."""
+    rubs = (problem.friction != 0).any(axis=(0, 2))
+    found = list(product(*[(1, -1) if rubbing else (0,) for rubbing in rubs]))
+    return np.array(found, dtype=float).reshape(len(found), problem.k)
+
+
+# -- by the question -----------------------------------------------------------------------
+
+
+@lru_cache(maxsize=16)
+def _kernel(n: int, k: int, term: str, weighs: bool, backend: str) -> Kernel:
+    """Serves every mechanism of so many efforts and contacts, whatever they are."""
+    structure = Structure("virtual_power", "core", (("cable", n),), (("plane", 4),) * k, ())
+    layout = Layout.of(structure)
+    shared, lane = (
+        sum(size for _, size in slots.values()) for slots in (layout.parameters, *layout.lanes)
+    )
+    numbers = Numbers(np.zeros(shared), (np.ones((lane, n)),), (np.zeros(lane),), tuple(range(n)))
+    question = Question.about(structure, "allocation", term, weighs)
+    if backend == "compiled":
+        try:
+            return CompiledKernel(question.key, question.variants, numbers)
+        except CompilerError:  # of which the model's own kernels tell
+            pass
+    return NumpyKernel(question.variants(), numbers)
+
+
+def _by_kernel(
+    p: Problem, objective: Objective, signs: np.ndarray, result: Result, backend: Backend
+) -> np.ndarray:
+    """Fill in what the question proves; returns the samples that it leaves to others."""
+    assert objective.term is not None
+    weight, count, k = objective.weight(p), p.count, p.k
+    kernel = _kernel(p.n, k, objective.term, weight > 0, backend.name)
+    low, high, push = p.low, p.high, p.push
+    if not objective.limits:
+        low, high, push = np.full_like(low, -np.inf), np.full_like(high, np.inf), 0 * push
+    bounds = {
+        "low": low,
+        "high": high,
+        "scale": objective.scale(p),
+        "contact_low": np.where(push > 0, p.preload, -np.inf),
+        "contact_high": np.where(push < 0, -p.preload, np.inf),
+        "weight": np.array([weight]),
+    }
+    inputs = {name: np.broadcast_to(a, (count, len(a))) for name, a in bounds.items()}
+    moved = np.einsum("rni,rn->ri", p.J, p.offset) if p.offset.any() else 0.0
+    inputs |= {"Q": p.Q + moved, "J": p.J.transpose(0, 2, 1)}
+    # Entry by entry, so that columns are not copied.
+    for name, a in (("normal", p.normal), ("friction", p.friction)):
+        inputs[name] = np.moveaxis(np.moveaxis(a, 0, -1).reshape(6 * k, count), -1, 0)
+    found, known = np.zeros(count, dtype=bool), np.ones(count, dtype=bool)
+    best = np.full(count, np.inf)
+    for sigma in signs:
+        inputs["sigma"] = np.broadcast_to(sigma, (count, k))
+        answer = kernel.run(inputs)
+        good, values = answer.status == OK, answer.values
+        known &= good | (values["none"] == 1)
+        with np.errstate(invalid="ignore"):
+            less = good & ~(values["value"] >= best - TIE * np.where(found, np.abs(best), 0.0))
+        found |= good
+        best = np.where(less, values["value"], best)
+        result.effort[less] = values["effort"].T[less]
+        result.contact_force[less] = values["contact_force"].T[less]
+        result.residual[less], result.pattern[less] = values["residual"][less], sigma
+    good = found & known
+    result.status[good], result.shortfall[good] = Status.ok, 1.0
+    result.primal[good] = result.dual[good] = 0.0  # by construction
+    return np.flatnonzero(~good)
+
+
+# -- one sample after the other ------------------------------------------------------------
+
+
+def _alone(p: Problem, i: int, objective: Objective, signs: np.ndarray, result: Result) -> None:
+    """Solve one sample under every pattern, and write the least answer, or why there is none."""
+    scale, weight = objective.scale(p), objective.weight(p)
+    samples = [Sample.of(p, i, sigma, scale, weight, objective.limits) for sigma in signs]
+    programs = [s for s in samples if s is not None]
+    if len(programs) < len(samples):
+        result.refuse(i, Status.singular, np.nan)
+        return
+    best: tuple[tuple[float, ...], int, Answer] | None = None
+    unknown = np.zeros(len(signs), dtype=bool)
+    for at, s in enumerate(programs):
+        answer = objective.solve(s)
+        unknown[at] = answer is None
+        if answer is not None:
+            values = objective.values(s, answer)
+            if best is None or _before(values, best[0]):
+                best = values, at, answer
+    status, shortfall = _explained(programs, signs, unknown, best is not None)
+    if best is None or status != Status.ok:
+        result.refuse(i, status, shortfall)
+        return
+    _, at, answer = best
+    unit, measure = programs[at].unit, programs[at].measure
+    result.effort[i] = unit * answer.x * scale
+    result.contact_force[i] = unit * measure * answer.force
+    result.pattern[i], result.status[i], result.shortfall[i] = signs[at], status, 1.0
+    result.residual[i], result.primal[i], result.dual[i] = (
+        answer.residual,
+        answer.excess,
+        answer.slack,
+    )
+
+
+def _before(a: Sequence[float], b: Sequence[float]) -> bool:
+    """Whether values a come before b, level by level; those within `TIE` are equal."""
+    for one, other in zip(a, b, strict=True):
+        if abs(one - other) > TIE * max(abs(one), abs(other)):
+            return one < other
+    return False
+
+
+def _explained(
+    programs: Sequence[Sample], signs: np.ndarray, unknown: np.ndarray, answered: bool
+) -> tuple[Status, float]:
+    """Status and shortfall of a sample that some patterns of friction gave no answer to.
+
+    Args: unknown: patterns with no answer, (P,);  answered: whether another has one, which is the
+          least if the unknown ones turn out to be empty.
+    """
+    if not unknown.any():
+        return Status.ok, 1.0
+    needed = np.array([_needed(s) if u else 0.0 for s, u in zip(programs, unknown, strict=True)])
+    # Nearer to 1, what fits is a point to rounding: then a solver that finds nothing may be right.
+    if (unknown & (needed < 1 - CERTIFIED)).any():
+        return Status.uncertified, np.nan
+    if answered:
+        return Status.ok, 1.0
+    shortfall = float(needed.min())
+    if not np.isfinite(shortfall) and signs.any():
+        bare = [_signs_only(s, sigma) for s, sigma in zip(programs, signs, strict=True)]
+        if not any(np.isfinite(_needed(s)) for s in bare):
+            return Status.jammed, np.nan
+    return Status.infeasible, shortfall
+
+
+def _needed(s: Sample) -> float:
+    """The least number by which the limits of a sample must be multiplied, inf if none does."""
+    if s.contradictory:
+        return np.inf
+    none = np.full_like(s.low, np.inf)
+    return least_stretch(replace(s, low=-none, high=none), s.low, s.high).t
+
+
+def _signs_only(s: Sample, sigma: np.ndarray) -> Sample:
+    """Without limits and one-sided contacts."""
+    none = np.full_like(s.low, np.inf)
+    return replace(
+        s,
+        low=-none,
+        high=none,
+        contact_low=np.where(sigma > 0, 0.0, -np.inf),
+        contact_high=np.where(sigma < 0, 0.0, np.inf),
+    )

@@ -1,0 +1,159 @@
+"""Objectives: how redundancy is resolved. A new one is an instance that is registered."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from ..errors import InputError, did_you_mean
+from .active_set import least
+from .certificate import Answer, certified
+from .eliminated import Sample
+from .problem import Problem
+from .stretch import least_stretch
+
+ROOM = 1e-10  # above the least greatest effort, within which other efforts may be
+
+
+@dataclass(frozen=True)
+class Objective:
+    """Sum of squares of efforts over `scale`, plus W times those of contact forces.
+
+    summary:     one line for help and docs.
+    limits:      efforts have limits, one-sided contacts push.
+    mixes_units: efforts may be of different units: each is divided by its limit.
+    weighs:      contact forces may have a weight.
+    """
+
+    term: ClassVar[str | None] = "square"  # of `allocation`, None where it is no sum of such
+
+    name: str
+    summary: str
+    limits: bool = True
+    mixes_units: bool = False
+    weighs: bool = False
+
+    def check(self, problem: Problem) -> None:
+        """Refuse what has no meaning under this objective."""
+        if self.mixes_units and not np.isfinite(problem.scale).all():
+            without = np.flatnonzero(~np.isfinite(problem.scale)).tolist()
+            raise InputError(
+                f"{self.name} divides each effort by its limit; efforts {without} have none. Give "
+                "them limits, or use bounded"
+            )
+
+    def scale(self, problem: Problem) -> np.ndarray:
+        """What efforts are divided by, (n,): 1, or the larger of their limits."""
+        limit = problem.scale
+        return np.where(limit > 0, limit, 1.0) if self.mixes_units else np.ones(problem.n)
+
+    def weight(self, problem: Problem) -> float:
+        """W of a half of the sum of squares of contact forces."""
+        return problem.contact_weight if self.weighs else 0.0
+
+    def solve(self, s: Sample) -> Answer | None:
+        """The least of one sample, certified; None where none was found."""
+        return least(s, lambda x: x, np.ones_like, curved=False)
+
+    def values(self, s: Sample, answer: Answer) -> tuple[float, ...]:
+        """What is least: the first before all; a second only breaks ties."""
+        square = answer.x @ answer.x + s.weight * answer.force @ answer.force
+        return (0.5 * s.unit**2 * float(square),)
+
+
+@dataclass(frozen=True)
+class Cubic(Objective):
+    """Sum of cubes of efforts over their limits, of efforts that only pull."""
+
+    term: ClassVar[str | None] = "cube"
+
+    def check(self, problem: Problem) -> None:
+        super().check(problem)
+        if (problem.low < 0).any():
+            negative = np.flatnonzero(problem.low < 0).tolist()
+            raise InputError(
+                f"cubic is for efforts that only pull; efforts {negative} may be negative. Set "
+                "their lower limit to 0, or use weighted"
+            )
+
+    def solve(self, s: Sample) -> Answer | None:
+        return least(s, lambda x: x * x, lambda x: 2 * x, curved=True)
+
+    def values(self, s: Sample, answer: Answer) -> tuple[float, ...]:
+        return (float(np.sum((s.unit * answer.x) ** 3)) / 3,)
+
+
+@dataclass(frozen=True)
+class Minimax(Objective):
+    """The greatest effort over its limit; of those that share it, the least sum of squares."""
+
+    term: ClassVar[str | None] = None
+
+    def solve(self, s: Sample) -> Answer | None:
+        if s.contradictory:
+            return None
+        ones = np.ones(len(s.low))
+        found = least_stretch(s, -ones, ones)
+        if not np.isfinite(found.t):
+            return None
+        if np.isfinite(found.error):
+            answer = certified(s, found.x, found.u, ones, found.error)
+            if answer.proved:
+                return answer
+        # For a t that is known better than its x.
+        most = found.t * (1 + ROOM)
+        narrow = replace(s, low=np.maximum(s.low, -most), high=np.minimum(s.high, most))
+        other = super().solve(narrow)
+        if other is None:
+            return None
+        above = abs(np.abs(other.x).max() - found.t)
+        slack = max(other.slack, above / found.t if above else 0.0)
+        answer = certified(s, other.x, other.u, ones, slack)
+        return answer if answer.proved else None
+
+    def values(self, s: Sample, answer: Answer) -> tuple[float, ...]:
+        x = s.unit * answer.x
+        return float(np.abs(x).max()), float(x @ x)
+
+
+OBJECTIVES: dict[str, Objective] = {}
+
+
+def register(objective: Objective) -> Objective:
+    """Add an objective under its name."""
+    OBJECTIVES[objective.name] = objective
+    return objective
+
+
+def named(name: str) -> Objective:
+    """The objective of this name."""
+    if name not in OBJECTIVES:
+        raise InputError(f'unknown distribution "{name}".' + did_you_mean(name, OBJECTIVES))
+    return OBJECTIVES[name]
+
+
+for _objective in (
+    Objective("bounded", "least sum of squares of efforts within limits; one-sided contacts push"),
+    Cubic(
+        "cubic",
+        "sum of cubes of efforts over their limits, efforts >= 0: muscle recruitment",
+        mixes_units=True,
+    ),
+    Minimax(
+        "minimax",
+        "least of the greatest effort over its limit; of those, as weighted",
+        mixes_units=True,
+    ),
+    Objective(
+        "minimum_norm", "least sum of squares of efforts; limits are not looked at", limits=False
+    ),
+    Objective(
+        "weighted",
+        "as bounded, each effort divided by its limit; contact forces may weigh as well",
+        mixes_units=True,
+        weighs=True,
+    ),
+):
+    register(_objective)

@@ -1,0 +1,51 @@
+"""Inverse dynamics within limits: efforts and contact forces that make a motion under a load."""
+
+from __future__ import annotations
+
+from itertools import product
+
+from ..dynamics import FORMULATIONS
+from ..graph.program import Program, Variants
+from ..status import Status
+from .allocation import TERMS, Allocated, Limits, least_pattern
+from .builder import Builder, Lanes
+from .equations import Wrench, equations
+from .inverse import DOUBTFUL, feasibility
+from .platform import Platform, closed, contacts
+from .structure import Structure
+
+
+def limited(structure: Structure, term: str = "square", weighs: bool = False) -> Variants:
+    """Efforts and contact forces, from q, q', q'', the load and the limits.
+
+    Args: term: of the objective, see `TERMS`;  weighs: whether contact forces have a weight.
+    """
+    return Variants(program(structure, term, weighs), single=True)
+
+
+def program(structure: Structure, term: str, weighs: bool) -> Program:
+    """The graph; samples that it cannot vouch for go the robust path."""
+    b = Builder(structure)
+    platform, load = closed(b), Wrench.of(b)
+    found, discriminants = within(b, platform, load, Limits.ports(b, weighs), term)
+    b.output("effort", found.effort, "N m or N")
+    b.output("contact_force", found.force, "N", len(structure.contacts))
+    b.check(feasibility(b, platform, discriminants), DOUBTFUL, Status.unreachable)
+    b.check(1 - 2 * found.none, 0.5, Status.infeasible)
+    b.check(found.sure, 0.5)
+    return b.finish()
+
+
+def within(
+    b: Builder, platform: Platform, load: Wrench, limits: Limits, term: str = "square"
+) -> tuple[Allocated, Lanes]:
+    """Efforts within limits that make a motion, of all signs of contact forces with friction; and
+    the chains' discriminants."""
+    s = b.structure
+    lump = FORMULATIONS[s.formulation].lumps
+    eq = equations(b, platform, load, route="core", lump=lump)
+    touch, rows = contacts(b, platform), [chain.row for chain in eq.chains]
+    both = eq.state.B.T @ touch.N, eq.state.B.T @ touch.T
+    signs = [(1, -1) if i in s.friction else (0,) for i in range(len(s.contacts))]
+    found = least_pattern(b, eq.Q, rows, both, list(product(*signs)), limits, TERMS[term])
+    return found, [chain.dynamics.discriminant for chain in eq.chains]
