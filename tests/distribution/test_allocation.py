@@ -74,7 +74,7 @@ def test_few_bites_of_the_jaw_are_left_to_others(name, monkeypatch):
     assert 100 < len(fits) < 400
     alone = []
     monkeypatch.setitem(distribute.__globals__, "_alone", lambda p, i, *rest: alone.append(i))
-    found = distribute(problem.take(fits), name)
+    found = distribute(problem.take(fits), name, "compiled")
     assert len(alone) <= 0.06 * len(fits)
     assert found.residual[found.status == Status.ok].max() <= 1e-13
 

@@ -21,7 +21,7 @@ def test_no_better_answer_is_near_or_far(seed):
     problem = random_problem(rng, n, k, friction=friction, pull=True, tight=1.5)
     scale = problem.scale
     programs = [full(problem, 0, sign, scale, True, 0.0) for sign in signs(problem)]
-    result = distribute(problem, "cubic")
+    result = distribute(problem, "cubic", None)
     if result.status[0] == Status.infeasible:
         assert min(map(least_stretch, programs)) > 1
         return
@@ -47,7 +47,7 @@ def test_no_better_answer_is_near_or_far(seed):
 def test_near_what_limits_allow(share):
     rng = np.random.default_rng(4)
     problem = random_problem(rng, 9, 2, 40, pull=True, tight=0.4)
-    needed = distribute(problem, "cubic").shortfall
+    needed = distribute(problem, "cubic", None).shortfall
     for i in np.flatnonzero(needed > 1)[:8]:
         one = problem.take(np.array([i]))
         result = distribute(stretched(one, needed[i] / share), "cubic")
@@ -66,4 +66,4 @@ def value(effort, scale):
 def test_efforts_that_push_are_refused():
     problem = random_problem(np.random.default_rng(0), 6, 2)
     with pytest.raises(InputError, match=r"efforts \[0, 1, 2, 3, 4, 5\] may be negative"):
-        distribute(problem, "cubic")
+        distribute(problem, "cubic", None)

@@ -42,7 +42,7 @@ def test_least_of_all_active_sets(name, seed):
     limits = name != "minimum_norm"
     programs = [full(problem, 0, sign, scale, limits, weight) for sign in signs(problem)]
     answers = [a for a in map(best_active_set, programs) if a is not None]
-    result = distribute(problem, name)
+    result = distribute(problem, name, None)
     if answers:
         best = min(answers, key=lambda answer: answer[0])[1]
         assert result.status[0] == Status.ok
@@ -58,6 +58,6 @@ def test_least_of_all_active_sets(name, seed):
 
 
 def test_both_outcomes_are_among_the_cases():
-    status = [int(distribute(cases(seed)).status[0]) for seed in range(32)]
+    status = [int(distribute(cases(seed), backend=None).status[0]) for seed in range(32)]
     assert status.count(Status.ok) > 8
     assert status.count(Status.infeasible) > 4

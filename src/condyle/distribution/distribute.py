@@ -32,7 +32,7 @@ from .stretch import least_stretch
 
 
 def distribute(
-    problem: Problem, distribution: str = "bounded", backend: Backend | str | None = "auto"
+    problem: Problem, distribution: str = "bounded", backend: Backend | str | None = "numpy"
 ) -> Result:
     """Share every sample's force among efforts and contacts.
 

@@ -135,7 +135,7 @@ def _places(
 
 def _limits(c: Context) -> dict[str, list[float]]:
     """Numbers of the ports `LIMITS`, in their order."""
-    low, high = zip(*(limits(chain) for chain in c.mechanism.chains), strict=True)
+    low, high = zip(*(limits(chain)[:2] for chain in c.mechanism.chains), strict=True)
     push = [contact.push if contact.one_sided else 0 for contact in c.mechanism.contacts]
     least = [0.0 if side > 0 else -math.inf for side in push]
     most = [0.0 if side < 0 else math.inf for side in push]
