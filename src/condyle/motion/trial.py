@@ -7,7 +7,6 @@ import numpy as np
 from ..mechanism.home import characteristic_length, independent_coordinates
 from ..mechanism.mechanism import Mechanism
 from .path import Motion
-from .reference_case import rise
 
 SWAY = 0.03  # of the characteristic length, and in radians
 SLOWEST, STEP = 0.4, 0.15  # of the first coordinate's sway, and from one to the next [Hz]
@@ -40,3 +39,9 @@ def trial_motion(
     }
     source = "trial motion (synthetic)"
     return Motion.from_arrays(t, columns, cutoff=cutoff, rate=rate, trim=trim, source=source)
+
+
+def rise(s: np.ndarray) -> np.ndarray:
+    """From 0 at 0 to 1 at 1, with four smooth derivatives."""
+    s = np.clip(s, 0, 1)
+    return s**5 * (126 - 420 * s + 540 * s**2 - 315 * s**3 + 70 * s**4)
