@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -204,86 +204,92 @@ def test_what_cannot_be_reached_is_said(fmus: dict[tuple[str, int], Path], versi
     assert asked(fmus["inverse", version], far, ["status"], "ModelExchange") == [1]
 
 
-def started(path: Path, version: int, folder: Path) -> tuple[Any, Callable[[str], float]]:
-    """A plant in co-simulation, and what reads one of its variables."""
-    description = fmpy.read_model_description(str(path))
-    numbers = {v.name: v.valueReference for v in description.modelVariables}
-    kind = fmpy.fmi2.FMU2Slave if version == 2 else fmpy.fmi3.FMU3Slave
-    unit = kind(
-        guid=description.guid,
-        unzipDirectory=fmpy.extract(str(path), unzipdir=str(folder)),
-        modelIdentifier=description.coSimulation.modelIdentifier,
-        instanceName="x",
-    )
-    unit.instantiate()
-    if version == 2:
-        unit.setupExperiment(startTime=0.0)
-    unit.enterInitializationMode()
-    unit.exitInitializationMode()
-    get = unit.getReal if version == 2 else unit.getFloat64
-    return unit, lambda name: get([numbers[name]])[0]
+class Unit:
+    """A plant in co-simulation, whatever the version."""
+
+    def __init__(self, path: Path, version: int, folder: Path) -> None:
+        description = fmpy.read_model_description(str(path))
+        self.variables = {v.name: v for v in description.modelVariables}
+        two = version == 2
+        self.unit = unit = (fmpy.fmi2.FMU2Slave if two else fmpy.fmi3.FMU3Slave)(
+            guid=description.guid,
+            unzipDirectory=fmpy.extract(str(path), unzipdir=str(folder)),
+            modelIdentifier=description.coSimulation.modelIdentifier,
+            instanceName="x",
+        )
+        unit.instantiate()
+        if two:
+            unit.setupExperiment(startTime=0.0)
+        unit.enterInitializationMode()
+        unit.exitInitializationMode()
+        state = "FMUstate" if two else "FMUState"
+        self.keep, self.back, self.pack, self.unpack = (
+            getattr(unit, f"{what}{state}")
+            for what in ("get", "set", "serialize", "deSerialize" if two else "deserialize")
+        )
+        self._get = unit.getReal if two else unit.getFloat64
+        self._set = unit.setReal if two else unit.setFloat64
+
+    def step(self, now: float, span: float = 0.01) -> float:
+        """Where it is after a step."""
+        self.unit.doStep(currentCommunicationPoint=now, communicationStepSize=span)
+        return self.read("q.X")
+
+    def read(self, name: str) -> float:
+        return self._get([self.variables[name].valueReference])[0]
+
+    def write(self, name: str, value: float) -> None:
+        self._set([self.variables[name].valueReference], [value])
 
 
-@pytest.mark.parametrize("version", VERSIONS)
-def test_a_state_can_be_kept_and_brought_back(
-    fmus: dict[tuple[str, int], Path], version: int, tmp_path: Path
-) -> None:
+@pytest.fixture(params=VERSIONS)
+def plant(
+    fmus: dict[tuple[str, int], Path], request: pytest.FixtureRequest, tmp_path: Path
+) -> Iterator[Unit]:
+    found = Unit(fmus["plant", request.param], request.param, tmp_path)
+    yield found
+    found.unit.freeInstance()
+
+
+def test_a_state_can_be_kept_and_brought_back(plant: Unit) -> None:
     """In memory and as bytes; a step from it is the same step again, and reset is the beginning."""
-    unit, read = started(fmus["plant", version], version, tmp_path)
-    two = version == 2
-    keep, back = (
-        (unit.getFMUstate, unit.setFMUstate) if two else (unit.getFMUState, unit.setFMUState)
-    )
-    pack = unit.serializeFMUstate if two else unit.serializeFMUState
-    unpack = unit.deSerializeFMUstate if two else unit.deserializeFMUState
-
-    def step(now: float) -> float:
-        unit.doStep(currentCommunicationPoint=now, communicationStepSize=0.01)
-        return read("q.X")
-
-    first = step(0.0)
-    state = keep()
-    packed = pack(state)
-    second = step(0.01)
-    back(state)
-    assert step(0.01) == second != first
-    back(unpack(packed))
-    assert step(0.01) == second
-    unit.reset()
-    assert read("q.X") == 0.0
-    unit.freeInstance()
+    first = plant.step(0.0)
+    state = plant.keep()
+    packed = plant.pack(state)
+    second = plant.step(0.01)
+    plant.back(state)
+    assert plant.step(0.01) == second != first
+    plant.back(plant.unpack(packed))
+    assert plant.step(0.01) == second
+    plant.unit.reset()
+    assert plant.read("q.X") == 0.0
 
 
-@pytest.mark.parametrize("version", VERSIONS)
-def test_what_a_host_must_not_do_is_refused(
-    fmus: dict[tuple[str, int], Path], version: int, tmp_path: Path
-) -> None:
+def test_what_a_host_must_not_do_is_refused(plant: Unit) -> None:
     """Steps at another time, back, or of no number; strange states; outputs that are set."""
-    unit, read = started(fmus["plant", version], version, tmp_path)
-    unit.doStep(currentCommunicationPoint=0.0, communicationStepSize=0.01)
-    before = read("q.X")
-    for now, span in ((0.0, 0.01), (0.02, 0.01), (0.01, -0.001), (0.01, np.nan), (np.nan, 0.01)):
+    before = plant.step(0.0)
+    packed = plant.pack(plant.keep())
+    outputs = [v.name for v in plant.variables.values() if v.causality == "output"]
+    computed = [name for name in outputs if name.split(".")[0] not in ("q", "q1")]
+    steps = ((0.0, 0.01), (0.02, 0.01), (0.01, -0.001), (0.01, np.nan), (np.nan, 0.01))
+    for call in (
+        *(partial(plant.step, *step) for step in steps),
+        *(partial(plant.unpack, strange) for strange in (bytes(len(packed)), packed[:-1])),
+        *(partial(plant.write, name, 1.0) for name in computed),
+    ):
         with pytest.raises(Exception, match=r"(?i)error"):
-            unit.doStep(currentCommunicationPoint=now, communicationStepSize=span)
-    unpack = unit.deSerializeFMUstate if version == 2 else unit.deserializeFMUState
-    pack, keep = (
-        (unit.serializeFMUstate, unit.getFMUstate)
-        if version == 2
-        else (unit.serializeFMUState, unit.getFMUState)
-    )
-    packed = pack(keep())
-    for strange in (bytes(len(packed)), packed[:-1]):
-        with pytest.raises(Exception, match=r"(?i)error"):
-            unpack(strange)
-    put = unit.setReal if version == 2 else unit.setFloat64
-    variables = fmpy.read_model_description(str(fmus["plant", version])).modelVariables
-    for v in variables:
-        if v.causality == "output" and v.name.split(".")[0] not in ("q", "q1"):  # states are set
-            with pytest.raises(Exception, match=r"(?i)error"):
-                put([v.valueReference], [1.0])
-    unit.doStep(currentCommunicationPoint=0.01, communicationStepSize=0.0)
-    assert read("q.X") == before
-    unit.freeInstance()
+            call()
+    assert computed and plant.step(0.01, 0.0) == before
+
+
+def test_a_plant_stops_where_it_cannot_go_on(plant: Unit) -> None:
+    """Without efforts the jaw falls until a crank is in line; the step is refused, and said why."""
+    now = 0.0
+    with pytest.raises(Exception, match=r"(?i)discard|failed|status"):
+        while now < 2:
+            plant.step(now)
+            now += 0.01
+    assert 0.05 < now < 1 and plant.read("status") in (1, 2)
 
 
 @pytest.mark.parametrize("version", VERSIONS)
@@ -304,21 +310,6 @@ def test_compilers_have_nothing_to_say(
             "-fsyntax-only",
         )
         run(compiler, *flags, "sources/fmu.c", folder=tmp_path / kind)
-
-
-@pytest.mark.parametrize("version", VERSIONS)
-def test_a_plant_stops_where_it_cannot_go_on(
-    fmus: dict[tuple[str, int], Path], version: int, tmp_path: Path
-) -> None:
-    """Without efforts the jaw falls until a crank is in line; the step is refused, and said why."""
-    unit, read = started(fmus["plant", version], version, tmp_path)
-    now = 0.0
-    with pytest.raises(Exception, match=r"(?i)discard|failed|status"):
-        while now < 2:
-            unit.doStep(currentCommunicationPoint=now, communicationStepSize=0.01)
-            now += 0.01
-    assert 0.05 < now < 1 and read("status") in (1, 2)
-    unit.freeInstance()
 
 
 def test_units_are_powers_of_base_units() -> None:

@@ -8,6 +8,8 @@ of scalar variables, called as array and label: `effort.masseter_left`, `q.X`.
 from __future__ import annotations
 
 import hashlib
+import re
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
@@ -32,6 +34,7 @@ STATES, RATES = ("q", "q1"), ("dq", "acceleration")
 PARAMETERS = ("point", "kp", "kd")
 STARTS = {"kp": 400.0, "kd": 40.0}
 TOLERANCE = 1e-9  # of a step of the plant, relative and absolute
+CODES = "0 ok, 1 unreachable, 2 singular, 3 out of bounds, 4 infeasible, 5 jammed, 6 uncertified"
 
 
 @dataclass(frozen=True)
@@ -87,56 +90,49 @@ def fmu_model(mechanism: Mechanism, kind: str) -> Fmu:
     plant = kind == "plant"
     calls = [e[question] for question in KINDS[kind]]
     arrays = {a.name: a for f in calls for a in f.arguments}
-    # A result of one function that another takes stands once: the acceleration of `motion`.
-    made = {a.name for f in calls for a in f.outputs}
+    states, rates = (STATES, RATES) if plant else ((), ())
     if plant:
         arrays["dq"] = replace(arrays["q1"], name="dq", given=False, text="rates of q")
-    rows: dict[str, list[Scalar]] = {}
+    # A result of one function that another takes stands once: the acceleration of `motion`.
+    made = [name for name in arrays if name in {a.name for f in calls for a in f.outputs}]
+    taken = {*states, *rates, "q2"} if plant else set()
+    given = [name for name, a in arrays.items() if a.given and name not in taken]
     variables: list[Scalar] = []
+    places: dict[str, int] = {}
 
     def add(role: str, names: Iterable[str]) -> None:
         for name in names:
-            found = list(_scalars(e, arrays[name], role, len(variables)))
-            rows[name] = found
-            variables.extend(found)
+            places[name] = len(variables)
+            variables.extend(_scalars(e, arrays[name], role, len(variables)))
 
-    states = [n for n in STATES if plant]
-    rates = [n for n in RATES if plant]
-    taken = {*states, *rates, "q2"} if plant else set()
-    given = [n for n, a in arrays.items() if a.given and n not in taken]
-    add("input", [n for n in given if n not in PARAMETERS])
-    add("parameter", [n for n in given if n in PARAMETERS])
+    def add_one(role: str, name: str, unit: str, text: str, start: float | None = None) -> None:
+        places[name] = len(variables)
+        variables.append(Scalar(name, role, unit, text, len(variables), start))
+
+    add("input", [name for name in given if name not in PARAMETERS])
+    add("parameter", [name for name in given if name in PARAMETERS])
     tuned = list(_tuned(mechanism, e))
-    first = len(variables)
-    variables += [
-        Scalar(t.name, "parameter", t.unit, t.text, first + i, t.start) for i, t in enumerate(tuned)
-    ]
+    for t in tuned:
+        add_one("parameter", t.name, t.unit, t.text, t.start)
     if plant:
-        variables.append(
-            Scalar("tolerance", "parameter", "1", "of a step", len(variables), TOLERANCE)
-        )
+        add_one("parameter", "tolerance", "1", "of a step", TOLERANCE)
     add("state", states)
-    computed = len(variables)
-    codes = (
-        "0 ok, 1 unreachable, 2 singular, 3 out of bounds, 4 infeasible, 5 jammed, 6 uncertified"
-    )
-    variables.append(Scalar("status", "output", "1", codes, computed))
+    add_one("output", "status", "1", CODES)
     add("rate", rates)
-    add("output", [n for n in arrays if n in made and n not in rates])
-    for state, rate in zip(states, rates, strict=True):
-        for x, dx in zip(rows[state], rows[rate], strict=True):
-            variables[dx.index] = replace(dx, of=x.index)
-    order = sum(len(rows[s]) for s in states)
-    places = {name: scalars[0].index for name, scalars in rows.items()}
-    body = _evaluate(e, kind, places) + _prepare(e, tuned, first)
+    add("output", [name for name in made if name not in rates])
+    order = places["status"] - places["q"] if plant else 0
+    for i in range(order):
+        rate = places["dq"] + i
+        variables[rate] = replace(variables[rate], of=places["q"] + i)
+    body = _evaluate(e, kind, places) + _prepare(e, tuned, places)
     macros = {
         "VALUES": len(variables),
-        "COMPUTED": computed,
-        "STATUS": computed,
+        "COMPUTED": places["status"],
+        "STATUS": places["status"],
         "ORDER": order,
         "STATES": places.get("q", 0),
         "DERIVATIVES": places.get("dq", 0),
-        "TOLERANCE": next((v.index for v in variables if v.name == "tolerance"), 0),
+        "TOLERANCE": places.get("tolerance", 0),
         "START": "{" + ", ".join(repr(v.start or 0.0) for v in variables) + "}",
     }
     head = "".join(f"#define MODEL_{name} {value}\n" for name, value in macros.items())
@@ -163,44 +159,42 @@ def _scalars(e: Exported, a: Argument, role: str, first: int) -> Iterable[Scalar
 
 def _tuned(mechanism: Mechanism, e: Exported) -> Iterable[Tuned]:
     """Gravity, the platform's mass and inertia, and what stands for itself of the chains."""
-    header, platform = e.header, mechanism.platform
-    if "double gravity[3]" in header:
+    platform, numbers = mechanism.platform, e.header.partition("_numbers;")[0]
+    sized = re.findall(r"double (\w+)", numbers)
+    if "gravity" in sized:
         for i, axis in enumerate("xyz"):
-            start = float(mechanism.gravity[i])
-            yield Tuned(f"gravity.{axis}", "m/s^2", f"gravity along {axis} of {{S}}", start,
-                        f"n.gravity[{i}] = value")  # fmt: skip
+            about = f"gravity.{axis}", "m/s^2", f"gravity along {axis} of {{S}}"
+            yield Tuned(*about, float(mechanism.gravity[i]), f"n.gravity[{i}] = value")
     # The numbers hold the chains' masses that move with the platform's joints as well.
-    for field, lumped in (("mass", "lumped_mass"), ("inertia", "lumped_inertia")):
-        found = next((f for f in (lumped, field) if f"double {f};" in header or
-                      f"double {f}[" in header), None)  # fmt: skip
-        if found is None:
-            continue
-        if field == "mass":
-            yield Tuned("platform.mass", "kg", "mass of the platform", platform.mass,
-                        f"n.{found} += value - {platform.mass!r}")  # fmt: skip
-            continue
-        for i, key in enumerate(("xx", "yy", "zz", "xy", "xz", "yz")):
+    mass, inertia = (
+        next((name for name in (f"lumped_{own}", own) if name in sized), None)
+        for own in ("mass", "inertia")
+    )
+    if mass is not None:
+        about = "platform.mass", "kg", "mass of the platform"
+        yield Tuned(*about, platform.mass, f"n.{mass} += value - {platform.mass!r}")
+    for i, key in enumerate(("xx", "yy", "zz", "xy", "xz", "yz")):
+        if inertia is not None:
             start = float(getattr(platform.inertia, key))
-            yield Tuned(f"platform.inertia.{key}", "kg m^2", f"inertia {key} of the platform",
-                        start, f"n.{found}[{i}] += value - {start!r}")  # fmt: skip
-    seen: dict[str, int] = {}
+            about = f"platform.inertia.{key}", "kg m^2", f"inertia {key} of the platform"
+            yield Tuned(*about, start, f"n.{inertia}[{i}] += value - {start!r}")
+    seen = Counter[str]()
     for chain in mechanism.chains:
-        number = seen.setdefault(chain.kind, 0)
+        name, at = e.names[chain.name], f"n.{chain.kind}[{seen[chain.kind]}]"
         seen[chain.kind] += 1
-        name, at = e.names[chain.name], f"n.{chain.kind}[{number}]"
         if chain.kind == "RSS":
-            yield Tuned(f"crank_inertia.{name}", "kg m^2", f"of the crank of {chain.name}",
-                        chain.crank.inertia, f"{at}.crank = value")  # fmt: skip
+            about = f"crank_inertia.{name}", "kg m^2", f"of the crank of {chain.name}"
+            yield Tuned(*about, chain.crank.inertia, f"{at}.crank = value")
         if chain.kind == "PSS":
-            yield Tuned(f"slider_mass.{name}", "kg", f"of the slider of {chain.name}",
-                        chain.slider.mass, f"{at}.slider = value")  # fmt: skip
-        if "double actuator[4]" in header:
+            about = f"slider_mass.{name}", "kg", f"of the slider of {chain.name}"
+            yield Tuned(*about, chain.slider.mass, f"{at}.slider = value")
+        if "actuator" in sized:
             family, actuator = FAMILIES[chain.kind], chain.actuator
-            unit = f"{family.effort_unit} s/{family.joint_unit}"
-            yield Tuned(f"viscous.{name}", unit, f"friction of {chain.name}",
-                        actuator.viscous, f"{at}.actuator[1] = value")  # fmt: skip
-            yield Tuned(f"coulomb.{name}", family.effort_unit, f"friction of {chain.name}",
-                        actuator.coulomb, f"{at}.actuator[2] = value")  # fmt: skip
+            unit, text = f"{family.effort_unit} s/{family.joint_unit}", f"friction of {chain.name}"
+            own = actuator.viscous, f"{at}.actuator[1] = value"
+            yield Tuned(f"viscous.{name}", unit, text, *own)
+            own = actuator.coulomb, f"{at}.actuator[2] = value"
+            yield Tuned(f"coulomb.{name}", family.effort_unit, text, *own)
 
 
 def _evaluate(e: Exported, kind: str, places: dict[str, int]) -> str:
@@ -223,10 +217,8 @@ def _evaluate(e: Exported, kind: str, places: dict[str, int]) -> str:
     return "\n".join([*lines, "    return 0;", "}", "", ""])
 
 
-def _prepare(e: Exported, tuned: list[Tuned], first: int) -> str:
+def _prepare(e: Exported, tuned: list[Tuned], places: dict[str, int]) -> str:
     lines = ["static void model_prepare(const double *v, model_constants *of)", "{"]
     lines += [f"    {e.prefix}_numbers n = {e.prefix.upper()}_NUMBERS;"]
-    for i, one in enumerate(tuned):
-        lines.append(f"    {one.code.replace('value', f'v[{first + i}]')};")
-    lines += [f"    {e.prefix}_prepare(&n, of);", "}", ""]
-    return "\n".join(lines)
+    lines += [f"    {t.code.replace('value', f'v[{places[t.name]}]')};" for t in tuned]
+    return "\n".join([*lines, f"    {e.prefix}_prepare(&n, of);", "}", ""])
