@@ -17,7 +17,11 @@ from condyle.motion.table_writer import TableWriter, write_table
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 
 
-@settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=50,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
 @given(values=arrays(float, st.tuples(st.integers(1, 20), st.integers(1, 4)), elements=FINITE))
 def test_every_number_comes_back_in_the_same_bits(tmp_path, values):
     columns = {f"c{j}": column for j, column in enumerate(values.T)}

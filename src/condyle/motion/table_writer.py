@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import ExitStack
-from types import TracebackType
+from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING, Any, BinaryIO, Self
 
 import numpy as np
@@ -37,41 +36,29 @@ class TableWriter:
     """
 
     def __init__(self, path: str | os.PathLike[str], *, parquet: bool | None = None) -> None:
-        self.path = path
         self._parquet = is_parquet(path) if parquet is None else parquet
         self._names: list[str] = []
-        self._file: BinaryIO
-        self._pool: ThreadPoolExecutor
         self._waiting: deque[Future[bytes]] = deque()
         self._to: Any = None
-        self._open: ExitStack
+        self._whole = self._written(path)
 
     def __enter__(self) -> Self:
-        with ExitStack() as stack:
-            temporary = stack.enter_context(replacing(self.path))
-            self._file = stack.enter_context(open(temporary, "wb"))
-            self._pool = stack.enter_context(ThreadPoolExecutor(_THREADS))
-            self._open = stack.pop_all()
+        self._whole.__enter__()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        try:
-            if error is None:
-                self._finish(0)
-            if self._to is not None:
-                self._to.close()
-        except BaseException as own:
-            kind, error, trace = type(own), error or own, trace or own.__traceback__
-            self._open.__exit__(kind, error, trace)
-            raise
-        if error is None and not self._names:
-            kind, error = _NothingWritten, _NothingWritten()
-        self._open.__exit__(kind, error, trace)
+    def __exit__(self, *error: Any) -> bool | None:
+        return self._whole.__exit__(*error)
+
+    @contextmanager
+    def _written(self, path: str | os.PathLike[str]) -> Iterator[None]:
+        with suppress(_NothingWritten), ExitStack() as self._open:
+            temporary = self._open.enter_context(replacing(path))
+            self._file: BinaryIO = self._open.enter_context(open(temporary, "wb"))
+            self._pool = self._open.enter_context(ThreadPoolExecutor(_THREADS))
+            yield
+            self._finish(0)
+            if not self._names:
+                raise _NothingWritten
 
     def write(self, columns: Mapping[str, Column]) -> None:
         """Append rows: numbers or strings by column name, all of one length.
@@ -108,6 +95,7 @@ class TableWriter:
 
         if self._to is None:
             self._to = pq.ParquetWriter(self._file, table.schema)
+            self._open.callback(self._to.close)
         self._to.write_table(table)
 
 
