@@ -13,6 +13,7 @@ from support.recorded_jaw import FIXED, LOWER, PLATFORM, UPPER, Jaw, record
 import condyle
 from condyle.errors import InputError
 from condyle.markers import MarkerMotion, from_c3d, read_markers
+from condyle.markers.marker_bodies import home_frames
 
 # Single precision of some 1.5 m, over the least breadth of a brace, 15 mm.
 ROUNDING = np.array([1e-6] * 3 + [2e-5] * 3)
@@ -97,6 +98,7 @@ def test_one_time_of_home(tmp_path: Path) -> None:
     jaw = record(head=0.0)
     got = measured(jaw, tmp_path, tables=jaw.tables(home=0.204))
     assert (error(got, jaw) < ROUNDING).all()
+    assert np.flatnonzero(home_frames(got.recording, (0.204, 0.204))).tolist() == [20]
 
 
 def test_frames_that_begin_later(tmp_path: Path) -> None:
