@@ -13,7 +13,7 @@ from condyle.results.model import Model
 from condyle.simulation import simulate
 from condyle.simulation.bind import bind
 from condyle.simulation.plan import Plan
-from condyle.simulation.run import run
+from condyle.simulation.running import run
 from condyle.simulation.scenario import scenario_from
 
 from .rows import Probe

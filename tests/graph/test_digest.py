@@ -115,9 +115,10 @@ def test_an_interface_survives_json() -> None:
 DIGESTS = """
 from support.cases import case
 from condyle.questions import QUESTIONS, Prescribed, Question
+from condyle.questions.law import CONTROLLERS
 from condyle.questions.structure import structure_of
 structure = structure_of(case("mixed_k2_n8").mechanism)
-given = dict.fromkeys(("closure", "conditions"), Prescribed()) | {"tick": "impedance"}
+given = dict.fromkeys(("closure", "conditions"), Prescribed()) | {"tick": CONTROLLERS["impedance"]}
 for name in QUESTIONS:
     details = (given[name],) if name in given else ()
     question = Question.about(structure, name, *details)

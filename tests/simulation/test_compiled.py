@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal
 
+import casadi as ca
 import numpy as np
 import pytest
 
 import condyle
 from condyle.backends.compiler import CompilerError, find_compiler
-from condyle.simulation import run as running
+from condyle.questions.builder import Lanes
+from condyle.questions.entries import Machine
+from condyle.questions.law.controller import EACH_COORDINATE, Control, ControllerTable
+from condyle.questions.load.acting import LoadTable, Place
+from condyle.simulation import CONTROLLERS, LOADS, running
 from condyle.simulation.bind import bind
+from condyle.simulation.gains import check_gains
 from condyle.simulation.plan import Plan, Trace
 from condyle.simulation.scenario import scenario_from
 
@@ -39,7 +46,7 @@ CASES: dict[str, dict[str, Any]] = {
             "kind": "joint_pd", "stiffness": 2.0, "damping": 0.02, "rate": 1000.0, "gravity": False,
         },
     },
-    "a law that Python has": {
+    "impedance": {
         "controller": {"kind": "impedance", "stiffness": 2e3, "damping": 30.0, "rate": 500.0},
     },
     "a bite, and food that breaks": {
@@ -68,10 +75,8 @@ def plan_of(told: dict[str, Any], model: condyle.Model) -> Plan:
     return bind(model, scenario_from({**BASE, **told}))
 
 
-def in_python(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> Trace:
-    with monkeypatch.context() as patch:
-        patch.setattr(running, "loop_of", lambda *_: None)
-        return running.run(plan)
+def in_python(plan: Plan) -> Trace:
+    return running.run(plan, compiled=False)
 
 
 @pytest.fixture(scope="module")
@@ -96,21 +101,16 @@ def same(found: Trace, expected: Trace) -> None:
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_the_same_as_in_python(
-    name: str, model: condyle.Model, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_same_as_in_python(name: str, model: condyle.Model) -> None:
     plan = plan_of(CASES[name], model)
-    quick = running.Run(plan).quick()
-    assert quick is not None and (quick.by_itself == ("Python" not in name))
+    assert running.Run(plan).steps is not None
     found = running.run(plan)
-    same(found, in_python(plan, monkeypatch))
+    same(found, in_python(plan))
     if "food" in name:
         assert {"food_touched", "food_broken"} <= {e.kind for e in found.events}
 
 
-def test_open_loop_between_rows(
-    model: condyle.Model, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_open_loop_between_rows(model: condyle.Model, tmp_path: Any) -> None:
     names = ",".join(f"tau_{name}" for name in model.mechanism.chain_names)
     rows = [
         f"{t},{','.join(str(0.01 * (i + 1) * t) for i in range(6))}" for t in (0.02, 0.05, 0.09)
@@ -122,39 +122,37 @@ def test_open_loop_between_rows(
             {**BASE, "duration": 0.1, "efforts": {"file": "efforts.csv"}}, folder=tmp_path
         ),
     )
-    same(running.run(plan), in_python(plan, monkeypatch))
+    same(running.run(plan), in_python(plan))
 
 
-def test_a_table_of_loads(
-    model: condyle.Model, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_table_of_loads(model: condyle.Model, tmp_path: Any) -> None:
     (tmp_path / "load.csv").write_text("t,Fz,Mx\n0.01,0,0\n0.02,-2,0.001\n0.05,-1,0\n")
     load = {"kind": "csv", "file": "load.csv", "point": "incisor"}
     told = {**BASE, "duration": 0.08, "controller": TORQUE, "load": [load]}
     plan = bind(model, scenario_from(told, folder=tmp_path))
-    same(running.run(plan), in_python(plan, monkeypatch))
+    same(running.run(plan), in_python(plan))
 
 
 def test_states_that_a_kernel_does_not_vouch_for_are_pythons(
     model: condyle.Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Where C has to give back every step, the run is Python's."""
+    """Where C has to give back every look and every step, the run is Python's."""
     plan = plan_of({"duration": 0.02, "controller": TORQUE}, model)
-    expected = in_python(plan, monkeypatch)
+    expected = in_python(plan)
     run = running.Run(plan)
-    quick = run.quick()
-    assert quick is not None
+    assert run.steps is not None
     calls = []
 
-    class Doubtful(type(quick)):  # type: ignore[misc]
-        def advance(self) -> int:
-            if self.corner + 1 >= len(plan.corners()):
-                return running.DONE
-            calls.append(self.corner)
-            return running.LOOK if self.at_a_look else running.STEP
+    def doubtful(budget: int) -> int:
+        struct, steps = run.steps.run, run.steps  # type: ignore[union-attr]
+        if struct.corner + 1 >= len(plan.corners()):
+            return running.DONE
+        calls.append(struct.corner)
+        ticks = np.isclose(plan.ticks(), struct.t, atol=1e-9)
+        assert steps is not None
+        return running.LOOK if struct.fresh and ticks.any() else running.STEP
 
-    quick.__class__ = Doubtful
-    monkeypatch.setattr(run, "quick", lambda: quick)
+    monkeypatch.setattr(run.steps, "advance", doubtful)
     same(run.trace(), expected)
     assert len(calls) > 20
 
@@ -165,12 +163,12 @@ def test_what_it_is_not_for(model: condyle.Model) -> None:
         {"controller": {**TORQUE, "ideal": True, "rate": None}},
     ):
         merged = {k: v for k, v in {**BASE, **told}.items() if v is not None}
-        assert running.Run(bind(model, scenario_from(merged))).quick() is None
+        assert running.Run(bind(model, scenario_from(merged))).steps is None
     loads = [lambda t, s, v: (0.0, 0.0, -1.0)]
     plan = bind(model, scenario_from(BASE), loads=loads)
-    assert running.Run(plan).quick() is None
+    assert running.Run(plan).steps is None
     plan = bind(condyle.derive("masticatory", backend="numpy"), scenario_from(BASE))
-    assert running.Run(plan).quick() is None
+    assert running.Run(plan).steps is None
 
 
 def test_side_by_side(model: condyle.Model) -> None:
@@ -184,3 +182,69 @@ def test_side_by_side(model: condyle.Model) -> None:
     told[3]["start"] = {"dZ": 1.0}
     with pytest.raises(condyle.CondyleError, match=r"scenario 4: 1 problem\n.*start: dZ"):
         condyle.simulate_all(model, told)
+
+
+class Damped(ControllerTable):
+    """What the path needs, a damper, and a count of its looks."""
+
+    ports: ClassVar[Mapping[str, str | int]] = {"damping": EACH_COORDINATE}
+    memory: ClassVar[tuple[float, ...]] = (3.0,)
+
+    kind: Literal["damped"]
+    damping: float
+
+    def numbers(self, machine: Machine) -> Mapping[str, Any]:
+        return {"damping": [self.damping] * len(machine.independent)}
+
+    @staticmethod
+    def equations(c: Control) -> tuple[Lanes, ca.SX]:
+        q2 = c.aim.q2 + c.gains.damping * (c.aim.q1 - c.now.q1)
+        return c.inverse(c.now.q, c.now.q1, q2), c.memory + 1
+
+
+class Wind(LoadTable):
+    """A drag."""
+
+    ports: ClassVar[Mapping[str, int]] = {"drag": 1}
+
+    kind: Literal["wind"]
+    drag: float
+
+    @staticmethod
+    def wrench(at: Place) -> ca.SX:
+        return -at.numbers.drag * at.v
+
+
+def test_laws_from_outside_run_in_compiled_code(
+    model: condyle.Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A controller and a load that are registered here, beside functions in Python."""
+    monkeypatch.setitem(CONTROLLERS, "damped", Damped)
+    monkeypatch.setitem(LOADS, "wind", Wind)
+    told = {
+        "duration": 0.05,
+        "start": {"beta": 0.02, "dX": 0.1},
+        "controller": {"kind": "damped", "damping": 40.0, "rate": 1000.0},
+        "load": [{"kind": "wind", "drag": 5.0, "point": "incisor"}],
+    }
+    plan = plan_of(told, model)
+    run = running.Run(plan)
+    assert run.steps is not None and not check_gains(plan).stable  # nothing holds the place
+    found = run.trace()
+    same(found, in_python(plan))
+    assert run.control is not None
+    memory = run.control.looks[:, run.control.columns.result("memory"), 0]
+    np.testing.assert_array_equal(memory[:, 0], 4.0 + np.arange(50))
+
+    def law(now: Any, aim: Any) -> np.ndarray:
+        q2 = aim.q2 + 40.0 * (aim.q1 - now.q1)
+        return model.one(now.q, now.q1, q2, np.zeros(9))
+
+    bare = {name: value for name, value in told.items() if name not in ("controller", "load")}
+    function = bind(
+        model,
+        scenario_from({**BASE, **bare}),
+        controller=law,
+        loads=[(lambda t, s, v: -5.0 * v, "incisor")],
+    )
+    np.testing.assert_allclose(running.run(function).state, found.state, rtol=0, atol=1e-9)

@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 
 import condyle
+from condyle.questions.load.food import APART, BROKEN, TOUCHING
 from condyle.results.model import Model
 from condyle.simulation.bind import bind
-from condyle.simulation.loads.food import APART, BROKEN, TOUCHING, FoodTable
-from condyle.simulation.loads.spring import Spring
-from condyle.simulation.run import Run, run
+from condyle.simulation.control import Controller, Lost
+from condyle.simulation.running import Run, run
 from condyle.simulation.scenario import scenario_from
-from condyle.simulation.sensing import Lost, Observer
 from condyle.status import Status
 
 FALL = {"duration": 0.08, "rate": 500}
@@ -72,29 +71,6 @@ def test_food_breaks_where_its_force_is_reached(jaw: Model) -> None:
     assert 10 < force.max() <= 20
     mode = found["load_mode"].sel(source="food").values
     assert (mode[0], mode[-1]) == (APART, BROKEN) and TOUCHING in mode
-
-
-def test_laws_of_food_and_springs(jaw: Model) -> None:
-    machine = jaw.mechanism
-    food = FoodTable(
-        kind="food",
-        point="incisor",
-        thickness=0.01,
-        stiffness=1e3,
-        damping=10.0,
-        direction=(0, 0, 2),
-    ).bind(machine, "food")
-    still, shut = (0.0, 0.0, 0.0), (0.0, 0.0, -0.004)
-    assert food.law(0, shut, still, TOUCHING) == pytest.approx((0, 0, -6.0))
-    assert food.law(0, shut, (0, 0, 0.1), TOUCHING) == pytest.approx((0, 0, -7.0))
-    assert food.law(0, shut, (0, 0, -0.1), TOUCHING) == pytest.approx((0, 0, -6.0))
-    assert food.law(0, shut, still, BROKEN) == (0, 0, 0) == food.law(0, (0, 0, -0.02), still, 1)
-    assert food.begin(still) == BROKEN and food.begin((0, 0, -0.02)) == APART
-    spring = Spring(
-        kind="spring", point="incisor", direction=(3, 0, 4), stiffness=100.0, damping=1.0, rest=0.01
-    ).bind(machine, "spring")
-    # x = 0.6 * 0.05 - 0.01 = 0.02 m, x' = 0.8 * 0.5 m/s
-    assert spring.law(0, (0.05, 0, 0), (0, 0, 0.5), 0) == pytest.approx((-1.44, 0, -1.92))
 
 
 def test_a_table_of_loads_is_the_load_of_the_inverse(jaw: Model, tmp_path: Path) -> None:
@@ -205,15 +181,15 @@ def test_encoders_that_give_no_pose_end_the_run(
         "sensors": {"encoder_resolution": 1e-5},
     }
     whole = run(bind(jaw, scenario_from(told)))
-    see, looks = Observer.see, []
+    look, looks = Controller.look, []
 
-    def blind(self: Observer, *given: np.ndarray) -> Any:
+    def blind(self: Controller, *given: Any) -> Any:
         looks.append(given)
         if len(looks) > 10:
             raise Lost
-        return see(self, *given)
+        return look(self, *given)
 
-    monkeypatch.setattr(Observer, "see", blind)
+    monkeypatch.setattr(Controller, "look", blind)
     trace = run(bind(jaw, scenario_from(told)))
     assert trace.ended is not None and trace.ended.kind == "lost"
     assert trace.ended.time == pytest.approx(10 / 500) and len(trace.command) == 10

@@ -12,8 +12,9 @@ import condyle
 from condyle.errors import UnsupportedError
 from condyle.results.model import Model
 from condyle.simulation.bind import bind
-from condyle.simulation.gains import Sampled, check_gains, error_bound
-from condyle.simulation.plan import ClosedLoop, Sensing
+from condyle.simulation.gains import Loop, Sampled, check_gains, error_bound
+from condyle.simulation.plan import ClosedLoop
+from condyle.simulation.running import run
 from condyle.simulation.scenario import scenario_from
 
 KP, PERIOD = 400.0, 1e-3
@@ -34,24 +35,34 @@ def test_a_continuous_loop_has_the_roots_of_its_gains(jaw: Model) -> None:
     assert np.isclose(home.damping, 24.0 / 2 / np.sqrt(KP), rtol=1e-4)
 
 
+def sampled(A: np.ndarray, B: np.ndarray, H: Any, T: float, delay: int) -> Sampled:
+    """A loop without memory."""
+    return Sampled(
+        A, B, np.array(H), np.zeros((1, 0)), np.zeros((0, 2)), np.zeros((0, 0)), T, delay
+    )
+
+
 def test_the_margin_of_phase() -> None:
     """L = (Kv s + Kp) / s^2 passes 1 at w with w^4 = Kp^2 + (Kv w)^2; holding takes w T / 2."""
     T, Kv = 1e-4, 24.0
     A, B = np.array([[0.0, 1.0], [0, 0]]), np.array([[0.0], [1]])
-    loop = ClosedLoop(None, None, T, 0, None)  # type: ignore[arg-type]
     w = np.sqrt((Kv**2 + np.sqrt(Kv**4 + 4 * KP**2)) / 2)
     margin = np.degrees(np.arctan(Kv * w / KP) - w * T / 2)
-    assert np.isclose(Sampled(A, B, np.array([[KP, Kv]]), loop, 1).phase(), margin, atol=0.05)
+    assert np.isclose(sampled(A, B, [[-KP, -Kv]], T, 0).phase(), margin, atol=0.05)
 
 
 @pytest.mark.parametrize("smoothing", [None, 0.0, 0.6])
 def test_a_sampled_loop_is_late(jaw: Model, smoothing: float | None) -> None:
     """A double integrator, held and one period late, beside its recursion run step by step."""
     T, Kv = PERIOD, 2 * np.sqrt(KP)
-    sensing = None if smoothing is None else Sensing(np.zeros(1), True, smoothing)
-    loop = ClosedLoop(None, None, T, 1, sensing)  # type: ignore[arg-type]
     A, B = np.array([[0.0, 1.0], [0, 0]]), np.array([[0.0], [1]])
-    z = np.linalg.eigvals(Sampled(A, B, np.array([[KP, Kv]]), loop, 1).closed())
+    loop = sampled(A, B, [[-KP, -Kv]], T, 1)
+    if smoothing is not None:  # memory: x, and the rate as filtered
+        part, kept = (1 - smoothing) / T, smoothing
+        H, E = [[-KP - Kv * part, 0.0]], [[1.0, 0.0], [part, 0.0]]
+        H_m, E_m = [[Kv * part, -Kv * kept]], [[0.0, 0.0], [-part, kept]]
+        loop = Sampled(A, B, *(np.array(a) for a in (H, H_m, E, E_m)), period=T, delay=1)
+    z = np.linalg.eigvals(loop.closed())
     x, v, late, before, rate = 1e-3, 0.0, 0.0, 1e-3, 0.0
     size = []
     for _ in range(4000):
@@ -74,6 +85,54 @@ def test_unstable_drives_are_foretold(jaw: Model, damping: float, stable: bool) 
     assert said.stable == stable and bool(said.warnings) != stable
     error = np.abs(condyle.simulate(jaw, tables, motion=rest)["tracking_error"].values)
     assert (error[-1].max() < 2e-5) == stable
+
+
+FIRM = {"kind": "food", "food": "firm_bolus", "point": "right_molar"}
+
+
+@pytest.mark.parametrize(("delay", "stable"), [(1, True), (5, False)])
+def test_a_bite_that_swings_is_foretold(jaw: Model, delay: int, stable: bool) -> None:
+    """50 N on a firm bolus at 1 kHz: while it bites, late efforts pump it up."""
+    bite = {"kind": "bite_force", "stiffness": 900.0, "force": 50.0, "delay": delay}
+    t = np.linspace(0, 0.5, 51)
+    s = 3 * (t / 0.5) ** 2 - 2 * (t / 0.5) ** 3
+    shut = condyle.Motion.from_arrays(
+        t, {"X": 0 * t, "Y": 0 * t, "alpha": 0 * t, "beta": 0.15 * (1 - s) - 0.02 * s}
+    )
+    tables = {"duration": 0.6, "method": "rk4", "step": 2e-4, "start": {"on_motion": True}}
+    plan = bind(jaw, scenario_from(tables | {"controller": bite, "load": [FIRM]}), motion=shut)
+    said = check_gains(plan)
+    holding = [point for point in said.points if point.holds == "food"]
+    assert holding and all(point.stable == stable for point in holding)
+    assert all(point.stable for point in said.points if point.holds is None)
+    force = run(plan).force[-100:]
+    assert (np.ptp(force) < 5.0) == stable
+
+
+@pytest.mark.parametrize("sensors", [None, {"encoder_resolution": 0.0, "velocity_cutoff": 150.0}])
+def test_the_loop_s_derivatives_are_its_differences(jaw: Model, sensors: Any) -> None:
+    """Plant with loads and tick, exact, beside central differences of the same kernels."""
+    spring = {"kind": "spring", "point": "incisor", "stiffness": 90.0, "damping": 2.0}
+    impedance = {"kind": "impedance", "stiffness": 900.0, "damping": 9.0}
+    told = {"controller": impedance, "load": [spring], "sensors": sensors}
+    plan = bind(jaw, scenario_from({k: v for k, v in told.items() if v is not None}))
+    assert isinstance(plan.drive, ClosedLoop)
+    loop = Loop(plan, plan.drive)
+    loop.at(0.3, plan.drive.path.aims(np.array([0.3]))[0])
+    for exact, columns in ((loop.rate, loop.plant.columns), (loop.tick, loop.control.columns)):
+        found = exact()
+        rows = np.concatenate([columns.rows(name) for name in exact.by])
+        for i, row in enumerate(rows):
+            ends = []
+            for h in (-1e-6, 1e-6):
+                columns.given[row, 0] += h
+                assert columns.run() == 0
+                ends.append({name: columns[name] for name in found})
+                columns.given[row, 0] -= h
+            for name, value in found.items():
+                slope = (ends[1][name] - ends[0][name]) / 2e-6
+                scale = max(np.abs(value).max(), np.abs(ends[0][name]).max())
+                assert np.abs(value[:, i] - slope).max() < 1e-5 * scale, (name, i)
 
 
 def test_no_loop_no_gains(jaw: Model) -> None:

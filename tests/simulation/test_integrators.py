@@ -9,8 +9,7 @@ import pytest
 
 import condyle
 from condyle.results.model import Model
-from condyle.simulation.integrators import Settings
-from condyle.simulation.integrators.rk4 import RK4, hermite
+from condyle.simulation.integrators import RK4, Settings, hermite
 
 START = {"X": 0.001, "beta": 0.04, "dbeta": -0.3, "dalpha": 0.2}
 

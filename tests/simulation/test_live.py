@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.simulation import run as running
+from condyle.simulation import running
 from condyle.simulation.bind import bind
-from condyle.simulation.live import Live
+from condyle.simulation.by_hand import Live
 from condyle.simulation.scenario import scenario_from
 
 BASE = {"duration": 0.1, "method": "rk4", "step": 2e-4}
@@ -22,7 +22,7 @@ SPRING = {"kind": "spring", "point": "incisor", "stiffness": 150.0, "damping": 1
 START = {"beta": 0.15, "dbeta": -2.0}  # closing, off the path: all numbers matter
 CASES: dict[str, dict[str, Any]] = {
     "in C": {"controller": TORQUE, "start": START, "load": [FOOD, SPRING]},
-    "a law that Python has": {"controller": BITE, "start": START, "load": [FOOD]},
+    "a bite": {"controller": BITE, "start": START, "load": [FOOD]},
     "servo drives": {
         "controller": {"kind": "joint_pd", "stiffness": 2.0, "damping": 0.02, "rate": 500.0},
         "start": START,
@@ -60,7 +60,7 @@ def test_bit_by_bit_is_the_whole_run(
     with monkeypatch.context() as patch:
         for means in ("c", "python"):
             if means == "python":
-                patch.setattr(running, "loop_of", lambda *_: None)
+                patch.setattr(running, "steps_of", lambda *_: None)
             found = live(CASES[name], jaw)
             for t in np.arange(0.0, 0.11, 0.0073):
                 found.go_to(t)

@@ -12,9 +12,9 @@ from condyle.errors import InputError, ScenarioError
 from condyle.results.model import Model
 from condyle.simulation import FOODS, load_scenario, scenario_schema
 from condyle.simulation.bind import bind
-from condyle.simulation.plausibility import odd_things
+from condyle.simulation.first_scenario import STARTER, default_scenario
 from condyle.simulation.scenario import scenario_from
-from condyle.simulation.starter import STARTER, default_scenario
+from condyle.simulation.slips import odd_things
 
 PD = {"kind": "joint_pd", "stiffness": 1.0, "damping": 0.1}
 FOOD = {"kind": "food", "food": "carrot", "point": "right_molar"}

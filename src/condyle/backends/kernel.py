@@ -32,6 +32,7 @@ class Kernel(Protocol):
 
     name: str
     interface: Interface
+    order: tuple[int, ...]  # where each lane stands among the callers'
 
     def renumbered(self, numbers: Numbers) -> Kernel:
         """The same kernel on the numbers of another mechanism of its structure."""

@@ -27,14 +27,14 @@ class NumpyKernel:
 
     def __init__(self, variants: Variants, numbers: Numbers) -> None:
         self.interface = variants.main.interface
-        self._order = numbers.order
+        self.order = numbers.order
         self._main = _Runner(variants.main, numbers)
         self._robust = None if variants.robust is None else _Runner(variants.robust, numbers)
 
     def renumbered(self, numbers: Numbers) -> NumpyKernel:
         """The same program on the numbers of another mechanism of its structure."""
         other = copy(self)
-        other._order = numbers.order
+        other.order = numbers.order
         other._main = self._main.renumbered(numbers)
         other._robust = None if self._robust is None else self._robust.renumbered(numbers)
         return other
@@ -42,7 +42,7 @@ class NumpyKernel:
     def run(self, inputs: Mapping[str, np.ndarray], threads: int | None = None) -> Answer:
         workers(threads)
         face = self.interface
-        count, columns = columns_of(face, inputs, self._order)
+        count, columns = columns_of(face, inputs, self.order)
         blocks = [np.empty((face.width(r), count)) for r in face.results]
         status = np.empty(count, dtype=np.uint8)
         with np.errstate(all="ignore"):
@@ -57,7 +57,7 @@ class NumpyKernel:
                     for block, better in zip(blocks, few, strict=True):
                         block[:, again] = better
         values = {
-            r.name: arranged(face, r, block, self._order)
+            r.name: arranged(face, r, block, self.order)
             for r, block in zip(face.results, blocks, strict=True)
         }
         return Answer(values, status)

@@ -46,9 +46,9 @@ def simulate(
     from ..results.summary import summarize
     from ..simulation import simulate as run
     from ..simulation.bind import bind
+    from ..simulation.first_scenario import default_scenario
     from ..simulation.gains import check_gains as check
     from ..simulation.simulating import as_scenario
-    from ..simulation.starter import default_scenario
 
     machine = condyle.load(mechanism)
     told = default_scenario() if scenario is None else as_scenario(scenario)
@@ -86,7 +86,7 @@ def simulate(
 def _new(path: Path, mechanism: str) -> Answer:
     from ..atomic import write_text
     from ..errors import InputError
-    from ..simulation.starter import STARTER
+    from ..simulation.first_scenario import STARTER
 
     if path.exists():
         raise InputError(f"{path} exists already; choose another name")

@@ -15,6 +15,7 @@ from ..model.distributing import LEAST
 from ..questions import Prescribed
 from ..questions.allocation import TERMS
 from ..questions.law import CONTROLLERS, ControllerTable
+from ..questions.law.computed_torque import ComputedTorque
 from ..questions.observer import ITERATIONS as OBSERVER_STEPS
 from .c_context import Context
 
@@ -163,7 +164,7 @@ CATALOGUE: dict[str, Entry] = {
         f"q_d q1_d q2_d q q1 stiffness>kp damping>kd {BORNE}",
         "asked>effort",
         question="tick",
-        details=lambda wish: ("computed_torque", (), None, False, True),
+        details=lambda wish: (ComputedTorque, (), None, False, True),
         rubbing="UNCERTIFIED",
         quick=True,
     ),
@@ -199,7 +200,7 @@ def _law(kind: str, table: type[ControllerTable]) -> Entry:
         "least norm; of efforts, what is beyond the actuators' limits is cut off.",
         results="effort memory",
         question="tick",
-        details=lambda wish: (kind, choices),
+        details=lambda wish: (table, choices),
         rubbing="UNCERTIFIED",
         limited=True,
         told={

@@ -100,12 +100,20 @@ class Question:
         """A text of everything that shapes the answer's graph."""
         s = self.structure
         told = replace(s, zeros=frozenset()), sorted(s.zeros)
-        return repr((self.name, told, self.details, _casadi(), _sources()))
+        known = repr((self.name, told, self.details, _casadi(), _sources()))
+        return known + (self.variants().digest if _foreign(self.details) else "")
 
     def variants(self) -> Variants:
         """The graph."""
         found = QUESTIONS[self.name](self.structure, *self.details)
         return found if isinstance(found, Variants) else Variants(found)
+
+
+def _foreign(details: Any) -> bool:
+    """Whether a law or a load from outside is among them, whose code is not in the rooms."""
+    if isinstance(details, tuple):
+        return any(map(_foreign, details))
+    return isinstance(details, type) and not details.__module__.startswith(f"{__package__}.")
 
 
 @lru_cache(maxsize=1)

@@ -21,8 +21,7 @@ from .configuration import loops_of
 from .equations import Wrench, total
 from .forward import accelerated
 from .instant import losses
-from .load import LOADS
-from .load.acting import Place
+from .load.acting import LoadTable, Place
 from .numbers import single_contacts
 from .platform import ANGLE_UNITS, Platform, closed, contacts
 from .structure import Structure
@@ -32,7 +31,7 @@ NEVER = -1.0  # a guard of a mode that is not on
 
 def rate(
     structure: Structure,
-    loads: Sequence[str] = (),
+    loads: Sequence[type[LoadTable]] = (),
     felt: Sequence[int] = (),
     bounded: Sequence[int] = (),
     sided: Sequence[int] = (),
@@ -45,7 +44,7 @@ def rate(
     Results: rate (2 m + 4,); guards: of bounded contacts, of one-sided ones, of the loads' jumps;
     too_fast, a lane's. wrench (6,) of all loads about O_M, load_force (loads, 3); felt (3,).
 
-    Args: loads: kinds;  felt: loads whose force `felt` is the sum of.
+    Args: loads: their laws;  felt: loads whose force `felt` is the sum of.
           bounded, sided: contacts whose bounds and pushes are guarded.
     """
     b = Builder(structure)
@@ -56,7 +55,7 @@ def rate(
     )
     effort = [ca.fmin(ca.fmax(e, lo), hi) for e, lo, hi in zip(asked, low, high, strict=True)]
     twist = platform.motion.twist
-    acting = [_Acting(b, platform, i, kind) for i, kind in enumerate(loads)]
+    acting = [_Acting(b, platform, i, law) for i, law in enumerate(loads)]
     wrench = total([ca.SX.zeros(6), *(one.wrench for one in acting)])
     zero = ca.SX.zeros(3)
     moved = accelerated(b, platform, Wrench(wrench[:3], wrench[3:], zero), effort)
@@ -98,8 +97,8 @@ def rate(
 class _Acting:
     """A load at its place: force at the point, wrench about O_M, guards."""
 
-    def __init__(self, b: Builder, platform: Platform, i: int, kind: str) -> None:
-        law, own = LOADS[kind], f"load_{i}_"
+    def __init__(self, b: Builder, platform: Platform, i: int, law: type[LoadTable]) -> None:
+        own = f"load_{i}_"
         point, mode = b.sample(f"{own}point", 3, "m"), b.sample(f"{own}mode", 1)
         numbers = SimpleNamespace(
             **{name: b.sample(own + name, size) for name, size in law.ports.items()}

@@ -18,20 +18,18 @@ from ..graph.program import Program, Variants
 from .builder import Builder, Lanes
 from .equations import Wrench
 from .inverse import HUGE, efforts, in_variants
-from .law import CONTROLLERS
 from .law.controller import Aim, Control, ControllerTable, Seen, gains_of
 from .observer import BEFORE, Observed, observe
 from .platform import placed
 from .structure import Structure
 
-FUNCTION = "function"  # a law whose efforts are given
 REQUEST = "request"  # results of ticks whose efforts are: what they have to balance
 AIMS = ("q_d", "q1_d", "q2_d", "joint_d", "joint_rate_d", "force_d")
 
 
 def tick(
     structure: Structure,
-    law: str,
+    law: type[ControllerTable] | None,
     choices: Sequence[tuple[str, Any]] = (),
     velocity: str | None = None,
     apart: bool = False,
@@ -41,29 +39,27 @@ def tick(
 
     Ports: q, q1, joint, joint_rate: as they are, or joints alone where there are sensors;
     aims `AIMS`; force at the law's point, (3,); its gains; low, high: limits, a lane's.
-    Results: effort; asked, without limits; q, q1, joint, joint_rate: what the law saw; memory.
+    Results: effort; asked, without limits; q, q1, joint, joint_rate, felt: what it saw; memory.
 
-    Args: law: its kind;  choices: entries of its table, by name.
+    Args: law: whose equations, None where efforts are `given`;  choices: entries of its table.
           velocity: how the `observer` comes to rates, None without sensors.
           apart: efforts of the inverse dynamics are a port, `given`; `REQUEST`: q, q', q'' and
           force and point of the load that they are to balance, (3 m + 6,).
           borne: efforts bear a known load besides, ports borne_force, borne_moment, borne_point.
     """
     write = partial(_program, structure, law, choices, velocity, apart, borne)
-    if apart or law == FUNCTION:
-        return Variants(write(False, False), single=True)
-    return in_variants(structure, write)
+    return in_variants(structure, write) if borne else Variants(write(True, False), single=True)
 
 
-def carried(results: Collection[str]) -> dict[str, str]:
-    """Which results of a tick are which ports of the next, of those that there are."""
+def carried(ports: Collection[str]) -> dict[str, str]:
+    """Which ports of the next tick take which results, of those ports that there are."""
     pairs = {"memory_before": "memory", **BEFORE}
-    return {port: result for port, result in pairs.items() if result in results}
+    return {port: result for port, result in pairs.items() if port in ports}
 
 
 def _program(
     structure: Structure,
-    law: str,
+    law: type[ControllerTable] | None,
     choices: Sequence[tuple[str, Any]],
     velocity: str | None,
     apart: bool,
@@ -97,22 +93,21 @@ def _program(
         return efforts(b, platform, load, robust, low_latency)
 
     now = Seen(seen.q, seen.q1, seen.joint, seen.joint_rate, force)
-    if law == FUNCTION:
+    if law is None:
         asked, memory = b.lane_sample("given", unit="N m or N"), ca.SX(0, 1)
     else:
-        table: Any = CONTROLLERS[law]
-        assert issubclass(table, ControllerTable)
-        before = b.sample("memory_before", len(table.memory)) if table.memory else ca.SX(0, 1)
-        control = Control(
-            b, now, aim, gains_of(b, table.ports), dict(choices), before, period, solve
+        before = b.sample("memory_before", len(law.memory)) if law.memory else ca.SX(0, 1)
+        gains = gains_of(b, law.ports)
+        asked, memory = law.equations(
+            Control(b, now, aim, gains, dict(choices), before, period, solve)
         )
-        asked, memory = table.equations(control)
     low, high = (b.lane_sample(name, unit="N m or N") for name in ("low", "high"))
     limited = [ca.fmin(ca.fmax(e, lo), hi) for e, lo, hi in zip(asked, low, high, strict=True)]
     b.output("effort", limited, "N m or N")
     b.output("asked", asked, "N m or N")
     b.output("q", now.q, "m, rad", m)
     b.output("q1", now.q1, "per s", m)
+    b.output("felt", force, "N", 3)
     if velocity is None:
         b.output("joint", now.joint, "rad or m")
         b.output("joint_rate", now.joint_rate, "rad/s or m/s")

@@ -1,9 +1,9 @@
 """Forward in time: integrators, events, loads that answer, controllers, sensors."""
 
-from .controllers import CONTROLLERS
+from ..questions.law import CONTROLLERS
+from ..questions.load import FOODS, LOADS
 from .events import Event
 from .integrators import INTEGRATORS
-from .loads import FOODS, LOADS
 from .scenario import Scenario, load_scenario, scenario_schema
 from .simulating import simulate, simulate_all
 

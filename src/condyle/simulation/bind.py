@@ -13,13 +13,16 @@ from ..mechanism import load as load_mechanism
 from ..mechanism.chain import limits
 from ..mechanism.home import characteristic_length
 from ..model.evaluator import Evaluator
-from ..motion import Motion, read_table
-from .controllers import FunctionLaw, Law
+from ..motion import Load as LoadTable
+from ..motion import Motion, read_table, resolve_load_point
+from ..questions.entries import Machine
+from ..questions.law import Law
+from ..questions.load import Load
+from ..questions.load.acting import WRENCH
+from ..questions.load.given import Constant
+from .aims import default_motion, path_of
 from .integrators import Settings
-from .loads import BoundFunction, BoundLoad
 from .plan import WORKS, ClosedLoop, OpenLoop, Plan, Sensing
-from .point import Instant
-from .reference import default_motion, path_of
 from .scenario import Scenario
 
 ABSOLUTE = 1e-3  # of the mechanism's size, radians or joules: what rtol is of, at the least
@@ -45,7 +48,7 @@ def bind(
     """
     problems = _Problems()
     with problems:
-        bound = _loads(model, scenario, loads)
+        bound, functions = _loads(model, scenario, loads)
     with problems:
         drive = _drive(model, scenario, controller, motion)
     start = None
@@ -75,6 +78,7 @@ def bind(
         scenario.method,
         Settings(scenario.rtol, atol, scenario.step),
         stop_at_bounds,
+        functions,
     )
 
 
@@ -103,13 +107,27 @@ def _times(scenario: Scenario) -> np.ndarray:
     return times
 
 
+def machine_of(model: Evaluator) -> Machine:
+    """What tables of a scenario are bound to."""
+    points = model.mechanism.platform.points
+
+    def tabled(file: str) -> tuple[np.ndarray, np.ndarray]:
+        load = LoadTable.from_csv(file)
+        return load.t, load.wrench
+
+    return Machine(
+        model.mechanism, model.independent, lambda name: resolve_load_point(name, points), tabled
+    )
+
+
 def _loads(
     model: Evaluator, scenario: Scenario, functions: Sequence[LoadFunction]
-) -> tuple[BoundLoad, ...]:
+) -> tuple[tuple[Load, ...], dict[int, LoadFunction]]:
+    """Loads, and which of them are functions in Python."""
     names = _names([load.name or load.kind for load in scenario.loads])
-    found = [
-        load.bind(model.mechanism, name) for load, name in zip(scenario.loads, names, strict=True)
-    ]
+    machine = machine_of(model)
+    found = [load.bind(machine, name) for load, name in zip(scenario.loads, names, strict=True)]
+    by_function = {}
     for i, given in enumerate(functions):
         function, point = given if isinstance(given, tuple) else (given, None)
         if not callable(function):
@@ -118,8 +136,10 @@ def _loads(
                 f"{type(function).__name__}"
             )
         at = np.zeros(3) if point is None else model.load_point(point)
-        found.append(BoundFunction(f"function_{i + 1}", at, point, function))
-    return tuple(found)
+        by_function[len(found)] = function
+        none, name = {WRENCH: np.zeros(6)}, f"function_{i + 1}"
+        found.append(Load(Constant, name, at, point, none))
+    return tuple(found), by_function
 
 
 def _names(wanted: Sequence[str]) -> list[str]:
@@ -143,9 +163,9 @@ def _drive(
     if scenario.closed_loop:
         return _closed(model, scenario, function, motion)
     if function is not None:
-        law = FunctionLaw(model, function)
         path = path_of(model, motion or default_motion(model), None, None)
-        return ClosedLoop(law, path, PERIOD, 0, _sensing(model, scenario, PERIOD))
+        sensing = _sensing(model, scenario, PERIOD)
+        return ClosedLoop(model, Law(None), path, PERIOD, 0, sensing, function)
     n = len(model.mechanism.chains)
     if scenario.efforts is None:
         return OpenLoop(np.zeros(1), np.zeros((1, n)))
@@ -183,7 +203,7 @@ def _closed(
             table.distribution,
             table.preload,
         )
-    law: Law = table.bind(own) if function is None else FunctionLaw(own, function)
+    law = table.bind(machine_of(own)) if function is None else Law(None)
     path = path_of(
         own,
         motion or _motion(table, own),
@@ -191,9 +211,10 @@ def _closed(
         getattr(table, "force_file", None),
     )
     if table.ideal:
-        return ClosedLoop(law, path, None, 0, None)
+        return ClosedLoop(own, law, path, None, function=function)
     period = 1.0 / table.rate
-    return ClosedLoop(law, path, period, table.delay, _sensing(own, scenario, period))
+    sensing = _sensing(own, scenario, period)
+    return ClosedLoop(own, law, path, period, table.delay, sensing, function)
 
 
 def _chooses(table: Any) -> bool:
@@ -229,7 +250,7 @@ def _sensing(model: Evaluator, scenario: Scenario, period: float) -> Sensing | N
     resolution = np.full(len(model.mechanism.chains), sensors.encoder_resolution)
     cutoff = sensors.velocity_cutoff
     smoothing = 0.0 if cutoff is None else float(np.exp(-2 * np.pi * cutoff * period))
-    return Sensing(resolution, sensors.velocity == "difference", smoothing)
+    return Sensing(resolution, sensors.velocity, smoothing)
 
 
 def _start(
@@ -250,8 +271,7 @@ def _start(
         if not isinstance(drive, ClosedLoop):
             return None
         q, q1 = (a[0] for a in drive.path.states(np.zeros(1))[:2])
-    at = Instant(model)
-    if at(q, q1):
+    if model.kernel("instant").run({"q": q[None], "q1": q1[None]}).status[0]:
         raise InputError(f"start: the pose cannot be reached: {_said(names, q)}")
     return q, q1
 
@@ -260,8 +280,7 @@ def _said(names: Iterable[str], values: Iterable[float]) -> str:
     return ", ".join(f"{n} = {v:g}" for n, v in zip(names, values, strict=True))
 
 
-def _moved(model: Evaluator, q: np.ndarray, load: BoundLoad) -> list[float]:
+def _moved(model: Evaluator, q: np.ndarray, load: Load) -> np.ndarray:
     """How far the load's point is from home at q, (3,) [m]."""
-    at = Instant(model)
-    at(q, np.zeros_like(q))
-    return (at.position(load.point) - load.point).tolist()
+    at = model.kernel("instant").run({"q": q[None], "q1": np.zeros((1, len(q)))}).values
+    return at["pose"][:3, 0] + at["R"][..., 0] @ load.point - load.point

@@ -1,11 +1,16 @@
 """Is the loop stable, and by how much? Eigenvalues of the loop linearised about points of its path.
 
-The mechanism is x' = A x + B u there, by exact derivatives (`Evaluator.linearised`); the law is
-u = -K x by differences. Sampled with a period T, held, and d periods late,
+The plant, with its loads as they are there, is x' = A x + B u, and a tick of the controller, with
+encoders, filter and integrator,
 
-    x+ = Phi x + Gamma u_-d,    Phi = exp(A T),    Gamma = int exp(A s) ds B,
+    u = H x + H_m w,    w+ = E x + E_m w,    w: its memory,
 
-with encoders' rates v+ = smoothing v + (1 - smoothing) (q - q_before) / T in the loop. It is stable
+both by exact derivatives of the questions `rate` and `tick`. Sampled with a period T, held, and d
+periods late,
+
+    x+ = Phi x + Gamma u_-d,    Phi = exp(A T),    Gamma = int exp(A s) ds B.
+
+A law that holds a force is looked at while it does, on each load that can bear one. It is stable
 where all eigenvalues z lie within the unit circle; s = log(z) / T are those of a continuous loop,
 of damping -Re s / |s|. The margin of phase is how much all efforts may lag together: the smallest
 angle between -1 and an eigenvalue of the open loop L(exp(i w T)) of modulus 1 (generalised Nyquist;
@@ -14,22 +19,33 @@ Skogestad and Postlethwaite, Multivariable Feedback Control, 2005, section 4.9).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from ..backends.numpy_kernel import NumpyKernel
 from ..errors import UnsupportedError
-from .controllers import Law, Measured, Reference
+from ..graph.program import Variants
+from ..mechanism.home import characteristic_length
+from ..model.evaluator import Evaluator
+from ..questions import QUESTIONS
+from ..questions.derivative import PREFIX, derivative
+from ..questions.numbers import Layout, specialised
+from ..questions.structure import structure_of
+from .columns import Columns
+from .control import Controller
+from .integrators import Stuck
 from .plan import ClosedLoop, Plan
-from .point import Instant
+from .plant import Plant
 
 POINTS = 11  # along the path, home besides
-DIFFERENCE = 1e-6  # of q and q', relative to 1 [m, rad; per s]
 FREQUENCIES = 400
 WEAK = 0.2  # damping, and
 SMALL = 30.0  # degrees of phase, below which a loop is called lively
+SHORT = 1e-3  # of the mechanism's size, first step of a search
 FAST = 1e-3  # of the unit circle: eigenvalues within it are gone after a period
 
 
@@ -37,7 +53,8 @@ FAST = 1e-3  # of the unit circle: eigenvalues within it are gone after a period
 class Point:
     """The loop at a point of the path.
 
-    time:  [s], None at home.   eigenvalues: s [1/s], complex.
+    time:  [s], None at home.   holds: name of the load that it holds a force on, or None.
+    eigenvalues: s [1/s], complex.
     radius: largest |z|, or 1 + largest Re s of a continuous loop [1/s].
     damping: least of all eigenvalues that last.   phase: margin [degrees]; inf if L is below 1.
     """
@@ -47,13 +64,16 @@ class Point:
     radius: float
     damping: float
     phase: float
+    holds: str | None = None
 
     @property
     def stable(self) -> bool:
+        """Whether what is off dies away."""
         return self.radius < 1.0
 
     def __str__(self) -> str:
         where = "home" if self.time is None else f"t = {self.time:.3g} s"
+        where += "" if self.holds is None else f", on {self.holds}"
         slow = min(abs(self.eigenvalues.real), default=0.0)
         verdict = "stable" if self.stable else "UNSTABLE"
         return (
@@ -105,6 +125,7 @@ class GainReport:
                 "radius": p.radius,
                 "damping": p.damping,
                 "phase_margin": p.phase,
+                "holds": p.holds,
                 "eigenvalues": [[float(s.real), float(s.imag)] for s in p.eigenvalues],
             }
             for p in self.points
@@ -116,110 +137,228 @@ class GainReport:
 
 
 def check_gains(plan: Plan) -> GainReport:
-    """The loop of a plan, linearised about home and points of its path, without loads.
+    """The loop of a plan, linearised about home and points of its path.
 
-    Raises: UnsupportedError: in open loop.
+    Raises: UnsupportedError: in open loop, or for a law that is a function in Python.
     """
     drive = plan.drive
     if not isinstance(drive, ClosedLoop):
         raise UnsupportedError("there is no loop to check: the scenario has no controller")
-    still = np.zeros_like(plan.q)
-    home = drive.path.references(np.zeros(1))[0]
-    at = Instant(drive.law.model)
-    at(still, still)
-    rest = np.zeros(len(plan.low))
-    home = Reference(still, still, still, at["joint"].copy(), rest, home.force)
+    if drive.function is not None:
+        raise UnsupportedError("a controller that is a function in Python has no derivatives")
+    loop = Loop(plan, drive)
     end = min(plan.duration, float(drive.path.times[-1]))
     times = np.linspace(0.0, end, POINTS)
-    places = [(None, home), *zip(times.tolist(), drive.path.references(times), strict=True)]
-    found = tuple(_point(plan, drive, time, aim) for time, aim in places)
-    return GainReport(found, drive.period, drive.delay)
+    home = drive.path.aims(np.zeros(1))
+    m = len(plan.q)
+    home[0, : 3 * m] = 0.0
+    at = drive.model.kernel("instant").run({"q": home[:, :m], "q1": home[:, :m]}).values
+    home[0, 3 * m : -1] = np.concatenate([at["joint"][:, 0], at["joint_rate"][:, 0]])
+    aims = [*home, *drive.path.aims(times)]
+    found = []
+    for time, aim in zip([None, *times.tolist()], aims, strict=True):
+        found += [loop.at(time, aim), *loop.holding(time, aim)]
+    return GainReport(tuple(found), drive.period, drive.delay)
 
 
-def _point(plan: Plan, drive: ClosedLoop, time: float | None, aim: Reference) -> Point:
-    model, m = plan.model, len(plan.q)
-    on_path = Measured(0.0, aim.q, aim.q1, aim.joint, aim.joint_rate, np.zeros(3))
-    effort, _ = drive.law(on_path, aim, drive.law.begin())
-    rows = (a[None] for a in (aim.q, aim.q1, effort, np.zeros(9)))
-    A, B = (a[0] for a in model.linearised(*rows))
-    K = _law(drive.law, aim)
-    if drive.period is None:
-        s = np.linalg.eigvals(A - B @ K)
-        worst = 1.0 + float(s.real.max())
-        return Point(time, s, worst, _damping(s), _phase_continuous(A, B, K))
-    step = Sampled(A, B, K, drive, m)
-    z = np.linalg.eigvals(step.closed())
-    lasting = z[np.abs(z) > FAST]
-    s = np.log(lasting.astype(complex)) / drive.period
-    return Point(time, s, float(np.abs(z).max()), _damping(s), step.phase())
+class Loop:
+    """Plant and controller of a plan, and their derivatives `rate` and `tick` where they stand."""
+
+    def __init__(self, plan: Plan, drive: ClosedLoop) -> None:
+        # A law does not know of limits: neither does this.
+        wide = np.full(len(plan.low), np.inf)
+        plan = replace(plan, low=-wide, high=wide)
+        exact = None if drive.sensing is None else replace(
+            drive.sensing, resolution=0.0 * drive.sensing.resolution
+        )  # fmt: skip
+        plan = replace(plan, drive=(drive := replace(drive, sensing=exact)))
+        self._plan, self._drive, self._m = plan, drive, len(plan.q)
+        self.plant, self.control = Plant(plan), Controller(plan)
+        self.control.fill(plan)
+        self.rate = Derivative(
+            plan.model, "rate", self.plant.details, self.plant.columns,
+            ("q", "q1", "effort"), ("rate", "joint", "joint_rate", "felt", "load_place"),
+        )  # fmt: skip
+        self._ports = [p for p in self.control.columns.kernel.interface.ports if p.name in MEASURED]
+        self._before = self.control.carry
+        self.tick = Derivative(
+            drive.model, "tick", self.control.details, self.control.columns,
+            [*(p.name for p in self._ports), *self._before], ("asked", *self._before.values()),
+        )  # fmt: skip
+
+    def at(
+        self,
+        time: float | None,
+        aim: np.ndarray,
+        q: np.ndarray | None = None,
+        load: int | None = None,
+    ) -> Point:
+        """Linearised about a reference, or about q while load `load` is held."""
+        plan, m, drive = self._plan, self._m, self._drive
+        y = np.zeros(plan.size)
+        y[: 2 * m] = aim[: 2 * m]
+        modes = self._modes(y)
+        memory = drive.law.memory
+        if q is not None and load is not None:
+            y[:m], y[m : 2 * m] = q, 0.0
+            modes[load] = plan.loads[load].law.bears or 0
+            memory = np.array(drive.law.table.holding)  # type: ignore[union-attr]
+        self.plant.set_modes(modes)
+        self.plant.look(time or 0.0, y)
+        effort = self.control.steadily(aim, memory, y, self.plant)
+        self.plant.columns.give("effort", effort)
+        rate, tick = self.rate(), self.tick()
+        A, B = rate["rate"][: 2 * m, : 2 * m], rate["rate"][: 2 * m, 2 * m :]
+        # What is measured, by x.
+        C = {"q": np.eye(2 * m)[:m], "q1": np.eye(2 * m)[m:]}
+        C |= {name: rate[name][:, : 2 * m] for name in ("joint", "joint_rate")}
+        C["force"] = rate["felt"][:, : 2 * m] if "felt" in rate else np.zeros((3, 2 * m))
+        by_x = np.vstack([C[port.name] for port in self._ports])
+        results = np.vstack([tick["asked"], *(tick[name] for name in self._before.values())])
+        n, seen = len(plan.low), len(by_x)
+        H, E = results[:n, :seen] @ by_x, results[n:, :seen] @ by_x
+        step = Sampled(
+            A, B, H, results[:n, seen:], E, results[n:, seen:], drive.period, drive.delay
+        )
+        holds = None if load is None else plan.loads[load].name
+        if drive.period is None:
+            s = np.linalg.eigvals(A + B @ H)
+            worst = 1.0 + float(s.real.max())
+            return Point(time, s, worst, _damping(s), _phase_continuous(A, B, -H), holds)
+        z = np.linalg.eigvals(step.closed())
+        lasting = z[np.abs(z) > FAST]
+        s = np.log(lasting.astype(complex)) / drive.period
+        return Point(time, s, float(np.abs(z).max()), _damping(s), step.phase(), holds)
+
+    def _modes(self, y: np.ndarray) -> list[int]:
+        """Of the loads, where they have not been touched."""
+        if not self._plan.loads:
+            return []
+        self.plant.set_modes([0] * len(self._plan.loads))
+        self.plant.look(0.0, y)
+        places = self.plant["load_place"].reshape(-1, 6)
+        return [load.begin(at[:3]) for load, at in zip(self._plan.loads, places, strict=True)]
+
+    def holding(self, time: float | None, aim: np.ndarray) -> Iterator[Point]:
+        """The same while the law holds its force on each load that bears it, where it can."""
+        law, m = self._drive.law, self._m
+        holding = None if law.table is None else law.table.holding
+        if holding is None or not aim[-1] > 0:
+            return
+        for i, load in enumerate(self._plan.loads):
+            if load.place != law.place or load.law.bears is None:
+                continue
+            q = self._pressed(i, aim[:m], float(aim[-1]), law.numbers["direction"])
+            if q is None:
+                continue
+            point = self.at(time, aim, q, i)
+            if self.control.columns["memory"][0] == holding[0]:  # it goes on holding
+                yield point
+
+    def _pressed(
+        self, load: int, q: np.ndarray, force: float, direction: np.ndarray
+    ) -> np.ndarray | None:
+        """Coordinates along the bite from q where a load bears a force [N], if there are any."""
+        from scipy.optimize import brentq
+
+        plan, plant, m = self._plan, self.plant, self._m
+        y = np.zeros(plan.size)
+        modes = [0] * len(plan.loads)
+        modes[load] = plan.loads[load].law.bears or 0
+
+        def beyond(way: float) -> float:
+            y[:m] = q + way * along
+            plant.look(0.0, y)
+            return float(-direction @ plant["load_force"].reshape(-1, 3)[load]) - force
+
+        plant.set_modes(modes)
+        y[:m] = q
+        try:
+            plant.look(0.0, y)
+            row = direction @ self.rate()["load_place"].reshape(len(modes), 6, -1)[load, :3, :m]
+            along = row / (row @ row)
+            size = characteristic_length(plan.model.mechanism)
+            ends = [SHORT * size, SHORT * size]
+            for i, sign in enumerate((1, -1)):
+                while sign * beyond(sign * ends[i]) < 0 and ends[i] < size:
+                    ends[i] *= 2
+            return q + brentq(beyond, -ends[1], ends[0]) * along
+        except (Stuck, ValueError):  # out of reach, or too soft for it
+            return None
 
 
-def _law(law: Law, aim: Reference) -> np.ndarray:
-    """K of effort = -K (dq, dq'), (n, 2 m), by central differences at the reference."""
-    at, m = Instant(law.model), len(aim.q)
-    columns = []
-    for i in range(2 * m):
-        pair = []
-        for sign in (1, -1):
-            x = np.concatenate([aim.q, aim.q1])
-            x[i] += sign * DIFFERENCE
-            q, q1 = x[:m], x[m:]
-            at(q, q1)
-            now = Measured(0.0, q, q1, at["joint"].copy(), at["joint_rate"].copy(), np.zeros(3))
-            pair.append(law(now, aim, law.begin())[0])
-        columns.append(-(pair[0] - pair[1]) / (2 * DIFFERENCE))
-    return np.column_stack(columns)
+MEASURED = ("q", "q1", "joint", "joint_rate", "force")  # ports of a tick
+
+
+class Derivative:
+    """Exact derivatives of a question, where the rows of its kernel stand."""
+
+    def __init__(
+        self,
+        model: Evaluator,
+        question: str,
+        details: Sequence[Any],
+        columns: Columns,
+        by: Sequence[str],
+        of: Sequence[str],
+    ) -> None:
+        """Args: columns: what its ports are given;  by: ports;  of: results."""
+        structure = structure_of(model.mechanism, model.formulation, model.route)
+        numbers = Layout.of(structure).numbers(model.mechanism)
+        structure = specialised(structure, numbers)
+        program = derivative(QUESTIONS[question](structure, *details), by, of)
+        self._kernel, self._columns, self.by = NumpyKernel(Variants(program), numbers), columns, by
+
+    def __call__(self) -> dict[str, np.ndarray]:
+        """By name: (numbers of the result, those of all ports), chains in the callers' order."""
+        columns, sizes = self._columns, [len(self._columns.rows(name)) for name in self.by]
+        size, start, ports = sum(sizes), 0, {}
+        for name, own in zip(self.by, sizes, strict=True):
+            ports[PREFIX + name] = np.eye(size)[:, start : start + own]
+            start += own
+        for port in self._kernel.interface.ports:
+            if port.name not in ports:
+                ports[port.name] = np.tile(columns.given[columns.rows(port.name), 0], (size, 1))
+        values = self._kernel.run(ports).values
+        return {name.removeprefix(PREFIX): a.reshape(-1, size) for name, a in values.items()}
 
 
 @dataclass(frozen=True)
 class Sampled:
-    """The sampled loop of x' = A x + B u, u = -K x.
+    """The sampled loop of x' = A x + B u, u = H x + H_m w, w+ = E x + E_m w, d periods late.
 
-    Its state: x, the last q and rate that the controller saw, and efforts that are on their way.
+    Its state: x, the controller's memory w, and efforts that are on their way.
     """
 
     A: np.ndarray
     B: np.ndarray
-    K: np.ndarray
-    drive: ClosedLoop
-    m: int
+    H: np.ndarray
+    H_m: np.ndarray
+    E: np.ndarray
+    E_m: np.ndarray
+    period: float | None
+    delay: int
 
     def open(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """F, G, C of state+ = F state + G u, and of what the law asks for, u = -C state."""
         from scipy.linalg import expm
 
-        m, (states, n), d = self.m, self.B.shape, self.drive.delay
-        T = self.drive.period
+        (states, n), w, d, T = self.B.shape, self.H_m.shape[1], self.delay, self.period
+        assert T is not None
         block = np.zeros((states + n, states + n))
         block[:states, :states], block[:states, states:] = self.A, self.B
         whole = expm(block * T)
-        Phi, Gamma = whole[:states, :states], whole[:states, states:]
-        sensing = self.drive.sensing
-        seen = 2 * m if sensing is not None and sensing.difference else 0
-        size = states + seen + d * n
+        seen = states + w
+        size = seen + d * n
         F, G, C = np.zeros((size, size)), np.zeros((size, n)), np.zeros((n, size))
-        F[:states, :states] = Phi
-        C[:, :m] = self.K[:, :m]
-        if seen:
-            assert sensing is not None and T is not None
-            part = (1 - sensing.smoothing) / T
-            rate = np.zeros((m, size))  # what the controller takes for q' now
-            rate[:, :m], rate[:, states : states + m] = np.eye(m) * part, -np.eye(m) * part
-            rate[:, states + m : states + 2 * m] = np.eye(m) * sensing.smoothing
-            C += self.K[:, m:] @ rate
-            F[states : states + m, :m] = np.eye(m)
-            F[states + m : states + 2 * m] = rate
-        else:
-            C[:, m : 2 * m] = self.K[:, m:]
-        if not d:
-            G[:states] = Gamma
-            return F, G, C
-        start = states + seen
-        F[:states, start : start + n] = Gamma
-        for i in range(d - 1):
-            row = start + i * n
-            F[row : row + n, row + n : row + 2 * n] = np.eye(n)
-        G[start + (d - 1) * n :] = np.eye(n)
+        F[:states, :states] = whole[:states, :states]
+        F[states:seen, :states], F[states:seen, states:seen] = self.E, self.E_m
+        C[:, :states], C[:, states:seen] = -self.H, -self.H_m
+        # Efforts on their way: the first acts, the last was asked for just now.
+        (F[:states, seen : seen + n] if d else G[:states])[:] = whole[:states, states:]
+        F[seen : size - n, seen + n :] = np.eye((d - 1) * n) if d else 0
+        if d:
+            G[size - n :] = np.eye(n)
         return F, G, C
 
     def closed(self) -> np.ndarray:
@@ -228,7 +367,7 @@ class Sampled:
 
     def phase(self) -> float:
         F, G, C = self.open()
-        T = self.drive.period
+        T = self.period
         assert T is not None
         frequencies = np.geomspace(1e-1, np.pi / T, FREQUENCIES)
         one = np.eye(len(F))

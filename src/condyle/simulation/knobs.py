@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from .controllers import Law
-from .loads import BoundLoad
+from ..questions.law import Law
+from ..questions.load import Load
 from .plan import ClosedLoop, Plan
 
 CONTROLLER = "controller"
@@ -43,10 +43,10 @@ def knobs_of(plan: Plan) -> list[Knob]:
     return found
 
 
-def _knobs(owner: str, of: Law | BoundLoad, force: np.ndarray) -> list[Knob]:
+def _knobs(owner: str, of: Law | Load, force: np.ndarray) -> list[Knob]:
     found = []
     for field, unit in of.knobs.items():
-        numbers = force if field == "force" else getattr(of, field)
+        numbers = force if field == "force" else of.numbers[field]
         value = float(np.max(numbers))
         if not np.isfinite(value):
             continue
@@ -77,12 +77,10 @@ def at(plan: Plan, knobs: Sequence[Knob], values: Sequence[float]) -> Plan:
 
 
 def _with(of: Any, knob: Knob, value: float) -> Any:
-    return replace(of, **{knob.field: _scaled(getattr(of, knob.field), value)})
+    return replace(of, numbers=of.numbers | {knob.field: _scaled(of.numbers[knob.field], value)})
 
 
 def _scaled(numbers: Any, value: float) -> Any:
     """The same, the largest of them `value`; all of them where they are 0."""
-    if np.ndim(numbers) == 0:
-        return value
     most = float(np.max(numbers))
     return numbers * (value / most) if most else np.full_like(numbers, value)

@@ -1,21 +1,19 @@
-"""The plan of a simulation: a scenario on a mechanism, as plain numbers.
-
-`run` makes a trace of it. Another way to run the same plan, such as a compiled loop, needs no more
-than what stands here.
-"""
+"""The plan of a simulation: a scenario on a mechanism, in plain numbers, and its trace."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from ..model.evaluator import Evaluator
-from .controllers import Law
+from ..questions.law import Law
+from ..questions.load import Load
+from .aims import Path
 from .events import Event
 from .integrators import Settings
-from .loads import BoundLoad
-from .reference import Path
 
 WORKS = ("actuators", "load", "actuator_losses", "contact_friction")
 
@@ -32,12 +30,12 @@ class OpenLoop:
 class Sensing:
     """Encoders: resolution [rad or m] of every chain (n,), 0 where exact.
 
-    difference: whether rates are differences of counts over a period, and not tachometers'.
-    smoothing:  of differences, from 0 (none) below 1: v = smoothing v + (1 - smoothing) difference.
+    velocity:  how the observer comes to rates.
+    smoothing: of differences, from 0 (none) below 1: v = smoothing v + (1 - smoothing) difference.
     """
 
     resolution: np.ndarray
-    difference: bool
+    velocity: str
     smoothing: float
 
 
@@ -45,15 +43,19 @@ class Sensing:
 class ClosedLoop:
     """A law, called every period, whose efforts come `delay` periods later and are held.
 
-    period:  [s]; None: at all times.
-    sensing: None where it sees the state itself.
+    model:    of the mechanism, as the controller takes it to be.
+    period:   [s]; None: at all times.
+    sensing:  None where it sees the state itself.
+    function: in Python, in the place of the law: (measured, reference) -> efforts (n,).
     """
 
+    model: Evaluator
     law: Law
     path: Path
     period: float | None
-    delay: int
-    sensing: Sensing | None
+    delay: int = 0
+    sensing: Sensing | None = None
+    function: Callable[..., Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,8 @@ class Plan:
     low, high, speed: limits of the actuators, (n,) each, infinite where there is none.
     method, settings: of the integrator.
     stop_at_bounds: whether a contact at the end of its surface ends the run.
+    functions: in Python, by the number of the load whose wrench they give: (t, s, v) -> force (3,)
+               or force and moment (6,).
     """
 
     model: Evaluator
@@ -73,7 +77,7 @@ class Plan:
     duration: float
     times: np.ndarray
     drive: OpenLoop | ClosedLoop
-    loads: tuple[BoundLoad, ...]
+    loads: tuple[Load, ...]
     modes: tuple[int, ...]
     low: np.ndarray
     high: np.ndarray
@@ -81,6 +85,7 @@ class Plan:
     method: str
     settings: Settings
     stop_at_bounds: bool = False
+    functions: dict[int, Callable[..., Any]] = field(default_factory=dict)
 
     @property
     def size(self) -> int:
@@ -89,12 +94,10 @@ class Plan:
 
     def corners(self) -> np.ndarray:
         """Times at which the rate of the state has a corner, rising, from 0 to the end [s]."""
-        found = [np.array([0.0, self.duration])]
+        found = [np.array([0.0, self.duration]), self.ticks()]
         if isinstance(self.drive, OpenLoop):
             found.append(self.drive.times)
-        elif self.drive.period is not None:
-            found.append(self.ticks())
-        found += [load.breaks(0.0, self.duration) for load in self.loads]
+        found += [load.times for load in self.loads]
         every = np.unique(np.concatenate(found))
         every = every[(every >= 0) & (every <= self.duration)]
         apart = np.concatenate([np.diff(every) > 1e-12, [True]])

@@ -1,158 +1,227 @@
-"""The mechanism as a system of first order: y' = f(t, y) with y = (q, q', works)."""
+"""The plant of a run, or of several in lockstep: the question `rate`, its ports filled."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ..backends.kernel import AGAIN
-from ..mechanism.mechanism import Mechanism
-from ..model.evaluator import Evaluator
-from ..results.contacts import bound_margins
+from ..errors import InputError
+from ..kinematics.chain import FAMILIES
+from ..questions.load.acting import WRENCH
 from ..status import Status
+from .columns import Columns
+from .events import KINDS
 from .integrators import Stuck
-from .loads import BoundLoad
-from .plan import WORKS
-from .point import Instant
-from .single import Single
+from .plan import ClosedLoop, OpenLoop, Plan
 
-Floats = Sequence[float]
+WIDE = 1e100  # a limit that is none: products with it stay finite
+CERTAIN = 0.5  # of a placement
+
+
+@dataclass(frozen=True)
+class Guard:
+    """What stays below zero, and what its passing zero means.
+
+    row: of the rate's results;  load, mode: which load takes which mode, or None.
+    """
+
+    row: int
+    kind: str
+    text: str
+    owner: str
+    ends: bool = False
+    load: int | None = None
+    mode: int = 0
+
+
+@dataclass(frozen=True)
+class Fed:
+    """A table that is fed to ports over time, linear between its rows.
+
+    port: the first of the rows that it is fed to;  vanishes: whether it is zero outside.
+    """
+
+    port: str
+    times: np.ndarray
+    rows: np.ndarray
+    vanishes: bool
+
+    def at(self, t: float) -> np.ndarray:
+        """Its row at a time [s]."""
+        times = self.times
+        if self.vanishes and not times[0] <= t <= times[-1]:
+            return np.zeros(self.rows.shape[1])
+        after = min(max(int(np.searchsorted(times, t, side="right")), 1), len(times) - 1)
+        before = max(after - 1, 0)
+        width = times[after] - times[before]
+        part = min(max((t - times[before]) / width, 0.0), 1.0) if width > 0 else 0.0
+        return self.rows[before] + part * (self.rows[after] - self.rows[before])
 
 
 class Plant:
-    """Kernels and loads of one run. It looks at one state at a time."""
+    """Kernel and numbers of a plan, or of several alike. It looks at one state at a time."""
 
-    def __init__(self, model: Evaluator, loads: Sequence[BoundLoad]) -> None:
-        self._model = model
-        self._m = len(model.independent)
-        self._instant = Instant(model)
-        self._forward = Single(model.kernel("forward", ("contact",)))
-        self.loads = loads
-        self._zero = np.zeros(3)
-        self._lossy = bool(model.mechanism.contacts)
+    def __init__(self, plan: Plan, runs: int = 1) -> None:
+        self._model, machine = plan.model, plan.model.mechanism
+        contacts = machine.contacts
+        self._bounded = [i for i, c in enumerate(contacts) if any(c.bounds.entries().values())]
+        self._sided = [i for i, c in enumerate(contacts) if c.one_sided]
+        self._push = np.array([contacts[i].push for i in self._sided], dtype=float)
+        felt: list[int] = []
+        if isinstance(plan.drive, ClosedLoop) and (place := plan.drive.law.place) is not None:
+            felt = [i for i, load in enumerate(plan.loads) if load.place == place]
+        laws = tuple(load.law for load in plan.loads)
+        self.details = (laws, tuple(felt), tuple(self._bounded), tuple(self._sided))
+        self.columns = Columns(plan.model.kernel("rate", *self.details), runs)
+        for run in range(runs):
+            self.fill(plan, run)
 
-    @property
-    def loads(self) -> Sequence[BoundLoad]:
-        """What acts on the platform."""
-        return self._loads
+    def fill(self, plan: Plan, run: int = 0) -> None:
+        """Take the numbers of a plan for a run."""
+        self.plan, give = plan, self.columns.give
+        self._tables = self.fed(plan)
+        for name in ("low", "high", "speed"):
+            give(name, np.clip(getattr(plan, name), -WIDE, WIDE), run)
+        if self._bounded:
+            give("bounds", np.clip(bounds(plan, self._bounded).ravel(), -WIDE, WIDE), run)
+        if self._sided:
+            give("push", self._push, run)
+        for i, load in enumerate(plan.loads):
+            give(f"load_{i}_point", load.point, run)
+            for name, value in load.numbers.items():
+                give(f"load_{i}_{name}", value, run)
 
-    @loads.setter
-    def loads(self, loads: Sequence[BoundLoad]) -> None:
-        self._loads = loads
-        self._points = [tuple(load.point.tolist()) for load in loads]
+    def set_modes(self, modes: list[int], run: int = 0) -> None:
+        """Of the loads."""
+        for i, mode in enumerate(modes):
+            self.columns.give(f"load_{i}_mode", mode, run)
 
-    # -- a state --------------------------------------------------------------------------
-
-    def look(self, q: np.ndarray, q1: np.ndarray) -> Instant:
-        """Where everything is; valid until the next look.
-
-        Raises: Stuck: where it cannot be.
-        """
-        status = self._instant(q, q1)
-        if status:
-            raise Stuck(Status.unreachable if status == AGAIN else status)
-        return self._instant
-
-    @property
-    def last(self) -> Instant:
-        """The last look."""
-        return self._instant
-
-    def places(self) -> list[tuple[Floats, Floats, Floats]]:
-        """Of every load at the last look: s and v of its point, and its lever from O_M [m, m/s]."""
-        if not self._loads:
-            return []
-        x = self._instant["pose"].tolist()
-        R = self._instant["R"].tolist()
-        V = self._twist
-        found: list[tuple[Floats, Floats, Floats]] = []
-        for p in self._points:
-            r = [row[0] * p[0] + row[1] * p[1] + row[2] * p[2] for row in R]
-            s = (x[0] + r[0] - p[0], x[1] + r[1] - p[1], x[2] + r[2] - p[2])
-            v = (
-                V[0] + V[4] * r[2] - V[5] * r[1],
-                V[1] + V[5] * r[0] - V[3] * r[2],
-                V[2] + V[3] * r[1] - V[4] * r[0],
-            )
-            found.append((s, v, r))
+    def fed(self, plan: Plan) -> list[Fed]:
+        """What changes with time alone."""
+        found = [
+            Fed(f"load_{i}_{WRENCH}", load.times, load.rows, True)
+            for i, load in enumerate(plan.loads)
+            if len(load.times)
+        ]
+        if isinstance(plan.drive, OpenLoop):
+            found.append(Fed("effort", plan.drive.times, plan.drive.efforts, False))
         return found
 
-    def wrench(self, t: float, modes: Floats) -> np.ndarray:
-        """Of all loads at the last look, about O_M, (6,) [N, N m] in {S}."""
-        total = np.zeros(6)
-        for load, mode, (s, v, r) in zip(self._loads, modes, self.places(), strict=True):
-            f = load.law(t, s, v, int(mode))
-            total[0] += f[0]
-            total[1] += f[1]
-            total[2] += f[2]
-            total[3] += r[1] * f[2] - r[2] * f[1]
-            total[4] += r[2] * f[0] - r[0] * f[2]
-            total[5] += r[0] * f[1] - r[1] * f[0]
-            if len(f) == 6:
-                total[3:] += f[3:]
-        return total
+    def guards(self, plan: Plan) -> list[Guard]:
+        """Bounds, pulls of one-sided contacts, speeds; then the loads' own."""
+        machine, rows = plan.model.mechanism, iter(self.columns.result("guards").tolist())
+        names = machine.contact_names
+        found = [
+            Guard(next(rows), "bound", KINDS["bound"], names[i], plan.stop_at_bounds)
+            for i in self._bounded
+        ]
+        found += [
+            Guard(next(rows), "lift_off", KINDS["lift_off"], names[i], True) for i in self._sided
+        ]
+        for i in np.flatnonzero(np.isfinite(plan.speed)).tolist():
+            chain, row = machine.chains[i], int(self.columns.result("too_fast")[i])
+            unit = FAMILIES[chain.kind].joint_unit
+            text = f"faster than its limit of {plan.speed[i]:g} {unit}/s"
+            found.append(Guard(row, "speed", text, chain.name))
+        for number, load in enumerate(plan.loads):
+            found += [
+                Guard(next(rows), jump.kind, jump.text, load.name, load=number, mode=jump.mode)
+                for jump in load.jumps
+            ]
+        return found
 
-    def force_at(self, place: str | None, t: float, modes: Floats) -> np.ndarray:
-        """Of the loads at a named point, at the last look, (3,) [N] in {S}."""
-        total = np.zeros(3)
-        for load, mode, (s, v, _) in zip(self._loads, modes, self.places(), strict=True):
-            if place is not None and load.place == place:
-                total += load.law(t, s, v, int(mode))[:3]
-        return total
+    # -- a state ------------------------------------------------------------------------------
 
-    @property
-    def _twist(self) -> list[float]:
-        return (self._instant["T"] @ self._q1).tolist()
-
-    # -- its rate ---------------------------------------------------------------------------
-
-    def accelerate(
-        self, q: np.ndarray, q1: np.ndarray, effort: np.ndarray, wrench: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """q'' (m,) and contact forces (k,) [N], valid until the next call.
+    def look(self, t: float, y: np.ndarray) -> None:
+        """Find out all about a state; results by name are those of the last look.
 
         Raises: Stuck: where there are none.
         """
-        call = self._forward
-        status = call(q, q1, effort, wrench[:3], wrench[3:], self._zero)
+        columns, m = self.columns, len(self.plan.q)
+        columns.given[: 2 * m, 0] = y[: 2 * m]
+        for table in self._tables:
+            columns.give(table.port, table.at(t))
+        status = columns.run()
+        if self.plan.functions:
+            self._ask(t)
+            status = columns.run()
         if status == AGAIN:
-            load = np.concatenate([wrench, self._zero])
-            found = self._model.forward(q[None], q1[None], effort[None], load[None])
-            if found.status[0]:
-                raise Stuck(int(found.status[0]))
-            return found.acceleration[0], found.contact_force[0]
-        if status:
+            self._robustly(y)
+        elif status:
             raise Stuck(status)
-        return call["acceleration"], call["contact_force"]
 
-    def state(self, t: float, y: np.ndarray, modes: Floats) -> np.ndarray:
-        """Look at y, and the loads' wrench there."""
-        m = self._m
-        self._q1 = y[m : 2 * m]
-        self.look(y[:m], self._q1)
-        return self.wrench(t, modes)
+    def along(self, t: np.ndarray, state: np.ndarray, modes: np.ndarray) -> dict[str, np.ndarray]:
+        """Results that do not depend on efforts, at states (N, size) and modes (N, loads)."""
+        columns, m = self.columns, len(self.plan.q)
+        ports = {
+            port.name: np.tile(columns.given[columns.rows(port.name), 0], (len(t), 1))
+            for port in columns.kernel.interface.ports
+        }
+        ports["q"], ports["q1"] = state[:, :m], state[:, m : 2 * m]
+        for i in range(modes.shape[1]):
+            ports[f"load_{i}_mode"] = modes[:, i : i + 1].astype(float)
+        for table in self._tables:
+            ports[table.port] = np.array([table.at(when) for when in t.tolist()])
+        found = columns.kernel.run(ports).values
+        for i, function in self.plan.functions.items():
+            places = np.moveaxis(found["load_place"], -1, 0)[:, i]
+            rows = [self._wrench(i, function, *x) for x in zip(t.tolist(), places, strict=True)]
+            ports[f"load_{i}_{WRENCH}"] = np.array(rows)
+        found = columns.kernel.run(ports).values if self.plan.functions else found
+        return {name: np.moveaxis(a, -1, 0) for name, a in found.items()}
 
-    def rate(self, t: float, y: np.ndarray, effort: np.ndarray, modes: Floats) -> np.ndarray:
-        """y', from the efforts as they act."""
-        wrench = self.state(t, y, modes)
-        return self.rate_here(y, effort, wrench)
+    def __getitem__(self, name: str) -> np.ndarray:
+        """A result of the last look."""
+        return self.columns[name]
 
-    def rate_here(self, y: np.ndarray, effort: np.ndarray, wrench: np.ndarray) -> np.ndarray:
-        """y' at the state that was looked at last."""
-        m, at = self._m, self._instant
-        acceleration, force = self.accelerate(y[:m], y[m : 2 * m], effort, wrench)
-        found = np.empty(2 * m + len(WORKS))
-        found[:m] = y[m : 2 * m]
-        found[m : 2 * m] = acceleration
-        found[2 * m] = effort @ at["joint_rate"]
-        found[2 * m + 1] = wrench @ (at["T"] @ y[m : 2 * m])
-        found[2 * m + 2] = at["loss"].sum()
-        found[2 * m + 3] = np.abs(force) @ at["rub"] if self._lossy else 0.0
-        return found
+    def _ask(self, t: float) -> None:
+        """Loads that are functions in Python."""
+        places = self["load_place"].reshape(-1, 6)
+        for i, function in self.plan.functions.items():
+            self.columns.give(f"load_{i}_{WRENCH}", self._wrench(i, function, t, places[i]))
 
-    # -- what is watched ----------------------------------------------------------------------
+    def _wrench(
+        self, i: int, function: Callable[..., Any], t: float, place: np.ndarray
+    ) -> np.ndarray:
+        found = np.asarray(function(t, place[:3], place[3:]), dtype=float).ravel()
+        if found.shape not in ((3,), (6,)) or not np.isfinite(found).all():
+            raise InputError(
+                f'load "{self.plan.loads[i].name}": at t = {t:g} s its function returned '
+                f"{found!s:.80}; expected a force (3,) [N], or a force and a moment (6,) "
+                "[N, N m], finite"
+            )
+        return np.concatenate([found, np.zeros(6 - len(found))])
 
-    def margins(self, mechanism: Mechanism) -> np.ndarray:
-        """Distance of every contact point to its nearest bound at the last look, (k,) [m]."""
-        return bound_margins(mechanism, self._instant["contact_point"][None])[0]
+    def _robustly(self, y: np.ndarray) -> None:
+        """Accelerations and contact forces where the kernel cannot vouch for its own."""
+        columns, m = self.columns, len(self.plan.q)
+        if self["certain"][0] < CERTAIN:
+            raise Stuck(Status.unreachable)
+        asked = columns.given[columns.rows("effort"), 0]
+        effort = np.clip(asked, self.plan.low, self.plan.high)
+        load = np.concatenate([self["wrench"], np.zeros(3)])
+        found = self._model.forward(y[None, :m], y[None, m : 2 * m], effort[None], load[None])
+        if found.status[0]:
+            raise Stuck(int(found.status[0]))
+        force, rate = found.contact_force[0], columns.result("rate")
+        columns.found[rate[m : 2 * m], 0] = found.acceleration[0]
+        columns.found[rate[2 * m + 3], 0] = np.abs(force) @ self["rub"]
+        columns.found[columns.result("contact_force"), 0] = force
+        first = len(self._bounded)
+        pulled = columns.result("guards")[first : first + len(self._sided)]
+        columns.found[pulled, 0] = -self._push * force[self._sided]
+
+
+def bounds(plan: Plan, contacts: list[int]) -> np.ndarray:
+    """Of contact points, (contacts, 2, 3) [m]: low and high, infinite where there is none."""
+    found = np.empty((len(contacts), 2, 3))
+    for to, i in zip(found, contacts, strict=True):
+        own = plan.model.mechanism.contacts[i].bounds
+        for axis, name in enumerate("xyz"):
+            interval = getattr(own, name)
+            to[:, axis] = (-np.inf, np.inf) if interval is None else interval
+    return found

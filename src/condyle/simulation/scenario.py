@@ -14,13 +14,14 @@ from pydantic import Field, ValidationError, create_model, model_validator
 from ..errors import ScenarioError
 from ..mechanism.files import without_unit
 from ..mechanism.messages import describe
-from ..mechanism.quantities import PER_METRE
+from ..mechanism.quantities import PER_METRE, Length, Number
 from ..mechanism.schema import schema_of
+from ..mechanism.table import Table
 from ..mechanism.toml import read_tables, read_text
-from .controllers import CONTROLLERS
-from .integrators import INTEGRATORS
-from .loads import LOADS
-from .table import File, Frequency, Gain, Length, Number, Positive, Table
+from ..questions.entries import File, Frequency, Gain, Positive
+from ..questions.law import CONTROLLERS
+from ..questions.load import LOADS
+from .integrators import FIXED, INTEGRATORS
 
 LONGEST = 1e4  # seconds
 COORDINATES = ("X", "Y", "Z", "alpha", "beta", "gamma")
@@ -101,7 +102,7 @@ class Scenario(Table):
         if self.method not in INTEGRATORS:
             known = ", ".join(INTEGRATORS)
             problems.append(f'method: got "{self.method:.40}"; available: {known}')
-        elif INTEGRATORS[self.method].fixed != (self.step is not None):
+        elif (self.method in FIXED) != (self.step is not None):
             problems.append(
                 f"step: {self.method} chooses its own steps, by rtol; remove it"
                 if self.step is not None
@@ -129,7 +130,7 @@ class Scenario(Table):
 def _controller_problems(controller: Any, sensors: Sensors | None) -> Iterable[str]:
     if not controller.ideal:
         return
-    if not controller.continuous:
+    if controller.memory:
         yield f"controller.ideal: {controller.kind} has a memory and needs a rate; remove ideal"
     if controller.delay:
         yield "controller.ideal: there is no delay without periods; remove one of them"

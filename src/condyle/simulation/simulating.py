@@ -16,9 +16,9 @@ from ..motion import Motion
 from ..results.model import Model, derive
 from ..results.solution import Solution
 from .bind import bind
-from .run import Run, run
+from .running import Run, run
 from .scenario import Scenario, load_scenario, scenario_from
-from .solution import solved
+from .simulated import solved
 
 
 def simulate(

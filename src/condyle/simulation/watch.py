@@ -7,141 +7,87 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kinematics.chain import FAMILIES
-from .events import KINDS
 from .integrators import Step
 from .plan import Plan
-from .plant import Plant
+from .plant import Guard, Plant
 
 TOLERANCE = 1e-12  # seconds, of the time of an event
-
 MODES = 3  # of a load, at most, that follow one another at once
 SUDDEN = 1e-9  # m, N, rad/s or m/s beyond zero: not rounding
-
-Acting = Callable[[float, np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
 class Crossing:
-    """A guard that passed zero.
-
-    load, mode: which load takes which mode, or None.
-    """
+    """A guard that passed zero, when and where."""
 
     time: float
     state: np.ndarray
-    kind: str
-    text: str
-    owner: str
-    ends: bool = False
-    load: int | None = None
-    mode: int = 0
-
-
-@dataclass(frozen=True)
-class _Guard:
-    kind: str
-    text: str
-    owner: str
-    ends: bool = False
-    load: int | None = None
-    mode: int = 0
+    guard: Guard
 
 
 class Watch:
-    """The guards of one run: bounds, pulls of one-sided contacts, speeds, and the loads' own."""
+    """The guards of one run: bounds, pulls of one-sided contacts, speeds, and the loads' own.
 
-    def __init__(self, plan: Plan, plant: Plant) -> None:
-        self._plant, self.loads = plant, plan.loads
-        machine = self._machine = plan.model.mechanism
-        self._m = len(plan.q)
-        self._bounded = [
-            i for i, c in enumerate(machine.contacts) if any(c.bounds.entries().values())
-        ]
-        self._sided = [i for i, c in enumerate(machine.contacts) if c.one_sided]
-        self._push = np.array([machine.contacts[i].push for i in self._sided], dtype=float)
-        self._quick = np.flatnonzero(np.isfinite(plan.speed))
-        self._speed = plan.speed[self._quick]
-        self._own = [
-            _Guard("bound", KINDS["bound"], machine.contact_names[i], plan.stop_at_bounds)
-            for i in self._bounded
-        ]
-        self._own += [
-            _Guard("lift_off", KINDS["lift_off"], machine.contact_names[i], True)
-            for i in self._sided
-        ]
-        for i in self._quick:
-            chain = machine.chains[i]
-            unit = FAMILIES[chain.kind].joint_unit
-            text = f"faster than its limit of {plan.speed[i]:g} {unit}/s"
-            self._own.append(_Guard("speed", text, chain.name))
-        self.past = np.zeros(len(self._own), dtype=bool)
+    past: (guards,), whether each is beyond zero already; loads' never are, their modes change.
+    """
 
-    @property
-    def told(self) -> list[tuple[int, int, float]]:
-        """Guards but those of loads, as numbers: kind (bound, lift off, speed), contact or chain,
-        and sign of the push or limit."""
-        found = [(0, i, 0.0) for i in self._bounded]
-        found += [(1, i, p) for i, p in zip(self._sided, self._push.tolist(), strict=True)]
-        return found + [
-            (2, int(i), v) for i, v in zip(self._quick, self._speed.tolist(), strict=True)
-        ]
+    def __init__(self, plan: Plan, plant: Plant, look: Callable[[float, np.ndarray], None]) -> None:
+        """Args: look: at a state, with the efforts that act there."""
+        self._plant, self._look = plant, look
+        self.change(plan)
+        self.past = np.zeros(len(self.guards), dtype=bool)
 
-    def begin(
-        self, t: float, y: np.ndarray, modes: Sequence[int], effort: np.ndarray
-    ) -> list[Crossing]:
+    def change(self, plan: Plan) -> None:
+        """Other numbers in the loads."""
+        self.guards = self._plant.guards(plan)
+        self._rows = np.array([guard.row for guard in self.guards], dtype=int)
+        self._own = np.array([guard.load is None for guard in self.guards], dtype=bool)
+
+    def _values(self, t: float, y: np.ndarray) -> np.ndarray:
+        self._look(t, y)
+        return self._plant.columns.found[self._rows, 0]
+
+    def begin(self, t: float, y: np.ndarray) -> list[Crossing]:
         """The guards' values to begin with, and what efforts that jumped did at once."""
-        self._before = values = self._values(t, y, modes, effort)
-        own = values[: len(self._own)]
-        sudden = np.flatnonzero((own > SUDDEN) & ~self.past)
-        self.past[:] = (own > 0) | (self.past & (own > -SUDDEN))
-        return [self._crossing(self._own[i], t, y) for i in sudden]
+        self._before = values = self._values(t, y)
+        sudden = np.flatnonzero((values > SUDDEN) & ~self.past & self._own)
+        self.past[:] = self._own & ((values > 0) | (self.past & (values > -SUDDEN)))
+        return [Crossing(t, y, self.guards[i]) for i in sudden]
 
-    def crossing(self, step: Step, modes: Sequence[int], acting: Acting) -> Crossing | None:
+    def crossing(self, step: Step) -> Crossing | None:
         """The first guard that passes zero within a step, if any."""
-        after = self._values(step.t1, step.y1, modes, acting(step.t1, step.y1))
+        after = self._values(step.t1, step.y1)
         before, self._before = self._before, after
-        new = (after > 0) & (before <= 0)
-        new[: len(self._own)] &= ~self.past
-        passed = np.flatnonzero(new)
+        passed = np.flatnonzero((after > 0) & (before <= 0) & ~self.past)
         if not passed.size:
-            self.past[:] = after[: len(self._own)] > 0
+            self.past[:] = self._own & (after > 0)
             return None
-        t, first = min((self._when(step, int(i), modes, acting), int(i)) for i in passed)
-        if first < len(self._own):
-            self.past[first] = True
-        return self._crossing(
-            self._guards(modes)[first], t, step.y1 if t == step.t1 else step.at(t)
-        )
+        t, first = min((self._when(step, int(i)), int(i)) for i in passed)
+        self.past[first] = self._own[first]
+        return Crossing(t, step.y1 if t == step.t1 else step.at(t), self.guards[first])
 
     def overtaken(self, t: float, y: np.ndarray, modes: Sequence[int]) -> list[Crossing]:
         """What loads do at once whose numbers have changed, each until nothing more happens."""
-        self._plant.state(t, y, modes)
-        found = []
-        for i, (load, mode, (s, v, _)) in enumerate(
-            zip(self.loads, modes, self._plant.places(), strict=True)
-        ):
-            for _ in range(MODES):
-                values = load.guards(t, s, v, mode)
-                passed = [j for j, g in zip(load.jumps(mode), values, strict=True) if g > 0]
-                if not passed:
-                    break
-                mode = passed[0].mode
-                guard = _Guard(passed[0].kind, passed[0].text, load.name, load=i, mode=mode)
-                found.append(self._crossing(guard, t, y))
+        found, modes = [], list(modes)
+        for _ in range(MODES):
+            self._plant.set_modes(modes)
+            over = self._values(t, y) > 0
+            passed = [g for g, on in zip(self.guards, over, strict=True) if on]
+            # The first of each load.
+            first = {g.load: g for g in reversed(passed) if g.load is not None}
+            if not first:
+                break
+            for i, guard in sorted(first.items()):
+                modes[i] = guard.mode
+                found.append(Crossing(t, y, guard))
         return found
 
-    @staticmethod
-    def _crossing(g: _Guard, t: float, y: np.ndarray) -> Crossing:
-        return Crossing(t, y, g.kind, g.text, g.owner, g.ends, g.load, g.mode)
-
-    def _when(self, step: Step, i: int, modes: Sequence[int], acting: Acting) -> float:
+    def _when(self, step: Step, i: int) -> float:
         """Time at which guard i passes zero, by bisection with secants (Brent)."""
         from scipy.optimize import brentq
 
         def value(t: float) -> float:
-            y = step.at(t)
-            return float(self._values(t, y, modes, acting(t, y))[i])
+            return float(self._values(t, step.at(t))[i])
 
         ends = value(step.t0), value(step.t1)
         if not ends[0] < 0 < ends[1]:
@@ -152,29 +98,3 @@ class Watch:
         while t < step.t1 and value(t) <= 0:
             t, on = min(t + on, step.t1), 2 * on
         return t
-
-    def _guards(self, modes: Sequence[int]) -> list[_Guard]:
-        found = list(self._own)
-        for i, (load, mode) in enumerate(zip(self.loads, modes, strict=True)):
-            for jump in load.jumps(mode):
-                found.append(_Guard(jump.kind, jump.text, load.name, load=i, mode=jump.mode))
-        return found
-
-    def _values(
-        self, t: float, y: np.ndarray, modes: Sequence[int], effort: np.ndarray
-    ) -> np.ndarray:
-        plant, m = self._plant, self._m
-        wrench = plant.state(t, y, modes)
-        values: list[float] = []
-        if self._bounded:
-            values += (-plant.margins(self._machine)[self._bounded]).tolist()
-        if self._sided:
-            _, force = plant.accelerate(y[:m], y[m : 2 * m], effort, wrench)
-            values += (-self._push * force[self._sided]).tolist()
-        if self._quick.size:
-            rate = np.abs(plant.last["joint_rate"][self._quick])
-            values += (rate - self._speed).tolist()
-        if self.loads:
-            for load, mode, (s, v, _) in zip(self.loads, modes, plant.places(), strict=True):
-                values += load.guards(t, s, v, mode)
-        return np.array(values)

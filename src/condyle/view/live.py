@@ -11,8 +11,8 @@ from ..mechanism import Mechanism
 from ..motion.points import DEFAULT_LOAD_POINT
 from ..report.scene import place
 from ..results.contacts import bound_margins
+from ..simulation.by_hand import Live, Moment
 from ..simulation.integrators import Stuck
-from ..simulation.live import Live, Moment
 from ..simulation.plan import Plan
 from .session import CENTRE
 from .snapshot import Level, Snapshot, measured, state_messages

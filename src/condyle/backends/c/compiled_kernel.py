@@ -121,7 +121,7 @@ class CompiledKernel:
 
 
 # Holds the GIL, since to give it away and take it back costs more than some evaluations.
-_ONE = ctypes.PYFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * 3)
+ONE = ctypes.PYFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * 3)
 
 
 class Single:
@@ -142,7 +142,7 @@ class Single:
         self.given, self.found = given[:columns], found[:results]
         one, _, table = kernel.address
         self.addresses = one, table, given.ctypes.data, found.ctypes.data
-        self.run: Callable[[], int] = partial(_ONE(one), *self.addresses[1:])
+        self.run: Callable[[], int] = partial(ONE(one), *self.addresses[1:])
 
 
 def _readable(column: np.ndarray) -> np.ndarray:

@@ -54,6 +54,7 @@ class BiteForce(ComputedTorque):
         "release": 1,
     }
     memory: ClassVar[tuple[float, ...]] = (FREE, 0.0)
+    holding: ClassVar[tuple[float, ...] | None] = (BITING, 0.0)
     knobs: ClassVar[Mapping[str, str]] = {
         **ComputedTorque.knobs,
         "force": "N",

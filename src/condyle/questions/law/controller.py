@@ -123,6 +123,8 @@ class ControllerTable(Table):
     ports: ClassVar[Mapping[str, str | int]] = {}
     # Memory to begin with; laws without any can do without periods.
     memory: ClassVar[tuple[float, ...]] = ()
+    # Memory while it holds a force on a load, along its `direction`; None where it never does.
+    holding: ClassVar[tuple[float, ...] | None] = None
     # Numbers that a hand may turn while it runs, with their units; `force` is that of the path.
     knobs: ClassVar[Mapping[str, str]] = {}
     # Entries that decide which equations they are.
@@ -168,23 +170,28 @@ class ControllerTable(Table):
         numbers = {name: np.array(v, dtype=float) for name, v in self.numbers(machine).items()}
         choices = tuple((name, getattr(self, name)) for name in self.chooses)
         memory = np.array(self.memory)
-        return Law(self.kind, choices, numbers, memory, self.place(machine), self.knobs)
+        return Law(type(self), choices, numbers, memory, self.place(machine))
 
 
 @dataclass(frozen=True)
 class Law:
     """A controller on one mechanism.
 
+    table:   whose equations they are; None where efforts are given.
     numbers: of its ports, one each for coordinates, or for chains in the mechanism's order.
     memory:  to begin with.   place: name of the point where it measures force, or None.
     """
 
-    kind: str
+    table: type[ControllerTable] | None
     choices: tuple[tuple[str, Any], ...] = ()
-    numbers: Mapping[str, np.ndarray] = field(default_factory=dict)
+    numbers: dict[str, np.ndarray] = field(default_factory=dict)
     memory: np.ndarray = field(default_factory=lambda: np.zeros(0))
     place: str | None = None
-    knobs: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def knobs(self) -> Mapping[str, str]:
+        """Numbers that a hand may turn, with their units."""
+        return {} if self.table is None else self.table.knobs
 
 
 def gains_of(b: Builder, ports: Mapping[str, str | int]) -> SimpleNamespace:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
@@ -50,6 +50,8 @@ class LoadTable(Table):
     """
 
     ports: ClassVar[Mapping[str, int]] = {}
+    # The mode in which it can bear a force that is held on it, if there is one.
+    bears: ClassVar[int | None] = None
     # Numbers that a hand may turn while it runs, with their units.
     knobs: ClassVar[Mapping[str, str]] = {}
 
@@ -88,25 +90,28 @@ class LoadTable(Table):
         """
         place, point = machine.point(self.point)
         numbers = {n: np.array(v, dtype=float) for n, v in self.given(machine).items()}
-        return Load(self.kind, type(self), name, point, place, numbers)
+        return Load(type(self), name, point, place, numbers)
 
 
 @dataclass(frozen=True)
 class Load:
     """A load at a point (3,) [m] of {M}, of that name; numbers of its ports by name.
 
-    kind: by which `law` is registered.
     times, rows: (N,) [s] and (N, 6), what `WRENCH` is between them, linearly; none outside.
     """
 
-    kind: str
     law: type[LoadTable]
     name: str
     point: np.ndarray
     place: str | None = None
-    numbers: Mapping[str, np.ndarray] = field(default_factory=dict)
+    numbers: dict[str, np.ndarray] = field(default_factory=dict)
     times: np.ndarray = field(default_factory=lambda: np.zeros(0))
     rows: np.ndarray = field(default_factory=lambda: np.zeros((0, 6)))
+
+    @property
+    def knobs(self) -> Mapping[str, str]:
+        """Numbers that a hand may turn, with their units."""
+        return self.law.knobs
 
     @property
     def jumps(self) -> Sequence[Jump]:
@@ -117,8 +122,3 @@ class Load:
         """The mode to begin with, the point being displaced by s, (3,) [m]."""
         numbers = SimpleNamespace(**{n: ca.DM(v) for n, v in self.numbers.items()})
         return int(self.law.begin(Place(ca.DM(s), ca.DM.zeros(3), ca.DM(0), numbers)))
-
-    def turned(self, **numbers: Any) -> Load:
-        """The same load with other numbers."""
-        new = {name: np.array(v, dtype=float) for name, v in numbers.items()}
-        return replace(self, numbers={**self.numbers, **new})

@@ -76,6 +76,7 @@ class FoodTable(LoadTable):
     """Food at a tooth: a preset by its name, or numbers, or a preset with some numbers changed."""
 
     ports: ClassVar[Mapping[str, int]] = {"direction": 3, **dict.fromkeys(_KEYS, 1)}
+    bears: ClassVar[int | None] = TOUCHING
     knobs: ClassVar[Mapping[str, str]] = {
         "thickness": "m",
         "stiffness": "N/m",

@@ -35,7 +35,7 @@ class Constant(LoadTable):
             return super().bind(machine, name)
         # A moment alone acts at no point.
         numbers = {WRENCH: np.array((*self.force, *self.moment))}
-        return Load(self.kind, type(self), name, np.zeros(3), None, numbers)
+        return Load(type(self), name, np.zeros(3), None, numbers)
 
 
 class Csv(LoadTable):

@@ -20,6 +20,7 @@ class Spring(LoadTable):
     """
 
     ports: ClassVar[Mapping[str, int]] = {"direction": 3, "stiffness": 1, "damping": 1, "rest": 1}
+    bears: ClassVar[int | None] = 0
     knobs: ClassVar[Mapping[str, str]] = {"stiffness": "N/m", "damping": "N s/m", "rest": "m"}
 
     kind: Literal["spring"]

@@ -20,8 +20,8 @@ from ..results.variables import ACCOUNTS
 from ..results.warnings import Notice, Watch
 from .plan import ClosedLoop, Plan, Trace
 from .plant import Plant
-from .plausibility import odd_things
 from .scenario import Scenario
+from .slips import odd_things
 
 
 def solved(plan: Plan, trace: Trace, scenario: Scenario, source: str, started: float) -> Solution:
@@ -31,11 +31,15 @@ def solved(plan: Plan, trace: Trace, scenario: Scenario, source: str, started: f
         raise InputError(f"{source}: the run ended before it began: {end}")
     model, m = plan.model, len(plan.q)
     q, q1 = trace.state[:, :m], trace.state[:, m : 2 * m]
-    wrench, forces = _loads(plan, trace)
+    acted = Plant(plan).along(trace.t, trace.state, trace.modes)
+    wrench = acted["wrench"]
     load = with_point(wrench, np.zeros(3))
     evaluation = _evaluation(model, q, q1, trace.effort, load)
     simulated = _energy(model, q, q1, trace, plan)
-    simulated |= {"load_force": forces, "load_mode": trace.modes} if plan.loads else {}
+    if any(not chain.actuator.ideal for chain in model.mechanism.chains):
+        simulated["actuator_loss"] = acted["loss"]
+    if plan.loads:
+        simulated |= {"load_force": acted["load_force"], "load_mode": trace.modes}
     if isinstance(plan.drive, ClosedLoop):
         simulated |= _controlled(plan, plan.drive, trace)
     derived = Derived(model.mechanism, evaluation, wrench, simulated=simulated)
@@ -94,30 +98,13 @@ def _evaluation(
     )
 
 
-def _loads(plan: Plan, trace: Trace) -> tuple[np.ndarray, np.ndarray]:
-    """Wrench of all loads about O_M, (N, 6), and force of each, (N, loads, 3), at the trace."""
-    count = len(trace.t)
-    wrench, forces = np.zeros((count, 6)), np.zeros((count, len(plan.loads), 3))
-    if not plan.loads:
-        return wrench, forces
-    plant = Plant(plan.model, plan.loads)
-    for i, (t, y, modes) in enumerate(zip(trace.t.tolist(), trace.state, trace.modes, strict=True)):
-        wrench[i] = plant.state(t, y, modes)
-        for k, (load, (s, v, _)) in enumerate(zip(plan.loads, plant.places(), strict=True)):
-            forces[i, k] = load.law(t, s, v, int(modes[k]))[:3]
-    return wrench, forces
-
-
 def _energy(
     model: Evaluator, q: np.ndarray, q1: np.ndarray, trace: Trace, plan: Plan
 ) -> dict[str, np.ndarray]:
-    """Kinetic and potential energy, works and losses since the start [J], and losses now [W]."""
+    """Kinetic and potential energy, works and losses since the start [J]."""
     values = model.kernel("energy").run({"q": q, "q1": q1}).values
     accounts = [values["kinetic"], values["potential"], *trace.state[:, 2 * len(plan.q) :].T]
-    found = {"energy": np.column_stack(accounts)}
-    if any(not chain.actuator.ideal for chain in model.mechanism.chains):
-        found["actuator_loss"] = model.kernel("instant").run({"q": q, "q1": q1}).values["loss"].T
-    return found
+    return {"energy": np.column_stack(accounts)}
 
 
 def _controlled(plan: Plan, drive: ClosedLoop, trace: Trace) -> dict[str, np.ndarray]:
@@ -141,7 +128,7 @@ def _controlled(plan: Plan, drive: ClosedLoop, trace: Trace) -> dict[str, np.nda
     if drive.law.place is not None:
         found["bite_force"] = trace.force[k]
     if drive.path.force.any():
-        found["bite_reference"] = np.interp(trace.t, drive.path.force_times, drive.path.force)
+        found["bite_reference"] = drive.path.force_at(trace.t)
     return found
 
 

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..mechanism.home import characteristic_length
-from .loads.food import BoundFood
 from .plan import ClosedLoop, Plan
 
 COARSE = 0.05  # rad or m: an encoder that hardly sees a motion
@@ -19,9 +18,9 @@ def odd_things(plan: Plan) -> Iterator[str]:
     """A line for each thing to look at."""
     size = characteristic_length(plan.model.mechanism)
     for load in plan.loads:
-        if isinstance(load, BoundFood) and load.thickness > THICK * size:
+        if (thickness := float(load.numbers.get("thickness", 0.0))) > THICK * size:
             yield (
-                f'load "{load.name}": {load.thickness * 1e3:.4g} mm of food in a mechanism of '
+                f'load "{load.name}": {thickness * 1e3:.4g} mm of food in a mechanism of '
                 f'{size * 1e3:.4g} mm; lengths are in metres, or length_unit = "mm"'
             )
     if not isinstance(plan.drive, ClosedLoop):

@@ -10,22 +10,21 @@ as three springs of one direction each. A controller does not feel it as a bite.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..questions.load import Load
+from ..questions.load.spring import Spring
+from ..status import Status
 from .events import Event
 from .integrators import Stuck
 from .knobs import Knob, at, knobs_of
-from .loads.spring import BoundSpring
 from .plan import ClosedLoop, Plan
-from .plant import Plant
-from .run import ROUNDING, Ended, Run
+from .running import ROUNDING, Ended, Run
 
 STEP = 2e-4  # seconds, in compiled code,
 SLOW_STEP = 1e-3  # and in Python
-AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 HAND = "hand"
 
 
@@ -63,10 +62,10 @@ class Live:
     def __init__(self, plan: Plan) -> None:
         if plan.method == "DOP853":
             plan = replace(plan, method="rk4", settings=replace(plan.settings, step=STEP))
-            if Run(replace(plan, times=np.zeros(0))).quick() is None:
+            if Run(replace(plan, times=np.zeros(0))).steps is None:
                 plan = replace(plan, settings=replace(plan.settings, step=SLOW_STEP))
         self.knobs: Sequence[Knob] = knobs_of(plan)
-        hand = tuple(BoundSpring(HAND, np.zeros(3), direction=u) for u in AXES)
+        hand = _hand(np.zeros(3), np.zeros(3), 0.0, 0.0)
         self._plan = replace(
             plan,
             times=np.zeros(0),  # nothing is kept
@@ -74,7 +73,6 @@ class Live:
             modes=(*plan.modes, *(0 for _ in hand)),
         )
         self._turned, self._hand = self._plan, hand
-        self._plant = Plant(plan.model, self._plan.loads)
         self.values = [knob.value for knob in self.knobs]
         self.duration = plan.duration
         self.restart()
@@ -85,7 +83,6 @@ class Live:
         """From the start, with knobs and hand as they are."""
         self._now = self._held()
         self._run = Run(self._now)
-        self._quick = self._run.quick()
         self._ended: Event | None = None
 
     @property
@@ -113,7 +110,7 @@ class Live:
         if self.over:
             return
         try:
-            self._run.go_to(min(t, self.duration), self._quick)
+            self._run.go_to(min(t, self.duration))
         except Ended:
             self._ended = self._run.events[-1]
 
@@ -131,24 +128,18 @@ class Live:
 
     def pull(self, point: np.ndarray, held: np.ndarray, stiffness: float, damping: float) -> None:
         """Hold a point (3,) [m] of {M} by a spring at (3,) [m] in {S}; N/m, N s/m."""
-        self._hand = tuple(
-            replace(
-                spring, point=point, rest=float(held[i] - point[i]),
-                stiffness=stiffness, damping=damping,
-            )
-            for i, spring in enumerate(self._hand)
-        )  # fmt: skip
+        self._hand = _hand(point, held - point, stiffness, damping)
         self._change()
 
     def let_go(self) -> None:
         """Take the hand away."""
-        self._hand = tuple(replace(s, stiffness=0.0, damping=0.0) for s in self._hand)
+        self._hand = _hand(self._hand[0].point, np.zeros(3), 0.0, 0.0)
         self._change()
 
     @property
     def pulling(self) -> bool:
         """Whether a hand holds it."""
-        return self._hand[0].stiffness > 0
+        return bool(self._hand[0].numbers["stiffness"] > 0)
 
     def _turn(self) -> None:
         self._turned = at(self._plan, self.knobs, self.values)
@@ -160,11 +151,8 @@ class Live:
 
     def _change(self) -> None:
         self._now = self._held()
-        self._plant.loads = self._now.loads
         if self._ended is None:
-            self._run.change(self._now.drive, self._now.loads)
-            if self._quick is not None:
-                self._quick.change(self._now.drive, self._now.loads)
+            self._run.change(self._now)
 
     # -- what is seen -------------------------------------------------------------------------
 
@@ -173,30 +161,29 @@ class Live:
 
         Raises: Stuck: where it cannot be.
         """
-        run, plant, m, now = self._run, self._plant, len(self._plan.q), self._now
-        t, y, modes = run.t, run.y, run.modes
-        q, q1 = y[:m], y[m : 2 * m]
-        wrench = plant.state(t, y, modes)
-        seen = plant.last
-        effort = np.full(len(now.low), np.nan)
+        run, m, now = self._run, len(self._plan.q), self._now
+        plant, effort = run.plant, np.full(len(now.low), np.nan)
         force = np.full(len(now.model.mechanism.contacts), np.nan)
-        with suppress(Stuck):
-            effort = run.effort()
-            force = plant.accelerate(q, q1, effort, wrench)[1].copy()
-        places = zip(now.loads, modes, plant.places(), strict=True)
-        forces = np.array([load.law(t, s, v, int(mode))[:3] for load, mode, (s, v, _) in places])
-        own = len(now.loads) - len(self._hand)
+        try:
+            effort = run.look()
+            force = plant["contact_force"]
+        except Stuck as stuck:
+            if stuck.status == Status.unreachable:
+                raise
+        q, own = run.y[:m], len(now.loads) - len(self._hand)
+        forces = plant["load_force"].reshape(-1, 3)
         error = bite = None
         if isinstance(now.drive, ClosedLoop):
-            error = now.drive.path.states(np.array([t]))[0][0] - q
+            error = now.drive.path.states(np.array([run.t]))[0][0] - q
             if now.drive.law.place is not None:
-                bite = float(np.linalg.norm(plant.force_at(now.drive.law.place, t, modes)))
+                felt = [load.place == now.drive.law.place for load in now.loads]
+                bite = float(np.linalg.norm(forces[felt].sum(axis=0)))
         return Moment(
-            t,
+            run.t,
             q.copy(),
-            seen["pose"].copy(),
-            seen["joint"].copy(),
-            seen["joint_rate"].copy(),
+            plant["pose"],
+            plant["joint"],
+            plant["joint_rate"],
             effort,
             force,
             error,
@@ -204,3 +191,15 @@ class Live:
             np.array([load.point for load in now.loads[: own + 1]]),
             bite,
         )
+
+
+def _hand(
+    point: np.ndarray, rest: np.ndarray, stiffness: float, damping: float
+) -> tuple[Load, ...]:
+    """Three springs at a point of {M}, each with its displacement of rest, (3,) [m]."""
+    found = []
+    for direction, at_rest in zip(np.eye(3), rest, strict=True):
+        numbers = {"direction": direction, "stiffness": stiffness, "damping": damping}
+        own = {name: np.array(v) for name, v in (numbers | {"rest": at_rest}).items()}
+        found.append(Load(Spring, HAND, np.asarray(point), None, own))
+    return tuple(found)

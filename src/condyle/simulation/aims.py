@@ -11,8 +11,6 @@ import numpy as np
 from ..errors import InputError
 from ..model.evaluator import Evaluator
 from ..motion import Motion, read_table
-from .controllers.base import Reference
-from .point import Instant
 
 DEGREE = 5  # of the spline through q, as of motions
 
@@ -37,10 +35,6 @@ class Path:
 
         return make_interp_spline(self.times - self.times[0], self.q, k=DEGREE)
 
-    @cached_property
-    def _instant(self) -> Instant:
-        return Instant(self.model)
-
     def states(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """q, q' and q'' at times (K,), (K, m) each."""
         since = np.clip(t, self.times[0], self.times[-1]) - self.times[0]
@@ -49,8 +43,11 @@ class Path:
         q1[outside] = q2[outside] = 0.0
         return q, q1, q2
 
-    def references(self, t: np.ndarray) -> list[Reference]:
-        """One at each of the times (K,) [s]."""
+    def aims(self, t: np.ndarray) -> np.ndarray:
+        """q, q', q'', joint, joint rate and force at times (K,) [s], (K, 3 m + 2 n + 1).
+
+        Raises: InputError: where the mechanism cannot be there.
+        """
         q, q1, q2 = self.states(t)
         answer = self.model.kernel("instant").run({"q": q, "q1": q1})
         if answer.status.any():
@@ -59,16 +56,11 @@ class Path:
                 f"controller.motion: the pose at t = {t[bad]:g} s cannot be reached: q = {q[bad]}"
             )
         joint, rate = answer.values["joint"].T, answer.values["joint_rate"].T
-        force = np.interp(t, self.force_times, self.force)
-        return [Reference(*row) for row in zip(q, q1, q2, joint, rate, force.tolist(), strict=True)]
+        return np.hstack([q, q1, q2, joint, rate, self.force_at(t)[:, None]])
 
-    def at(self, t: float) -> Reference:
-        """At one time [s]."""
-        q, q1, q2 = (a[0] for a in self.states(np.array([t])))
-        self._instant(q, q1)
-        force = float(np.interp(t, self.force_times, self.force))
-        joint, rate = (self._instant[name].copy() for name in ("joint", "joint_rate"))
-        return Reference(q, q1, q2, joint, rate, force)
+    def force_at(self, t: np.ndarray) -> np.ndarray:
+        """The force at times (K,) [s], (K,) [N]."""
+        return np.interp(t, self.force_times, self.force)
 
 
 def path_of(model: Evaluator, motion: Motion, force: float | None, file: str | None) -> Path:
@@ -100,6 +92,3 @@ def default_motion(model: Evaluator) -> Motion:
     if len(machine.contacts) == 2 and "incisor" in machine.platform.points:
         return reference_motion()
     return trial_motion(machine)
-
-
-__all__ = ["Path", "default_motion", "path_of"]

@@ -1,0 +1,174 @@
+"""Integrators by name: steps from a state on, each with what is between its ends.
+
+`rk4` has fixed steps, which compiled code takes as well, by the same coefficients. The others are
+SciPy's, whose error is held below a tolerance: explicit DOP853, and implicit Radau for stiff
+springs and friction with a small smoothing speed (Hairer, Norsett and Wanner, Solving Ordinary
+Differential Equations I; Hairer and Wanner, II).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+Rate = Callable[[float, np.ndarray], np.ndarray]
+
+# The classical method of Runge and Kutta, of fourth order: rows of coefficients; the last makes y.
+RUNGE_KUTTA = ((1 / 2,), (0, 1 / 2), (0, 0, 1), (1 / 6, 1 / 3, 1 / 3, 1 / 6))
+ROUNDING = 1e-9  # of a step
+LONGEST = 0.01  # seconds a step, so that events between its ends are not passed over
+SHORTEST = 1e-10  # seconds: where a state has no rate within such a step, it is at its end
+SHRINK = 0.25
+
+
+class Stuck(Exception):
+    """The state has no rate there, or none that the integrator can follow.
+
+    Attributes: status: of `Status`, or None where steps became too small.
+    """
+
+    def __init__(self, status: int | None = None) -> None:
+        super().__init__(status)
+        self.status = status
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step from t0 to t1.
+
+    at: (t,) -> the state between its ends.
+    """
+
+    t0: float
+    t1: float
+    y0: np.ndarray
+    y1: np.ndarray
+    at: Callable[[float], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """rtol: relative tolerance;  atol: (s,), absolute, one a state;  step: of fixed ones [s]."""
+
+    rtol: float
+    atol: np.ndarray
+    step: float | None = None
+
+
+class RK4:
+    """Between the corners of the efforts steps are equal, and at most `step` long.
+
+    Between its ends a step is a cubic through both states and rates, of fourth order too.
+    """
+
+    fixed: ClassVar[bool] = True  # whether steps are given, and not chosen by the error
+
+    def __init__(self, rate: Rate, settings: Settings) -> None:
+        assert settings.step is not None
+        self._rate, self._size = rate, settings.step
+
+    def restart(self, t: float, y: np.ndarray, until: float) -> None:
+        """Go on from here, to `until` at most: wherever the rate has a corner."""
+        self._count = max(math.ceil((until - t) / self._size - ROUNDING), 1)
+        self._start, self._until, self._done = t, until, 0
+        self._y, self._f = y, self._rate(t, y)
+
+    def step(self) -> Step:
+        """The next step.
+
+        Raises: Stuck: where there is none; the state stays at the end of the last one.
+        """
+        h, y0, f0 = (self._until - self._start) / self._count, self._y, self._f
+        t0, t1 = self._time(self._done), self._time(self._done + 1)
+        k = [f0]
+        for row in RUNGE_KUTTA:
+            y = y0 + sum(h * a * f for a, f in zip(row, k, strict=True) if a)
+            k.append(self._rate(t1 if sum(row) > 0.9 else t0 + sum(row) * h, y))
+        y1, f1 = y, k[-1]
+        self._done, self._y, self._f = self._done + 1, y1, f1
+        return Step(t0, t1, y0, y1, lambda t: hermite((t - t0) / h, h, y0, f0, y1, f1))
+
+    def _time(self, k: int) -> float:
+        if k == self._count:
+            return self._until
+        return self._start + k * ((self._until - self._start) / self._count)
+
+
+def hermite(
+    s: float, h: float, y0: np.ndarray, f0: np.ndarray, y1: np.ndarray, f1: np.ndarray
+) -> np.ndarray:
+    """The cubic with these values and rates at s = 0 and 1, a step h apart."""
+    a = s * s * (3 - 2 * s)
+    return y0 + a * (y1 - y0) + h * s * (1 - s) * ((1 - s) * f0 - s * f1)
+
+
+class Adaptive:
+    """One of SciPy's solvers, restarted between corners without a search for its first step."""
+
+    fixed: ClassVar[bool] = False
+
+    def __init__(self, solver: str, rate: Rate, settings: Settings) -> None:
+        import scipy.integrate
+
+        self._solver: Any = getattr(scipy.integrate, solver)
+        self._rate, self._settings = rate, settings
+        self._size: float | None = None
+        self._running: Any = None
+
+    def restart(self, t: float, y: np.ndarray, until: float) -> None:
+        """As of `RK4`."""
+        self._until = until
+        self._begin(t, y, self._size)
+
+    def _begin(self, t: float, y: np.ndarray, size: float | None) -> None:
+        first = None if size is None else min(size, self._until - t)
+        self._running = self._solver(
+            self._rate,
+            t,
+            y,
+            self._until,
+            max_step=LONGEST,
+            rtol=self._settings.rtol,
+            atol=self._settings.atol,
+            first_step=first,
+        )
+
+    def step(self) -> Step:
+        """As of `RK4`."""
+        running = self._running
+        t0, y0 = running.t, running.y
+        while True:
+            size = running.h_abs
+            try:
+                problem = running.step()
+                break
+            except Stuck:
+                size = min(size, self._until - t0) * SHRINK
+                if size < SHORTEST:
+                    raise
+                self._begin(t0, y0, size)
+                running = self._running
+        if problem is not None:
+            raise Stuck
+        self._size = running.h_abs
+        dense: list[Any] = []
+
+        def at(t: float) -> np.ndarray:
+            if not dense:
+                dense.append(running.dense_output())
+            return dense[0](t)
+
+        return Step(t0, running.t, y0, running.y, at)
+
+
+INTEGRATORS = ("DOP853", "Radau", "rk4")
+FIXED = ("rk4",)  # those with a step of their own
+
+
+def integrator(method: str, rate: Rate, settings: Settings) -> RK4 | Adaptive:
+    """The one of that name."""
+    return RK4(rate, settings) if method in FIXED else Adaptive(method, rate, settings)

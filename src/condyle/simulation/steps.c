@@ -1,0 +1,158 @@
+/* Runs with fixed steps, one or a crowd of them in lockstep: plant and controller are two kernels,
+ * given by address, and what either means is not known here.
+ *
+ * All rows are of `stride` numbers, one a run. The struct `Run` stands before this text, written from
+ * the table that lays it out for Python.
+ *
+ * What is rare is left to the caller, who goes on from there: steps in which a guard changes its
+ * sign, states that a kernel cannot vouch for. `gone` says in which runs. */
+
+enum { DONE, PAUSE, STEP, LOOK }; /* why `advance` returns; PAUSE: after `budget` steps */
+#define ROUNDING 1e-12            /* seconds */
+
+/* How many of rising times are at or before t. */
+static int64_t passed_by(const double *times, int64_t count, double t)
+{
+    int64_t low = 0, high = count;
+    while (low < high) {
+        int64_t middle = (low + high) / 2;
+        if (times[middle] <= t) low = middle + 1;
+        else high = middle;
+    }
+    return low;
+}
+
+/* Rows of numbers, of which `lanes` is 1 for all runs or one each. */
+static void spread(const Run *r, double *to, const double *from, int64_t rows, int64_t lanes)
+{
+    for (int64_t i = 0; i < rows; i++)
+        for (int64_t v = 0; v < r->runs; v++)
+            to[i * r->stride + v] = from[i * lanes + (lanes > 1 ? v : 0)];
+}
+
+/* What tables say at t, linear between their rows; outside they stay, or are zero. */
+static void feed(const Run *r, double t)
+{
+    for (const Table *f = r->table; f < r->table + r->tables; f++) {
+        int64_t after = passed_by(f->times, f->count, t), before = after > 0 ? after - 1 : 0;
+        int none = f->vanishes && (after == 0 || t > f->times[f->count - 1]);
+        if (after == f->count) after = f->count - 1;
+        if (f->vanishes && after == before && after > 0) before--;
+        double width = f->times[after] - f->times[before];
+        double part = width > 0 ? (t - f->times[before]) / width : 0;
+        const double *a = f->rows + before * f->width * f->lanes;
+        const double *b = f->rows + after * f->width * f->lanes;
+        for (int64_t i = 0; i < f->width; i++)
+            for (int64_t v = 0; v < r->runs; v++) {
+                int64_t at = i * f->lanes + (f->lanes > 1 ? v : 0);
+                f->to[i * r->stride + v] = none ? 0 : a[at] + part * (b[at] - a[at]);
+            }
+    }
+}
+
+/* Whether any run is gone: a kernel cannot vouch for it. */
+static int evaluate(Run *r, const Kernel *k)
+{
+    int any = 0;
+    if (r->runs == 1) return r->gone[0] = k->one(k->table, k->given, k->found) != 0;
+    k->batch(k->table, k->from, k->strides, (size_t)r->runs, k->found, (size_t)r->stride, r->status);
+    for (int64_t v = 0; v < r->runs; v++) any |= r->gone[v] = r->status[v] && r->alive[v];
+    return any;
+}
+
+static int rates(void *of, double t, const double *y, double *f)
+{
+    Run *r = of;
+    feed(r, fabs(t - r->until) < ROUNDING ? r->until : t);
+    memcpy(r->plant.given, y, (size_t)(r->inputs * r->stride) * sizeof *y);
+    if (evaluate(r, &r->plant)) return STEP;
+    memcpy(f, r->plant.found, (size_t)(r->size * r->stride) * sizeof *y);
+    return 0;
+}
+
+/* Whether a guard is on the other side of zero than it was, at the last rates. */
+static int guarded(Run *r)
+{
+    int any = 0;
+    for (int64_t g = 0; g < r->guards; g++) {
+        const double *value = r->plant.found + r->guard[g] * r->stride;
+        const uint8_t *past = r->past + g * r->runs;
+        for (int64_t v = 0; v < r->runs; v++)
+            if ((value[v] > 0) != past[v] && r->alive[v]) any = r->gone[v] = 1;
+    }
+    return any;
+}
+
+/* The controller looks: 0, or LOOK where the caller has to. */
+static int look(Run *r)
+{
+    int64_t stride = r->stride, k = r->tick + 1, due = k > r->delay ? k - r->delay : 0;
+    double *kept = r->looks + k * r->results * stride;
+    if (!r->seen && rates(r, r->t, r->y, r->k)) return LOOK;
+    r->seen = 1;
+    spread(r, r->aim, r->aims + k * r->aim_rows * r->aim_lanes, r->aim_rows, r->aim_lanes);
+    for (int64_t i = 0; i < r->links; i++)
+        memcpy(r->link_to[i], r->link_from[i], (size_t)stride * sizeof *kept);
+    if (evaluate(r, &r->control)) return LOOK;
+    memcpy(kept, r->control.found, (size_t)(r->results * stride) * sizeof *kept);
+    memcpy(r->states + k * r->size * stride, r->y, (size_t)(r->size * stride) * sizeof *kept);
+    for (int64_t i = 0; i < r->carried; i++)
+        memcpy(r->carry_to[i], r->carry_from[i], (size_t)stride * sizeof *kept);
+    for (int64_t i = 0; i < r->efforts; i++)
+        memcpy(r->effort + i * stride, r->looks + (due * r->results + r->effort_row[i]) * stride,
+               (size_t)stride * sizeof *kept);
+    r->tick = k;
+    return 0;
+}
+
+/* States at the results' times before `end`, by the cubic with these values and rates. */
+static void keep(Run *r, double t, double h, double end, const double *y0, const double *f0,
+                 const double *y1, const double *f1)
+{
+    int64_t n = r->size * r->stride;
+    for (; r->next < r->count && r->times[r->next] < end - ROUNDING; r->next++) {
+        double s = (fmax(r->times[r->next], t) - t) / h;
+        double a = s * s * (3 - 2 * s), b = h * s * (1 - s);
+        double *state = r->kept + r->next * n;
+        for (int64_t i = 0; i < n; i++)
+            state[i] = y0[i] + a * (y1[i] - y0[i]) + b * ((1 - s) * f0[i] - s * f1[i]);
+    }
+}
+
+/* Equal steps to `until`. */
+static int between(Run *r, double until)
+{
+    int64_t n = r->size * r->stride, steps = (int64_t)fmax(ceil((until - r->t) / r->step - 1e-9), 1);
+    double start = r->t, h = (until - start) / (double)steps, *f1 = r->k + r->stages * n;
+    r->until = until, r->seen = 0;
+    if (rates(r, start, r->y, r->k) || guarded(r)) return STEP;
+    for (int64_t k = 0; k < steps; k++) {
+        double t0 = start + (double)k * h, t1 = k + 1 < steps ? start + (double)(k + 1) * h : until;
+        r->seen = 0;
+        if (r->budget-- <= 0) return PAUSE;
+        if (runge_kutta(r->method, (int)r->stages, t0, h, r->y, (int)n, r->y1, r->k, rates, r) ||
+            guarded(r))
+            return STEP;
+        keep(r, t0, h, t1, r->y, r->k, r->y1, f1);
+        memcpy(r->y, r->y1, (size_t)n * sizeof *f1);
+        memcpy(r->k, f1, (size_t)n * sizeof *f1);
+        r->t = t1;
+        r->seen = 1;
+    }
+    return 0;
+}
+
+/* From where the runs are to their end, or to what the caller has to see to. */
+int advance(Run *r)
+{
+    for (; r->corner + 1 < r->corners; r->corner++, r->fresh = 1) {
+        int code;
+        if (r->fresh) {
+            r->t = r->corner_time[r->corner];
+            if (r->is_tick[r->corner] && (code = look(r))) return code;
+            r->fresh = 0;
+        }
+        if ((code = between(r, r->corner_time[r->corner + 1]))) return code;
+    }
+    return DONE;
+}

@@ -1,0 +1,254 @@
+"""Fixed steps in compiled code: `steps.c` over the kernels of plant and controller.
+
+It takes the steps of one run, or of several in lockstep, and hands back what is rare: a guard that
+changes its sign, a state that a kernel cannot vouch for.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from functools import lru_cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..backends import cache
+from ..backends.c.compiled_kernel import CompiledKernel
+from ..backends.c.shared_library import obtained, tool
+from ..backends.compiler import CompilerError, find_compiler
+from .columns import Columns
+from .control import Controller
+from .integrators import FIXED, RUNGE_KUTTA
+from .plan import ClosedLoop, Plan
+from .plant import Fed, Guard, Plant
+
+DONE, PAUSE, STEP, LOOK = range(4)  # why `advance` returns
+BUDGET = 20_000  # steps between two words of progress
+
+NUMBERS, POINTERS = "const double *", "double *const *"
+# What C and Python share, member by member; the struct in C is written from it.
+KERNEL = {
+    "one": "one_function", "batch": "batch_function", "table": NUMBERS, "given": "double *",
+    "found": "double *", "from": "const double *const *", "strides": "const ptrdiff_t *",
+}  # fmt: skip
+TABLE = {
+    "times": NUMBERS, "rows": NUMBERS, "to": "double *", "count": "int64_t", "width": "int64_t",
+    "lanes": "int64_t", "vanishes": "int64_t",
+}  # fmt: skip
+RUN = {
+    # runs, each a column of `stride`; which are alive, which are gone, what a batch said
+    "runs": "int64_t", "stride": "int64_t", "alive": "const uint8_t *", "gone": "uint8_t *",
+    "status": "uint8_t *", "plant": "Kernel", "control": "Kernel",
+    # the state y (size, ..), of which `inputs` rows go into the plant; rates k, stage by stage
+    "size": "int64_t", "inputs": "int64_t", "stages": "int64_t", "y": "double *", "y1": "double *",
+    "k": "double *", "method": NUMBERS, "step": "double", "t": "double", "until": "double",
+    "budget": "int64_t",
+    # where the rate has corners, at which of them the controller looks, and where the runs are
+    "corner_time": NUMBERS, "is_tick": "const uint8_t *", "corners": "int64_t", "corner": "int64_t",
+    "fresh": "int64_t", "seen": "int64_t",
+    # guards: rows of the plant's results, and whether each is beyond zero already
+    "guard": "const int64_t *", "guards": "int64_t", "past": "const uint8_t *",
+    "table": "const Table *", "tables": "int64_t",
+    # a look: aims to where they go, measured rows, results kept, what is carried on, efforts
+    "aims": NUMBERS, "aim": "double *", "aim_rows": "int64_t", "aim_lanes": "int64_t",
+    "link_to": POINTERS, "link_from": "const double *const *", "links": "int64_t",
+    "carry_to": POINTERS, "carry_from": "const double *const *", "carried": "int64_t",
+    "looks": "double *", "states": "double *", "results": "int64_t", "tick": "int64_t",
+    "delay": "int64_t", "effort": "double *", "effort_row": "const int64_t *", "efforts": "int64_t",
+    # results: states at times
+    "times": NUMBERS, "count": "int64_t", "next": "int64_t", "kept": "double *",
+}  # fmt: skip
+STRUCTS = {"Kernel": KERNEL, "Table": TABLE, "Run": RUN}
+HEAD = """#include <math.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+typedef int (*one_function)(const double *, const double *, double *);
+typedef void (*batch_function)(const double *, const double *const *, const ptrdiff_t *, size_t,
+                               double *, size_t, uint8_t *);
+"""
+
+
+def _structure(name: str) -> Any:
+    plain = {"int64_t": ctypes.c_int64, "double": ctypes.c_double}
+    fields = [
+        (member, _TYPES[kind] if kind in _TYPES else plain.get(kind, ctypes.c_void_p))
+        for member, kind in STRUCTS[name].items()
+    ]
+    return type(name, (ctypes.Structure,), {"_fields_": fields})
+
+
+_TYPES: dict[str, Any] = {}
+for _name in STRUCTS:
+    _TYPES[_name] = _structure(_name)
+
+
+@lru_cache(maxsize=1)
+def _library() -> Any:
+    """The loop, from the cache or built.
+
+    Raises: CompilerError: where it cannot be built.
+    """
+    room, compiler = files("condyle"), find_compiler()
+    structs = [
+        f"typedef struct {{\n{''.join(f'    {kind} {n};{chr(10)}' for n, kind in members.items())}"
+        f"}} {name};\n"
+        for name, members in STRUCTS.items()
+    ]
+    parts = ("backends/c/runge_kutta.h", "simulation/steps.c")
+    texts = [(room / part).read_text(encoding="utf-8") for part in parts]
+    source = "\n".join([HEAD, *structs, *texts])
+
+    def make(folder: Path) -> tuple[Path, dict[str, Any]]:
+        (folder / "steps.c").write_text(source, encoding="utf-8")
+        compiler.build(folder / "steps.so", folder / "steps.c")
+        return folder / "steps.so", {"flags": list(compiler.flags)}
+
+    return obtained(cache.digest(source, tool(compiler)), make, _opened)[1]
+
+
+def _opened(path: str) -> ctypes.CDLL:
+    library = ctypes.CDLL(path)
+    library.advance.argtypes = [ctypes.c_void_p]
+    return library
+
+
+def steps_of(plant: Plant, control: Controller | None, *shared: Any) -> Steps | None:
+    """Compiled steps of a plan, or None where there are none for it; see `Steps`."""
+    plan = plant.plan
+    if plan.method not in FIXED or plan.functions:
+        return None
+    if control is not None and (control.outside or not len(control.ticks)):
+        return None
+    both = [plant.columns, *([] if control is None else [control.columns])]
+    if not all(isinstance(columns.kernel, CompiledKernel) for columns in both):
+        return None
+    try:
+        return Steps(plan, _library(), plant, control, *shared)
+    except CompilerError:
+        return None
+
+
+class Steps:
+    """Runs in compiled code, on the rows of plant and controller and the arrays of who owns them.
+
+    Attributes: run: the struct, whose t, corner, tick, next, fresh and budget the owner reads and
+                sets;  gone: (runs,), which of them the owner has to see to.
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        library: Any,
+        plant: Plant,
+        control: Controller | None,
+        guards: Sequence[Guard],
+        fed: Sequence[Fed],
+        y: np.ndarray,
+        past: np.ndarray,
+        alive: np.ndarray,
+        kept: np.ndarray,
+    ) -> None:
+        """The steps of runs.
+
+        Args: guards: of the first run, which stand where all others' do.
+              fed: tables, of rows for all runs or one each;  past: (guards, runs), of bool.
+              y: (size, stride);  alive: (runs,);  kept: (N, size, stride), of the results' times.
+        """
+        self._library, self._past = library, past
+        self._keep: list[Any] = [plant, control, y, alive, kept]
+        runs, stride = alive.size, plant.columns.stride
+        self.run = run = _TYPES["Run"]()
+        self.gone = np.zeros(runs, dtype=np.uint8)
+        self._flags = np.zeros(past.shape, dtype=np.uint8)
+        run.runs, run.stride, run.budget = runs, stride, BUDGET
+        run.alive, run.gone = alive.ctypes.data, self.gone.ctypes.data
+        run.status = self._at(np.zeros(runs, dtype=np.uint8))
+        run.plant = self._kernel(plant.columns)
+        run.size, run.inputs, run.stages = plan.size, 2 * len(plan.q), len(RUNGE_KUTTA)
+        run.y, run.y1 = y.ctypes.data, self._at(np.zeros_like(y))
+        run.k = self._at(np.zeros((len(RUNGE_KUTTA) + 1, *y.shape)))
+        run.method = self._at(np.concatenate([np.array(row, float) for row in RUNGE_KUTTA]))
+        run.step = plan.settings.step
+        corners, ticks = plan.corners(), plan.ticks()
+        is_tick = np.zeros(len(corners), dtype=np.uint8)
+        if len(ticks):
+            is_tick[np.clip(np.searchsorted(corners, ticks - 1e-12), 0, len(corners) - 1)] = 1
+            is_tick[-1] = 0
+        run.corner_time, run.is_tick = self._at(corners), self._at(is_tick)
+        run.corners, run.fresh, run.tick = len(corners), 1, -1
+        run.guard = self._at(np.array([guard.row for guard in guards], dtype=np.int64))
+        run.guards, run.past = len(guards), self._flags.ctypes.data
+        self._feed(fed, plant)
+        if control is not None:
+            self._control(plan, plant, control, y)
+        run.times, run.count, run.kept = self._at(plan.times), len(kept), kept.ctypes.data
+
+    def advance(self, budget: int = BUDGET) -> int:
+        """Go on; returns DONE, PAUSE (nothing happened yet), or what the owner has to see to."""
+        self._flags[:], self.gone[:], self.run.budget = self._past, 0, budget
+        return int(self._library.advance(ctypes.addressof(self.run)))
+
+    def _feed(self, fed: Sequence[Fed], plant: Plant) -> None:
+        tables = (_TYPES["Table"] * max(len(fed), 1))()
+        for to, table in zip(tables, fed, strict=False):
+            rows, columns = plant.columns.rows(table.port), plant.columns
+            to.times, to.rows = self._at(table.times), self._at(table.rows[:, np.argsort(rows)])
+            to.to, to.count, to.width = columns.address(int(rows.min())), *table.rows.shape[:2]
+            to.lanes = table.rows.shape[2] if table.rows.ndim > 2 else 1
+            to.vanishes = table.vanishes
+        self._keep.append(tables)
+        self.run.table, self.run.tables = ctypes.addressof(tables), len(fed)
+
+    def _control(self, plan: Plan, plant: Plant, control: Controller, y: np.ndarray) -> None:
+        run, columns, m = self.run, control.columns, len(plan.q)
+        run.control = self._kernel(columns)
+        run.aims, run.aim = control.aims.ctypes.data, columns.address(control.first)
+        run.aim_rows, run.aim_lanes = control.aims.shape[1:]
+        measured = [(plant.columns, name, name) for name in ("joint", "joint_rate")]
+        measured += [(plant.columns, "felt", "force")] * bool(plant.columns.result("felt").size)
+        links = [
+            (columns.address(to), source.address(row, found=True))
+            for source, name, port in measured
+            for to, row in zip(columns.rows(port), source.result(name), strict=True)
+        ]
+        if columns.has("q"):
+            to = [*columns.rows("q"), *columns.rows("q1")]
+            links += [
+                (columns.address(row), y[i:].ctypes.data) for i, row in enumerate(to[: 2 * m])
+            ]
+        run.link_to, run.link_from, run.links = *self._pointers(links), len(links)
+        pairs = zip(control.carry_to, control.carry_from, strict=True)
+        carry = [(columns.address(to), columns.address(row, found=True)) for to, row in pairs]
+        run.carry_to, run.carry_from, run.carried = *self._pointers(carry), len(carry)
+        run.looks, run.states = control.looks.ctypes.data, control.states.ctypes.data
+        run.results = columns.results
+        assert isinstance(plan.drive, ClosedLoop)
+        run.delay = plan.drive.delay
+        rows = plant.columns.rows("effort")
+        run.effort = plant.columns.address(int(rows.min()))
+        order = columns.result("effort")[np.argsort(rows)]
+        run.effort_row, run.efforts = self._at(order.astype(np.int64)), len(order)
+
+    def _kernel(self, columns: Columns) -> Any:
+        one, batch, table = columns.kernel.address  # type: ignore[attr-defined]
+        pointers, strides = columns.pointers()
+        self._keep += [columns, pointers, strides]
+        given, found = columns.address(0), columns.address(0, found=True)
+        places = ctypes.addressof(pointers), ctypes.addressof(strides)
+        return _TYPES["Kernel"](one, batch, table, given, found, *places)
+
+    def _pointers(self, pairs: list[tuple[int, int]]) -> tuple[int, int]:
+        both = [(ctypes.c_void_p * max(len(pairs), 1))(*side) for side in zip(*pairs, strict=True)]
+        both = both or [(ctypes.c_void_p * 1)(), (ctypes.c_void_p * 1)()]
+        self._keep += both
+        return ctypes.addressof(both[0]), ctypes.addressof(both[1])
+
+    def _at(self, array: np.ndarray) -> int:
+        """Address of an array's numbers, kept as long as this is."""
+        own = np.ascontiguousarray(array)
+        self._keep.append(own)
+        return own.ctypes.data
