@@ -1,7 +1,7 @@
 """Measured motion as laboratories have it: markers of a C3D file, and the pose they give."""
 
-from .gaps import Gap
 from .marker_file import MarkerFile, read_markers
+from .marker_gaps import Gap
 from .marker_motion import (
     MAX_GAP,
     MAX_RESIDUAL,

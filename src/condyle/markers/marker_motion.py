@@ -21,10 +21,10 @@ from ..motion.path import Motion
 from .channel_tables import Forces
 from .emg import envelopes
 from .forces import measured_load
-from .gaps import close_gaps
 from .marker_bodies import Bodies, Body, find_bodies
 from .marker_checks import odd_sizes, suspects_in, why_none
 from .marker_file import MarkerFile, Place, read_markers
+from .marker_gaps import close_gaps
 from .marker_labels import find_label
 from .marker_report import MarkerMotion, MarkerResidual
 from .measured_channels import Beside

@@ -15,7 +15,7 @@ from ..motion.column_units import FORCE, MOMENT, POSE
 from ..motion.path import Motion
 from ..motion.platform_load import Load
 from ..motion.table_writer import TableWriter
-from .gaps import Gap
+from .marker_gaps import Gap
 from .measured_channels import Beside
 from .recording import Recording
 from .registration import Registration
