@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -42,31 +43,15 @@ class Robust:
         self._independent = independent
         self._distributor = distributor
         angles = [name not in ("X", "Y", "Z") for name in independent]
-        self._surveys: dict[tuple[str, ...], NumpyKernel] = {}
+        self._kernels: dict[tuple[Any, ...], NumpyKernel] = {}
         self._scale = np.where(angles, characteristic(structure, numbers), 1.0)
 
-    def _kernel(self, name: str) -> NumpyKernel:
-        return NumpyKernel(Question.about(self._structure, name).variants(), self._numbers)
-
-    @cached_property
-    def _motion(self) -> NumpyKernel:
-        return self._kernel("motion")
-
-    @cached_property
-    def _system(self) -> NumpyKernel:
-        return self._kernel("system")
-
-    @cached_property
-    def _forward_system(self) -> NumpyKernel:
-        return self._kernel("forward_system")
-
-    @cached_property
-    def _linear(self) -> NumpyKernel:
-        return self._kernel("linear")
-
-    @cached_property
-    def _configuration(self) -> NumpyKernel:
-        return self._kernel("configuration")
+    def _kernel(self, *asked: Any) -> NumpyKernel:
+        """Of a question and its details; made once."""
+        if asked not in self._kernels:
+            question = Question.about(self._structure, *asked)
+            self._kernels[asked] = NumpyKernel(question.variants(), self._numbers)
+        return self._kernels[asked]
 
     @cached_property
     def _followed(self) -> FollowedClosure:
@@ -80,7 +65,7 @@ class Robust:
         load = {name: inputs[name] for name in ("force", "moment", "point")}
         with np.errstate(all="ignore"):
             values |= self.configuration(poses["pose"])
-            system = self._system.run(poses | load).values
+            system = self._kernel("system").run(poses | load).values
             s = {name: np.moveaxis(a, -1, 0) for name, a in system.items()}
             values["joint_rate"], values["joint_acceleration"] = (
                 s[name].T for name in ("joint_rate", "joint_acceleration")
@@ -117,7 +102,7 @@ class Robust:
         others = {name: inputs[name] for name in ("effort", "force", "moment", "point")}
         with np.errstate(all="ignore"):
             configuration = self.configuration(poses["pose"])
-            system = self._forward_system.run(poses | others).values
+            system = self._kernel("forward_system").run(poses | others).values
             s = {name: np.moveaxis(a, -1, 0) for name, a in system.items()}
             found = balanced(s, self._structure.friction)
             q2 = solved_rows(s["S"], found.w)
@@ -145,11 +130,11 @@ class Robust:
 
     def linear(self, ports: Mapping[str, np.ndarray]) -> Arrays:
         """Results of the question of that name: asked for too seldom to be worth a compiler."""
-        return self._linear.run(ports).values
+        return self._kernel("linear").run(ports).values
 
     def motion(self, inputs: Mapping[str, np.ndarray]) -> tuple[Arrays, np.ndarray]:
         """X_EE and its rates by name, (6, N) each, and statuses: whether contacts can be met."""
-        answer = self._motion.run(inputs)
+        answer = self._kernel("motion").run(inputs)
         doubtful = np.flatnonzero(answer.status == AGAIN)
         if doubtful.size:
             found = self._followed.solve(*(inputs[name][doubtful] for name in ("q", "q1", "q2")))
@@ -160,7 +145,7 @@ class Robust:
 
     def configuration(self, pose: np.ndarray) -> Arrays:
         """The configuration's results by name, samples last; always by LAPACK."""
-        values = self._configuration.run({"pose": pose}).values
+        values = self._kernel("configuration").run({"pose": pose}).values
         rows = np.moveaxis(values["J_W"], -1, 0)
         good = np.isfinite(rows).all(axis=(1, 2))
         sigma = np.full((len(rows), self._structure.m), np.nan)
@@ -171,10 +156,7 @@ class Robust:
     def survey(self, wanted: tuple[str, ...], pose: np.ndarray) -> Arrays:
         """Results of that question at whole poses, and `rows`, by name, samples last."""
         wanted = (*wanted, *(() if "rows" in wanted else ("rows",)))
-        if wanted not in self._surveys:
-            question = Question.about(self._structure, "survey", wanted, True)
-            self._surveys[wanted] = NumpyKernel(question.variants(), self._numbers)
-        values = self._surveys[wanted].run({"pose": pose}).values
+        values = self._kernel("survey", wanted, True).run({"pose": pose}).values
         rows = np.moveaxis(values["rows"], -1, 0)
         good = np.isfinite(rows).all(axis=(1, 2))
         if "J_W_sigma" in values:

@@ -37,6 +37,11 @@ class Derived:
         return self.evaluation.status == Status.ok
 
     @cached_property
+    def status(self) -> np.ndarray:
+        """Of `Status`, (N,) int8."""
+        return self.evaluation.status.astype(np.int8, copy=False)
+
+    @cached_property
     def all_ok(self) -> bool:
         return bool(self.ok.all())
 

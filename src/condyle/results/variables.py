@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 
@@ -36,10 +37,6 @@ WRENCH = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 Rule = Callable[[Mechanism], str]
 
 
-def always(_: Derived) -> bool:
-    return True
-
-
 def with_friction(derived: Derived) -> bool:
     return any(contact.friction.coefficient for contact in derived.mechanism.contacts)
 
@@ -48,36 +45,46 @@ def with_limits(derived: Derived) -> bool:
     return any(limits(chain).limited for chain in derived.mechanism.chains)
 
 
-def chosen_within_limits(derived: Derived) -> bool:
-    return derived.limited
-
-
 @dataclass(frozen=True)
 class Variable:
     """A variable of a solution.
 
     units:  or a rule that gives them for a mechanism; with several, one an entry or a chain.
-    values: from an evaluation. Floating-point ones become NaN where a sample failed.
+    place:  of its values in a `Derived`, as attributes; "" where a simulation brings them, by
+            name. Floating-point ones become NaN where a sample failed.
     column: what the names of its columns begin with in CSV, before that of the entry; None: it
             has none there.
     flags:  what its integers mean, or a rule for that: words that a blank parts.
-    when:   whether a solution has it at all.
+    only:   whether a solution has it at all.
     failed: whether failed samples may have a value too.
     sizes:  of vectors along the last dimension stand in CSV, not their components.
-    simulated: whether only a simulation has it.
     """
 
     name: str
     dims: tuple[str, ...]
     units: str | Rule
     meaning: str
-    values: Callable[[Derived], np.ndarray]
+    place: str = ""
     column: str | None = None
     flags: str | Rule = ""
-    when: Callable[[Derived], bool] = always
+    only: Callable[[Derived], bool] | None = None
     failed: bool = False
     sizes: bool = False
-    simulated: bool = False
+
+    @property
+    def simulated(self) -> bool:
+        """Whether only a simulation has it."""
+        return not self.place
+
+    def when(self, derived: Derived) -> bool:
+        """Whether a solution has it."""
+        if self.simulated:
+            return self.name in derived.simulated
+        return self.only is None or self.only(derived)
+
+    def values(self, derived: Derived) -> np.ndarray:
+        """Its values; floating-point ones of failed samples may be anything."""
+        return derived.simulated[self.name] if self.simulated else attrgetter(self.place)(derived)
 
     def attributes(self, mechanism: Mechanism) -> dict[str, str]:
         """`units`, `long_name` and, where there are flags, `flag_meanings`."""
@@ -101,28 +108,6 @@ def variable_columns(
 def named_columns(prefix: str, names: Iterable[str], values: np.ndarray) -> dict[str, np.ndarray]:
     """Columns (N, entries) by their names."""
     return {f"{prefix}{name}": values[:, i] for i, name in enumerate(names)}
-
-
-def _simulated(
-    name: str,
-    dims: tuple[str, ...],
-    units: str | Rule,
-    meaning: str,
-    column: str | None = None,
-    sizes: bool = False,
-) -> Variable:
-    """A variable of simulations, whose values come with them."""
-    return Variable(
-        name,
-        dims,
-        units,
-        meaning,
-        lambda d: d.simulated[name],
-        column=column,
-        when=lambda d: name in d.simulated,
-        sizes=sizes,
-        simulated=True,
-    )
 
 
 def of_independent(form: str) -> Rule:
@@ -168,156 +153,141 @@ _FREE = ("time", "independent")
 # Those with columns come first, in the order of the columns.
 # fmt: off
 VARIABLES = (
-    Variable(
-        "torque", _CHAIN, of_effort(), chosen(LEAST),
-        lambda d: d.evaluation.effort, column="tau_",
-    ),
+    Variable("torque", _CHAIN, of_effort(), chosen(LEAST), "evaluation.effort", column="tau_"),
     Variable(
         "contact_force", _CONTACT, "N",
         "contact force on the platform along the unit normal of the surface",
-        lambda d: d.evaluation.contact_force, column="contact_",
+        "evaluation.contact_force", column="contact_",
     ),
     Variable(
-        "pose", _POSE, of_pose("{}"), "pose of the platform X_EE",
-        lambda d: d.evaluation.pose, column="",
+        "pose", _POSE, of_pose("{}"), "pose of the platform X_EE", "evaluation.pose", column="",
     ),
     Variable(
         "joint", _CHAIN, of_joint(), "joint coordinate, zero at home",
-        lambda d: d.evaluation.configuration.joint, column="joint_",
+        "evaluation.configuration.joint", column="joint_",
     ),
     Variable(
         "sliding_speed", _CONTACT, "m/s",
-        "speed of the platform where it touches, where contacts have friction",
-        lambda d: d.sliding_speed, column="sliding_", when=with_friction,
+        "speed of the platform where it touches, where contacts have friction", "sliding_speed",
+        column="sliding_", only=with_friction,
     ),
     Variable(
-        "friction_force", _PLACE, "N",
-        "friction on the platform in {S}, where contacts have some",
-        lambda d: d.evaluation.friction_force, column="friction_", when=with_friction, sizes=True,
+        "friction_force", _PLACE, "N", "friction on the platform in {S}, where contacts have some",
+        "evaluation.friction_force", column="friction_", only=with_friction, sizes=True,
     ),
     Variable(
         "friction_power", _CONTACT, "W",
         "power of friction on the platform, never positive, where contacts have friction",
-        lambda d: d.friction_power, when=with_friction,
+        "friction_power", only=with_friction,
     ),
-    _simulated("command", _CHAIN, of_effort(), "effort that the controller asks for", "command_"),
-    _simulated("measured_joint", _CHAIN, of_joint(), "joint as its encoder reads", "measured_"),
-    _simulated(
-        "estimate", _FREE, of_independent("{}"), "state as the controller takes it", "estimate_"
+    Variable(
+        "command", _CHAIN, of_effort(), "effort that the controller asks for", column="command_",
     ),
-    _simulated("estimate_rate", _FREE, of_independent("{}/s"), "rate as the controller takes it"),
-    _simulated("reference", _FREE, of_independent("{}"), "state to follow", "reference_"),
-    _simulated("reference_rate", _FREE, of_independent("{}/s"), "rate to follow"),
-    _simulated(
-        "tracking_error", _FREE, of_independent("{}"), "reference less state", "error_"
+    Variable(
+        "measured_joint", _CHAIN, of_joint(), "joint as its encoder reads", column="measured_",
     ),
-    _simulated("bite_force", ("time",), "N", "force that the controller measures", "bite_force"),
-    _simulated("bite_reference", ("time",), "N", "force to bite with", "bite_reference"),
-    _simulated(
-        "load_force", ("time", "source", "axis"), "N",
-        "force of each load on the platform in {S}", "load_", sizes=True,
+    Variable(
+        "estimate", _FREE, of_independent("{}"), "state as the controller takes it",
+        column="estimate_",
     ),
-    _simulated(
+    Variable("estimate_rate", _FREE, of_independent("{}/s"), "rate as the controller takes it"),
+    Variable("reference", _FREE, of_independent("{}"), "state to follow", column="reference_"),
+    Variable("reference_rate", _FREE, of_independent("{}/s"), "rate to follow"),
+    Variable(
+        "tracking_error", _FREE, of_independent("{}"), "reference less state", column="error_",
+    ),
+    Variable(
+        "bite_force", ("time",), "N", "force that the controller measures", column="bite_force",
+    ),
+    Variable("bite_reference", ("time",), "N", "force to bite with", column="bite_reference"),
+    Variable(
+        "load_force", ("time", "source", "axis"), "N", "force of each load on the platform in {S}",
+        column="load_", sizes=True,
+    ),
+    Variable(
         "load_mode", ("time", "source"), "1",
         "mode of each load: of food 0 apart, 1 between the teeth, 2 broken",
     ),
-    _simulated(
+    Variable(
         "energy", ("time", "account"), "J",
         "kinetic and potential energy, work of actuators and loads, losses since the start",
     ),
-    _simulated("actuator_loss", _CHAIN, "W", "power that the actuator's own friction takes"),
+    Variable("actuator_loss", _CHAIN, "W", "power that the actuator's own friction takes"),
     Variable(
         "actuator_power", _CHAIN, "W", "power of the actuator: effort times joint rate",
-        lambda d: d.actuator_power,
+        "actuator_power",
     ),
     Variable(
         "activation", _CHAIN, "1",
         "effort over the greatest |limit| of its chain, where chains have limits; nan without one",
-        lambda d: d.activation, when=with_limits,
+        "activation", only=with_limits,
     ),
     Variable(
         "shortfall", ("time",), "1",
         "by how much all limits would have to be multiplied, where efforts were chosen within "
         "limits: 1 where they suffice, inf where no limits would do",
-        lambda d: d.shortfall, when=chosen_within_limits, failed=True,
+        "shortfall", only=attrgetter("limited"), failed=True,
     ),
-    Variable(
-        "pose_rate", _POSE, of_pose("{}/s"), "rate of X_EE", lambda d: d.evaluation.pose_rate
-    ),
+    Variable("pose_rate", _POSE, of_pose("{}/s"), "rate of X_EE", "evaluation.pose_rate"),
     Variable(
         "pose_acceleration", _POSE, of_pose("{}/s^2"), "acceleration of X_EE",
-        lambda d: d.evaluation.pose_acceleration,
+        "evaluation.pose_acceleration",
     ),
     Variable(
         "share", ("part", *_CHAIN), of_effort(), "part of the effort each part needs",
-        lambda d: d.evaluation.share,
+        "evaluation.share",
     ),
     Variable(
         "lift_off", _CONTACT, "1",
-        "whether a one-sided contact would have to pull: the ball lifts off",
-        lambda d: d.lifted,
+        "whether a one-sided contact would have to pull: the ball lifts off", "lifted",
     ),
     Variable(
         "contact_point", _PLACE, "m", "centre of the contact ball in {S}",
-        lambda d: d.evaluation.configuration.contact_point,
+        "evaluation.configuration.contact_point",
     ),
     Variable(
         "contact_normal", _PLACE, "1", "unit normal of the surface at the contact in {S}",
-        lambda d: d.evaluation.configuration.contact_normal,
+        "evaluation.configuration.contact_normal",
     ),
     Variable(
         "bound_margin", _CONTACT, "m",
-        "distance of the contact point to its nearest bound; negative outside",
-        lambda d: d.margin,
+        "distance of the contact point to its nearest bound; negative outside", "margin",
     ),
-    Variable(
-        "joint_rate", _CHAIN, of_joint("{}/s"), "joint rate", lambda d: d.evaluation.joint_rate
-    ),
+    Variable("joint_rate", _CHAIN, of_joint("{}/s"), "joint rate", "evaluation.joint_rate"),
     Variable(
         "joint_acceleration", _CHAIN, of_joint("{}/s^2"), "joint acceleration",
-        lambda d: d.evaluation.joint_acceleration,
+        "evaluation.joint_acceleration",
     ),
-    Variable(
-        "rod_beta", _CHAIN, "rad", "rod angle beta_i", lambda d: d.evaluation.configuration.beta
-    ),
-    Variable(
-        "rod_gamma", _CHAIN, "rad", "rod angle gamma_i", lambda d: d.evaluation.configuration.gamma
-    ),
-    Variable(
-        "load", ("time", "component"), "N, N m", "load on the platform in {S}", lambda d: d.wrench
-    ),
+    Variable("rod_beta", _CHAIN, "rad", "rod angle beta_i", "evaluation.configuration.beta"),
+    Variable("rod_gamma", _CHAIN, "rad", "rod angle gamma_i", "evaluation.configuration.gamma"),
+    Variable("load", ("time", "component"), "N, N m", "load on the platform in {S}", "wrench"),
     Variable(
         "J_A", _CHAIN, of_joint("m^2/{}"), "diagonal of J_A, eq. (26)",
-        lambda d: d.evaluation.configuration.singularity.J_A,
+        "evaluation.configuration.singularity.J_A",
     ),
     Variable(
         "transmission", _CHAIN, "1", "J_A made dimensionless",
-        lambda d: d.evaluation.configuration.singularity.transmission,
+        "evaluation.configuration.singularity.transmission",
     ),
     Variable(
         "J_W_sigma", ("time", "independent"), "1", "singular values of the dimensionless J_W",
-        lambda d: d.evaluation.configuration.singularity.J_W_sigma,
+        "evaluation.configuration.singularity.J_W_sigma",
     ),
-    Variable("condition", ("time",), "1", "condition number of J_W", lambda d: d.condition),
+    Variable("condition", ("time",), "1", "condition number of J_W", "condition"),
     Variable(
         "rank", ("time",), "1", "rank of J_W; 0 where the pose cannot be reached",
-        lambda d: d.evaluation.configuration.singularity.rank,
+        "evaluation.configuration.singularity.rank",
     ),
     Variable(
-        "singularity_ratio", ("time",), "1",
-        "smallest over largest singular value of J_A or J_W", lambda d: d.ratio,
+        "singularity_ratio", ("time",), "1", "smallest over largest singular value of J_A or J_W",
+        "ratio",
     ),
     Variable(
-        "singularity", ("time",), "1", "kind of singularity that is near",
-        lambda d: d.near, flags=" ".join(KINDS),
+        "singularity", ("time",), "1", "kind of singularity that is near", "near",
+        flags=" ".join(KINDS),
     ),
-    Variable(
-        "status", ("time",), "1", "status",
-        lambda d: d.evaluation.status.astype(np.int8, copy=False), flags=" ".join(STATUS_NAMES),
-    ),
-    Variable(
-        "cause", ("time",), "1", "what the sample fails by", lambda d: d.cause, flags=cause_flags
-    ),
+    Variable("status", ("time",), "1", "status", "status", flags=" ".join(STATUS_NAMES)),
+    Variable("cause", ("time",), "1", "what the sample fails by", "cause", flags=cause_flags),
 )
 # fmt: on
 
