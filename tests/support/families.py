@@ -39,6 +39,17 @@ WITH_CABLES: dict[str, dict[str, Any]] = {
     "cable_k0": {"families": ("cable",), "contacts": 0},
     "every_family": {"families": (*MIXED, "cable"), "chains": 8},
 }
+LINES: dict[str, dict[str, Any]] = {
+    "k0": {"families": ("cable",), "contacts": 0},
+    "k2_n9": {"families": ("cable",), "chains": 9, "tilted_gravity": True},
+    "k3_curved": {"families": ("cable",), "contacts": 3, "surface": "quadratic"},
+    "along_x": {"families": ("cable",), "rod_along_x": True},
+    "mixed_k1": {"families": ("cable", "SPS", "PSS"), "contacts": 1, "chains": 8},
+    "mixed_k2": {"families": ("cable", "PSS"), "contacts": 2, "chains": 7},
+}
+# Cables and motors: the default distribution refuses to add squares of N and N m.
+TWO_UNITS = {"k2_two_units": {"families": ("cable", "RSS"), "contacts": 2, "chains": 8}}
+ALL = MECHANISMS | WITH_CABLES | LINES | TWO_UNITS
 SCALES = (0.0, 0.05, 1.0, 1.0)  # home, near it, and far
 
 
@@ -51,15 +62,15 @@ class Case:
     states: dict[str, Any]
     load: np.ndarray
 
-    def evaluate(
-        self,
-        formulation: str = "virtual_power",
-        route: str = "core",
-        backend: str = "numpy",
-    ) -> Evaluation:
-        model = Model(self.mechanism, formulation, route, backend)
+    def model(self, *choices: str, backend: str = "numpy", **options: Any) -> Model:
+        """Args: choices: formulation and route."""
+        model = Model(self.mechanism, *choices, backend=backend, **options)
         assert model.independent == tuple(self.states["names"])
-        return model.evaluate(*(self.states[key] for key in ("q", "qd", "qdd")), self.load)
+        return model
+
+    def evaluate(self, *choices: str, backend: str = "numpy", **options: Any) -> Evaluation:
+        q = (self.states[key] for key in ("q", "qd", "qdd"))
+        return self.model(*choices, backend=backend, **options).evaluate(*q, self.load)
 
     def sample(self, i: int) -> tuple[Any, ...]:
         """Pose, its rate and acceleration, wrench and load point, as the oracles take them."""
@@ -69,11 +80,8 @@ class Case:
 
 @cache
 def case(name: str) -> Case:
-    """One of `MECHANISMS` or `WITH_CABLES`, at home, near it and away from it."""
-    raw = random_mechanism(
-        np.random.default_rng(sum(map(ord, name))), **(MECHANISMS | WITH_CABLES)[name]
-    )
-    return of_raw(raw)
+    """One of `ALL`, at home, near it and away from it."""
+    return of_raw(random_mechanism(np.random.default_rng(sum(map(ord, name))), **ALL[name]))
 
 
 def of_raw(raw: Raw) -> Case:
@@ -95,3 +103,11 @@ def close(got: Any, wanted: Any, tolerance: float, floor: float = 0.0) -> None:
     got, wanted = np.asarray(got), np.asarray(wanted)
     scale = max(np.abs(wanted).max(initial=0), floor)
     np.testing.assert_allclose(got, wanted, rtol=0, atol=tolerance * scale)
+
+
+def same(ours: Evaluation, wanted: Evaluation, tolerance: float) -> None:
+    assert (ours.status == 0).all() and (wanted.status == 0).all()
+    # Shares cancel in the effort; parts are compared with the largest of them.
+    for name in ("effort", "share", "joint_rate", "joint_acceleration"):
+        close(getattr(ours, name), getattr(wanted, name), tolerance)
+    close(ours.contact_force, wanted.contact_force, 10 * tolerance)

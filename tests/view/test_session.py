@@ -9,8 +9,8 @@ import pytest
 
 import condyle
 from condyle.errors import InputError
-from condyle.kinematics.bryant import bryant_angles
 from condyle.markers import Beside
+from condyle.mechanism.coordinates import bryant_angles
 from condyle.motion import Load, Motion
 from condyle.report.scene import contact_patch, place, platform_hull, rotations
 from condyle.results.solution import Solution

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError
-from ..kinematics.bryant import rotations
+from ..mechanism.coordinates import rotations
 from ..motion.column_units import Dimension, unit_factor
 from ..motion.file_words import listed, short
 from ..motion.platform_load import Load

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kinematics.bryant import bryant_angles
+from ..mechanism.coordinates import bryant_angles
 
 FEWEST = 3  # markers that hold a body
 FLATTEST = 0.03  # breadth over length of a body whose turn about its length can still be told

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from ..errors import InputError, did_you_mean
-from ..kinematics.bryant import rotations
 from ..markers import Beside, read_beside
+from ..mechanism.coordinates import rotations
 
 if TYPE_CHECKING:
     import xarray as xr

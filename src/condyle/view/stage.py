@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import viser
 
-from ..kinematics.bryant import bryant_angles
 from ..mechanism import Mechanism
+from ..mechanism.coordinates import bryant_angles
 from ..report.scene import LIGHT, MARKERS, ROLES, VIEWS, Bar, Scene, cloud, parts_of, place
 from ..report.scene.parts import JOINT, ROD
 from .shapes import matrix, quaternion, turn_onto, unit_rod

@@ -6,25 +6,15 @@ from pathlib import Path
 
 import pytest
 from oracles import description
-from support.families import MECHANISMS, Case, case, close, of_raw
+from support.families import MECHANISMS, Case, case, of_raw, same
 
 import condyle
 from condyle.dynamics import FORMULATIONS
 from condyle.mechanism import load
-from condyle.model.data import Evaluation
 from condyle.questions.numbers import has_closed_form
 
 OTHERS = [name for name in FORMULATIONS if name != "virtual_power"]
 BUNDLED = Path(condyle.__file__).parent / "mechanism" / "bundled"
-
-
-def same(ours: Evaluation, wanted: Evaluation, tolerance: float) -> None:
-    close(ours.effort, wanted.effort, tolerance)
-    close(ours.contact_force, wanted.contact_force, 10 * tolerance)
-    # Shares cancel in the effort; parts are compared with the largest of them.
-    close(ours.share, wanted.share, tolerance)
-    close(ours.joint_rate, wanted.joint_rate, tolerance)
-    close(ours.joint_acceleration, wanted.joint_acceleration, tolerance)
 
 
 @pytest.mark.parametrize("formulation", OTHERS)

@@ -11,8 +11,8 @@ from oracles.rotations import bryant
 
 import condyle
 from condyle.errors import InconsistentError, InputError, UnreachableError
-from condyle.kinematics.bryant import bryant_angles, rotations
 from condyle.mechanism import bundled_mechanisms
+from condyle.mechanism.coordinates import bryant_angles, rotations
 from condyle.mechanism.files import from_data
 from condyle.model.forward_kinematics import ForwardKinematics
 from condyle.model.forward_kinematics.orientation import principal

@@ -23,7 +23,7 @@ import casadi as ca
 import numpy as np
 
 from ...mechanism.bodies import cross
-from ..bryant import rotations
+from ...mechanism.coordinates import rotations
 from ..rotation import rotation_y, rotation_z
 
 Cut = Callable[[ca.SX], ca.SX]

@@ -8,7 +8,8 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from ..quantities import Number, Point, PositiveLength, Vector
+from ..coordinates import rotations
+from ..quantities import Point, PositiveLength, Vector
 from .base import Coordinates, Scalar, SurfaceTable
 from .parallel import Parallel
 from .parallel_quadric import cheapest
@@ -38,7 +39,7 @@ class Ellipsoid(SurfaceTable):
     def constants(self) -> tuple[float, ...]:
         """As `quadric.about_itself` gives them."""
         s = math.prod(self.semi_axes) ** (1 / 3)
-        R = bryant_matrix(self.rotation)
+        R = rotations(np.array(self.rotation))
         A = (R * (s / (2 * np.square(self.semi_axes)))) @ R.T
         return about_itself(A, np.array(self.centre), s / 2)
 
@@ -50,12 +51,3 @@ class Ellipsoid(SurfaceTable):
 
     def parallel(self, distance: float, point: Coordinates) -> Parallel:
         return cheapest(Parallel.near(self, distance, point))
-
-
-def bryant_matrix(angles: tuple[Number, Number, Number]) -> np.ndarray:
-    """R = Rx(alpha) Ry(beta) Rz(gamma), (3, 3)."""
-    (ca, sa), (cb, sb), (cg, sg) = ((math.cos(a), math.sin(a)) for a in angles)
-    Rx = np.array([[1, 0, 0], [0, ca, -sa], [0, sa, ca]])
-    Ry = np.array([[cb, 0, sb], [0, 1, 0], [-sb, 0, cb]])
-    Rz = np.array([[cg, -sg, 0], [sg, cg, 0], [0, 0, 1]])
-    return Rx @ Ry @ Rz

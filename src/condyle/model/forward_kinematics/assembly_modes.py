@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...kinematics.bryant import bryant_angles, rotations
+from ...mechanism.coordinates import bryant_angles, rotations
 from ...mechanism.mechanism import Mechanism
 from ..continuation import CONVERGED, Steps
 from .orientation import principal

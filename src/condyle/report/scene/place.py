@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...kinematics.bryant import rotations
 from ...mechanism import Mechanism
+from ...mechanism.coordinates import rotations
 from .chain_drawings import ChainDrawing, drawing_points
 
 
