@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import base64
-import json
-import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from matplotlib.collections import QuadMesh
+from support.report_pages import column, payload
 
 import condyle
 from condyle.mechanism.actuator import Limits
@@ -43,18 +41,6 @@ def jaw() -> Solution:
 @pytest.fixture(scope="module")
 def page(jaw: Solution) -> dict[str, Any]:
     return payload(report_html(jaw))
-
-
-def payload(page: str) -> dict[str, Any]:
-    found = re.search(r'<script type="application/json" id="payload">(.*?)</script>', page, re.S)
-    assert found is not None
-    return json.loads(found[1])
-
-
-def column(data: dict[str, Any], number: int) -> np.ndarray:
-    columns = data["columns"]
-    values = np.frombuffer(base64.b64decode(columns["values"]), "<f4")
-    return values.reshape(-1, columns["samples"])[number]
 
 
 def test_rms_and_power_by_hand(robot: Solution) -> None:

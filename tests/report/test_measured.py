@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import base64
-import json
-import re
-from typing import Any
-
 import numpy as np
 import pytest
 from matplotlib.collections import QuadMesh
+from support.report_pages import column, payload
 
 import condyle
 from condyle.markers import Beside
@@ -21,17 +17,6 @@ from condyle.results.solution import Solution
 from condyle.view.playback import Playback
 
 NAMES = ("Upper", "Lower", "Ear")
-
-
-def payload(page: str) -> dict[str, Any]:
-    found = re.search(r'<script type="application/json" id="payload">(.*?)</script>', page, re.S)
-    assert found is not None
-    return json.loads(found[1])
-
-
-def column(data: dict[str, Any], number: int) -> np.ndarray:
-    values = np.frombuffer(base64.b64decode(data["columns"]["values"]), "<f4")
-    return values.reshape(-1, data["columns"]["samples"])[number]
 
 
 @pytest.fixture(scope="module")

@@ -8,17 +8,17 @@ import itertools
 import json
 import re
 import tracemalloc
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from support.report_pages import Elements, column, payload, unpacked
 
 import condyle
 from condyle.errors import InputError
 from condyle.motion import Motion, bundled_reference
-from condyle.report.gaps import at_sample, gaps
+from condyle.report.failed_spans import at_sample, gaps
 from condyle.report.page import report_html, write_report
 from condyle.report.page.html import fill, json_for_script, tag
 from condyle.report.page.reduce import BUDGET, reduced
@@ -41,43 +41,6 @@ def solution(reference: condyle.Mechanism) -> Solution:
 @pytest.fixture(scope="module")
 def page(solution: Solution) -> str:
     return report_html(solution)
-
-
-class Elements(HTMLParser):
-    """Every element with its attributes, and the text of scripts and of the rest."""
-
-    def __init__(self, page: str) -> None:
-        super().__init__()
-        self.found: list[tuple[str, dict[str, str | None]]] = []
-        self.scripts: list[str] = []
-        self.text = ""
-        self._open: list[str] = []
-        self.feed(page)
-
-    def handle_starttag(self, name: str, attributes: list[tuple[str, str | None]]) -> None:
-        self.found.append((name, dict(attributes)))
-        self._open.append(name)
-        if name == "script":
-            self.scripts.append("")
-
-    def handle_endtag(self, name: str) -> None:
-        while self._open and self._open.pop() != name:
-            pass
-
-    def handle_data(self, data: str) -> None:
-        if self._open and self._open[-1] == "script":
-            self.scripts[-1] += data
-        elif "style" not in self._open:
-            self.text += data
-
-
-def payload(page: str) -> dict[str, Any]:
-    return json.loads(Elements(page).scripts[0])
-
-
-def column(data: dict[str, Any], number: int) -> np.ndarray:
-    values = np.frombuffer(base64.b64decode(data["columns"]["values"]), dtype="<f4")
-    return values.reshape(-1, data["columns"]["samples"])[number]
 
 
 def test_page_of_5001_samples_is_one_file_below_10_megabytes(
@@ -321,10 +284,6 @@ def long_run(solution: Solution) -> Solution:
         long[name].values[20_000:20_040] = np.nan
     long["status"].values[20_000:20_040] = 1
     return long
-
-
-def unpacked(data: str, kind: str) -> np.ndarray:
-    return np.frombuffer(base64.b64decode(data), dtype=kind)
 
 
 def test_long_runs_are_thinned_and_keep_every_peak(long_run: Solution) -> None:

@@ -11,8 +11,8 @@ from support.browser import Tab
 
 import condyle
 from condyle.errors import InputError
-from condyle.view import View, live, open_view
-from condyle.view.live import LivePlayer
+from condyle.view import View, live_player, open_view
+from condyle.view.live_player import LivePlayer
 from condyle.view.readout import live_html, status_html
 from condyle.view.serve import planned
 
@@ -25,7 +25,7 @@ CHEW = {"duration": 3.0, "controller": TORQUE, "load": [FOOD]}
 
 @pytest.fixture
 def player(reference: condyle.Mechanism, monkeypatch: pytest.MonkeyPatch) -> LivePlayer:
-    monkeypatch.setattr(live, "BUDGET", np.inf)  # however slow this machine is
+    monkeypatch.setattr(live_player, "BUDGET", np.inf)  # however slow this machine is
     return LivePlayer(planned(reference, CHEW))
 
 
@@ -46,7 +46,7 @@ def test_it_keeps_the_time_of_the_clock(player: LivePlayer) -> None:
 def test_it_says_that_it_cannot_keep_pace(
     player: LivePlayer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(live, "BUDGET", 0.0)
+    monkeypatch.setattr(live_player, "BUDGET", 0.0)
     for _ in range(20):
         player.advance(0.1)
     assert player.now == 0
@@ -85,7 +85,7 @@ def test_an_end_is_said_and_a_restart_goes_on(reference: condyle.Mechanism) -> N
 def test_it_begins_again_at_its_end(
     reference: condyle.Mechanism, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(live, "BUDGET", np.inf)
+    monkeypatch.setattr(live_player, "BUDGET", np.inf)
     player = LivePlayer(planned(reference, {"duration": 0.05, "controller": TORQUE}))
     player.advance(0.1)
     assert player.now == 0 and player.playing

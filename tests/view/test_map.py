@@ -11,7 +11,7 @@ from support.browser import PATIENCE, Tab
 import condyle
 from condyle.errors import InputError
 from condyle.view import View, open_view
-from condyle.view.maps import BESIDE, SIDE
+from condyle.view.map_layer import BESIDE, SIDE
 
 OVER = ["X=-5:12:12 mm", "beta=-15:30:12 deg", "Y=-6:6:5 mm"]
 

@@ -10,7 +10,7 @@ import numpy as np
 import viser
 
 from ..simulation.knobs import Knob
-from .live import LivePlayer
+from .live_player import LivePlayer
 from .readout import live_html
 from .stage import Stage
 

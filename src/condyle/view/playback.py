@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..kinematics.singularities import KINDS
-from ..report.gaps import Gap, at_sample, gaps
+from ..report.failed_spans import Gap, at_sample, gaps
 from ..report.scene import place
 from ..results.solution import Solution
 from .snapshot import Level, Snapshot, state_messages

@@ -11,7 +11,7 @@ from ..kinematics.chain import FAMILIES
 from ..mechanism import COORDINATES, Mechanism
 from ..mechanism.chain import limits
 from .internal import Directions
-from .live import LivePlayer, event_lines
+from .live_player import LivePlayer, event_lines
 from .snapshot import Snapshot
 
 COLOURS = {"calm": "#2b8a3e", "warning": "#b35c00", "unreachable": "#c92a2a"}

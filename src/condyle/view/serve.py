@@ -21,10 +21,10 @@ from ..analysis.map.map_files import mechanism_of, open_map
 from ..errors import CondyleError, InputError
 from ..mechanism import Mechanism, load
 from ..results.solution import Solution, open_solution
+from .controls import Panel
 from .gate import Gate, guarded
-from .live import LivePlayer
-from .maps import MapLayer
-from .panel import Panel
+from .live_player import LivePlayer
+from .map_layer import MapLayer
 from .playback import Playback
 from .session import Session
 from .snapshot import Snapshot

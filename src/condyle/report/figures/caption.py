@@ -7,7 +7,7 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 from ...analysis.paper import is_stand_in, is_synthetic
-from ..gaps import gaps
+from ..failed_spans import gaps
 
 if TYPE_CHECKING:
     from ...results.solution import Solution

@@ -18,7 +18,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from ..actuators import EMG_ROW, REACH
-from ..gaps import gaps, longest
+from ..failed_spans import gaps, longest
 from ..naming import groups, heading, readable, short, stem
 from ..panel import Curve, Panel, PanelGroup
 from .caption import TIME, caption, written

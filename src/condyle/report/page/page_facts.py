@@ -14,7 +14,7 @@ import numpy as np
 from ...errors import InputError
 from ...results.summary import summarize
 from ..actuators import drawn_limits
-from ..gaps import gaps, longest
+from ..failed_spans import gaps, longest
 from ..panel_list import reaction
 from .html import Markup, table, tag
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...atomic import write_text
 from ...progress import step
-from ..gaps import gaps, longest
+from ..failed_spans import gaps, longest
 from ..panel import panels_of
 from ..scene import styles
 from .alerts import alerts

@@ -50,12 +50,18 @@ def machine(solution: Solution, columns: Columns) -> dict[str, Any]:
     rods, joints = _chains(mechanism, parts, scene, columns)
     arrows = [*_contact_arrows(solution, scene, parts, columns), *_load_arrow(solution, columns)]
     scales = _scales(arrows, size)
-    ends = [a.far_end(scene.on_platform(a.at), scales[a.kind]["metresPerNewton"]) for a in arrows]
+    ends = [
+        scene.on_platform(a.at)
+        + (-1 if a.into else 1) * scales[a.kind]["metresPerNewton"] * a.force
+        for a in arrows
+    ]
     everything = np.vstack([cloud(scene, vertices), reach(solution), *ends])
-    low, high = _box(everything, size)
+    spare = 0.15 * size
+    low, high = np.nanmin(everything, axis=0) - spare, np.nanmax(everything, axis=0) + spare
     arm = _rounded(TRIAD * size)
     triad = low + arm * np.vstack([np.zeros(3), np.eye(3)])
     surfaces = list(_surfaces(parts))
+    drawn = {surface["name"] for surface in surfaces if surface["faces"]}
     return {
         "size": size,
         "views": {n: {"from": a, "up": up, "flat": flat} for n, (a, up, flat) in VIEWS.items()},
@@ -82,7 +88,7 @@ def machine(solution: Solution, columns: Columns) -> dict[str, Any]:
         ],
         "markers": markers(solution, columns),
         "surfaces": surfaces,
-        "undrawn": _undrawn(mechanism, surfaces),
+        "undrawn": [name for name in mechanism.contact_names if name not in drawn],
         "arrows": [arrow.description for arrow in arrows],
         "scales": {kind: scale for kind, scale in scales.items() if scale["largest"]},
         "traces": list(_traces(solution)),
@@ -106,17 +112,11 @@ def _chains(
             else:
                 found = {"columns": columns.add_vector(f"point.{chain.name}.{name}", point)}
             at[chain.name, name] = found
-    rods = [
-        {
-            "chain": bar.chain,
-            "body": bar.body,
-            "from": at[bar.chain, bar.start],
-            "to": at[bar.chain, bar.end],
-            "radius": bar.radius,
-            "colour": bar.colour,
-        }
-        for bar in parts.bars
-    ]
+    rods = []
+    for bar in parts.bars:
+        ends = {"from": at[bar.chain, bar.start], "to": at[bar.chain, bar.end]}
+        told = {"chain": bar.chain, "body": bar.body, "radius": bar.radius, "colour": bar.colour}
+        rods.append(told | ends)
     return rods, [at[key] | {"radius": JOINT * parts.size} for key in parts.joints]
 
 
@@ -129,12 +129,6 @@ def _surfaces(parts: Parts) -> Iterator[dict[str, Any]]:
             "outline": patch.outline.tolist(),
             "bounded": patch.bounded,
         }
-
-
-def _undrawn(mechanism: Mechanism, surfaces: Sequence[dict[str, Any]]) -> list[str]:
-    """Contacts of whose surface there is nothing to draw."""
-    drawn = {surface["name"] for surface in surfaces if surface["faces"]}
-    return [name for name in mechanism.contact_names if name not in drawn]
 
 
 @dataclass(frozen=True)
@@ -159,20 +153,10 @@ class Arrow:
     def into(self) -> bool:
         return self.kind == "contact"
 
-    def far_end(self, at: np.ndarray, scale: float) -> np.ndarray:
-        """The end away from the platform's point at (N, 3), (N, 3) [m]."""
-        return at + (-scale if self.into else scale) * self.force
-
     @property
     def description(self) -> dict[str, Any]:
-        at = {"platform": list(self.at)}
-        return {
-            "kind": self.kind,
-            "at": at,
-            "gap": self.gap,
-            "into": self.into,
-            "columns": self.columns,
-        }
+        told = {"kind": self.kind, "at": {"platform": list(self.at)}, "gap": self.gap}
+        return told | {"into": self.into, "columns": self.columns}
 
 
 def _scales(arrows: Sequence[Arrow], size: float) -> dict[str, dict[str, float]]:
@@ -229,12 +213,6 @@ def _traces(solution: Solution) -> Iterator[dict[str, Any]]:
     yield {"name": guide or "platform centre", "at": list(points.get(guide, (0.0, 0.0, 0.0)))}
     for contact in mechanism.contacts:
         yield {"name": contact.name, "at": list(contact.point)}
-
-
-def _box(cloud: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Corners, (3,) each, of a box round everything that is ever shown [m]."""
-    spare = 0.15 * size
-    return np.nanmin(cloud, axis=0) - spare, np.nanmax(cloud, axis=0) + spare
 
 
 def _extremes(cloud: np.ndarray) -> np.ndarray:

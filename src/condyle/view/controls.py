@@ -16,8 +16,8 @@ from ..errors import InputError
 from ..kinematics.chain import FAMILIES
 from ..mechanism import Mechanism, bundled_mechanisms, load, parse
 from ..results.solution import Solution, open_solution
-from .live import LivePlayer
 from .live_panel import LivePanel
+from .live_player import LivePlayer
 from .playback import Playback
 from .readout import COLOURS, effects_html, internal_text, status_html, tables_html
 from .session import MOST_INTERNAL, Session
