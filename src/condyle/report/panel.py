@@ -83,7 +83,7 @@ class Panel:
     sets: curves by the label of their set; several sets are a choice.
     kind: "time": curves over time;  "field": rows of colour, |value| from 0 to 1 and beyond;
           "plane": curves over `across`, with fixed `lines`;  "track": likewise on equal scales.
-    place: row and column within its group.   components: the curves are those of a vector.
+    place: row and column within its group; None: a row of its own.   components: of a vector.
     lines: fixed ones, (x, y) each.   bounds: intervals across and up, of a track, in SI.
     outside: samples of a track, (N,), that are out of them.
     """
@@ -95,7 +95,7 @@ class Panel:
     sets: Mapping[str, Sequence[Curve]] | Sequence[Curve]
     kind: str = "time"
     order: int = 0
-    place: tuple[str, str] = ("", "")
+    place: tuple[str, str] | None = None
     note: str = ""
     limits: Sequence[Limit] = ()
     log: bool = False

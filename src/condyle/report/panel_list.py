@@ -156,15 +156,11 @@ def activation(solution: Solution) -> Iterator[Panel]:
         return
     note = "Effort over greatest effort; orange: beyond 1, a limit is exceeded."
     note += " EMG: its measured envelope over its greatest." if measured else ""
-    yield Panel(
-        "activation", "Activation", "activation", "1", rows, "field", place=("field", ""), note=note
-    )
+    yield Panel("activation", "Activation", "activation", "1", rows, "field", note=note)
     loads = [Curve(n, f"joint_load.{n}", v) for n, v in joint_loads(solution).items()]
     if loads:
         note = "Along the normal; negative: the joint would have to pull."
-        yield Panel(
-            "load-on-joints", "Joint load", "joint load", "N", loads, place=("load", ""), note=note
-        )
+        yield Panel("load-on-joints", "Joint load", "joint load", "N", loads, note=note)
 
 
 @panels("actuators", "Efforts against speeds, with limits")
@@ -251,12 +247,12 @@ def contact_force(solution: Solution) -> Iterator[Panel]:
     forces = of_names(solution, "contact_force", "contact")
     note = "Negative: against the normal, the surface pushes the ball along -n."
     title = "Contact force along the normal"
-    yield Panel("contact-force", title, "force", "N", forces, place=("force", ""), note=note)
+    yield Panel("contact-force", title, "force", "N", forces, note=note)
     margins = of_names(solution, "bound_margin", "contact")
     margins = [curve for curve in margins if not np.isposinf(curve.values).any()]
     if margins:
         note, title = "Negative: outside the bounds.", "Distance to the nearest bound"
-        yield Panel("bound-margin", title, "to a bound", "m", margins, place=("b", ""), note=note)
+        yield Panel("bound-margin", title, "to a bound", "m", margins, note=note)
 
 
 def _load_heading(solution: Solution) -> str:
@@ -271,11 +267,10 @@ def load(solution: Solution, every: bool = False) -> Iterator[Panel]:
     some = [any(np.nan_to_num(c.values).any() for c in part) for part in (curves[:3], curves[3:])]
     at = f" at {point}" if point else ""
     if every or some[0] or not any(some):
-        place = ("force", "")
-        yield Panel("load", f"Load{at}", "force", "N", curves[:3], place=place, components=True)
+        yield Panel("load", f"Load{at}", "force", "N", curves[:3], components=True)
     if every or some[1]:
-        title, place = f"Moment of the load{at}", ("moment", "")
-        yield Panel("moment", title, "moment", "N m", curves[3:], place=place, components=True)
+        title = f"Moment of the load{at}"
+        yield Panel("moment", title, "moment", "N m", curves[3:], components=True)
 
 
 @panels("tracks", "Tracks of the contact points", empty=NO_CONTACTS)
@@ -344,7 +339,7 @@ def singularity(solution: Solution) -> Iterator[Panel]:
             {"log": True},
         ),
     ):
-        yield Panel(name, title, axis, "1", curves, place=(name, ""), note=note, **more)
+        yield Panel(name, title, axis, "1", curves, note=note, **more)
 
 
 @panels("singularity", "Diagonal of J_A", split=0)
@@ -398,7 +393,6 @@ def reaction(solution: Solution) -> Iterator[Panel]:
             "magnitude",
             str(about.get("units", "")),
             [Curve(label, f"{name}.{label}", v) for label, v in magnitudes(solution, name).items()],
-            place=(name, ""),
             note="Magnitudes.",
         )
 

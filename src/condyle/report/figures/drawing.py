@@ -83,13 +83,10 @@ def mathematics(text: str) -> str:
 
 def places(panels: Sequence[Panel]) -> tuple[list[tuple[int, int]], int, int]:
     """Row and column of each panel by its `place`, else row by row; and how many there are."""
-    rows, columns = (list(dict.fromkeys(panel.place[k] for panel in panels)) for k in (0, 1))
-    if len({panel.place for panel in panels}) == len(panels):
-        return (
-            [(rows.index(p.place[0]), columns.index(p.place[1])) for p in panels],
-            len(rows),
-            len(columns),
-        )
+    if panels[0].kind != "plane":
+        keys = [panel.place or (panel.id, "") for panel in panels]
+        rows, columns = (list(dict.fromkeys(key[k] for key in keys)) for k in (0, 1))
+        return [(rows.index(a), columns.index(b)) for a, b in keys], len(rows), len(columns)
     across = min(MOST_COLUMNS, max(2, int(np.ceil(np.sqrt(len(panels))))), len(panels))
     across = 1 if narrow() else across
     return [divmod(i, across) for i in range(len(panels))], -(-len(panels) // across), across
@@ -181,7 +178,8 @@ def split_columns(panels: Sequence[Panel], chains: Sequence[str]) -> Columns:
                 if label in chains:
                     columns.setdefault(curve.label, {})[label] = curve, panel
                 elif not label:
-                    columns.setdefault(panel.place[0], {})[curve.label] = curve, panel
+                    word = panel.place[0] if panel.place else ""
+                    columns.setdefault(word, {})[curve.label] = curve, panel
     return columns
 
 

@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from ...mechanism.mechanism import COORDINATES
+from ...results.variables import WRENCH
 from ..naming import readable
 from ..panel import shown
 from .caption import COORDINATE
@@ -87,7 +88,7 @@ def map_figure(
     grid = figure.subplots(rows, columns, squeeze=False)
     used: set[str] = set()
     for place, (panel, one) in zip(grid.flat, pictures, strict=False):
-        used |= _picture(figure, place, dataset, panel, one, axes, run)
+        used |= _picture(place, dataset, panel, one, axes, run)
     for place in grid.flat[len(pictures) :]:
         place.axis("off")
     handles: list[Any] = [
@@ -132,8 +133,14 @@ def _label(name: str) -> tuple[str, float]:
     return f"{COORDINATE.get(name, name)} [{unit}]", scale
 
 
+def _value(name: str, value: float) -> str:
+    """'α = 10 °'."""
+    label, scale = _label(name)
+    symbol, unit = label.split(" ")
+    return f"{symbol} = {value * scale:.3g} {unit.strip('[]')}"
+
+
 def _picture(
-    figure: Figure,
     place: Any,
     dataset: xr.Dataset,
     panel: Panel,
@@ -150,11 +157,14 @@ def _picture(
     place.set_facecolor(OUT)
     place.grid(False)
     if panel.variable == "cause":
-        _causes(place, dataset, x, y, here)
+        colours = _colours(dataset)[0]
+        edges = [*(i - 0.5 for i in colours), max(colours) + 0.5]
+        shades: dict[str, Any] = {"cmap": ListedColormap(list(colours.values())), "alpha": PALE}
+        place.pcolormesh(x, y, here.T, norm=BoundaryNorm(edges, len(colours)), **shades)
     else:
-        _filled(figure, place, dataset, panel, x, y, here, values)
-    u, v = (a * scale for a, scale in zip(one.values, scales, strict=True))
-    if panel.variable != "cause":
+        unit, scale = _units(dataset, panel)
+        _filled(place, x, y, here * scale, values * scale, panel.variable, unit)
+        u, v = (a * scale for a, scale in zip(one.values, scales, strict=True))
         outside = np.where(np.isfinite(one.margin), one.margin, -1.0)
         place.contourf(u, v, outside.T, levels=[-np.inf, 0.0], colors=[OUT], zorder=2)
     for line in one.lines:
@@ -162,45 +172,38 @@ def _picture(
         place.plot(*(points * scales).T, **LINES[line.kind][0], zorder=3)
     if run is not None:
         place.plot(*(run[:, :2] * scales).T, **RUN, zorder=5)
-    place.set_xlim(x[0], x[-1])
-    place.set_ylim(y[0], y[-1])
-    place.set_xlabel(labels[0])
-    place.set_ylabel(labels[1])
+    place.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]), xlabel=labels[0], ylabel=labels[1])
     heading = [panel.title] if panel.title else []
     if one.at is not None:
-        name, scale = _label(axes[2])
-        symbol, unit = name.split(" ")
-        heading.append(f"{symbol} = {one.at * scale:.3g} {unit.strip('[]')}")
+        heading.append(_value(axes[2], one.at))
     place.set_title(", ".join(heading))
     return {line.kind for line in one.lines}
 
 
 def _filled(
-    figure: Figure,
     place: Any,
-    dataset: xr.Dataset,
-    panel: Panel,
     x: np.ndarray,
     y: np.ndarray,
-    values: np.ndarray,
+    field: np.ndarray,
     of_all: np.ndarray,
+    variable: str,
+    unit: str,
 ) -> None:
     """Contours; colours are those of all slices."""
-    unit, scale = _units(dataset, panel)
-    field = grown(values * scale)
-    good = of_all[np.isfinite(of_all)] * scale
+    good = of_all[np.isfinite(of_all)]
     if not good.size:
         place.text(0.5, 0.5, "out of reach", ha="center", transform=place.transAxes, color=GREY)
         return
     low, high = np.quantile(good, [0.002, 0.998])
     options: dict[str, Any] = {"cmap": COLOURS, "extend": "both"}
-    if good.min() > 0 and high > LOGARITHMIC.get(panel.variable, WIDE) * low:
+    if good.min() > 0 and high > LOGARITHMIC.get(variable, WIDE) * low:
         levels = np.geomspace(low, high, LEVELS)
         options["norm"] = LogNorm(low, high)
     else:
         levels = np.linspace(low, high if high > low else low + 1.0, LEVELS)
-    filled = place.contourf(x, y, np.ma.masked_invalid(field).T, levels=levels, **options)
-    bar = figure.colorbar(filled, ax=place, format=lambda value, _: f"{value:.3g}")
+    masked = np.ma.masked_invalid(grown(field)).T
+    filled = place.contourf(x, y, masked, levels=levels, **options)
+    bar = place.figure.colorbar(filled, ax=place, format=lambda value, _: f"{value:.3g}")
     bar.set_ticks(list(levels[:: max((len(levels) - 1) // 5, 1)]))
     bar.ax.minorticks_off()
     bar.set_label(f"[{unit}]")
@@ -215,15 +218,6 @@ def _colours(dataset: xr.Dataset) -> tuple[dict[int, str], list[Patch]]:
         Patch(facecolor=c, alpha=PALE, label="reachable" if i == 0 else f"no: {readable(names[i])}")
         for i, c in colours.items()
     ]
-
-
-def _causes(
-    place: Any, dataset: xr.Dataset, x: np.ndarray, y: np.ndarray, values: np.ndarray
-) -> None:
-    colours = _colours(dataset)[0]
-    edges = [*(i - 0.5 for i in colours), max(colours) + 0.5]
-    options: dict[str, Any] = {"cmap": ListedColormap(list(colours.values())), "alpha": PALE}
-    place.pcolormesh(x, y, values.T, norm=BoundaryNorm(edges, len(colours)), **options)
 
 
 def grown(field: np.ndarray, rounds: int = 2) -> np.ndarray:
@@ -289,19 +283,10 @@ def _along(
 
 def _caption(dataset: xr.Dataset, axes: Sequence[str]) -> str:
     held = json.loads(dataset.attrs["held"])
-    parts = []
-    for name, value in held.items():
-        label, scale = _label(name)
-        symbol, unit = label.split(" ")
-        parts.append(f"{symbol} = {value * scale:.3g} {unit.strip('[]')}")
-    load = np.asarray(dataset.attrs["load"])[:6]
-    loads = [
-        f"{name} = {value:g} {'N' if i < 3 else 'N m'}"
-        for i, (name, value) in enumerate(
-            zip(("Fx", "Fy", "Fz", "Mx", "My", "Mz"), load, strict=True)
-        )
-        if value
-    ]
+    parts = [_value(name, value) for name, value in held.items()]
+    pairs = zip(WRENCH, np.asarray(dataset.attrs["load"])[:6], strict=True)
+    units = ("N", "N m")
+    loads = [f"{name} = {v:g} {units[name[0] == 'M']}" for name, v in pairs if v]
     text = f"Mechanism {dataset.attrs['mechanism_name']}, at rest"
     text += f"; held {', '.join(parts)}" if parts else ""
     return text + (f"; load {', '.join(loads)}" if loads else "") + "."

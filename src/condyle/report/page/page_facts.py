@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,16 +34,6 @@ FAILURES = 30  # spans without a result that are listed
 SOURCES = ("motion", "load")  # options that may be paths
 
 
-@dataclass(frozen=True)
-class Fact:
-    """A number worth knowing at once: what, how much, and where."""
-
-    what: str
-    value: str
-    where: str = ""
-    alarm: bool = field(default=False)
-
-
 def warnings_box(warnings: Sequence[str]) -> Markup:
     """Every warning of the run."""
     if not warnings:
@@ -61,30 +50,23 @@ def warnings_box(warnings: Sequence[str]) -> Markup:
 
 
 def fact_cards(page: Reduced) -> Markup:
-    cards = [
-        tag(
-            "div",
-            tag("dt", fact.what),
-            tag("dd", fact.value, tag("small", fact.where)),
-            class_="fact alarm" if fact.alarm else "fact",
-        )
-        for fact in _facts(page)
-    ]
-    return tag("dl", *cards, class_="facts")
+    """Numbers worth knowing at once: what, how much, and where."""
+    return tag("dl", *(_card(*fact) for fact in _facts(page)), class_="facts")
 
 
-def _facts(page: Reduced) -> Iterator[Fact]:
+def _card(what: str, value: str, where: str, alarm: bool = False) -> Markup:
+    parts = tag("dt", what), tag("dd", value, tag("small", where))
+    return tag("div", *parts, class_="fact alarm" if alarm else "fact")
+
+
+def _facts(page: Reduced) -> Iterator[tuple[Any, ...]]:
     """Peaks come from the samples kept, where every curve's largest is; counts from all."""
     solution, failed = page.solution, page.failed
     data = summarize(solution).data
     start, end = page.time[[0, -1]]
     time = solution["time"].values
-    yield Fact(
-        "Samples",
-        f"{page.total:,}".replace(",", "\u202f"),
-        f"{failed} without a result" if failed else f"{start:g} to {end:g} s",
-        alarm=bool(failed),
-    )
+    told = f"{failed} without a result" if failed else f"{start:g} to {end:g} s"
+    yield "Samples", f"{page.total:,}".replace(",", "\u202f"), told, bool(failed)
     units = [str(unit) for unit in solution["effort_unit"].values]
     for unit in dict.fromkeys(units):
         mine = [i for i, u in enumerate(units) if u == unit]
@@ -93,30 +75,23 @@ def _facts(page: Reduced) -> Iterator[Fact]:
             sample, i, value = peak
             name = solution["chain"].values[mine[i]]
             word = "Largest torque" if unit == "N m" else "Largest force"
-            yield Fact(word, f"{value:.4g} {unit}", f"{name}, t = {time[sample]:g} s")
+            yield word, f"{value:.4g} {unit}", f"{name}, t = {time[sample]:g} s"
     peak = _peak(solution["contact_force"].values)
     if peak is not None:
         sample, i, value = peak
         where = f"{solution['contact'].values[i]}, t = {time[sample]:g} s"
-        yield Fact("Largest contact force", f"{value:.4g} N", where)
+        yield "Largest contact force", f"{value:.4g} N", where
     bounds = data["closest_to_bounds"]
     if bounds:
         name = min(bounds, key=lambda n: bounds[n]["margin"])
         margin = bounds[name]["margin"]
-        yield Fact(
-            "Closest to the bounds" if margin >= 0 else "Outside the bounds",
-            f"{margin * 1e3:.4g} mm",
-            f"{name}, t = {bounds[name]['time']:g} s",
-            alarm=margin < 0,
-        )
+        word = "Closest to the bounds" if margin >= 0 else "Outside the bounds"
+        where = f"{name}, t = {bounds[name]['time']:g} s"
+        yield word, f"{margin * 1e3:.4g} mm", where, margin < 0
     near = data["closest_to_singularity"]
     if near is not None:
-        yield Fact(
-            "Closest to a singularity",
-            f"{near['ratio']:.4g}",
-            f"ratio, t = {near['time']:g} s",
-            alarm=bool(page.near),
-        )
+        where = f"ratio, t = {near['time']:g} s"
+        yield "Closest to a singularity", f"{near['ratio']:.4g}", where, bool(page.near)
 
 
 def failure_table(page: Reduced) -> Markup:
