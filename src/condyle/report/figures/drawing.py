@@ -296,7 +296,7 @@ def draw_time(axes: Axes, solution: Solution, panel: Panel) -> None:
         axes.axhline(0, color=GREY, lw=0.8, zorder=1)
     if panel.note:
         note = f"{panel.title}: {panel.note[0].lower()}{panel.note[1:].rstrip('.')}"
-        axes.set_title(fill(mathematics(note), LONG))
+        axes.set_title(mathematics(panel.title) if narrow() else fill(mathematics(note), LONG))
     axes.set_ylabel(axis_label(panel))
     if panel.log and (values > 0).any():
         axes.set_yscale("log")
