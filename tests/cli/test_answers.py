@@ -143,7 +143,7 @@ def test_the_next_step_works(
     if words[0] == "run":
         words += QUICK if "--rate" not in words else ()
     if "--figures" in words:  # all of them take long
-        monkeypatch.setattr("condyle.report.figures.files.save", lambda *_: [])
+        monkeypatch.setattr("condyle.report.figures.saving.save", lambda *_: [])
     again = command(*words)
     assert again.status == 0, (last, again.err)
 

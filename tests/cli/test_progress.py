@@ -216,7 +216,7 @@ def test_steps_of_a_comparison(
     )
     assert watcher.steps["deriving every model"] == [4, 4]
     assert watcher.steps["running every model"] == [6, 6]
-    monkeypatch.setattr("condyle.report.figures.files.save", lambda *_: [])
+    monkeypatch.setattr("condyle.report.figures.saving.save", lambda *_: [])
     save_figures(comparison.solution, comparison, tmp_path)
     assert watcher.steps["drawing figures"] == [5, 5]
     save_solution_figures(comparison.solution, tmp_path)
