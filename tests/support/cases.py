@@ -11,7 +11,7 @@ from oracles import description
 from oracles.random_mechanism import random_mechanism, random_state, toml_text
 
 from condyle.backends.c.compiled_kernel import CompiledKernel
-from condyle.backends.kernel import arranged
+from condyle.backends.kernel import results_of
 from condyle.mechanism import Mechanism, load, parse
 
 Array = np.ndarray
@@ -125,9 +125,5 @@ def ones(kernel: CompiledKernel, samples: Array) -> tuple[dict[str, Array], Arra
     """What `one` says of samples, one after the other, as `run` returns it."""
     found = [kernel.one(sample) for sample in samples]
     columns = np.array([row for row, _ in found]).T
-    values, start, face = {}, 0, kernel.interface
-    for result in face.results:
-        width = face.width(result)
-        values[result.name] = arranged(face, result, columns[start : start + width], kernel.order)
-        start += width
+    values = results_of(kernel.interface, columns, kernel.order)
     return values, np.array([status for _, status in found])

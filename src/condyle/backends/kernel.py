@@ -89,6 +89,18 @@ def _numbers(name: str, given: object) -> np.ndarray:
         ) from None
 
 
+def results_of(
+    interface: Interface, columns: np.ndarray, order: tuple[int, ...]
+) -> dict[str, np.ndarray]:
+    """Every result of columns, (width of all, N), by name; see `arranged`."""
+    values, row = {}, 0
+    for r in interface.results:
+        end = row + interface.width(r)
+        values[r.name] = arranged(interface, r, columns[row:end], order)
+        row = end
+    return values
+
+
 def arranged(
     interface: Interface, result: Result, block: np.ndarray, order: tuple[int, ...]
 ) -> np.ndarray:

@@ -14,7 +14,7 @@ import numpy as np
 from ..graph.graph import VARYING, Value
 from ..graph.operations import OPERATIONS, REDUCTIONS
 from ..graph.program import Numbers, Program, Variants
-from .kernel import AGAIN, OK, Answer, arranged, columns_of
+from .kernel import AGAIN, OK, Answer, columns_of, results_of
 from .threads import workers
 
 BLOCK = 2048  # samples: few enough that what is alive stays in a cache
@@ -43,24 +43,19 @@ class NumpyKernel:
         workers(threads)
         face = self.interface
         count, columns = columns_of(face, inputs, self.order)
-        blocks = [np.empty((face.width(r), count)) for r in face.results]
+        found = np.empty((sum(face.width(r) for r in face.results), count))
         status = np.empty(count, dtype=np.uint8)
         with np.errstate(all="ignore"):
             for start in range(0, count, BLOCK):
                 part = slice(start, min(start + BLOCK, count))
                 some = [column[part] for column in columns]
-                status[part] = self._main(some, [block[:, part] for block in blocks])
+                status[part] = self._main(some, found[:, part])
                 again = np.flatnonzero(status[part] == AGAIN) + start
                 if self._robust is not None and again.size:
-                    few = [np.empty((len(block), again.size)) for block in blocks]
-                    status[again] = self._robust([column[again] for column in columns], few)
-                    for block, better in zip(blocks, few, strict=True):
-                        block[:, again] = better
-        values = {
-            r.name: arranged(face, r, block, self.order)
-            for r, block in zip(face.results, blocks, strict=True)
-        }
-        return Answer(values, status)
+                    better = np.empty((len(found), again.size))
+                    status[again] = self._robust([column[again] for column in columns], better)
+                    found[:, again] = better
+        return Answer(results_of(face, found, self.order), status)
 
 
 class _Runner:
@@ -148,8 +143,8 @@ class _Runner:
 
         return reduced
 
-    def __call__(self, columns: list[np.ndarray], blocks: list[np.ndarray]) -> np.ndarray:
-        """Fill blocks of results, (width, N) each; returns the statuses."""
+    def __call__(self, columns: list[np.ndarray], found: np.ndarray) -> np.ndarray:
+        """Fill the columns of all results, (width, N); returns the statuses."""
         count = len(columns[0]) if columns else 0
         # Two samples at least: numpy adds the lanes of a single one in another order.
         size = max(count, 2)
@@ -160,16 +155,10 @@ class _Runner:
                 row[count:] = columns[column + i][:1] if count else 0.0
         for call, args, out in self._steps:
             call(*[values[a] for a in args], out=values[out])
-        for output, block in zip(self._program.outputs, blocks, strict=True):
-            row = 0
-            for entry in output.entries:
-                for g, v in enumerate(entry):
-                    if v is None:
-                        continue
-                    lanes = self._program.counts[g] if output.lanes else 1
-                    a = np.broadcast_to(values[self._place[v]], (lanes, size))
-                    block[row : row + lanes] = a[:, :count]
-                    row += lanes
+        for at, v, lanes in self._program.stored():
+            if at < len(found):
+                a = np.broadcast_to(values[self._place[v]], (lanes, size))
+                found[at : at + lanes] = a[:, :count]
         return self._status(values, count, size)
 
     def _status(self, values: list[Any], count: int, size: int) -> np.ndarray:

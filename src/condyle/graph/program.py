@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -133,6 +133,18 @@ class Program:
         """Every value that is wanted."""
         found = [v for o in self.outputs for entry in o.entries for v in entry if v is not None]
         return tuple(dict.fromkeys([*found, *(c.value for c in self.checks)]))
+
+    def stored(self) -> Iterator[tuple[int, Value, int]]:
+        """First column, value and lanes of all that a sample gives: results, then checks."""
+        at = 0
+        for o in self.outputs:
+            for entry in o.entries:
+                for group, v in enumerate(entry):
+                    if v is not None:
+                        lanes = self.counts[group] if o.lanes else 1
+                        yield at, v, lanes
+                        at += lanes
+        yield from ((at + i, check.value, 1) for i, check in enumerate(self.checks))
 
     @cached_property
     def order(self) -> tuple[Value, ...]:

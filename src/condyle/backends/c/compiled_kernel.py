@@ -15,7 +15,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...graph.program import Interface, Numbers, Variants
-from ..kernel import Answer, arranged, columns_of
+from ..kernel import Answer, columns_of, results_of
 from ..threads import shared_out, workers
 from .build import loaded
 from .shared_library import aligned, prepared
@@ -83,13 +83,7 @@ class CompiledKernel:
 
         work = self.facts["operations"] * count // self.facts["lanes"]
         shared_out(piece, count, min(workers(threads), 1 + work // WORTH_A_THREAD), UNIT)
-        values, row = {}, 0
-        for r in self.interface.results:
-            width = self.interface.width(r)
-            block = results[row : row + width, :count]
-            values[r.name] = arranged(self.interface, r, block, self.order)
-            row += width
-        return Answer(values, status)
+        return Answer(results_of(self.interface, results[:, :count], self.order), status)
 
     def one(self, sample: np.ndarray) -> tuple[np.ndarray, int]:
         """Evaluate one sample, (columns,), at least latency: all results in a row, and a status.

@@ -58,7 +58,8 @@ class Loops(Printer):
             own = self.statements(values, 0) if part[1] is None else self._chains(part, values)
             lines += [f"  {s}" for s in own]
         self.here = (-1, None)
-        lines += self._outputs()
+        for at, v, lanes in self.program.stored():
+            lines += [self._stored(at + c, v, c) for c in range(lanes)]
         return "\n".join([*lines, "}", ""])
 
     def operations(self) -> int:
@@ -180,18 +181,6 @@ class Loops(Printer):
             if node.op != "mul":
                 yield from self._steps(node.args[2], sign)
             yield -sign if node.op == "fnma" else sign, node.args[:2]
-
-    def _outputs(self) -> Iterator[str]:
-        """What is stored: results, then checks."""
-        slot = 0
-        for o in self.program.outputs:
-            for entry in o.entries:
-                for group, v in enumerate(entry):
-                    for c in range(0 if v is None else self.counts[group] if o.lanes else 1):
-                        assert v is not None
-                        yield self._stored(slot, v, c)
-                        slot += 1
-        yield from (self._stored(slot + i, c.value, 0) for i, c in enumerate(self.program.checks))
 
     def _stored(self, slot: int, v: Value, copy: int) -> str:
         name = self.name(v, copy)

@@ -89,20 +89,9 @@ class Straight(Printer):
 
     def outputs(self) -> Iterator[str]:
         """What is stored: results, then checks."""
-        slot = 0
-        for o in self.program.outputs:
-            for entry in o.entries:
-                for group, v in enumerate(entry):
-                    if v is None:
-                        continue
-                    count = self.counts[group] if o.lanes else 1
-                    for c in range(-(-count // self.width)):
-                        at = c * self.width
-                        yield self._stored(slot + at, v, c, min(self.width, count - at))
-                    slot += count
-        yield from (
-            self._stored(slot + i, c.value, 0, 1) for i, c in enumerate(self.program.checks)
-        )
+        for at, v, count in self.program.stored():
+            for c, first in enumerate(range(0, count, self.width)):
+                yield self._stored(at + first, v, c, min(self.width, count - first))
 
     def _stored(self, at: int, v: Value, copy: int, used: int) -> str:
         name = self.name(v, copy)
