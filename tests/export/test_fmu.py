@@ -22,7 +22,7 @@ from condyle.export import fmu as target
 from condyle.export.fmu_description import exponents
 
 Array = np.ndarray
-KINDS, VERSIONS = ("plant", "inverse", "controller"), (2, 3)
+KINDS, VERSIONS = ("plant", "inverse", "controller", "bounded"), (2, 3)
 Q = ("X", "Y", "alpha", "beta")
 POINT = np.array([0.02, 0.01, 0.005])
 FORCE, MOMENT = np.array([3.0, -2.0, 10.0]), np.array([0.01, 0.02, -0.03])
@@ -83,16 +83,26 @@ def test_fmpy_has_nothing_to_say(
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-@pytest.mark.parametrize("how", ["ModelExchange", "CoSimulation"])
+@pytest.mark.parametrize(
+    "kind, how",
+    [("inverse", "ModelExchange"), ("inverse", "CoSimulation"), ("bounded", "CoSimulation")],
+)
 def test_inverse(
-    fmus: dict[tuple[str, int], Path], model: condyle.Model, version: int, how: str
+    fmus: dict[tuple[str, int], Path], model: condyle.Model, version: int, kind: str, how: str
 ) -> None:
-    found = model.evaluate(STATE[0][None], STATE[1][None], AHEAD[None], ROW)
+    """Within limits where a load makes them count."""
+    scale = 26.0 if kind == "bounded" else 1.0
+    if kind == "bounded":
+        model = condyle.derive(model.mechanism, backend="numpy", distribution="bounded")
+    load = ROW * np.repeat([scale, 1.0], [6, 3])
+    found = model.evaluate(STATE[0][None], STATE[1][None], AHEAD[None], load)
     chains, contacts = model.mechanism.chain_names, model.mechanism.contact_names
     names = [f"effort.{c}" for c in chains] + [f"contact_force.{c}" for c in contacts]
-    got = asked(fmus["inverse", version], HERE | LOAD | row("q2", Q, AHEAD), names, how)
+    given = HERE | {name: scale * v for name, v in LOAD.items()} | row("q2", Q, AHEAD)
+    got = asked(fmus[kind, version], given, names, how)
     right = np.concatenate([found.effort[0], found.contact_force[0]])
     np.testing.assert_allclose(got, right, rtol=0, atol=EXACT * np.abs(right).max())
+    assert (kind == "bounded") == (np.abs(right[: len(chains)]).max() > 2.99)
 
 
 @pytest.mark.parametrize("version", VERSIONS)

@@ -23,7 +23,7 @@ DISTRIBUTIONS = {  # name -> what is least, and subject to what
     "minimax": "the largest of them, then weighted",
 }
 BACKENDS = ("auto", "compiled", "numpy")
-FMUS = ("plant", "inverse", "controller")
+FMUS = ("plant", "inverse", "controller", "bounded")
 FORMATS = ("auto", "netcdf", "zarr")
 STYLES = ("screen", "journal", "journal-wide")
 EXPORTS = (

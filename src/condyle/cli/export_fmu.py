@@ -20,8 +20,9 @@ def fmu(
 ) -> Answer:
     """Functional mock-up units (FMI 2.0 or 3.0), for model exchange and co-simulation.
 
-    The plant (efforts in, motion out), the inverse model and a computed-torque controller. They
-    hold their sources, and a binary for this machine where there is a C compiler.
+    The plant (efforts in, motion out), the inverse model, within limits as `bounded`, and a
+    computed-torque controller. They hold their sources, and a binary for this machine where there
+    is a C compiler.
 
     Options:
         out: Folder for the files.
@@ -33,13 +34,14 @@ def fmu(
 
     machine = condyle.load(mechanism)
     folder, files, bare = output_folder(out), [], False
-    for one in dict.fromkeys(kind or completion.FMUS):
+    kinds = list(dict.fromkeys(kind or completion.FMUS[:3]))
+    for one in kinds:
         path = folder / f"{file_stem(machine.name)}-{file_stem(one)}.fmu"
         bare |= not write_fmu(machine, one, fmi, path)
         files.append(path)
     if bare:
         warn(["no binary for this machine: the files hold sources alone, to be compiled elsewhere"])
-    if set(kind or completion.FMUS) - {"plant"} and any(c.kind == "cable" for c in machine.chains):
+    if {"inverse", "controller"} & set(kinds) and any(c.kind == "cable" for c in machine.chains):
         warn(["efforts in FMUs are of least norm, without limits: a cable may be asked to push"])
     data = {"mechanism": machine.name, "fmi": fmi, "binary": not bare, "files": files}
     return Answer(files_line(files), data, command_line("check", mechanism))

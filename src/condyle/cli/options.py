@@ -43,7 +43,8 @@ HELP = {
     "flag": "Keep samples that cannot be computed: empty, with a status.",
     "quantity": f"What to map, of {', '.join(completion.QUANTITIES)}; repeat for more, or "
     "separate by commas. Default: ratio.",
-    "kind": f"What to export; repeat for more: {', '.join(completion.FMUS)}. Default: all.",
+    "kind": f"What to export; repeat for more: {', '.join(completion.FMUS)}. Default: the first "
+    "three.",
     "strict": "A contact outside its bounds is an error.",
     "threads": "At most so many threads. Default: all processors. Same results.",
     "trim": "Leave out so many seconds of the motion at either end, where smoothing is least "

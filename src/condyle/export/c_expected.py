@@ -8,13 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..backends.kernel import AGAIN
-from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
 from ..model.closing import Closure
 from ..model.evaluator import Evaluator
 from ..model.forward_kinematics import ForwardKinematics
+from ..questions.structure import structure_of
 from ..status import Status
-from .c_function import LIMITS, renamed
+from .c_context import CODES
+from .c_function import own_numbers, renamed
 from .catalogue import Wish, least_norm, require_question
 
 Arrays = dict[str, np.ndarray]
@@ -56,37 +57,29 @@ def _graph(r: Reference, question: str, given: Given) -> tuple[Arrays, np.ndarra
     entry = require_question(question)
     kernel = r.model.kernel(entry.question or question, *entry.details(r.wish))
     names = renamed(entry.given)
-    ports = {}
+    ports, known = {}, own_numbers(r.model.mechanism)
     for port in kernel.interface.ports:
         size = port.size * (kernel.interface.lanes if port.lanes else 1)
         ports[port.name] = np.zeros((len(next(iter(given.values()))), size))
         name = names.get(port.name, port.name)
         if name in given and (not names or port.name in names):
             ports[port.name] = given[name]
-        elif port.name in LIMITS:
-            ends = [limits(chain)[LIMITS.index(port.name)] for chain in r.model.mechanism.chains]
-            ports[port.name] += ends
+        elif port.name in known:
+            ports[port.name] += known[port.name]
     found = kernel.run(ports)
     results = {
         name: found.values[result].reshape(-1, len(found.status)).T
         for result, name in renamed(entry.results).items()
         if result in found.values
     }
-    unsure = Status.unreachable if entry.doubt == "UNREACHABLE" else Status.singular
+    unsure = CODES[entry.unsure(structure_of(r.model.mechanism))]
     return results, np.where(found.status == AGAIN, unsure, found.status)
 
 
-def _inverse(
-    r: Reference, given: Given, distribution: str | None = None
-) -> tuple[Arrays, np.ndarray]:
-    model = r.model if distribution is None else r.model.choosing(distribution)
+def _inverse(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
     load = np.hstack([given[name] for name in ("force", "moment", "point")])
-    found = model.torques(given["q"], given["q1"], given["q2"], load, outputs=("contact",))
+    found = r.model.torques(given["q"], given["q1"], given["q2"], load, outputs=("contact",))
     return {"effort": found.effort, "contact_force": found["contact_force"]}, found.status
-
-
-def _bounded(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
-    return _inverse(r, given, "bounded")
 
 
 def _forward(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
@@ -116,7 +109,6 @@ def _pose(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
 _ANSWERS: dict[str, Callable[[Reference, Given], tuple[Arrays, np.ndarray]]] = {
     "inverse": _inverse,
     "contact": _inverse,
-    "bounded": _bounded,
     "forward": _forward,
     "closure": _closure,
     "pose": _pose,

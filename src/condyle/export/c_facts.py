@@ -15,7 +15,7 @@ from typing import Any
 
 from ..atomic import write_text
 from ..backends.compiler import CompilerError, find_compiler
-from .c_package import TOLERANCE
+from .c_package import tolerance
 from .exported import Exported
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=fast", "-fno-math-errno")
@@ -57,10 +57,10 @@ def write_facts(exported: Exported, folder: Path) -> Facts:
     path = folder / "FACTS.md"
     write_text(path, _page(exported, rows, how))
     warnings = [
-        f"{name} does not answer as recorded: worst error {row['error']:.1e}, {row['wrong']} wrong "
-        "statuses; look at it with make check"
-        for name, row in rows.items()
-        if row["wrong"] or (row["error"] or 0.0) > TOLERANCE[exported.precision]
+        f"{f.name} does not answer as recorded: worst error {row['error']:.1e}, {row['wrong']} "
+        "wrong statuses; look at it with make check"
+        for f, row in zip(exported.functions, rows.values(), strict=True)
+        if row["wrong"] or (row["error"] or 0.0) > tolerance(exported, f)
     ]
     return Facts(path, {"functions": rows, "measured_by": how}, warnings)
 

@@ -10,6 +10,7 @@ from ..backends.c.printer import nested
 from ..errors import UnsupportedError
 from ..graph.program import Program
 from ..mechanism.chain import limits
+from ..mechanism.mechanism import Mechanism
 from ..questions.friction import MOST
 from .c_body import HUGE, Places, Scalar, Wide
 from .c_context import CODES, Body, Context
@@ -118,7 +119,7 @@ def _places(
 ) -> Places:
     """Where numbers are; of ports without an argument, or beyond its end, what they are."""
     sizes = {a.name: a.size for a in arguments if a.given}
-    known, huge = _limits(c), HUGE[c.precision]
+    known, huge = own_numbers(c.mechanism), HUGE[c.precision]
     suffix = "" if c.precision == "double" else "f"
 
     def place(port: str, i: int) -> str:
@@ -133,10 +134,10 @@ def _places(
     return Places.of(program.interface, c.numbers.order, place, results)
 
 
-def _limits(c: Context) -> dict[str, list[float]]:
+def own_numbers(mechanism: Mechanism) -> dict[str, list[float]]:
     """Numbers of the ports `LIMITS`, in their order."""
-    low, high = zip(*(limits(chain)[:2] for chain in c.mechanism.chains), strict=True)
-    push = [contact.push if contact.one_sided else 0 for contact in c.mechanism.contacts]
+    low, high = zip(*(limits(chain)[:2] for chain in mechanism.chains), strict=True)
+    push = [contact.push if contact.one_sided else 0 for contact in mechanism.contacts]
     least = [0.0 if side > 0 else -math.inf for side in push]
     most = [0.0 if side < 0 else math.inf for side in push]
     rows = low, high, [1.0] * len(low), least, most
@@ -157,7 +158,7 @@ def _judged(
         found.append((_sum(angles), f"<= {body.number(ANGLES[c.precision])}", "OUT_OF_BOUNDS"))
     for i, check in enumerate(body.program.checks):
         limit = body.number(threshold(check.tolerance, c.precision))
-        known = NAMES[int(check.below)] if check.below is not None else entry.unsure(c)
+        known = NAMES[int(check.below)] if check.below is not None else entry.unsure(c.structure)
         found.append((body.check(i), f">= {limit}", known))
     for store in body.stores() if entry.within else ():
         place, value = store.rstrip(";").split(" = ", 1)

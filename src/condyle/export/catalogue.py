@@ -17,7 +17,7 @@ from ..questions.allocation import TERMS
 from ..questions.law import CONTROLLERS, ControllerTable
 from ..questions.law.computed_torque import ComputedTorque
 from ..questions.observer import ITERATIONS as OBSERVER_STEPS
-from .c_context import Context
+from ..questions.structure import Structure
 
 POSE_STEPS = 8  # as many as a start that is off by a third of what steps may be takes
 
@@ -76,9 +76,9 @@ class Entry:
     told: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     limited: bool = False
 
-    def unsure(self, c: Context) -> str:
+    def unsure(self, structure: Structure) -> str:
         """The status of what cannot be vouched for."""
-        return self.rubbing if self.rubbing and c.structure.friction else self.doubt
+        return self.rubbing if self.rubbing and structure.friction else self.doubt
 
 
 def least_norm(mechanism: Mechanism) -> str | None:

@@ -1,8 +1,9 @@
 """What an FMU is of a mechanism, in C: its variables, and how they follow from each other.
 
-Three kinds: the `plant` (efforts and a load in, motion out), the `inverse` model (a motion in,
-efforts out) and the `controller` (computed torque). Every array of the exported functions is a row
-of scalar variables, called as array and label: `effort.masseter_left`, `q.X`.
+Four kinds: the `plant` (efforts and a load in, motion out), the `inverse` model (a motion in,
+efforts out), `bounded`, the same within limits, and the `controller` (computed torque). Every array
+of the exported functions is a row of scalar variables, called as array and label:
+`effort.masseter_left`, `q.X`.
 """
 
 from __future__ import annotations
@@ -24,11 +25,13 @@ KINDS = {
     "plant": ("forward", "motion"),
     "inverse": ("contact",),
     "controller": ("computed_torque",),
+    "bounded": ("bounded",),
 }
 TEXTS = {
     "plant": "Forward dynamics: efforts and a load in, motion and contact forces out",
     "inverse": "Inverse dynamics: a motion and a load in, efforts and contact forces out",
     "controller": "Computed torque: wanted and measured motion in, efforts out",
+    "bounded": "Inverse dynamics within limits: a motion and a load in, efforts and forces out",
 }
 STATES, RATES = ("q", "q1"), ("dq", "acceleration")
 PARAMETERS = ("point", "kp", "kd")

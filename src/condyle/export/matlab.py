@@ -17,7 +17,7 @@ from .c_names import identifier
 from .c_source import export
 from .exported import Argument, Exported, Function
 
-DEFAULT = ("contact", "inverse", "forward", "motion", "pose", "computed_torque")
+DEFAULT = ("contact", "inverse", "bounded", "forward", "motion", "pose", "computed_torque")
 LONGEST = 63  # letters of a name in MATLAB
 
 
