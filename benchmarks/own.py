@@ -22,12 +22,11 @@ from condyle.backends.compiler import find_compiler
 from condyle.backends.kernel import Kernel
 from condyle.mechanism.contact import Friction
 from condyle.mechanism.mechanism import Mechanism
-from condyle.model.evaluator import Evaluator
+from condyle.model.model import Model
 from condyle.motion import Motion, reference_load, reference_motion
 from condyle.questions.inverse import inverse
 from condyle.questions.numbers import Layout, has_closed_form, specialised
 from condyle.questions.structure import structure_of
-from condyle.results.model import Model
 
 from .programs import Bites, program_probes, tight
 from .rows import Probe, Row, spread
@@ -65,7 +64,7 @@ class Timer:
         return min(self.library.vector_operation(ctypes.c_long(1_200_000)) for _ in range(3))
 
 
-def reachable_samples(model: Evaluator, count: int, seed: int = 0) -> np.ndarray:
+def reachable_samples(model: Model, count: int, seed: int = 0) -> np.ndarray:
     """Random states (q, q', q'', F) that the mechanism reaches, (count, 3 m + 3)."""
     rng = np.random.default_rng(seed)
     m = model.mechanism.degrees_of_freedom
@@ -93,7 +92,7 @@ class Case:
     @staticmethod
     def of(mechanism: Mechanism) -> Case:
         point = np.array(mechanism.platform.points.get("right_molar", (0.01, 0.02, 0.005)))
-        reference = Evaluator(mechanism, backend="numpy")
+        reference = Model(mechanism, backend="numpy")
         m = mechanism.degrees_of_freedom
         samples = reachable_samples(reference, SAMPLES)
         load = np.hstack(
@@ -131,12 +130,12 @@ def own_probes(mechanism: Mechanism, formulations: list[str]) -> Iterator[Probe]
         elif has_closed_form(mechanism):
             variants.append((", direct", "direct", ()))
         for what, route, outputs in variants:
-            model = Evaluator(mechanism, formulation, route, "compiled")
+            model = Model(mechanism, formulation, route, "compiled")
             kernel = model.kernel("inverse", outputs)
             found = model.torques(*case.states, case.load, outputs).effort
             yield from _kernel_probes(label + what, kernel, case.columns, case.right, found, timer)
     yield from _forward_probes(f"{name} {FORWARD}", case, timer)
-    numpy = Evaluator(mechanism, backend="numpy")
+    numpy = Model(mechanism, backend="numpy")
     yield _python_probe(
         f"{name} numpy: batch", lambda: numpy.torques(*case.states, case.load), SAMPLES
     )
@@ -146,7 +145,7 @@ def own_probes(mechanism: Mechanism, formulations: list[str]) -> Iterator[Probe]
 
 def _forward_probes(label: str, case: Case, timer: Timer) -> Iterator[Probe]:
     """Accelerations and contact forces, from the efforts that inverse dynamics finds."""
-    model = Evaluator(case.mechanism, backend="compiled")
+    model = Model(case.mechanism, backend="compiled")
     kernel = model.kernel("forward", ("contact",))
     q, q1, q2 = case.states
     assert isinstance(kernel, CompiledKernel)
@@ -206,7 +205,7 @@ def _addresses(kernel: CompiledKernel) -> list[ctypes.c_void_p]:
 
 def thread_probes(mechanism: Mechanism) -> Iterator[Probe]:
     """One thread and two, by the same call from Python on few and on many samples."""
-    model, case = Evaluator(mechanism, backend="compiled"), Case.of(mechanism)
+    model, case = Model(mechanism, backend="compiled"), Case.of(mechanism)
     label = f"{mechanism.name} virtual_power: batch"
     for count in (100, 5000, 200_000):
         given = case.many(count)
@@ -230,7 +229,7 @@ def asked_probes(mechanism: Mechanism) -> Iterator[Probe]:
 
 def map_probes(mechanism: Mechanism) -> Iterator[Probe]:
     """A map over two coordinates, on one core: what can be reached, and the singularity ratio."""
-    model = Evaluator(mechanism, backend="compiled")
+    model = Model(mechanism, backend="compiled")
     over = {"X": (-5e-3, 5e-3, 400), "beta": (-0.1, 0.35, MAPPED // 400)}
     call = partial(workspace_map, model, over, "ratio", threads=1)
     yield _python_probe(f"{mechanism.name}: {MAP}", call, MAPPED)
@@ -250,7 +249,7 @@ def policy_probes(mechanism: Mechanism) -> Iterator[Probe]:
         (BOUNDED, wide, "bounded"),
         (FRICTION, rough, "minimum_norm"),
     ):
-        model = Evaluator(machine, backend="compiled", distribution=policy)
+        model = Model(machine, backend="compiled", distribution=policy)
         outputs = ("contact", "motion")  # which `bounded` needs, so that all have the same
         call = partial(model.torques, *given, outputs=outputs, threads=1)
         yield _python_probe(f"{label}: {name}", call, JAW_SAMPLES)
@@ -261,13 +260,13 @@ def limit_probes(
 ) -> Iterator[Probe]:
     """Limits that bind at one sample in three, and bites of a jaw, beside other solvers."""
     given = Case.of(mechanism).many(JAW_SAMPLES)
-    free = Evaluator(mechanism, backend="compiled").torques(*given).effort
+    free = Model(mechanism, backend="compiled").torques(*given).effort
     greatest = float(np.quantile(np.abs(free).max(axis=1), 2 / 3))
-    model = Evaluator(tight(mechanism, greatest), backend="compiled", distribution="bounded")
+    model = Model(tight(mechanism, greatest), backend="compiled", distribution="bounded")
     fits = model.torques(*given).status == 0
     q, q1, q2, acting = (a[fits] for a in given)
     yield from program_probes(Bites(mechanism.name, model, (q, q1, q2, acting)), unavailable)
-    model = Evaluator(jaw, backend="compiled", distribution="bounded")
+    model = Model(jaw, backend="compiled", distribution="bounded")
     still = np.zeros((JAW_SAMPLES, jaw.degrees_of_freedom))
     bite = np.zeros((JAW_SAMPLES, 9))
     bite[:, 2], bite[:, 6:] = np.linspace(0, -600, JAW_SAMPLES), model.load_point("right_molar")
@@ -277,7 +276,7 @@ def limit_probes(
 def jaw_probes(mechanism: Mechanism) -> Iterator[Probe]:
     """Muscles of a jaw that opens and bites, by objective."""
     for objective in ("bounded", "cubic"):
-        model = Evaluator(mechanism, backend="compiled", distribution=objective)
+        model = Model(mechanism, backend="compiled", distribution=objective)
         t = np.linspace(0, 5, JAW_SAMPLES)[:, None]
         unit = np.array([1e-3 if name in "XYZ" else 0.03 for name in model.independent])
         turn = 2 * np.pi
@@ -345,8 +344,8 @@ def ready_rows(mechanism: str) -> Iterator[Row]:
     program = (
         "import time; t = time.perf_counter()\n"
         "import numpy as np, condyle\n"
-        "from condyle.model.evaluator import Evaluator\n"
-        f"k = Evaluator(condyle.load({mechanism!r})).kernel('inverse', ())\n"
+        "from condyle.model.model import Model\n"
+        f"k = Model(condyle.load({mechanism!r})).kernel('inverse', ())\n"
         "k.one(np.zeros(k.interface.columns))\n"
         "print(time.perf_counter() - t)\n"
     )

@@ -13,7 +13,7 @@ from condyle.distribution import Problem, distribute
 from condyle.distribution.eliminated import Sample
 from condyle.mechanism.chain import limits
 from condyle.mechanism.mechanism import Mechanism
-from condyle.model.evaluator import Evaluator
+from condyle.model.model import Model
 
 from .peers.solvers import SOLVERS
 from .rows import Probe
@@ -31,7 +31,7 @@ class Bites:
     """Samples of a mechanism whose limits bind, and how they are called."""
 
     label: str
-    model: Evaluator
+    model: Model
     given: Given
 
     def ours(self) -> float:

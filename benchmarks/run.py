@@ -19,7 +19,7 @@ from condyle import __version__
 from condyle.backends.compiler import find_compiler
 from condyle.dynamics import FORMULATIONS
 from condyle.mechanism import bundled_text, load
-from condyle.model.evaluator import Evaluator
+from condyle.model.model import Model
 from condyle.progress import step
 
 from . import peers
@@ -180,7 +180,7 @@ def _peer_probes(unavailable: dict[str, str]) -> Iterator[Probe]:
     """The other engines that can be had."""
     raw = tomllib.loads(bundled_text(REFERENCE))
     mechanism = load(REFERENCE)
-    model = Evaluator(mechanism, backend="numpy")
+    model = Model(mechanism, backend="numpy")
     m = mechanism.degrees_of_freedom
     samples = reachable_samples(model, 64)
     q, q1, q2 = (np.ascontiguousarray(samples[:, i * m : (i + 1) * m]) for i in range(3))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from condyle.mechanism.mechanism import Mechanism
-from condyle.results.model import Model
+from condyle.model.model import Model
 from condyle.simulation import simulate
 from condyle.simulation.bind import bind
 from condyle.simulation.plan import Plan

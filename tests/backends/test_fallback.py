@@ -22,7 +22,7 @@ from support.cases import case, error
 from condyle.backends import cache, compiler
 from condyle.backends.compiler import CompilerError, find_compiler
 from condyle.errors import InputError
-from condyle.model.evaluator import Evaluator
+from condyle.model.model import Model
 
 NAME = "gough-stewart"
 SLOWER = "; numpy gives the same numbers, slower\n"
@@ -38,8 +38,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cache"
 
 
-def by_numpy() -> Evaluator:
-    return Evaluator(case(NAME).mechanism, backend="numpy")
+def by_numpy() -> Model:
+    return Model(case(NAME).mechanism, backend="numpy")
 
 
 @functools.cache
@@ -47,7 +47,7 @@ def wanted() -> np.ndarray:
     return by_numpy().torques(*case(NAME).arguments).effort
 
 
-def check_numbers(model: Evaluator) -> None:
+def check_numbers(model: Model) -> None:
     """Those of numpy."""
     found = model.torques(*case(NAME).arguments)
     tolerance = 1e-12 if model.route == "direct" else 0
@@ -144,7 +144,7 @@ def test_same_numbers_and_one_notice(
 ) -> None:
     """However often it is called; and nothing stays behind."""
     c = case(NAME)
-    model = Evaluator(c.mechanism)
+    model = Model(c.mechanism)
     for _ in range(2):
         check_numbers(model)
     assert model.backend.name == "numpy"
@@ -164,10 +164,10 @@ def test_one_notice_for_many_models(
 ) -> None:
     """Whatever it is that is wrong with the compiler next."""
     for _ in range(2):
-        check_numbers(Evaluator(case(NAME).mechanism))
-    check_numbers(Evaluator(case(NAME).mechanism, route="direct"))
+        check_numbers(Model(case(NAME).mechanism))
+    check_numbers(Model(case(NAME).mechanism, route="direct"))
     monkeypatch.setenv("CC", "no-such-cc")
-    check_numbers(Evaluator(case(NAME).mechanism))
+    check_numbers(Model(case(NAME).mechanism))
     assert capsys.readouterr().err.count("condyle: ") == 1
 
 
@@ -178,7 +178,7 @@ def test_kernels_that_are_demanded(
     """At the latest when the first of them is needed."""
     c = case(NAME)
     with pytest.raises(CompilerError) as failure:
-        Evaluator(c.mechanism, backend="compiled").torques(*c.arguments)
+        Model(c.mechanism, backend="compiled").torques(*c.arguments)
     assert useless[1] in str(failure.value) and REMEDY in str(failure.value)
     assert capsys.readouterr().err == ""
 
@@ -202,7 +202,7 @@ def test_no_place_to_build(
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(tempfile, "mkdtemp", full)
-    check_numbers(Evaluator(case(NAME).mechanism))
+    check_numbers(Model(case(NAME).mechanism))
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and os.strerror(errno.ENOSPC) in said and said.endswith(SLOWER)
 
@@ -211,9 +211,9 @@ def test_no_place_to_build(
 def test_what_was_built_before_needs_no_second_build(monkeypatch: pytest.MonkeyPatch) -> None:
     """A compiler that has broken since is not called for what is there."""
     c = case(NAME)
-    first = Evaluator(c.mechanism).kernel("inverse", ())
+    first = Model(c.mechanism).kernel("inverse", ())
     monkeypatch.setattr(compiler.Compiler, "build", lambda *call: pytest.fail("built again"))
-    second = Evaluator(c.mechanism).kernel("inverse", ())
+    second = Model(c.mechanism).kernel("inverse", ())
     assert second.cached and not first.cached
 
 
@@ -225,21 +225,21 @@ def test_the_environment_decides_what_auto_means(monkeypatch: pytest.MonkeyPatch
     meant = {"numpy": "numpy", "interpreted": "numpy", "compiled": "compiled", "": "compiled"}
     for value, name in meant.items():
         monkeypatch.setenv("CONDYLE_BACKEND", value)
-        assert Evaluator(mechanism).backend.name == name
+        assert Model(mechanism).backend.name == name
         for backend in ("compiled", "numpy"):
-            assert Evaluator(mechanism, backend=backend).backend.name == backend
-        assert Evaluator(mechanism, backend="numpy").backend.name == "numpy"
+            assert Model(mechanism, backend=backend).backend.name == backend
+        assert Model(mechanism, backend="numpy").backend.name == "numpy"
     monkeypatch.setenv("CONDYLE_BACKEND", "compilled")
     with pytest.raises(InputError, match=r'no backend "compilled"\. Did you mean "compiled"'):
-        Evaluator(mechanism)
+        Model(mechanism)
 
 
 def test_demanded_by_the_environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     absent(tmp_path, monkeypatch)
     monkeypatch.setenv("CONDYLE_BACKEND", "compiled")
     with pytest.raises(CompilerError, match=REMEDY):
-        Evaluator(case(NAME).mechanism)
-    assert Evaluator(case(NAME).mechanism, backend="numpy").backend.name == "numpy"
+        Model(case(NAME).mechanism)
+    assert Model(case(NAME).mechanism, backend="numpy").backend.name == "numpy"
 
 
 # -- on the command line ----------------------------------------------------------------------

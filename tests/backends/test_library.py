@@ -11,7 +11,7 @@ from support.interpreter import Interpreter
 import condyle
 from condyle.graph.operations import BY_CASADI
 from condyle.mechanism.surface import Expression
-from condyle.model.evaluator import Evaluator
+from condyle.model.model import Model
 from condyle.status import Status
 
 SIZE = 1e-5  # of what the functions add to a plane [m]
@@ -50,7 +50,7 @@ def test_kernels_agree_with_casadi(backend: str) -> None:
     left = left.model_copy(update={"surface": Expression(bumpy)})
     mechanism = mechanism.replace(contacts=(left, right))
     wanted = Interpreter(mechanism).solve(*reference.arguments)
-    kernel = Evaluator(mechanism, backend=backend).kernel("inverse", ())
+    kernel = Model(mechanism, backend=backend).kernel("inverse", ())
     answer = kernel.run(reference.inputs)
     good = answer.status == Status.ok
     assert wanted.reached[good].all() and good.mean() > 0.5

@@ -19,16 +19,16 @@ from condyle.backends import cache
 from condyle.backends.c.build import _recipe
 from condyle.backends.c.compiled_kernel import CompiledKernel
 from condyle.backends.compiler import find_compiler
-from condyle.model.evaluator import Evaluator
+from condyle.model.model import Model
 from condyle.questions import Question
 
 SOLVE = """
 import json, sys
 from condyle.backends import cache
-from condyle.model.evaluator import Evaluator
+from condyle.model.model import Model
 from support.cases import case
 c = case("gough-stewart")
-kernel = Evaluator(c.mechanism, backend="compiled").kernel("inverse", ())
+kernel = Model(c.mechanism, backend="compiled").kernel("inverse", ())
 sys.stdin.readline()  # the others are as far
 """
 RUN = """
@@ -102,7 +102,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def kernel() -> CompiledKernel:
-    model = Evaluator(case("gough-stewart").mechanism, backend="compiled")
+    model = Model(case("gough-stewart").mechanism, backend="compiled")
     return model.kernel("inverse", ())
 
 
@@ -231,7 +231,7 @@ def test_a_library_that_no_longer_loads_is_built_again(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Whole, but of another machine, say."""
-    model = Evaluator(case("gough-stewart").mechanism, backend="numpy")
+    model = Model(case("gough-stewart").mechanism, backend="numpy")
     question = Question.about(model.system.structure, "inverse", ())
     kernel()
     recipe = _recipe(question.key, find_compiler())

@@ -15,7 +15,7 @@ from condyle.backends.c.compiled_kernel import CompiledKernel
 from condyle.backends.kernel import Answer
 from condyle.backends.threads import shared_out
 from condyle.errors import InputError
-from condyle.model.evaluator import Evaluator
+from condyle.model.model import Model
 from condyle.results import state_rows
 from condyle.results.inverse_rows import solve_file
 
@@ -23,7 +23,7 @@ from condyle.results.inverse_rows import solve_file
 @pytest.fixture(scope="module", params=["masticatory", "masticatory-curved"])
 def kernel(request: pytest.FixtureRequest) -> CompiledKernel:
     mechanism = case(request.param).mechanism
-    return Evaluator(mechanism, backend="compiled").kernel("inverse", ("contact",))
+    return Model(mechanism, backend="compiled").kernel("inverse", ("contact",))
 
 
 Inputs = dict[str, np.ndarray]
@@ -60,7 +60,7 @@ def test_threads(kernel: CompiledKernel, samples: Inputs, monkeypatch: pytest.Mo
 @pytest.mark.parametrize("backend", ["compiled", "numpy"])
 def test_fewer_than_one_thread(backend: str, threads: int) -> None:
     c = case("masticatory")
-    model = Evaluator(c.mechanism, backend=backend)
+    model = Model(c.mechanism, backend=backend)
     for call in (model.evaluate, model.torques):
         with pytest.raises(InputError, match=f"threads is {threads}; expected 1 or more"):
             call(*c.arguments, threads=threads)
@@ -97,7 +97,7 @@ def test_blocks_of_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its results do not depend on how many samples it takes at a time."""
     c = case("mixed_k2_n8").repeated(100)
     c.q[::9, 1] += 10.0
-    kernel = Evaluator(c.mechanism, backend="numpy").kernel("inverse", ("contact",))
+    kernel = Model(c.mechanism, backend="numpy").kernel("inverse", ("contact",))
     whole = kernel.run(c.inputs)
     assert 0 in whole.status and whole.status.any()
     for size in (1, 7, 64):
@@ -127,7 +127,7 @@ def test_models_do_not_disturb_each_other() -> None:
     heavy = c.mechanism.model_copy(
         update={"platform": c.mechanism.platform.model_copy(update={"mass": 1.0})}
     )
-    first, second = (Evaluator(m, backend="compiled") for m in (c.mechanism, heavy))
+    first, second = (Model(m, backend="compiled") for m in (c.mechanism, heavy))
     before, other, after = (m.torques(*c.arguments).effort for m in (first, second, first))
     np.testing.assert_array_equal(before, after)
     assert np.abs(before - other).max() > 1e-3
@@ -141,7 +141,7 @@ def test_rows_of_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     load = c.load.copy()
     load[100:, 3:6] = 0.0
     path = write(tmp_path / "states.csv", Case(c.mechanism, c.q, c.q1, c.q2, load))
-    model = Evaluator(c.mechanism, backend="compiled")
+    model = Model(c.mechanism, backend="compiled")
     texts = []
     for rows in (65536, 100, 33):
         monkeypatch.setattr(state_rows, "CHUNK_ROWS", rows)
@@ -152,7 +152,7 @@ def test_rows_of_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
 
 def write(path: Path, c: Case) -> Path:
     """A states file."""
-    names = Evaluator(c.mechanism, backend="numpy").independent
+    names = Model(c.mechanism, backend="numpy").independent
     head = [p + name for p in ("", "d", "dd") for name in names]
     head += ["Fx", "Fy", "Fz", "Mx", "My", "Mz"]
     lines = [",".join(head), *(",".join(map(repr, row)) for row in c.samples[:, :-3].tolist())]

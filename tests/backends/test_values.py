@@ -17,7 +17,7 @@ from condyle.backends.numpy_kernel import NumpyKernel
 from condyle.dynamics import FORMULATIONS
 from condyle.graph.program import Variants
 from condyle.model.inverse_dynamics import RESULTS
-from condyle.model.model import Model as Evaluator
+from condyle.model.model import Model
 from condyle.questions import Question
 from condyle.questions.inverse import OUTPUTS
 
@@ -60,8 +60,8 @@ def wanted(name: str) -> Found:
     return found
 
 
-def model(name: str, formulation: str, route: str, backend: str = "compiled") -> Evaluator:
-    found = Evaluator(case(name).mechanism, formulation, route, backend)
+def model(name: str, formulation: str, route: str, backend: str = "compiled") -> Model:
+    found = Model(case(name).mechanism, formulation, route, backend)
     assert found.backend.name == backend
     return found
 
@@ -156,7 +156,7 @@ def test_whole_answers(name: str) -> None:
             assert error(values[result.name], truth) < TOLERANCE, result.name
 
 
-def questions_of(evaluator: Evaluator, *details: Any) -> Variants:
+def questions_of(evaluator: Model, *details: Any) -> Variants:
     return Question.about(evaluator.system.structure, "inverse", *details).variants()
 
 

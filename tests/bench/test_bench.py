@@ -22,7 +22,7 @@ from benchmarks.run import Benchmark
 from condyle.distribution import distribute
 from condyle.distribution.eliminated import Sample
 from condyle.mechanism import load
-from condyle.model.evaluator import Evaluator
+from condyle.model.model import Model
 
 
 def test_every_row_is_right() -> None:
@@ -118,7 +118,7 @@ def test_solvers_that_are_missing_are_named(monkeypatch: pytest.MonkeyPatch) -> 
 
     some = {"DAQP": SOLVERS["DAQP"], "none": missing}
     monkeypatch.setattr("benchmarks.programs.SOLVERS", some)
-    model = Evaluator(tight(load("masticatory"), 0.2), backend="numpy", distribution="bounded")
+    model = Model(tight(load("masticatory"), 0.2), backend="numpy", distribution="bounded")
     given = Case.of(model.mechanism).many(40)
     unavailable: dict[str, str] = {}
     probes = list(program_probes(Bites("some", model, given), unavailable))

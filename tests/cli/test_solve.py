@@ -15,9 +15,8 @@ from condyle.backends.c import compiled_kernel as kernel
 from condyle.backends.c.compiled_kernel import CompiledKernel
 from condyle.backends.compiler import CompilerError, find_compiler
 from condyle.mechanism import COORDINATES
-from condyle.model.evaluator import with_point
+from condyle.model.model import Model, with_point
 from condyle.motion import read_table
-from condyle.results.model import Model
 
 NAMES = ("X", "Y", "alpha", "beta")
 LOAD = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")

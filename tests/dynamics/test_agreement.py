@@ -16,8 +16,7 @@ from condyle import InputError, UnsupportedError
 from condyle.dynamics import FORMULATIONS, ROUTES
 from condyle.mechanism import Mechanism, parse
 from condyle.model.data import Evaluation
-from condyle.model.evaluator import with_point
-from condyle.results.model import Model
+from condyle.model.model import Model, with_point
 from condyle.status import Status
 
 

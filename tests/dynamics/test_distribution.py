@@ -11,7 +11,7 @@ from oracles.random_mechanism import random_mechanism, random_state, toml_text
 import condyle
 from condyle.dynamics.minimum_norm import minimum_norm
 from condyle.mechanism import parse
-from condyle.model.evaluator import with_point
+from condyle.model.model import with_point
 
 
 @pytest.mark.parametrize("n, m", [(6, 6), (6, 4), (8, 4), (5, 1)])

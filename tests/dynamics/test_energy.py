@@ -15,8 +15,7 @@ from oracles.rotations import platform_motion
 import condyle
 from condyle.dynamics import FORMULATIONS
 from condyle.mechanism import parse
-from condyle.model.evaluator import with_point
-from condyle.results.model import Model
+from condyle.model.model import Model, with_point
 
 CASES = {f"k{k}": {"contacts": k} for k in range(4)} | {"n8": {"chains": 8}}
 

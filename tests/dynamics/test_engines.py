@@ -13,7 +13,7 @@ from oracles.random_mechanism import random_mechanism, random_state, toml_text
 import condyle
 from condyle.kinematics.chain import FAMILIES
 from condyle.mechanism import parse
-from condyle.model.evaluator import with_point
+from condyle.model.model import with_point
 
 # Cables have no bodies; tests/kinematics/chain holds them against the oracle of free bodies.
 RIGID = tuple(kind for kind, family in FAMILIES.items() if family.bodies)

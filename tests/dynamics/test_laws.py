@@ -12,8 +12,7 @@ from oracles.random_mechanism import random_mechanism, random_state, toml_text
 import condyle
 from condyle.dynamics import FORMULATIONS
 from condyle.mechanism import Mechanism, parse
-from condyle.model.evaluator import with_point
-from condyle.results.model import Model
+from condyle.model.model import Model, with_point
 
 MIRROR = {"X": 1, "Y": -1, "Z": 1, "alpha": -1, "beta": 1, "gamma": -1}
 

@@ -13,7 +13,7 @@ from oracles.rubbing import losses, touching
 from support.rubbing import Rubbing, drawn
 
 from condyle.mechanism.chain import limits
-from condyle.model.evaluator import Evaluator
+from condyle.model.model import Model
 from condyle.status import Status
 
 TOLERANCE = 1e-8
@@ -53,7 +53,7 @@ def by_pinocchio(case: Rubbing, i: int, low: np.ndarray, high: np.ndarray) -> An
     return least_of_patterns(J, found["C_normal"], T, found["Q"] + J.T @ loss, low, high)
 
 
-def check(case: Rubbing, model: Evaluator, low: np.ndarray, high: np.ndarray) -> set[int]:
+def check(case: Rubbing, model: Model, low: np.ndarray, high: np.ndarray) -> set[int]:
     """Every sample; returns the statuses that there were."""
     got = model.evaluate(*case.arguments)
     n = len(model.mechanism.chains)
@@ -73,7 +73,7 @@ def check(case: Rubbing, model: Evaluator, low: np.ndarray, high: np.ndarray) ->
 @pytest.mark.parametrize("name", LEAST)
 def test_least_norm_with_friction_and_actuators(name: str) -> None:
     case = drawn(**{"count": 2, **LEAST[name]})
-    model = Evaluator(case.mechanism, backend="numpy")
+    model = Model(case.mechanism, backend="numpy")
     free = np.full(len(case.mechanism.chains) + len(case.mechanism.contacts), np.inf)
     assert check(case, model, -free, free) == {Status.ok}
 
@@ -86,6 +86,6 @@ def test_limits_with_contacts_that_push(name: str) -> None:
     push = np.array([contact.push for contact in machine.contacts])
     low = np.r_[[x.low for x in both], np.where(push > 0, preload, -np.inf)]
     high = np.r_[[x.high for x in both], np.where(push < 0, -preload, np.inf)]
-    model = Evaluator(machine, backend="numpy", distribution="bounded", preload=preload)
+    model = Model(machine, backend="numpy", distribution="bounded", preload=preload)
     seen = check(case, model, low, high)
     assert Status.ok in seen <= {Status.ok, Status.infeasible}

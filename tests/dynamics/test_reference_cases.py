@@ -13,7 +13,7 @@ import pytest
 
 import condyle
 from condyle.dynamics import FORMULATIONS, ROUTES
-from condyle.model.evaluator import with_point
+from condyle.model.model import with_point
 
 REFERENCE = json.loads((Path(__file__).parents[1] / "oracles" / "reference_cases.json").read_text())
 CASES = {key: np.array([case[key] for case in REFERENCE["cases"]]) for key in REFERENCE["cases"][0]}

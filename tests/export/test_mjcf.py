@@ -21,7 +21,7 @@ from condyle.errors import UnsupportedError
 from condyle.export.mjcf import Mjcf, mjcf
 from condyle.export.mjcf_tracks import track
 from condyle.mechanism import bundled_mechanisms
-from condyle.results.model import Model
+from condyle.model.model import Model
 
 AT_REST = 1e-9  # of the largest generalized force: MuJoCo and condyle share the poses
 # Name -> largest difference in motion: that of finite differences, a coupler that spins with its

@@ -14,7 +14,7 @@ import condyle
 from condyle.distribution import Problem, Status, distribute
 from condyle.mechanism import Mechanism
 from condyle.mechanism.chain import limits
-from condyle.model.evaluator import Evaluator
+from condyle.model.model import Model
 from condyle.motion.reference_case import reference_load, reference_motion
 
 TABLE = Path(__file__).parents[1] / "distribution" / "human_jaw.csv"
@@ -118,7 +118,7 @@ def test_static_bites_of_the_jaw_on_planes() -> None:
 def test_the_model_puts_the_same_wrenches_on_the_platform() -> None:
     """Jacobian and normals of the model are those that the bites were computed with."""
     jaw = condyle.load("human-jaw")
-    rows = Evaluator(jaw, backend="numpy").jacobians(np.zeros((1, 4)))["J_theta"][0]
+    rows = Model(jaw, backend="numpy").jacobians(np.zeros((1, 4)))["J_theta"][0]
     for chain, row in zip(jaw.chains, rows, strict=True):
         line = np.subtract(chain.base, chain.platform)
         line /= np.linalg.norm(line)

@@ -20,7 +20,7 @@ from condyle.dynamics import FORMULATIONS
 from condyle.mechanism import parse
 from condyle.mechanism.contact import Friction
 from condyle.model.data import Evaluation
-from condyle.model.evaluator import Evaluator
+from condyle.model.model import Model
 from condyle.status import Status
 
 CASES: dict[str, dict[str, Any]] = {
@@ -54,8 +54,8 @@ def found(name: str) -> tuple[Rubbing, Evaluation]:
 
 
 @cache
-def by_numpy(name: str) -> Evaluator:
-    return Evaluator(drawn(**{"count": 3, **CASES[name]}).mechanism, backend="numpy")
+def by_numpy(name: str) -> Model:
+    return Model(drawn(**{"count": 3, **CASES[name]}).mechanism, backend="numpy")
 
 
 def least(b: Balance) -> tuple[float, np.ndarray, np.ndarray] | None:
@@ -214,7 +214,7 @@ HELD: dict[str, dict[str, Any]] = {
 def test_a_kernel_is_sure_of_forces_that_are_held_at_zero(name: str) -> None:
     """All candidates in one graph against Newton's method on the dual, pattern by pattern."""
     case = drawn(count=20, **HELD[name])
-    model = Evaluator(case.mechanism, backend="numpy")
+    model = Model(case.mechanism, backend="numpy")
     q, q1, q2, load = case.arguments
     wrench = {"force": load[:, :3], "moment": load[:, 3:6], "point": load[:, 6:]}
     given = {"q": q, "q1": q1, "q2": q2, **wrench}
@@ -233,7 +233,7 @@ def test_a_kernel_is_sure_of_forces_that_are_held_at_zero(name: str) -> None:
 @pytest.mark.parametrize("route", ["core", "direct"])
 def test_every_formulation_and_route(formulation: str, route: str) -> None:
     case, wanted = found("k2 plane")
-    model = Evaluator(case.mechanism, formulation, route, "numpy")
+    model = Model(case.mechanism, formulation, route, "numpy")
     got = model.evaluate(*case.arguments)
     for name in ("effort", "contact_force", "friction_force", "slip"):
         a, b = getattr(got, name), getattr(wanted, name)
@@ -243,7 +243,7 @@ def test_every_formulation_and_route(formulation: str, route: str) -> None:
 @pytest.mark.usefixtures("quick")
 def test_compiled() -> None:
     case, wanted = found("k2 plane")
-    model = Evaluator(case.mechanism, backend="compiled")
+    model = Model(case.mechanism, backend="compiled")
     got = model.torques(*case.arguments, outputs=("contact",))
     size = np.abs(wanted.effort).max()
     np.testing.assert_allclose(got.effort, wanted.effort, atol=1e-11 * size)
@@ -291,7 +291,7 @@ def test_at_rest_friction_vanishes(name: str) -> None:
     for contact in raw["contact"]:
         del contact["friction"]
     got = by_numpy(name).evaluate(*case.arguments)
-    bare = Evaluator(parse(toml_text(raw)), backend="numpy").evaluate(*case.arguments)
+    bare = Model(parse(toml_text(raw)), backend="numpy").evaluate(*case.arguments)
     assert np.abs(got.friction_force).max() == 0 == np.abs(got.slip).max()
     size = np.abs(bare.effort).max()
     np.testing.assert_allclose(got.effort, bare.effort, atol=1e-12 * size)
@@ -307,7 +307,7 @@ def test_without_friction_and_losses_nothing_changes(contacts: int) -> None:
         contact["friction"] = {"coefficient": 0.0}
     raw["chain"] = [c | {"actuator": {"coulomb": 0.0, "gear": 9.0}} for c in raw["chain"]]
     a, b = (
-        Evaluator(parse(toml_text(x)), backend="numpy").evaluate(*bare.arguments)
+        Model(parse(toml_text(x)), backend="numpy").evaluate(*bare.arguments)
         for x in (bare.raw, raw)
     )
     assert (a.effort == b.effort).all() and (a.contact_force == b.contact_force).all()
@@ -323,7 +323,7 @@ def test_the_order_of_chains_and_contacts_does_not_matter() -> None:
     raw["contact"] = [raw["contact"][i] for i in contacts]
     rows = rng.permutation(len(wanted.effort))
     given = [a[rows] for a in case.arguments]
-    got = Evaluator(parse(toml_text(raw)), backend="numpy").evaluate(*given)
+    got = Model(parse(toml_text(raw)), backend="numpy").evaluate(*given)
     effort = wanted.effort[rows][:, chains]
     np.testing.assert_allclose(got.effort, effort, atol=1e-10 * np.abs(effort).max())
     force = wanted.contact_force[rows][:, contacts]
@@ -387,7 +387,7 @@ def test_efforts_are_continuous_but_where_the_least_pattern_changes() -> None:
 
     Either a force passes through 0 there, and efforts do not leap, or two patterns are of one norm.
     """
-    model = Evaluator(reference_with_friction(0.9), backend="numpy")
+    model = Model(reference_with_friction(0.9), backend="numpy")
     times = np.linspace(0, 5, 5001)
     motion = condyle.Motion.from_csv(condyle.motion.bundled_reference()[0], times=times)
     states, _ = model.independent_motion(motion)
@@ -427,7 +427,7 @@ def test_efforts_are_continuous_but_where_the_least_pattern_changes() -> None:
 def test_jammed() -> None:
     """Strong friction under which, at some samples, no pattern of signs is consistent."""
     case = drawn(4, count=40, mu=3.0, contacts=2, chains=4, lossy=False)
-    got = Evaluator(case.mechanism, backend="numpy").evaluate(*case.arguments)
+    got = Model(case.mechanism, backend="numpy").evaluate(*case.arguments)
     jams = np.array([least(b) is None for b in case.balances()])
     assert 0 < jams.sum() < len(jams)
     assert (got.status[jams] == Status.jammed).all()
@@ -438,7 +438,7 @@ def test_jammed() -> None:
 
 def test_a_jam_does_not_disturb_others() -> None:
     case = drawn(4, count=40, mu=3.0, contacts=2, chains=4, lossy=False)
-    model = Evaluator(case.mechanism, backend="numpy")
+    model = Model(case.mechanism, backend="numpy")
     got = model.evaluate(*case.arguments)
     good = got.status == Status.ok
     alone = model.evaluate(*(a[good] for a in case.arguments))
@@ -476,7 +476,7 @@ def test_the_robust_path_agrees(name: str) -> None:
 def test_a_kernel_vouches_only_for_the_least_of_all() -> None:
     """Among many samples are some whose least has a contact force of 0, next to a worse pattern."""
     case = drawn(3, count=150, mu=0.9)
-    model = Evaluator(case.mechanism, backend="numpy")
+    model = Model(case.mechanism, backend="numpy")
     q, q1, q2, load = case.arguments
     names = ("q", "q1", "q2", "force", "moment", "point")
     given = dict(zip(names, (q, q1, q2, *np.hsplit(load, 3)), strict=True))

@@ -15,7 +15,7 @@ import condyle
 from condyle.backends.c.compiled_kernel import CompiledKernel, Single
 from condyle.backends.kernel import AGAIN, Answer
 from condyle.errors import InputError
-from condyle.model.evaluator import Evaluator
+from condyle.model.model import Model
 from condyle.status import Status
 
 pytestmark = pytest.mark.usefixtures("quick")
@@ -44,7 +44,7 @@ class Asked:
 
     def __init__(self, name: str, question: str, backend: str) -> None:
         c = case(name)
-        self.model = Evaluator(c.mechanism, backend=backend)
+        self.model = Model(c.mechanism, backend=backend)
         self.names = ("q", "q'", "q''" if question == "inverse" else "effort", "load")
         effort = np.random.default_rng(1).normal(size=(len(c.q), len(c.mechanism.chains)))
         self.given: Arrays = (c.q, c.q1, c.q2 if question == "inverse" else effort, c.load)
@@ -233,7 +233,7 @@ def test_threads_do_not_meet(compiled: Asked) -> None:
 def test_another_choice_of_efforts_is_another_answer() -> None:
     """`choosing` keeps the kernels, but not what is bound to the least norm."""
     c = case("masticatory")
-    model = Evaluator(c.mechanism, backend="compiled")
+    model = Model(c.mechanism, backend="compiled")
     sample = [a[-1] for a in c.arguments]
     least = model.one(*sample)
     other = model.choosing("minimax")
@@ -249,17 +249,17 @@ def test_another_choice_of_efforts_is_another_answer() -> None:
 def test_another_mechanism_of_the_structure(question: str) -> None:
     base = condyle.load("masticatory")
     other = base.set({"platform.mass": 0.31})
-    general = Evaluator(base, backend="compiled", general=True)
+    general = Model(base, backend="compiled", general=True)
     c = case("masticatory")
     given = [a[-1] for a in c.arguments]
     if question == "forward":
         given[2] = general.one(*given)
 
-    def ask(model: Evaluator) -> np.ndarray:
+    def ask(model: Model) -> np.ndarray:
         return (model.forward_one if question == "forward" else model.one)(*given)
 
     own = ask(general)
-    found, wanted = ask(general.renumbered(other)), ask(Evaluator(other, backend="numpy"))
+    found, wanted = ask(general.renumbered(other)), ask(Model(other, backend="numpy"))
     assert error(found, wanted) < 1e-9
     assert error(own, wanted) > 1e-3
     np.testing.assert_array_equal(ask(general), own)

@@ -1,4 +1,4 @@
-"""What `Evaluator.torques` returns besides efforts: what was asked for, and nothing else."""
+"""What `Model.torques` returns besides efforts: what was asked for, and nothing else."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from support.cases import case, error
 
 from condyle.errors import InputError
 from condyle.model.inverse_dynamics import RESULTS
-from condyle.model.model import Model as Evaluator
+from condyle.model.model import Model
 
 
 @pytest.mark.usefixtures("quick")
@@ -16,7 +16,7 @@ from condyle.model.model import Model as Evaluator
 def test_condition_is_that_of_the_jacobian(backend: str) -> None:
     """Against singular values of the Jacobian that forward differences of the joints give."""
     c = case("masticatory")
-    model = Evaluator(c.mechanism, backend=backend)
+    model = Model(c.mechanism, backend=backend)
     q, q1, q2, load = (a[:5] for a in c.arguments)
     result = model.torques(q, q1, q2, load, outputs=("condition",))
     assert set(result.others) == {"condition"} and not result.status.any()
@@ -39,7 +39,7 @@ def test_condition_is_that_of_the_jacobian(backend: str) -> None:
 def test_what_is_asked_for_is_what_evaluate_says(output: str, backend: str) -> None:
     """Samples first, chains where the file has them, and nothing else comes along."""
     c = case("mixed_k2_n8")
-    model = Evaluator(c.mechanism, backend=backend)
+    model = Model(c.mechanism, backend=backend)
     whole = model.evaluate(*c.arguments)
     found = model.torques(*c.arguments, outputs=(output,))
     assert error(found.effort, whole.effort) < 1e-12
@@ -59,7 +59,7 @@ def test_what_is_asked_for_is_what_evaluate_says(output: str, backend: str) -> N
 def test_gravity_is_the_shares_at_rest(name: str, backend: str) -> None:
     """What gravity and load alone ask for, whatever the rates are."""
     c = case(name)
-    model = Evaluator(c.mechanism, backend=backend)
+    model = Model(c.mechanism, backend=backend)
     moving = model.torques(*c.arguments, outputs=("gravity", "share"))
     resting = model.torques(c.q, 0 * c.q1, 0 * c.q2, c.load, outputs=("gravity", "share"))
     assert error(moving["gravity"], resting["share"]) < 1e-12
@@ -68,7 +68,7 @@ def test_gravity_is_the_shares_at_rest(name: str, backend: str) -> None:
     assert error(moving["share"].sum(axis=0), moving.effort) < 1e-12
 
 
-def _arm(model: Evaluator) -> np.ndarray:
+def _arm(model: Model) -> np.ndarray:
     """Crank lengths, (n, 1): J_W = J_A J in lengths of the coupler."""
     return np.array(
         [[np.linalg.norm(np.subtract(c.crank_tip, c.base))] for c in model.mechanism.chains]
@@ -78,14 +78,14 @@ def _arm(model: Evaluator) -> np.ndarray:
 def test_an_unknown_output_is_named() -> None:
     c = case("masticatory")
     with pytest.raises(InputError, match='no output "contacts"'):
-        Evaluator(c.mechanism, backend="numpy").torques(*c.arguments, outputs=("contacts",))
+        Model(c.mechanism, backend="numpy").torques(*c.arguments, outputs=("contacts",))
 
 
 @pytest.mark.usefixtures("quick")
 def test_a_call_derives_nothing_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """What the mechanism alone decides is found once: a call of few samples would pay for it."""
     c = case("masticatory")
-    model = Evaluator(c.mechanism)
+    model = Model(c.mechanism)
     model.torques(*c.arguments)
 
     def again(_: object) -> None:

@@ -14,7 +14,7 @@ from support.rubbing import Rubbing, balanced, drawn
 
 import condyle
 from condyle.mechanism.chain import limits
-from condyle.model.evaluator import Evaluator
+from condyle.model.model import Model
 from condyle.status import Status
 
 MIXED = ("RSS", "PSS", "SPS", "cable")
@@ -43,17 +43,17 @@ TIGHTER = 1e-8
 
 
 @cache
-def found(name: str) -> tuple[Rubbing, Evaluator, Any]:
+def found(name: str) -> tuple[Rubbing, Model, Any]:
     options = dict(CASES[name])
     policy = {key: options.pop(key) for key in ("preload", "contact_weight") if key in options}
     case = drawn(**{"count": 3, **options})
     if options.get("families") == ("cable",):
         case = balanced(case, 1, 20.0)
-    model = Evaluator(case.mechanism, backend="numpy", distribution=name.split()[0], **policy)
+    model = Model(case.mechanism, backend="numpy", distribution=name.split()[0], **policy)
     return case, model, model.evaluate(*case.arguments)
 
 
-def programs(model: Evaluator, b: Balance, mixes: bool) -> list[Full]:
+def programs(model: Model, b: Balance, mixes: bool) -> list[Full]:
     """The program of every pattern, with bounds of efforts, of signs, and of one-sided contacts."""
     robot, policy = model.mechanism, model.policy
     low, high = (np.array([getattr(limits(c), x) for c in robot.chains]) for x in ("low", "high"))
@@ -167,7 +167,7 @@ def test_limits_that_no_effort_meets() -> None:
             a["torque_limit"] = [x * worst * more for x in a["torque_limit"]]
             chain["actuator"] = a
         wide = Rubbing(raw, case.states)
-        model = Evaluator(wide.mechanism, backend="numpy", distribution="bounded")
+        model = Model(wide.mechanism, backend="numpy", distribution="bounded")
         again = model.evaluate(*case.arguments)
         at = int(np.nanargmax(np.where(np.isfinite(got.shortfall), got.shortfall, -1)))
         assert bool(again.status[at] == Status.ok) is enough
@@ -177,7 +177,7 @@ def test_limits_that_no_effort_meets() -> None:
 def test_wide_limits_leave_the_least_norm(contacts: int) -> None:
     case = drawn(8, count=3, limit=1e6, contacts=contacts)
     bounded, least = (
-        Evaluator(case.mechanism, backend="numpy", distribution=name).evaluate(*case.arguments)
+        Model(case.mechanism, backend="numpy", distribution=name).evaluate(*case.arguments)
         for name in ("bounded", "minimum_norm")
     )
     size = np.abs(least.effort).max()
@@ -201,7 +201,7 @@ def test_torques_one_and_evaluate_agree(name: str) -> None:
 @pytest.mark.usefixtures("quick")
 def test_one_sample_of_a_compiled_model_keeps_the_policy() -> None:
     case, _, wanted = found("bounded k2 one-sided")
-    model = Evaluator(case.mechanism, backend="compiled", distribution="bounded", preload=0.5)
+    model = Model(case.mechanism, backend="compiled", distribution="bounded", preload=0.5)
     rows = [model.one(*row) for row in zip(*case.arguments, strict=True)]
     np.testing.assert_allclose(rows, wanted.effort, rtol=1e-8, atol=1e-9)
 
@@ -215,7 +215,7 @@ def test_compiled_limits_and_shortfalls_are_those_of_numpy(objective: str) -> No
     load[:, :6] *= np.tile([0.5, 1, 4, 16], len(load) // 4)[:, None]
     wanted = model.choosing(objective, 0.5).evaluate(q, q1, q2, load)
     assert set(wanted.status) == {Status.ok, Status.infeasible}
-    compiled = Evaluator(case.mechanism, backend="compiled", distribution=objective, preload=0.5)
+    compiled = Model(case.mechanism, backend="compiled", distribution=objective, preload=0.5)
     got = compiled.evaluate(q, q1, q2, load)
     assert (got.status == wanted.status).all()
     good = wanted.status == Status.ok

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.model.evaluator import Evaluator, with_point
+from condyle.model.model import Model, with_point
 
 CHANGES = {
     "masticatory": {"platform.mass": 0.31, "chain.masseter_left.base[0]": 0.0352},
@@ -23,13 +23,13 @@ CHANGES = {
 def test_a_renumbered_model_is_the_mechanisms_own(name: str, backend: str) -> None:
     base = condyle.load(name)
     other = base.set(CHANGES[name])
-    general = Evaluator(base, backend=backend, general=True)
+    general = Model(base, backend=backend, general=True)
     motion = condyle.trial_motion(base, rate=4.0)
     load = with_point(np.tile([1.0, 2.0, 3.0, 0.1, 0.2, 0.3], (len(motion), 1)), np.ones(3) / 50)
     states, _ = general.independent_motion(motion)
     before = general.evaluate(*states, load, 1).effort
     found = general.renumbered(other).evaluate(*states, load, 1)
-    wanted = Evaluator(other, backend="numpy").evaluate(*states, load, 1)
+    wanted = Model(other, backend="numpy").evaluate(*states, load, 1)
     for field in ("effort", "contact_force", "joint_rate"):
         a, b = getattr(found, field), getattr(wanted, field)
         np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * np.abs(b).max(initial=1.0))
@@ -41,16 +41,16 @@ def test_a_landmarks_path_too() -> None:
     base = condyle.load("masticatory")
     other = base.set("platform.points.incisor[0]", base.get("platform.points.incisor[0]") + 0.004)
     motion = condyle.Motion.from_csv(condyle.motion.bundled_reference()[0], rate=4.0)
-    general = Evaluator(base, backend="numpy", general=True)
+    general = Model(base, backend="numpy", general=True)
     own, _ = general.independent_motion(motion)
     found, _ = general.renumbered(other).independent_motion(motion)
-    wanted, _ = Evaluator(other, backend="numpy").independent_motion(motion)
+    wanted, _ = Model(other, backend="numpy").independent_motion(motion)
     np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-9)
     assert np.abs(found[0] - own[0]).max() > 1e-4
 
 
 def test_copies_share_their_kernels_and_travel() -> None:
-    general = Evaluator(condyle.load("gough-stewart"), backend="numpy", general=True)
+    general = Model(condyle.load("gough-stewart"), backend="numpy", general=True)
     kernel = general.kernel("motion")
     assert copy.copy(general).kernel("motion") is kernel
     assert general.choosing("bounded").kernel("motion") is kernel
@@ -60,5 +60,5 @@ def test_copies_share_their_kernels_and_travel() -> None:
 
 def test_what_was_chosen_stays_chosen() -> None:
     base = condyle.load("masticatory")
-    chosen = Evaluator(base, backend="numpy", general=True).choosing("bounded")
+    chosen = Model(base, backend="numpy", general=True).choosing("bounded")
     assert chosen.renumbered(base.set(CHANGES["masticatory"])).policy == chosen.policy

@@ -10,7 +10,7 @@ from support.interpreter import Interpreter
 
 import condyle
 from condyle.mechanism import Mechanism, parse
-from condyle.model.evaluator import Evaluator
+from condyle.model.model import Model
 from condyle.status import Status
 
 BACKENDS = ("numpy", "one", "batch")
@@ -29,7 +29,7 @@ def near_stewart() -> tuple[Mechanism, np.ndarray]:
 
 def turn_of_stewart(q: np.ndarray) -> float:
     """gamma near pi / 2 where the legs' Jacobian is singular, by bisection of its sign."""
-    model = Evaluator(condyle.load("gough-stewart"), backend="numpy")
+    model = Model(condyle.load("gough-stewart"), backend="numpy")
 
     def sign(gamma: float) -> float:
         return np.linalg.slogdet(model.jacobians(np.array([[*q[:5], gamma]]))["J_theta"][0])[0]
@@ -48,11 +48,11 @@ def near_four_chains() -> tuple[Mechanism, np.ndarray]:
         raw = random_mechanism(np.random.default_rng(seed), contacts=2, chains=6)
         raw["chain"] = raw["chain"][:4]
         mechanism = parse(toml_text(raw))
-        model = Evaluator(mechanism, backend="numpy")
+        model = Model(mechanism, backend="numpy")
         unit = np.array([0.006 if name in "XYZ" else 0.25 for name in model.independent])
         way = np.random.default_rng(seed).normal(0, 1, 4) * unit
 
-        def sign(part: float, model: Evaluator = model, way: np.ndarray = way) -> float:
+        def sign(part: float, model: Model = model, way: np.ndarray = way) -> float:
             J = model.jacobians(part * way[None])
             return np.linalg.slogdet(J["J_theta"][0] @ J["M_J"][0])[0]
 
@@ -90,7 +90,7 @@ def test_near_singularities(case: str) -> None:
     singular = np.linalg.svd(A / scale, compute_uv=False)
     condition = singular[:, 0] / singular[:, -1]
     assert condition.max() > 1e8 > 1e3 > condition.min()
-    compiled, numpy = (Evaluator(mechanism, backend=name) for name in ("compiled", "numpy"))
+    compiled, numpy = (Model(mechanism, backend=name) for name in ("compiled", "numpy"))
     found = {}
     for name, model in (("numpy", numpy), ("batch", compiled)):
         answer = model.torques(q, q1, q2, load, outputs=("contact",))
@@ -115,7 +115,7 @@ def test_near_singularities(case: str) -> None:
 
 
 def test_no_effort_that_overflows_is_ok() -> None:
-    model = Evaluator(condyle.load("masticatory"), backend="numpy")
+    model = Model(condyle.load("masticatory"), backend="numpy")
     zero = np.zeros((3, 4))
     load = np.zeros((3, 9))
     load[1, 0] = 1e308

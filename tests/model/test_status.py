@@ -14,8 +14,8 @@ from support.interpreter import Interpreter
 from condyle.backends.kernel import AGAIN
 from condyle.errors import InputError, UnreachableError
 from condyle.model.data import Evaluation
-from condyle.model.evaluator import Evaluator, with_point
 from condyle.model.judge import require_ok
+from condyle.model.model import Model, with_point
 from condyle.status import Status
 
 NAMES = ("masticatory", "masticatory-curved", "gough-stewart", "hexaglide")
@@ -23,10 +23,10 @@ COUNT = 250
 
 
 @cache
-def models(name: str) -> tuple[Evaluator, Evaluator]:
+def models(name: str) -> tuple[Model, Model]:
     """Compiled and numpy."""
     mechanism = case(name).mechanism
-    return Evaluator(mechanism, backend="compiled"), Evaluator(mechanism, backend="numpy")
+    return Model(mechanism, backend="compiled"), Model(mechanism, backend="numpy")
 
 
 @cache

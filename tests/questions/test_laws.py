@@ -10,7 +10,7 @@ import pytest
 from support.points import moved
 
 import condyle
-from condyle.model.evaluator import Evaluator
+from condyle.model.model import Model
 from condyle.motion import resolve_load_point
 from condyle.questions.entries import Machine
 from condyle.questions.law import CONTROLLERS
@@ -24,8 +24,8 @@ Arrays = dict[str, np.ndarray]
 
 
 @cache
-def jaw() -> Evaluator:
-    return Evaluator(condyle.load("masticatory"), backend="numpy")
+def jaw() -> Model:
+    return Model(condyle.load("masticatory"), backend="numpy")
 
 
 @cache

@@ -11,15 +11,15 @@ from support.interpreter import Interpreter
 
 from condyle.dynamics import FORMULATIONS
 from condyle.errors import InputError
-from condyle.model.evaluator import Evaluator
+from condyle.model.model import Model
 
 NAMES = ("masticatory", "masticatory-curved", "gough-stewart", "rss_k1_n6_ball", "mixed_k2_n8")
 NAMES += ("mixed_k3_n9_curved", "mixed_k4_n6", "mixed_k5_n6", "sps_k2_n6_ellipsoid")
 
 
 @cache
-def model(name: str, formulation: str = "virtual_power", backend: str = "numpy") -> Evaluator:
-    return Evaluator(case(name).mechanism, formulation, backend=backend)
+def model(name: str, formulation: str = "virtual_power", backend: str = "numpy") -> Model:
+    return Model(case(name).mechanism, formulation, backend=backend)
 
 
 def system(c: Case) -> tuple[np.ndarray, np.ndarray]:
@@ -30,7 +30,7 @@ def system(c: Case) -> tuple[np.ndarray, np.ndarray]:
     return s["b"].sum(axis=2), s["b"][..., -1]
 
 
-def check_balance(c: Case, m: Evaluator) -> None:
+def check_balance(c: Case, m: Model) -> None:
     """M q'' + C q' + G = A^T tau + load."""
     M, bias, gravity = m.inertia_matrix(c.q), m.bias(c.q, c.q1), m.gravity(c.q)
     needed, load = system(c)
@@ -110,7 +110,7 @@ def test_inertia_of_platform_and_rods_by_pinocchio() -> None:
     from condyle.mechanism import parse
 
     raw = random_mechanism(np.random.default_rng(4), contacts=0)
-    m, engine = Evaluator(parse(toml_text(raw)), backend="numpy"), PinocchioEngine(raw)
+    m, engine = Model(parse(toml_text(raw)), backend="numpy"), PinocchioEngine(raw)
     q = random_state(np.random.default_rng(1), raw, 3)["q"]
     M, G = m.inertia_matrix(q), m.gravity(q)
     zero, no_load = np.zeros(6), np.zeros(6)
@@ -157,7 +157,7 @@ def test_what_cannot_be_asked() -> None:
     m = model("masticatory")
     with pytest.raises(InputError, match=r'no space "Q"'):
         m.inertia_matrix(np.zeros((1, 4)), "Q")
-    walls = Evaluator(case("mixed_k3_n9_curved").mechanism, backend="numpy")
+    walls = Model(case("mixed_k3_n9_curved").mechanism, backend="numpy")
     q = np.zeros((2, 3))
     q[1, :] = 40.0
     with pytest.raises(InputError, match="the contacts cannot be met at sample 1"):

@@ -13,8 +13,8 @@ from condyle.backends.kernel import AGAIN, Kernel
 from condyle.backends.numpy_kernel import NumpyKernel
 from condyle.graph.program import Variants
 from condyle.kinematics.chain import FAMILIES
-from condyle.model.evaluator import Evaluator
 from condyle.model.forward_kinematics import ForwardKinematics
+from condyle.model.model import Model
 from condyle.questions.builder import Builder
 from condyle.questions.numbers import Layout
 from condyle.questions.pose import pose_from_encoders
@@ -25,8 +25,8 @@ NAMES += ("rss_k2_n6_profile", "mixed_k2_n8", "mixed_k3_n9_curved", "mixed_k5_n6
 
 
 @cache
-def model(name: str, backend: str = "numpy") -> Evaluator:
-    return Evaluator(case(name).mechanism, backend=backend)
+def model(name: str, backend: str = "numpy") -> Model:
+    return Model(case(name).mechanism, backend=backend)
 
 
 @cache

@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 import condyle
+from condyle import accessors
 from condyle.analysis.comparison import Comparison
 from condyle.kinematics.rotation import rotation
 from condyle.mechanism.surface import Plane, Quadratic
@@ -35,7 +36,6 @@ from condyle.report.figures.platform_path import track
 from condyle.report.figures.style import new_figure
 from condyle.report.naming import groups, heading
 from condyle.report.panel import Curve, Panel
-from condyle.results import accessors
 from condyle.results.solution import Solution
 
 NOTHING = {"marker": "no markers", "reaction": "no reactions"}  # where a run has none

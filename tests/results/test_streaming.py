@@ -16,7 +16,7 @@ from support.cases import case
 from support.children import PATIENCE, end, start, wait_for
 
 from condyle.errors import CondyleError
-from condyle.model.evaluator import Evaluator
+from condyle.model.model import Model
 from condyle.results import inverse_rows, state_rows
 from condyle.results.inverse_rows import solve_file
 
@@ -35,8 +35,8 @@ main()
 
 
 @pytest.fixture(scope="module")
-def model() -> Evaluator:
-    return Evaluator(case(NAME).mechanism, backend="numpy")
+def model() -> Model:
+    return Model(case(NAME).mechanism, backend="numpy")
 
 
 @pytest.fixture(autouse=True)
@@ -64,7 +64,7 @@ def names(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def peak(model: Evaluator, folder: Path, count: int) -> int:
+def peak(model: Model, folder: Path, count: int) -> int:
     """Bytes at most in use while a file is solved."""
     path = write(folder / f"{count}.csv", count)
     gc.collect()
@@ -79,13 +79,13 @@ def peak(model: Evaluator, folder: Path, count: int) -> int:
 @pytest.mark.parametrize("backend", ["numpy", "compiled"])
 @pytest.mark.usefixtures("quick")
 def test_memory_does_not_grow(backend: str, tmp_path: Path) -> None:
-    model = Evaluator(case(NAME).mechanism, backend=backend)
+    model = Model(case(NAME).mechanism, backend=backend)
     solve_file(model, write(tmp_path / "first.csv", CHUNK), tmp_path / "out.csv")
     few, many = (peak(model, tmp_path, count) for count in (3 * CHUNK, 15 * CHUNK))
     assert many < 1.5 * few
 
 
-def test_as_in_one_piece(model: Evaluator, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_as_in_one_piece(model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write(tmp_path / "states.csv", 2 * CHUNK + 7)
     solve_file(model, path, tmp_path / "pieces.csv")
     monkeypatch.setattr(state_rows, "CHUNK_ROWS", 65536)
@@ -110,7 +110,7 @@ LATE = {
 
 @pytest.mark.parametrize("old", [None, "old"])
 @pytest.mark.parametrize("kind", LATE)
-def test_a_bad_row_late(model: Evaluator, tmp_path: Path, kind: str, old: str | None) -> None:
+def test_a_bad_row_late(model: Model, tmp_path: Path, kind: str, old: str | None) -> None:
     """The error names it, counted from the top of the file; nothing is written."""
     text, said = LATE[kind]
     path = write(tmp_path / "states.csv", 900, row_733=text)
@@ -124,7 +124,7 @@ def test_a_bad_row_late(model: Evaluator, tmp_path: Path, kind: str, old: str | 
     assert not old or out.read_text() == old
 
 
-def test_bad_rows_late_that_are_kept(model: Evaluator, tmp_path: Path) -> None:
+def test_bad_rows_late_that_are_kept(model: Model, tmp_path: Path) -> None:
     path = write(tmp_path / "states.csv", 900, row_733=LATE["unreachable"][0])
     assert solve_file(model, path, tmp_path / "out.csv", flag=True)[0] == 900
     lines = (tmp_path / "out.csv").read_text().splitlines()
@@ -132,7 +132,7 @@ def test_bad_rows_late_that_are_kept(model: Evaluator, tmp_path: Path) -> None:
     assert all(line.endswith(",ok,") for i, line in enumerate(lines) if i not in (0, 733))
 
 
-def test_warnings_count_rows_of_the_file(model: Evaluator, tmp_path: Path) -> None:
+def test_warnings_count_rows_of_the_file(model: Model, tmp_path: Path) -> None:
     path = write(tmp_path / "states.csv", 900, row_733="0,0.004" + ",0" * 10)
     _, warnings, _ = solve_file(model, path, tmp_path / "out.csv")
     assert any("in 1 rows" in text and "in row 733" in text for text in warnings)
@@ -140,7 +140,7 @@ def test_warnings_count_rows_of_the_file(model: Evaluator, tmp_path: Path) -> No
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt(), MemoryError()])
 def test_interrupted(
-    model: Evaluator, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException
+    model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException
 ) -> None:
     real, calls = inverse_rows.solve_table, []
 

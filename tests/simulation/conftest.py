@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import condyle
-from condyle.results.model import Model
+from condyle.model.model import Model
 
 FRICTION = {"coefficient": 0.1, "smoothing_speed": 0.1}
 LOSSES = {"torque_limit": 3.0, "viscous": 2e-3, "coulomb": 5e-3, "smoothing_speed": 1.0}

@@ -9,7 +9,7 @@ import pytest
 from support.points import moved
 
 import condyle
-from condyle.results.model import Model
+from condyle.model.model import Model
 from condyle.simulation.gains import error_bound
 
 Kp, Kv = 2500.0, 100.0

@@ -8,7 +8,7 @@ from scipy.integrate import simpson
 from support.points import moved
 
 import condyle
-from condyle.results.model import Model
+from condyle.model.model import Model
 
 STIFFNESS, REST = 600.0, -0.001
 PLACES = (("incisor", 0), ("incisor", 1), ("incisor", 2))

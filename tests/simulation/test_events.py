@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import condyle
+from condyle.model.model import Model
 from condyle.questions.load.food import APART, BROKEN, TOUCHING
-from condyle.results.model import Model
 from condyle.simulation.bind import bind
 from condyle.simulation.control import Controller, Lost
 from condyle.simulation.running import Run, run

@@ -10,7 +10,7 @@ from scipy.integrate import trapezoid
 
 import condyle
 from condyle.errors import UnsupportedError
-from condyle.results.model import Model
+from condyle.model.model import Model
 from condyle.simulation.bind import bind
 from condyle.simulation.gains import Loop, Sampled, check_gains, error_bound
 from condyle.simulation.plan import ClosedLoop

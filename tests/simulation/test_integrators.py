@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.results.model import Model
+from condyle.model.model import Model
 from condyle.simulation.integrators import RK4, Settings, hermite
 
 START = {"X": 0.001, "beta": 0.04, "dbeta": -0.3, "dalpha": 0.2}

@@ -9,7 +9,7 @@ import pytest
 
 import condyle
 from condyle.errors import InputError, ScenarioError
-from condyle.results.model import Model
+from condyle.model.model import Model
 from condyle.simulation import FOODS, load_scenario, scenario_schema
 from condyle.simulation.bind import bind
 from condyle.simulation.first_scenario import STARTER, default_scenario

@@ -12,7 +12,7 @@ from oracles.random_mechanism import random_mechanism, random_state, toml_text
 
 from condyle.mechanism import Mechanism, parse
 from condyle.model.data import Evaluation
-from condyle.results.model import Model
+from condyle.model.model import Model
 
 MIXED = ("RSS", "PSS", "SPS")
 MECHANISMS: dict[str, dict[str, Any]] = {

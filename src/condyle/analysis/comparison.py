@@ -18,7 +18,7 @@ from ..dynamics import FORMULATIONS, ROUTES
 from ..dynamics import formulation as formulation_named
 from ..errors import UnsupportedError
 from ..mechanism.mechanism import Mechanism
-from ..model.evaluator import Evaluator, with_point
+from ..model.model import Model, with_point
 from ..progress import step
 from .runs import Run, Samples, TimedModel, run
 from .torque_indices import Indices, indices
@@ -157,7 +157,7 @@ def compare(
     )
 
 
-def samples_of(model: Evaluator, solution: Solution) -> Samples:
+def samples_of(model: Model, solution: Solution) -> Samples:
     """The motion and load of a solution."""
     wrench, name = solution["load"].values, solution.options["load_point"]
     point = model.load_point(name) if name is not None or wrench.any() else np.zeros(3)

@@ -12,8 +12,7 @@ import numpy as np
 
 from ..kinematics.constraints import indices
 from ..mechanism.mechanism import Mechanism
-from ..model.evaluator import Evaluator
-from ..results.model import Model
+from ..model.model import Model
 from .paper import Seconds
 
 
@@ -73,7 +72,7 @@ class Samples:
     acceleration: np.ndarray
     load: np.ndarray
 
-    def states(self, model: Evaluator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def states(self, model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """q, q1, q2 of a model, (N, m) each."""
         own = indices(model.independent)
         return self.pose[:, own], self.rate[:, own], self.acceleration[:, own]

@@ -17,8 +17,8 @@ import numpy as np
 from ..errors import InputError
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
+from ..model.model import derive
 from ..progress import step
-from ..results.model import derive
 from ..status import Status
 from .comparison import samples_of
 

@@ -15,8 +15,8 @@ from ..extras import require
 if TYPE_CHECKING:
     from ..analysis.sweep import Study
     from ..mechanism import Mechanism
+    from ..model.model import Model
     from ..motion import Load, Motion
-    from ..results.model import Model
 
 
 def motion_and_load(

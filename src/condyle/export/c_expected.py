@@ -10,8 +10,8 @@ import numpy as np
 from ..backends.kernel import AGAIN
 from ..mechanism.mechanism import Mechanism
 from ..model.closing import Closure
-from ..model.evaluator import Evaluator
 from ..model.forward_kinematics import ForwardKinematics
+from ..model.model import Model
 from ..questions.structure import structure_of
 from ..status import Status
 from .c_context import CODES
@@ -26,14 +26,14 @@ Given = Mapping[str, np.ndarray]  # argument -> (N, size)
 class Reference:
     """The library's own answers about one mechanism."""
 
-    model: Evaluator
+    model: Model
     wish: Wish
 
     @staticmethod
     def of(mechanism: Mechanism, formulation: str, route: str, wish: Wish) -> Reference:
         """By numpy: no code is shared with what prints C."""
         least = least_norm(mechanism)
-        return Reference(Evaluator(mechanism, formulation, route, "numpy", least), wish)
+        return Reference(Model(mechanism, formulation, route, "numpy", least), wish)
 
     def __call__(self, question: str, given: Given) -> tuple[Arrays, np.ndarray]:
         """Results by argument, (N, size) each, and statuses, (N,): out of bounds is `overflow`.

@@ -13,7 +13,7 @@ from ..dynamics import formulation as formulation_named
 from ..errors import InputError
 from ..mechanism.mechanism import Mechanism
 from ..model.closing import require_independent, require_landmark
-from ..model.evaluator import Evaluator
+from ..model.model import Model
 from ..questions.numbers import Layout, specialised
 from ..questions.structure import structure_of
 from ..version import __version__
@@ -59,7 +59,7 @@ def export(
             MechanismError: if the contacts do not hold the platform at home.
     """
     # What a model checks of a mechanism is checked here as well.
-    model = Evaluator(mechanism, formulation, route, "numpy", least_norm(mechanism))
+    model = Model(mechanism, formulation, route, "numpy", least_norm(mechanism))
     asked = usual(mechanism) if questions is None else questions
     entries = _entries(mechanism, asked, coordinates, landmark)
     structure = structure_of(mechanism, formulation_named(formulation).name, route)

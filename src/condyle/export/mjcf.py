@@ -15,7 +15,7 @@ import numpy as np
 from ..atomic import write_text
 from ..errors import CondyleError
 from ..mechanism import Mechanism
-from ..model.evaluator import Evaluator
+from ..model.model import Model
 from .mjcf_chains import write_chain
 from .mjcf_platform import write_platform
 from .mjcf_xml import Document
@@ -55,7 +55,7 @@ def mjcf(mechanism: Mechanism) -> Mjcf:
 def _home(document: Document) -> None:
     """A keyframe with the efforts that hold the mechanism at home, if there are such."""
     try:
-        model = Evaluator(document.mechanism, backend="numpy")
+        model = Model(document.mechanism, backend="numpy")
         rest = np.zeros((1, document.mechanism.degrees_of_freedom))
         efforts = model.torques(rest, rest, rest, np.zeros((1, 9)))
         if efforts.status[0]:

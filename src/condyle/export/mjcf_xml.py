@@ -14,10 +14,10 @@ from xml.etree.ElementTree import Comment, Element, SubElement
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ..accessors import extend
 from ..errors import UnsupportedError
 from ..mechanism import Mechanism
 from ..mechanism.home import characteristic_length
-from ..results.accessors import extend
 
 # Elements whose names MuJoCo keeps apart by more than their tag.
 SPACES = {"spatial": "tendon", "motor": "actuator", "freejoint": "joint"}

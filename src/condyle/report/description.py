@@ -16,7 +16,7 @@ from ..mechanism.chain import limits
 from ..mechanism.home import HOME_WARNING, home_residuals
 from ..mechanism.mechanism import Contact, Mechanism
 from ..mechanism.plausibility import extent, length_text, plausibility_warnings
-from ..model.evaluator import Evaluator
+from ..model.model import Model
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ def _count(items: Sized, word: str) -> str:
 
 def describe(mechanism: Mechanism) -> Description:
     """Describe a mechanism at home."""
-    model = Evaluator(mechanism, backend="numpy")  # one pose: building a kernel takes longer
+    model = Model(mechanism, backend="numpy")  # one pose: building a kernel takes longer
     s = model.configuration(np.zeros((1, 6))).singularity
     room = ball_around_home(model)
     m = mechanism.degrees_of_freedom

@@ -12,7 +12,7 @@ from ..kinematics.chain import FAMILIES
 from ..mechanism.mechanism import COORDINATES
 from ..mechanism.writing import record
 from ..model.data import Evaluation
-from ..model.evaluator import Evaluator
+from ..model.model import Model
 from ..motion import Load, Motion
 from ..questions.equations import LOAD as LOAD_PART
 from ..version import __version__
@@ -24,7 +24,7 @@ from .warnings import Notice, Watch
 
 
 def assemble(
-    model: Evaluator,
+    model: Model,
     motion: Motion,
     load: Load,
     wrench: np.ndarray,
@@ -49,7 +49,7 @@ def assemble(
 
 
 def labelled(
-    model: Evaluator,
+    model: Model,
     derived: Derived,
     times: np.ndarray,
     parts: Sequence[str],
@@ -90,7 +90,7 @@ def _variable(
     return variable.dims, values, variable.attributes(derived.mechanism)
 
 
-def _coordinates(model: Evaluator, times: np.ndarray, parts: Sequence[str]) -> dict[str, Any]:
+def _coordinates(model: Model, times: np.ndarray, parts: Sequence[str]) -> dict[str, Any]:
     """Labels along every dimension of `DIMENSIONS`, and the units of each chain."""
     mechanism = model.mechanism
     families = [FAMILIES[chain.kind] for chain in mechanism.chains]
@@ -109,7 +109,7 @@ def _coordinates(model: Evaluator, times: np.ndarray, parts: Sequence[str]) -> d
 
 
 def _options(
-    model: Evaluator,
+    model: Model,
     motion: Motion,
     load: Load,
     load_point: str | None,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..model.evaluator import Evaluator
+from ..model.model import Model
 from ..motion import Motion, read_table
 
 DEGREE = 5  # of the spline through q, as of motions
@@ -23,7 +23,7 @@ class Path:
     force: (F,) times [s] and (F,) newtons, linear between; one of each where it stays.
     """
 
-    model: Evaluator
+    model: Model
     times: np.ndarray
     q: np.ndarray
     force_times: np.ndarray
@@ -63,7 +63,7 @@ class Path:
         return np.interp(t, self.force_times, self.force)
 
 
-def path_of(model: Evaluator, motion: Motion, force: float | None, file: str | None) -> Path:
+def path_of(model: Model, motion: Motion, force: float | None, file: str | None) -> Path:
     """The path of a motion on a model's mechanism.
 
     Args: force: f_d [N] at all times;  file: CSV of t, force instead.
@@ -84,7 +84,7 @@ def path_of(model: Evaluator, motion: Motion, force: float | None, file: str | N
     return Path(model, motion.t - motion.t[0], q, times, newtons)
 
 
-def default_motion(model: Evaluator) -> Motion:
+def default_motion(model: Model) -> Motion:
     """The bundled chewing path where it fits; else a trial motion about home."""
     from ..motion import reference_motion, trial_motion
 

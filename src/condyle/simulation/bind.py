@@ -12,7 +12,7 @@ from ..kinematics.chain import FAMILIES
 from ..mechanism import load as load_mechanism
 from ..mechanism.chain import limits
 from ..mechanism.home import characteristic_length
-from ..model.evaluator import Evaluator
+from ..model.model import Model
 from ..motion import Load as LoadTable
 from ..motion import Motion, read_table, resolve_load_point
 from ..questions.entries import Machine
@@ -31,7 +31,7 @@ LoadFunction = Callable[..., Any]
 
 
 def bind(
-    model: Evaluator,
+    model: Model,
     scenario: Scenario,
     *,
     controller: Callable[..., Any] | None = None,
@@ -107,7 +107,7 @@ def _times(scenario: Scenario) -> np.ndarray:
     return times
 
 
-def machine_of(model: Evaluator) -> Machine:
+def machine_of(model: Model) -> Machine:
     """What tables of a scenario are bound to."""
     points = model.mechanism.platform.points
 
@@ -121,7 +121,7 @@ def machine_of(model: Evaluator) -> Machine:
 
 
 def _loads(
-    model: Evaluator, scenario: Scenario, functions: Sequence[LoadFunction]
+    model: Model, scenario: Scenario, functions: Sequence[LoadFunction]
 ) -> tuple[tuple[Load, ...], dict[int, LoadFunction]]:
     """Loads, and which of them are functions in Python."""
     names = _names([load.name or load.kind for load in scenario.loads])
@@ -155,7 +155,7 @@ def _names(wanted: Sequence[str]) -> list[str]:
 
 
 def _drive(
-    model: Evaluator,
+    model: Model,
     scenario: Scenario,
     function: Callable[..., Any] | None,
     motion: Motion | None,
@@ -172,7 +172,7 @@ def _drive(
     return _open(model, scenario.efforts.file)
 
 
-def _open(model: Evaluator, file: str) -> OpenLoop:
+def _open(model: Model, file: str) -> OpenLoop:
     names = [f"tau_{name}" for name in model.mechanism.chain_names]
     units = [FAMILIES[chain.kind].effort_unit for chain in model.mechanism.chains]
     kinds = {"N": ("force", 0), "N m": ("moment", 0)}
@@ -185,7 +185,7 @@ def _open(model: Evaluator, file: str) -> OpenLoop:
 
 
 def _closed(
-    model: Evaluator,
+    model: Model,
     scenario: Scenario,
     function: Callable[..., Any] | None,
     motion: Motion | None,
@@ -221,7 +221,7 @@ def _chooses(table: Any) -> bool:
     return table.distribution is not None or bool(table.preload)
 
 
-def _same_machine(model: Evaluator, other: Any, file: str) -> None:
+def _same_machine(model: Model, other: Any, file: str) -> None:
     one = model.mechanism
     if one.chain_names != other.chain_names:
         raise InputError(
@@ -237,13 +237,13 @@ def _same_machine(model: Evaluator, other: Any, file: str) -> None:
         )
 
 
-def _motion(table: Any, model: Evaluator) -> Motion:
+def _motion(table: Any, model: Model) -> Motion:
     if table.motion is None:
         return default_motion(model)
     return Motion.from_csv(table.motion, units=table.units, landmark=table.landmark)
 
 
-def _sensing(model: Evaluator, scenario: Scenario, period: float) -> Sensing | None:
+def _sensing(model: Model, scenario: Scenario, period: float) -> Sensing | None:
     sensors = scenario.sensors
     if sensors is None:
         return None
@@ -254,7 +254,7 @@ def _sensing(model: Evaluator, scenario: Scenario, period: float) -> Sensing | N
 
 
 def _start(
-    model: Evaluator, scenario: Scenario, drive: OpenLoop | ClosedLoop | None
+    model: Model, scenario: Scenario, drive: OpenLoop | ClosedLoop | None
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """q and q' to begin with, (m,) each; None where the path is not known."""
     names = model.independent
@@ -280,7 +280,7 @@ def _said(names: Iterable[str], values: Iterable[float]) -> str:
     return ", ".join(f"{n} = {v:g}" for n, v in zip(names, values, strict=True))
 
 
-def _moved(model: Evaluator, q: np.ndarray, load: Load) -> np.ndarray:
+def _moved(model: Model, q: np.ndarray, load: Load) -> np.ndarray:
     """How far the load's point is from home at q, (3,) [m]."""
     at = model.kernel("instant").run({"q": q[None], "q1": np.zeros((1, len(q)))}).values
     return at["pose"][:3, 0] + at["R"][..., 0] @ load.point - load.point

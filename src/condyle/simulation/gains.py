@@ -30,7 +30,7 @@ from ..backends.numpy_kernel import NumpyKernel
 from ..errors import UnsupportedError
 from ..graph.program import Variants
 from ..mechanism.home import characteristic_length
-from ..model.evaluator import Evaluator
+from ..model.model import Model
 from ..questions import QUESTIONS
 from ..questions.derivative import PREFIX, derivative
 from ..questions.numbers import Layout, specialised
@@ -295,7 +295,7 @@ class Derivative:
 
     def __init__(
         self,
-        model: Evaluator,
+        model: Model,
         question: str,
         details: Sequence[Any],
         columns: Columns,

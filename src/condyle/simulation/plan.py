@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..model.evaluator import Evaluator
+from ..model.model import Model
 from ..questions.law import Law
 from ..questions.load import Load
 from .aims import Path
@@ -49,7 +49,7 @@ class ClosedLoop:
     function: in Python, in the place of the law: (measured, reference) -> efforts (n,).
     """
 
-    model: Evaluator
+    model: Model
     law: Law
     path: Path
     period: float | None
@@ -71,7 +71,7 @@ class Plan:
                or force and moment (6,).
     """
 
-    model: Evaluator
+    model: Model
     q: np.ndarray
     q1: np.ndarray
     duration: float

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import InputError
 from ..model.data import Evaluation
 from ..model.distributing import shares
-from ..model.evaluator import Evaluator, with_point
+from ..model.model import Model, with_point
 from ..questions.equations import INTERNAL
 from ..results.assemble import labelled
 from ..results.derived import Derived
@@ -70,7 +70,7 @@ def solved(plan: Plan, trace: Trace, scenario: Scenario, source: str, started: f
 
 
 def _evaluation(
-    model: Evaluator, q: np.ndarray, q1: np.ndarray, effort: np.ndarray, load: np.ndarray
+    model: Model, q: np.ndarray, q1: np.ndarray, effort: np.ndarray, load: np.ndarray
 ) -> Evaluation:
     """Everything about the states of a trace, from forward dynamics."""
     found = model.forward(q, q1, effort, load, ("motion", "joint", "sliding"))
@@ -99,7 +99,7 @@ def _evaluation(
 
 
 def _energy(
-    model: Evaluator, q: np.ndarray, q1: np.ndarray, trace: Trace, plan: Plan
+    model: Model, q: np.ndarray, q1: np.ndarray, trace: Trace, plan: Plan
 ) -> dict[str, np.ndarray]:
     """Kinetic and potential energy, works and losses since the start [J]."""
     values = model.kernel("energy").run({"q": q, "q1": q1}).values

@@ -11,9 +11,8 @@ from typing import Any
 from ..backends.threads import workers
 from ..errors import InputError
 from ..mechanism.mechanism import Mechanism
-from ..model.evaluator import Evaluator
+from ..model.model import Model, derive
 from ..motion import Motion
-from ..results.model import Model, derive
 from ..results.solution import Solution
 from .bind import bind
 from .running import Run, run
@@ -49,7 +48,7 @@ def simulate(
     if source is None:
         source = os.fspath(scenario) if isinstance(scenario, str | os.PathLike) else "scenario"
     told = as_scenario(scenario)
-    if not isinstance(model, Evaluator):
+    if not isinstance(model, Model):
         model = derive(model)
     plan = bind(
         model,
@@ -78,7 +77,7 @@ def simulate_all(
     Raises: ScenarioError: for a scenario with anything wrong, before any of them runs.
     """
     start = time.perf_counter()
-    if not isinstance(model, Evaluator):
+    if not isinstance(model, Model):
         model = derive(model)
     told = [as_scenario(scenario) for scenario in scenarios]
     plans = [bind(model, one, source=f"scenario {i + 1}") for i, one in enumerate(told)]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.evaluator import Evaluator
+from ..model.model import Model
 
 RANK = 1e-10  # of the largest singular value
 SAME = 1e-9  # contact forces below this part of a unit effort are none
@@ -75,7 +75,7 @@ def scaled(found: Directions) -> Directions:
 class Internal:
     """The directions of one model, wherever it is."""
 
-    def __init__(self, model: Evaluator) -> None:
+    def __init__(self, model: Model) -> None:
         self._model = model
         self._home: Directions | None = None
         self._last = Directions(np.empty((0, 0)), np.empty((0, 0)))

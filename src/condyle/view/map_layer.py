@@ -16,7 +16,7 @@ from ..analysis.map.map_files import grid_and_reach
 from ..analysis.map.skin import first_hit, sheet, skin
 from ..kinematics.constraints import indices
 from ..mechanism import COORDINATES
-from ..model.evaluator import Evaluator
+from ..model.model import Model
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,7 +34,7 @@ class MapLayer:
     """A map in the scene of one mechanism."""
 
     def __init__(
-        self, scene: viser.SceneApi, centre: np.ndarray, model: Evaluator, dataset: xr.Dataset
+        self, scene: viser.SceneApi, centre: np.ndarray, model: Model, dataset: xr.Dataset
     ) -> None:
         """Args: dataset: a map over two or three coordinates."""
         self.grid, self._reach = grid_and_reach(dataset, model)

@@ -244,7 +244,7 @@ def planned(mechanism: Mechanism, scenario: Any) -> Plan:
 
     Raises: ScenarioError: for a scenario with anything wrong, or that does not fit.
     """
-    from ..results.model import derive
+    from ..model.model import derive
     from ..simulation.bind import bind
     from ..simulation.simulating import as_scenario
 

@@ -15,8 +15,8 @@ from ..kinematics.singularities import KINDS, NEAR_SINGULAR
 from ..mechanism import COORDINATES, Mechanism
 from ..mechanism.chain import limits
 from ..model.data import Evaluation
-from ..model.evaluator import Evaluator
 from ..model.judge import unreachable_cause
+from ..model.model import Model
 from ..motion.points import DEFAULT_LOAD_POINT
 from ..results.contacts import bound_margins
 from ..status import Status
@@ -64,7 +64,7 @@ class Session:
         """Raises: MechanismError: if the contacts do not hold the platform at home."""
         self.mechanism = mechanism
         # One pose at a time: a compiled kernel would take longer to build than it saves.
-        self.model = Evaluator(mechanism, backend="numpy")
+        self.model = Model(mechanism, backend="numpy")
         self.q = np.zeros(len(self.model.independent))
         self.load = np.zeros(3)
         points = mechanism.platform.points

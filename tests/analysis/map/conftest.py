@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 import condyle
-from condyle.results.model import Model
+from condyle.model.model import Model
 
 Models = Callable[[str], Model]
 

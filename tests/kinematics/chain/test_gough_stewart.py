@@ -19,7 +19,7 @@ from support.families import close
 import condyle
 from condyle.dynamics import FORMULATIONS
 from condyle.mechanism import bundled_text
-from condyle.results.model import Model
+from condyle.model.model import Model
 
 RAW = tomllib.loads(bundled_text("gough-stewart"))
 GRAVITY = np.array(RAW["gravity"], float)

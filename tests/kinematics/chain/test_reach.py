@@ -10,7 +10,7 @@ import condyle
 from condyle.errors import UnreachableError
 from condyle.mechanism import Mechanism
 from condyle.model.judge import require_ok
-from condyle.results.model import Model
+from condyle.model.model import Model
 from condyle.status import Status
 
 

@@ -17,7 +17,7 @@ from condyle.mechanism import Mechanism
 from condyle.mechanism.files import from_data
 from condyle.mechanism.surface import Expression, Plane, Profile, Quadratic, Sphere
 from condyle.model.data import Evaluation
-from condyle.results.model import Model
+from condyle.model.model import Model
 
 COUNT = 4
 MECHANISMS: dict[str, dict[str, Any]] = {

@@ -10,8 +10,8 @@ import pytest
 import condyle
 from condyle.mechanism import Mechanism
 from condyle.mechanism.surface import Plane, Sphere
+from condyle.model.model import Model
 from condyle.motion import Motion
-from condyle.results.model import Model
 from condyle.results.solution import Solution, lift_off
 from condyle.results.summary import summarize
 

@@ -14,10 +14,10 @@ from condyle.analysis.comparison import compare
 from condyle.errors import InputError, MechanismError
 from condyle.mechanism import Contact, Mechanism, dumps, parse
 from condyle.mechanism.surface import Expression, Unknown
+from condyle.model.model import Model
 from condyle.motion import Motion
 from condyle.report.figures import PLOTS
 from condyle.report.page import write_report
-from condyle.results.model import Model
 from condyle.results.solution import Solution
 
 

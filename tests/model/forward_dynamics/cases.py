@@ -11,7 +11,7 @@ from oracles.random_mechanism import random_state
 from support.cases import BUNDLED_FOLDER
 from support.rubbing import Rubbing, drawn
 
-from condyle.model.evaluator import Evaluator
+from condyle.model.model import Model
 
 Array = np.ndarray
 # Of `drawn`: friction at every contact and losses in every actuator, unless it says otherwise.
@@ -46,9 +46,9 @@ def case(name: str) -> Rubbing:
 
 
 @cache
-def by_numpy(name: str) -> Evaluator:
+def by_numpy(name: str) -> Model:
     distribution = "minimax" if name in CABLES else None  # other efforts of mixed units have none
-    return Evaluator(case(name).mechanism, distribution=distribution, backend="numpy")
+    return Model(case(name).mechanism, distribution=distribution, backend="numpy")
 
 
 def load_of(c: Rubbing) -> Array:
@@ -66,7 +66,7 @@ def efforts(c: Rubbing) -> Array:
     return rng.normal(0, 1, (len(c.states["q"]), len(sizes))) * sizes
 
 
-def state(c: Rubbing, m: Evaluator) -> tuple[Array, Array]:
+def state(c: Rubbing, m: Model) -> tuple[Array, Array]:
     """q and q' in the order of the model."""
     order = [c.states["names"].index(name) for name in m.independent]
     return c.states["q"][:, order], c.states["qd"][:, order]

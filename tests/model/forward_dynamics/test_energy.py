@@ -11,7 +11,7 @@ from oracles.rotations import platform_motion
 from scipy.integrate import solve_ivp
 
 from condyle.mechanism import parse
-from condyle.model.evaluator import Evaluator
+from condyle.model.model import Model
 
 DRIFT = 1e-9
 
@@ -19,13 +19,13 @@ DRIFT = 1e-9
 def test_a_swing_of_ten_seconds(quick: None) -> None:
     """Five contacts leave one freedom; gravity is turned so that home is the bottom of a well."""
     raw = random_mechanism(np.random.default_rng(4), contacts=5, condition=100.0)
-    name = Evaluator(parse(toml_text(raw)), backend="numpy").independent[0]
+    name = Model(parse(toml_text(raw)), backend="numpy").independent[0]
     h = 1e-3 if name in "XYZ" else 1e-2
     q = h * np.array([[-1.0], [0.0], [1.0]])
     forces = []
     for axis in np.eye(3):
         raw["gravity"] = [float(x) for x in 9.81 * axis]
-        forces.append(Evaluator(parse(toml_text(raw)), backend="numpy").gravity(q)[:, 0])
+        forces.append(Model(parse(toml_text(raw)), backend="numpy").gravity(q)[:, 0])
     slope, stiffness = np.array(forces)[:, 1], np.ptp(np.array(forces)[:, ::2], axis=1)
     stiffness = (np.array(forces)[:, 2] - np.array(forces)[:, 0]) / (2 * h)
     across = stiffness - slope * (slope @ stiffness) / (slope @ slope)
@@ -45,7 +45,7 @@ def test_a_fall_of_four_freedoms(quick: None) -> None:
 
 def followed(raw: dict, duration: float, q: np.ndarray, q1: np.ndarray) -> tuple[float, float, int]:
     """Drift of the energy over its kinetic part, largest gap [m], and how often it turns back."""
-    d, model = read(raw), Evaluator(parse(toml_text(raw)))
+    d, model = read(raw), Model(parse(toml_text(raw)))
     m, effort, load = len(q), np.zeros(len(d.chains)), np.zeros(9)
 
     def slope(t: float, x: np.ndarray) -> np.ndarray:

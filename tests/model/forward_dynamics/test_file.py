@@ -12,7 +12,7 @@ import pytest
 
 import condyle
 from condyle.mechanism import COORDINATES
-from condyle.model.evaluator import Evaluator, with_point
+from condyle.model.model import Model, with_point
 
 NAMES = ("X", "Y", "alpha", "beta")
 LOAD = ("Fx", "Fy", "Fz")
@@ -27,17 +27,17 @@ def by_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(scope="module")
-def model() -> Evaluator:
-    return Evaluator(condyle.load("masticatory"), backend="numpy")
+def model() -> Model:
+    return Model(condyle.load("masticatory"), backend="numpy")
 
 
-def drawn(model: Evaluator) -> tuple[np.ndarray, ...]:
+def drawn(model: Model) -> tuple[np.ndarray, ...]:
     rng = np.random.default_rng(0)
     q = rng.uniform(-1, 1, (COUNT, 4)) * [0.002, 0.002, 0.05, 0.08]
     return q, rng.normal(0, 0.5, (COUNT, 4)), rng.normal(0, 0.1, (COUNT, 6))
 
 
-def columns_of(model: Evaluator) -> list[str]:
+def columns_of(model: Model) -> list[str]:
     return [*NAMES, *(f"d{n}" for n in NAMES), *(f"tau_{n}" for n in model.mechanism.chain_names)]
 
 
@@ -55,7 +55,7 @@ def read(path: str) -> tuple[list[str], list[list[str]]]:
 WORDS = ("forward", "masticatory", "--states", "in.csv", "--out", "out.csv")
 
 
-def test_columns_and_digits(condyle_command: Run, model: Evaluator) -> None:
+def test_columns_and_digits(condyle_command: Run, model: Model) -> None:
     """Columns in the contract's order; every cell is the double that Python gets."""
     q, q1, effort = drawn(model)
     force = np.random.default_rng(1).normal(0, 5, (COUNT, 3))
@@ -77,7 +77,7 @@ def test_columns_and_digits(condyle_command: Run, model: Evaluator) -> None:
     np.testing.assert_array_equal(np.array(rows, dtype=float), np.hstack(wanted))
 
 
-def test_other_coordinates(condyle_command: Run, model: Evaluator) -> None:
+def test_other_coordinates(condyle_command: Run, model: Model) -> None:
     """A state in Z and gamma gets its accelerations in these."""
     q, q1, effort = drawn(model)
     found = model.forward(q, q1, effort, np.zeros((COUNT, 9)), ("motion",))
@@ -97,7 +97,7 @@ def test_other_coordinates(condyle_command: Run, model: Evaluator) -> None:
     )
 
 
-def test_rows_that_fail(condyle_command: Run, model: Evaluator) -> None:
+def test_rows_that_fail(condyle_command: Run, model: Model) -> None:
     q, q1, effort = drawn(model)
     q[3, 0] = 0.3
     q1[4, 2] = 1e200
@@ -118,7 +118,7 @@ def test_rows_that_fail(condyle_command: Run, model: Evaluator) -> None:
     assert "accelerations at row 1 are not finite" in outcome.err
 
 
-def test_without_rates_it_is_at_rest(condyle_command: Run, model: Evaluator) -> None:
+def test_without_rates_it_is_at_rest(condyle_command: Run, model: Model) -> None:
     q, _, effort = drawn(model)
     names = columns_of(model)
     write(Path("in.csv"), [*names[:4], *names[8:]], np.hstack([q, effort]))
@@ -130,7 +130,7 @@ def test_without_rates_it_is_at_rest(condyle_command: Run, model: Evaluator) -> 
     np.testing.assert_array_equal(rows[:, :4], found.acceleration)
 
 
-def test_columns_that_are_missing(condyle_command: Run, model: Evaluator) -> None:
+def test_columns_that_are_missing(condyle_command: Run, model: Model) -> None:
     q, q1, effort = drawn(model)
     rows = np.hstack([q, q1, effort])
     write(Path("in.csv"), columns_of(model)[:-1], rows[:, :-1])

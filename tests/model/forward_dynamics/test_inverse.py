@@ -13,7 +13,7 @@ from support.rubbing import Rubbing
 
 import condyle
 from condyle.dynamics import FORMULATIONS
-from condyle.model.evaluator import Evaluator
+from condyle.model.model import Model
 
 from .cases import CASES, DRAWN, by_numpy, case, close, efforts, load_of, state
 
@@ -49,7 +49,7 @@ def test_inverse_undoes_forward(name: str) -> None:
 @pytest.mark.parametrize("name", ["human-jaw", "human-jaw-curved"])
 def test_inverse_undoes_forward_of_muscles(name: str) -> None:
     """Tensions below zero too: what limits them does not matter to the equations."""
-    model = Evaluator(condyle.load(name), distribution="minimum_norm", backend="numpy")
+    model = Model(condyle.load(name), distribution="minimum_norm", backend="numpy")
     rng = np.random.default_rng(5)
     sizes = np.array([0.002 if c in "XYZ" else 0.03 for c in model.independent])
     q, q1, q2 = (k * rng.normal(0, 1, (3, len(sizes))) * sizes for k in (1, 10, 300))
@@ -77,7 +77,7 @@ def unrubbed(name: str) -> Rubbing:
 def test_free_bodies_are_in_balance(name: str) -> None:
     """Six equations of free bodies a sample, by the accelerations that come out."""
     c = case(name) if name in DRAWN else unrubbed(name)
-    model = by_numpy(name) if name in DRAWN else Evaluator(c.mechanism, backend="numpy")
+    model = by_numpy(name) if name in DRAWN else Model(c.mechanism, backend="numpy")
     s, effort = c.states, efforts(c)
     found = model.forward(*state(c, model), effort, load_of(c), ("motion", "sliding"))
     assert not found.status.any()
@@ -99,7 +99,7 @@ def test_formulations_agree(name: str) -> None:
     best = wanted.forward(*given)
     assert not best.status.any()
     for formulation in FORMULATIONS:
-        model = Evaluator(c.mechanism, formulation, backend="numpy")
+        model = Model(c.mechanism, formulation, backend="numpy")
         found = model.forward(*given)
         assert not found.status.any()
         close(found.acceleration, best.acceleration, 1e-10)
@@ -127,7 +127,7 @@ def test_robust_path_says_the_same(name: str) -> None:
 def test_backends_agree(name: str, quick: None) -> None:
     """Compiled batches and single samples give numpy's numbers."""
     c, model = case(name), by_numpy(name)
-    compiled = Evaluator(c.mechanism, backend="compiled")
+    compiled = Model(c.mechanism, backend="compiled")
     given = (*state(c, model), efforts(c), load_of(c))
     wanted, found = (m.forward(*given) for m in (model, compiled))
     close(found.acceleration, wanted.acceleration, 1e-12)

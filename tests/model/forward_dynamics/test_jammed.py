@@ -9,7 +9,7 @@ from oracles.pinocchio_engine import PinocchioEngine
 from support.rubbing import drawn
 
 from condyle.errors import InputError
-from condyle.model.evaluator import Evaluator
+from condyle.model.model import Model
 from condyle.status import Status
 
 from .cases import by_numpy, case, close, efforts, load_of, state
@@ -18,7 +18,7 @@ from .cases import by_numpy, case, close, efforts, load_of, state
 @pytest.mark.parametrize(("contacts", "mu", "seed"), [(1, 6.0, 3), (2, 6.0, 1), (3, 2.0, 2)])
 def test_patterns_are_those_of_the_tree(contacts: int, mu: float, seed: int) -> None:
     c = drawn(seed, count=25, mu=mu, lossy=False, contacts=contacts)
-    model, effort = Evaluator(c.mechanism, backend="numpy"), efforts(c)
+    model, effort = Model(c.mechanism, backend="numpy"), efforts(c)
     found = model.forward(*state(c, model), effort, load_of(c), ("motion",))
     engine, s, counts = PinocchioEngine(c.raw), c.states, []
     for i in range(len(effort)):
@@ -41,7 +41,7 @@ def test_without_motion_and_weight_no_force_has_a_sign() -> None:
     """All patterns say the same, so none is in doubt: not jammed."""
     c = case("RSS k1 n8")
     mechanism = c.mechanism.replace(gravity=(0.0, 0.0, 0.0))
-    model = Evaluator(mechanism, backend="numpy")
+    model = Model(mechanism, backend="numpy")
     n = len(mechanism.chains)
     found = model.forward(np.zeros((1, 5)), np.zeros((1, 5)), np.zeros((1, n)), np.zeros((1, 9)))
     assert not found.status.any()

@@ -9,7 +9,7 @@ import pytest
 
 from condyle.mechanism import Mechanism
 from condyle.mechanism.files import from_data
-from condyle.model.evaluator import Evaluator
+from condyle.model.model import Model
 
 G = 9.81
 INERTIA = (2e-4, 3e-4, 4e-4)
@@ -42,7 +42,7 @@ def machine(surface: dict[str, Any] | None = None, **contact: Any) -> Mechanism:
 
 def moved(mechanism: Mechanism, q: Any, q1: Any, effort: Any = 0.0) -> Any:
     """Forward dynamics of one sample under its weight."""
-    model = Evaluator(mechanism, backend="numpy")
+    model = Model(mechanism, backend="numpy")
     tension = np.full((1, len(mechanism.chains)), effort)
     found = model.forward(np.array([q]), np.array([q1]), tension, np.zeros((1, 9)), ("motion",))
     assert not found.status.any()

@@ -10,7 +10,7 @@ from oracles.random_mechanism import random_mechanism
 from support.families import MECHANISMS, Case, case, of_raw
 
 from condyle.model.joint_reactions import Reaction, reactions
-from condyle.results.model import Model
+from condyle.model.model import Model
 
 SURFACES = {
     "curved_k3": {"surface": "mixed", "contacts": 3, "families": ("RSS", "PSS", "SPS")},

@@ -17,10 +17,10 @@ import condyle
 from condyle.mechanism import Mechanism
 from condyle.model.data import Evaluation
 from condyle.model.joint_reactions import reactions
+from condyle.model.model import Model
 from condyle.motion import read_table, write_table
 from condyle.questions.reactions import reaction_places
 from condyle.results.inverse_rows import solve_file
-from condyle.results.model import Model
 from condyle.results.solving import reaction_variables
 
 # Our joint -> the oracle's link and whether it is its force or its moment.

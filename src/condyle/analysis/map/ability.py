@@ -22,7 +22,7 @@ from ...kinematics.chain import FAMILIES
 from ...kinematics.constraints import indices
 from ...mechanism.chain import limits
 from ...mechanism.mechanism import Mechanism
-from ...model.evaluator import Evaluator
+from ...model.model import Model
 from ...status import Status
 
 MANY = 300  # subsets of columns, above which a linear program is quicker
@@ -35,14 +35,14 @@ ROUNDING = 1e-9  # of forces, relative to the largest
 class Ability:
     """Limits of one mechanism's efforts and of its one-sided contacts."""
 
-    model: Evaluator
+    model: Model
     low: np.ndarray
     high: np.ndarray
     free: list[int]
     sided: list[int]
 
     @staticmethod
-    def of(model: Evaluator) -> Ability:
+    def of(model: Model) -> Ability:
         mechanism = model.mechanism
         own = [limits(chain) for chain in mechanism.chains]
         sided = [i for i, c in enumerate(mechanism.contacts) if c.one_sided]

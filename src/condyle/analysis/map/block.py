@@ -9,7 +9,7 @@ import numpy as np
 
 from ...kinematics.singularities import SINGULAR
 from ...model.data import Efforts
-from ...model.evaluator import Evaluator
+from ...model.model import Model
 from ...model.surveying import Survey
 from ...results.contacts import bound_margins
 from ...status import Status
@@ -26,7 +26,7 @@ class Asked:
     stiffness: of the actuators, (n,) [N m/rad or N/m]; None if it was not given.
     """
 
-    model: Evaluator
+    model: Model
     reach: Reach
     load: np.ndarray
     direction: np.ndarray | None = None

@@ -17,7 +17,7 @@ from ...errors import InputError, did_you_mean
 from ...extras import require
 from ...mechanism import dumps
 from ...mechanism.mechanism import COORDINATES, Mechanism
-from ...model.evaluator import Evaluator
+from ...model.model import Model
 from ...motion.column_units import FORCE, MOMENT
 from ...progress import step
 from ...version import __version__
@@ -35,7 +35,7 @@ BLOCK = 1 << 16  # poses at a time
 
 
 def workspace_map(
-    model: Evaluator,
+    model: Model,
     over: Over,
     quantity: str | Sequence[str] = "ratio",
     hold: Values = "",
@@ -78,7 +78,7 @@ def workspace_map(
 
 
 def asked_of(
-    model: Evaluator,
+    model: Model,
     load: Values = "",
     load_point: str | None = None,
     direction: str | Sequence[float] | None = None,
@@ -229,7 +229,7 @@ def _attributes(asked: Asked, grid: Grid) -> dict[str, Any]:
     }
 
 
-def _point(model: Evaluator, name: str | None) -> np.ndarray:
+def _point(model: Model, name: str | None) -> np.ndarray:
     """Where a load acts; O_M in a mechanism without points."""
     if name is None and not model.mechanism.platform.points:
         return np.zeros(3)

@@ -12,7 +12,7 @@ import numpy as np
 from ...atomic import replacing
 from ...errors import InputError, no_such_file
 from ...mechanism import Mechanism, parse
-from ...model.evaluator import Evaluator
+from ...model.model import Model
 from ...results.netcdf import write_netcdf
 from .axes import Axis, Grid
 from .reach import Reach
@@ -80,7 +80,7 @@ def mechanism_of(dataset: xr.Dataset) -> Mechanism:
     return parse(dataset.attrs["mechanism"], "the mechanism of the map")
 
 
-def grid_and_reach(dataset: xr.Dataset, model: Evaluator) -> tuple[Grid, Reach]:
+def grid_and_reach(dataset: xr.Dataset, model: Model) -> tuple[Grid, Reach]:
     """What it goes over, and what it took for reach."""
     names, held = model.independent, json.loads(dataset.attrs["held"])
     axes = []

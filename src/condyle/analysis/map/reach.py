@@ -17,7 +17,7 @@ from ...errors import InputError, did_you_mean
 from ...kinematics.chain import FAMILIES
 from ...mechanism.contact import Bounds
 from ...mechanism.mechanism import Mechanism
-from ...model.evaluator import Evaluator
+from ...model.model import Model
 from ...model.surveying import Survey
 from ...motion.column_units import unit_factor
 from ...status import Status
@@ -30,13 +30,13 @@ Strokes = Collection[str] | Mapping[str, tuple[float, float]]
 class Reach:
     """What a mechanism can reach; low, high: of the joint coordinates, (n,) [rad or m]."""
 
-    model: Evaluator
+    model: Model
     low: np.ndarray
     high: np.ndarray
     threads: int | None = None
 
     @staticmethod
-    def of(model: Evaluator, strokes: Strokes = (), threads: int | None = None) -> Reach:
+    def of(model: Model, strokes: Strokes = (), threads: int | None = None) -> Reach:
         """Raises InputError for chains that there are not, or ranges that are none."""
         return Reach(model, *strokes_of(model.mechanism, strokes), threads)
 

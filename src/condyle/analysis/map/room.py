@@ -17,7 +17,7 @@ import numpy as np
 from ...errors import InputError
 from ...kinematics.singularities import NEAR_SINGULAR
 from ...mechanism.mechanism import COORDINATES
-from ...model.evaluator import Evaluator
+from ...model.model import Model
 from .ability import limited
 from .axes import Axis, Grid
 from .block import Asked, Block
@@ -137,7 +137,7 @@ def greatest_ball(free: Free, grid: Grid, points: int = POINTS) -> Ball:
     return Ball(radius, stops, points, radius * (_ball_volume(d) / points) ** (1 / d))
 
 
-def ball_around_home(model: Evaluator, points: int = FEW) -> Ball:
+def ball_around_home(model: Model, points: int = FEW) -> Ball:
     """In all independent coordinates, no further than the characteristic length and a radian.
 
     Without limits of efforts; quick, for one look at a mechanism.

@@ -13,7 +13,7 @@ from ...errors import InputError
 from ...mechanism import load as load_mechanism
 from ...mechanism.home import independent_coordinates
 from ...mechanism.mechanism import Mechanism
-from ...model.evaluator import Evaluator
+from ...model.model import Model
 from ...model.reference_force import reference_force
 from ...motion import (
     Load,
@@ -86,14 +86,14 @@ class Job:
             values |= {f.what: f.times * value + f.plus for f in one.mirror}
         return values
 
-    def model(self, mechanism: Mechanism) -> Evaluator:
+    def model(self, mechanism: Mechanism) -> Model:
         """A model that lends its kernels to every mechanism of the structure.
 
         Raises: as of `condyle.derive`.
         """
         s = self.study
         weight = s.contact_weight / reference_force(self.mechanism) ** 2 if s.contact_weight else 0
-        return Evaluator(
+        return Model(
             mechanism, s.formulation, s.route, s.backend, s.distribution, s.preload, weight, True
         )
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...errors import InputError, did_you_mean
 from ...mechanism.mechanism import COORDINATES
-from ...model.evaluator import Evaluator
+from ...model.model import Model
 from ...results.contacts import AXES
 from ...results.derived import Derived
 from ...results.variables import VARIABLES, WRENCH, Variable
@@ -54,7 +54,7 @@ class Reading:
         return np.atleast_1d(TAKES[self.take](a, axis=self.axes)).ravel()
 
 
-def reading(name: str, measure: Measure, model: Evaluator) -> Reading:
+def reading(name: str, measure: Measure, model: Model) -> Reading:
     """A measure, looked up in what a model's solutions have.
 
     Raises: InputError: for a variable, dimension or entry that there is not.
@@ -94,7 +94,7 @@ def reading(name: str, measure: Measure, model: Evaluator) -> Reading:
     return Reading(variable.name, measure.take, place, axes, names, units)
 
 
-def _variable(name: str, measure: Measure, model: Evaluator) -> Variable:
+def _variable(name: str, measure: Measure, model: Model) -> Variable:
     variable = _BY_NAME.get(ALIASES.get(measure.of, measure.of))
     there = [v for v in VARIABLES if v.when(Derived(model.mechanism, None, limited=model.limited))]
     if variable is None:
@@ -110,7 +110,7 @@ def _variable(name: str, measure: Measure, model: Evaluator) -> Variable:
     return variable
 
 
-def labels_of(model: Evaluator) -> Mapping[str, tuple[str, ...]]:
+def labels_of(model: Model) -> Mapping[str, tuple[str, ...]]:
     """Entries along each dimension but time."""
     mechanism = model.mechanism
     return {

@@ -14,8 +14,8 @@ import numpy as np
 from ...errors import CondyleError, InputError, SampleError, shortened
 from ...mechanism.mechanism import Mechanism
 from ...model.data import Evaluation
-from ...model.evaluator import Evaluator, with_point
 from ...model.judge import require_ok
+from ...model.model import Model, with_point
 from ...questions.structure import Structure, structure_of
 from ...results.assemble import assemble
 from ...results.derived import Derived
@@ -47,7 +47,7 @@ class Solved:
     """A variant along one motion: what came of it, or the reason why nothing did."""
 
     motion: int
-    model: Evaluator | None
+    model: Model | None
     evaluation: Evaluation | None
     status: str
     reason: str
@@ -59,7 +59,7 @@ class Solver:
 
     def __init__(self, job: Job) -> None:
         self._job = job
-        self._models: dict[Structure, Evaluator] = {}
+        self._models: dict[Structure, Model] = {}
 
     def variants(self, part: int) -> Iterator[tuple[int, np.ndarray, list[Solved]]]:
         """Number, values and outcomes of the variants of a part, one after the other."""
@@ -78,14 +78,14 @@ class Solver:
             return [Solved(m, None, None, REFUSED, _reason(error)) for m in motions]
         return [self._along(model, m) for m in motions]
 
-    def _model(self, mechanism: Mechanism) -> Evaluator:
+    def _model(self, mechanism: Mechanism) -> Model:
         study = self._job.study
         structure = structure_of(mechanism, study.formulation, study.route)
         if structure not in self._models:
             self._models[structure] = self._job.model(mechanism)
         return self._models[structure].renumbered(mechanism)
 
-    def _along(self, model: Evaluator, m: int) -> Solved:
+    def _along(self, model: Model, m: int) -> Solved:
         job, motion = self._job, self._job.motions[m]
         point = np.zeros(3) if job.point is None else model.load_point(job.point)
         try:
