@@ -2,7 +2,7 @@
 # make bench  compare with other engines    make docs   build the documentation
 # make format  set the code                 make fuzz   the long run of the fuzzers
 # make lint    ruff and mypy alone          make house  which room imports which
-# make coverage  what the tests of three rooms leave out; make test COVER=1 holds it
+# make coverage  what the tests of four rooms leave out; make test COVER=1 holds it
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin

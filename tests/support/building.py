@@ -13,7 +13,7 @@ import pytest
 from condyle.backends import notice
 from condyle.backends.compiler import CompilerError, find_compiler
 
-OWN_CACHE = {"accelerating", "backends", "graph", "model", "questions", "results", "simulation"}
+OWN_CACHE = {"backends", "graph", "model", "questions", "results", "simulation"}
 TESTS = Path(__file__).parents[1]
 
 
