@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from support.tools import run
 import condyle
 from condyle.export import Exported, export
 from condyle.model.forward_kinematics import ForwardKinematics
+from condyle.questions.law import CONTROLLERS, Control, ControllerTable
 
 Folders = Callable[[str], Folder]
 OK, UNREACHABLE, SINGULAR, OUT_OF_BOUNDS, INFEASIBLE = range(5)
@@ -136,6 +138,38 @@ def test_the_controller_is_the_inverse_at_a_corrected_acceleration(jaw: Library)
     right = model.one(q, q1, q2, acting)
     assert status == OK
     np.testing.assert_allclose(found["effort"], right, rtol=0, atol=1e-13 * np.abs(right).max())
+
+
+class Homing(ControllerTable):
+    """A law of one's own: it brings the state home, and counts its calls."""
+
+    ports: ClassVar[Mapping[str, str | int]] = {"stiffness": "coordinate", "loss": 1}
+    memory: ClassVar[tuple[float, ...]] = (0.0,)
+    kind: Literal["homing"]
+
+    def numbers(self, machine: Any) -> Mapping[str, Any]:
+        return {}
+
+    @staticmethod
+    def equations(c: Control) -> Any:
+        q2 = -c.gains.stiffness * c.now.q - c.gains.loss * c.now.q1
+        return c.inverse(c.now.q, c.now.q1, q2), c.memory + 1
+
+
+def test_a_law_of_ones_own_is_exported(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setitem(CONTROLLERS, "homing", Homing)
+    mechanism = condyle.load("gough-stewart")
+    law = Library(export(mechanism, ("homing",), prefix="arm", lanes=0), tmp_path)
+    given = [a.name for a in law.exported["homing"].inputs]
+    assert given == ["q", "q1", "memory_before", "stiffness", "loss"]
+    q, q1 = 0.01 * np.random.default_rng(7).normal(size=(2, 6))
+    stiffness = np.arange(1.0, 7.0)
+    gains = {"stiffness": stiffness, "loss": 3.0}
+    status, found = law("homing", q=q, q1=q1, memory_before=4.0, **gains)
+    assert status == OK and found["memory"] == 5.0
+    model = condyle.derive(mechanism, backend="numpy")
+    right = model.one(q, q1, -stiffness * q - 3.0 * q1, np.zeros(9))
+    np.testing.assert_allclose(found["effort"], right, rtol=0, atol=1e-12 * np.abs(right).max())
 
 
 def test_limits_bind_in_the_recorded_samples(folder: Folders) -> None:

@@ -32,7 +32,7 @@ def test_no_two_names_meet() -> None:
     assert len({name.lower() for name in found.values()}) == 4
 
 
-@pytest.mark.parametrize("prefix", ["", "1a", "a-b", "int", "x" * 41, "a b", "é"])
+@pytest.mark.parametrize("prefix", ["", "1a", "a-b", "int", "x" * 41, "a b", "é", "main", "Check"])
 def test_prefixes_that_c_does_not_take(prefix: str) -> None:
     with pytest.raises(InputError, match="prefix"):
         require_prefix(prefix)

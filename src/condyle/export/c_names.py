@@ -17,6 +17,7 @@ mutable namespace new not operator or private protected public template this thr
 typename using virtual xor
 """
 RESERVED = frozenset(_C.split()) | frozenset(word.lower() for word in keyword.kwlist)
+OTHERS = ("main", "check", "checker", "example")  # files of an exported folder besides
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
@@ -51,9 +52,10 @@ def in_format(text: str) -> str:
 
 def require_prefix(prefix: str) -> str:
     """Raises InputError for what no name in C can begin with."""
-    if not _WORD.fullmatch(prefix) or prefix in RESERVED or len(prefix) > 40:
+    taken = prefix.lower() in OTHERS
+    if not _WORD.fullmatch(prefix) or prefix in RESERVED or len(prefix) > 40 or taken:
         raise InputError(
             f'prefix "{prefix:.60}": expected a name that C takes, of at most 40 letters, digits '
-            "and _, a letter first"
+            f"and _, a letter first, other than {', '.join(OTHERS)}"
         )
     return prefix

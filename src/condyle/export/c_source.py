@@ -22,7 +22,7 @@ from .arguments import Arguments
 from .c_context import Body, Context
 from .c_function import function
 from .c_header import WHY, header_text
-from .c_names import identifier, identifiers, in_comment, require_prefix
+from .c_names import OTHERS, identifier, identifiers, in_comment, require_prefix
 from .c_pick import picked, used
 from .c_precision import require_precision
 from .catalogue import Entry, Wish, in_order, least_norm, require_question, usual
@@ -71,7 +71,8 @@ def export(
     if lanes not in (0, 2, 4, 8):
         raise InputError(f"lanes: expected 0, 2, 4 or 8, got {lanes}")
     plain = struct or real != "double"
-    name = require_prefix(prefix or identifier(mechanism.name).lower())
+    own = identifier(mechanism.name).lower()
+    name = require_prefix(prefix or (f"{own}_" if own in OTHERS else own))
     wish = Wish(in_order(coordinates), landmark)
     arguments = Arguments(mechanism, wish.coordinates, landmark)
     c = Context(mechanism, structure, numbers, name, real, 0 if plain else lanes, arguments, struct)
