@@ -17,6 +17,7 @@ from condyle.questions.law.controller import EACH_COORDINATE, Control, Controlle
 from condyle.questions.load.acting import LoadTable, Place
 from condyle.simulation import CONTROLLERS, LOADS, running
 from condyle.simulation.bind import bind
+from condyle.simulation.crowd import run_all
 from condyle.simulation.gains import check_gains
 from condyle.simulation.plan import Plan, Trace
 from condyle.simulation.scenario import scenario_from
@@ -84,14 +85,14 @@ def model() -> condyle.Model:
     return condyle.derive("masticatory")
 
 
-def same(found: Trace, expected: Trace) -> None:
+def same(found: Trace, expected: Trace, bound: float = 1e-10) -> None:
     assert found.t.tolist() == expected.t.tolist()
     assert found.tick.tolist() == expected.tick.tolist()
     assert found.modes.tolist() == expected.modes.tolist()
     for name in ("state", "effort", "command", "count", "estimate", "force"):
         one, other = getattr(found, name), getattr(expected, name)
         scale = np.abs(other).max(initial=1e-3)
-        np.testing.assert_allclose(one, other, rtol=0, atol=1e-10 * scale, err_msg=name)
+        np.testing.assert_allclose(one, other, rtol=0, atol=bound * scale, err_msg=name)
     events, others = (
         [(e.kind, e.owner, e.ends, pytest.approx(e.time, abs=1e-8)) for e in trace.events]
         for trace in (found, expected)
@@ -171,14 +172,34 @@ def test_what_it_is_not_for(model: condyle.Model) -> None:
     assert running.Run(plan).steps is None
 
 
+def test_in_lockstep(model: condyle.Model) -> None:
+    """Runs of a crowd are the runs alone, those with events among them; looks, too."""
+
+    def told(i: int) -> dict[str, Any]:
+        return {
+            "start": {"beta": 0.05 + 5e-4 * i, "dbeta": -0.5},
+            "controller": {**TORQUE, "stiffness": 300.0 + 5 * i, "delay": 1},
+            "sensors": {"encoder_resolution": 1e-5},
+            "load": [{**FOOD, "thickness": 4e-3 + 1e-4 * i}],
+        }
+
+    plans = [plan_of(told(i), model) for i in range(11)]
+    plans += [plan_of({"start": {"dbeta": 0.02 * i}, "duration": 0.01}, model) for i in range(3)]
+    alone = [running.run(plan) for plan in plans]
+    for found, expected in zip(run_all(plans), alone, strict=True):
+        same(found, expected, 1e-12)
+    quiet = [not trace.events for trace in alone]
+    assert any(quiet) and not all(quiet)
+
+
 def test_side_by_side(model: condyle.Model) -> None:
-    """Many runs on threads are the runs alone, bit by bit."""
+    """Many runs are the runs alone, whatever the threads."""
     told = [{**BASE, "duration": 0.02, "start": {"dbeta": 0.02 * i}} for i in range(5)]
     alone = [condyle.simulate(model, one) for one in told]
-    for threads in (1, 3):
-        found = condyle.simulate_all(model, told, threads=threads)
-        for one, other in zip(found, alone, strict=True):
-            np.testing.assert_array_equal(one["pose"], other["pose"])
+    many = [condyle.simulate_all(model, told, threads=threads) for threads in (1, 3)]
+    for one, other, expected in zip(*many, alone, strict=True):
+        np.testing.assert_array_equal(one["pose"], other["pose"])
+        assert np.abs(one["pose"] - expected["pose"]).max() < 1e-13
     told[3]["start"] = {"dZ": 1.0}
     with pytest.raises(condyle.CondyleError, match=r"scenario 4: 1 problem\n.*start: dZ"):
         condyle.simulate_all(model, told)

@@ -102,7 +102,7 @@ class Controller:
             give("resolution", drive.sensing.resolution, run)
             give("smoothing", drive.sensing.smoothing, run)
 
-    def begin(self, plan: Plan, plant: Plant, run: int = 0) -> None:
+    def begin(self, plan: Plan, run: int = 0) -> None:
         """Aims, and memory to begin with: a machine knows where it starts."""
         drive, give = self._drive(plan), self.columns.give
         if len(self.ticks):

@@ -50,7 +50,7 @@ class Run:
         self.control = Controller(plan) if isinstance(drive, ClosedLoop) else None
         if self.control is not None:
             self.control.fill(plan)
-            self.control.begin(plan, self.plant)
+            self.control.begin(plan)
         self._watch = Watch(plan, self.plant, self._look)
         self.events: list[Event] = []
         self._seen: dict[tuple[str, str], int] = {}
@@ -78,6 +78,30 @@ class Run:
             self.go_to(self._plan.duration)
             self._keep_end(self._plan.duration, self.y)
         return self._trace()
+
+    def take_over(
+        self,
+        steps: Steps,
+        y: np.ndarray,
+        kept: np.ndarray,
+        crowd: Controller | None,
+        plant: Plant,
+        i: int,
+    ) -> None:
+        """Go on alone from where a crowd has brought its run i, without an event so far."""
+        at, columns = steps.run, self.plant.columns
+        self.t, self.tick, self.next = at.t, at.tick, at.next
+        self.corner, self.fresh, self.y = at.corner, bool(at.fresh), y.copy()
+        self.kept[: self.next] = kept[: self.next]
+        self.kept_modes[: self.next] = self.modes
+        columns.given[:, 0] = plant.columns.given[:, i]
+        if crowd is None or self.control is None:
+            return
+        own, looked = self.control, self.tick + 1
+        own.columns.given[:, 0] = crowd.columns.given[:, i]
+        own.looks[:looked, :, 0] = crowd.looks[:looked, :, i]
+        own.states[:looked, :, 0] = crowd.states[:looked, :, i]
+        self._saturated(0)
 
     def go_to(self, until: float) -> None:
         """Run to a time, or to the next step after it [s].

@@ -5,17 +5,16 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-from ..backends.threads import workers
 from ..errors import InputError
 from ..mechanism.mechanism import Mechanism
 from ..model.model import Model, derive
 from ..motion import Motion
 from ..results.solution import Solution
 from .bind import bind
-from .running import Run, run
+from .crowd import run_all
+from .running import run
 from .scenario import Scenario, load_scenario, scenario_from
 from .simulated import solved
 
@@ -70,7 +69,8 @@ def simulate_all(
 ) -> list[Solution]:
     """Simulations of one model, side by side; see `simulate`.
 
-    Runs of method `rk4` are compiled code and share the processors; others take turns.
+    Runs of method `rk4` that differ in numbers alone (gains, starts, loads, paths, limits, files)
+    are compiled code in lockstep, which share the processors; others take turns.
 
     Args:   threads: at most so many; default: the processors at hand. Results do not depend on it.
     Returns: solutions in the scenarios' order.
@@ -81,10 +81,7 @@ def simulate_all(
         model = derive(model)
     told = [as_scenario(scenario) for scenario in scenarios]
     plans = [bind(model, one, source=f"scenario {i + 1}") for i, one in enumerate(told)]
-    for plan in plans[:1]:
-        Run(plan)  # kernels are there before threads ask for them
-    with ThreadPoolExecutor(workers(threads)) as pool:
-        traces = list(pool.map(run, plans))
+    traces = run_all(plans, threads)
     return [
         solved(plan, trace, one, f"scenario {i + 1}", start)
         for i, (plan, trace, one) in enumerate(zip(plans, traces, told, strict=True))
