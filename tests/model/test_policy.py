@@ -265,3 +265,21 @@ def test_weights_are_numbers(bad: float) -> None:
     for what in ("preload", "contact_weight"):
         with pytest.raises(condyle.InputError, match="at least 0"):
             condyle.derive("masticatory", backend="numpy", **{what: bad})
+
+
+def test_one_sample_within_limits_is_one_evaluation_of_a_kernel() -> None:
+    robot = condyle.load("masticatory")
+    chains = []
+    for chain in robot.chains:
+        actuator = chain.actuator.model_copy(update={"torque_limit": 0.35})
+        chains.append(chain.model_copy(update={"actuator": actuator}))
+    model = Evaluator(robot.replace(chains=tuple(chains)), distribution="bounded")
+    rng = np.random.default_rng(2)
+    q, q1, q2 = 0.004 * rng.normal(size=(3, 40, 4)) * np.array([1, 10, 100])[:, None, None]
+    load = np.zeros((40, 9))
+    load[:, 2], load[:, 6] = rng.uniform(-15, 0, 40), 0.03
+    many = model.torques(q, q1, q2, load)
+    found = np.array([model.one(*row) for row in zip(q, q1, q2, load, strict=True)])
+    assert {Status.ok, Status.infeasible} <= set(many.status.tolist())
+    assert (np.abs(many.effort) == 0.35).any()
+    np.testing.assert_allclose(found, many.effort, rtol=0, atol=1e-12)

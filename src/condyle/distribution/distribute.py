@@ -107,19 +107,8 @@ def _by_kernel(
 ) -> np.ndarray:
     """Fill in what the question proves; returns the samples that it leaves to others."""
     assert objective.term is not None
-    weight, count, k = objective.weight(p), p.count, p.k
-    kernel = _kernel(p.n, k, objective.term, weight > 0, backend.name)
-    low, high, push = p.low, p.high, p.push
-    if not objective.limits:
-        low, high, push = np.full_like(low, -np.inf), np.full_like(high, np.inf), 0 * push
-    bounds = {
-        "low": low,
-        "high": high,
-        "scale": objective.scale(p),
-        "contact_low": np.where(push > 0, p.preload, -np.inf),
-        "contact_high": np.where(push < 0, -p.preload, np.inf),
-        "weight": np.array([weight]),
-    }
+    bounds, count, k = objective.ports(p), p.count, p.k
+    kernel = _kernel(p.n, k, objective.term, "weight" in bounds, backend.name)
     inputs = {name: np.broadcast_to(a, (count, len(a))) for name, a in bounds.items()}
     moved = np.einsum("rni,rn->ri", p.J, p.offset) if p.offset.any() else 0.0
     inputs |= {"Q": p.Q + moved, "J": p.J.transpose(0, 2, 1)}

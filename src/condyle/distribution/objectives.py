@@ -53,6 +53,20 @@ class Objective:
         """W of a half of the sum of squares of contact forces."""
         return problem.contact_weight if self.weighs else 0.0
 
+    def ports(self, problem: Problem) -> dict[str, np.ndarray]:
+        """Limits as the questions `allocation` and `limited` take them, a row each."""
+        p, free = problem, np.full(problem.n, np.inf)
+        low, high, push = (p.low, p.high, p.push) if self.limits else (-free, free, 0 * p.push)
+        ports = {
+            "low": low,
+            "high": high,
+            "scale": self.scale(p),
+            "contact_low": np.where(push > 0, p.preload, -np.inf),
+            "contact_high": np.where(push < 0, -p.preload, np.inf),
+        }
+        weight = self.weight(p)
+        return ports | ({"weight": np.array([weight])} if weight else {})
+
     def solve(self, s: Sample) -> Answer | None:
         """The least of one sample, certified; None where none was found."""
         return least(s, lambda x: x, np.ones_like, curved=False)

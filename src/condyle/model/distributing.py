@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -130,6 +131,20 @@ class Distributor:
         """Whether it has a say at all in the efforts."""
         return not self.least_norm or self.unsolved_friction
 
+    @property
+    def question(self) -> tuple[tuple[Any, ...], dict[str, np.ndarray]]:
+        """The question of one sample's efforts with its details, none where a kernel alone cannot
+        say what they are; and its ports that are always given the same."""
+        objective = OBJECTIVES[self.policy.objective]
+        if not self.chooses:
+            return ("inverse", ()), {}
+        # Cubes take twice the steps, and compilers a minute.
+        if objective.term != "square" or self.unsolved_friction:
+            return (), {}
+        empty = np.zeros((0, len(self._low), 6)), np.zeros((0, len(self._push), 6))
+        ports = objective.ports(self._problem(np.zeros((0, 6)), *empty))
+        return ("limited", objective.term, "weight" in ports), ports
+
     def rows(self, values: Mapping[str, np.ndarray], status: np.ndarray) -> np.ndarray:
         """Good samples that the least norm does not serve."""
         good = status == Status.ok
@@ -154,17 +169,7 @@ class Distributor:
         Args: system: the results of that question or of `balance`, samples last.
         """
         s = {name: np.moveaxis(a, -1, 0) for name, a in system.items()}
-        problem = Problem(
-            s["Q"],
-            s["J"].transpose(0, 2, 1),
-            s["normal"],
-            s["friction"],
-            self._low,
-            self._high,
-            self._push,
-            self.policy.preload,
-            contact_weight=self.policy.contact_weight,
-        )
+        problem = self._problem(s["Q"], s["J"].transpose(0, 2, 1), s["normal"], s["friction"])
         result = distribute(problem, self.policy.objective, self._backend)
         found = {
             "effort": result.effort.T,
@@ -177,6 +182,21 @@ class Distributor:
             found["share"] = shares(s, found["effort"].T, rubbing).transpose(2, 1, 0)
             found |= {name: system[name] for name in ("slip", "drag")}
         return found
+
+    def _problem(self, *balance: np.ndarray) -> Problem:
+        """Q, J, normal and friction (if any) of samples, with what the policy asks for."""
+        Q, J, normal, *friction = balance
+        return Problem(
+            Q,
+            J,
+            normal,
+            friction[0] if friction else None,  # type: ignore[arg-type]
+            low=self._low,
+            high=self._high,
+            push=self._push,
+            preload=self.policy.preload,
+            contact_weight=self.policy.contact_weight,
+        )
 
 
 def shares(

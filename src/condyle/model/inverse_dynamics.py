@@ -77,10 +77,12 @@ class InverseDynamics:
     @cached_property
     def _one_by_one(self) -> OneByOne | None:
         """What `one` calls; None where a kernel alone cannot say what the efforts are."""
-        kernel = self._system.kernel("inverse", ())
-        if self.distributor.chooses or not isinstance(kernel, CompiledKernel):
+        question, fixed = self.distributor.question
+        compiled = self._system.backend.name == "compiled"
+        kernel = self._system.kernel(*question) if question and compiled else None
+        if not isinstance(kernel, CompiledKernel):
             return None
-        return OneByOne(kernel, self._samples, np.argsort(kernel.order))
+        return OneByOne(kernel, self._samples, np.argsort(kernel.order), fixed)
 
     @cached_property
     def _samples(self) -> tuple[Sample, ...]:

@@ -7,7 +7,8 @@ kernel is called, is prepared once a thread.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -28,13 +29,22 @@ class OneByOne(threading.local):
     """
 
     def __init__(
-        self, kernel: CompiledKernel, samples: tuple[Sample, ...], wanted: np.ndarray
+        self,
+        kernel: CompiledKernel,
+        samples: tuple[Sample, ...],
+        wanted: np.ndarray,
+        fixed: Mapping[str, np.ndarray] = MappingProxyType({}),
     ) -> None:
         """Every thread comes through here when it first asks for `call`.
 
         Args: samples: what is given;  wanted: columns of the results, in order.
+              fixed: what other ports are always given.
         """
         self._single = kernel.single()  # has to stay as long as it is called
+        for port in kernel.interface.ports:
+            if port.name in fixed:
+                row = fixed[port.name][list(kernel.order) if port.lanes else slice(None)]
+                self._single.given[port.start : port.start + len(row)] = row
         moved = kernel.interface.ports[2].lanes and kernel.order != tuple(sorted(kernel.order))
         order = np.array(kernel.order) if moved else None
         self.call = _bound(self._single, samples, wanted, order)
@@ -46,7 +56,7 @@ def _bound(
     """Args: order: where the kernel's lanes stand in the third array, if elsewhere."""
     run, found = single.run, single.found
     ends = np.cumsum([sample.length for sample in samples])
-    places = np.split(single.given, ends[:-1])
+    places = np.split(single.given[: ends[-1]], ends[:-1])
     lanes = places[2]
     if order is not None:
         places[2] = np.empty_like(lanes)
