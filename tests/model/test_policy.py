@@ -273,7 +273,7 @@ def test_one_sample_within_limits_is_one_evaluation_of_a_kernel() -> None:
     for chain in robot.chains:
         actuator = chain.actuator.model_copy(update={"torque_limit": 0.35})
         chains.append(chain.model_copy(update={"actuator": actuator}))
-    model = Evaluator(robot.replace(chains=tuple(chains)), distribution="bounded")
+    model = Model(robot.replace(chains=tuple(chains)), distribution="bounded")
     rng = np.random.default_rng(2)
     q, q1, q2 = 0.004 * rng.normal(size=(3, 40, 4)) * np.array([1, 10, 100])[:, None, None]
     load = np.zeros((40, 9))
