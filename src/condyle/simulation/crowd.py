@@ -93,7 +93,7 @@ def crowd(plans: Sequence[Plan]) -> list[Trace]:
         code = steps.advance()
         gone = {DONE: alive, PAUSE: 0 * alive}.get(code, steps.gone)
         for i in np.flatnonzero(gone).tolist():
-            alone = Run(plans[i])
+            alone = Run(plans[i], compiled=code != DONE)
             alone.take_over(steps, y[:, i], kept[..., i], control, plant, i)
             found[i], alive[i] = alone.trace(), False
         steps.run.seen = 0
