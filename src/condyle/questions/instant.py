@@ -1,7 +1,6 @@
-"""The mechanism at an instant of a simulation: where everything is, how fast, and what rubs.
+"""The mechanism at an instant: where it is, and how fast; accelerations belong to `forward`.
 
-All that loads, sensors, events and controllers ask of a state q, q'; accelerations belong to
-`forward`. And the energy of a state, which the dynamics do not need and a balance does.
+And the energy of a state, which the dynamics do not need and a balance does.
 """
 
 from __future__ import annotations
@@ -9,28 +8,22 @@ from __future__ import annotations
 import casadi as ca
 
 from ..dynamics.joint_space import chain_jacobians
-from ..graph.program import Program, Variants
+from ..graph.program import Program
 from ..kinematics.chain import FAMILIES
-from ..kinematics.constraints import contact_frame
 from ..status import Status
 from .builder import Builder
 from .equations import Wrench, platform_body
 from .inertia import affine
-from .numbers import single_contacts
-from .platform import ANGLE_UNITS, Platform, closed, contacts
+from .platform import ANGLE_UNITS, Platform, closed
 from .structure import Structure
 
 CERTAIN = 0.5  # of a placement's discriminant, which is 0 or 1 where it was iterated
 
 
-def instant(structure: Structure, inertia: bool = False) -> Variants:
-    """Pose, twist, joints and contacts from the independent coordinates and rates.
+def instant(structure: Structure) -> Program:
+    """Pose and joints from the independent coordinates and rates.
 
-    Results: pose, pose_rate (6,); R (3, 3); T (6, m): [V; omega] = T q'; joint, joint_rate, and
-    A (m,) a lane: theta' = A q'; loss, power that an actuator's own friction takes [W];
-    contact_point (k, 3); rub (k,), power of friction a newton of contact force [m/s].
-
-    Args: inertia: M_r of `matrices` too, (m, m).
+    Results: pose, pose_rate (6,); R (3, 3); joint, joint_rate, and A (m,) a lane: theta' = A q'.
     """
     b = Builder(structure)
     platform = closed(b, rates=1)
@@ -39,8 +32,7 @@ def instant(structure: Structure, inertia: bool = False) -> Variants:
     b.output("pose", platform.pose, ANGLE_UNITS)
     b.output("pose_rate", motion.rate, "per s")
     b.output("R", platform.R, "1", 3, 3)
-    b.output("T", T, "", 6, s.m)
-    joints, rates, rows, lost, discriminants = [], [], [], [], []
+    joints, rates, rows, discriminants = [], [], [], []
     for group, kind in enumerate(s.families):
         family = FAMILIES[kind]
         r = platform.R @ b.lane(group, "joint")
@@ -52,27 +44,16 @@ def instant(structure: Structure, inertia: bool = False) -> Variants:
         joints.append(loop.q_r[0])
         rates.append(rate)
         rows.append(row)
-        lost.append(losses(b, group, rate))
         discriminants.append(loop.discriminant)
     b.output("joint", joints, "rad or m")
     b.output("joint_rate", rates, "rad/s or m/s")
     b.output("A", rows, "", s.m)
-    b.output("loss", lost, "W")
-    touch, k = contacts(b, platform), len(s.contacts)
-    position = platform.placement.position
-    frame = contact_frame(single_contacts(s, b.parameter), position, platform.R)
-    points = [position + r for r in frame.levers]
-    b.output("contact_point", ca.horzcat(ca.SX(3, 0), *points).T, "m", k, 3)
-    rubs = [ca.dot(touch.slip[:, i], touch.drag[:, i]) for i in range(k)]
-    b.output("rub", ca.vertcat(ca.SX(0, 1), *rubs), "m/s", k)
-    if inertia:
-        b.output("inertia_matrix", inertia_matrix(b, platform), "kg, kg m, kg m^2", s.m, s.m)
     placement = platform.placement
     if placement.discriminant is not None:
         below = None if placement.iterated else Status.unreachable
         b.check(placement.discriminant, CERTAIN if placement.iterated else 0.0, below)
     b.check(b.least(discriminants), 0.0, Status.unreachable)
-    return Variants(b.finish(), single=True)
+    return b.finish()
 
 
 def energy(structure: Structure) -> Program:
