@@ -71,7 +71,7 @@ if TYPE_CHECKING:
 register("model.solve", "condyle.results.solving:solve")
 register("solution.plot", "condyle.report.figures:SolutionPlots")
 register("comparison.text", "condyle.report.tables:comparison_text")
-register("mechanism.look", "condyle.report.scene.look:Look")
+register("mechanism.look", "condyle.report.scene.parts:Look")
 
 __all__ = [*_HOMES, "__version__"]
 

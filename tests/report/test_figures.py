@@ -32,7 +32,7 @@ from condyle.report.figures import (
     registry,
 )
 from condyle.report.figures.drawing import looks
-from condyle.report.figures.platform_path import track
+from condyle.report.figures.paper_figures import track
 from condyle.report.figures.style import new_figure
 from condyle.report.naming import groups, heading
 from condyle.report.panel import Curve, Panel

@@ -8,11 +8,11 @@ import pytest
 import condyle
 from condyle.motion import trial_motion
 from condyle.report.figures import PLOTS
-from condyle.report.page.alerts import alerts
 from condyle.report.page.page_columns import Columns
-from condyle.report.page.page_facts import chain_table
+from condyle.report.page.page_facts import alerts, chain_table
 from condyle.report.page.panel_data import panel_data
-from condyle.report.panel_list import torque
+from condyle.report.panel import panels_of
+from condyle.report.panel_list import load, torque
 from condyle.results.solution import Solution
 from condyle.view.snapshot import state_messages
 
@@ -106,3 +106,11 @@ def test_the_view_tells_of_slack(solution: Solution) -> None:
         f"{FIRST} is below its least effort of -0.0005",
         f"{SECOND} is below its least effort of 0",
     ]
+
+
+def test_a_page_has_a_load_where_there_is_one(fewer_contacts: dict[int, Solution]) -> None:
+    loaded = fewer_contacts[0]
+    free = loaded.assign(load=0.0 * loaded["load"])
+    for solution, there in ((loaded, {"load", "moment"}), (free, set())):
+        assert {p.id for _, p in panels_of(solution)} & {"load", "moment"} == there
+    assert [p.id for p in load(free)] == ["load"], "the figure draws a flat line"

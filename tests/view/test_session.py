@@ -18,7 +18,7 @@ from condyle.view import open_view
 from condyle.view.playback import Playback
 from condyle.view.readout import number, status_html, tables_html
 from condyle.view.session import Session
-from condyle.view.shapes import matrix, quaternion, turn_onto, unit_rod
+from condyle.view.stage import matrix, quaternion, turn_onto, unit_rod
 
 MECHANISMS = ["masticatory", "gough-stewart", "hexaglide", "human-jaw"]
 

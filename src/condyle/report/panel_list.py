@@ -261,12 +261,15 @@ def _load_heading(solution: Solution) -> str:
 
 
 @panels("contacts", _load_heading)
-def load(solution: Solution, every: bool = False) -> Iterator[Panel]:
-    """Force on the platform over time, and its moment where there is one."""
+def load(solution: Solution, every: bool | None = None) -> Iterator[Panel]:
+    """Force on the platform over time, and its moment where there is one.
+
+    Args: every: also what is 0 throughout; by default the force, where the moment is 0 too.
+    """
     point, curves = solution.options.get("load_point"), of_names(solution, "load", "component")
     some = [any(np.nan_to_num(c.values).any() for c in part) for part in (curves[:3], curves[3:])]
     at = f" at {point}" if point else ""
-    if every or some[0] or not any(some):
+    if every or some[0] or (every is None and not some[1]):
         yield Panel("load", f"Load{at}", "force", "N", curves[:3], components=True)
     if every or some[1]:
         title = f"Moment of the load{at}"

@@ -21,19 +21,21 @@ from ..actuators import EMG_ROW, REACH
 from ..failed_spans import gaps, longest
 from ..naming import groups, heading, readable, short, stem
 from ..panel import Curve, Panel, PanelGroup
-from .caption import TIME, caption, written
 from .registry import plot
 from .style import (
     ALERT,
     DARK,
     GREY,
     PALETTE,
+    TIME,
     XYZ,
+    caption,
     figsize_is_free,
     look,
     narrow,
     new_figure,
     nothing_to_draw,
+    written,
 )
 
 if TYPE_CHECKING:

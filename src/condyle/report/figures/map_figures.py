@@ -17,8 +17,7 @@ from ...mechanism.mechanism import COORDINATES
 from ...results.variables import WRENCH
 from ..naming import readable
 from ..panel import shown
-from .caption import COORDINATE
-from .style import ALERT, DARK, DASHES, GREY, PALETTE, house, look, new_figure
+from .style import ALERT, COORDINATE, DARK, DASHES, GREY, PALETTE, house, look, new_figure
 
 if TYPE_CHECKING:
     import xarray as xr

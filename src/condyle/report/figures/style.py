@@ -1,4 +1,4 @@
-"""The house style of the figures: sizes, colours and line styles, and figures that carry them.
+"""The house style of the figures: sizes, colours, line styles and captions.
 
 Figures are plain `matplotlib.figure.Figure` objects. No state of pyplot is touched, so they can be
 drawn in a script, a notebook or a server alike.
@@ -6,20 +6,27 @@ drawn in a script, a notebook or a server alike.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import wraps
+from pathlib import PurePath
 from string import ascii_lowercase
 from textwrap import fill
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 from cycler import cycler
 from matplotlib.figure import Figure
 from matplotlib.transforms import ScaledTranslation
 
+from ...analysis.paper import is_stand_in, is_synthetic
 from ...errors import InputError, did_you_mean
+from ..failed_spans import gaps
+
+if TYPE_CHECKING:
+    from ...results.solution import Solution
 
 # Okabe and Ito's colours, told apart by colour-blind readers; without yellow, which pales on white.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -224,3 +231,35 @@ def nothing_to_draw(title: str, caption: str, why: str) -> Figure:
     axes.axis("off")
     axes.text(0.5, 0.5, why, ha="center", va="center", color=GREY)
     return figure
+
+
+TIME = "time [s]"
+MOST_REASONS = 3  # why samples have no result, in a caption
+COORDINATE = {"alpha": "α", "beta": "β", "gamma": "γ"}
+
+
+def written(coordinate: str) -> str:
+    """A coordinate, or its rate, as formulas have it."""
+    name = coordinate.rstrip("′")
+    return COORDINATE.get(name, name) + coordinate[len(name) :]
+
+
+def caption(solution: Solution) -> str:
+    """Where the data come from, and what they must not be taken for."""
+    options, name = solution.options, solution.attrs["mechanism_name"]
+    stand_in = is_stand_in(solution.mechanism)
+    invented = [what for what in ("motion", "load") if is_synthetic(options[what])]
+    parts = [f"Mechanism {name}" + (": stand-in, not the authors' robot" if stand_in else "")]
+    if invented:
+        parts.append(f"synthetic {' and '.join(invented)}, not the paper's")
+    parts += [
+        f"{what}: {PurePath(options[what]).name}"
+        for what in ("motion", "load")
+        if what not in invented
+    ]
+    if "bands" in solution.attrs:
+        count = json.loads(solution.attrs["bands"])["variants"]
+        parts.append(f"bands: 5 to 95 and 25 to 75 % of {count} variants")
+    reasons = dict.fromkeys(str(one) for one in gaps(solution))
+    grey = [f" Grey: no result ({', '.join(list(reasons)[:MOST_REASONS])})."] if reasons else []
+    return "; ".join(parts) + "." + "".join(grey)

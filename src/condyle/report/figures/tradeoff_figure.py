@@ -8,8 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..naming import readable
-from .caption import caption
-from .style import DARK, house, look, new_figure
+from .style import DARK, caption, house, look, new_figure
 
 if TYPE_CHECKING:
     from ...analysis.weight_curve import Tradeoff

@@ -2,27 +2,34 @@
 
 from __future__ import annotations
 
+import base64
 import hashlib
 import re
 from collections.abc import Iterator, Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...errors import InputError
+from ...extras import require
+from ...results.solution import BOUND_TOLERANCE
 from ...results.summary import summarize
 from ..actuators import drawn_limits
 from ..failed_spans import gaps, longest
 from ..panel_list import reaction
 from .html import Markup, table, tag
+from .page_columns import Columns
 
 if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
     from ...mechanism.actuator import Limits
     from ...results.solution import Solution
     from ..tables import Table
     from .reduce import Reduced
-
 
 _WORDS = {
     "characteristic_length": "characteristic length [m]",
@@ -234,3 +241,79 @@ def _said(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"
     return "none" if value is None else str(value)
+
+
+NEAR_SINGULAR = "near a singularity"
+
+
+def alerts(solution: Solution, columns: Columns) -> list[dict[str, Any]]:
+    """Texts, each with the number of a column that is 1 where the text holds.
+
+    `failed`: there is nothing to draw at such samples.
+    """
+    status = solution["status"]
+    words = status.attrs["flag_meanings"].split()
+    found = [
+        (f"no result: {word}", status.values == code, True)
+        for code, word in enumerate(words)
+        if code
+    ]
+    found += [(text, where, False) for text, where in _warnings(solution)]
+    return [
+        {"text": text, "column": columns.add(f"alert.{text}", where), "failed": failed}
+        for text, where, failed in found
+        if where.any()
+    ]
+
+
+def _warnings(solution: Solution) -> Iterator[tuple[str, np.ndarray]]:
+    with np.errstate(invalid="ignore"):
+        for i, name in enumerate(solution["contact"].values):
+            margin = solution["bound_margin"].values[:, i]
+            yield f"{name} is outside its bounds", margin < -BOUND_TOLERANCE
+            yield f"{name} lifts off", solution["lift_off"].values[:, i]
+        for variable, word in (("torque", "effort"), ("joint_rate", "speed")):
+            values, limits = solution[variable].values, drawn_limits(solution, variable)
+            for i, name in enumerate(solution["chain"].values):
+                yield f"{name} is beyond its {word} limit", limits[i].beyond(values[:, i])
+    yield NEAR_SINGULAR, solution["singularity"].values != 0
+
+
+DPI = 110
+
+
+def sweep_section(found: xr.Dataset | None) -> Markup:
+    """Pictures and tables of a sweep; nothing without one."""
+    if found is None:
+        return Markup("")
+    require("matplotlib", "figures")
+    from ..figures.sweep_figures import sweep_plots
+    from ..tables.sweep_tables import sweep_tables
+
+    pictures = [
+        tag("p", _image(draw(found), (draw.__doc__ or "").splitlines()[0]))
+        for draw in sweep_plots(found).values()
+    ]
+    tables = [table(t.columns, t.rows, t.title, t.notes) for t in sweep_tables(found)]
+    return tag("section", tag("h2", "Sweep"), *pictures, *tables, id="sweep")
+
+
+def bands_section(solution: Solution) -> Markup:
+    """Efforts and contact forces with their bands, where the solution has some."""
+    if "bands" not in solution.attrs:
+        return Markup("")
+    require("matplotlib", "figures")
+    from ..figures import PLOTS
+
+    names = ["torque"] + ["contact_force"] * bool(solution.sizes["contact"])
+    pictures = [tag("p", _image(PLOTS[n](solution), f"Bands of {n}")) for n in names]
+    return tag("section", tag("h2", "Bands over variants"), *pictures, id="bands")
+
+
+def _image(figure: Figure, meaning: str) -> Markup:
+    """A picture within the page: it needs no file beside it."""
+    content = BytesIO()
+    figure.savefig(content, format="png", dpi=DPI)
+    data = base64.b64encode(content.getvalue()).decode()
+    source = Markup(f"data:image/png;base64,{data}")
+    return Markup(f'<img src="{source}" alt="{meaning}" style="max-width:100%">')

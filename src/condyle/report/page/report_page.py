@@ -16,20 +16,21 @@ from ...progress import step
 from ..failed_spans import gaps, longest
 from ..panel import panels_of
 from ..scene import styles
-from .alerts import alerts
 from .html import Markup, fill, json_for_script, tag, text
 from .page_columns import Columns
 from .page_facts import (
+    alerts,
+    bands_section,
     chain_table,
     fact_cards,
     failure_table,
     given_tables,
     provenance,
     reaction_tables,
+    sweep_section,
     warnings_box,
 )
 from .panel_data import panel_data
-from .pictures import bands_section, sweep_section
 from .reduce import Reduced, reduced
 from .stage_data import machine
 
@@ -42,20 +43,7 @@ if TYPE_CHECKING:
 
 _ASSETS = package_files(__package__) / "assets"
 # One file an idea, in the order they run.
-_SCRIPTS = (
-    "data",
-    "theme",
-    "clock",
-    "geometry",
-    "stage",
-    "panels",
-    "fields",
-    "planes",
-    "readout",
-    "controls",
-    "print",
-    "main",
-)
+_SCRIPTS = "data theme clock geometry stage panels fields planes readout controls print main"
 
 
 NEEDED = ("torque", "lift_off", "status")
@@ -198,7 +186,7 @@ def _policy(scripts: Sequence[str]) -> str:
 
 
 def _script() -> str:
-    body = "\n".join(_asset(f"{name}.js") for name in _SCRIPTS)
+    body = "\n".join(_asset(f"{name}.js") for name in _SCRIPTS.split())
     return f'"use strict";\n(() => {{\n{body}\n}})();\n'
 
 

@@ -26,8 +26,8 @@ from ..scene import (
     parts_of,
     place,
 )
-from ..scene.chain_drawings import PLATFORM_JOINT
 from ..scene.parts import JOINT
+from ..scene.place import PLATFORM_JOINT
 from .page_columns import Columns
 
 if TYPE_CHECKING:

@@ -1,11 +1,9 @@
 """Where everything of a mechanism stands, as numbers: the geometry that every picture draws."""
 
-from .chain_drawings import DRAWINGS, ChainDrawing, Rod, drawing_points
 from .colours import DARK, DASHES, LIGHT, MARKERS, ROLES, Style, styles
-from .hull import platform_hull
-from .parts import VIEWS, Bar, Parts, cloud, parts_of
+from .parts import VIEWS, Bar, Parts, cloud, parts_of, platform_hull
 from .patches import Patch, contact_normals, contact_patch, contact_profile
-from .place import Scene, place, rotations
+from .place import DRAWINGS, ChainDrawing, Rod, Scene, drawing_points, place, rotations
 
 __all__ = [
     "DARK",

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...mechanism import Contact, Mechanism
-from .colours import styles
-from .hull import platform_hull
+from ...mechanism.home import characteristic_length
+from .colours import LIGHT, styles
 from .patches import Patch, contact_patch
 from .place import Scene
 
@@ -90,3 +90,60 @@ def parts_of(mechanism: Mechanism, scene: Scene) -> Parts:
 def ball_radius(contact: Contact, size: float) -> float:
     """Radius of a contact's ball as drawn [m]: its own, where the file gives one."""
     return contact.ball_radius or BALL * size
+
+
+SLAB = 0.04  # half thickness of a flat platform over the characteristic length
+
+
+def platform_hull(mechanism: Mechanism) -> tuple[np.ndarray, np.ndarray]:
+    """Hull of the joints, contact points and landmarks in {M}.
+
+    Points in one plane get a thickness; points on one line a small body round it.
+    Returns: vertices (V, 3) [m]; triangles (F, 3), counter-clockwise seen from outside.
+    """
+    from scipy.spatial import ConvexHull
+
+    points = [chain.platform for chain in mechanism.chains]
+    points += [contact.point for contact in mechanism.contacts]
+    points += list(mechanism.platform.points.values())
+    cloud = _with_thickness(np.array(points), SLAB * characteristic_length(mechanism))
+    hull = ConvexHull(cloud)
+    number = np.full(len(cloud), -1)
+    number[hull.vertices] = np.arange(len(hull.vertices))
+    vertices, faces = cloud[hull.vertices], number[hull.simplices]
+    return vertices, _outward(vertices, faces)
+
+
+def _with_thickness(points: np.ndarray, half: float) -> np.ndarray:
+    """Points spread along the directions in which they do not extend."""
+    spread = points - points.mean(axis=0)
+    _, sigma, directions = np.linalg.svd(spread, full_matrices=True)
+    sizes = np.append(sigma, np.zeros(3 - len(sigma)))
+    for direction, size in zip(directions, sizes, strict=True):
+        if size < half:
+            points = np.vstack([points - half * direction, points + half * direction])
+    return points
+
+
+def _outward(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    inward = ((a - vertices.mean(axis=0)) * np.cross(b - a, c - a)).sum(axis=1) < 0
+    return np.where(inward[:, None], faces[:, ::-1], faces)
+
+
+class Look:
+    """The shapes and colours of one mechanism at home.
+
+    colours: of its chains, "#rrggbb";  hull: vertices of the platform, (V, 3) [m] in {M}.
+    """
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        names = mechanism.chain_names
+        self.colours = {n: LIGHT[s.colour] for n, s in zip(names, styles(names), strict=True)}
+        self.hull = platform_hull(mechanism)[0]
+        self._size = characteristic_length(mechanism)
+
+    def patch(self, contact: Contact) -> tuple[np.ndarray, np.ndarray]:
+        """The wall within its bounds, or near home: vertices (V, 3) [m] in {S}, faces (F, 3)."""
+        patch = contact_patch(contact, np.array([contact.point]), self._size)
+        return patch.vertices, patch.faces

@@ -7,10 +7,8 @@ from pathlib import Path
 
 from ...analysis.comparison import Comparison
 from ...atomic import write_text
-from .differences import differences
-from .index_table import table_2
+from .comparison_tables import differences, table_1, table_2
 from .report_table import Table, kept_tables, with_tables
-from .seconds_table import table_1
 
 __all__ = [
     "Table",
