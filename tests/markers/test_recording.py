@@ -11,7 +11,7 @@ from oracles.c3d_file import c3d_bytes
 
 from condyle.errors import InputError, MissingExtraError
 from condyle.markers import read_c3d
-from condyle.markers.marker_labels import find_label
+from condyle.markers.recording import find_label
 
 RNG = np.random.default_rng(0)
 LABELS = ["Jaw:Upper FL", "Lower_FL", "*3"]

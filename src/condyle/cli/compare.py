@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from ..errors import InputError
 from . import options
 from .answer import Answer, command_line, files_line
 from .command import COMPUTE, command
 from .inputs import file_stem, motion_and_load, output_folder, require_drawing, warn, weight_of
-from .tradeoff import require_free_weight, weigh
-
-if TYPE_CHECKING:
-    from ..analysis.comparison import Comparison
 
 
 @command(COMPUTE, example="condyle compare jaw.toml --motion path.csv --load bite.csv")
@@ -50,38 +47,54 @@ def compare(
     import condyle
 
     from ..analysis.comparison import compare as compare_models
+    from ..analysis.weight_curve import tradeoff as weigh
     from ..report.tables import save_tables, tables, with_tables
+    from ..report.tables.tradeoff_table import tradeoff_table
 
     machine = condyle.load(mechanism)
     path, acting = motion_and_load(machine, motion, load, units, landmark, smooth, rate, trim)
     if tradeoff:
-        require_free_weight(distribution, contact_weight)
-        return weigh(machine, path, acting, load_point, preload, out, figures, report)
-    weight = weight_of(machine, contact_weight)
-    policy: dict[str, Any] = {
-        "distribution": distribution,
-        "preload": preload,
-        "contact_weight": weight,
-    }
-    comparison = compare_models(machine, path, acting, load_point, **policy)
+        if distribution not in (None, "weighted") or contact_weight:
+            raise InputError(
+                "--tradeoff goes through the weights of --distribution weighted by itself: leave "
+                "--distribution and --contact-weight out"
+            )
+        curve = weigh(machine, path, acting, load_point, preload=preload)
+        shown, solution, text = [tradeoff_table(curve)], curve.solution, ""
+        data: dict[str, Any] = {"reference_force": curve.reference_force, "samples": curve.samples}
+    else:
+        policy: dict[str, Any] = {"distribution": distribution, "preload": preload}
+        policy["contact_weight"] = weight_of(machine, contact_weight)
+        comparison = compare_models(machine, path, acting, load_point, **policy)
+        shown, solution, text = list(tables(comparison)), comparison.solution, str(comparison)
+        unavailable = {one.label: one.reason for one in comparison.unavailable}
+        data = {"samples": comparison.samples, "unavailable": unavailable}
     output_folder(out)
-    files = save_tables(comparison, out)
-    solution = with_tables(comparison.solution, tables(comparison))
-    files.append(out / f"{file_stem(machine.name)}-compare.nc")
-    solution.save(files[-1])
-    if figures:
+    files = save_tables(shown, out)
+    solution, stem = with_tables(solution, shown), file_stem(machine.name)
+    kept = out / f"{stem}-{'tradeoff' if tradeoff else 'compare'}.nc"
+    solution.save(kept)
+    files.append(kept)
+    if figures and tradeoff:
+        from ..report.figures import save
+        from ..report.figures.tradeoff_figure import tradeoff_figure
+
+        files += save(tradeoff_figure(curve), out, shown[0].name)
+    elif figures:
         from ..report.figures import save_figures
 
         files += save_figures(comparison.solution, comparison, out)
     if report:
         from ..report.page import write_report
 
-        inputs = [file for file in (motion, load) if file is not None]
-        page = out / f"{file_stem(machine.name)}.html"
+        inputs = [] if tradeoff else [file for file in (motion, load) if file is not None]
+        page = kept.with_suffix(".html") if tradeoff else out / f"{stem}.html"
         files.append(write_report(solution, page, files=inputs))
     warn([*path.warnings, *acting.warnings, *solution.warnings])
-    if report:  # the page is there already
-        then = command_line("view", solution=out / f"{file_stem(machine.name)}-compare.nc")
+    if tradeoff:
+        then = command_line("report", kept)
+    elif report:  # the page is there already
+        then = command_line("view", solution=kept)
     else:
         then = command_line(
             "run",
@@ -100,16 +113,6 @@ def compare(
             trim=trim or None,
             report=True,
         )
-    return Answer(f"{comparison}\n{files_line(files)}", _data(comparison) | {"files": files}, then)
-
-
-def _data(comparison: Comparison) -> dict[str, Any]:
-    from ..report.tables import tables
-
-    return {
-        "mechanism": comparison.mechanism.name,
-        "samples": comparison.samples,
-        **{table.name.replace("-", "_"): table.records for table in tables(comparison)},
-        "unavailable": {one.label: one.reason for one in comparison.unavailable},
-        "warnings": comparison.solution.warnings,
-    }
+    records = {table.name.replace("-", "_"): table.records for table in shown}
+    about = {"mechanism": machine.name, **records, "warnings": solution.warnings, "files": files}
+    return Answer(f"{text or shown[0].text()}\n{files_line(files)}", data | about, then)

@@ -8,9 +8,8 @@ import numpy as np
 
 from ..errors import InputError, did_you_mean
 from ..motion.file_words import short
-from .channel_tables import Emg
-from .marker_labels import find_label
-from .recording import Recording
+from .marker_file import Emg
+from .recording import Recording, find_label
 
 if TYPE_CHECKING:
     from ..mechanism.mechanism import Mechanism

@@ -13,11 +13,10 @@ from ..motion.column_units import Dimension, unit_factor
 from ..motion.file_words import listed, short
 from ..motion.platform_load import Load
 from ..motion.points import DEFAULT_LOAD_POINT, resolve_load_point
-from .channel_tables import Forces
 from .marker_bodies import Bodies
-from .marker_labels import find_label
+from .marker_file import Forces
 from .plates import CHANNELS, Plate
-from .recording import Recording
+from .recording import Recording, find_label
 from .registration import Registration
 
 if TYPE_CHECKING:

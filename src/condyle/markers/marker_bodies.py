@@ -10,8 +10,7 @@ import numpy as np
 from ..errors import InputError
 from ..motion.file_words import listed
 from .marker_file import MarkerFile
-from .marker_labels import find_label
-from .recording import Recording
+from .recording import Recording, find_label
 from .rigid import FEWEST, FLATTEST, Fit, breadth, common_shape, fit
 
 _STILL = 1e-3  # m, by which the platform may move while the mechanism is at home

@@ -1,11 +1,13 @@
-"""Checks of a recording: why frames have no pose, labels exchanged, markers off or loose."""
+"""Checks of a recording: why frames have no pose, labels exchanged, markers or balls off."""
 
 from __future__ import annotations
 
 from itertools import combinations, permutations
 
+import casadi as ca
 import numpy as np
 
+from ..mechanism.mechanism import Mechanism
 from ..motion.arrays import runs_of
 from .marker_bodies import Bodies
 from .recording import Recording
@@ -157,3 +159,21 @@ def _changes(points: np.ndarray) -> np.ndarray:
     count = np.maximum(known.sum(axis=0), 1)
     mean = np.where(known, distance, 0.0).sum(axis=0) / count
     return np.where(known, (distance - mean) ** 2, 0.0).sum(axis=0) / count
+
+
+def off_contacts(
+    mechanism: Mechanism, rotation: np.ndarray, position: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Distance of every ball from its surface, by contact, (F,) [m]; along the normal.
+
+    Args: rotation: R of {M} in {S}, (F, 3, 3);  position: of O_M, (F, 3) [m].
+    """
+    found = {}
+    for contact in mechanism.contacts:
+        p = ca.SX.sym("p", 3)
+        phi = contact.offset_surface.phi(p)
+        slope = ca.norm_2(ca.gradient(phi, p))
+        distance = ca.Function("distance", [p], [phi / slope]).map(len(position))
+        balls = rotation @ np.array(contact.point) + position
+        found[contact.name] = np.asarray(distance(balls.T)).ravel()
+    return found

@@ -18,18 +18,15 @@ from ..mechanism.mechanism import Mechanism
 from ..motion.column_units import POSE
 from ..motion.file_words import listed
 from ..motion.path import Motion
-from .channel_tables import Forces
 from .emg import envelopes
 from .forces import measured_load
 from .marker_bodies import Bodies, Body, find_bodies
-from .marker_checks import odd_sizes, suspects_in, why_none
-from .marker_file import MarkerFile, Place, read_markers
+from .marker_checks import odd_sizes, off_contacts, suspects_in, why_none
+from .marker_file import Forces, MarkerFile, Place, read_markers
 from .marker_gaps import close_gaps
-from .marker_labels import find_label
 from .marker_report import MarkerMotion, MarkerResidual
 from .measured_channels import Beside
-from .off_contacts import off_contacts
-from .recording import Recording, read_c3d
+from .recording import Recording, find_label, read_c3d
 from .registration import register
 from .rigid import continuous_angles
 

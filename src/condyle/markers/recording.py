@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import os
 import warnings
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from typing import Any
 
 import numpy as np
 
-from ..errors import CondyleError, InputError
+from ..errors import CondyleError, InputError, did_you_mean
 from ..extras import require
 from ..motion.column_units import LENGTH_UNITS
-from ..motion.file_words import short
-from ..motion.input_file import content_of, digest
+from ..motion.file_words import content_of, digest, listed, short
 from .plates import Plate, read_plates
 
 ASSUMED = "mm"  # what laboratories mean that name no unit
@@ -212,3 +212,36 @@ def _plain(content: bytes) -> str:
     except UnicodeDecodeError:
         text = content.decode("latin-1")
     return text.strip(" \0\t\r\n")
+
+
+def find_label(name: str, labels: Sequence[str], where: str, what: str = "marker") -> int:
+    """Index of the label that a name means, as "upper fl" means "Subject1:Upper_FL".
+
+    The whole label goes before one without its prefix, and the same letters before others.
+
+    Raises: InputError: if there is none, or several are meant.
+    """
+    for form in _FORMS:
+        found = [i for i, label in enumerate(labels) if label and form(label) == form(name)]
+        if len(found) == 1:
+            return found[0]
+        if found:
+            several = listed([labels[i] for i in found])
+            alike = len({labels[i] for i in found}) < len(found)
+            cure = "rename one of them in the file" if alike else "give the whole label"
+            raise InputError(f'{where}: {what} "{name}" may be any of {several}; {cure}')
+    present = [label for label in labels if label and not label.startswith("*")]
+    raise InputError(f'{where}: has no {what} "{name}".{did_you_mean(name, present)}')
+
+
+def _folded(label: str) -> str:
+    return "_".join(label.replace("_", " ").split()).casefold()
+
+
+_FORMS: tuple[Callable[[str], str], ...] = (
+    str,
+    lambda label: " ".join(label.split()),
+    _folded,
+    lambda label: " ".join(label.rpartition(":")[2].split()),
+    lambda label: _folded(label.rpartition(":")[2]),
+)

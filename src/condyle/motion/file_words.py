@@ -1,11 +1,12 @@
-"""Names and cells of strangers' files, as they may stand in a message."""
+"""Files of strangers: their names and cells as they may stand in a message, bytes and hash."""
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Iterable
 
-from ..errors import MANY, printable, shortened
+from ..errors import MANY, InputError, no_such_file, printable, shortened
 
 
 def short(text: str) -> str:
@@ -29,3 +30,26 @@ def columns_are(names: Iterable[str]) -> str:
     """'column "a" is', 'columns "a", "b" are'."""
     names = list(names)
     return f"column {listed(names)} is" if len(names) == 1 else f"columns {listed(names)} are"
+
+
+def content_of(path: str | os.PathLike[str], most: int = -1) -> bytes:
+    """The bytes of a file, or so many of them.
+
+    Raises: InputError: if it cannot be read.
+    """
+    try:
+        with open(path, "rb") as file:
+            return file.read(most)
+    except FileNotFoundError:
+        raise no_such_file(path) from None
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{short(os.fspath(path))}: cannot be read ({why})") from None
+
+
+def digest(path: str | os.PathLike[str]) -> str | None:
+    """SHA-256 of a file in hexadecimal; None for a pipe, which can be read only once."""
+    if not os.path.isfile(path):
+        return None
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -13,9 +13,8 @@ import numpy as np
 from ..errors import InputError
 from .arrays import as_samples, check_rising
 from .column_units import LANDMARK, POSE, Units, parse_units
-from .file_words import listed
+from .file_words import digest, listed
 from .frame import as_sampled, table_from_frame
-from .input_file import digest
 from .memory import memory_at_hand
 from .number_table import Table
 from .smoothing import Smoothing, parse_cutoff, smoothing_spline

@@ -11,8 +11,8 @@ import numpy as np
 from ..errors import InputError
 from .arrays import as_samples, check_rising
 from .column_units import FORCE, MOMENT
+from .file_words import digest
 from .frame import as_sampled, table_from_frame
-from .input_file import digest
 from .number_table import Table
 from .table_reader import read_table
 from .unit_checks import load_warnings

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from pathlib import Path
 
 from ...analysis.comparison import Comparison
@@ -33,10 +34,10 @@ def comparison_text(comparison: Comparison) -> str:
     return "\n".join(table.text() for table in tables(comparison))
 
 
-def save_tables(comparison: Comparison, folder: str | os.PathLike[str]) -> list[Path]:
-    """Write each table as Markdown and CSV; returns the paths."""
+def save_tables(found: Comparison | Iterable[Table], folder: str | os.PathLike[str]) -> list[Path]:
+    """Write tables, or those of a comparison, as Markdown and CSV; returns the paths."""
     paths = []
-    for table in tables(comparison):
+    for table in tables(found) if isinstance(found, Comparison) else found:
         stem = Path(folder) / table.name
         paths += [stem.with_suffix(".md"), stem.with_suffix(".csv")]
         write_text(paths[-2], table.markdown())
