@@ -3,7 +3,7 @@
 import numpy as np
 
 import condyle
-from condyle.model.forward import ForwardKinematics
+from condyle.model.forward_kinematics import ForwardKinematics
 
 mechanism = condyle.load("masticatory")
 solution = condyle.derive(mechanism).solve(condyle.reference_motion())

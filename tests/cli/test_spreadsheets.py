@@ -113,7 +113,7 @@ def test_units_in_the_header_and_columns_that_are_not_used(
     write_table("in.csv", si | {"alpha": 0 * TIMES, "beta": np.radians(TIMES)})
     assert condyle_command("run", "--motion", "in.csv", "--out", "b", "--quiet").err == ""
     a, b = (read_table(f"{folder}/masticatory.csv") for folder in "ab")
-    np.testing.assert_allclose(a.require(a.names), b.require(a.names), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(a.require(a.columns), b.require(a.columns), rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize(

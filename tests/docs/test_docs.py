@@ -88,10 +88,14 @@ def registers() -> Iterator[None]:
     """What a page registers is gone after it."""
     from condyle.dynamics import FORMULATIONS
     from condyle.questions import QUESTIONS
+    from condyle.questions.law import CONTROLLERS
+    from condyle.questions.load import LOADS
     from condyle.report.figures import PLOTS
+    from condyle.report.panel import PANEL_GROUPS
 
+    registers = FORMULATIONS, PLOTS, PANEL_GROUPS, QUESTIONS, CONTROLLERS, LOADS
     kept: list[tuple[dict[str, Any], dict[str, Any]]] = [
-        (register, dict(register)) for register in (FORMULATIONS, PLOTS, QUESTIONS)
+        (register, dict(register)) for register in registers
     ]
     yield
     for register, before in kept:
