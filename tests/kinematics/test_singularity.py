@@ -14,8 +14,7 @@ from condyle import SingularError
 from condyle.kinematics.singularities import KINDS, Singularity
 from condyle.mechanism import Mechanism, parse
 from condyle.mechanism.files import from_data
-from condyle.model.data import Evaluation
-from condyle.model.judge import require_ok
+from condyle.model.data import Evaluation, require_ok
 from condyle.status import STATUS_NAMES
 
 HOME = np.zeros((1, 6))

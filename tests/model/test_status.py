@@ -13,8 +13,7 @@ from support.interpreter import Interpreter
 
 from condyle.backends.kernel import AGAIN
 from condyle.errors import InputError, UnreachableError
-from condyle.model.data import Evaluation
-from condyle.model.judge import require_ok
+from condyle.model.data import Evaluation, require_ok
 from condyle.model.model import Model, with_point
 from condyle.status import Status
 
@@ -143,7 +142,7 @@ def singular_pose(name: str) -> np.ndarray:
 
     def ratio(u: np.ndarray) -> float:
         q = (u * size)[None]
-        poses, reached = model.poses.whole(q, 0 * q, 0 * q)
+        poses, reached = model.whole(q, 0 * q, 0 * q)
         found = model.configuration(poses["pose"])
         if not reached[0] or (found.discriminant < 0).any():
             return 1.0

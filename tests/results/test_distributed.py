@@ -21,7 +21,7 @@ from condyle.errors import (
     UncertifiedError,
 )
 from condyle.mechanism import Mechanism, bundled_text, parse
-from condyle.model.judge import require_ok
+from condyle.model.data import require_ok
 from condyle.results.derived import Derived
 from condyle.results.summary import summarize, work
 from condyle.results.warnings import Watch

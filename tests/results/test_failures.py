@@ -13,7 +13,7 @@ import pytest
 
 import condyle
 from condyle.errors import BoundsError, MechanismError, NumberRangeError, UnreachableError
-from condyle.model.judge import require_ok
+from condyle.model.data import require_ok
 from condyle.motion import Motion
 from condyle.status import STATUS_NAMES, Status, judge
 

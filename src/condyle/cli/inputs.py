@@ -92,7 +92,7 @@ def weight_of(machine: Mechanism, contact_weight: float) -> float:
 
     Raises: InputError: unless W is a number of at least 0.
     """
-    from ..model.reference_force import reference_force
+    from ..model.distributing import reference_force
 
     if not (math.isfinite(contact_weight) and contact_weight >= 0):
         raise InputError(

@@ -20,6 +20,7 @@ from ..dynamics.minimum_norm import minimum_norm
 from ..errors import InputError, did_you_mean, few
 from ..kinematics.chain import FAMILIES
 from ..mechanism.chain import limits
+from ..mechanism.home import characteristic_length
 from ..mechanism.mechanism import Mechanism
 from ..questions.friction import MOST
 from ..status import Status
@@ -102,6 +103,20 @@ def _require_limits(mechanism: Mechanism, objective: str) -> None:
             f"distribution cubic is for efforts that only pull, and {few(both)} may be negative: "
             "set the lower limit to 0, or take weighted"
         )
+
+
+def reference_force(mechanism: Mechanism) -> float:
+    """The largest limit of the chains [N]; 1 N where none has a limit.
+
+    `weighted` adds W (lambda_k / N_ref)^2 of every contact: with W = 1 a contact force as large as
+    the strongest actuator's weighs as much as that actuator at its limit. A torque counts as the
+    force that it gives at the characteristic length.
+    """
+    forces = []
+    for chain in mechanism.chains:
+        arm = 1.0 if FAMILIES[chain.kind].effort_unit == "N" else characteristic_length(mechanism)
+        forces.append(limits(chain).greatest / arm)
+    return max((force for force in forces if np.isfinite(force) and force > 0), default=1.0)
 
 
 class Distributor:

@@ -11,8 +11,8 @@ import numpy as np
 from ..atomic import replacing
 from ..errors import InputError
 from ..mechanism.mechanism import COORDINATES
+from ..model.data import require_ok
 from ..model.joint_reactions import reactions as joint_reactions
-from ..model.judge import require_ok
 from ..model.model import Model
 from ..motion import Table
 from .contacts import AXES, lift_off_columns

@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import os
 from contextlib import ExitStack
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import h5netcdf
 import numpy as np
 import xarray as xr
 
@@ -23,7 +25,6 @@ from ..progress import step
 from .contacts import AXES, BOUND_TOLERANCE, bound_margins, lift_off, lift_off_columns
 from .failed_samples import Failure, failures, status_columns
 from .mat_file import dataset_variables, write_mat
-from .netcdf import write_netcdf
 from .variables import VARIABLES, WRENCH, named_columns, variable_columns
 from .warnings import Notice
 
@@ -166,3 +167,17 @@ def open_solution(path: str | Path) -> Solution:
         lifted = lift_off(solution.mechanism, solution["contact_force"].values)
         solution["lift_off"] = variable.dims, lifted, variable.attributes(solution.mechanism)
     return solution
+
+
+def write_netcdf(dataset: xr.Dataset, path: Path) -> None:
+    """Write a dataset as NetCDF-4.
+
+    HDF5 ends the whole process where it cannot finish a file. It sees memory alone, so that a full
+    disk or a signal is met by Python's own writing. Takes as much memory as the file is large.
+
+    Raises: OSError: if the file cannot be written.
+    """
+    image = BytesIO()
+    with h5netcdf.File(image, "w") as file:
+        dataset.dump_to_store(xr.backends.H5NetCDFStore(file))
+    path.write_bytes(image.getbuffer())

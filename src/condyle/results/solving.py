@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..mechanism.mechanism import Mechanism
+from ..model.data import require_ok
 from ..model.joint_reactions import Reaction
 from ..model.joint_reactions import reactions as joint_reactions
-from ..model.judge import require_ok
 from ..model.model import Model, with_point
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
 from ..progress import step

@@ -14,8 +14,7 @@ from ..kinematics.constraints import indices
 from ..kinematics.singularities import KINDS, NEAR_SINGULAR
 from ..mechanism import COORDINATES, Mechanism
 from ..mechanism.chain import limits
-from ..model.data import Evaluation
-from ..model.judge import unreachable_cause
+from ..model.data import Evaluation, unreachable_cause
 from ..model.model import Model
 from ..motion.points import DEFAULT_LOAD_POINT
 from ..results.contacts import bound_margins

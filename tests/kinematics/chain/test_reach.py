@@ -9,7 +9,7 @@ from support.families import case
 import condyle
 from condyle.errors import UnreachableError
 from condyle.mechanism import Mechanism
-from condyle.model.judge import require_ok
+from condyle.model.data import require_ok
 from condyle.model.model import Model
 from condyle.status import Status
 

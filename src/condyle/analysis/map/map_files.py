@@ -13,7 +13,7 @@ from ...atomic import replacing
 from ...errors import InputError, no_such_file
 from ...mechanism import Mechanism, parse
 from ...model.model import Model
-from ...results.netcdf import write_netcdf
+from ...results.solution import write_netcdf
 from .axes import Axis, Grid
 from .reach import Reach
 

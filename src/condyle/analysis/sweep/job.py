@@ -13,8 +13,8 @@ from ...errors import InputError
 from ...mechanism import load as load_mechanism
 from ...mechanism.home import independent_coordinates
 from ...mechanism.mechanism import Mechanism
+from ...model.distributing import reference_force
 from ...model.model import Model
-from ...model.reference_force import reference_force
 from ...motion import (
     Load,
     Motion,

@@ -13,8 +13,7 @@ import numpy as np
 
 from ...errors import CondyleError, InputError, SampleError, shortened
 from ...mechanism.mechanism import Mechanism
-from ...model.data import Evaluation
-from ...model.judge import require_ok
+from ...model.data import Evaluation, require_ok
 from ...model.model import Model, with_point
 from ...questions.structure import Structure, structure_of
 from ...results.assemble import assemble
