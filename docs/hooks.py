@@ -126,7 +126,7 @@ def draw_maps(folder: Path, solution: Any) -> None:
     import condyle
     from condyle.analysis.map.axes import grid_of
     from condyle.analysis.map.compute import asked_of
-    from condyle.analysis.map.slices import slices_of
+    from condyle.analysis.map.lines import slices_of
     from condyle.report.figures.map_figures import map_figure
 
     run = solution["pose"].sel(coordinate=["X", "beta"]).values

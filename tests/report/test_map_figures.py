@@ -8,7 +8,7 @@ import pytest
 import condyle
 from condyle.analysis.map.axes import grid_of
 from condyle.analysis.map.compute import asked_of
-from condyle.analysis.map.slices import slices_of
+from condyle.analysis.map.lines import slices_of
 from condyle.report.figures.map_figures import LINES, drawn, grown, map_figure
 
 

@@ -32,11 +32,12 @@ def motion_and_load(
     """The files named; without a motion the reference case, or a trial motion."""
     from ..mechanism.home import independent_coordinates
     from ..motion import Load, Motion, bundled_reference, resolve_landmark, trial_motion
+    from ..motion.reference_case import fits_reference
 
     if motion is None and units is not None:
         raise InputError("--units is for a motion of your own; name it with --motion")
     reference_path, reference_load = bundled_reference()
-    reference = motion is None and chews(machine, landmark)
+    reference = motion is None and fits_reference(machine, landmark)
     if motion is None and landmark is not None and not reference:
         raise InputError(
             f"--landmark {landmark}: the bundled path is for two contacts; "
@@ -117,12 +118,6 @@ def study_for(path: Path, machine: Mechanism) -> Study:
             "name one of them in both, or leave it out of the study"
         )
     return study
-
-
-def chews(machine: Mechanism, landmark: str | None = None) -> bool:
-    """Whether the bundled motion is one for such a mechanism."""
-    named = landmark is not None or "incisor" in machine.platform.points
-    return named and len(machine.contacts) == 2
 
 
 def output_folder(path: Path) -> Path:

@@ -140,7 +140,7 @@ def _run_path(run: Path, grid: Grid) -> Any:
 
 
 def _draw(asked: Asked, grid: Grid, dataset: xr.Dataset, stem: Path, path: Any) -> list[Path]:
-    from ..analysis.map.slices import slices_of
+    from ..analysis.map.lines import slices_of
     from ..report.figures import save
     from ..report.figures.map_figures import drawn, map_figure
 

@@ -14,10 +14,9 @@ from .chain import Chain
 from .contact import Contact
 from .coordinates import COORDINATES
 from .home import holding_problems, off_surface
-from .mechanism import Mechanism
+from .mechanism import Mechanism, structural_problems
 from .messages import describe, shown, unknown_key
 from .quantities import PER_METRE
-from .rules import structural_problems
 from .schema import schema_of
 from .toml import nests_too_deep, read_tables, read_text, too_deep
 

@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from ..atomic import replacing
+from ..mechanism.mechanism import Mechanism
 from .column_units import LANDMARK
 from .path import Motion
 from .platform_load import Load
@@ -27,6 +28,12 @@ from .platform_load import Load
 MOTION_FILE = "chewing-incisor.csv"
 LOAD_FILE = "bite-force.csv"
 SYNTHETIC = "synthetic, not the recording of the paper"
+
+
+def fits_reference(mechanism: Mechanism, landmark: str | None = None) -> bool:
+    """Whether the bundled motion is one for a mechanism: two contacts, and a landmark."""
+    named = landmark is not None or "incisor" in mechanism.platform.points
+    return named and len(mechanism.contacts) == 2
 
 
 def reference_motion() -> Motion:

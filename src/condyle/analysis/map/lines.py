@@ -1,12 +1,13 @@
 """The lines of a map over two coordinates: its borders, singular curves and bounds.
 
 Contour lines of a grid are brought onto the curve, point by point, by Newton's steps, and followed
-to where another margin forbids the pose, or the function ends.
+to where another margin forbids the pose, or the function ends. Pictures of a map have these lines,
+and the margin of reach on a finer grid.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,9 +16,10 @@ import numpy as np
 from ...extras import require
 from ...motion.arrays import runs_of
 from ...results.contacts import bound_margins
-from .axes import Grid
+from .axes import Axis, Grid
 from .reach import Reach, bounded
 
+FINE, SLICES = 161, 6  # points along an axis of a slice at least; slices of three coordinates
 LEAST, MOST = 41, 201  # points along an axis of the grid that lines are looked for on
 ROUNDING = 1e-9  # of the other margins, on a line
 ROUNDS, HALVINGS = 8, 30  # of Newton; of bisection
@@ -212,3 +214,41 @@ def _end(
         else:
             high = middle
     return last
+
+
+@dataclass(frozen=True)
+class Slice:
+    """Two axes of a map, the third one held.
+
+    index:  of the third axis, None where there is none;  at: its value, SI.
+    values: of the two axes, SI, at which `margin`, (n1, n2), is known: negative, or no number, out
+            of reach.
+    """
+
+    index: int | None
+    at: float | None
+    values: tuple[np.ndarray, np.ndarray]
+    margin: np.ndarray
+    lines: list[Line]
+
+
+def slices_of(reach: Reach, grid: Grid) -> Iterator[Slice]:
+    """The slice of a map over two coordinates, or some along the last of three."""
+    if len(grid.axes) == 2:
+        yield _slice(reach, grid, None, None)
+    elif len(grid.axes) == 3:
+        *two, last = grid.axes
+        count = min(SLICES, last.count)
+        for index in np.unique(np.linspace(0, last.count - 1, count + 2).round()[1:-1]).astype(int):
+            at = float(last.values[index])
+            held = list(grid.held)
+            held[grid.names.index(last.name)] = at
+            yield _slice(reach, Grid(grid.names, tuple(two), tuple(held)), int(index), at)
+
+
+def _slice(reach: Reach, grid: Grid, index: int | None, at: float | None) -> Slice:
+    axes = tuple(Axis(a.name, a.low, a.high, max(a.count, FINE)) for a in grid.axes)
+    fine = Grid(grid.names, axes, grid.held)
+    margin = reach.margin(fine.block(0, fine.size)).reshape(fine.shape)
+    first, second = (axis.values for axis in axes)
+    return Slice(index, at, (first, second), margin, lines_of(reach, grid))

@@ -14,6 +14,7 @@ from ...errors import InputError, did_you_mean
 from ...kinematics.singularities import KINDS, NEAR_SINGULAR
 from ...mechanism.chain import limits
 from ...mechanism.mechanism import COORDINATES, Mechanism
+from ...model.model import Model
 from ...results.variables import cause_flags, of_effort, of_joint, of_pose
 from ...status import STATUS_NAMES
 from .ability import limited
@@ -89,9 +90,10 @@ def scaled_rates(b: Block) -> np.ndarray:
 
 def _speed(b: Block) -> np.ndarray:
     """A rate of size v makes joint i turn at |row_i| v in its worst direction."""
-    speeds = [limits(chain).speed for chain in b.asked.model.mechanism.chains]
     with np.errstate(divide="ignore"):
-        return (np.array(speeds) / np.linalg.norm(scaled_rates(b), axis=2)).min(axis=1)
+        return (np.array(_speeds(b.asked.model)) / np.linalg.norm(scaled_rates(b), axis=2)).min(
+            axis=1
+        )
 
 
 def _stiffness(b: Block, rates: np.ndarray) -> np.ndarray:
@@ -108,6 +110,11 @@ def _stiffness_values(b: Block) -> np.ndarray:
     return found
 
 
+def _unless(has: Callable[[Asked], object], needed: str) -> Callable[[Asked], str]:
+    """What is needed, where a map has it not."""
+    return lambda asked: "" if has(asked) else needed
+
+
 def _no_limits(asked: Asked) -> str:
     if asked.direction is None:
         return "which way the load acts: --direction 0,0,-1"
@@ -115,21 +122,8 @@ def _no_limits(asked: Asked) -> str:
     return "" if some else "efforts with limits: torque_limit or force_limit in the mechanism file"
 
 
-def _no_speeds(asked: Asked) -> str:
-    some = any(np.isfinite(limits(chain).speed) for chain in asked.model.mechanism.chains)
-    return "" if some else "actuators with a speed_limit in the mechanism file"
-
-
-def _no_bounds(asked: Asked) -> str:
-    return "" if bounded(asked.model.mechanism) else "contacts with bounds in the mechanism file"
-
-
-def _no_contacts(asked: Asked) -> str:
-    return "" if asked.model.mechanism.contacts else "contacts"
-
-
-def _no_stiffness(asked: Asked) -> str:
-    return "" if asked.stiffness is not None else "how stiff actuators are: --stiffness 1000"
+def _speeds(model: Model) -> list[float]:
+    return [limits(chain).speed for chain in model.mechanism.chains]
 
 
 # Which variables every map has.
@@ -151,7 +145,8 @@ QUANTITIES: dict[str, Quantity] = {
         "how far contacts are within their bounds", ("points",),
         (Mapped("bounds", ("contact",), "m", "distance of the contact point to its bounds, inside",
                 lambda b: b.bounds),),
-        _no_bounds,
+        _unless(lambda asked: bounded(asked.model.mechanism),
+                "contacts with bounds in the mechanism file"),
     ),
     "joint": Quantity(
         "joint coordinates", ("joint",),
@@ -185,7 +180,7 @@ QUANTITIES: dict[str, Quantity] = {
         "contact forces under gravity and the load", (),
         (Mapped("contact_force", ("contact",), "N", "contact force at rest, along the unit normal",
                 lambda b: b.held["contact_force"]),),
-        _no_contacts,
+        _unless(lambda asked: asked.model.mechanism.contacts, "contacts"),
     ),
     "load_limit": Quantity(
         "largest further load in a direction that limits allow", ("pose",),
@@ -197,7 +192,8 @@ QUANTITIES: dict[str, Quantity] = {
         "speed that speed limits allow in the worst direction", ("rates",),
         (Mapped("speed", (), "m/s", "speed that limits allow in every direction, of q' with angles "
                 "times the characteristic length", _speed),),
-        _no_speeds,
+        _unless(lambda asked: np.isfinite(_speeds(asked.model)).any(),
+                "actuators with a speed_limit in the mechanism file"),
     ),
     "stiffness": Quantity(
         "stiffness that given stiffnesses of the actuators make", ("rates",),
@@ -208,7 +204,8 @@ QUANTITIES: dict[str, Quantity] = {
                    "stiffness in q_EE",
                    lambda b: _stiffness(b, b.value("rates").transpose(2, 1, 0))),
         ),
-        _no_stiffness,
+        _unless(lambda asked: asked.stiffness is not None,
+                "how stiff actuators are: --stiffness 1000"),
     ),
 }  # fmt: skip
 

@@ -23,7 +23,7 @@ from ...motion import (
     resolve_load_point,
     trial_motion,
 )
-from ...motion.reference_case import bundled_reference
+from ...motion.reference_case import bundled_reference, fits_reference
 from .measure import Reading, reading
 from .sampling import Design
 from .study import NONE, REFERENCE, TRIAL, MotionFile, Study
@@ -158,8 +158,7 @@ def _motion(given: MotionFile, machine: Mechanism) -> Motion:
     if given.file == REFERENCE:
         if given.units:
             raise InputError('motion: "reference" has its units; leave them out')
-        known = machine.platform.points.keys() & {"incisor", given.landmark}
-        if len(machine.contacts) != 2 or not known:
+        if not fits_reference(machine, given.landmark):
             names = ", ".join(independent_coordinates(machine))
             raise InputError(
                 'motion: "reference" is the path of an incisor for two contacts; '

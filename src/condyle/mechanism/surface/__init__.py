@@ -11,14 +11,13 @@ from pydantic import Field, ValidationInfo, ValidatorFunctionWrapHandler, WrapVa
 from .base import SurfaceTable, sides
 from .cylinder import Cylinder
 from .ellipsoid import Ellipsoid
-from .expression import Expression
+from .expression import Expression, Unknown
 from .parallel import Parallel
 from .parallel_quadric import ParallelQuadric
 from .plane import Plane
 from .profile import Profile
 from .quadratic import Quadratic
 from .sphere import Sphere
-from .unknown import Unknown
 
 
 def _written_in_python(

@@ -1,11 +1,11 @@
-"""A surface written in Python: any CasADi expression of a point."""
+"""A surface written in Python: any CasADi expression of a point, and what a file keeps of one."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NoReturn
 
 import casadi as ca
 
@@ -89,3 +89,34 @@ class Expression(Smooth):
 
 def _unpickled(serialized: str, closed: bool) -> Expression:
     return Expression(ca.Function.deserialize(serialized), closed)
+
+
+@dataclass(frozen=True)
+class Unknown(Smooth):
+    """The place of an `Expression` in the mechanism of a solution that came from a file.
+
+    It says what the surface was called and whether it was `closed`; whatever asks for its equation
+    gets an InputError.
+    """
+
+    closed: bool = False
+
+    kind: ClassVar[str] = "expression"
+    known: ClassVar[bool] = False
+
+    def phi(self, point: Any, constants: Any = None) -> NoReturn:
+        raise InputError(
+            "this mechanism comes from a solution and had a surface written in Python, of which a "
+            "file keeps only a note. To compute with it, build it again in Python, or put the "
+            "Expression back with mechanism.replace(contacts=...)"
+        )
+
+    def constants(self) -> NoReturn:
+        self.phi(None)
+
+    @property
+    def form(self) -> NoReturn:
+        self.phi(None)
+
+    def parallel(self, distance: float, point: Any) -> NoReturn:
+        self.phi(None)

@@ -22,7 +22,7 @@ from .style import ALERT, COORDINATE, DARK, DASHES, GREY, PALETTE, house, look, 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from ...analysis.map.slices import Slice
+    from ...analysis.map.lines import Slice
 
 MOST_PANELS = 12
 LEVELS = 20
