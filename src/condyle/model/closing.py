@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from copy import copy
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -138,8 +138,10 @@ class Closure:
         landmark: str | None = None,
         backend: Backend | None = None,
         general: bool = False,
+        lender: Closure | None = None,
     ) -> None:
         """Args:   general: whether its kernel serves every mechanism of the structure.
+                lender: a general one of another mechanism of the structure, whose kernel it shares.
         Raises: InputError: if these do not determine a pose.
         """
         if landmark is None:
@@ -149,32 +151,20 @@ class Closure:
             require_landmark(mechanism, landmark)
             self.names = ()
         prescribed = Prescribed(self.names)
-        self._landmark = landmark
-        structure = structure_of(mechanism)
-        self._numbers = Layout.of(structure).numbers(mechanism, landmark)
+        structure = lender._robust[0] if lender else structure_of(mechanism)
+        numbers = Layout.of(structure).numbers(mechanism, landmark)
         if not general:
-            structure = specialised(structure, self._numbers)
-        question = Question.about(structure, "closure", prescribed)
-        backend = backend or Backend()
-        self._kernel: Kernel = backend.kernel(question.key, question.variants, self._numbers)
-        self._robust = (structure, self._numbers, prescribed)
-        self._followed: FollowedClosure | None = None
-
-    def renumbered(self, mechanism: Mechanism) -> Closure:
-        """The same, if it is general, of another mechanism of the structure.
-
-        Raises: InputError: if the names or the landmark do not determine its pose.
-        """
-        if self._landmark is None:
-            require_independent(mechanism, self.names)
+            structure = specialised(structure, numbers)
+        if lender:
+            self._kernel: Kernel = lender._kernel.renumbered(numbers)
         else:
-            require_landmark(mechanism, self._landmark)
-        other = copy(self)
-        structure, _, prescribed = self._robust
-        other._numbers = Layout.of(structure).numbers(mechanism, self._landmark)
-        other._kernel = self._kernel.renumbered(other._numbers)
-        other._robust, other._followed = (structure, other._numbers, prescribed), None
-        return other
+            question = Question.about(structure, "closure", prescribed)
+            self._kernel = (backend or Backend()).kernel(question.key, question.variants, numbers)
+        self._robust: tuple[Structure, Numbers, Prescribed] = (structure, numbers, prescribed)
+
+    @cached_property
+    def _followed(self) -> FollowedClosure:
+        return FollowedClosure.of(*self._robust)
 
     def solve(
         self, s: np.ndarray, s1: np.ndarray, s2: np.ndarray, threads: int | None = None
@@ -188,7 +178,6 @@ class Closure:
         reached = answer.status == Status.ok
         again = np.flatnonzero(answer.status == AGAIN)
         if again.size:
-            self._followed = self._followed or FollowedClosure.of(*self._robust)
             better = self._followed.solve(s[again], s1[again], s2[again])
             reached[again] = better.reached
             for target, a in zip(found, better.named().values(), strict=True):

@@ -98,12 +98,12 @@ class System:
     def closure(self, names: tuple[str, ...], landmark: str | None) -> Closure:
         """What leads from other coordinates, or from a landmark's path, to whole poses."""
         key = names, landmark
-        if key not in self._closures and self.general not in (None, self):
-            shared = self.general.closure(names, landmark)
-            self._closures[key] = shared.renumbered(self.mechanism)
         if key not in self._closures:
-            general = self.general is not None
-            self._closures[key] = Closure(self.mechanism, names, landmark, self.backend, general)
+            general = self.general
+            lender = None if general in (None, self) else general.closure(names, landmark)
+            self._closures[key] = Closure(
+                self.mechanism, names, landmark, self.backend, general is not None, lender
+            )
         return self._closures[key]
 
     @cached_property

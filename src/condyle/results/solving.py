@@ -1,21 +1,30 @@
-"""A motion and a load in, a labelled solution out: what `Model.solve` returns."""
+"""From a motion and a load, or their evaluation, to a labelled solution."""
 
 from __future__ import annotations
 
+import json
 import time
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from ..mechanism.mechanism import Mechanism
-from ..model.data import require_ok
+from ..kinematics.chain import FAMILIES
+from ..mechanism.mechanism import COORDINATES, Mechanism
+from ..mechanism.writing import record
+from ..model.data import Evaluation, require_ok
 from ..model.joint_reactions import Reaction
 from ..model.joint_reactions import reactions as joint_reactions
 from ..model.model import Model, with_point
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
 from ..progress import step
-from .assemble import assemble
+from ..questions.equations import LOAD as LOAD_PART
+from ..version import __version__
+from .contacts import AXES
+from .derived import Derived
 from .solution import Solution
+from .variables import VARIABLES, WRENCH, Variable, chosen
+from .warnings import Notice, Watch
 
 
 def solve(
@@ -47,6 +56,124 @@ def solve(
     found = joint_reactions(model, evaluation)
     variables, coordinates = reaction_variables(model.mechanism, found)
     return solution.assign(variables).assign_coords(coordinates)
+
+
+def assemble(
+    model: Model,
+    motion: Motion,
+    load: Load,
+    wrench: np.ndarray,
+    load_point: str | None,
+    evaluation: Evaluation,
+    residual: float | None,
+    seconds: float,
+) -> Solution:
+    """The labelled dataset of an evaluation along a motion.
+
+    Arrays of the evaluation become those of the solution, without a copy where no sample failed.
+    The share of the load is left out where there is no load.
+    """
+    derived = Derived(model.mechanism, evaluation, wrench, model.limited)
+    watch = Watch(model.mechanism, residual=residual)
+    watch.see(derived, motion.t)
+    options = _options(model, motion, load, load_point, residual, seconds)
+    title = f"Inverse dynamics of {model.mechanism.name}"
+    solution = labelled(model, derived, motion.t, model.parts, title, options, watch.notices())
+    solution["torque"].attrs["long_name"] = chosen(model.policy.objective)
+    return solution
+
+
+def labelled(
+    model: Model,
+    derived: Derived,
+    times: np.ndarray,
+    parts: Sequence[str],
+    title: str,
+    options: Mapping[str, Any],
+    notices: Sequence[Notice],
+) -> Solution:
+    """The dataset of samples at times (N,) [s]; `parts` are those of `share`."""
+    mechanism = model.mechanism
+    loaded = bool(np.any(derived.wrench))
+    kept = [i for i, part in enumerate(parts) if loaded or part != LOAD_PART]
+    variables = {v.name: _variable(v, derived) for v in VARIABLES if v.when(derived)}
+    if len(kept) < len(parts):
+        dims, share, attributes = variables["share"]
+        variables["share"] = dims, share[kept], attributes
+    solution = Solution(variables, _coordinates(model, times, [parts[i] for i in kept]))
+    solution.attrs = {
+        "title": title,
+        "source": f"condyle {__version__}",
+        "condyle_version": __version__,
+        "mechanism_name": mechanism.name,
+        "mechanism": record(mechanism),
+        "options": json.dumps(options),
+        "warnings": json.dumps([notice.text for notice in notices]),
+        "notices": json.dumps([notice.to_dict() for notice in notices]),
+    }
+    return solution
+
+
+def _variable(
+    variable: Variable, derived: Derived
+) -> tuple[tuple[str, ...], np.ndarray, dict[str, str]]:
+    """What xarray makes a variable of; numbers of failed samples are NaN."""
+    values = variable.values(derived)
+    if values.dtype.kind == "f" and not (derived.all_ok or variable.failed):
+        values = values.copy()
+        values[(slice(None),) * variable.dims.index("time") + (~derived.ok,)] = np.nan
+    return variable.dims, values, variable.attributes(derived.mechanism)
+
+
+def _coordinates(model: Model, times: np.ndarray, parts: Sequence[str]) -> dict[str, Any]:
+    """Labels along every dimension of `DIMENSIONS`, and the units of each chain."""
+    mechanism = model.mechanism
+    families = [FAMILIES[chain.kind] for chain in mechanism.chains]
+    return {
+        "time": ("time", times, {"units": "s", "long_name": "time"}),
+        "chain": list(mechanism.chain_names),
+        "contact": np.array(mechanism.contact_names, dtype=object),
+        "coordinate": list(COORDINATES),
+        "part": list(parts),
+        "axis": list(AXES),
+        "component": list(WRENCH),
+        "independent": list(model.independent),
+        "effort_unit": ("chain", [family.effort_unit for family in families]),
+        "joint_unit": ("chain", [family.joint_unit for family in families]),
+    }
+
+
+def _options(
+    model: Model,
+    motion: Motion,
+    load: Load,
+    load_point: str | None,
+    residual: float | None,
+    seconds: float,
+) -> dict[str, Any]:
+    """How the solution was made."""
+    return {
+        "formulation": model.formulation,
+        "route": model.route,
+        "distribution": model.policy.objective,
+        "preload": model.policy.preload,
+        "contact_weight": model.policy.contact_weight * model.reference_force**2,
+        "reference_force": model.reference_force,
+        "motion": motion.source,
+        "motion_sha256": motion.sha256,
+        "motion_kind": motion.kind,
+        "landmark": motion.landmark,
+        "load": load.source,
+        "load_sha256": load.sha256,
+        "load_point": load_point,
+        "independent": list(model.independent),
+        "dependent": list(model.dependent),
+        "characteristic_length": model.characteristic_length,
+        "contact_residual_of_given_pose": residual,
+        "smoothing": None if motion.smoothing is None else str(motion.smoothing),
+        "derivation_seconds": model.derivation_seconds,
+        "solve_seconds": seconds,
+    }
 
 
 def reaction_variables(

@@ -13,9 +13,9 @@ from ..model.data import Evaluation
 from ..model.distributing import shares
 from ..model.model import Model, with_point
 from ..questions.equations import INTERNAL
-from ..results.assemble import labelled
 from ..results.derived import Derived
 from ..results.solution import Solution
+from ..results.solving import labelled
 from ..results.variables import ACCOUNTS
 from ..results.warnings import Notice, Watch
 from .plan import ClosedLoop, Plan, Trace

@@ -16,8 +16,8 @@ from ...mechanism.mechanism import Mechanism
 from ...model.data import Evaluation, require_ok
 from ...model.model import Model, with_point
 from ...questions.structure import Structure, structure_of
-from ...results.assemble import assemble
 from ...results.derived import Derived
+from ...results.solving import assemble
 from .job import Job
 
 OK, REFUSED, FAILED = "ok", "refused", "failed"
