@@ -19,7 +19,7 @@ from support.tools import need, run
 import condyle
 from condyle.errors import InputError
 from condyle.export import fmu as target
-from condyle.export.fmu_description import exponents
+from condyle.export.fmu import exponents
 
 Array = np.ndarray
 KINDS, VERSIONS = ("plant", "inverse", "controller", "bounded"), (2, 3)

@@ -14,8 +14,7 @@ import condyle
 from condyle.cli import completion
 from condyle.errors import InputError, UnsupportedError
 from condyle.export import CATALOGUE, export
-from condyle.export.c_names import identifier, identifiers, require_prefix
-from condyle.export.c_pick import picked
+from condyle.export.c_names import identifier, identifiers, picked, require_prefix
 from condyle.questions.law import CONTROLLERS
 
 

@@ -1,22 +1,211 @@
-"""One question as one C function without a loop."""
+"""One question as one C function without a loop.
+
+Its body is portable scalar code, or has chains in vector types; both are straight lines of the
+backend, with arrays of their own for what goes in and out.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from abc import abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
-from ..backends.c.printer import nested
+from ..backends.c.printer import nested, number
+from ..backends.c.straight_line import Straight
 from ..errors import UnsupportedError
-from ..graph.program import Program
+from ..graph.graph import Value
+from ..graph.program import Interface, Output, Program
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
 from ..questions.friction import MOST
-from .c_body import HUGE, Places, Scalar, Wide
-from .c_context import CODES, Body, Context
-from .c_precision import ANGLES, LARGEST, threshold
+from .c_context import ANGLES, CODES, LARGEST, WHY, Body, Context, threshold
 from .catalogue import Entry, Wish
-from .exported import Argument
+from .exported import Argument, Function
+
+HUGE = {"double": 1e300, "float": 1e37}  # numbers of a program are kept within
+
+
+@dataclass(frozen=True)
+class Places:
+    """Arrays in the order of the mechanism file; a program's lanes stand family by family.
+
+    columns: C for each input of the program.
+    names:   result -> its array in C; what is not there is not wanted.
+    order:   where each lane of the program stands in the mechanism file.
+    """
+
+    columns: tuple[str, ...]
+    names: Mapping[str, str]
+    order: tuple[int, ...]
+
+    @staticmethod
+    def of(
+        interface: Interface,
+        order: tuple[int, ...],
+        place: Callable[[str, int], str],
+        results: Mapping[str, str],
+    ) -> Places:
+        """Args: place: (port, entry) -> C;  results: names there -> arrays in C."""
+        columns = []
+        for port in interface.ports:
+            where = [(i, k) for i in range(port.size) for k in (order if port.lanes else (0,))]
+            stride = interface.lanes if port.lanes else 1
+            columns += [place(port.name, i * stride + k) for i, k in where]
+        return Places(tuple(columns), results, order)
+
+    def result(self, name: str, entry: int, lane: int | None) -> str:
+        """C for one number of a result, of a lane if it has lanes."""
+        at = entry if lane is None else entry * len(self.order) + self.order[lane]
+        return f"{self.names[name]}[{at}]"
+
+
+class _Body(Straight):
+    """What both have in common: where numbers come from and go to."""
+
+    def __init__(self, program: Program, width: int, places: Places, precision: str) -> None:
+        super().__init__(program, width)
+        self.places, self.precision = places, precision
+
+    def lines(self) -> Iterator[str]:
+        """Statements that define every value."""
+        yield from (line.strip() for line in self._body())
+
+    def statements(self, values: list[Value], copy: int) -> Iterator[str]:
+        wanted = [v for v in values if v not in self.merged]
+        yield from super().statements(wanted, copy)
+
+    @cached_property
+    def merged(self) -> set[Value]:
+        """Roots that only their inverses are wanted of, which are computed at once."""
+        roots = {v for v in self.varying if self.g.nodes[v].op == "sqrt"} - set(self.program.roots)
+        for v in self.varying:
+            node = self.g.nodes[v]
+            if not (node.op == "div" and self.is_inverse_root(v)):
+                roots -= set(node.args)
+        return roots
+
+    def check(self, i: int) -> str:
+        """The value of a check."""
+        return self.name(self.program.checks[i].value, 0)
+
+    def stores(self) -> Iterator[str]:
+        """Statements that write the results."""
+        starts = [sum(self.counts[:g]) for g in range(len(self.counts))]
+        for o in self.program.outputs:
+            if o.name not in self.places.names:
+                continue
+            for i, entry in enumerate(o.entries):
+                for group, v in enumerate(entry):
+                    if v is None:
+                        continue
+                    if o.lanes:
+                        yield from self._lanes_stored(o, i, v, group, starts[group])
+                    else:
+                        yield f"{self.places.result(o.name, i, None)} = {self.name(v, 0)};"
+
+    @abstractmethod
+    def _lanes_stored(
+        self, o: Output, entry: int, v: Value, group: int, start: int
+    ) -> Iterator[str]:
+        """What keeps a result that differs from lane to lane."""
+
+    def number(self, value: object) -> str:
+        """A number in this precision."""
+        assert isinstance(value, float)
+        huge = HUGE[self.precision]
+        text = number(max(-huge, min(huge, value)) if abs(value) < float("inf") else value)
+        if self.precision == "double" or ("(" not in text and not text[0].isdigit()):
+            return text
+        return f"{text[:-1]}f)" if text.endswith(")") and text[1] == "-" else f"{text}f"
+
+    def name(self, v: Value, copy: int) -> str:
+        node = self.g.nodes[v]
+        return self.number(node.data[0]) if node.op == "const" else super().name(v, copy)
+
+    def sample(self, i: object) -> str:
+        assert isinstance(i, int)
+        return self.places.columns[i]
+
+
+class Scalar(_Body):
+    """Portable: every chain's statements by themselves, in `double` or `float`."""
+
+    def __init__(self, program: Program, places: Places, precision: str) -> None:
+        super().__init__(program, 1, places, precision)
+
+    def kind(self, v: Value) -> str:
+        return self.precision
+
+    def is_scalar(self, v: Value) -> bool:
+        return True
+
+    def bundles(self) -> list[list[Value]]:
+        return []
+
+    @property
+    def operations(self) -> int:
+        """Floating-point operations; a fused multiply-add counts one, sine with cosine too."""
+        total = 0
+        for v in self.varying:
+            node = self.g.nodes[v]
+            if node.op in ("sum", "least"):
+                total += sum(self.counts[g] for g, _ in self.lane_terms(v)) - 1
+            elif node.op not in ("input", "lane_input", "neg"):
+                total += 1 if node.group is None else self.counts[node.group]
+        return total
+
+    def reduction(self, v: Value) -> str:
+        lanes = self._lane_names(v)
+        shared = [self.repeated(v, t, count) for count, t in self.shared_terms(v)]
+        if self.g.nodes[v].op == "sum":
+            return " + ".join([*lanes, *shared])
+        return nested("fmin_s", [*lanes, *shared])
+
+    def lane_sample(self, first: object, copy: int) -> str:
+        assert isinstance(first, int)
+        return self.places.columns[first + copy]
+
+    def _lanes_stored(
+        self, o: Output, entry: int, v: Value, group: int, start: int
+    ) -> Iterator[str]:
+        for c in range(self.counts[group]):
+            yield f"{self.places.result(o.name, entry, start + c)} = {self.name(v, c)};"
+
+
+class Wide(_Body):
+    """Chains in the lanes of GCC's vector types, in `double`; for least latency."""
+
+    def __init__(self, program: Program, places: Places, width: int) -> None:
+        super().__init__(program, width, places, "double")
+
+    def lane_sample(self, first: object, copy: int) -> str:
+        assert isinstance(first, int)
+        some = range(first + copy * self.width, first + (copy + 1) * self.width)
+        known = self.places.columns
+        return f"(vec){{{', '.join(known[i] if i < len(known) else '0.0' for i in some)}}}"
+
+    def _lanes_stored(
+        self, o: Output, entry: int, v: Value, group: int, start: int
+    ) -> Iterator[str]:
+        for c in range(self.copies[group]):
+            used = min(self.width, self.counts[group] - c * self.width)
+            places = [
+                self.places.result(o.name, entry, start + c * self.width + i) for i in range(used)
+            ]
+            plain = self.is_scalar(v)
+            if not plain and _in_a_row(places):
+                yield f"store_some(&{places[0]}, {self.name(v, c)}, {used});"
+                continue
+            for i, place in enumerate(places):
+                yield f"{place} = {self.name(v, c)}{'' if plain else f'[{i}]'};"
+
+
+def _in_a_row(places: list[str]) -> bool:
+    at = [int(place.rpartition("[")[2].rstrip("]")) for place in places]
+    return at == list(range(at[0], at[0] + len(at)))
+
 
 NAMES = {int(code): name for name, code in CODES.items()}
 # Ports that are numbers of the mechanism: limits, and by what efforts are measured.
@@ -28,7 +217,7 @@ def renamed(words: str) -> dict[str, str]:
     return {pair[0]: pair[-1] for pair in (word.split(">") for word in words.split())}
 
 
-def function(c: Context, name: str, entry: Entry, wish: Wish) -> tuple[tuple[Argument, ...], Body]:
+def function(c: Context, name: str, entry: Entry, wish: Wish) -> Body:
     """A function that judges its samples, and writes results of good ones alone.
 
     Raises: UnsupportedError: where efforts with friction have no closed form.
@@ -45,16 +234,18 @@ def function(c: Context, name: str, entry: Entry, wish: Wish) -> tuple[tuple[Arg
     program = _pruned(found.robust or found.main, results)
     given = renamed(entry.given or " ".join(_used(program)))
     arguments = tuple(_arguments(c, entry, program, given, results))
-    parameters, p = c.parameters(arguments), c.prefix.upper()
+    context = [f"const {c.prefix}_constants *constants"] * c.struct
+    parameters = ", ".join([*context, *(a.declared(c.precision) for a in arguments)])
     public = f"int {c.prefix}_{name}({parameters})"
     scalar = Scalar(c.floats(program, name), _places(c, program, given, arguments), c.precision)
-    cost, statuses = (
-        scalar.operations,
-        tuple(dict.fromkeys(status for *_, status in _judged(c, entry, scalar, arguments))),
-    )
+    text, own = entry.text, f"{c.prefix}_{name}"
+    if c.pulls and not entry.limited and any(a.name == "effort" and not a.given for a in arguments):
+        text += " Limits are not regarded: a cable's effort may be negative."
+    why = {status: WHY[status] for *_, status in _judged(c, entry, scalar, arguments)}
+    made = Function(own, name, text, arguments, entry.steps, scalar.operations, why)
     if not (entry.quick and c.lanes):
         code = _text(c, entry, scalar, public, name, arguments)
-        return arguments, Body(code, cost, statuses)
+        return Body(made, code)
     plain = f"static int {c.prefix}_{name}_plain({parameters})"
     code = _text(c, entry, scalar, plain, name, arguments)
     # With fewer steps in a row; samples that it cannot vouch for go to `program`.
@@ -62,17 +253,16 @@ def function(c: Context, name: str, entry: Entry, wish: Wish) -> tuple[tuple[Arg
     vector = Wide(c.floats(latency, name), _places(c, latency, given, arguments), c.lanes)
     head = f"static int {c.prefix}_{name}_quick({parameters})"
     wide = _text(c, entry, vector, head, f"{name}_quick", arguments)
-    words = [a.name for a in arguments]
-    sure, slow = (c.call(f"{c.prefix}_{name}_{how}", words) for how in ("quick", "plain"))
+    words, p = ", ".join(a.name for a in arguments), c.prefix.upper()
     dispatch = f"""{public}
 {{
 #if defined({p}_VECTOR)
-    if ({sure} == {p}_OK) return {p}_OK;
+    if ({own}_quick({words}) == {p}_OK) return {p}_OK;
 #endif
-    return {slow};
+    return {own}_plain({words});
 }}
 """
-    return arguments, Body(code, cost, statuses, wide, dispatch)
+    return Body(made, code, wide, dispatch)
 
 
 def _pruned(program: Program, results: Mapping[str, str]) -> Program:

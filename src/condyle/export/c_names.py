@@ -1,10 +1,13 @@
-"""Names of a mechanism file as C takes them."""
+"""Names: of a mechanism file as C takes them, and what a C text defines and uses."""
 
 from __future__ import annotations
 
 import keyword
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from importlib.resources import files
+
+import numpy as np
 
 from ..errors import InputError
 
@@ -18,7 +21,6 @@ typename using virtual xor
 """
 RESERVED = frozenset(_C.split()) | frozenset(word.lower() for word in keyword.kwlist)
 OTHERS = ("main", "check", "checker", "example")  # files of an exported folder besides
-_WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
 def identifier(name: str) -> str:
@@ -50,12 +52,87 @@ def in_format(text: str) -> str:
     return text.replace("\\", "\\\\").replace('"', '\\"').replace("%", "%%").replace("?", "\\?")
 
 
+def literal(x: float, precision: str) -> str:
+    """A number in C."""
+    if not np.isfinite(x):
+        name = "NAN" if np.isnan(x) else "INFINITY" if x > 0 else "-INFINITY"
+        return f"({precision}){name}"
+    return repr(float(x)) if precision == "double" else f"{float(np.float32(x))!r}f"
+
+
+def packaged(name: str) -> str:
+    """The text of a file of this folder."""
+    return (files(__package__) / name).read_text(encoding="utf-8")
+
+
 def require_prefix(prefix: str) -> str:
     """Raises InputError for what no name in C can begin with."""
     taken = prefix.lower() in OTHERS
-    if not _WORD.fullmatch(prefix) or prefix in RESERVED or len(prefix) > 40 or taken:
+    if (
+        not re.fullmatch("[A-Za-z][A-Za-z0-9_]*", prefix)
+        or prefix in RESERVED
+        or len(prefix) > 40
+        or taken
+    ):
         raise InputError(
             f'prefix "{prefix:.60}": expected a name that C takes, of at most 40 letters, digits '
             f"and _, a letter first, other than {', '.join(OTHERS)}"
         )
     return prefix
+
+
+_WORD = re.compile(r"[A-Za-z_]\w*")
+_DEFINED = re.compile(r"^\s*(?:#define\s+(\w+)|INLINE[^(]*?(\w+)\(|static[^(]*?(\w+)\()", re.M)
+_MACHINE = re.compile(r"^(ONE_ARGUMENT|TWO_ARGUMENTS)\((\w+)", re.M)
+
+
+def picked(text: str, wanted: str) -> str:
+    """What the code `wanted` uses of `text`, directly or not; what defines nothing stays."""
+    known = set(_WORD.findall(wanted))
+    kept = []
+    for item in reversed(list(_items(text))):
+        names = _names(item)
+        if names and not names & known:
+            continue
+        known |= set(_WORD.findall(item))
+        kept.append(item)
+    return "\n".join(reversed(kept)) + "\n"
+
+
+def used(text: str, names: str) -> list[str]:
+    """Those of some words that stand in a text."""
+    words = set(_WORD.findall(text))
+    return [name for name in names.split() if name in words]
+
+
+def _names(item: str) -> set[str]:
+    found = {name for match in _DEFINED.findall(item) for name in match if name}
+    for _, name in _MACHINE.findall(item):
+        found |= {f"{name}_s", f"{name}_v"}
+    return found
+
+
+def _items(text: str) -> Iterator[str]:
+    """Definitions with the comments above them; a conditional part is one."""
+    lines: list[str] = []
+    conditionals = brackets = 0
+    comment = False
+    for line in text.splitlines():
+        if not (line.strip() or conditionals or brackets):
+            if lines:
+                yield "\n".join(lines)
+            lines = []
+            continue
+        lines.append(line)
+        conditionals += line.startswith("#if") - line.startswith("#endif")
+        code = re.sub(r"/\*.*?\*/", "", line)
+        if comment:
+            code = code.partition("*/")[2]
+        comment = "/*" in code or (comment and "*/" not in line)
+        code = code.partition("/*")[0]
+        brackets += sum(code.count(b) for b in "({[") - sum(code.count(b) for b in ")}]")
+        if code.strip() and not (conditionals or brackets or comment or code.endswith("\\")):
+            yield "\n".join(lines)
+            lines = []
+    if lines:
+        yield "\n".join(lines)

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from importlib.resources import files
 from pathlib import Path
-
-import numpy as np
 
 from ..atomic import write_text
 from ..mechanism.mechanism import Mechanism
-from .c_expected import Reference
-from .c_names import in_format
+from .c_names import in_format, literal, packaged
 from .c_samples import Vectors, vectors
 from .catalogue import Wish
 from .exported import Exported, Function
@@ -25,7 +21,7 @@ def write_package(
     exported: Exported, mechanism: Mechanism, wish: Wish, folder: Path
 ) -> dict[str, Path]:
     """Write everything but the facts; returns the files by what they are."""
-    made = vectors(exported, mechanism, Reference.of(mechanism, wish=wish, **exported.recipe))
+    made = vectors(exported, mechanism, wish)
     p = exported.prefix
     texts = {
         "header": (f"{p}.h", exported.header),
@@ -49,7 +45,7 @@ def tolerance(e: Exported, f: Function) -> float:
 
 def makefile(e: Exported) -> str:
     """Targets all, check and clean."""
-    text = (files(__package__) / "c_package.mk").read_text(encoding="utf-8")
+    text = packaged("c_package.mk")
     vector = f"-D{e.prefix.upper()}_VECTOR -march=native" if e.lanes else ""
     return text.replace("@prefix@", e.prefix).replace("@vector@", vector)
 
@@ -104,7 +100,7 @@ def recorded(e: Exported, made: list[Vectors]) -> str:
             values = (v.given if a.given else v.right)[a.name]
             kind = e.precision if a.given else "double"
             lines.append(f"static const {kind} {f.name}_{a.name}[{count}][{a.size}] = {{")
-            lines += [f"    {{{', '.join(_number(x, kind) for x in row)}}}," for row in values]
+            lines += [f"    {{{', '.join(literal(x, kind) for x in row)}}}," for row in values]
             lines.append("};")
         status = ", ".join(str(int(s)) for s in v.status)
         lines.append(f"static const int {f.name}_status[{count}] = {{{status}}};")
@@ -119,7 +115,7 @@ def check(e: Exported, made: list[Vectors]) -> str:
         f'#include "{e.prefix}.h"',
         f'#include "{e.prefix}_vectors.h"',
         "",
-        (files(__package__) / "c_check.h").read_text(encoding="utf-8").replace("real", e.precision),
+        packaged("c_check.h").replace("real", e.precision),
     ]
     for v in made:
         lines += _checked(e, v.function)
@@ -159,9 +155,3 @@ def _checked(e: Exported, f: Function) -> Iterator[str]:
     yield f'    return told("{f.name}", {count}, wrong, worst, {most!r});'
     yield "}"
     yield ""
-
-
-def _number(x: float, kind: str) -> str:
-    if not np.isfinite(x):
-        return f"({kind}){'NAN' if np.isnan(x) else 'INFINITY'}"
-    return repr(float(x)) if kind == "double" else f"{float(np.float32(x))!r}f"

@@ -1,21 +1,118 @@
-"""Recorded test vectors: arguments, and what the library answers to them."""
+"""Recorded test vectors: arguments, and what the library itself answers to them, in numpy."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..backends.kernel import AGAIN
 from ..backends.numpy_kernel import NumpyKernel
 from ..mechanism.home import characteristic_length, independent_coordinates
 from ..mechanism.mechanism import Mechanism
+from ..model.closing import Closure
+from ..model.forward_kinematics import ForwardKinematics
+from ..model.model import Model
 from ..questions import Question
 from ..questions.numbers import Layout, specialised
 from ..questions.structure import structure_of
 from ..status import Status
-from .c_expected import Reference
+from .c_context import CODES
+from .c_function import own_numbers, renamed
+from .catalogue import Wish, least_norm, require_question
 from .exported import Exported, Function
+
+Arrays = dict[str, np.ndarray]
+Given = Mapping[str, np.ndarray]  # argument -> (N, size)
+
+
+@dataclass
+class Reference:
+    """The library's own answers about one mechanism."""
+
+    model: Model
+    wish: Wish
+
+    def __call__(self, question: str, given: Given) -> tuple[Arrays, np.ndarray]:
+        """Results by argument, (N, size) each, and statuses, (N,): out of bounds is `overflow`.
+
+        Results of samples that are not ok mean nothing.
+        """
+        good = np.isfinite(np.hstack(list(given.values()))).all(axis=1)
+        answer = _ANSWERS.get(question, lambda r, given: _graph(r, question, given))
+        with np.errstate(all="ignore"):
+            found, own = answer(self, {name: a[good] for name, a in given.items()})
+        status = np.full(len(good), Status.overflow)
+        status[good] = own
+        results = {name: np.full((len(good), *a.shape[1:]), np.nan) for name, a in found.items()}
+        for name, a in found.items():
+            results[name][good] = a
+        return results, status
+
+
+def _graph(r: Reference, question: str, given: Given) -> tuple[Arrays, np.ndarray]:
+    """By numpy's kernel of the same question."""
+    entry = require_question(question)
+    kernel = r.model.kernel(entry.question or question, *entry.details(r.wish))
+    names = renamed(entry.given)
+    ports, known = {}, own_numbers(r.model.mechanism)
+    for port in kernel.interface.ports:
+        size = port.size * (kernel.interface.lanes if port.lanes else 1)
+        ports[port.name] = np.zeros((len(next(iter(given.values()))), size))
+        name = names.get(port.name, port.name)
+        if name in given and (not names or port.name in names):
+            ports[port.name] = given[name]
+        elif port.name in known:
+            ports[port.name] += known[port.name]
+    found = kernel.run(ports)
+    results = {
+        name: found.values[result].reshape(-1, len(found.status)).T
+        for result, name in renamed(entry.results).items()
+        if result in found.values
+    }
+    unsure = CODES[entry.unsure(structure_of(r.model.mechanism))]
+    return results, np.where(found.status == AGAIN, unsure, found.status)
+
+
+def _inverse(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
+    load = np.hstack([given[name] for name in ("force", "moment", "point")])
+    found = r.model.torques(given["q"], given["q1"], given["q2"], load, outputs=("contact",))
+    return {"effort": found.effort, "contact_force": found["contact_force"]}, found.status
+
+
+def _forward(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
+    load = np.hstack([given[name] for name in ("force", "moment", "point")])
+    found = r.model.forward(given["q"], given["q1"], given["effort"], load)
+    results = {"acceleration": found.acceleration, "contact_force": found.contact_force}
+    return results, found.status
+
+
+def _closure(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
+    closure = Closure(
+        r.model.mechanism, r.wish.coordinates, r.wish.landmark, backend=r.model.backend
+    )
+    rest = np.zeros((len(given["s"]), int(not closure.names)))
+    s, s1, s2 = (np.hstack([given[name], rest]) for name in ("s", "s1", "s2"))
+    found = closure.solve(s, s1, s2)
+    return dict(found.named()), np.where(found.reached, Status.ok, Status.unreachable)
+
+
+def _pose(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
+    found = ForwardKinematics(r.model.mechanism).solve(given["joint"])
+    # A residual beyond the tolerance is infeasible in C.
+    codes = np.array([Status.ok, Status.unreachable, Status.unreachable, Status.infeasible])
+    return {"pose": found.pose, "residual": found.residual}, codes[found.status]
+
+
+_ANSWERS: dict[str, Callable[[Reference, Given], tuple[Arrays, np.ndarray]]] = {
+    "inverse": _inverse,
+    "contact": _inverse,
+    "forward": _forward,
+    "closure": _closure,
+    "pose": _pose,
+}
+
 
 COUNT = 40
 SIZES = {"force": 20.0, "moment": 0.5, "point": 0.05, "kp": 400.0, "kd": 40.0, "period": 1e-3}
@@ -37,24 +134,23 @@ class Vectors:
     status: np.ndarray
 
 
-def vectors(
-    exported: Exported, mechanism: Mechanism, reference: Reference, count: int = COUNT
-) -> list[Vectors]:
+def vectors(exported: Exported, mechanism: Mechanism, wish: Wish) -> list[Vectors]:
     """Seeded samples about home, home itself, and some that have to fail."""
-    draw = Samples(mechanism, reference, np.random.default_rng(0), count)
+    # By numpy: no code is shared with what prints C.
+    model = Model(mechanism, **exported.recipe, backend="numpy", distribution=least_norm(mechanism))
+    reference = Reference(model, wish)
+    draw = Samples(reference)
     found = []
     for f in exported.functions:
-        given = {a.name: _rounded(draw(a.name, a.size, f), exported) for a in f.inputs}
+        given = {a.name: draw(a.name, a.size, f) for a in f.inputs}
+        if exported.precision == "float":
+            given = {name: a.astype(np.float32).astype(float) for name, a in given.items()}
         _spoil(given)
         right, status = reference(f.question, given)
         good = (status == Status.ok)[:, None]
         right = {a.name: np.where(good, right[a.name], 0.0) for a in f.outputs}
         found.append(Vectors(f, given, right, status))
     return found
-
-
-def _rounded(a: np.ndarray, exported: Exported) -> np.ndarray:
-    return a if exported.precision == "double" else a.astype(np.float32).astype(float)
 
 
 def _spoil(given: dict[str, np.ndarray]) -> None:
@@ -69,10 +165,9 @@ def _spoil(given: dict[str, np.ndarray]) -> None:
 class Samples:
     """Arguments by name, (N, size) each, that belong to states which can be reached."""
 
-    def __init__(
-        self, mechanism: Mechanism, reference: Reference, rng: np.random.Generator, count: int
-    ) -> None:
-        self._mechanism, self._reference, self._rng, self._count = mechanism, reference, rng, count
+    def __init__(self, reference: Reference) -> None:
+        self._reference, self._rng = reference, np.random.default_rng(0)
+        mechanism = reference.model.mechanism
         length = characteristic_length(mechanism)
         names = independent_coordinates(mechanism)
         self._scale = np.array([length if n in "XYZ" else 1.0 for n in names])
@@ -82,12 +177,14 @@ class Samples:
         """q about home, (N, m), home first, and poses and rates that belong to them."""
         width, m = WIDTH, len(self._scale)
         while True:
-            q = self._rng.uniform(-width, width, (4 * self._count, m)) * self._scale
+            q = self._rng.uniform(-width, width, (4 * COUNT, m)) * self._scale
             q[0] = 0.0
             zero = np.zeros((len(q), 3))
             given = {"q": q, "q1": 0 * q, "q2": 0 * q, "force": zero, "moment": zero, "point": zero}
-            good = np.flatnonzero(self._sure(given))[: self._count]
-            if len(good) == self._count:
+            # Where the kernels' own code can vouch for efforts, as the C is: no path to follow.
+            efforts = self._reference.model.kernel("inverse", ("contact",)).run(given)
+            good = np.flatnonzero(efforts.status == Status.ok)[:COUNT]
+            if len(good) == COUNT:
                 break
             width /= 2
         q = q[good]
@@ -95,14 +192,10 @@ class Samples:
         self._rates = q1, q2
         return q, self._reference("motion", {"q": q, "q1": q1, "q2": q2})[0]
 
-    def _sure(self, given: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Where the kernels' own code can vouch for efforts, as the C is: no path to follow."""
-        return self._reference.model.kernel("inverse", ("contact",)).run(given).status == Status.ok
-
     def __call__(self, name: str, size: int, f: Function) -> np.ndarray:
         """Numbers for an argument of a function."""
         q1, q2 = self._rates
-        rng, shape = self._rng, (self._count, size)
+        rng, shape = self._rng, (COUNT, size)
         known = {"q": self.q, "q_d": self.q + 0.01 * self._scale * rng.uniform(-1, 1, self.q.shape)}
         known |= {"q1": q1, "q1_d": 0.9 * q1, "q2": q2, "q2_d": q2}
         if name in known:
@@ -123,7 +216,7 @@ class Samples:
         labels = next(a.labels for a in f.inputs if a.name == name)
         if labels == ("x", "y", "z"):  # the landmark's path, small enough for any
             share = {"s": 0.02, "s1": 0.1, "s2": 1.0}[name] * self._scale[:1]
-            return self._rng.uniform(-1, 1, (self._count, 3)) * share
+            return self._rng.uniform(-1, 1, (COUNT, 3)) * share
         order = ["X", "Y", "Z", "alpha", "beta", "gamma"]
         return self.pose[quantity][:, [order.index(label) for label in labels]].copy()
 
@@ -134,8 +227,9 @@ class Samples:
 
     def _joints(self) -> np.ndarray:
         """Joint coordinates of poses half-way to home: Newton's reach."""
-        structure = structure_of(self._mechanism)
-        numbers = Layout.of(structure).numbers(self._mechanism)
+        mechanism = self._reference.model.mechanism
+        structure = structure_of(mechanism)
+        numbers = Layout.of(structure).numbers(mechanism)
         question = Question.about(specialised(structure, numbers), "encoders")
         kernel = NumpyKernel(question.variants(), numbers)
         return kernel.run({"pose": self._near()["pose"]}).values["joint"].T.copy()

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+import textwrap
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from importlib.resources import files
 
-import numpy as np
-
 from ..dynamics import formulation as formulation_named
 from ..errors import InputError
+from ..mechanism.coordinates import COORDINATES
+from ..mechanism.home import dependent_coordinates, independent_coordinates
 from ..mechanism.mechanism import Mechanism
 from ..model.closing import require_independent, require_landmark
 from ..model.model import Model
@@ -18,15 +19,21 @@ from ..questions.numbers import Layout, specialised
 from ..questions.structure import structure_of
 from ..version import __version__
 from . import c_struct
-from .arguments import Arguments
-from .c_context import Body, Context
+from .c_context import CODES, WHY, Body, Context, require_precision
 from .c_function import function
-from .c_header import WHY, header_text
-from .c_names import OTHERS, identifier, identifiers, in_comment, require_prefix
-from .c_pick import picked, used
-from .c_precision import require_precision
+from .c_names import (
+    OTHERS,
+    identifier,
+    identifiers,
+    in_comment,
+    literal,
+    packaged,
+    picked,
+    require_prefix,
+    used,
+)
 from .catalogue import Entry, Wish, in_order, least_norm, require_question, usual
-from .exported import Argument, Exported, Function
+from .exported import Argument, Arguments, Exported, Function
 
 # Functions of the C library that a source may call, in `double`.
 LIBRARY = """sqrt fabs floor ceil atan2 pow fmod remainder hypot exp expm1 log log1p tan asin acos
@@ -64,7 +71,9 @@ def export(
     entries = _entries(mechanism, asked, coordinates, landmark)
     structure = structure_of(mechanism, formulation_named(formulation).name, route)
     numbers = Layout.of(structure).numbers(mechanism, landmark)
-    struct = _is_struct(constants)
+    if constants not in ("inside", "struct"):
+        raise InputError(f'constants: expected inside or struct, got "{constants}"')
+    struct = constants == "struct"
     if not struct:
         structure = specialised(structure, numbers)
     real = require_precision(precision)
@@ -76,9 +85,7 @@ def export(
     wish = Wish(in_order(coordinates), landmark)
     arguments = Arguments(mechanism, wish.coordinates, landmark)
     c = Context(mechanism, structure, numbers, name, real, 0 if plain else lanes, arguments, struct)
-    made = {question: function(c, question, entry, wish) for question, entry in entries.items()}
-    functions = [_function(c, q, entries[q], *own) for q, own in made.items()]
-    bodies = [body for _, body in made.values()]
+    bodies = [function(c, question, entry, wish) for question, entry in entries.items()]
     named = [*(chain.name for chain in mechanism.chains), *mechanism.contact_names]
     portable = _portable(c, bodies)
     source = _source(c, bodies, portable)
@@ -86,7 +93,7 @@ def export(
         prefix=name,
         source=source,
         header="",
-        functions=tuple(functions),
+        functions=tuple(body.function for body in bodies),
         precision=real,
         names=identifiers(named),
         struct=struct,
@@ -113,37 +120,14 @@ def _entries(
     return found
 
 
-def _is_struct(constants: str) -> bool:
-    if constants not in ("inside", "struct"):
-        raise InputError(f'constants: expected inside or struct, got "{constants}"')
-    return constants == "struct"
-
-
-def _function(
-    c: Context, question: str, entry: Entry, arguments: tuple[Argument, ...], body: Body
-) -> Function:
-    text = entry.text
-    if c.pulls and not entry.limited and any(a.name == "effort" and not a.given for a in arguments):
-        text += " Limits are not regarded: a cable's effort may be negative."
-    return Function(
-        f"{c.prefix}_{question}",
-        question,
-        text,
-        arguments,
-        entry.steps,
-        body.operations,
-        {name: WHY[name] for name in body.statuses},
-    )
-
-
 def _portable(c: Context, bodies: Sequence[Body]) -> str:
     """Scalar code, with what it uses."""
     code = "\n".join(body.code for body in bodies)
     if c.struct:
         constants = c_struct.prepared(c)
     else:
-        constants = "\n".join(_table(c, name) for name in c.tables if not _is_quick(name))
-    helpers = picked(_text(f"c_{c.precision}.h") + _text("c_scalar.h"), constants + code)
+        constants = "\n".join(_table(c, name) for name in c.tables if not name.endswith("_quick"))
+    helpers = picked(packaged(f"c_{c.precision}.h") + packaged("c_scalar.h"), constants + code)
     return "\n".join([helpers, constants, code])
 
 
@@ -156,14 +140,10 @@ def _source(c: Context, bodies: Sequence[Body], portable: str) -> str:
         portable,
     ]
     if wide := "\n".join(body.wide for body in bodies if body.wide):
-        own = "\n".join(_table(c, name) for name in c.tables if _is_quick(name))
+        own = "\n".join(_table(c, name) for name in c.tables if name.endswith("_quick"))
         parts += [_vector(c.prefix.upper(), c.lanes, f"{own}\n{wide}")]
     parts += [body.dispatch for body in bodies if body.dispatch]
     return "\n".join(part.rstrip("\n") + "\n" for part in parts if part)
-
-
-def _is_quick(table: str) -> bool:
-    return table.endswith("_quick")
 
 
 def _vector(p: str, lanes: int, code: str) -> str:
@@ -181,19 +161,10 @@ def _table(c: Context, name: str) -> str:
     values = c.tables[name]
     if not values.size:
         return ""
-    rows = [_number(x, c.precision) for x in values]
+    rows = [literal(x, c.precision) for x in values]
     lines = [", ".join(rows[i : i + 4]) for i in range(0, len(rows), 4)]
     body = ",\n    ".join(lines)
     return f"static const {c.precision} {c.prefix}_{name}_table[{len(rows)}] = {{\n    {body}}};\n"
-
-
-def _number(x: float, precision: str) -> str:
-    if not np.isfinite(x):
-        name = "NAN" if np.isnan(x) else "INFINITY" if x > 0 else "-INFINITY"
-        return f"({precision}){name}"
-    if precision == "double":
-        return repr(float(x))
-    return f"{float(np.float32(x))!r}f"
 
 
 def _symbols(c: Context, source: str) -> tuple[str, ...]:
@@ -202,5 +173,103 @@ def _symbols(c: Context, source: str) -> tuple[str, ...]:
     return tuple(f"{word}{'f' * (c.precision == 'float')}" for word in used(code, LIBRARY))
 
 
-def _text(name: str) -> str:
-    return (files(__package__) / name).read_text(encoding="utf-8")
+WIDTH = 100
+
+
+def header_text(exported: Exported, mechanism: Mechanism, extra: str) -> str:
+    """The file `prefix`.h. Args: extra: what constants in a structure need."""
+    p = exported.prefix.upper()
+    guard = f"{p}_H"
+    parts = [
+        _about(exported, mechanism),
+        f"#ifndef {guard}\n#define {guard}\n",
+        '#ifdef __cplusplus\nextern "C" {\n#endif\n',
+        _statuses(p),
+        _sizes(p, exported, mechanism),
+        extra,
+        *(_declared(exported, f) for f in exported.functions),
+        "#ifdef __cplusplus\n}\n#endif\n",
+        f"#endif /* {guard} */\n",
+    ]
+    return "\n".join(part for part in parts if part)
+
+
+def _about(exported: Exported, mechanism: Mechanism) -> str:
+    name = mechanism.name
+    lines = [
+        f'{exported.prefix}.h - mechanism "{name}" in C, written by condyle {__version__}',
+        "",
+        f"Independent coordinates: {', '.join(independent_coordinates(mechanism))}; the contacts "
+        f"determine {', '.join(dependent_coordinates(mechanism)) or 'nothing'}.",
+        "Units: m, rad, s, kg, N. Frames: {S} of the base, {M} of the platform; they agree at "
+        "home. Angles are Bryant angles alpha, beta, gamma.",
+        "",
+        "Functions return a status and write their results only where it is "
+        f"{exported.prefix.upper()}_OK. They keep nothing: no heap, no globals, no input or "
+        "output, no recursion; any thread or interrupt may call them. Arrays that go in and out "
+        "must not overlap.",
+    ]
+    if exported.names and (mapped := {k: v for k, v in exported.names.items() if k != v}):
+        lines += ["", "Names that C does not take:"]
+        lines += [f"  {theirs} is {ours}" for theirs, ours in mapped.items()]
+    return _comment(lines)
+
+
+def _statuses(p: str) -> str:
+    rows = [f"    {p}_{name} = {int(code)}, /* {WHY[name]} */" for name, code in CODES.items()]
+    rows[-1] = rows[-1].replace(",", "", 1)
+    return "\n".join(["/* Statuses. */", "enum {", *rows, "};", ""])
+
+
+def _sizes(p: str, exported: Exported, m: Mechanism) -> str:
+    lines = ["/* Sizes, and where things stand in arrays. */"]
+    for name, size in (
+        ("CHAINS", len(m.chains)),
+        ("CONTACTS", len(m.contacts)),
+        ("FREEDOMS", m.degrees_of_freedom),
+    ):
+        lines.append(f"#define {p}_{name} {size}")
+    lines += ["", "enum {"]
+    groups: Sequence[tuple[str, Sequence[str]]] = (
+        ("CHAIN", [c.name for c in m.chains]),
+        ("CONTACT", m.contact_names),
+    )
+    rows = [
+        f"    {p}_{kind}_{exported.names[name]} = {i},"
+        for kind, names in groups
+        for i, name in enumerate(names)
+    ]
+    rows += [f"    {p}_{name} = {i}," for i, name in enumerate(COORDINATES)]
+    rows[-1] = f"{rows[-1].rstrip(',')} /* in X_EE */"
+    return "\n".join([*lines, *rows, "};", ""])
+
+
+def _declared(exported: Exported, f: Function) -> str:
+    lines = [f.text, ""]
+    lines += [line for a in f.arguments for line in _argument(a)]
+    if f.iterations:
+        lines += ["", f"At most {f.iterations} steps."]
+    words = [f"{name.lower()} ({why})" for name, why in f.statuses.items()]
+    lines += ["", f"Returns ok, or {', '.join(words)}."]
+    declared = textwrap.wrap(
+        f"{exported.prototype(f)};", WIDTH, subsequent_indent="    ", break_long_words=False
+    )
+    return _comment(lines) + "\n".join(declared) + "\n"
+
+
+def _argument(a: Argument) -> Iterator[str]:
+    way = "in" if a.given else "out"
+    yield f"  {a.name}[{a.size}]  {way}: {a.text} [{a.unit}]"
+    yield f"      order: {', '.join(a.labels)}"
+
+
+def _comment(lines: Sequence[str]) -> str:
+    out = []
+    for line in lines:
+        indent = len(line) - len(line.lstrip())
+        wrapped = textwrap.wrap(
+            line, WIDTH - 3, subsequent_indent=" " * (indent + 2 if indent else 0)
+        )
+        out += wrapped or [""]
+    text = "\n".join(f" * {in_comment(line)}".rstrip() for line in out)
+    return f"/*\n{text}\n */\n"

@@ -7,14 +7,13 @@
 from __future__ import annotations
 
 import re
-from importlib.resources import files
 
 from ..backends.c.prepare import prepare
 from ..backends.c.printer import Printer
 from ..kinematics.chain import FAMILIES
 from ..questions.numbers import Layout
 from .c_context import Context
-from .c_pick import picked
+from .c_names import packaged, picked
 
 # What the shared numbers are; of contacts and chains `FIELDS` says it once for all.
 FIELDS = {
@@ -51,11 +50,12 @@ def declared(c: Context) -> str:
     for name, size in _shared(c).items():
         known = FIELDS.get(name) or FIELDS.get(f"lumped_{name}", "")
         about = known or ("of its contact" if name[-1].isdigit() else "")
-        lines.append(f"    double {_sized(name, size)};{f' /* {about} */' if about else ''}")
+        lines.append(f"    double {_at(name, size, size)};{f' /* {about} */' if about else ''}")
     for group, kind in enumerate(c.structure.families):
         lines.append("    struct {")
         lines += [
-            f"        double {_sized(name, size)};" for name, size in _lane_fields(c, group).items()
+            f"        double {_at(name, size, size)};"
+            for name, size in _lane_fields(c, group).items()
         ]
         lines.append(f"    }} {kind}[{c.structure.counts[group]}];")
     lines += [f"}} {p}_numbers;", "", "/* What functions read: filled by prepare. */"]
@@ -73,8 +73,7 @@ def declared(c: Context) -> str:
 def prepared(c: Context) -> str:
     """`prepare` and what it is made of, for the source."""
     code = "\n".join(_prepare(c, name, printer) for name, printer in c.printers.items())
-    text = (files(__package__) / "c_scalar.h").read_text(encoding="utf-8")
-    text = re.sub(r"\breal\b", "double", text)
+    text = re.sub(r"\breal\b", "double", packaged("c_scalar.h"))
     text = re.sub(r"\bF\((\w+)\)", r"\1", re.sub(r"\bR\(([^()]*)\)", r"\1", text))
     text = picked(re.sub(r"\b(\w+)_s\b", r"\1_d", text), code)
     p = c.prefix
@@ -163,10 +162,6 @@ def _initialiser(c: Context) -> list[str]:
 def _values(numbers: object) -> str:
     values = [repr(float(x)) for x in numbers]  # type: ignore[attr-defined]
     return values[0] if len(values) == 1 else f"{{{', '.join(values)}}}"
-
-
-def _sized(name: str, size: int) -> str:
-    return name if size == 1 else f"{name}[{size}]"
 
 
 def _at(name: str, size: int, i: int) -> str:

@@ -6,9 +6,15 @@ never look into the source.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
+
+from ..graph.program import Port, Result
+from ..kinematics.chain import FAMILIES
+from ..mechanism.home import independent_coordinates
+from ..mechanism.mechanism import COORDINATES, Mechanism
 
 Precision = Literal["double", "float"]
 
@@ -113,3 +119,102 @@ class Exported:
         """Declaration of a function, without the semicolon."""
         parts = [a.declared(self.precision) for a in function.arguments]
         return f"int {function.name}({', '.join([self.context] * self.struct + parts)})"
+
+
+# What entries are of: independent coordinates, X_EE, those that `closure` starts from, joints,
+# actuators, contacts, axes.
+FREE, WHOLE, GIVEN = "free", "whole", "given"
+JOINT, EFFORT, CONTACT, AXES = "joint", "effort", "contact", "axes"
+# Name -> what it is, what its entries are of, and their unit: what follows that of a coordinate or
+# joint, or all of it.
+KNOWN = {
+    "q": ("independent coordinates", FREE, ""),
+    "q1": ("rates of q", FREE, "/s"),
+    "q2": ("accelerations of q", FREE, "/s^2"),
+    "acceleration": ("accelerations of q", FREE, "/s^2"),
+    "q_d": ("wanted independent coordinates", FREE, ""),
+    "q1_d": ("wanted rates", FREE, "/s"),
+    "q2_d": ("wanted accelerations", FREE, "/s^2"),
+    "kp": ("stiffness: acceleration by deviation", FREE, "=1/s^2"),
+    "kd": ("damping: acceleration by deviation of rate", FREE, "=1/s"),
+    "s": ("prescribed coordinates", GIVEN, ""),
+    "s1": ("rates of s", GIVEN, "/s"),
+    "s2": ("accelerations of s", GIVEN, "/s^2"),
+    "force": ("force on the platform, axes of {S}", AXES, "N"),
+    "moment": ("moment on the platform, axes of {S}", AXES, "N m"),
+    "point": ("where the force acts, in the platform's frame {M}", AXES, "m"),
+    "direction": ("unit vector, in {S}", AXES, "1"),
+    "pose": ("the platform's pose X_EE", WHOLE, ""),
+    "pose_rate": ("its rates", WHOLE, "/s"),
+    "pose_acceleration": ("its accelerations", WHOLE, "/s^2"),
+    "start": ("where to start: the last pose; at first home, zeros", WHOLE, ""),
+    "pose_before": ("pose that the last call gave; at first where it is", WHOLE, ""),
+    "pose_rate_before": ("pose_rate that the last call gave; at first 0", WHOLE, "/s"),
+    "joint": ("joint coordinates, zero at home", JOINT, ""),
+    "joint_rate": ("rates of joints", JOINT, "/s"),
+    "joint_d": ("wanted joint coordinates", JOINT, ""),
+    "joint_rate_d": ("wanted rates of joints", JOINT, "/s"),
+    "joint_read": ("joint coordinates as encoders have them", JOINT, ""),
+    "joint_rate_read": ("rates of joints, filtered", JOINT, "/s"),
+    "joint_before": ("joint_read of the last call; at first as joint", JOINT, ""),
+    "joint_rate_before": ("joint_rate_read of the last call; at first 0", JOINT, "/s"),
+    "resolution": ("of encoders; 0: exact", JOINT, ""),
+    "residual": ("joint less joint coordinates of the pose", JOINT, ""),
+    "effort": ("efforts of the actuators at their joints", EFFORT, ""),
+    "contact_force": (
+        "contact forces on the platform, along the unit normals of the surfaces", CONTACT, "N",
+    ),
+}  # fmt: skip
+LETTERS = {"force": "F", "moment": "M"}  # of axes
+
+
+class Arguments:
+    """Arguments about one mechanism.
+
+    given:    names of what `closure` starts from;  landmark: whose path that is, if it is one.
+    """
+
+    def __init__(
+        self, mechanism: Mechanism, given: Sequence[str] = (), landmark: str | None = None
+    ) -> None:
+        families = [FAMILIES[chain.kind] for chain in mechanism.chains]
+        chains = [chain.name for chain in mechanism.chains]
+        self.independent = independent_coordinates(mechanism)
+        self._landmark = landmark
+        self._labels: dict[str, Sequence[str]] = {
+            FREE: self.independent,
+            WHOLE: COORDINATES,
+            GIVEN: given if landmark is None else "xyz",
+            JOINT: chains,
+            EFFORT: chains,
+            CONTACT: mechanism.contact_names,
+        }
+        self._units: dict[str, Sequence[str]] = {
+            JOINT: [family.joint_unit for family in families],
+            EFFORT: [family.effort_unit for family in families],
+        }
+
+    def argument(
+        self, name: str, port: Port | Result, given: bool, told: tuple[str, str] | None
+    ) -> Argument:
+        """What a port or result is in C.
+
+        Args: name: in C;  told: what it is and its unit, where that is not `KNOWN`.
+        """
+        size = port.size if isinstance(port, Port) else math.prod(port.shape)
+        text, of, per = KNOWN.get(name, (name.replace("_", " "), "", "=1"))
+        if told is not None:
+            text, per = told[0], f"={told[1]}"
+        if not of:
+            of = JOINT if port.lanes else FREE if size == len(self.independent) else AXES
+        labels = self._labels.get(of, [f"{LETTERS.get(name, '')}{axis}" for axis in "xyz"])
+        if not (port.lanes or name in KNOWN or size == len(labels)):
+            labels = [str(i + 1) for i in range(size)] if size > 1 else [name]
+        if name == "s" and self._landmark is not None:
+            text = f'displacement of "{self._landmark}" from home, in {{S}}'
+        if of in (AXES, CONTACT) or per.startswith("="):
+            units = [per.removeprefix("=")] * len(labels)
+        else:
+            own = self._units.get(of) or ["m" if n in "XYZxyz" else "rad" for n in labels]
+            units = [f"{unit}{per}" for unit in own]
+        return Argument(name, text, tuple(labels), tuple(units), given, port.name)

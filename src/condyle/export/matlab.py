@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator, Sequence
-from importlib.resources import files
 from pathlib import Path
 
 from ..atomic import write_text
 from ..mechanism import Mechanism
-from .c_names import identifier
+from .c_names import identifier, packaged
 from .c_source import export
 from .exported import Argument, Exported, Function
 
@@ -29,7 +28,8 @@ def write_matlab(
     Raises: InputError, UnsupportedError: for what cannot be exported to C, or a file that cannot be
             written.
     """
-    e = export(mechanism, questions, lanes=0, prefix=_prefix(mechanism))
+    # Short enough that every function's name is one in MATLAB.
+    e = export(mechanism, questions, lanes=0, prefix=identifier(mechanism.name).lower()[:40])
     texts = {f"{e.prefix}.c": e.source, f"{e.prefix}.h": e.header}
     for f in e.functions:
         texts[f"{f.name}_mex.c"] = gateway(e, f)
@@ -60,8 +60,7 @@ def gateway(e: Exported, f: Function) -> str:
         f"#define CALL(in, out) {f.name}({words})",
         "",
     ]
-    room = files(__package__)
-    return "\n".join(parts) + (room / "matlab_mex.c").read_text(encoding="utf-8")
+    return "\n".join(parts) + packaged("matlab_mex.c")
 
 
 def help_text(e: Exported, f: Function, mechanism: Mechanism) -> str:
@@ -148,8 +147,3 @@ def _in_order(f: Function) -> Iterator[tuple[int, Argument]]:
 def _plain(label: str) -> str:
     """Between quotes, and with underscores that are not subscripts."""
     return label.replace("'", "''").replace("_", "\\_")
-
-
-def _prefix(mechanism: Mechanism) -> str:
-    """Short enough that every function's name is one in MATLAB."""
-    return identifier(mechanism.name).lower()[:40]

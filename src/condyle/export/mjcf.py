@@ -1,24 +1,41 @@
 """A mechanism for MuJoCo: one file of MJCF, its home the mechanism's and its controls our efforts.
 
-Loops are closed by `connect`, contacts by what carries the platform (`mjcf_platform`). Joints and
+Loops are closed by `connect`, contacts by what carries the platform. Joints and
 actuators are called as their chains, so that `data.actuator("masseter_left").ctrl` is an effort
 in N m or N, and joint coordinates are zero at home.
+
+The first contacts carry the platform: their joints and a ball joint are its place in the tree, so
+that MuJoCo cannot leave those surfaces. Two on parallel planes carry it together, on two slides, a
+hinge along the normal and one along the line between them: all four freedoms, and no equation. Each
+other contact is a runner, a small weightless body that stays on its surface, connected to the
+platform. A one-sided contact on a plane is a real one, which may open: ball against plane, without
+friction or with Coulomb's.
+
+Chains are trees of bodies: `connect` closes each loop at its platform joint. A rod turns on two
+hinges along Y and Z of N_i0, as in `kinematics.chain`; behind a crank these turn with the crank,
+which changes nothing but how the rod spins about its own line. A cable is a tendon.
 """
 
 from __future__ import annotations
 
+import math
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
+from xml.etree.ElementTree import Element
 
 import numpy as np
 
 from ..atomic import write_text
 from ..errors import CondyleError
-from ..mechanism import Mechanism
+from ..kinematics.chain import FAMILIES
+from ..mechanism import Contact, Mechanism
+from ..mechanism.chain import limits
+from ..mechanism.surface import Plane
 from ..model.model import Model
-from .mjcf_chains import write_chain
-from .mjcf_platform import write_platform
-from .mjcf_xml import Document
+from .mjcf_tracks import Freedom, Track, track
+from .mjcf_xml import Document, element, inertial, quaternion, rgba
 
 
 @dataclass(frozen=True)
@@ -63,3 +80,326 @@ def _home(document: Document) -> None:
         document.add("keyframe", "key", name="home", ctrl=efforts.effort[0])
     except CondyleError:
         document.note("no efforts hold it at home, so there is no keyframe with them")
+
+
+RUNNER = 1e-3  # mass of a runner over the platform's
+PARALLEL = 1e-12
+
+
+def write_platform(d: Document) -> None:
+    """The platform, its contacts and landmarks."""
+    contacts = d.mechanism.contacts
+    real = [c for c in contacts if c.one_sided and isinstance(c.offset_surface, Plane)]
+    held = [c for c in contacts if c not in real]
+    tracks = {c.name: _track(d, c) for c in held}
+    seat = parallel_pair(held) or sorted(held, key=lambda c: _cost(tracks[c.name]))[:1]
+    body = _seated(d, seat, tracks)
+    _platform(d, body)
+    for contact in held:
+        if contact not in seat:
+            runner = f"{contact.name}_runner"
+            _stages(d, contact, tracks[contact.name], runner)
+            ends = {"body1": runner, "body2": "platform", "anchor": contact.point}
+            d.add("equality", "connect", name=contact.name, **ends)
+    for contact in contacts:
+        if contact in real:
+            _real(d, body, contact)
+        else:
+            size = [_ball(d, contact)]
+            element(body, "geom", class_="ball", pos=contact.point, size=size)
+            _wall(d, contact)
+    for contact in held:
+        if contact.friction.coefficient:
+            d.note(f'contact "{contact.name}": its friction is left out')
+        if contact.one_sided:
+            d.note(f'contact "{contact.name}": it cannot lift off here; only planes can be left')
+
+
+def parallel_pair(contacts: list[Contact]) -> list[Contact]:
+    """Two contacts on parallel planes, if there are such, whose line is not along the normal."""
+    flat = [c for c in contacts if isinstance(c.offset_surface, Plane)]
+    for i, first in enumerate(flat):
+        for second in flat[i + 1 :]:
+            n, d = _normal(first), np.subtract(second.point, first.point)
+            parallel = np.linalg.norm(np.cross(n, _normal(second))) < PARALLEL
+            if parallel and np.linalg.norm(np.cross(n, d)) > 0.1 * np.linalg.norm(d):
+                return [first, second]
+    return []
+
+
+def _seated(d: Document, seat: list[Contact], tracks: dict[str, Track]) -> Element:
+    """The platform's body, with the joints that its contacts leave it."""
+    if not seat:
+        body = element(d.world, "body", name="platform")
+        element(body, "freejoint", name="platform")
+        return body
+    first = seat[0]
+    body = _stages(d, first, tracks[first.name], "platform")
+    if len(seat) == 1:
+        element(body, "joint", name=f"{first.name}_ball", type="ball", pos=first.point)
+        return body
+    line = np.subtract(seat[1].point, first.point)
+    for name, axis in (("yaw", _normal(first)), ("roll", line / np.linalg.norm(line))):
+        _joint(body, f"{first.name}_{name}", Freedom("hinge", axis, np.array(first.point)))
+    return body
+
+
+def _stages(d: Document, contact: Contact, found: Track, last: str) -> Element:
+    """A body for every stage, the last one called `last`; all but the platform are weightless."""
+    body = d.world
+    for k, stage in enumerate(found.stages, 1):
+        name = last if k == len(found.stages) else f"{contact.name}_carriage"
+        body = element(body, "body", name=name)
+        names = [f"{contact.name}_{k}{letter}" for letter in "abc"]
+        for joint, freedom in zip(names, stage.freedoms, strict=False):
+            _joint(body, joint, freedom)
+        if name != "platform":
+            d.note(
+                "bodies that only guide a contact weigh nothing and have 0.1 % of the platform's "
+                "mass"
+            )
+            body.set("gravcomp", "1")
+            mass = RUNNER * d.mechanism.platform.mass
+            inertial(body, mass, contact.point, [mass * (0.1 * d.size) ** 2] * 3)
+        if stage.law is not None:
+            joints = {"joint1": names[1], "joint2": names[0]}
+            d.add("equality", "joint", **joints, polycoef=stage.law)
+    return body
+
+
+def _joint(body: Element, name: str, freedom: Freedom) -> None:
+    pos = freedom.point if freedom.kind == "hinge" else None
+    element(body, "joint", name=name, type=freedom.kind, axis=freedom.axis, pos=pos)
+
+
+def _platform(d: Document, body: Element) -> None:
+    """Mass, hull, sites and sensors."""
+    platform = d.mechanism.platform
+    i = platform.inertia
+    tensor = [i.xx, i.yy, i.zz, i.xy, i.xz, i.yz]
+    element(body, "inertial", mass=platform.mass, pos=np.zeros(3), fullinertia=tensor)
+    d.add("asset", "mesh", name="platform", vertex=d.look.hull)
+    element(body, "geom", class_="platform", type="mesh", mesh="platform")
+    sites = {f"{chain.name}_platform": chain.platform for chain in d.mechanism.chains}
+    # Names may meet here, which is said where the document is written.
+    pairs = [*sites.items(), *((f"{c.name}_contact", c.point) for c in d.mechanism.contacts)]
+    for name, point in [*pairs, *platform.points.items()]:
+        element(body, "site", name=name, pos=point)
+    for kind in ("pos", "quat"):
+        of = {"objtype": "xbody", "objname": "platform"}
+        d.add("sensor", f"frame{kind}", **of, name=f"platform_{kind}")
+
+
+def _real(d: Document, body: Element, contact: Contact) -> None:
+    """A ball against a plane: the normal of MuJoCo's plane is its Z axis, towards the ball."""
+    ball, up = _ball(d, contact), contact.push * _normal(contact)
+    name = {"class_": "ball", "name": f"{contact.name}_ball"}
+    element(body, "geom", **name, pos=contact.point, size=[ball])
+    wall = {"class_": "wall", "name": f"{contact.name}_wall", "type": "plane"}
+    place = {"pos": contact.point - ball * up, "quat": quaternion(_onto(up))}
+    element(d.world, "geom", **wall, **place, size=[0.3 * d.size, 0.3 * d.size, 0.01])
+    mu, geoms = contact.friction.coefficient, {"geom1": name["name"], "geom2": wall["name"]}
+    friction = [mu, mu, 0.005, 0.0001, 0.0001] if mu else None
+    rough = {"condim": 3 if mu else 1, "friction": friction}
+    d.add("contact", "pair", name=contact.name, **geoms, **rough)
+
+
+def _wall(d: Document, contact: Contact) -> None:
+    """The surface as it is drawn."""
+    vertices, faces = d.look.patch(contact)
+    if not len(faces):
+        return
+    used, renamed = np.unique(faces, return_inverse=True)
+    mesh = {"vertex": vertices[used], "face": " ".join(map(str, renamed.ravel()))}
+    d.add("asset", "mesh", name=f"{contact.name}_wall", inertia="shell", **mesh)
+    element(d.world, "geom", class_="wall", type="mesh", mesh=f"{contact.name}_wall")
+
+
+def _track(d: Document, contact: Contact) -> Track:
+    found = track(contact, d.size)
+    if found.error:
+        reach = found.reach
+        where = "its bounds" if reach is None else f"{reach * 1e3:.3g} mm of home"
+        d.note(
+            f'contact "{contact.name}": a {contact.surface.kind} is followed by polynomials, '
+            f"{found.error * 1e3:.2g} mm off at most within {where}"
+        )
+    return found
+
+
+def _normal(contact: Contact) -> np.ndarray:
+    """Of a plane, upwards, (3,)."""
+    a, b = contact.surface.slope  # type: ignore[union-attr]
+    return np.array([-a, -b, 1.0]) / np.linalg.norm([a, b, 1.0])
+
+
+def _onto(direction: np.ndarray) -> np.ndarray:
+    """A rotation whose Z axis is a unit vector, (3, 3)."""
+    x = np.cross(np.eye(3)[int(np.argmin(np.abs(direction)))], direction)
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(direction, x), direction])
+
+
+def _cost(found: Track) -> tuple[int, int, float]:
+    """What follows exactly and on one body carries best."""
+    laws = sum(stage.law is not None for stage in found.stages)
+    return laws, len(found.stages), found.error
+
+
+def _ball(d: Document, contact: Contact) -> float:
+    return contact.ball_radius or 0.06 * d.size
+
+
+LIGHT = 1e-6  # mass of a massless body over the platform's
+THIN, SLENDER = 1e-2, 0.03  # radius of gyration over a length; drawn radius over the mechanism's
+BARREL = 0.6  # length of a leg's cylinder over the leg's at home
+UNLIMITED = 1e9  # N: of a cable that has no greatest tension
+X, ZERO = np.array([1.0, 0, 0]), np.zeros(3)
+
+
+def write_chain(d: Document, chain: Any) -> None:
+    """Bodies, joints, actuator and sensors of a chain."""
+    WRITERS[chain.kind](d, chain)
+    low, high, speed = limits(chain)
+    cable = chain.kind == "cable"
+    if cable:  # a tendon's force would lengthen it
+        low, high = max(low, 0.0), min(high, UNLIMITED)
+    kind, name = "tendon" if cable else "joint", chain.name
+    limited = math.isfinite(low) or math.isfinite(high)
+    ends = np.clip([low, high], -UNLIMITED, UNLIMITED) if limited else None
+    gear = [-1.0] if cable else None
+    d.add("actuator", "motor", name=name, **{kind: name}, gear=gear, ctrlrange=ends)
+    for quantity in ("pos", "vel"):
+        d.add("sensor", f"{kind}{quantity}", name=f"{name}_{quantity}", **{kind: name})
+    if math.isfinite(speed):
+        d.add("custom", "numeric", name=f"speed_limit_{name}", data=[speed])
+    if chain.actuator.coulomb:
+        d.note(
+            "Coulomb friction of actuators is MuJoCo's frictionloss, which holds at rest; "
+            "condyle's fades below the smoothing speed"
+        )
+
+
+def _rss(d: Document, chain: Any) -> None:
+    c = FAMILIES["RSS"].constants(chain)
+    crank = element(d.world, "body", name=f"{chain.name}_crank", pos=c["G"])
+    _driven(crank, chain, "hinge", c["C"][:, 2])
+    # Its shaft stands on the base: neither its mass nor its inertia across ever matter.
+    inertial(crank, c["crank"] / c["l"] ** 2, ZERO, [c["crank"]] * 3)
+    _line(d, crank, chain, 1.6, ZERO, c["l"] * c["C"][:, 0])
+    _rod(d, crank, chain, "coupler", c["l"] * c["C"][:, 0], c["N"], float(c["L"]))
+    _fixed(d, c["G"], 0.25 * c["l"] * c["C"][:, 2], 2.0)
+
+
+def _pss(d: Document, chain: Any) -> None:
+    c = FAMILIES["PSS"].constants(chain)
+    axis = np.array(chain.axis) / np.linalg.norm(chain.axis)
+    length = float(np.linalg.norm(np.subtract(chain.platform, chain.base)))
+    slider = element(d.world, "body", name=f"{chain.name}_slider", pos=chain.base)
+    _driven(slider, chain, "slide", axis)
+    # It only slides, so that any inertia will do.
+    moments = [(chain.slider.mass or 1.0) * (THIN * length) ** 2] * 3
+    _massive(d, slider, chain.slider.mass, ZERO, moments, length)
+    _rod(d, slider, chain, "rod", ZERO, c["N"], length)
+    _fixed(d, np.array(chain.base), 0.2 * length * axis, 0.8)
+
+
+def _sps(d: Document, chain: Any) -> None:
+    c = FAMILIES["SPS"].constants(chain)
+    home = float(c["home"])
+    cylinder = _turning(d.world, f"{chain.name}_cylinder", c["B"], c["N"])
+    piston_at = home * X
+    _slim(d, cylinder, chain.cylinder, chain.cylinder.com, home)
+    _line(d, cylinder, chain, 2.0, ZERO, BARREL * home * X)
+    piston = element(cylinder, "body", name=f"{chain.name}_piston", pos=piston_at)
+    _driven(piston, chain, "slide", X)
+    _slim(d, piston, chain.piston, -chain.piston.com, home)
+    _line(d, piston, chain, 1.0, -(1 - BARREL) * piston_at, ZERO)
+    _shut(d, chain, f"{chain.name}_piston", (cylinder, ZERO), (piston, ZERO))
+
+
+def _cable(d: Document, chain: Any) -> None:
+    element(d.world, "site", name=f"{chain.name}_base", pos=chain.base)
+    look = {"width": 0.4 * SLENDER * d.size, "rgba": rgba(d.look.colours[chain.name])}
+    tendon = d.add("tendon", "spatial", name=chain.name, **look, **_losses(chain))
+    for end in ("base", "platform"):
+        element(tendon, "site", site=f"{chain.name}_{end}")
+
+
+WRITERS: dict[str, Callable[[Document, Any], None]] = {
+    "RSS": _rss,
+    "PSS": _pss,
+    "SPS": _sps,
+    "cable": _cable,
+}
+
+
+def _losses(chain: Any) -> dict[str, float | None]:
+    a = chain.actuator
+    losses = {"armature": a.reflected_inertia, "damping": a.viscous, "frictionloss": a.coulomb}
+    return {key: value or None for key, value in losses.items()}
+
+
+def _driven(body: Element, chain: Any, kind: str, axis: np.ndarray) -> None:
+    element(body, "joint", name=chain.name, type=kind, axis=axis, **_losses(chain))
+
+
+def _rod(
+    d: Document, parent: Element, chain: Any, what: str, at: Any, N: np.ndarray, length: float
+) -> None:
+    """The part of a chain between its drive and the platform."""
+    part = getattr(chain, what)
+    body = _turning(parent, f"{chain.name}_{what}", at, N)
+    _slim(d, body, part, part.com * length, length)
+    _line(d, body, chain, 1.0, ZERO, length * X)
+    _shut(d, chain, f"{chain.name}_{what}", (body, ZERO), (body, length * X))
+
+
+def _turning(parent: Element, name: str, at: np.ndarray, N: np.ndarray) -> Element:
+    """A body on two hinges along Y and Z of N_i0; its X axis runs along it."""
+    body = element(parent, "body", name=name, pos=at, quat=quaternion(N))
+    for which, axis in (("beta", [0, 1, 0]), ("gamma", [0, 0, 1])):
+        element(body, "joint", name=f"{name}_{which}", type="hinge", axis=axis)
+    return body
+
+
+def _slim(d: Document, body: Element, part: Any, com: float, length: float) -> None:
+    """Mass and moments of a part that is symmetric about X."""
+    _massive(d, body, part.mass, com * X, [part.axial, part.transverse, part.transverse], length)
+
+
+def _massive(
+    d: Document, body: Element, mass: float, com: Any, inertia: Any, length: float
+) -> None:
+    """MuJoCo has no massless bodies: those get a millionth of the platform, and no weight."""
+    if not mass:
+        mass = LIGHT * d.mechanism.platform.mass
+        body.set("gravcomp", "1")
+        d.note("bodies without mass weigh nothing and have a millionth of the platform's")
+    least = mass * (THIN * length) ** 2
+    moments = np.array(inertia, float)
+    if (moments <= 0).any():
+        moments = np.maximum(moments, min(least, moments[moments > 0].min(initial=least)))
+        d.note("moments of inertia that are zero are those of a thin rod")
+    inertial(body, mass, com, moments)
+
+
+def _shut(d: Document, chain: Any, last: str, *joints: tuple[Element, np.ndarray]) -> None:
+    """The last body's end is the platform's joint M; balls are drawn at both joints."""
+    ends = {"body1": last, "body2": "platform", "anchor": joints[-1][1]}
+    d.add("equality", "connect", name=f"{chain.name}_loop", **ends)
+    for body, at in joints:
+        element(body, "geom", class_="drawn", pos=at, size=[1.5 * SLENDER * d.size])
+
+
+def _line(d: Document, body: Element, chain: Any, thickness: float, start: Any, end: Any) -> None:
+    """A body of a chain, drawn."""
+    colour, size = rgba(d.look.colours[chain.name]), [thickness * SLENDER * d.size]
+    line = {"fromto": [start, end], "size": size, "rgba": colour}
+    element(body, "geom", class_="drawn", type="capsule", **line)
+
+
+def _fixed(d: Document, middle: np.ndarray, half: np.ndarray, thickness: float) -> None:
+    """A shaft or rail of the base, drawn."""
+    line = {"fromto": [middle - half, middle + half], "size": [thickness * SLENDER * d.size]}
+    element(d.world, "geom", class_="fixed", type="cylinder", **line)

@@ -25,9 +25,7 @@ import numpy as np
 from ..errors import UnsupportedError
 from ..mechanism import Mechanism
 from ..mechanism.files import from_data
-from .mjcf_contacts import contact_of, real_contacts, seat
 from .mjcf_graph import WORLD, Graph, Step, read_graph, turned
-from .mjcf_parts import actuator_of, cable_actuator, part
 
 PARALLEL = 1e-3  # sine
 FEWEST = 3  # chains and contacts that make a body the platform
@@ -259,3 +257,206 @@ def _platform_table(
 
 
 _ENTRIES = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+
+
+PARALLEL_AXES = 1e-6  # sine, of a contact's joints
+PLANE, SPHERE = 0, 2  # geoms of MuJoCo
+
+
+def contact_of(graph: Graph, steps: tuple[Step, ...], name: str) -> dict[str, Any] | None:
+    """The contact that joints from the world to a ball joint are, if they are one."""
+    kinds, at = [step.kind for step in steps], steps[-1].point
+    named = (n for n, place in graph.sites() if np.linalg.norm(place - at) < graph.near)
+    name = next((n.removesuffix("_contact") for n in named if n.endswith("_contact")), name)
+    surface: dict[str, Any]
+    if kinds == ["slide", "slide", "ball"]:
+        n = np.cross(steps[0].axis, steps[1].axis)
+        if abs(n[2]) < 1e-6:
+            raise UnsupportedError(
+                f'contact "{name}": its plane is upright, which z = f(x, y) cannot be; turn the '
+                "model"
+            )
+        surface = _plane(graph, n, at)
+    elif sorted(kinds[:2]) == ["hinge", "slide"] and kinds[2:] == ["ball"]:
+        hinge, slide = sorted(steps[:2], key=lambda step: step.kind)
+        axis, arm = hinge.axis, at - hinge.point
+        if np.linalg.norm(np.cross(slide.axis, axis)) > PARALLEL_AXES:
+            return None
+        radius = float(np.linalg.norm(arm - axis * (axis @ arm)))
+        surface = {"kind": "cylinder", "point": graph.point(hinge.point)}
+        surface |= {"axis": [float(v) for v in axis], "radius": radius}
+    elif kinds == ["ball", "ball"]:
+        radius = float(np.linalg.norm(at - steps[0].point))
+        surface = {"kind": "sphere", "centre": graph.point(steps[0].point), "radius": radius}
+    else:
+        return None
+    return {"name": name, "point": graph.point(at), "surface": surface}
+
+
+def seat(graph: Graph, platform: int, steps: tuple[Step, ...]) -> list[dict[str, Any]]:
+    """Contacts that the platform's own joints stand for; a free joint stands for none.
+
+    Raises: UnsupportedError: for other joints.
+    """
+    kinds = [step.kind for step in steps]
+    turns = [k for k in kinds if k != "slide"]
+    free = kinds.count("slide") == 3 and turns in (["ball"], ["hinge"] * 3)
+    if kinds == ["free"] or free:
+        return []
+    if kinds == ["slide", "slide", "hinge", "hinge"]:
+        if pair := _pair(graph, platform, steps):
+            return pair
+    elif turns:
+        merged = steps
+        if kinds[-3:] == ["hinge"] * 3 and len(kinds) > 3:
+            merged = (*steps[:-3], Step("ball", steps[-1].point))
+        if [s.kind for s in merged] == ["hinge", "hinge", "ball"]:
+            merged = (Step("ball", merged[0].point), merged[2])
+        if (made := contact_of(graph, merged, "contact")) is not None:
+            return [made]
+    raise UnsupportedError(
+        f"the platform {graph.name(platform)} has the joints {' '.join(kinds)}; expected a "
+        "free joint, or slides, hinges and a ball joint that keep a point on a plane, cylinder or "
+        "sphere"
+    )
+
+
+def real_contacts(graph: Graph, platform: int) -> list[dict[str, Any]]:
+    """Pairs of a ball of the platform and a plane of the world: one-sided contacts."""
+    m, d = graph.model, graph.data
+    found = []
+    for i in range(m.npair):
+        kinds = {int(m.geom_type[g]): int(g) for g in (m.pair_geom1[i], m.pair_geom2[i])}
+        if set(kinds) != {PLANE, SPHERE}:
+            graph.note(f"contact pair {i + 1} is not of a sphere and a plane; it is left out")
+            continue
+        wall, ball = kinds[PLANE], kinds[SPHERE]
+        if [graph.group(int(m.geom_bodyid[g])) for g in (wall, ball)] != [WORLD, platform]:
+            continue
+        up, centre = d.geom_xmat[wall].reshape(3, 3)[:, 2], d.geom_xpos[ball]
+        name = m.pair(i).name or f"contact_{i + 1}"
+        if abs(up[2]) < 1e-6:
+            graph.note(f"contact {name}: an upright plane, which a mechanism file cannot have")
+            continue
+        table = {"name": name, "point": graph.point(centre), "surface": _plane(graph, up, centre)}
+        table |= {"side": "above" if up[2] > 0 else "below", "one_sided": True}
+        if m.pair_dim[i] > 1 and m.pair_friction[i, 0] > 0:
+            table["friction"] = {"coefficient": float(m.pair_friction[i, 0])}
+        found.append(table)
+    return found
+
+
+def _pair(graph: Graph, platform: int, steps: tuple[Step, ...]) -> list[dict[str, Any]]:
+    """Two contacts on parallel planes: a hinge along their normal, and one along their line.
+
+    The second may be anywhere on that line: a site of the platform whose name ends in _contact.
+    """
+    u, v, yaw, roll = steps
+    n = np.cross(u.axis, v.axis)
+    if np.linalg.norm(np.cross(n, yaw.axis)) > PARALLEL_AXES:
+        return []
+    found = [
+        {
+            "name": name.removesuffix("_contact"),
+            "point": graph.point(at),
+            "surface": _plane(graph, n, at),
+        }
+        for name, at in graph.sites(platform)
+        if name.endswith("_contact")
+        and np.linalg.norm(np.cross(at - roll.point, roll.axis)) < graph.near
+    ]
+    return found if len(found) == 2 else []
+
+
+def _plane(graph: Graph, n: np.ndarray, at: np.ndarray) -> dict[str, Any]:
+    """The plane through a point with a normal."""
+    a, b = (round(float(v), 12) + 0.0 for v in -n[:2] / n[2])
+    x, y, z = graph.point(at)
+    return {"kind": "plane", "slope": [a, b], "offset": z - a * x - b * y}
+
+
+OFF_LINE = 1e-3  # of a rod: what is nearer to its line is on it
+
+
+def part(
+    graph: Graph, what: str, group: int, start: np.ndarray, line: np.ndarray, rod: bool = False
+) -> dict[str, float]:
+    """Mass, mass centre along a line and moments, of a body taken as symmetric about it.
+
+    rod: the centre is a part of the line's length, and the body may have no mass.
+    """
+    body = graph.body(group)
+    length = float(np.linalg.norm(line))
+    n, arm = line / length, body.centre - start
+    com = float(arm @ n)
+    off = float(np.linalg.norm(arm - com * n))
+    axial = float(n @ body.inertia @ n)
+    transverse = float((np.trace(body.inertia) - axial) / 2)
+    across = np.linalg.svd(n[None])[2][1:]
+    uneven = np.linalg.eigvalsh(across @ body.inertia @ across.T) - transverse
+    side = body.inertia @ n - axial * n
+    if off > OFF_LINE * max(abs(com), 1e-3):
+        graph.note(f"{what}: its mass centre is {off * 1e3:.3g} mm off its line; taken on it")
+    if max(np.abs(uneven).max(), np.linalg.norm(side)) > 1e-3 * max(transverse, 1e-30):
+        graph.note(f"{what}: it is not symmetric about its line; taken so")
+    return {
+        "mass": body.weight if rod else body.mass,
+        "com": min(max(com / length, 0.0), 1.0) if rod else max(com, 0.0),
+        "transverse": transverse,
+        "axial": min(axial, 2 * transverse),
+    }
+
+
+def actuator_of(graph: Graph, step: Step, sign: float, name: str) -> dict[str, Any]:
+    """The actuator of a driven joint; `sign`: of its coordinate against ours."""
+    m = graph.model
+    dof = int(m.jnt_dofadr[step.index])
+    table = _losses(m.dof_armature[dof], m.dof_damping[dof], m.dof_frictionloss[dof])
+    drives = _drives(m, step.index, joint=True)
+    if not drives:
+        graph.note(f"joint {name} has no actuator; it is taken as the driven one")
+    if (limit := _limit(m, drives, sign)) is not None:
+        low, high = limit
+        key = "force_limit" if step.kind == "slide" else "torque_limit"
+        table[key] = high if low == -high else limit
+    speed = f"speed_limit_{name}"
+    if any(m.numeric(i).name == speed for i in range(m.nnumeric)):
+        table["speed_limit"] = float(m.numeric(speed).data[0])
+    return {"actuator": table} if table else {}
+
+
+def cable_actuator(graph: Graph, tendon: int) -> dict[str, Any]:
+    """That of a tendon, which can only pull."""
+    m = graph.model
+    armature = getattr(m, "tendon_armature", np.zeros(m.ntendon))[tendon]
+    table = _losses(armature, m.tendon_damping[tendon], m.tendon_frictionloss[tendon])
+    limit = _limit(m, _drives(m, tendon, joint=False), -1.0)
+    if limit is not None and limit[1] > 0:
+        table["force_limit"] = [max(limit[0], 0.0), limit[1]]
+    return {"actuator": table} if table else {}
+
+
+def _losses(armature: float, damping: Any, friction: float) -> dict[str, Any]:
+    values = {"rotor_inertia": armature, "viscous": np.ravel(damping)[0], "coulomb": friction}
+    return {key: float(value) for key, value in values.items() if value > 0}
+
+
+def _drives(m: Any, index: int, joint: bool) -> list[int]:
+    """Actuators of a joint or a tendon."""
+    of = [i for i in range(m.nu) if m.actuator_trnid[i, 0] == index]
+    return [i for i in of if (int(m.actuator_trntype[i]) in (0, 1)) == joint]  # or jointinparent
+
+
+def _limit(m: Any, drives: list[int], sign: float) -> list[float] | None:
+    """Of force, or of the control of a plain motor, through the gear."""
+    for i in drives:
+        gear = sign * float(m.actuator_gear[i, 0])
+        motor = m.actuator_biastype[i] == 0 and m.actuator_gaintype[i] == 0
+        ends = None
+        if m.actuator_forcelimited[i]:
+            ends = m.actuator_forcerange[i]
+        elif m.actuator_ctrllimited[i] and motor:
+            ends = m.actuator_ctrlrange[i] * m.actuator_gainprm[i, 0]
+        if ends is not None and ends[0] < ends[1]:
+            return sorted(float(gear * end) for end in ends)
+    return None

@@ -6,7 +6,6 @@ It is written as XML, not by MuJoCo's `MjSpec`, whose own writer keeps six digit
 from __future__ import annotations
 
 from collections import Counter
-from importlib.resources import files
 from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Comment, Element, SubElement
@@ -18,6 +17,7 @@ from ..accessors import extend
 from ..errors import UnsupportedError
 from ..mechanism import Mechanism
 from ..mechanism.home import characteristic_length
+from .c_names import packaged
 
 # Elements whose names MuJoCo keeps apart by more than their tag.
 SPACES = {"spatial": "tendon", "motor": "actuator", "freejoint": "joint"}
@@ -31,8 +31,7 @@ class Document:
         self.mechanism, self.notes = mechanism, list[str]()
         self.size = size = characteristic_length(mechanism)
         self.look = extend("mechanism.look", mechanism)
-        text = (files(__package__) / "mjcf_settings.xml").read_text(encoding="utf-8")
-        self.root = ElementTree.fromstring(text)
+        self.root = ElementTree.fromstring(packaged("mjcf_settings.xml"))
         self.world = self.section("worldbody")
         fixed = [point for chain in mechanism.chains for point in chain.fixed_points]
         cloud = np.vstack([self.look.hull, *fixed])  # what a camera should see
