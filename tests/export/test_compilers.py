@@ -10,7 +10,7 @@ import pytest
 from export.conftest import Folder
 from support.tools import need, run
 
-from condyle.export.c_facts import write_facts
+from condyle.export.c_package import write_facts
 
 Folders = Callable[[str], Folder]
 STRICT = "-Werror -Wshadow -Wstrict-prototypes -Wmissing-prototypes -Wdouble-promotion"

@@ -50,8 +50,7 @@ def c(
 
     from ..export import Wish, in_order, usual
     from ..export import export as exported_of
-    from ..export.c_facts import write_facts
-    from ..export.c_package import write_package
+    from ..export.c_package import write_facts, write_package
 
     machine = condyle.load(mechanism)
     given = (one.strip() for one in coordinates.split(",")) if coordinates else ()

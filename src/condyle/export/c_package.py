@@ -1,11 +1,23 @@
-"""Target `c`: a folder with source, header, an example, recorded test vectors and a Makefile."""
+"""Target `c`: a folder with source, header, an example, recorded test vectors and a Makefile.
+
+And a page of measured facts: by compiling the folder, where there is a compiler.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import platform
+import re
+import shutil
+import subprocess
+import tempfile
+from collections import Counter
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from ..atomic import write_text
+from ..backends.compiler import CompilerError, find_compiler
 from ..mechanism.mechanism import Mechanism
 from .c_names import in_format, literal, packaged
 from .c_samples import Vectors, vectors
@@ -52,39 +64,37 @@ def makefile(e: Exported) -> str:
 
 def example(e: Exported) -> str:
     """A program that asks the first question at home, at rest."""
-    f = e.functions[0]
-    p = e.prefix.upper()
+    f, p = e.functions[0], e.prefix.upper()
+    constants, prepared = _constants(e)
+    known = [f"    static const {e.precision} {a.name}[{a.size}] = {{0}};" for a in f.inputs]
+    known += [f"    {e.precision} {a.name}[{a.size}];" for a in f.outputs]
+    shown = [
+        f'    printf("{a.name} {in_format(label)}: %.9g {unit}\\n", (double){a.name}[{i}]);'
+        for a in f.outputs
+        for i, (label, unit) in enumerate(zip(a.labels, a.units, strict=True))
+    ]
     lines = [
         f"/* What {f.name} answers at home: every argument is 0 but those set below. */",
-        "#include <stdio.h>",
-        f'#include "{e.prefix}.h"',
-        "",
-        "int main(void)",
-        "{",
-    ]
-    lines += [f"    static const {e.precision} {a.name}[{a.size}] = {{0}};" for a in f.inputs]
-    lines += [f"    {e.precision} {a.name}[{a.size}];" for a in f.outputs]
-    words = ["&constants"] * e.struct + [a.name for a in f.arguments]
-    if e.struct:
-        lines += [
-            f"    static const {e.prefix}_numbers numbers = {p}_NUMBERS;",
-            f"    {e.prefix}_constants constants;",
-        ]
-    call = f"{f.name}({', '.join(words)})"
-    lines += ["    int status;"]
-    lines += [f"    {e.prefix}_prepare(&numbers, &constants);"] * e.struct
-    lines += [
-        f"    status = {call};",
+        f'#include <stdio.h>\n#include "{e.prefix}.h"\n\nint main(void)\n{{',
+        *(*known, *constants, "    int status;", *prepared),
+        f"    status = {_call(e, f, [a.name for a in f.arguments])};",
         f"    if (status != {p}_OK) {{",
-        '        printf("status %d\\n", status);',
-        "        return 1;",
-        "    }",
+        '        printf("status %d\\n", status);\n        return 1;\n    }',
+        *(*shown, "    return 0;", "}", ""),
     ]
-    for a in f.outputs:
-        for i, (label, unit) in enumerate(zip(a.labels, a.units, strict=True)):
-            text = f"{a.name} {in_format(label)}: %.9g {unit}"
-            lines.append(f'    printf("{text}\\n", (double){a.name}[{i}]);')
-    return "\n".join([*lines, "    return 0;", "}", ""])
+    return "\n".join(lines)
+
+
+def _constants(e: Exported) -> tuple[list[str], list[str]]:
+    """Statements that declare and fill the constants, where these are a structure."""
+    p = e.prefix
+    declared = [f"    static const {p}_numbers numbers = {p.upper()}_NUMBERS;"]
+    declared += [f"    {p}_constants constants;"]
+    return declared * e.struct, [f"    {p}_prepare(&numbers, &constants);"] * e.struct
+
+
+def _call(e: Exported, f: Function, words: list[str]) -> str:
+    return f"{f.name}({', '.join(['&constants'] * e.struct + words)})"
 
 
 def recorded(e: Exported, made: list[Vectors]) -> str:
@@ -124,34 +134,165 @@ def check(e: Exported, made: list[Vectors]) -> str:
     return "\n".join([*lines, "    return failed ? 1 : 0;", "}", ""])
 
 
-def _checked(e: Exported, f: Function) -> Iterator[str]:
-    p = e.prefix.upper()
-    yield f"static int check_{f.question}(void)"
-    yield "{"
-    if e.struct:
-        yield f"    static const {e.prefix}_numbers numbers = {p}_NUMBERS;"
-        yield f"    {e.prefix}_constants constants;"
-    yield "    double worst = 0.0;"
-    yield "    int wrong = 0;"
-    if e.struct:
-        yield f"    {e.prefix}_prepare(&numbers, &constants);"
-    yield f"    for (int i = 0; i < {f.name.upper()}_SAMPLES; i++) {{"
-    for a in f.outputs:
-        yield f"        {e.precision} {a.name}[{a.size}] = {{0}};"
+def _checked(e: Exported, f: Function) -> list[str]:
+    ok, count = f"{e.prefix.upper()}_OK", f"{f.name.upper()}_SAMPLES"
+    constants, prepared = _constants(e)
     words = [f"{f.name}_{a.name}[i]" if a.given else a.name for a in f.arguments]
-    call = f"{f.name}({', '.join(['&constants'] * e.struct + words)})"
-    yield f"        const int status = {call};"
-    yield f"        wrong += status != {f.name}_status[i];"
-    yield f"        if (status != {p}_OK || {f.name}_status[i] != {p}_OK) continue;"
-    for a in f.outputs:
-        if a.name != "residual":  # which is rounding
-            right = f"&{f.name}_{a.name}[0][0]"
-            yield (
-                f"        worst = larger(worst, error({a.name}, {right}, i, {a.size}, "
-                f"{f.name.upper()}_SAMPLES));"
-            )
-    yield "    }"
-    count, most = f"{f.name.upper()}_SAMPLES", tolerance(e, f)
-    yield f'    return told("{f.name}", {count}, wrong, worst, {most!r});'
-    yield "}"
-    yield ""
+    compared = [a for a in f.outputs if a.name != "residual"]  # which is rounding
+    return [
+        f"static int check_{f.question}(void)\n{{",
+        *(*constants, "    double worst = 0.0;\n    int wrong = 0;", *prepared),
+        f"    for (int i = 0; i < {count}; i++) {{",
+        *(f"        {e.precision} {a.name}[{a.size}] = {{0}};" for a in f.outputs),
+        f"        const int status = {_call(e, f, words)};",
+        f"        wrong += status != {f.name}_status[i];",
+        f"        if (status != {ok} || {f.name}_status[i] != {ok}) continue;",
+        *(
+            f"        worst = larger(worst, error({a.name}, &{f.name}_{a.name}[0][0], i, {a.size}, "
+            f"{count}));"
+            for a in compared
+        ),
+        f'    }}\n    return told("{f.name}", {count}, wrong, worst, {tolerance(e, f)!r});\n}}\n',
+    ]
+
+
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=fast", "-fno-math-errno")
+SECONDS = 300
+NOTHING: dict[str, Any] = {"code": None, "stack": None, "error": None, "wrong": None}
+_TOLD = re.compile(r"^(\w+): (\d+) samples, worst error (\S+), (\d+) wrong", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Where they stand, and the same as data: function -> name -> number, None if not measured.
+
+    warnings: functions that do not answer as recorded where they were compiled.
+    """
+
+    path: Path
+    data: dict[str, Any]
+    warnings: list[str]
+
+
+def write_facts(exported: Exported, folder: Path) -> Facts:
+    """Measure and write FACTS.md."""
+    rows = {
+        f.name: {"operations": f.operations, "iterations": f.iterations, **NOTHING}
+        for f in exported.functions
+    }
+    how = ""
+    with (
+        tempfile.TemporaryDirectory(prefix="condyle-facts-") as place,
+        suppress(CompilerError, OSError, subprocess.SubprocessError),
+    ):
+        command = list(find_compiler().command)
+        found = _sizes(exported, command, folder.resolve(), Path(place))
+        errors = _errors(exported, command, folder.resolve(), Path(place))
+        version = _run([*command, "--version"], folder).splitlines()[0]
+        how = f"{version}, {' '.join(FLAGS)}, {platform.machine()}"
+        for name, row in rows.items():
+            row |= found.get(name, {}) | errors.get(name, {})
+    path = folder / "FACTS.md"
+    write_text(path, _page(exported, rows, how))
+    warnings = [
+        f"{f.name} does not answer as recorded: worst error {row['error']:.1e}, {row['wrong']} "
+        "wrong statuses; look at it with make check"
+        for f, row in zip(exported.functions, rows.values(), strict=True)
+        if row["wrong"] or (row["error"] or 0.0) > tolerance(exported, f)
+    ]
+    return Facts(path, {"functions": rows, "measured_by": how}, warnings)
+
+
+def _sizes(
+    e: Exported, command: list[str], folder: Path, place: Path
+) -> dict[str, dict[str, int | None]]:
+    """Bytes of machine code and of stack of each function, with those that it alone calls."""
+    call = [*command, *FLAGS, "-c", str(folder / f"{e.prefix}.c"), "-o", str(place / "code.o")]
+    try:
+        _run([*call, "-fstack-usage"], place)
+    except subprocess.SubprocessError:
+        _run(call, place)
+    sizes, stacks = Counter[str](), dict[str, int]()
+    if shutil.which("nm"):
+        for line in _run(["nm", "-S", "-t", "d", str(place / "code.o")], place).splitlines():
+            parts = line.split()
+            if len(parts) == 4 and parts[2] in "tT":
+                sizes[parts[3].partition(".")[0]] += int(parts[1])  # GCC names parts after it
+    for usage in place.glob("*.su"):
+        for line in usage.read_text(encoding="utf-8").splitlines():
+            where, size, *_ = line.split("\t")
+            stacks[where.rpartition(":")[2].partition(".")[0]] = int(size)
+    calls = _calls(e.source, {*sizes, *stacks})
+
+    def reached(name: str) -> set[str]:
+        return {name}.union(*map(reached, calls.get(name, ())))
+
+    def deepest(name: str) -> int:
+        return stacks.get(name, 0) + max(map(deepest, calls.get(name, ())), default=0)
+
+    return {
+        f.name: {
+            "code": sum(sizes[n] for n in reached(f.name)) if sizes else None,
+            "stack": deepest(f.name) if stacks else None,
+        }
+        for f in e.functions
+    }
+
+
+def _calls(source: str, names: set[str]) -> dict[str, set[str]]:
+    """Which functions call which, of those that the compiler kept."""
+    found: dict[str, set[str]] = {}
+    here = ""
+    for line in source.splitlines():
+        if line[:1].isalpha() and line.endswith(")"):
+            here = line.partition("(")[0].rpartition(" ")[2].lstrip("*")
+        elif here and line.startswith(" "):
+            words = set(re.findall(r"(\w+)\(", line))
+            found.setdefault(here, set()).update(words & names - {here})
+    return found
+
+
+def _errors(
+    e: Exported, command: list[str], folder: Path, place: Path
+) -> dict[str, dict[str, float]]:
+    """The worst error over the recorded samples."""
+    program = place / "checker"
+    sources = [str(folder / "check.c"), str(folder / f"{e.prefix}.c")]
+    _run([*command, *FLAGS, *sources, "-o", str(program), "-lm"], place)
+    told = subprocess.run([str(program)], capture_output=True, text=True, timeout=SECONDS).stdout
+    return {
+        name: {"error": float(error), "wrong": int(wrong)}
+        for name, _, error, wrong in _TOLD.findall(told)
+    }
+
+
+def _run(call: list[str], place: Path) -> str:
+    done = subprocess.run(call, capture_output=True, timeout=SECONDS, cwd=place, check=True)
+    return done.stdout.decode(errors="replace")
+
+
+def _page(e: Exported, rows: dict[str, dict[str, Any]], how: str) -> str:
+    lines = [
+        f"# {e.prefix}: measured facts",
+        "",
+        f"Measured with {how}. Portable code, {e.precision}; yours will differ."
+        if how
+        else "Not measured: no C compiler was at hand. `condyle export` again where there is one.",
+        "",
+        "| function | operations | steps at most | code [bytes] | stack [bytes] | worst error |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name, row in rows.items():
+        steps = str(row["iterations"] or "no iteration")
+        error = "" if row["error"] is None else f"{row['error']:.1e}"
+        cells = [name, row["operations"], steps, row["code"], row["stack"], error]
+        lines.append(f"| {' | '.join('' if cell is None else str(cell) for cell in cells)} |")
+    lines += [
+        "",
+        "- Operations: additions, products, roots and quotients of one call, a fused multiply-add, "
+        "or a sine with its cosine, as one.",
+        "- Code and stack: of a function with all that it calls, but the C library.",
+        "- Worst error: over the recorded samples, of the largest entry of each result.",
+        f"- Of the C library it may call {', '.join(e.symbols) or 'nothing'}.",
+    ]
+    return "\n".join([*lines, ""])

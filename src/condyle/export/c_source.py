@@ -222,21 +222,14 @@ def _statuses(p: str) -> str:
 
 
 def _sizes(p: str, exported: Exported, m: Mechanism) -> str:
+    named = {"CHAIN": m.chain_names, "CONTACT": m.contact_names}
+    sizes = {f"{kind}S": len(names) for kind, names in named.items()}
     lines = ["/* Sizes, and where things stand in arrays. */"]
-    for name, size in (
-        ("CHAINS", len(m.chains)),
-        ("CONTACTS", len(m.contacts)),
-        ("FREEDOMS", m.degrees_of_freedom),
-    ):
-        lines.append(f"#define {p}_{name} {size}")
-    lines += ["", "enum {"]
-    groups: Sequence[tuple[str, Sequence[str]]] = (
-        ("CHAIN", [c.name for c in m.chains]),
-        ("CONTACT", m.contact_names),
-    )
+    sizes["FREEDOMS"] = m.degrees_of_freedom
+    lines += [*(f"#define {p}_{name} {size}" for name, size in sizes.items()), "", "enum {"]
     rows = [
         f"    {p}_{kind}_{exported.names[name]} = {i},"
-        for kind, names in groups
+        for kind, names in named.items()
         for i, name in enumerate(names)
     ]
     rows += [f"    {p}_{name} = {i}," for i, name in enumerate(COORDINATES)]

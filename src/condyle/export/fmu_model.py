@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from ..errors import InputError, did_you_mean
@@ -59,9 +59,8 @@ class Scalar:
 
 @dataclass(frozen=True)
 class Fmu:
-    """kind; variables in the order of their references; C of all of it, without the interface."""
+    """Variables in the order of their references; C of all of it, without the interface."""
 
-    kind: str
     name: str
     text: str
     token: str
@@ -71,15 +70,9 @@ class Fmu:
     head: str
 
 
-@dataclass(frozen=True)
-class Tuned:
-    """A number of the mechanism that can be changed: `code` puts it, as `value`, into `n`."""
-
-    name: str
-    unit: str
-    text: str
-    start: float
-    code: str
+# A number of the mechanism that can be changed: name, unit, text and start of its parameter, and
+# code that puts it, as `value`, into `n`.
+Tuned = tuple[str, str, str, float, str]
 
 
 def fmu_model(mechanism: Mechanism, kind: str) -> Fmu:
@@ -90,8 +83,7 @@ def fmu_model(mechanism: Mechanism, kind: str) -> Fmu:
     if kind not in KINDS:
         raise InputError(f'there is no FMU "{kind}".{did_you_mean(kind, KINDS)}')
     e = export(mechanism, KINDS[kind], constants="struct", lanes=0)
-    plant = kind == "plant"
-    calls = [e[question] for question in KINDS[kind]]
+    plant, calls = kind == "plant", [e[question] for question in KINDS[kind]]
     arrays = {a.name: a for f in calls for a in f.arguments}
     states, rates = (STATES, RATES) if plant else ((), ())
     if plant:
@@ -116,7 +108,7 @@ def fmu_model(mechanism: Mechanism, kind: str) -> Fmu:
     add("parameter", [name for name in given if name in PARAMETERS])
     tuned = list(_tuned(mechanism, e))
     for t in tuned:
-        add_one("parameter", t.name, t.unit, t.text, t.start)
+        add_one("parameter", *t[:4])
     if plant:
         add_one("parameter", "tolerance", "1", "of a step", TOLERANCE)
     add("state", states)
@@ -142,7 +134,6 @@ def fmu_model(mechanism: Mechanism, kind: str) -> Fmu:
     head += f"typedef {e.prefix}_constants model_constants;\n"
     token = hashlib.sha256((e.source + head + body).encode()).hexdigest()[:32]
     return Fmu(
-        kind=kind,
         name=f"{e.prefix}_{kind}",
         text=f"{TEXTS[kind]}, of {mechanism.name}",
         token=f"{{{token[:8]}-{token[8:12]}-{token[12:16]}-{token[16:20]}-{token[20:]}}}",
@@ -160,44 +151,42 @@ def _scalars(e: Exported, a: Argument, role: str, first: int) -> Iterable[Scalar
         yield Scalar(name, role, unit, f"{a.text}: {label}", first + i, start)
 
 
-def _tuned(mechanism: Mechanism, e: Exported) -> Iterable[Tuned]:
+def _tuned(mechanism: Mechanism, e: Exported) -> Iterator[Tuned]:
     """Gravity, the platform's mass and inertia, and what stands for itself of the chains."""
     platform, numbers = mechanism.platform, e.header.partition("_numbers;")[0]
     sized = re.findall(r"double (\w+)", numbers)
     if "gravity" in sized:
-        for i, axis in enumerate("xyz"):
+        for i, (axis, start) in enumerate(zip("xyz", map(float, mechanism.gravity), strict=True)):
             about = f"gravity.{axis}", "m/s^2", f"gravity along {axis} of {{S}}"
-            yield Tuned(*about, float(mechanism.gravity[i]), f"n.gravity[{i}] = value")
+            yield *about, start, f"n.gravity[{i}] = value"
     # The numbers hold the chains' masses that move with the platform's joints as well.
     mass, inertia = (
         next((name for name in (f"lumped_{own}", own) if name in sized), None)
         for own in ("mass", "inertia")
     )
     if mass is not None:
-        about = "platform.mass", "kg", "mass of the platform"
-        yield Tuned(*about, platform.mass, f"n.{mass} += value - {platform.mass!r}")
-    for i, key in enumerate(("xx", "yy", "zz", "xy", "xz", "yz")):
-        if inertia is not None:
-            start = float(getattr(platform.inertia, key))
-            about = f"platform.inertia.{key}", "kg m^2", f"inertia {key} of the platform"
-            yield Tuned(*about, start, f"n.{inertia}[{i}] += value - {start!r}")
+        put = f"n.{mass} += value - {platform.mass!r}"
+        yield "platform.mass", "kg", "mass of the platform", platform.mass, put
+    for i, key in enumerate(("xx", "yy", "zz", "xy", "xz", "yz") if inertia else ()):
+        start = float(getattr(platform.inertia, key))
+        about = f"platform.inertia.{key}", "kg m^2", f"inertia {key} of the platform"
+        yield *about, start, f"n.{inertia}[{i}] += value - {start!r}"
     seen = Counter[str]()
     for chain in mechanism.chains:
         name, at = e.names[chain.name], f"n.{chain.kind}[{seen[chain.kind]}]"
         seen[chain.kind] += 1
         if chain.kind == "RSS":
             about = f"crank_inertia.{name}", "kg m^2", f"of the crank of {chain.name}"
-            yield Tuned(*about, chain.crank.inertia, f"{at}.crank = value")
+            yield *about, chain.crank.inertia, f"{at}.crank = value"
         if chain.kind == "PSS":
             about = f"slider_mass.{name}", "kg", f"of the slider of {chain.name}"
-            yield Tuned(*about, chain.slider.mass, f"{at}.slider = value")
+            yield *about, chain.slider.mass, f"{at}.slider = value"
         if "actuator" in sized:
-            family, actuator = FAMILIES[chain.kind], chain.actuator
-            unit, text = f"{family.effort_unit} s/{family.joint_unit}", f"friction of {chain.name}"
-            own = actuator.viscous, f"{at}.actuator[1] = value"
-            yield Tuned(f"viscous.{name}", unit, text, *own)
-            own = actuator.coulomb, f"{at}.actuator[2] = value"
-            yield Tuned(f"coulomb.{name}", family.effort_unit, text, *own)
+            family, text = FAMILIES[chain.kind], f"friction of {chain.name}"
+            units = f"{family.effort_unit} s/{family.joint_unit}", family.effort_unit
+            for k, (key, unit) in enumerate(zip(("viscous", "coulomb"), units, strict=True), 1):
+                own = getattr(chain.actuator, key), f"{at}.actuator[{k}] = value"
+                yield f"{key}.{name}", unit, text, *own
 
 
 def _evaluate(e: Exported, kind: str, places: dict[str, int]) -> str:
@@ -212,16 +201,14 @@ def _evaluate(e: Exported, kind: str, places: dict[str, int]) -> str:
         names = ["acceleration" if kind == "plant" and a.name == "q2" else a.name
                  for a in function.arguments]  # fmt: skip
         words = ", ".join(["of", *(f"v + {places[name]}" for name in names)])
-        lines += [
-            f"    status = {function.name}({words});",
-            "    if (status)",
-            "        return status;",
-        ]
+        lines.append(
+            f"    status = {function.name}({words});\n    if (status)\n        return status;"
+        )
     return "\n".join([*lines, "    return 0;", "}", "", ""])
 
 
 def _prepare(e: Exported, tuned: list[Tuned], places: dict[str, int]) -> str:
     lines = ["static void model_prepare(const double *v, model_constants *of)", "{"]
     lines += [f"    {e.prefix}_numbers n = {e.prefix.upper()}_NUMBERS;"]
-    lines += [f"    {t.code.replace('value', f'v[{places[t.name]}]')};" for t in tuned]
+    lines += [f"    {put.replace('value', f'v[{places[name]}]')};" for name, *_, put in tuned]
     return "\n".join([*lines, f"    {e.prefix}_prepare(&n, of);", "}", ""])

@@ -73,19 +73,11 @@ def help_text(e: Exported, f: Function, mechanism: Mechanism) -> str:
     ]
     lines += ["  one column serves all samples.", ""]
     for a in f.arguments:
-        lines += textwrap.wrap(
-            f"{a.name} ({a.size} x N): {a.text} [{a.unit}]: {', '.join(a.labels)}",
-            92,
-            initial_indent="  ",
-            subsequent_indent="      ",
-        )
+        lines += _wrapped(f"{a.name} ({a.size} x N): {a.text} [{a.unit}]: {', '.join(a.labels)}")
     words = "; ".join(f"{name.lower()}: {why}" for name, why in f.statuses.items())
-    lines += textwrap.wrap(
+    lines += _wrapped(
         f"status (1 x N): 0 where there is a result, else results are NaN. {words}. Without this "
-        "output it is an error.",
-        92,
-        initial_indent="  ",
-        subsequent_indent="      ",
+        "output it is an error."
     )
     head = f"function varargout = {f.name}(varargin)"
     text = [head, *(f"% {line}".rstrip() for line in lines)]
@@ -124,8 +116,7 @@ def example(e: Exported, mechanism: Mechanism) -> str:
     outputs = ", ".join([a.name for a in f.outputs] + ["status"])
     lines.append(f"[{outputs}] = {f.name}({', '.join(names)});")
     lines.append("assert(all(status == 0))")
-    if any(a.name == "effort" for a in f.outputs):
-        effort = next(a for a in f.outputs if a.name == "effort")
+    if effort := next((a for a in f.outputs if a.name == "effort"), None):
         legend = ", ".join(f"'{label}'" for label in map(_plain, effort.labels))
         lines += [f"% plot(t, effort'); legend({legend}); ylabel('effort [{effort.unit}]');"]
         known = {g.question: g for g in e.functions}
@@ -136,6 +127,10 @@ def example(e: Exported, mechanism: Mechanism) -> str:
                 "assert(max(abs(again(:) - q2(:))) < 1e-6 * max(abs(q2(:))))",
             ]
     return "\n".join([*lines, ""])
+
+
+def _wrapped(text: str) -> list[str]:
+    return textwrap.wrap(text, 92, initial_indent="  ", subsequent_indent=" " * 6)
 
 
 def _in_order(f: Function) -> Iterator[tuple[int, Argument]]:
