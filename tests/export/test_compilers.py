@@ -15,13 +15,7 @@ from condyle.export.c_package import write_facts
 Folders = Callable[[str], Folder]
 STRICT = "-Werror -Wshadow -Wstrict-prototypes -Wmissing-prototypes -Wdouble-promotion"
 SANITIZED = "-fsanitize=address,undefined -fno-sanitize-recover=all"
-CORTEX = (
-    "-mcpu=cortex-m7",
-    "-mfpu=fpv5-d16",
-    "-mfloat-abi=hard",
-    "-isystem",
-    "/usr/include/newlib",
-)
+CORTEX = "-mcpu=cortex-m7 -mfpu=fpv5-d16 -mfloat-abi=hard -isystem /usr/include/newlib"
 
 
 def checked(of: Folder, flags: str, **variables: str) -> str:
@@ -71,7 +65,7 @@ def test_a_bare_arm_calls_only_what_is_stated(folder: Folders, name: str) -> Non
     of = folder(name)
     need("arm-none-eabi-nm")
     strict = ["-Wall", "-Wextra", "-Wconversion", "-pedantic", *STRICT.split()]
-    build = ["-std=c99", "-O2", *strict, *CORTEX, "-c", of.source, "-o", "bare.o"]
+    build = ["-std=c99", "-O2", *strict, *CORTEX.split(), "-c", of.source, "-o", "bare.o"]
     run("arm-none-eabi-gcc", *build, folder=of.path)
     told = run("arm-none-eabi-nm", "-u", "bare.o", folder=of.path)
     # Compilers put memcpy for loops that copy.
@@ -109,10 +103,8 @@ def test_two_mechanisms_in_one_program(folder: Folders, tmp_path: Path) -> None:
     lines = [f'#include "{of.exported.prefix}.h"' for of in (jaw, hexapod)]
     lines += ["int main(void) {", "    double q[6] = {0}, pose[6], rate[6], more[6];"]
     lines += ["    hexapod_numbers numbers = HEXAPOD_NUMBERS;", "    hexapod_constants k;"]
-    lines += [
-        "    hexapod_prepare(&numbers, &k);",
-        "    return jaw_motion(q, q, q, pose, rate, more)",
-    ]
+    lines += ["    hexapod_prepare(&numbers, &k);"]
+    lines += ["    return jaw_motion(q, q, q, pose, rate, more)"]
     lines += ["        + hexapod_motion(&k, q, q, q, pose, rate, more);", "}", ""]
     (tmp_path / "both.c").write_text("\n".join(lines))
     sources = [of.path / of.source for of in (jaw, hexapod)]

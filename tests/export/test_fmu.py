@@ -28,8 +28,7 @@ POINT = np.array([0.02, 0.01, 0.005])
 FORCE, MOMENT = np.array([3.0, -2.0, 10.0]), np.array([0.01, 0.02, -0.03])
 EXACT = 1e-9  # of the largest entry
 
-needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
-pytestmark = needs_compiler
+pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
 
 
 @pytest.fixture(scope="module")
@@ -42,8 +41,7 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, int], Path
         folder, made = tmp_path_factory.mktemp("fmu"), {}
         for kind in KINDS:
             for version in VERSIONS:
-                made[kind, version] = folder / f"{kind}{version}.fmu"
-                path = made[kind, version]
+                made[kind, version] = path = folder / f"{kind}{version}.fmu"
                 assert target.write_fmu(condyle.load("masticatory"), kind, version, path)
     return made
 
@@ -310,16 +308,8 @@ def test_compilers_have_nothing_to_say(
     need(compiler)
     for kind in ("plant", "inverse"):  # with states and without
         zipfile.ZipFile(fmus[kind, version]).extractall(tmp_path / kind)
-        flags = (
-            "-std=c99",
-            "-pedantic",
-            "-Wall",
-            "-Wextra",
-            "-Wshadow",
-            "-Werror",
-            "-fsyntax-only",
-        )
-        run(compiler, *flags, "sources/fmu.c", folder=tmp_path / kind)
+        flags = "-std=c99 -pedantic -Wall -Wextra -Wshadow -Werror -fsyntax-only"
+        run(compiler, *flags.split(), "sources/fmu.c", folder=tmp_path / kind)
 
 
 def test_units_are_powers_of_base_units() -> None:

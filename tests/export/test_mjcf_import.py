@@ -56,16 +56,10 @@ def test_there_and_back(name: str, tmp_path: Path) -> None:
 
 
 def test_losses_and_every_family_come_back(tmp_path: Path) -> None:
-    changes = {
-        f"chain.masseter_left.actuator.{key}": value
-        for key, value in {
-            "torque_limit": (-1.0, 3.0),
-            "rotor_inertia": 1e-4,
-            "viscous": 0.004,
-            "coulomb": 0.03,
-        }.items()
-    }
-    mechanism = condyle.load("masticatory").set(changes)
+    losses = {"rotor_inertia": 1e-4, "viscous": 0.004, "coulomb": 0.03}
+    changes = {"torque_limit": (-1.0, 3.0), **losses}.items()
+    jaw = condyle.load("masticatory")
+    mechanism = jaw.set({f"chain.masseter_left.actuator.{k}": v for k, v in changes})
     write_mjcf(mechanism, tmp_path / "m.xml")
     same(mechanism, from_mjcf(tmp_path / "m.xml", mechanism.name).mechanism)
 
@@ -107,14 +101,8 @@ def stewart(folder: Path, carried: bool = True, **changes: str) -> Path:
         if not hung:
             connects += f'<connect body1="bar{i}" body2="plate" anchor="{ends}"/>'
         drives += f'<position name="servo{i}" joint="leg{i}" class="drive"/>'
-    text = TEMPLATE.read_text()
-    for key, value in {
-        "LEGS": legs,
-        "PLATFORM": "" if carried else platform,
-        "CONNECTS": connects,
-        "DRIVES": drives,
-        **changes,
-    }.items():
+    text, own = TEMPLATE.read_text(), {"LEGS": legs, "PLATFORM": "" if carried else platform}
+    for key, value in (own | {"CONNECTS": connects, "DRIVES": drives} | changes).items():
         text = text.replace(key, value)
     (folder / "stewart.xml").write_text(text)
     return folder / "stewart.xml"

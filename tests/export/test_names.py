@@ -15,6 +15,8 @@ from condyle.cli import completion
 from condyle.errors import InputError, UnsupportedError
 from condyle.export import CATALOGUE, export
 from condyle.export.c_names import identifier, identifiers, picked, require_prefix
+from condyle.mechanism.contact import Friction
+from condyle.mechanism.surface.plane import Plane
 from condyle.questions.law import CONTROLLERS
 
 
@@ -64,42 +66,26 @@ def test_every_argument_is_documented() -> None:
         ({"precision": "half"}, "precision"),
         ({"constants": "outside"}, "struct"),
         ({"lanes": 3}, "lanes"),
+        ({"questions": ("bounded",), "precision": "float"}, "in double"),
         ({"questions": ("closure",)}, "degrees of freedom"),
         ({"questions": ("closure",), "landmark": "nose"}, "landmark"),
     ],
 )
 def test_refusals_say_what_is_wrong(options: dict[str, Any], said: str) -> None:
-    with pytest.raises(InputError, match=said):
+    refusal = UnsupportedError if said == "in double" else InputError
+    with pytest.raises(refusal, match=said):
         export(condyle.load("masticatory"), **{"questions": ("motion",), **options})
 
 
-def test_friction_at_many_contacts_has_no_closed_form() -> None:
+@pytest.mark.parametrize("question", ["inverse", "bounded"])
+def test_friction_at_many_contacts_has_no_closed_form(question: str) -> None:
     machine = condyle.load("masticatory")
-    rough = [c.model_copy(update={"friction": _friction()}) for c in machine.contacts]
-    third = rough[0].model_copy(update={"name": "third", "point": (0.05, 0.0, 0.0)})
-    third = third.model_copy(update={"surface": _plane()})
-    many = machine.model_copy(update={"contacts": (*rough, third)})
+    rough = [c.model_copy(update={"friction": Friction(coefficient=0.1)}) for c in machine.contacts]
+    flat = Plane(kind="plane", slope=(0.0, 0.0), offset=0.0)
+    other = {"name": "third", "point": (0.05, 0.0, 0.0), "surface": flat}
+    many = machine.model_copy(update={"contacts": (*rough, rough[0].model_copy(update=other))})
     with pytest.raises(UnsupportedError, match="at most 2"):
-        export(many, ("inverse",))
-    with pytest.raises(UnsupportedError, match="at most 2"):
-        export(many, ("bounded",))
-
-
-def test_limits_need_double() -> None:
-    with pytest.raises(UnsupportedError, match="double"):
-        export(condyle.load("masticatory"), ("bounded",), precision="float")
-
-
-def _friction() -> Any:
-    from condyle.mechanism.contact import Friction
-
-    return Friction(coefficient=0.1)
-
-
-def _plane() -> Any:
-    from condyle.mechanism.surface.plane import Plane
-
-    return Plane(kind="plane", slope=(0.0, 0.0), offset=0.0)
+        export(many, (question,))
 
 
 def test_the_command(condyle_command: Any, tmp_path: Path) -> None:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from export.instructions import counts
-from support.tools import need
+from support.tools import need, run
 
 import condyle
-from condyle.export import Function, export
+from condyle.export import Exported, Function, export
 
 STATES = 10_000
 SPREAD = 1.10
@@ -41,3 +42,66 @@ def test_instructions_do_not_depend_on_the_state(tmp_path: Path) -> None:
     for question, instructions in found.items():
         assert instructions.min() > 0
         assert instructions.max() < SPREAD * instructions.min(), question
+
+
+def counts(
+    exported: Exported, states: Mapping[str, Mapping[str, np.ndarray]], folder: Path
+) -> dict[str, np.ndarray]:
+    """Instructions of each state, (N,), by question.
+
+    Every state has a function of its own, from which callgrind sees what the calls cost.
+
+    Args: states: question -> argument -> (N, size).
+    """
+    asked = [exported[question] for question in states]
+    count = len(next(iter(next(iter(states.values())).values())))
+    (folder / f"{exported.prefix}.c").write_text(exported.source)
+    (folder / f"{exported.prefix}.h").write_text(exported.header)
+    (folder / "states.c").write_text(_program(exported, asked, count))
+    rows = [np.hstack([states[f.question][a.name] for a in f.inputs]) for f in asked]
+    np.hstack(rows).astype(float).tofile(folder / "states.bin")
+    build = ["gcc", "-std=c99", "-ffp-contract=fast", "-fno-math-errno"]
+    run(*build, "-O2", "-c", f"{exported.prefix}.c", folder=folder)
+    run(*build, "-O0", "states.c", f"{exported.prefix}.o", "-o", "states", "-lm", folder=folder)
+    run("valgrind", "--tool=callgrind", "--callgrind-out-file=costs", "./states", folder=folder)
+    return _costs((folder / "costs").read_text(), asked, count)
+
+
+def _program(e: Exported, asked: list[Function], count: int) -> str:
+    width = sum(a.size for f in asked for a in f.inputs)
+    lines = ["#include <stdio.h>", f'#include "{e.prefix}.h"']
+    lines += [f"static double in[{count}][{width}], out[200];", "static int status;"]
+    calls, at = [], 0
+    for f in asked:
+        words, to = [], 0
+        for a in f.arguments:
+            words.append(f"in[i] + {at}" if a.given else f"out + {to}")
+            at, to = (at + a.size, to) if a.given else (at, to + a.size)
+        calls.append(f"status += {f.name}({', '.join(words)});")
+    lines.append(f"#define CALLS(i) {' '.join(calls)}")
+    lines += [
+        f"static void state_{i}(void) {{ CALLS({i}) }}".replace("[i]", f"[{i}]")
+        for i in range(count)
+    ]
+    lines += ["int main(void) {", '    FILE *f = fopen("states.bin", "rb");']
+    lines += ["    if (fread(in, sizeof in, 1, f) != 1) return 1;"]
+    lines += [f"    state_{i}();" for i in range(count)]
+    return "\n".join([*lines, "    return 0;", "}", ""]).replace("CALLS(i) ", "CALLS(i) ", 1)
+
+
+def _costs(text: str, asked: list[Function], count: int) -> dict[str, np.ndarray]:
+    found = {f.question: np.zeros(count, dtype=int) for f in asked}
+    names: dict[str, str] = {}
+    questions = {f.name: f.question for f in asked}
+    here, called = -1, ""
+    lines = iter(text.splitlines())
+    for line in lines:
+        if match := re.match(r"(c?)fn=\((\d+)\)(?: (\S+))?", line):
+            name = names.setdefault(match[2], match[3] or "")
+            if match[1]:
+                called = name
+            else:
+                here = int(name[6:]) if re.fullmatch(r"state_\d+", name) else -1
+        elif line.startswith("calls=") and here >= 0 and called in questions:
+            found[questions[called]][here] = int(next(lines).split()[-1])
+    return found
