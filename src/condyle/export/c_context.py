@@ -12,11 +12,10 @@ from ..backends.c.printer import Printer
 from ..errors import InputError, did_you_mean
 from ..graph.graph import Graph, Value
 from ..graph.operations import OPERATIONS, REDUCTIONS
-from ..graph.program import Numbers, Program, Variants
+from ..graph.program import Numbers, Program
 from ..kinematics.iteration import CLOSED, TINY
 from ..kinematics.one_angle import CLOSED as ANGLE_CLOSED
 from ..mechanism.mechanism import Mechanism
-from ..questions import Question
 from ..questions.inverse import DOUBTFUL, WEAK
 from ..questions.pose import CLOSED as POSE_CLOSED
 from ..questions.pose import CONDITIONED
@@ -33,6 +32,25 @@ PRECISIONS: tuple[Precision, ...] = ("double", "float")
 _FLOAT = {DOUBTFUL: 1e-6, WEAK: 1e-8, CLOSED**2: 4e-12, TINY**2: 1e-10, ANGLE_CLOSED: 4e-6}
 _ENCODERS = {POSE_CLOSED**2: 4e-10, POSE_TINY**2: 1e-10, CONDITIONED: 1e-6}
 _FLOAT_OF = {"pose": _ENCODERS, "observer": _ENCODERS}
+# Statuses in C, and where they come from.
+CODES = {
+    "OK": Status.ok,
+    "UNREACHABLE": Status.unreachable,
+    "SINGULAR": Status.singular,
+    "OUT_OF_BOUNDS": Status.overflow,
+    "INFEASIBLE": Status.infeasible,
+    "JAMMED": Status.jammed,
+    "UNCERTIFIED": Status.uncertified,
+}
+WHY = {
+    "OK": "results are written",
+    "UNREACHABLE": "no chain or contact reaches this pose, or none that could be vouched for",
+    "SINGULAR": "the pose is singular to this precision",
+    "OUT_OF_BOUNDS": "an argument is no number, or too large for the arithmetic",
+    "INFEASIBLE": "nothing within the limits, or no pose, fits what is given",
+    "JAMMED": "no pattern of friction is consistent",
+    "UNCERTIFIED": "a result was found that could not be certified",
+}
 
 
 def require_precision(name: str) -> Precision:
@@ -104,27 +122,6 @@ def _reduced(printer: Printer, v: int, values: dict[int, Any]) -> float:
     return min([a.min() for a in own] + [a for _, a in shared])
 
 
-# Statuses in C, and where they come from.
-CODES = {
-    "OK": Status.ok,
-    "UNREACHABLE": Status.unreachable,
-    "SINGULAR": Status.singular,
-    "OUT_OF_BOUNDS": Status.overflow,
-    "INFEASIBLE": Status.infeasible,
-    "JAMMED": Status.jammed,
-    "UNCERTIFIED": Status.uncertified,
-}
-WHY = {
-    "OK": "results are written",
-    "UNREACHABLE": "no chain or contact reaches this pose, or none that could be vouched for",
-    "SINGULAR": "the pose is singular to this precision",
-    "OUT_OF_BOUNDS": "an argument is no number, or too large for the arithmetic",
-    "INFEASIBLE": "nothing within the limits, or no pose, fits what is given",
-    "JAMMED": "no pattern of friction is consistent",
-    "UNCERTIFIED": "a result was found that could not be certified",
-}
-
-
 @dataclass(frozen=True)
 class Body:
     """A program as a C function.
@@ -158,15 +155,6 @@ class Context:
     struct: bool = False
     tables: dict[str, np.ndarray] = field(default_factory=dict)
     printers: dict[str, Printer] = field(default_factory=dict)
-
-    @property
-    def pulls(self) -> bool:
-        """Whether some chains can only pull."""
-        return any(chain.kind == "cable" for chain in self.mechanism.chains)
-
-    def variants(self, question: str, *details: Any) -> Variants:
-        """The graph of a question about this mechanism."""
-        return Question.about(self.structure, question, *details).variants()
 
     def table(self, name: str, printer: Printer) -> str:
         """The statement by which a body finds its constants."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -16,15 +16,19 @@ from ..backends.c.printer import nested, number
 from ..backends.c.straight_line import Straight
 from ..errors import UnsupportedError
 from ..graph.graph import Value
-from ..graph.program import Interface, Output, Program
+from ..graph.program import Output, Program
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
+from ..questions import Question
 from ..questions.friction import MOST
 from .c_context import ANGLES, CODES, LARGEST, WHY, Body, Context, threshold
-from .catalogue import Entry, Wish
+from .catalogue import Entry, Wish, least_norm
 from .exported import Argument, Function
 
 HUGE = {"double": 1e300, "float": 1e37}  # numbers of a program are kept within
+NAMES = {int(code): name for name, code in CODES.items()}
+# Ports that are numbers of the mechanism: limits, and by what efforts are measured.
+LIMITS = ("low", "high", "scale", "contact_low", "contact_high")
 
 
 @dataclass(frozen=True)
@@ -39,21 +43,6 @@ class Places:
     columns: tuple[str, ...]
     names: Mapping[str, str]
     order: tuple[int, ...]
-
-    @staticmethod
-    def of(
-        interface: Interface,
-        order: tuple[int, ...],
-        place: Callable[[str, int], str],
-        results: Mapping[str, str],
-    ) -> Places:
-        """Args: place: (port, entry) -> C;  results: names there -> arrays in C."""
-        columns = []
-        for port in interface.ports:
-            where = [(i, k) for i in range(port.size) for k in (order if port.lanes else (0,))]
-            stride = interface.lanes if port.lanes else 1
-            columns += [place(port.name, i * stride + k) for i, k in where]
-        return Places(tuple(columns), results, order)
 
     def result(self, name: str, entry: int, lane: int | None) -> str:
         """C for one number of a result, of a lane if it has lanes."""
@@ -207,11 +196,6 @@ def _in_a_row(places: list[str]) -> bool:
     return at == list(range(at[0], at[0] + len(at)))
 
 
-NAMES = {int(code): name for name, code in CODES.items()}
-# Ports that are numbers of the mechanism: limits, and by what efforts are measured.
-LIMITS = ("low", "high", "scale", "contact_low", "contact_high")
-
-
 def renamed(words: str) -> dict[str, str]:
     """Ports or results -> names in C, of an entry."""
     return {pair[0]: pair[-1] for pair in (word.split(">") for word in words.split())}
@@ -229,7 +213,8 @@ def function(c: Context, name: str, entry: Entry, wish: Wish) -> Body:
         )
     if entry.question == "limited" and c.precision != "double":
         raise UnsupportedError("efforts within limits are exported in double alone")
-    found = c.variants(entry.question or name, *entry.details(wish))
+    question = Question.about(c.structure, entry.question or name, *entry.details(wish))
+    found = question.variants()
     results = renamed(entry.results)
     program = _pruned(found.robust or found.main, results)
     given = renamed(entry.given or " ".join(_used(program)))
@@ -239,7 +224,8 @@ def function(c: Context, name: str, entry: Entry, wish: Wish) -> Body:
     public = f"int {c.prefix}_{name}({parameters})"
     scalar = Scalar(c.floats(program, name), _places(c, program, given, arguments), c.precision)
     text, own = entry.text, f"{c.prefix}_{name}"
-    if c.pulls and not entry.limited and any(a.name == "effort" and not a.given for a in arguments):
+    efforts = any(a.name == "effort" and not a.given for a in arguments)
+    if efforts and not entry.limited and least_norm(c.mechanism):
         text += " Limits are not regarded: a cable's effort may be negative."
     why = {status: WHY[status] for *_, status in _judged(c, entry, scalar, arguments)}
     made = Function(own, name, text, arguments, entry.steps, scalar.operations, why)
@@ -308,7 +294,7 @@ def _places(
     c: Context, program: Program, given: Mapping[str, str], arguments: Sequence[Argument]
 ) -> Places:
     """Where numbers are; of ports without an argument, or beyond its end, what they are."""
-    sizes = {a.name: a.size for a in arguments if a.given}
+    sizes, order = {a.name: a.size for a in arguments if a.given}, c.numbers.order
     known, huge = own_numbers(c.mechanism), HUGE[c.precision]
     suffix = "" if c.precision == "double" else "f"
 
@@ -320,8 +306,11 @@ def _places(
             value = max(-huge, min(huge, known[port][i]))
         return f"({value!r}{suffix})"
 
-    results = {a.port: a.name for a in arguments if not a.given}
-    return Places.of(program.interface, c.numbers.order, place, results)
+    columns = []
+    for port in program.ports:
+        stride, lanes = (len(order), order) if port.lanes else (1, (0,))
+        columns += [place(port.name, i * stride + k) for i in range(port.size) for k in lanes]
+    return Places(tuple(columns), {a.port: a.name for a in arguments if not a.given}, order)
 
 
 def own_numbers(mechanism: Mechanism) -> dict[str, list[float]]:

@@ -21,6 +21,9 @@ typename using virtual xor
 """
 RESERVED = frozenset(_C.split()) | frozenset(word.lower() for word in keyword.kwlist)
 OTHERS = ("main", "check", "checker", "example")  # files of an exported folder besides
+_WORD = re.compile(r"[A-Za-z_]\w*")
+_DEFINED = re.compile(r"^\s*(?:#define\s+(\w+)|INLINE[^(]*?(\w+)\(|static[^(]*?(\w+)\()", re.M)
+_MACHINE = re.compile(r"^(ONE_ARGUMENT|TWO_ARGUMENTS)\((\w+)", re.M)
 
 
 def identifier(name: str) -> str:
@@ -79,11 +82,6 @@ def require_prefix(prefix: str) -> str:
             f"and _, a letter first, other than {', '.join(OTHERS)}"
         )
     return prefix
-
-
-_WORD = re.compile(r"[A-Za-z_]\w*")
-_DEFINED = re.compile(r"^\s*(?:#define\s+(\w+)|INLINE[^(]*?(\w+)\(|static[^(]*?(\w+)\()", re.M)
-_MACHINE = re.compile(r"^(ONE_ARGUMENT|TWO_ARGUMENTS)\((\w+)", re.M)
 
 
 def picked(text: str, wanted: str) -> str:

@@ -27,6 +27,10 @@ from .exported import Exported, Function
 # By precision: what results may differ from the library's by, over the largest entry of each.
 TOLERANCE = {"double": 1e-12, "float": 1e-4}
 DUAL = 1e3  # of that, for efforts within limits, which squares decide on
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=fast", "-fno-math-errno")
+SECONDS = 300
+NOTHING: dict[str, Any] = {"code": None, "stack": None, "error": None, "wrong": None}
+_TOLD = re.compile(r"^(\w+): (\d+) samples, worst error (\S+), (\d+) wrong", re.MULTILINE)
 
 
 def write_package(
@@ -154,12 +158,6 @@ def _checked(e: Exported, f: Function) -> list[str]:
         ),
         f'    }}\n    return told("{f.name}", {count}, wrong, worst, {tolerance(e, f)!r});\n}}\n',
     ]
-
-
-FLAGS = ("-std=c99", "-O2", "-ffp-contract=fast", "-fno-math-errno")
-SECONDS = 300
-NOTHING: dict[str, Any] = {"code": None, "stack": None, "error": None, "wrong": None}
-_TOLD = re.compile(r"^(\w+): (\d+) samples, worst error (\S+), (\d+) wrong", re.MULTILINE)
 
 
 @dataclass(frozen=True)

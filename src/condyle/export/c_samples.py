@@ -25,6 +25,10 @@ from .exported import Exported, Function
 
 Arrays = dict[str, np.ndarray]
 Given = Mapping[str, np.ndarray]  # argument -> (N, size)
+COUNT = 40
+SIZES = {"force": 20.0, "moment": 0.5, "point": 0.05, "kp": 400.0, "kd": 40.0, "period": 1e-3}
+SIGNED = ("force", "moment", "point", "direction")
+WIDTH = 0.1  # of states about home, in characteristic lengths and radians, halved until most reach
 
 
 @dataclass
@@ -75,15 +79,19 @@ def _graph(r: Reference, question: str, given: Given) -> tuple[Arrays, np.ndarra
     return results, np.where(found.status == AGAIN, unsure, found.status)
 
 
+def _load(given: Given) -> np.ndarray:
+    return np.hstack([given[name] for name in ("force", "moment", "point")])
+
+
 def _inverse(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
-    load = np.hstack([given[name] for name in ("force", "moment", "point")])
-    found = r.model.torques(given["q"], given["q1"], given["q2"], load, outputs=("contact",))
+    found = r.model.torques(
+        given["q"], given["q1"], given["q2"], _load(given), outputs=("contact",)
+    )
     return {"effort": found.effort, "contact_force": found["contact_force"]}, found.status
 
 
 def _forward(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
-    load = np.hstack([given[name] for name in ("force", "moment", "point")])
-    found = r.model.forward(given["q"], given["q1"], given["effort"], load)
+    found = r.model.forward(given["q"], given["q1"], given["effort"], _load(given))
     results = {"acceleration": found.acceleration, "contact_force": found.contact_force}
     return results, found.status
 
@@ -114,11 +122,7 @@ _ANSWERS: dict[str, Callable[[Reference, Given], tuple[Arrays, np.ndarray]]] = {
 }
 
 
-COUNT = 40
-SIZES = {"force": 20.0, "moment": 0.5, "point": 0.05, "kp": 400.0, "kd": 40.0, "period": 1e-3}
 SIZES |= {"resolution": 1e-5, "smoothing": 0.9, "stiffness": 100.0, "damping": 10.0}
-SIGNED = ("force", "moment", "point", "direction")
-WIDTH = 0.1  # of states about home, in characteristic lengths and radians, halved until most reach
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib.resources import files
 
@@ -33,11 +33,12 @@ from .c_names import (
     used,
 )
 from .catalogue import Entry, Wish, in_order, least_norm, require_question, usual
-from .exported import Argument, Arguments, Exported, Function
+from .exported import Arguments, Exported, Function
 
 # Functions of the C library that a source may call, in `double`.
 LIBRARY = """sqrt fabs floor ceil atan2 pow fmod remainder hypot exp expm1 log log1p tan asin acos
 atan sinh cosh tanh asinh acosh atanh erf copysign sin cos"""
+WIDTH = 100
 
 
 def export(
@@ -89,6 +90,7 @@ def export(
     named = [*(chain.name for chain in mechanism.chains), *mechanism.contact_names]
     portable = _portable(c, bodies)
     source = _source(c, bodies, portable)
+    code = re.sub(r"/\*.*?\*/", "", portable, flags=re.DOTALL)
     exported = Exported(
         prefix=name,
         source=source,
@@ -98,7 +100,7 @@ def export(
         names=identifiers(named),
         struct=struct,
         lanes=c.lanes if any(body.wide for body in bodies) else 0,
-        symbols=_symbols(c, portable),
+        symbols=tuple(f"{word}{'f' * (real == 'float')}" for word in used(code, LIBRARY)),
         recipe={"formulation": model.formulation, "route": route},
     )
     extra = c_struct.declared(c) if struct else ""
@@ -167,15 +169,6 @@ def _table(c: Context, name: str) -> str:
     return f"static const {c.precision} {c.prefix}_{name}_table[{len(rows)}] = {{\n    {body}}};\n"
 
 
-def _symbols(c: Context, source: str) -> tuple[str, ...]:
-    """Functions of the library that a source calls, with the suffix of its precision."""
-    code = re.sub(r"/\*.*?\*/", "", source, flags=re.DOTALL)
-    return tuple(f"{word}{'f' * (c.precision == 'float')}" for word in used(code, LIBRARY))
-
-
-WIDTH = 100
-
-
 def header_text(exported: Exported, mechanism: Mechanism, extra: str) -> str:
     """The file `prefix`.h. Args: extra: what constants in a structure need."""
     p = exported.prefix.upper()
@@ -239,7 +232,9 @@ def _sizes(p: str, exported: Exported, m: Mechanism) -> str:
 
 def _declared(exported: Exported, f: Function) -> str:
     lines = [f.text, ""]
-    lines += [line for a in f.arguments for line in _argument(a)]
+    for a in f.arguments:
+        lines.append(f"  {a.name}[{a.size}]  {'in' if a.given else 'out'}: {a.text} [{a.unit}]")
+        lines.append(f"      order: {', '.join(a.labels)}")
     if f.iterations:
         lines += ["", f"At most {f.iterations} steps."]
     words = [f"{name.lower()} ({why})" for name, why in f.statuses.items()]
@@ -248,12 +243,6 @@ def _declared(exported: Exported, f: Function) -> str:
         f"{exported.prototype(f)};", WIDTH, subsequent_indent="    ", break_long_words=False
     )
     return _comment(lines) + "\n".join(declared) + "\n"
-
-
-def _argument(a: Argument) -> Iterator[str]:
-    way = "in" if a.given else "out"
-    yield f"  {a.name}[{a.size}]  {way}: {a.text} [{a.unit}]"
-    yield f"      order: {', '.join(a.labels)}"
 
 
 def _comment(lines: Sequence[str]) -> str:

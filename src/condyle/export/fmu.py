@@ -33,6 +33,15 @@ FOLDERS: dict[str, dict[str, tuple[str | None, str]]] = {
     "darwin": {"x86_64": ("darwin64", "x86_64-darwin"), "arm64": (None, "aarch64-darwin")},
     "win32": {"amd64": ("win64", "x86_64-windows")},
 }
+# Powers of kg, m, s, rad in units of ours.
+BASE = {
+    "m": {"m": 1},
+    "rad": {"rad": 1},
+    "kg": {"kg": 1},
+    "N": {"kg": 1, "m": 1, "s": -2},
+    "s": {"s": 1},
+}
+STEP = {"canHandleVariableCommunicationStepSize": "true"}
 
 
 def write_fmu(mechanism: Mechanism, kind: str, version: int, path: Path) -> bool:
@@ -95,17 +104,6 @@ def _built(sources: dict[str, str]) -> bytes | None:
         library = Path(folder, "fmu.bin")
         replace(compiler, flags=FLAGS).build(library, Path(folder, "fmu.c"))
         return library.read_bytes()
-
-
-# Powers of kg, m, s, rad in units of ours.
-BASE = {
-    "m": {"m": 1},
-    "rad": {"rad": 1},
-    "kg": {"kg": 1},
-    "N": {"kg": 1, "m": 1, "s": -2},
-    "s": {"s": 1},
-}
-STEP = {"canHandleVariableCommunicationStepSize": "true"}
 
 
 def description(fmu: Fmu, version: int) -> str:

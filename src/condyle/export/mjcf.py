@@ -37,6 +37,14 @@ from ..model.model import Model
 from .mjcf_tracks import Freedom, Track, track
 from .mjcf_xml import Document, element, inertial, quaternion, rgba
 
+RUNNER = 1e-3  # mass of a runner over the platform's
+PARALLEL = 1e-12
+LIGHT = 1e-6  # mass of a massless body over the platform's
+THIN, SLENDER = 1e-2, 0.03  # radius of gyration over a length; drawn radius over the mechanism's
+BARREL = 0.6  # length of a leg's cylinder over the leg's at home
+UNLIMITED = 1e9  # N: of a cable that has no greatest tension
+X, ZERO = np.array([1.0, 0, 0]), np.zeros(3)
+
 
 @dataclass(frozen=True)
 class Mjcf:
@@ -80,10 +88,6 @@ def _home(document: Document) -> None:
         document.add("keyframe", "key", name="home", ctrl=efforts.effort[0])
     except CondyleError:
         document.note("no efforts hold it at home, so there is no keyframe with them")
-
-
-RUNNER = 1e-3  # mass of a runner over the platform's
-PARALLEL = 1e-12
 
 
 def write_platform(d: Document) -> None:
@@ -248,13 +252,6 @@ def _cost(found: Track) -> tuple[int, int, float]:
 
 def _ball(d: Document, contact: Contact) -> float:
     return contact.ball_radius or 0.06 * d.size
-
-
-LIGHT = 1e-6  # mass of a massless body over the platform's
-THIN, SLENDER = 1e-2, 0.03  # radius of gyration over a length; drawn radius over the mechanism's
-BARREL = 0.6  # length of a leg's cylinder over the leg's at home
-UNLIMITED = 1e9  # N: of a cable that has no greatest tension
-X, ZERO = np.array([1.0, 0, 0]), np.zeros(3)
 
 
 def write_chain(d: Document, chain: Any) -> None:

@@ -30,6 +30,10 @@ from .mjcf_graph import WORLD, Graph, Step, read_graph, turned
 PARALLEL = 1e-3  # sine
 FEWEST = 3  # chains and contacts that make a body the platform
 LINES = "ball slide ball (SPS), slide ball ball (PSS), hinge ball ball (RSS)"
+_ENTRIES = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+PARALLEL_AXES = 1e-6  # sine, of a contact's joints
+PLANE, SPHERE = 0, 2  # geoms of MuJoCo
+OFF_LINE = 1e-3  # of a rod: what is nearer to its line is on it
 
 
 @dataclass(frozen=True)
@@ -256,13 +260,6 @@ def _platform_table(
     return {"mass": body.mass, "inertia": inertia, **({"points": points} if points else {})}
 
 
-_ENTRIES = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
-
-
-PARALLEL_AXES = 1e-6  # sine, of a contact's joints
-PLANE, SPHERE = 0, 2  # geoms of MuJoCo
-
-
 def contact_of(graph: Graph, steps: tuple[Step, ...], name: str) -> dict[str, Any] | None:
     """The contact that joints from the world to a ball joint are, if they are one."""
     kinds, at = [step.kind for step in steps], steps[-1].point
@@ -373,9 +370,6 @@ def _plane(graph: Graph, n: np.ndarray, at: np.ndarray) -> dict[str, Any]:
     a, b = (round(float(v), 12) + 0.0 for v in -n[:2] / n[2])
     x, y, z = graph.point(at)
     return {"kind": "plane", "slope": [a, b], "offset": z - a * x - b * y}
-
-
-OFF_LINE = 1e-3  # of a rod: what is nearer to its line is on it
 
 
 def part(
