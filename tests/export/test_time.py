@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import subprocess
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -63,7 +64,8 @@ def counts(
     build = ["gcc", "-std=c99", "-ffp-contract=fast", "-fno-math-errno"]
     run(*build, "-O2", "-c", f"{exported.prefix}.c", folder=folder)
     run(*build, "-O0", "states.c", f"{exported.prefix}.o", "-o", "states", "-lm", folder=folder)
-    run("valgrind", "--tool=callgrind", "--callgrind-out-file=costs", "./states", folder=folder)
+    count_them = ["valgrind", "--tool=callgrind", "--callgrind-out-file=costs", "./states"]
+    subprocess.run(count_them, cwd=folder, capture_output=True, check=True)  # takes minutes
     return _costs((folder / "costs").read_text(), asked, count)
 
 
