@@ -61,17 +61,8 @@ def test_states_as_a_table(condyle_command: Callable[..., Any], tmp_path: Path) 
     names = [p + n for p in ("", "d", "dd") for n in ("X", "Y", "alpha", "beta")]
     rows = [",".join(names), ",".join(["0"] * 12), ",".join(["0.001"] * 12)]
     (tmp_path / "states.csv").write_text("\n".join(rows))
-    command = (
-        "solve",
-        "masticatory",
-        "--states",
-        "states.csv",
-        "--out",
-        "x.csv",
-        "--backend",
-        "numpy",
-    )
-    outcome = condyle_command(*command, "--mat", "--reactions")
+    command = "solve masticatory --states states.csv --out x.csv --backend numpy --mat --reactions"
+    outcome = condyle_command(*command.split())
     assert outcome.status == 0 and "x.mat" in outcome.out
     read = loadmat(tmp_path / "x.mat", simplify_cells=True)
     written = np.genfromtxt(tmp_path / "x.csv", delimiter=",", names=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -87,11 +86,8 @@ def status_columns(
     Where efforts have limits, `shortfall` besides: see `Derived.shortfall`.
     """
     words = [str(owner) for owner in owners(mechanism)]
-    needed: dict[str, np.ndarray | list[str]] = {}
-    if shortfall is not None:
-        needed["shortfall"] = shortfall
-    return {"status": _words(STATUS_NAMES, status), "cause": _words(words, cause)} | needed
-
-
-def _words(words: Sequence[str], index: np.ndarray) -> list[str]:
-    return [words[i] for i in index.tolist()]
+    columns: dict[str, np.ndarray | list[str]] = {
+        "status": [STATUS_NAMES[i] for i in status.tolist()],
+        "cause": [words[i] for i in cause.tolist()],
+    }
+    return columns if shortfall is None else columns | {"shortfall": shortfall}

@@ -80,7 +80,7 @@ def summarize(solution: Solution) -> Summary:
     ok = solution["status"].values == 0
     units = solution["effort_unit"].values
     margins, ratio = solution["bound_margin"].values, solution["singularity_ratio"].values
-    options = solution.options
+    options, failed = solution.options, solution.failures
     some = bool(ok.any())
     bounds = {}
     for i, name in enumerate(solution["contact"].values):
@@ -97,28 +97,28 @@ def summarize(solution: Solution) -> Summary:
             "mechanism": solution.attrs["mechanism_name"],
             "samples": len(time),
             "failed_samples": int((~ok).sum()),
-            "failures": [asdict(failure) for failure in solution.failures],
+            "failures": [asdict(failure) for failure in failed],
             "time": [float(time[0]), float(time[-1])],
             "formulation": options["formulation"],
             "route": options["route"],
             "seconds": options["solve_seconds"],
             "peak_effort": {
-                str(name): [float(np.nanmax(np.abs(torque[:, i]))) if some else None, str(units[i])]
+                str(name): [float(np.nanmax(np.abs(torque[:, i]))), str(units[i])]
                 for i, name in enumerate(solution["chain"].values)
-            }
-            if some
-            else {},
+                if some
+            },
             "greatest_activation": _greatest_activation(solution),
             "distribution": options.get("distribution", "minimum_norm"),
             "power": _power(solution),
             "friction_work": _friction_work(solution),
-            "shortfall": _shortfall(solution),
+            "shortfall": max(
+                (f.shortfall for f in failed if f.shortfall is not None), default=None
+            ),
             "peak_contact_force": {
                 str(name): [float(np.nanmin(contact[:, i])), float(np.nanmax(contact[:, i]))]
                 for i, name in enumerate(solution["contact"].values)
-            }
-            if some
-            else {},
+                if some
+            },
             "closest_to_singularity": None
             if closest is None
             else {"ratio": float(ratio[closest]), "time": float(time[closest])},
@@ -185,9 +185,3 @@ def _friction_work(solution: Solution) -> dict[str, float]:
     done = work(power, solution["time"].values)
     names = solution["contact"].values
     return {str(name): float(done[i]) for i, name in enumerate(names) if done[i]}
-
-
-def _shortfall(solution: Solution) -> float | None:
-    """The largest number by which limits would have to be multiplied, above 1."""
-    needed = [one.shortfall for one in solution.failures if one.shortfall is not None]
-    return max(needed) if needed else None
