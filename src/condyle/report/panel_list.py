@@ -308,41 +308,20 @@ def singularity(solution: Solution) -> Iterator[Panel]:
     condition = solution["condition"].values
     sigma = solution["J_W_sigma"].values
     near = Limit(NEAR_SINGULAR, math.inf, f"near: {NEAR_SINGULAR:g}")
-    for name, title, axis, curves, note, more in (
-        (
-            "transmission",
-            "Transmission (J_A, dimensionless)",
-            "transmission",
-            of_names(solution, "transmission", "chain"),
-            "±1 is best; 0 is an inverse singularity of that chain.",
-            {},
-        ),
-        (
-            "sigma",
-            "Singular values of J_W (dimensionless)",
-            "σ",
-            [Curve(f"σ{i + 1}", f"J_W_sigma.{i}", one) for i, one in enumerate(sigma.T)],
-            "The smallest at 0 is a direct singularity.",
-            {"log": True},
-        ),
-        (
-            "ratio",
-            "Distance from a singularity",
-            "ratio",
-            [Curve("ratio", "singularity_ratio", solution["singularity_ratio"].values)],
-            "Smallest over largest singular value of J_A or J_W; 0 is singular.",
-            {"log": True, "limits": [near]},
-        ),
-        (
-            "condition",
-            "Condition number of J_W",
-            "condition",
-            [Curve("condition", "condition", np.where(np.isfinite(condition), condition, np.nan))],
-            "",
-            {"log": True},
-        ),
-    ):
-        yield Panel(name, title, axis, "1", curves, note=note, **more)
+    note = "±1 is best; 0 is an inverse singularity of that chain."
+    chains, title = of_names(solution, "transmission", "chain"), "Transmission (J_A, dimensionless)"
+    yield Panel("transmission", title, "transmission", "1", chains, note=note)
+    title = "Singular values of J_W (dimensionless)"
+    note = "The smallest at 0 is a direct singularity."
+    values = [Curve(f"σ{i + 1}", f"J_W_sigma.{i}", v) for i, v in enumerate(sigma.T)]
+    yield Panel("sigma", title, "σ", "1", values, note=note, log=True)
+    note = "Smallest over largest singular value of J_A or J_W; 0 is singular."
+    ratio = [Curve("ratio", "singularity_ratio", solution["singularity_ratio"].values)]
+    title = "Distance from a singularity"
+    yield Panel("ratio", title, "ratio", "1", ratio, note=note, log=True, limits=[near])
+    finite = np.where(np.isfinite(condition), condition, np.nan)
+    one = [Curve("condition", "condition", finite)]
+    yield Panel("condition", "Condition number of J_W", "condition", "1", one, log=True)
 
 
 @panels("singularity", "Diagonal of J_A", split=0)

@@ -165,7 +165,10 @@ class Session:
         status = int(found.status[0])
         pose = found.pose[0]
         met = bool(np.isfinite(pose).all())
-        wanted = None if met else self._wanted()
+        # What was asked for, completed by the dependent coordinates of the last good pose.
+        wanted = None if met else self._pose.copy()
+        if wanted is not None:
+            wanted[indices(self.model.independent)] = self.q
         if met:
             self._pose = pose
         joint, reach = found.configuration.joint[0], found.configuration.discriminant[0]
@@ -183,9 +186,21 @@ class Session:
             force = force + directions.contact @ self.internal
         measures = measured(found.configuration.singularity)
         margin = bound_margins(self.mechanism, found.configuration.contact_point)[0]
-        level, messages = self._messages(
-            found, met, broken, margin, torque, force, measures["near"]
-        )
+        level: Level
+        if status == Status.unreachable:
+            level, cause = "unreachable", unreachable_cause(self.mechanism, found, 0)
+            messages = [f"Out of reach: {cause}"]
+            others = [name for name in broken if f'"{name}"' not in cause]
+            if met and others:
+                messages.append(f"Also out of reach: {', '.join(others)}")
+            messages += bound_messages(self.mechanism, margin)
+        else:
+            messages = [] if status == Status.ok else [NO_EFFORTS[status]]
+            messages += state_messages(self.mechanism, margin, force, torque, None)
+            if (near := measures["near"]) != KINDS[0] and status == Status.ok:
+                text = f"Near a singularity of the kind {near} (ratio below {NEAR_SINGULAR:g})"
+                messages.append(text)
+            level = "warning" if messages else "calm"
         return Snapshot.at(
             self.mechanism,
             self._pose,
@@ -200,7 +215,7 @@ class Session:
             load=self.load,
             load_at=self._load_at(),
             level=level,
-            messages=messages,
+            messages=tuple(messages),
             **measures,
         )
 
@@ -211,40 +226,6 @@ class Session:
 
     def _load_at(self) -> np.ndarray:
         return np.array(self.mechanism.platform.points.get(self.load_point, (0.0, 0.0, 0.0)))
-
-    def _wanted(self) -> np.ndarray:
-        """What was asked for, completed by the dependent coordinates of the last good pose."""
-        wanted = self._pose.copy()
-        wanted[indices(self.model.independent)] = self.q
-        return wanted
-
-    def _messages(
-        self,
-        found: Evaluation,
-        met: bool,
-        broken: list[str],
-        margin: np.ndarray,
-        torque: np.ndarray,
-        force: np.ndarray,
-        near: str,
-    ) -> tuple[Level, tuple[str, ...]]:
-        status = int(found.status[0])
-        if status == Status.unreachable:
-            cause = unreachable_cause(self.mechanism, found, 0)
-            messages = [f"Out of reach: {cause}"]
-            others = [name for name in broken if f'"{name}"' not in cause]
-            if met and others:
-                messages.append(f"Also out of reach: {', '.join(others)}")
-            return "unreachable", (*messages, *bound_messages(self.mechanism, margin))
-        messages = []
-        if status != Status.ok:
-            messages.append(NO_EFFORTS[status])
-        messages += state_messages(self.mechanism, margin, force, torque, None)
-        if near != KINDS[0] and status == Status.ok:
-            messages.append(
-                f"Near a singularity of the kind {near} (ratio below {NEAR_SINGULAR:g})"
-            )
-        return ("warning" if messages else "calm"), tuple(messages)
 
 
 def _around_home(value: np.ndarray, reached: np.ndarray) -> tuple[float, float]:

@@ -76,16 +76,15 @@ def reduced(solution: Solution) -> Reduced:
         near += int((piece["singularity"].values != 0).sum())
         meter.see(piece)
         for name, values in curve_values(piece).items():
-            _take(envelope, name, values, time, starts, first, last)
-    for name in envelope.low:
-        for best, values, at in (
-            (np.nanargmin, envelope.low[name], envelope.low_at[name]),
-            (np.nanargmax, envelope.high[name], envelope.high_at[name]),
-        ):
+            spans = envelope.spans.setdefault(name, np.array(4 * [np.full(buckets, np.nan)]))
+            spans[:, first:last] = _extremes(values, np.diff(starts[first : last + 1]))
+    length = np.maximum(np.diff(envelope.edges), 1e-300)
+    for spans in envelope.spans.values():
+        at = starts[:-1] + np.nan_to_num(spans[2:]).astype(int)
+        for best, values, sample in zip((np.nanargmin, np.nanargmax), spans[:2], at, strict=True):
             if np.isfinite(values).any():
-                k = int(best(values))
-                extremes.add(int(starts[k] + at[k]))
-    _as_fractions(envelope, time, starts)
+                extremes.add(int(sample[best(values)]))
+        spans[2:] = np.clip((time[at] - envelope.edges[:-1]) / length, 0.0, 1.0)
     extremes |= set(_edges(status).tolist())
     steps = np.linspace(0, count - 1, max(spare - len(extremes), 2)).astype(int)
     samples = np.unique([*steps, *extremes])
@@ -113,41 +112,16 @@ def pieces(starts: np.ndarray) -> Iterator[tuple[int, int]]:
         first = end
 
 
-def _take(
-    envelope: Envelope,
-    name: str,
-    values: np.ndarray,
-    time: np.ndarray,
-    starts: np.ndarray,
-    first: int,
-    last: int,
-) -> None:
-    """Put the spans `first` to `last` of a curve into the envelope, places as sample numbers."""
-    size = np.diff(starts[first : last + 1])
-    at = np.arange(size.max())
-    inside = at < size[:, None]
+def _extremes(values: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Of spans of so many samples: least and greatest value, and their numbers in it, (4, B)."""
+    inside = np.arange(size.max()) < size[:, None]
     wide = np.full(inside.shape, np.nan)
     wide[inside] = values
-    span = slice(first, last)
-    for best, store, places, worst in (
-        (np.argmin, envelope.low, envelope.low_at, np.inf),
-        (np.argmax, envelope.high, envelope.high_at, -np.inf),
-    ):
-        if name not in store:
-            store[name] = np.full(len(starts) - 1, np.nan)
-            places[name] = np.zeros(len(starts) - 1)
-        k = best(np.where(np.isnan(wide), worst, wide), axis=1)
-        store[name][span] = wide[np.arange(len(k)), k]
-        places[name][span] = k
-
-
-def _as_fractions(envelope: Envelope, time: np.ndarray, starts: np.ndarray) -> None:
-    """Places as parts of their span's time, in place of sample numbers."""
-    length = np.maximum(np.diff(envelope.edges), 1e-300)
-    for places in (envelope.low_at, envelope.high_at):
-        for name, at in places.items():
-            when = time[starts[:-1] + at.astype(int)]
-            places[name] = np.clip((when - envelope.edges[:-1]) / length, 0.0, 1.0)
+    at = [
+        np.argmin(np.where(np.isnan(wide), np.inf, wide), axis=1),
+        np.argmax(np.where(np.isnan(wide), -np.inf, wide), axis=1),
+    ]
+    return np.array([*(wide[np.arange(len(k)), k] for k in at), *at])
 
 
 def _edges(status: np.ndarray, most: int = 200) -> np.ndarray:
