@@ -8,9 +8,8 @@ import pytest
 import condyle
 from condyle.motion import trial_motion
 from condyle.report.figures import PLOTS
-from condyle.report.page.page_columns import Columns
+from condyle.report.page.page_columns import Columns, panel_data
 from condyle.report.page.page_facts import alerts, chain_table
-from condyle.report.page.panel_data import panel_data
 from condyle.report.panel import panels_of
 from condyle.report.panel_list import load, torque
 from condyle.results.solution import Solution

@@ -29,44 +29,29 @@ class LivePlayer:
     """A simulation with a clock; of the same use to the page as a `Playback`.
 
     Attributes: playing;  speed: times real time;  again: whether it begins again at its end;
-                stiffness: of the hand [N/m];  pull_at: name of the point that it holds.
+                stiffness: of the hand [N/m];  pull_at: name of the point that it holds, of
+                `pull_points`.   independent, load_names: names of q and of the scenario's loads.
+                moment: the last that could be seen.
     """
 
     def __init__(self, plan: Plan) -> None:
         self.mechanism: Mechanism = plan.model.mechanism
-        self._plan, self._model = plan, plan.model
+        self._model = plan.model
         self.live = Live(plan)
         self.playing, self.speed, self.again = True, 1.0, True
         self.stiffness = HAND * self.mechanism.platform.mass
+        self.independent = tuple(plan.model.independent)
+        self.load_names = tuple(load.name for load in plan.loads)
         points = self.mechanism.platform.points
+        self.pull_points = (CENTRE, *points)
         self.pull_at = DEFAULT_LOAD_POINT if DEFAULT_LOAD_POINT in points else CENTRE
         self._pace, self._clock = 1.0, 0.0
-        self._last = self.live.moment()
+        self.moment = self.live.moment()
 
     @property
     def now(self) -> float:
         """Time of the simulation [s]."""
         return self.live.t
-
-    @property
-    def independent(self) -> tuple[str, ...]:
-        """Names of q."""
-        return tuple(self._model.independent)
-
-    @property
-    def load_names(self) -> tuple[str, ...]:
-        """Of the scenario's loads."""
-        return tuple(load.name for load in self._plan.loads)
-
-    @property
-    def pull_points(self) -> tuple[str, ...]:
-        """Where a hand can pull."""
-        return (CENTRE, *self.mechanism.platform.points)
-
-    @property
-    def moment(self) -> Moment:
-        """The last that could be seen."""
-        return self._last
 
     # -- time -----------------------------------------------------------------------------------
 
@@ -118,7 +103,7 @@ class LivePlayer:
 
     def grip(self) -> np.ndarray:
         """Where the point `pull_at` is, (3,) [m] in {S}."""
-        scene = place(self.mechanism, self._last.pose[None], self._last.joint[None])
+        scene = place(self.mechanism, self.moment.pose[None], self.moment.joint[None])
         return np.array(scene.on_platform(tuple(self._pulled()))).ravel()
 
     def _pulled(self) -> np.ndarray:
@@ -130,10 +115,10 @@ class LivePlayer:
         """The mechanism now, or where it could be seen last."""
         stale = False
         try:
-            self._last = self.live.moment()
+            self.moment = self.live.moment()
         except Stuck:
             stale = True
-        now = self._last
+        now = self.moment
         found = self._model.configuration(now.pose[None])
         margin = bound_margins(self.mechanism, found.contact_point)[0]
         level, messages = self._messages(now, margin)

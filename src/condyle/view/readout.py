@@ -10,8 +10,8 @@ import numpy as np
 from ..kinematics.chain import FAMILIES
 from ..mechanism import COORDINATES, Mechanism
 from ..mechanism.chain import limits
-from .internal import Directions
 from .live_player import LivePlayer, event_lines
+from .session import Directions
 from .snapshot import Snapshot
 
 COLOURS = {"calm": "#2b8a3e", "warning": "#b35c00", "unreachable": "#c92a2a"}
@@ -122,7 +122,7 @@ def _chains(s: Snapshot) -> str:
             chain.name,
             number(s.joint[i] * scale, 2, unit),
             number(s.torque[i], 4, family.effort_unit),
-            _mark(chain.name in s.over)
+            (f"{SIGNS['warning']} " if chain.name in s.over else "")
             + ("" if use is None else "slack" if np.isinf(use) else number(100 * use, 0, "%")),
         ]
         if s.rate is not None:
@@ -133,10 +133,6 @@ def _chains(s: Snapshot) -> str:
     speed = f"{units.pop()}/s" if len(units) == 1 else "speed"
     last = speed if s.reach is None else "reach"
     return _table(["Chain", "joint", "effort", "of limit", last], rows, "chains")
-
-
-def _mark(over: bool) -> str:
-    return f"{SIGNS['warning']} " if over else ""
 
 
 def _contacts(s: Snapshot) -> str:

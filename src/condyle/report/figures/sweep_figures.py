@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
@@ -31,17 +30,10 @@ def sweep_scatter(table: xr.Dataset) -> Figure:
         return nothing_to_draw(title, sweep_caption(table), NOTHING_GOOD)
     figure, grid = _grid(title, table, measures, parameters)
     size = float(np.clip(2000 / rows.sizes["row"], 1.0, 12.0))
+    look: Any = {"s": size, "lw": 0, "alpha": 0.6, "color": PALETTE[0], "rasterized": True}
     for line, measure in zip(grid, measures, strict=True):
         for axes, parameter in zip(line, parameters, strict=True):
-            axes.scatter(
-                rows[parameter],
-                rows[measure],
-                s=size,
-                lw=0,
-                alpha=0.6,
-                color=PALETTE[0],
-                rasterized=True,
-            )
+            axes.scatter(rows[parameter], rows[measure], **look)
     return figure
 
 
@@ -162,20 +154,15 @@ def _grid(
     for axes, parameter in zip(grid[-1], parameters, strict=True):
         axes.set_xlabel(_short(parameter))
     for axes in grid.ravel():
-        _roomy(axes)
+        axes.margins(0.05)
+        axes.locator_params(nbins=4)
     return figure, grid
-
-
-def _roomy(axes: Axes) -> None:
-    axes.margins(0.05)
-    axes.locator_params(nbins=4)
 
 
 def _names(table: xr.Dataset) -> tuple[list[str], list[str]]:
     """Measures and parameters, as many as one picture holds."""
-    return list(table.attrs["measures"])[:MOST_PANELS], list(table.attrs["parameters"])[
-        :MOST_PANELS
-    ]
+    measures, parameters = (list(table.attrs[key]) for key in ("measures", "parameters"))
+    return measures[:MOST_PANELS], parameters[:MOST_PANELS]
 
 
 def _labelled(table: xr.Dataset, measure: str) -> str:

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import base64
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+
+from ..naming import short
+from ..panel import Curve, Panel
+from ..scene import Style, styles
 
 
 def packed(values: Any, kind: str) -> str:
@@ -74,3 +80,93 @@ class Columns:
             "values": packed(list(self.values.values()), "<f4"),
             "envelope": None if envelope is None else envelope.packed(self.lines),
         }
+
+
+# The third with gaps, through which one that it lies on can be seen, as gamma on alpha in chewing.
+COMPONENTS = [Style(0, "solid"), Style(1, "dot"), Style(2, "dash")]
+PAIR = [Style(0, "solid"), Style(1, "dot")]
+MOST_LIMITS = 4  # lines in one plot; more would hide the curves
+LIMITS_IN_VIEW = 0.25  # of a limit: peaks above this bring the limit into view
+DIGITS = 4  # significant, of the largest value shown
+
+
+def panel_data(
+    section: str, panel: Panel, columns: Columns, chains: dict[str, Style]
+) -> dict[str, Any]:
+    """A panel for the page.
+
+    Args: chains: looks of the chains, the same in all panels and in the picture in space.
+    """
+    (unit, scale), limits = panel.shown, panel.limits
+    values = np.concatenate([curve.values for curve in panel.curves])
+    finite = np.abs(values[np.isfinite(values)])
+    peak = float(finite.max(initial=0.0))
+    nearest = min((abs(v) for one in limits for v in (one.low, one.high) if v), default=np.inf)
+    names = [curve.label for curve in panel.curves]
+    few = len(limits) <= MOST_LIMITS
+    return {
+        "id": panel.id,
+        "section": section,
+        "kind": panel.kind,
+        "title": panel.title,
+        "unit": unit.removeprefix("1"),
+        "decimals": 3 if panel.kind == "field" else decimals(peak * scale),
+        "note": panel.note,
+        "axes": [panel.across, panel.axis],
+        "limitsDrawn": few,
+        "limits": [
+            {
+                "low": _level(one.low * scale),
+                "high": _level(one.high * scale),
+                "label": one.label(names),
+                "of": one.of,
+            }
+            for one in limits
+        ],
+        "limitsInView": few and peak >= LIMITS_IN_VIEW * nearest,
+        "fixed": [[_levels(np.multiply(v, scale)) for v in line] for line in panel.lines],
+        "bounds": [None if b is None else [v * scale for v in b] for b in panel.bounds],
+        "sets": [
+            {"label": label, "lines": _lines(panel, curves, columns, chains)}
+            for label, curves in panel.choices.items()
+        ],
+    }
+
+
+def _lines(
+    panel: Panel, curves: Sequence[Curve], columns: Columns, chains: dict[str, Style]
+) -> list[dict[str, Any]]:
+    names = [curve.label for curve in curves]
+    looks = [chains.get(n, look) for n, look in zip(names, styles(names), strict=True)]
+    if panel.components:
+        looks = COMPONENTS
+    elif panel.kind == "plane":
+        looks, names = PAIR, short(names)
+    found = []
+    for name, curve, look in zip(names, curves, looks, strict=False):
+        line: dict[str, Any] = {
+            "label": name,
+            "column": columns.add(curve.column, curve.values, line=True),
+            "scale": panel.shown.scale if curve.scale is None else curve.scale,
+            "colour": look.colour,
+            "dash": look.dash,
+        }
+        if curve.across is not None:
+            line |= {"across": columns.add(*curve.across, line=True), "text": curve.text}
+        found.append(line)
+    return found
+
+
+def decimals(largest: float) -> int:
+    """Decimal places that give a value four digits."""
+    if largest == 0.0:
+        return DIGITS - 1
+    return min(max(DIGITS - 1 - math.floor(math.log10(largest)), 0), 9)
+
+
+def _level(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _levels(values: np.ndarray) -> list[float | None]:
+    return [_level(value) for value in values]

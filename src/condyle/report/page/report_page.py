@@ -17,7 +17,7 @@ from ..failed_spans import gaps, longest
 from ..panel import panels_of
 from ..scene import styles
 from .html import Markup, fill, json_for_script, tag, text
-from .page_columns import Columns
+from .page_columns import Columns, panel_data
 from .page_facts import (
     alerts,
     bands_section,
@@ -30,7 +30,6 @@ from .page_facts import (
     sweep_section,
     warnings_box,
 )
-from .panel_data import panel_data
 from .reduce import Reduced, reduced
 from .stage_data import machine
 
