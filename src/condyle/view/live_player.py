@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -155,8 +154,3 @@ class LivePlayer:
         if self.playing and self._pace < BEHIND:
             told.append(f"Slower than asked: {self._pace * self.speed:.2g} times real time")
         return ("warning" if state else "calm"), (*told, *state)
-
-
-def event_lines(player: LivePlayer, count: int) -> Sequence[str]:
-    """The last events, the newest first."""
-    return [str(event) for event in player.live.events[: -count - 1 : -1]]

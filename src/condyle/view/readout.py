@@ -10,7 +10,7 @@ import numpy as np
 from ..kinematics.chain import FAMILIES
 from ..mechanism import COORDINATES, Mechanism
 from ..mechanism.chain import limits
-from .live_player import LivePlayer, event_lines
+from .live_player import LivePlayer
 from .session import Directions
 from .snapshot import Snapshot
 
@@ -98,7 +98,7 @@ def live_html(player: LivePlayer) -> str:
     if now.bite is not None:
         rows.append(["as the controller feels it", number(now.bite, 2, "N")])
     parts.append(_table(["Load", "force"], rows, "loads"))
-    lines = event_lines(player, EVENTS)
+    lines = map(str, player.live.events[: -EVENTS - 1 : -1])
     items = "<br>".join(map(escape, lines)) or "Nothing has happened yet."
     parts.append(f'<div data-table="events" style="line-height:1.4">{items}</div>')
     return f'<div style="margin:4px 10px;font-size:12px;overflow-x:auto">{"".join(parts)}</div>'

@@ -58,19 +58,14 @@ class Stage:
         self._add_static()
         self._add_platform()
         self._add_chains()
-        self._arrows = {
-            name: self._arrow(name, colour, count) for name, colour, count in self._arrow_kinds()
-        }
+        kinds = (("load", LOAD, 1), ("contact", BALL, len(mechanism.contacts)))
+        self._arrows = {name: self._arrow(name, colour, n) for name, colour, n in kinds if n}
         self._paths: list[Any] = []
         self._markers: list[Any] = []
         self._pushes: list[Any] = []
         self.control = self._scene.add_transform_controls(
             "/drag", scale=0.55, line_width=3.0, depth_test=False
         )
-
-    def _arrow_kinds(self) -> list[tuple[str, RGB, int]]:
-        count = len(self.mechanism.contacts)
-        return [("load", LOAD, 1)] + ([("contact", BALL, count)] if count else [])
 
     def _arrow(self, name: str, colour: RGB, count: int) -> Any:
         return self._scene.add_arrows(
@@ -106,16 +101,10 @@ class Stage:
         look: Any = {"opacity": 0.6, "flat_shading": True, "side": "double"}
         self._body = add.add_mesh_simple("/platform/body", vertices, faces, color=PLATFORM, **look)
         add.add_mesh_simple("/ghost/body", vertices, faces, color=ALARM, wireframe=True)
-        self._balls = [
-            self._named(
-                f"ball{i}",
-                contact.name,
-                contact.point,
-                self.scale * self._parts.balls[contact.name],
-                BALL,
-            )
-            for i, contact in enumerate(self.mechanism.contacts)
-        ]
+        self._balls = []
+        for i, c in enumerate(self.mechanism.contacts):
+            radius = self.scale * self._parts.balls[c.name]
+            self._balls.append(self._named(f"ball{i}", c.name, c.point, radius, BALL))
         for i, (name, point) in enumerate(self.mechanism.platform.points.items()):
             self._named(f"landmark{i}", name, point, self._slender, LOAD)
 
@@ -278,23 +267,16 @@ class Stage:
         self._scene.reset()
 
 
-Mesh = tuple[np.ndarray, np.ndarray]
-
-
-def unit_rod(sides: int = 16) -> Mesh:
+def unit_rod(sides: int = 16) -> tuple[np.ndarray, np.ndarray]:
     """A closed cylinder of radius 1 along Z from 0 to 1: vertices (V, 3), faces (F, 3)."""
     angle = 2 * np.pi * np.arange(sides) / sides
     ring = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(sides)])
     vertices = np.vstack([ring, np.add(ring, [0, 0, 1]), [[0, 0, 0], [0, 0, 1]]])
     i, j = np.arange(sides), np.roll(np.arange(sides), -1)
     low, high = np.full(sides, 2 * sides), np.full(sides, 2 * sides + 1)
-    faces = [
-        (i, j, j + sides),
-        (i, j + sides, i + sides),
-        (low, j, i),
-        (high, i + sides, j + sides),
-    ]
-    return vertices, np.concatenate([np.column_stack(f) for f in faces])
+    walls = [(i, j, j + sides), (i, j + sides, i + sides)]
+    ends = [(low, j, i), (high, i + sides, j + sides)]
+    return vertices, np.concatenate([np.column_stack(f) for f in walls + ends])
 
 
 def turn_onto(direction: np.ndarray) -> np.ndarray:

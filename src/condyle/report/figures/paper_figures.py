@@ -71,12 +71,7 @@ def figure_9(solution: Solution) -> Figure:
 
 def first_and_others(comparison: Comparison) -> tuple[Run, list[Run]]:
     """Model 1 (momentum, direct) and the two the paper sets against it, as far as there are."""
-    wanted = [
-        ("momentum", "direct"),
-        ("momentum", "core"),
-        ("lagrange", "direct"),
-        ("lagrange", "core"),
-    ]
+    wanted = [(name, route) for name in ("momentum", "lagrange") for route in ("direct", "core")]
     found = [run for key in wanted if (run := comparison.run(*key)) is not None]
     found += [run for run in comparison.runs if run not in found]
     return found[0], found[1:3]

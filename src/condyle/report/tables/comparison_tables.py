@@ -8,7 +8,7 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from ...analysis import paper
-from ...analysis.comparison import Comparison, Difference
+from ...analysis.comparison import Comparison
 from ...analysis.runs import Run
 from ...analysis.torque_indices import Indices
 from .report_table import NOTHING, Table
@@ -31,7 +31,9 @@ def differences(comparison: Comparison) -> Table:
         for run in runs:
             others = [pair for pair in pairs if run in (pair.first, pair.second)]
             if others:
-                rows.append([run.label, *_largest(others, _has_forces(run))])
+                contact = f"{max(pair.contact_force for pair in others):.1e}"
+                torque = f"{max(pair.torque for pair in others):.1e}"
+                rows.append([run.label, torque, contact if _has_forces(run) else NOTHING])
     notes = [
         "Each model against all others on the same motion: the largest difference of any torque "
         "and contact force, divided by the largest component along the motion.",
@@ -39,12 +41,6 @@ def differences(comparison: Comparison) -> Table:
     ]
     title = f"Differences between models: {_what(comparison)}"
     return Table("differences", title, ("Model", "Torque", "Contact force"), rows, records, notes)
-
-
-def _largest(pairs: Sequence[Difference], forces: bool) -> list[str]:
-    torque = max(pair.torque for pair in pairs)
-    contact = max(pair.contact_force for pair in pairs)
-    return [f"{torque:.1e}", f"{contact:.1e}" if forces else NOTHING]
 
 
 def _has_forces(run: Run) -> bool:
