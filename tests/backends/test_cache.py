@@ -122,6 +122,7 @@ MANIFESTS: dict[str, Callable[[str], str | bytes]] = {
     "truncated": lambda text: text[:-1],
     "no text": lambda text: b"\xff\xfe\0",
     "a list": lambda text: "[1, 2]",
+    "nested too deeply": lambda text: "[" * 100_000,
     "null": lambda text: "null",
     "no facts": lambda text: "{}",
     "facts of no kind": lambda text: '{"seal": "", "facts": "x"}',
@@ -505,31 +506,16 @@ def test_what_cannot_be_cleared(
     assert outcome.err == f"condyle: {folder} cannot be cleared: Read-only file system\n"
 
 
-def test_nested_manifests_and_folders_in_the_way(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A manifest that nests too deeply is none; a folder where a file should be is replaced."""
-    monkeypatch.setenv("CONDYLE_CACHE", str(tmp_path / "kernels"))
-    recipe = "a" * 40
-
-    def make(folder: Path) -> tuple[Path, dict[str, Any]]:
-        (folder / "k.so").write_bytes(b"library")
-        return folder / "k.so", {}
-
-    said: list[str] = []
-    entry = cache.build(recipe, make, lambda what, about: said.append(what))
-    manifest = entry.library.parent / f"{recipe}.json"
-    manifest.write_text("[" * 100_000)
-    assert cache.find(recipe) is None and cache.contents().kernels == 0
-    manifest.write_text("[]")
-    assert cache.find(recipe) is None
-    for path in (manifest, entry.library):
+def test_folders_in_the_way(folder: Path) -> None:
+    """A folder where a file should be is replaced."""
+    library, manifest = kept().library, folder / f"{RECIPE}.json"
+    for path in (manifest, library):
         path.unlink()
         (path / "below").mkdir(parents=True)
-    assert cache.find(recipe) is None
-    cache.build(recipe, make, lambda what, about: said.append(what))
-    assert cache.find(recipe) is not None and said == []
+    assert cache.find(RECIPE) is None
+    kept()
+    assert cache.find(RECIPE) is not None
     manifest.unlink()
     (manifest / "below").mkdir(parents=True)
     cache.clear()
-    assert [*manifest.parent.iterdir()] == []
+    assert names(folder) == []

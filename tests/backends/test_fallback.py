@@ -158,9 +158,7 @@ def test_same_numbers_and_one_notice(
     "useless", [("useless", "none"), ("broken", "error")], indirect=True, ids="-".join
 )
 def test_one_notice_for_many_models(
-    useless: tuple[str, str],
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+    useless: tuple[str, str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Whatever it is that is wrong with the compiler next."""
     for _ in range(2):

@@ -96,10 +96,7 @@ def test_a_bar_shows_the_innermost_step_and_goes(
 
 @pytest.mark.parametrize("why", ["quick", "not wanted", "no terminal"])
 def test_no_bar(
-    terminal: Terminal,
-    on_terminal: Callable[[], None],
-    monkeypatch: pytest.MonkeyPatch,
-    why: str,
+    terminal: Terminal, on_terminal: Callable[[], None], monkeypatch: pytest.MonkeyPatch, why: str
 ) -> None:
     on_terminal()
     if why == "quick":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,8 @@ from condyle.motion import read_table
 
 NAMES = ("X", "Y", "alpha", "beta")
 LOAD = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+CALL = ("solve", "masticatory", "--states", "states.csv", "--out", "out.csv")
+Solve = Callable[..., tuple[Any, list[str], list[list[str]]]]
 
 
 def header(names: tuple[str, ...] = NAMES) -> list[str]:
@@ -33,23 +35,32 @@ def draw(count: int, seed: int = 0) -> tuple[np.ndarray, ...]:
 
 
 @pytest.fixture
+def solve(
+    condyle_command: Callable[..., Any],
+    write_csv: Callable[..., Path],
+    read_csv: Callable[..., Any],
+) -> Solve:
+    """Runs `condyle solve masticatory` on a table: outcome, columns and cells of its file."""
+
+    def run(columns: Sequence[str], rows: np.ndarray, *options: object) -> tuple[Any, Any, Any]:
+        write_csv(columns, rows, "states.csv")
+        outcome = condyle_command(*CALL, *options)
+        return outcome, *(read_csv("out.csv") if Path("out.csv").exists() else ([], []))
+
+    return run
+
+
+@pytest.fixture
 def model(reference: condyle.Mechanism) -> Model:
     return condyle.derive(reference)
 
 
-def test_columns_and_digits(
-    condyle_command: Callable[..., Any],
-    write_csv: Callable[..., Path],
-    read_csv: Callable[..., Any],
-    model: Model,
-) -> None:
+def test_columns_and_digits(solve: Solve, model: Model) -> None:
     """Columns in the contract's order; every cell is the double that Python gets, in few digits."""
     q, q1, q2 = draw(9)
     wrench = np.random.default_rng(1).normal(0, 5, (9, 6))
-    write_csv([*header(), *LOAD], np.hstack([q, q1, q2, wrench]), "states.csv")
-    outcome = condyle_command("solve", "masticatory", "--states", "states.csv", "--out", "out.csv")
+    outcome, columns, rows = solve([*header(), *LOAD], np.hstack([q, q1, q2, wrench]))
     assert outcome.status == 0 and outcome.out.startswith("9 rows solved: out.csv\n")
-    columns, rows = read_csv("out.csv")
     chains, contacts = model.mechanism.chain_names, model.mechanism.contact_names
     assert columns == [
         *(f"tau_{name}" for name in chains),
@@ -71,12 +82,7 @@ def figures(number: str) -> str:
 
 
 @pytest.mark.parametrize("names", [NAMES, ("Y", "Z", "alpha", "beta")])
-def test_rows_never_influence_each_other(
-    condyle_command: Callable[..., Any],
-    write_csv: Callable[..., Path],
-    read_csv: Callable[..., Any],
-    names: tuple[str, ...],
-) -> None:
+def test_rows_never_influence_each_other(solve: Solve, names: tuple[str, ...]) -> None:
     """37 rows, some out of reach, some without a moment: in any order and alone the same text."""
     q, q1, q2 = draw(37, seed=3)
     q[[4, 11, 12, 30]] += [0.5, 0, 0, 0]
@@ -86,10 +92,9 @@ def test_rows_never_influence_each_other(
     order = np.random.default_rng(0).permutation(37)
 
     def lines(rows: np.ndarray) -> list[list[str]]:
-        write_csv([*header(names), *LOAD], rows, "states.csv")
-        arguments = ("--states", "states.csv", "--out", "out.csv", "--flag")
-        assert condyle_command("solve", "masticatory", *arguments).status == 0
-        return read_csv("out.csv")[1]
+        outcome, _, cells = solve([*header(names), *LOAD], rows, "--flag")
+        assert outcome.status == 0
+        return cells
 
     together = lines(rows)
     assert {row[-2] for row in together} == {"ok", "unreachable"}
@@ -99,13 +104,7 @@ def test_rows_never_influence_each_other(
 
 
 @pytest.mark.parametrize("names", [("Y", "Z", "alpha", "beta"), ("beta", "X", "gamma", "Y")])
-def test_any_valid_set_of_coordinates(
-    condyle_command: Callable[..., Any],
-    write_csv: Callable[..., Path],
-    read_csv: Callable[..., Any],
-    model: Model,
-    names: tuple[str, ...],
-) -> None:
+def test_any_valid_set_of_coordinates(solve: Solve, model: Model, names: tuple[str, ...]) -> None:
     """The same states in other coordinates, columns in any order: the same torques."""
     q, q1, q2 = draw(12)
     found = model.evaluate(q, q1, q2, np.zeros((12, 9)))
@@ -113,41 +112,33 @@ def test_any_valid_set_of_coordinates(
     poses = (found.pose, found.pose_rate, found.pose_acceleration)
     cells = np.hstack([a[:, columns] for a in poses])
     mix = np.random.default_rng(2).permutation(12)
-    write_csv([header(names)[i] for i in mix], cells[:, mix], "states.csv")
-    outcome = condyle_command("solve", "masticatory", "--states", "states.csv", "--out", "out.csv")
+    outcome, _, rows = solve([header(names)[i] for i in mix], cells[:, mix])
     assert outcome.status == 0, outcome.err
-    table = np.array(read_csv("out.csv")[1], dtype=float)
+    table = np.array(rows, dtype=float)
     torque = found.effort
     np.testing.assert_allclose(table[:, :6], torque, atol=1e-11 * np.abs(torque).max())
     np.testing.assert_allclose(table[:, 8:14], found.pose, atol=1e-13)
 
 
-def test_flagged_rows_are_kept_and_empty(
-    condyle_command: Callable[..., Any],
-    write_csv: Callable[..., Path],
-    read_csv: Callable[..., Any],
-) -> None:
+def test_flagged_rows_are_kept_and_empty(solve: Solve) -> None:
     q, q1, q2 = draw(6)
     q[2, 0], q[4, 3] = 0.3, 1.5
-    write_csv(header(), np.hstack([q, q1, q2]), "states.csv")
-    arguments = ("solve", "masticatory", "--states", "states.csv", "--out", "out.csv")
-    assert condyle_command(*arguments, "--flag").status == 0
-    columns, rows = read_csv("out.csv")
+    states = np.hstack([q, q1, q2])
+    outcome, columns, rows = solve(header(), states, "--flag")
+    assert outcome.status == 0
     assert columns[-2:] == ["status", "cause"] and len(columns) == 22 and len(rows) == 6
     assert [row[-2] for row in rows] == ["ok", "ok", "unreachable", "ok", "unreachable", "ok"]
     for i, row in enumerate(rows):
         assert all((cell == "") == (i in (2, 4)) for cell in row[:-2])
         assert row[-1] == ("chain temporalis_left" if i in (2, 4) else "")
     Path("out.csv").unlink()
-    outcome = condyle_command(*arguments)
+    outcome, _, _ = solve(header(), states)
     assert outcome.status == 2 and "at row 3" in outcome.err and not Path("out.csv").exists()
     assert 'chain "temporalis_left" cannot reach M' in outcome.err
     good = [i for i in range(6) if i not in (2, 4)]
-    write_csv(header(), np.hstack([q, q1, q2])[good], "states.csv")
-    assert condyle_command(*arguments).status == 0
-    assert read_csv("out.csv")[1] == [rows[i][:-2] for i in good]
-    assert condyle_command(*arguments, "--flag").status == 0
-    assert read_csv("out.csv")[1] == [rows[i] for i in good]
+    for options, end in (((), -2), (("--flag",), None)):
+        outcome, _, found = solve(header(), states[good], *options)
+        assert outcome.status == 0 and found == [rows[i][:end] for i in good]
 
 
 def test_a_singular_row_has_its_own_status(
@@ -188,21 +179,17 @@ def test_a_singular_row_has_its_own_status(
     assert not Path("out.csv").exists()
 
 
-def test_loads_are_optional_and_act_at_their_point(
-    condyle_command: Callable[..., Any],
-    write_csv: Callable[..., Path],
-    read_csv: Callable[..., Any],
-) -> None:
+def test_loads_are_optional_and_act_at_their_point(solve: Solve) -> None:
     """A force at a point is the force at another and the moment between; moments have no point."""
     q, q1, q2 = np.zeros((3, 1, 4))
     arm = np.subtract([25.2, -24.8, 9.89], [52.75, 0, 4.63]) / 1000
     force = np.array([3.0, -2.0, -40.0])
 
     def torques(columns: tuple[str, ...], load: Any, *options: str) -> np.ndarray:
-        write_csv([*header(), *columns], np.hstack([q, q1, q2, [load]]), "states.csv")
-        arguments = ("--states", "states.csv", "--out", "out.csv", *options)
-        assert condyle_command("solve", "masticatory", *arguments).status == 0
-        return np.array(read_csv("out.csv")[1], dtype=float)[0, :8]
+        states = np.hstack([q, q1, q2, [load]])
+        outcome, _, rows = solve([*header(), *columns], states, *options)
+        assert outcome.status == 0
+        return np.array(rows, dtype=float)[0, :8]
 
     at_molar = torques(LOAD[:3], force)
     assert (torques(LOAD[:3], force, "--load-point", "right_molar") == at_molar).all()
@@ -216,50 +203,37 @@ def test_loads_are_optional_and_act_at_their_point(
     assert (torques(LOAD, [0.0] * 6) == rest).all()
 
 
-def test_a_component_alone_and_columns_that_are_not_used(
-    condyle_command: Callable[..., Any],
-    write_csv: Callable[..., Path],
-    read_csv: Callable[..., Any],
-) -> None:
+def test_a_component_alone_and_columns_that_are_not_used(solve: Solve) -> None:
     state = np.hstack(draw(2))
-    arguments = ("solve", "masticatory", "--states", "states.csv", "--out", "out.csv")
     results = []
     for columns, load in ((LOAD[:3], [0, 0, -9]), (("fz [kN]", "t", "label"), [-0.009, 1, 2])):
-        write_csv([*header(), *columns], np.hstack([state, [load, load]]), "states.csv")
-        outcome = condyle_command(*arguments)
+        outcome, _, rows = solve([*header(), *columns], np.hstack([state, [load, load]]))
         assert outcome.status == 0
-        results.append(np.array(read_csv("out.csv")[1], dtype=float))
+        results.append(np.array(rows, dtype=float))
     np.testing.assert_allclose(results[1], results[0], rtol=1e-12, atol=1e-15)
     assert 'states.csv: columns "t", "label" are not used' in outcome.err
 
 
-def test_bounds_warn_and_strict_refuses(
-    condyle_command: Callable[..., Any], write_csv: Callable[..., Path]
-) -> None:
+def test_bounds_warn_and_strict_refuses(solve: Solve) -> None:
     states = np.zeros((3, 12))
     states[1, 1], states[2, 1] = 0.0031, 0.004  # bounds end 3 mm to the side
-    write_csv(header(), states, "states.csv")
-    arguments = ("solve", "masticatory", "--states", "states.csv", "--out", "out.csv")
-    outcome = condyle_command(*arguments)
+    outcome, _, _ = solve(header(), states)
     assert outcome.status == 0 and Path("out.csv").exists()
     assert (
         '"left_condyle" leaves its bounds in 2 rows, first in row 2, by up to 1 mm in row 3'
         in outcome.err
     )
     Path("out.csv").unlink()
-    outcome = condyle_command(*arguments, "--strict")
+    outcome, _, _ = solve(header(), states, "--strict")
     assert outcome.status == 2 and '"left_condyle" leaves its bounds' in outcome.err
     assert [path.name for path in Path().iterdir()] == ["states.csv"]
     states[1:, 1] = 0.0029
-    write_csv(header(), states, "states.csv")
-    outcome = condyle_command(*arguments, "--strict", "--quiet")
+    outcome, _, _ = solve(header(), states, "--strict", "--quiet")
     assert (outcome.status, outcome.out, outcome.err) == (0, "", "")
 
 
 def test_threads(
-    condyle_command: Callable[..., Any],
-    write_csv: Callable[..., Path],
-    monkeypatch: pytest.MonkeyPatch,
+    condyle_command: Callable[..., Any], solve: Solve, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """--threads reaches the kernel, and the file is the same to the byte, with and without."""
     try:
@@ -276,15 +250,13 @@ def test_threads(
 
     monkeypatch.setattr(CompiledKernel, "run", spy)
     monkeypatch.setattr(kernel, "WORTH_A_THREAD", 1000)
-    write_csv(header(), np.hstack(draw(50)), "states.csv")
-    arguments = ("solve", "masticatory", "--states", "states.csv", "--out", "out.csv")
     texts = []
     for options in ((), ("--threads", 1), ("--threads", 3)):
-        assert condyle_command(*arguments, *options).status == 0
+        assert solve(header(), np.hstack(draw(50)), *options)[0].status == 0
         texts.append(Path("out.csv").read_bytes())
     assert texts[1] == texts[0] and texts[2] == texts[0]
     assert asked == [None, 1, 3]
-    for command in (arguments, ("run", "masticatory")):
+    for command in (CALL, ("run", "masticatory")):
         outcome = condyle_command(*command, "--threads", 0)
         assert outcome.status == 2 and "--threads" in outcome.err
     assert condyle_command("run", "--threads", 2).status == 0 and asked[3:] == [2]
@@ -293,16 +265,8 @@ def test_threads(
 def test_a_static_bite_in_two_lines(condyle_command: Callable[..., Any]) -> None:
     """Numbers found independently with the same muscles, by sum of cubes."""
     Path("bite.csv").write_text("X,Y,alpha,beta,Fz\n0,0,0,0,-10\n0,0,0,0,-100\n")
-    call = (
-        "solve",
-        "human-jaw",
-        "--states",
-        "bite.csv",
-        "--out",
-        "o.csv",
-        "--distribution",
-        "cubic",
-    )
+    call = ("solve", "human-jaw", "--states", "bite.csv", "--out", "o.csv")
+    call += ("--distribution", "cubic")
     outcome = condyle_command(*call, "--backend", "numpy")
     assert outcome.status == 0 and "at rest" in outcome.err and outcome.err.count("\n") == 1
     assert "Greatest activation (effort over its limit): 0.178, " in outcome.out

@@ -61,8 +61,7 @@ def test_an_ill_conditioned_jacobian_costs_its_condition_number_and_no_more(n: i
 
 
 @pytest.mark.parametrize(
-    "contacts, chains, backend",
-    [(2, 8, "auto"), (2, 8, "numpy"), (1, 6, "numpy"), (5, 6, "numpy")],
+    "contacts, chains, backend", [(2, 8, "auto"), (2, 8, "numpy"), (1, 6, "numpy"), (5, 6, "numpy")]
 )
 def test_models_choose_the_least_norm(contacts: int, chains: int, backend: str) -> None:
     raw = random_mechanism(np.random.default_rng(9), contacts=contacts, chains=chains)

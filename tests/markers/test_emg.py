@@ -59,10 +59,7 @@ def test_an_envelope_that_is_made_already(tmp_path: Path) -> None:
     [
         ({"channels": {"masseter": "EMG0"}}, 'emg: "human-jaw" has no chain "masseter"'),
         ({"channels": {CHAINS[0]: "EMG7"}}, 'emg: has no channel "EMG7".*Available: EMG0, EMG1'),
-        (
-            {"channels": {CHAINS[0]: "EMG0"}, "high_pass": 500.0},
-            "sampled at 1000 Hz, and high",
-        ),
+        ({"channels": {CHAINS[0]: "EMG0"}, "high_pass": 500.0}, "sampled at 1000 Hz, and high"),
         ({"channels": {CHAINS[0]: "EMG0"}, "low_pass": 700.0}, "low_pass is 700 Hz; expected less"),
         ({"channels": {CHAINS[0]: "EMG0"}, "low_pass": 0.5}, "lasts 0.8 s, too short for low_pass"),
         ({"channels": {CHAINS[0]: "EMG1"}}, r'"EMG1" \(superficial_masseter_left\) is constant'),

@@ -18,9 +18,7 @@ FINITE = st.floats(allow_nan=False, allow_infinity=False)
 
 
 @settings(
-    max_examples=50,
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
+    max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(values=arrays(float, st.tuples(st.integers(1, 20), st.integers(1, 4)), elements=FINITE))
 def test_every_number_comes_back_in_the_same_bits(tmp_path, values):
@@ -31,11 +29,7 @@ def test_every_number_comes_back_in_the_same_bits(tmp_path, values):
 
 
 def test_nan_is_an_empty_cell_and_text_is_quoted_where_needed(tmp_path):
-    columns = {
-        "a": np.array([0.1, np.nan]),
-        "one, two": [1, 2],
-        "status": ["ok", 'not "ok", nan'],
-    }
+    columns = {"a": np.array([0.1, np.nan]), "one, two": [1, 2], "status": ["ok", 'not "ok", nan']}
     write_table(tmp_path / "out.csv", columns)
     assert (tmp_path / "out.csv").read_text() == (
         'a,"one, two",status\n0.1,1,"ok"\n,2,"not ""ok"", nan"\n'

@@ -52,8 +52,7 @@ def test_forces_of_ships():
 
 
 @pytest.mark.parametrize(
-    ("resolve", "default"),
-    [(resolve_landmark, "incisor"), (resolve_load_point, "right_molar")],
+    ("resolve", "default"), [(resolve_landmark, "incisor"), (resolve_load_point, "right_molar")]
 )
 def test_the_point_that_is_meant(resolve, default):
     points = {"tip": [0, 0, 0], default: [1, 0, 0]}

@@ -11,19 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .jets import (
-    Array,
-    Jet,
-    cos,
-    jet,
-    length,
-    power,
-    rotation_x,
-    rotation_y,
-    rotation_z,
-    sin,
-    spin,
-)
+from .jets import Array, Jet, cos, jet, length, power, rotation_x, rotation_y, rotation_z, sin, spin
 
 EYE = np.eye(3)
 

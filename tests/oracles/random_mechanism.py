@@ -12,12 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from .closure import (
-    complete_state,
-    contact_rows,
-    dependent_coordinates,
-    independent_coordinates,
-)
+from .closure import complete_state, contact_rows, dependent_coordinates, independent_coordinates
 from .description import COORDINATES, Description, Raw, joint, load, read, rod_angles
 from .rotations import X, bryant, platform_motion, unit
 

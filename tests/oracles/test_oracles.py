@@ -13,12 +13,7 @@ import pinocchio as pin
 import pytest
 
 from . import newton_euler
-from .closure import (
-    complete_state,
-    dependent_coordinates,
-    independent_coordinates,
-    residuals,
-)
+from .closure import complete_state, dependent_coordinates, independent_coordinates, residuals
 from .description import COORDINATES, load, read
 from .mujoco_engine import MujocoEngine
 from .pinocchio_engine import PinocchioEngine

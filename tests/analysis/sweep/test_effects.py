@@ -10,13 +10,7 @@ import pytest
 import xarray as xr
 
 import condyle
-from condyle.analysis.sweep.effects import (
-    best,
-    front,
-    main_effects,
-    pareto,
-    sensitivities,
-)
+from condyle.analysis.sweep.effects import best, front, main_effects, pareto, sensitivities
 from condyle.analysis.sweep.sampling import Design
 from condyle.analysis.sweep.study import Study
 

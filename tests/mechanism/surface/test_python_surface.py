@@ -105,8 +105,7 @@ def test_options_of_the_note(machine: Mechanism, motion: Motion) -> None:
     """Whether the surface is closed decides what its sides are called."""
     centre, radius = (-0.02665, 0.072, 0.04253 - 0.026), 0.03
     shell = Expression(
-        lambda p: ca.sqrt(sum((p[i] - centre[i]) ** 2 for i in range(3))) - radius,
-        closed=True,
+        lambda p: ca.sqrt(sum((p[i] - centre[i]) ** 2 for i in range(3))) - radius, closed=True
     )
     ball = {"surface": shell, "side": "inside", "ball_radius": 0.004}
     left = machine.contacts[0].model_copy(update=ball)
