@@ -9,12 +9,12 @@ from .reference_case import (
     bundled_reference,
     reference_load,
     reference_motion,
+    trial_motion,
     write_reference,
 )
 from .smoothing import AUTO_CUTOFF, Smoothing
 from .table_reader import iter_table, read_table
 from .table_writer import TableWriter, write_table
-from .trial import trial_motion
 
 __all__ = [
     "AUTO_CUTOFF",

@@ -1,12 +1,12 @@
-"""The reference motion and load: SYNTHETIC, files made by formulas.
+"""The reference motion and load, and a motion to try any mechanism with: SYNTHETIC, by formulas.
 
-They are not the recordings of the paper, which were never published in numbers. They keep the
+The reference is not the recordings of the paper, which were never published in numbers. It has the
 traits that Section 6 of [Cheng2023] tells of its Figures 5 and 7: five seconds, the first one at
 rest, then rhythmic chewing nearly in one inclined plane, and five bursts of bite force.
 
     x, y, z = -2.55 mm o, 2 mm w sin(phi), -15 mm o,    o = w (1 - cos(phi)) / 2,   phi = 2 pi u / T
 
-with u = t - 1 s, T = 0.8 s, and w rising from 0 to 1 in half a second (`trial.rise`). Bursts of
+with u = t - 1 s, T = 0.8 s, and w rising from 0 to 1 in half a second (`rise`). Bursts of
 100, 90, 80, 70 and 60 N, sin^2 of a quarter second, begin 0.1 s after the mouth is widest open;
 their sideways and forward parts are 15 and 10 %.
 """
@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from ..atomic import replacing
+from ..mechanism.home import characteristic_length, independent_coordinates
 from ..mechanism.mechanism import Mechanism
 from .column_units import LANDMARK
 from .path import Motion
@@ -27,6 +28,8 @@ from .platform_load import Load
 
 MOTION_FILE = "chewing-incisor.csv"
 LOAD_FILE = "bite-force.csv"
+SWAY = 0.03  # of the characteristic length, and in radians
+SLOWEST, STEP = 0.4, 0.15  # of the first coordinate's sway, and from one to the next [Hz]
 SYNTHETIC = "synthetic, not the recording of the paper"
 
 
@@ -68,3 +71,38 @@ def bundled_reference() -> tuple[Path, Path]:
 
 def _columns(file: Path) -> np.ndarray:
     return np.loadtxt(file, delimiter=",", skiprows=1, unpack=True)
+
+
+def trial_motion(
+    mechanism: Mechanism,
+    *,
+    cutoff: float | str | None = None,
+    rate: float | None = None,
+    trim: float = 0.0,
+) -> Motion:
+    """Five seconds in which the independent coordinates sway about home, each at its own pace.
+
+        q_i = a_i w(t) sin(2 pi f_i t),    f_i = 0.4, 0.55, 0.7, ... Hz
+
+    with a_i = 3 % of the characteristic length or 0.03 rad, and w rising from 0 to 1 in the first
+    second. Synthetic.
+
+    Args: cutoff, rate, trim: as of `Motion.from_arrays`.
+    """
+    t = np.round(np.linspace(0, 5, 5001), 3)
+    names = independent_coordinates(mechanism)
+    length = SWAY * characteristic_length(mechanism)
+    columns = {
+        name: (length if name in "XYZ" else SWAY)
+        * rise(t)
+        * np.sin(2 * np.pi * (SLOWEST + STEP * i) * t)
+        for i, name in enumerate(names)
+    }
+    source = "trial motion (synthetic)"
+    return Motion.from_arrays(t, columns, cutoff=cutoff, rate=rate, trim=trim, source=source)
+
+
+def rise(s: np.ndarray) -> np.ndarray:
+    """From 0 at 0 to 1 at 1, with four smooth derivatives."""
+    s = np.clip(s, 0, 1)
+    return s**5 * (126 - 420 * s + 540 * s**2 - 315 * s**3 + 70 * s**4)

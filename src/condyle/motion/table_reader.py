@@ -55,10 +55,12 @@ def iter_table(
         from .parquet_file import iter_parquet as read  # pyarrow takes a while
     else:
         from .csv_file import iter_csv as read
-    with step(f"{doing} {Path(path).name}", _size(path)) as advance:
+    size_known = os.path.isfile(path)  # of a pipe it is not
+    total = os.path.getsize(path) if size_known else None
+    with step(f"{doing} {Path(path).name}", total) as advance:
         chunks = read(path, chunk_rows, known, gaps)
         # A pipe may keep us waiting, and a thread that waits cannot be interrupted.
-        for table, size in _ahead(chunks) if os.path.isfile(path) else chunks:
+        for table, size in _ahead(chunks) if size_known else chunks:
             yield table
             advance(size)
 
@@ -76,8 +78,3 @@ def _ahead(items: Iterator[T]) -> Iterator[T]:
         while (item := coming.result()) is not end:
             coming = pool.submit(next, items, end)
             yield item  # type: ignore[misc]
-
-
-def _size(path: str | os.PathLike[str]) -> int | None:
-    """Bytes in a file, None for a pipe."""
-    return os.path.getsize(path) if os.path.isfile(path) else None
