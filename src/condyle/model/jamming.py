@@ -41,7 +41,7 @@ def balanced(system: Mapping[str, np.ndarray], rubbing: Sequence[int]) -> Balanc
     for signs in product((1.0, -1.0), repeat=len(rubbing)):
         sigma = np.zeros(N.shape[2])
         sigma[list(rubbing)] = signs
-        one, good = _solved(np.concatenate([H, T * sigma - N], axis=2), -F)
+        one, good = solved(np.concatenate([H, T * sigma - N], axis=2), -F)
         regular |= good
         force = one[:, m:]
         tiny = NOTHING * np.abs(force).max(axis=1, initial=0.0, keepdims=True)
@@ -54,7 +54,7 @@ def balanced(system: Mapping[str, np.ndarray], rubbing: Sequence[int]) -> Balanc
     return Balanced(x[:, :m], x[:, m:], regular, found & ~several)
 
 
-def _solved(A: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def solved(A: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A^-1 right, (N, s), and where A is regular; rows and columns are first made of one size."""
     x = np.full(right.shape, np.nan)
     regular = np.isfinite(A).all(axis=(1, 2))
@@ -72,8 +72,3 @@ def _solved(A: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     x[regular] = np.where(sure[:, None], y[..., 0] / columns[:, 0], np.nan)
     regular[regular] = sure
     return x, regular
-
-
-def solved_rows(A: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """A^-1 right, (N, m); no number where A is singular."""
-    return _solved(A, right)[0]

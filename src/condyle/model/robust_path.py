@@ -23,7 +23,7 @@ from ..questions.structure import Structure
 from ..status import Status, judge
 from .closing import FollowedClosure
 from .distributing import Distributor
-from .jamming import balanced, solved_rows
+from .jamming import balanced, solved
 
 Arrays = dict[str, np.ndarray]
 
@@ -105,7 +105,7 @@ class Robust:
             system = self._kernel("forward_system").run(poses | others).values
             s = {name: np.moveaxis(a, -1, 0) for name, a in system.items()}
             found = balanced(s, self._structure.friction)
-            q2 = solved_rows(s["S"], found.w)
+            q2 = solved(s["S"], found.w)[0]
             moved = poses["pose_acceleration"] + (s["M_J"] @ q2[..., None])[..., 0]
             turned = s["bias"] + (s["J"].transpose(0, 2, 1) @ found.w[..., None])[..., 0]
             least, most = configuration["J_A_extremes"]
