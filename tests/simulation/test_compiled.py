@@ -12,7 +12,6 @@ import pytest
 import condyle
 from condyle.backends.compiler import CompilerError, find_compiler
 from condyle.questions.builder import Lanes
-from condyle.questions.entries import Machine
 from condyle.questions.law.controller import EACH_COORDINATE, Control, ControllerTable
 from condyle.questions.load.acting import LoadTable, Place
 from condyle.simulation import CONTROLLERS, LOADS, running
@@ -214,9 +213,6 @@ class Damped(ControllerTable):
     kind: Literal["damped"]
     damping: float
 
-    def numbers(self, machine: Machine) -> Mapping[str, Any]:
-        return {"damping": [self.damping] * len(machine.independent)}
-
     @staticmethod
     def equations(c: Control) -> tuple[Lanes, ca.SX]:
         q2 = c.aim.q2 + c.gains.damping * (c.aim.q1 - c.now.q1)
@@ -269,3 +265,43 @@ def test_laws_from_outside_run_in_compiled_code(
         loads=[(lambda t, s, v: -5.0 * v, "incisor")],
     )
     np.testing.assert_allclose(running.run(function).state, found.state, rtol=0, atol=1e-9)
+
+
+def test_laws_from_outside_in_lockstep(
+    model: condyle.Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(CONTROLLERS, "damped", Damped)
+    monkeypatch.setitem(LOADS, "wind", Wind)
+    plans = [
+        plan_of(
+            {
+                "duration": 0.05,
+                "start": {"beta": 0.02, "dX": 0.02 * i},
+                "controller": {"kind": "damped", "damping": 30.0 + i, "rate": 1000.0},
+                "load": [{"kind": "wind", "drag": 5.0 - i, "point": "incisor"}],
+            },
+            model,
+        )
+        for i in range(4)
+    ]
+    alone = [running.run(plan) for plan in plans]
+    for alone_only in ("_between", "_tick_at"):
+        monkeypatch.setattr(running.Run, alone_only, None)
+    for found, expected in zip(run_all(plans), alone, strict=True):
+        same(found, expected, 1e-12)
+
+
+def test_drives_that_chatter_stay_in_compiled_code() -> None:
+    """Limits cut efforts in hundreds of looks; none of them is a step or a look in Python."""
+    machine = condyle.load("masticatory")
+    limits = {f"chain.{name}.actuator.torque_limit": 0.02 for name in machine.chain_names}
+    hard = {"kind": "joint_pd", "stiffness": 200.0, "damping": 1.0, "rate": 2000.0}
+    told = {"duration": 0.3, "controller": hard, "start": {"beta": 0.02}}
+    run = running.Run(plan_of(told, condyle.derive(machine.set(limits))))
+    assert run.steps is not None
+    advance, codes = run.steps.advance, []
+    run.steps.advance = lambda budget: codes.append(advance(budget)) or codes[-1]  # type: ignore
+    trace = run.trace()
+    assert trace.ended is None and sum(run._seen.values()) > 300
+    assert {event.kind for event in trace.events} == {"saturated"}
+    assert codes == [running.DONE]

@@ -83,6 +83,7 @@ def test_unstable_drives_are_foretold(jaw: Model, damping: float, stable: bool) 
     tables = {"duration": 0.03, "controller": pd, "start": {"beta": 1e-5}}
     said = check_gains(bind(jaw, scenario_from(tables), motion=rest))
     assert said.stable == stable and bool(said.warnings) != stable
+    assert all((point.phase > 0) == point.stable for point in said.points)
     error = np.abs(condyle.simulate(jaw, tables, motion=rest)["tracking_error"].values)
     assert (error[-1].max() < 2e-5) == stable
 

@@ -12,6 +12,7 @@ goes in and comes out: `BEFORE` says which result is which port of the next peri
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 
@@ -32,13 +33,19 @@ BEFORE = {  # port -> result
 
 
 @dataclass(frozen=True)
-class Observed:
-    """What counts give: q, q' (m,), and joints and their rates as they are read, lanes."""
+class Seen:
+    """What a controller sees at a tick: expressions in a law, arrays where it is in Python.
 
-    q: ca.SX
-    q1: ca.SX
-    joint: Lanes
-    joint_rate: Lanes
+    q, q1:  estimated state, (m,) each;  joint, joint_rate: a chain's, as encoders have it.
+    force:  of the loads on the platform at the controller's point, (3,) [N] in {S};  t: [s].
+    """
+
+    q: Any
+    q1: Any
+    joint: Any
+    joint_rate: Any
+    force: Any = None
+    t: float = 0.0
 
 
 def observer(structure: Structure, velocity: str = DIFFERENCE) -> Variants:
@@ -55,7 +62,7 @@ def observer(structure: Structure, velocity: str = DIFFERENCE) -> Variants:
     return Variants(b.finish(), single=True)
 
 
-def observe(b: Builder, joint: Lanes, rate: Lanes, velocity: str, period: ca.SX) -> Observed:
+def observe(b: Builder, joint: Lanes, rate: Lanes, velocity: str, period: ca.SX) -> Seen:
     """The same as a part of another question: its other ports, results of `BEFORE`, and check."""
     resolution = b.lane_sample("resolution", unit="rad or m")
     smoothing = b.sample("smoothing", 1)
@@ -76,4 +83,4 @@ def observe(b: Builder, joint: Lanes, rate: Lanes, velocity: str, period: ca.SX)
     b.output("joint", counts, "rad or m")
     b.output("joint_rate", rate, "rad/s or m/s")
     b.check(2 * found.sure - 1, 0.5)
-    return Observed(found.q, q1, counts, rate)
+    return Seen(found.q, q1, counts, rate)

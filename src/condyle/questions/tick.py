@@ -9,6 +9,7 @@ What lasts from one tick to the next goes in and comes out: see `carried`.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -18,8 +19,8 @@ from ..graph.program import Program, Variants
 from .builder import Builder, Lanes
 from .equations import Wrench
 from .inverse import HUGE, efforts, in_variants
-from .law.controller import Aim, Control, ControllerTable, Seen, gains_of
-from .observer import BEFORE, Observed, observe
+from .law.controller import Aim, Control, ControllerTable, gains_of
+from .observer import BEFORE, Seen, observe
 from .platform import placed
 from .structure import Structure
 
@@ -69,8 +70,13 @@ def _program(
 ) -> Program:
     b = Builder(structure)
     m = structure.m
-    seen = _seen(b, velocity, period := b.sample("period", 1, "s"))
-    force = b.sample("force", 3, "N")
+    period = b.sample("period", 1, "s")
+    joint, rate = b.lane_sample("joint", unit="rad or m"), b.lane_sample("joint_rate")
+    if velocity is not None:
+        now = observe(b, joint, rate, velocity, period)
+    else:
+        now = Seen(b.sample("q", m), b.sample("q1", m), joint, rate)
+    now = replace(now, force=b.sample("force", 3, "N"))
     q, q1, q2 = (b.sample(name, m) for name in AIMS[:3])
     joint, rate = (b.lane_sample(name) for name in AIMS[3:5])
     aim = Aim(q, q1, q2, joint, rate, b.sample(AIMS[5], 1, "N"))
@@ -92,7 +98,6 @@ def _program(
             load = Wrench(both[:3], both[3:], ca.SX.zeros(3))
         return efforts(b, platform, load, robust, low_latency)
 
-    now = Seen(seen.q, seen.q1, seen.joint, seen.joint_rate, force)
     if law is None:
         asked, memory = b.lane_sample("given", unit="N m or N"), ca.SX(0, 1)
     else:
@@ -107,7 +112,7 @@ def _program(
     b.output("asked", asked, "N m or N")
     b.output("q", now.q, "m, rad", m)
     b.output("q1", now.q1, "per s", m)
-    b.output("felt", force, "N", 3)
+    b.output("felt", now.force, "N", 3)
     if velocity is None:
         b.output("joint", now.joint, "rad or m")
         b.output("joint_rate", now.joint_rate, "rad/s or m/s")
@@ -116,11 +121,3 @@ def _program(
     whole = b.total([b.lane(i, "mask") * asked[i] for i in range(len(asked))])
     b.check(2 * (ca.fabs(whole) < HUGE) - 1, 0.5)
     return b.finish()
-
-
-def _seen(b: Builder, velocity: str | None, period: ca.SX) -> Observed:
-    m = b.structure.m
-    joint, rate = b.lane_sample("joint", unit="rad or m"), b.lane_sample("joint_rate")
-    if velocity is not None:
-        return observe(b, joint, rate, velocity, period)
-    return Observed(b.sample("q", m), b.sample("q1", m), joint, rate)

@@ -56,7 +56,7 @@ class Live:
     """A plan, run bit by bit, with fixed steps unless it asks for an implicit method.
 
     Attributes: knobs, values: what can be turned, and where each stands;  pulling: whether a hand
-                holds the platform.
+                holds the platform;  ended: what ended it before its time.
     """
 
     def __init__(self, plan: Plan) -> None:
@@ -72,8 +72,7 @@ class Live:
             loads=plan.loads + hand,
             modes=(*plan.modes, *(0 for _ in hand)),
         )
-        self._turned, self._hand = self._plan, hand
-        self.values = [knob.value for knob in self.knobs]
+        self._hand, self.values = hand, [knob.value for knob in self.knobs]
         self.duration = plan.duration
         self.restart()
 
@@ -83,7 +82,7 @@ class Live:
         """From the start, with knobs and hand as they are."""
         self._now = self._held()
         self._run = Run(self._now)
-        self._ended: Event | None = None
+        self.ended: Event | None = None
 
     @property
     def t(self) -> float:
@@ -96,14 +95,9 @@ class Live:
         return self._run.events
 
     @property
-    def ended(self) -> Event | None:
-        """What ended it before its time."""
-        return self._ended
-
-    @property
     def over(self) -> bool:
         """Whether it goes no further."""
-        return self._ended is not None or self.t >= self.duration - ROUNDING
+        return self.ended is not None or self.t >= self.duration - ROUNDING
 
     def go_to(self, t: float) -> None:
         """Go on to a time [s], or to what ends the run before."""
@@ -112,19 +106,19 @@ class Live:
         try:
             self._run.go_to(min(t, self.duration))
         except Ended:
-            self._ended = self._run.events[-1]
+            self.ended = self._run.events[-1]
 
     # -- hands --------------------------------------------------------------------------------
 
     def turn(self, number: int, value: float) -> None:
         """Put a knob to a value, in SI."""
         self.values[number] = value
-        self._turn()
+        self._change()
 
     def reset(self) -> None:
         """All knobs as they were to begin with."""
         self.values = [knob.value for knob in self.knobs]
-        self._turn()
+        self._change()
 
     def pull(self, point: np.ndarray, held: np.ndarray, stiffness: float, damping: float) -> None:
         """Hold a point (3,) [m] of {M} by a spring at (3,) [m] in {S}; N/m, N s/m."""
@@ -141,17 +135,13 @@ class Live:
         """Whether a hand holds it."""
         return bool(self._hand[0].numbers["stiffness"] > 0)
 
-    def _turn(self) -> None:
-        self._turned = at(self._plan, self.knobs, self.values)
-        self._change()
-
     def _held(self) -> Plan:
-        own = len(self._plan.loads) - len(self._hand)
-        return replace(self._turned, loads=self._turned.loads[:own] + self._hand)
+        turned, own = at(self._plan, self.knobs, self.values), -len(self._hand)
+        return replace(turned, loads=turned.loads[:own] + self._hand)
 
     def _change(self) -> None:
         self._now = self._held()
-        if self._ended is None:
+        if self.ended is None:
             self._run.change(self._now)
 
     # -- what is seen -------------------------------------------------------------------------
@@ -198,8 +188,9 @@ def _hand(
 ) -> tuple[Load, ...]:
     """Three springs at a point of {M}, each with its displacement of rest, (3,) [m]."""
     found = []
-    for direction, at_rest in zip(np.eye(3), rest, strict=True):
-        numbers = {"direction": direction, "stiffness": stiffness, "damping": damping}
-        own = {name: np.array(v) for name, v in (numbers | {"rest": at_rest}).items()}
+    for numbers in zip(
+        np.eye(3), *(np.full(3, x) for x in (stiffness, damping)), rest, strict=True
+    ):
+        own = {name: np.array(v) for name, v in zip(Spring.ports, numbers, strict=True)}
         found.append(Load(Spring, HAND, np.asarray(point), None, own))
     return tuple(found)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..errors import InputError
+from ..questions.law.controller import Aim
+from ..questions.observer import Seen
 from ..questions.tick import AIMS, REQUEST, carried
 from .columns import Columns
 from .plan import ClosedLoop, Plan
@@ -19,32 +19,10 @@ class Lost(Exception):
     """The encoders' counts give no pose near the last one."""
 
 
-@dataclass(frozen=True)
-class Measured:
-    """What a controller in Python sees at a tick.
-
-    q, q1:  estimated state, (m,) each;  joint, joint_rate: (n,) each, as encoders have it.
-    force:  of the loads on the platform at the controller's point, (3,) [N] in {S}.
-    """
-
-    t: float
-    q: np.ndarray
-    q1: np.ndarray
-    joint: np.ndarray
-    joint_rate: np.ndarray
-    force: np.ndarray
-
-
-@dataclass(frozen=True)
-class Reference:
-    """What it should be there: q, q1, q2 (m,), joint, joint_rate (n,), force [N]."""
-
-    q: np.ndarray
-    q1: np.ndarray
-    q2: np.ndarray
-    joint: np.ndarray
-    joint_rate: np.ndarray
-    force: float = 0.0
+def drive_of(plan: Plan) -> ClosedLoop:
+    """That of a plan in closed loop."""
+    assert isinstance(plan.drive, ClosedLoop)
+    return plan.drive
 
 
 class Controller:
@@ -56,7 +34,7 @@ class Controller:
     """
 
     def __init__(self, plan: Plan, runs: int = 1) -> None:
-        drive = self._drive(plan)
+        drive = drive_of(plan)
         sensing = drive.sensing
         self._model, velocity = drive.model, None if sensing is None else sensing.velocity
         self.details = (drive.law.table, drive.law.choices, velocity)
@@ -76,23 +54,15 @@ class Controller:
         self.looks = np.empty((len(self.ticks), kept, self.stride))
         self.states = np.empty((len(self.ticks), plan.size, self.stride))
         self.carry = carried([port.name for port in self.columns.kernel.interface.ports])
-        self.carry_to, self.carry_from = (
-            np.concatenate([np.zeros(0, dtype=int), *(find(name) for name in names)])
-            for find, names in (
-                (self.columns.rows, self.carry),
-                (self.columns.result, self.carry.values()),
-            )
-        )
-
-    @staticmethod
-    def _drive(plan: Plan) -> ClosedLoop:
-        assert isinstance(plan.drive, ClosedLoop)
-        return plan.drive
+        none = [np.zeros(0, dtype=int)]
+        self.carry_to = np.concatenate(none + [self.columns.rows(to) for to in self.carry])
+        found = [self.columns.result(name) for name in self.carry.values()]
+        self.carry_from = np.concatenate(none + found)
 
     def fill(self, plan: Plan, run: int = 0) -> None:
         """Take the numbers of a plan for a run, but not its aims."""
-        drive, give = self._drive(plan), self.columns.give
-        self.plan, self._function = plan, drive.function
+        self.plan, self.drive, give = plan, drive_of(plan), self.columns.give
+        drive = self.drive
         for name in ("low", "high"):
             give(name, np.clip(getattr(plan, name), -WIDE, WIDE), run)
         for name, value in drive.law.numbers.items():
@@ -104,7 +74,7 @@ class Controller:
 
     def begin(self, plan: Plan, run: int = 0) -> None:
         """Aims, and memory to begin with: a machine knows where it starts."""
-        drive, give = self._drive(plan), self.columns.give
+        drive, give = drive_of(plan), self.columns.give
         if len(self.ticks):
             self.aims[:, self._aimed - self.first, run] = drive.path.aims(self.ticks)
         if drive.law.memory.size:
@@ -117,10 +87,14 @@ class Controller:
         true = joint.run({"q": plan.q[None], "q1": plan.q1[None]}).values["joint"][:, 0]
         with np.errstate(divide="ignore", invalid="ignore"):
             counts = np.where(step > 0, step * np.round(true / step), true)
-        rate = at["joint_rate"][:, 0]
-        give("pose_before", at["pose"][:, 0], run)
+        self._remember(at["pose"][:, 0], counts, at["joint_rate"][:, 0], run)
+
+    def _remember(self, pose: np.ndarray, joint: np.ndarray, rate: np.ndarray, run: int) -> None:
+        """What an observer saw a period ago, the pose at rest."""
+        give, period = self.columns.give, self.drive.period or 1.0
+        give("pose_before", pose, run)
         give("pose_rate_before", np.zeros(6), run)
-        give("joint_before", counts - drive.period * rate, run)
+        give("joint_before", joint - period * rate, run)
         give("joint_rate_before", rate, run)
 
     def aim_for(self, path_force: np.ndarray) -> None:
@@ -145,28 +119,24 @@ class Controller:
     def acting(self, k: int) -> np.ndarray:
         """Efforts within limits that act from tick k on, (n,): until the first efforts come, the
         drives hold what they will be."""
-        due = max(k - self._drive(self.plan).delay, 0)
+        due = max(k - self.drive.delay, 0)
         return self.looks[due, self.columns.result("effort"), 0]
 
     def at_once(self, t: float, y: np.ndarray, plant: Plant) -> np.ndarray:
         """Efforts of an ideal controller where the plant was looked at, (n,)."""
-        self.columns.given[self._aimed, 0] = self._drive(self.plan).path.aims(np.array([t]))[0]
+        self.columns.given[self._aimed, 0] = self.drive.path.aims(np.array([t]))[0]
         return self._solve(t, y, plant)
 
     def steadily(
         self, aim: np.ndarray, memory: np.ndarray, y: np.ndarray, plant: Plant
     ) -> np.ndarray:
         """Efforts asked for after a while of the same, where the plant was looked at, (n,)."""
-        columns, period = self.columns, self.columns.rows("period")
+        columns = self.columns
         columns.given[self._aimed, 0] = aim
         if memory.size:
             columns.give("memory_before", memory)
         if columns.has("pose_before"):
-            rate = plant["joint_rate"]
-            columns.give("pose_before", plant["pose"])
-            columns.give("pose_rate_before", np.zeros(6))
-            columns.give("joint_before", plant["joint"] - columns.given[period, 0] * rate)
-            columns.give("joint_rate_before", rate)
+            self._remember(plant["pose"], plant["joint"], plant["joint_rate"], 0)
         return self._solve(0.0, y, plant)
 
     def _solve(self, t: float, y: np.ndarray, plant: Plant) -> np.ndarray:
@@ -210,16 +180,16 @@ class Controller:
 
     def _given(self, t: float, seen: Columns) -> np.ndarray:
         n, m = len(self.plan.low), len(self.plan.q)
-        if self._function is None:
+        if self.drive.function is None:
             if not seen.result(REQUEST).size:
                 return np.zeros(n)
             q, q1, q2, force, point = np.split(seen[REQUEST], [m, 2 * m, 3 * m, 3 * m + 3])
             load = np.concatenate([force, np.zeros(3), point])
             return self._model.one(q, q1, q2, load)
         names = ("q", "q1", "joint", "joint_rate")
-        now = Measured(t, **{name: seen[name] for name in names}, force=seen["felt"])
+        now = Seen(**{name: seen[name] for name in names}, force=seen["felt"], t=t)
         *aim, force = (seen.given[seen.rows(name), 0] for name in AIMS)
-        found = self._function(now, Reference(*aim, force=float(force[0])))  # type: ignore[misc]
+        found = self.drive.function(now, Aim(*aim, force=float(force[0])))  # type: ignore[misc]
         effort: np.ndarray = np.asarray(found, dtype=float)
         if effort.shape != (n,) or not np.isfinite(effort).all():
             raise InputError(

@@ -56,7 +56,8 @@ class Point:
     time:  [s], None at home.   holds: name of the load that it holds a force on, or None.
     eigenvalues: s [1/s], complex.
     radius: largest |z|, or 1 + largest Re s of a continuous loop [1/s].
-    damping: least of all eigenvalues that last.   phase: margin [degrees]; inf if L is below 1.
+    damping: least of all eigenvalues that last.
+    phase: margin [degrees], negative where unstable; inf if L is below 1.
     """
 
     time: float | None
@@ -99,22 +100,20 @@ class GainReport:
         """What to look at."""
         bad = [point for point in self.points if not point.stable]
         if bad:
-            late = "" if self.period is None else self._late()
-            return [f"the loop is unstable at {len(bad)} of {len(self.points)} points{late}"]
+            text = f"the loop is unstable at {len(bad)} of {len(self.points)} points"
+            if self.period is not None:
+                held = (self.delay + 0.5) * self.period * 1e3
+                text += (
+                    f": efforts come {held:.3g} ms late on average (delay, and half a period held);"
+                    " lower the gains, the delay or the period"
+                )
+            return [text]
         found = []
         if (least := min(point.damping for point in self.points)) < WEAK:
             found.append(f"the loop is hardly damped: {least:.3f}, below {WEAK:g}")
         if (phase := min(point.phase for point in self.points)) < SMALL:
             found.append(f"the phase margin is {phase:.1f} degrees, below {SMALL:g}")
         return found
-
-    def _late(self) -> str:
-        assert self.period is not None
-        held = (self.delay + 0.5) * self.period * 1e3
-        return (
-            f": efforts come {held:.3g} ms late on average (delay, and half a period held); lower "
-            "the gains, the delay or the period"
-        )
 
     def data(self) -> dict[str, Any]:
         """For programs."""
@@ -221,14 +220,16 @@ class Loop:
             A, B, H, results[:n, seen:], E, results[n:, seen:], drive.period, drive.delay
         )
         holds = None if load is None else plan.loads[load].name
+        s = z = np.linalg.eigvals(step.closed())
         if drive.period is None:
-            s = np.linalg.eigvals(A + B @ H)
             worst = 1.0 + float(s.real.max())
-            return Point(time, s, worst, _damping(s), _phase_continuous(A, B, -H), holds)
-        z = np.linalg.eigvals(step.closed())
-        lasting = z[np.abs(z) > FAST]
-        s = np.log(lasting.astype(complex)) / drive.period
-        return Point(time, s, float(np.abs(z).max()), _damping(s), step.phase(), holds)
+        else:
+            worst = float(np.abs(z).max())
+            s = np.log(z[np.abs(z) > FAST].astype(complex)) / drive.period
+        size = np.abs(s)
+        damping = float((-s.real[size > 0] / size[size > 0]).min(initial=1.0))
+        phase = step.phase() if worst < 1.0 else -step.phase()
+        return Point(time, s, worst, damping, phase, holds)
 
     def _modes(self, y: np.ndarray) -> list[int]:
         """Of the loads, where they have not been touched."""
@@ -327,7 +328,8 @@ class Derivative:
 class Sampled:
     """The sampled loop of x' = A x + B u, u = H x + H_m w, w+ = E x + E_m w, d periods late.
 
-    Its state: x, the controller's memory w, and efforts that are on their way.
+    Its state: x, the controller's memory w, and efforts that are on their way; x alone where it is
+    at all times, without a period.
     """
 
     A: np.ndarray
@@ -340,11 +342,12 @@ class Sampled:
     delay: int
 
     def open(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """F, G, C of state+ = F state + G u, and of what the law asks for, u = -C state."""
+        """F, G, C of state+ (or its rate) = F state + G u, and u = -C state, which it asks for."""
         from scipy.linalg import expm
 
         (states, n), w, d, T = self.B.shape, self.H_m.shape[1], self.delay, self.period
-        assert T is not None
+        if T is None:
+            return self.A, self.B, -self.H
         block = np.zeros((states + n, states + n))
         block[:states, :states], block[:states, states:] = self.A, self.B
         whole = expm(block * T)
@@ -366,43 +369,23 @@ class Sampled:
         return F - G @ C
 
     def phase(self) -> float:
-        F, G, C = self.open()
-        T = self.period
-        assert T is not None
-        frequencies = np.geomspace(1e-1, np.pi / T, FREQUENCIES)
-        one = np.eye(len(F))
-        return _margin(
-            [
-                np.linalg.eigvals(C @ np.linalg.solve(np.exp(1j * w * T) * one - F, G))
-                for w in frequencies
-            ]
-        )
-
-
-def _phase_continuous(A: np.ndarray, B: np.ndarray, K: np.ndarray) -> float:
-    one, frequencies = np.eye(len(A)), np.geomspace(1e-1, 1e5, FREQUENCIES)
-    return _margin(
-        [np.linalg.eigvals(K @ np.linalg.solve(1j * w * one - A, B)) for w in frequencies]
-    )
-
-
-def _margin(loops: list[np.ndarray]) -> float:
-    """Least angle between -1 and where an eigenvalue's modulus passes 1 [degrees]."""
-    least = np.inf
-    ordered = [one[np.argsort(-np.abs(one))] for one in loops]
-    for before, after in pairwise(ordered):
-        with np.errstate(divide="ignore"):
-            a, b = np.log(np.abs(before)), np.log(np.abs(after))
-        for i in np.flatnonzero(a * b < 0):
+        """Least angle between -1 and where an eigenvalue's modulus passes 1 [degrees]."""
+        (F, G, C), T = self.open(), self.period
+        w = 1j * np.geomspace(1e-1, 1e5 if T is None else np.pi / T, FREQUENCIES)
+        one, least = np.eye(len(F)), np.inf
+        loops = [
+            np.linalg.eigvals(C @ np.linalg.solve(z * one - F, G))
+            for z in (w if T is None else np.exp(w * T))
+        ]
+        ordered = [loop[np.argsort(-np.abs(loop))] for loop in loops]
+        for before, after in pairwise(ordered):
+            with np.errstate(divide="ignore"):
+                a, b = np.log(np.abs(before)), np.log(np.abs(after))
+            i = np.flatnonzero(a * b < 0)
             turned = a[i] / (a[i] - b[i]) * np.angle(after[i] / before[i])
-            value = before[i] * np.exp(1j * turned)
-            least = min(least, abs(np.degrees(np.angle(-value))))
-    return float(least)
-
-
-def _damping(s: np.ndarray) -> float:
-    size = np.abs(s)
-    return float((-s.real[size > 0] / size[size > 0]).min(initial=1.0))
+            values = before[i] * np.exp(1j * turned)
+            least = min(least, np.degrees(np.abs(np.angle(-values))).min(initial=np.inf))
+        return float(least)
 
 
 def error_bound(stiffness: float, damping: float, disturbance: float) -> float:

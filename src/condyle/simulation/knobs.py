@@ -55,25 +55,22 @@ def _knobs(owner: str, of: Law | Load, force: np.ndarray) -> list[Knob]:
     return found
 
 
-def turned(plan: Plan, knob: Knob, value: float) -> Plan:
-    """The plan with a knob at another value, from the plan that it was found in."""
-    if knob.owner == CONTROLLER:
-        drive = plan.drive
+def at(plan: Plan, knobs: Sequence[Knob], values: Sequence[float]) -> Plan:
+    """The plan, in which the knobs were found, with them at values."""
+    drive, loads = plan.drive, list(plan.loads)
+    for knob, value in zip(knobs, values, strict=True):
+        if value == knob.value:
+            continue
+        if knob.owner != CONTROLLER:
+            loads = [_with(x, knob, value) if x.name == knob.owner else x for x in loads]
+            continue
         assert isinstance(drive, ClosedLoop)
         if knob.field == "force":
             path = replace(drive.path, force=_scaled(drive.path.force, value))
-            return replace(plan, drive=replace(drive, path=path))
-        return replace(plan, drive=replace(drive, law=_with(drive.law, knob, value)))
-    loads = [_with(one, knob, value) if one.name == knob.owner else one for one in plan.loads]
-    return replace(plan, loads=tuple(loads))
-
-
-def at(plan: Plan, knobs: Sequence[Knob], values: Sequence[float]) -> Plan:
-    """The plan with knobs at values."""
-    for knob, value in zip(knobs, values, strict=True):
-        if value != knob.value:
-            plan = turned(plan, knob, value)
-    return plan
+            drive = replace(drive, path=path)
+        else:
+            drive = replace(drive, law=_with(drive.law, knob, value))
+    return replace(plan, drive=drive, loads=tuple(loads))
 
 
 def _with(of: Any, knob: Knob, value: float) -> Any:

@@ -50,16 +50,10 @@ class Fed:
     rows: np.ndarray
     vanishes: bool
 
-    def at(self, t: float) -> np.ndarray:
-        """Its row at a time [s]."""
-        times = self.times
-        if self.vanishes and not times[0] <= t <= times[-1]:
-            return np.zeros(self.rows.shape[1])
-        after = min(max(int(np.searchsorted(times, t, side="right")), 1), len(times) - 1)
-        before = max(after - 1, 0)
-        width = times[after] - times[before]
-        part = min(max((t - times[before]) / width, 0.0), 1.0) if width > 0 else 0.0
-        return self.rows[before] + part * (self.rows[after] - self.rows[before])
+    def at(self, t: float | np.ndarray) -> np.ndarray:
+        """Its row at a time [s], or its rows at several."""
+        ends = {"left": 0.0, "right": 0.0} if self.vanishes else {}
+        return np.array([np.interp(t, self.times, one, **ends) for one in self.rows.T]).T
 
 
 class Plant:
@@ -87,7 +81,7 @@ class Plant:
         for name in ("low", "high", "speed"):
             give(name, np.clip(getattr(plan, name), -WIDE, WIDE), run)
         if self._bounded:
-            give("bounds", np.clip(bounds(plan, self._bounded).ravel(), -WIDE, WIDE), run)
+            give("bounds", bounds(plan, self._bounded), run)
         if self._sided:
             give("push", self._push, run)
         for i, load in enumerate(plan.loads):
@@ -165,7 +159,7 @@ class Plant:
         for i in range(modes.shape[1]):
             ports[f"load_{i}_mode"] = modes[:, i : i + 1].astype(float)
         for table in self._tables:
-            ports[table.port] = np.array([table.at(when) for when in t.tolist()])
+            ports[table.port] = table.at(t)
         found = columns.kernel.run(ports).values
         for i, function in self.plan.functions.items():
             places = np.moveaxis(found["load_place"], -1, 0)[:, i]
@@ -217,11 +211,7 @@ class Plant:
 
 
 def bounds(plan: Plan, contacts: list[int]) -> np.ndarray:
-    """Of contact points, (contacts, 2, 3) [m]: low and high, infinite where there is none."""
-    found = np.empty((len(contacts), 2, 3))
-    for to, i in zip(found, contacts, strict=True):
-        own = plan.model.mechanism.contacts[i].bounds
-        for axis, name in enumerate("xyz"):
-            interval = getattr(own, name)
-            to[:, axis] = (-np.inf, np.inf) if interval is None else interval
-    return found
+    """Of contact points, (6 contacts,) [m]: low and high, `WIDE` where there is none."""
+    own = [plan.model.mechanism.contacts[i].bounds for i in contacts]
+    ends = [[getattr(one, axis) or (-WIDE, WIDE) for axis in "xyz"] for one in own]
+    return np.array(ends, dtype=float).swapaxes(1, 2).ravel()

@@ -135,7 +135,10 @@ class Run:
 
         Raises: Stuck: where it cannot be.
         """
-        self._look(self.t, self.y)
+        return self._acting(self.t, self.y)
+
+    def _acting(self, t: float, y: np.ndarray) -> np.ndarray:
+        self._look(t, y)
         asked = self.plant.columns.given[self.plant.columns.rows("effort"), 0]
         return np.clip(asked, self._plan.low, self._plan.high)
 
@@ -196,39 +199,30 @@ class Run:
             tick = np.minimum(tick, self.tick)
         if control is None or not len(self._ticks):
             effort = self._efforts(t, state, modes)
-            none = np.empty((0, n))
-            return Trace(
-                t, state, modes, effort, tick, none, none, np.empty((0, 2 * m)), np.empty(0),
-                tuple(self.events),
-            )  # fmt: skip
-        looks, rows = control.looks[:looked, :, 0], control.columns.result
-        due = np.maximum(tick - drive.delay, 0)  # type: ignore[union-attr]
-        force = np.linalg.norm(looks[:, rows("felt")], axis=1)
-        return Trace(
-            t,
-            state,
-            modes,
-            looks[due][:, rows("effort")] if looked else np.zeros((len(t), n)),
-            tick,
-            looks[:, rows("asked")],
-            looks[:, rows("joint")],
-            looks[:, np.concatenate([rows("q"), rows("q1")])],
-            force,
-            tuple(self.events),
-        )
+            seen: dict[str, np.ndarray] = dict.fromkeys(("command", "count"), np.empty((0, n)))
+            seen |= {"estimate": np.empty((0, 2 * m)), "force": np.empty(0)}
+        else:
+            looks, rows = control.looks[:looked, :, 0], control.columns.result
+            due = np.maximum(tick - drive.delay, 0)  # type: ignore[union-attr]
+            effort = looks[due][:, rows("effort")] if looked else np.zeros((len(t), n))
+            seen = {
+                "command": looks[:, rows("asked")],
+                "count": looks[:, rows("joint")],
+                "estimate": looks[:, np.concatenate([rows("q"), rows("q1")])],
+                "force": np.linalg.norm(looks[:, rows("felt")], axis=1),
+            }
+        return Trace(t, state, modes, effort, tick, **seen, events=tuple(self.events))
 
     def _efforts(self, t: np.ndarray, state: np.ndarray, modes: np.ndarray) -> np.ndarray:
         """As they acted at the results' times, where they follow from time and state, (N, n)."""
         plan, drive = self._plan, self._plan.drive
         if isinstance(drive, OpenLoop):
-            columns = [np.interp(t, drive.times, column) for column in drive.efforts.T]
-            return np.clip(np.column_stack(columns), plan.low, plan.high)
+            fed = next(table for table in self.plant.fed(plan) if table.port == "effort")
+            return np.clip(fed.at(t), plan.low, plan.high)
         found = np.empty((len(t), len(plan.low)))
         for i, when in enumerate(t.tolist()):
             self.plant.set_modes(modes[i].tolist())
-            self._look(when, state[i])
-            asked = self.plant.columns.given[self.plant.columns.rows("effort"), 0]
-            found[i] = np.clip(asked, plan.low, plan.high)
+            found[i] = self._acting(when, state[i])
         return found
 
     # -- efforts ------------------------------------------------------------------------------

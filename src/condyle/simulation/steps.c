@@ -30,6 +30,12 @@ static void spread(const Run *r, double *to, const double *from, int64_t rows, i
             to[i * r->stride + v] = from[i * lanes + (lanes > 1 ? v : 0)];
 }
 
+static void copied(const Run *r, const Copy *row, int64_t rows)
+{
+    for (const Copy *end = row + rows; row < end; row++)
+        memcpy(row->to, row->from, (size_t)r->stride * sizeof *row->to);
+}
+
 /* What tables say at t, linear between their rows; outside they stay, or are zero. */
 static void feed(const Run *r, double t)
 {
@@ -91,13 +97,11 @@ static int look(Run *r)
     if (!r->seen && rates(r, r->t, r->y, r->k)) return LOOK;
     r->seen = 1;
     spread(r, r->aim, r->aims + k * r->aim_rows * r->aim_lanes, r->aim_rows, r->aim_lanes);
-    for (int64_t i = 0; i < r->links; i++)
-        memcpy(r->link_to[i], r->link_from[i], (size_t)stride * sizeof *kept);
+    copied(r, r->link, r->links);
     if (evaluate(r, &r->control)) return LOOK;
     memcpy(kept, r->control.found, (size_t)(r->results * stride) * sizeof *kept);
     memcpy(r->states + k * r->size * stride, r->y, (size_t)(r->size * stride) * sizeof *kept);
-    for (int64_t i = 0; i < r->carried; i++)
-        memcpy(r->carry_to[i], r->carry_from[i], (size_t)stride * sizeof *kept);
+    copied(r, r->carry, r->carried);
     for (int64_t i = 0; i < r->efforts; i++)
         memcpy(r->effort + i * stride, r->looks + (due * r->results + r->effort_row[i]) * stride,
                (size_t)stride * sizeof *kept);

@@ -22,13 +22,13 @@ from ..backends.compiler import CompilerError, find_compiler
 from .columns import Columns
 from .control import Controller
 from .integrators import FIXED, RUNGE_KUTTA
-from .plan import ClosedLoop, Plan
+from .plan import Plan
 from .plant import Fed, Guard, Plant
 
 DONE, PAUSE, STEP, LOOK = range(4)  # why `advance` returns
 BUDGET = 20_000  # steps between two words of progress
 
-NUMBERS, POINTERS = "const double *", "double *const *"
+NUMBERS = "const double *"
 # What C and Python share, member by member; the struct in C is written from it.
 KERNEL = {
     "one": "one_function", "batch": "batch_function", "table": NUMBERS, "given": "double *",
@@ -38,6 +38,7 @@ TABLE = {
     "times": NUMBERS, "rows": NUMBERS, "to": "double *", "count": "int64_t", "width": "int64_t",
     "lanes": "int64_t", "vanishes": "int64_t",
 }  # fmt: skip
+COPY = {"to": "double *", "from": NUMBERS}
 RUN = {
     # runs, each a column of `stride`; which are alive, which are gone, what a batch said
     "runs": "int64_t", "stride": "int64_t", "alive": "const uint8_t *", "gone": "uint8_t *",
@@ -54,14 +55,13 @@ RUN = {
     "table": "const Table *", "tables": "int64_t",
     # a look: aims to where they go, measured rows, results kept, what is carried on, efforts
     "aims": NUMBERS, "aim": "double *", "aim_rows": "int64_t", "aim_lanes": "int64_t",
-    "link_to": POINTERS, "link_from": "const double *const *", "links": "int64_t",
-    "carry_to": POINTERS, "carry_from": "const double *const *", "carried": "int64_t",
+    "link": "const Copy *", "links": "int64_t", "carry": "const Copy *", "carried": "int64_t",
     "looks": "double *", "states": "double *", "results": "int64_t", "tick": "int64_t",
     "delay": "int64_t", "effort": "double *", "effort_row": "const int64_t *", "efforts": "int64_t",
     # results: states at times
     "times": NUMBERS, "count": "int64_t", "next": "int64_t", "kept": "double *",
 }  # fmt: skip
-STRUCTS = {"Kernel": KERNEL, "Table": TABLE, "Run": RUN}
+STRUCTS = {"Kernel": KERNEL, "Table": TABLE, "Copy": COPY, "Run": RUN}
 HEAD = """#include <math.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -220,14 +220,13 @@ class Steps:
             links += [
                 (columns.address(row), y[i:].ctypes.data) for i, row in enumerate(to[: 2 * m])
             ]
-        run.link_to, run.link_from, run.links = *self._pointers(links), len(links)
+        run.link, run.links = self._copies(links), len(links)
         pairs = zip(control.carry_to, control.carry_from, strict=True)
         carry = [(columns.address(to), columns.address(row, found=True)) for to, row in pairs]
-        run.carry_to, run.carry_from, run.carried = *self._pointers(carry), len(carry)
+        run.carry, run.carried = self._copies(carry), len(carry)
         run.looks, run.states = control.looks.ctypes.data, control.states.ctypes.data
         run.results = columns.results
-        assert isinstance(plan.drive, ClosedLoop)
-        run.delay = plan.drive.delay
+        run.delay = control.drive.delay
         rows = plant.columns.rows("effort")
         run.effort = plant.columns.address(int(rows.min()))
         order = columns.result("effort")[np.argsort(rows)]
@@ -241,11 +240,10 @@ class Steps:
         places = ctypes.addressof(pointers), ctypes.addressof(strides)
         return _TYPES["Kernel"](one, batch, table, given, found, *places)
 
-    def _pointers(self, pairs: list[tuple[int, int]]) -> tuple[int, int]:
-        both = [(ctypes.c_void_p * max(len(pairs), 1))(*side) for side in zip(*pairs, strict=True)]
-        both = both or [(ctypes.c_void_p * 1)(), (ctypes.c_void_p * 1)()]
-        self._keep += both
-        return ctypes.addressof(both[0]), ctypes.addressof(both[1])
+    def _copies(self, pairs: list[tuple[int, int]]) -> int:
+        copies = (_TYPES["Copy"] * max(len(pairs), 1))(*pairs)
+        self._keep.append(copies)
+        return ctypes.addressof(copies)
 
     def _at(self, array: np.ndarray) -> int:
         """Address of an array's numbers, kept as long as this is."""

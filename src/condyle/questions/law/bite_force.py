@@ -22,7 +22,7 @@ hard. Since f is borne all the time, efforts do not jump where one law follows t
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import casadi as ca
 from pydantic import Field, model_validator
@@ -30,7 +30,7 @@ from pydantic import Field, model_validator
 from ...dynamics.least_norm import definite_solve
 from ...mechanism.quantities import Direction, Name, NonNegativeLength
 from ..builder import Lanes
-from ..entries import File, Gain, Machine, Positive, unit
+from ..entries import File, Gain, Machine, Positive
 from .computed_torque import ComputedTorque, corrected
 from .controller import Control
 
@@ -82,15 +82,6 @@ class BiteForce(ComputedTorque):
         if (self.force is None) == (self.force_file is None):
             raise ValueError("expected force [N] or force_file (CSV of t, force), one of them")
         return self
-
-    def numbers(self, machine: Machine) -> Mapping[str, Any]:
-        own = ("proportional", "integral", "bite_damping", "threshold", "release")
-        return {
-            **super().numbers(machine),
-            "point": machine.point(self.point)[1],
-            "direction": unit(self.direction),
-            **{name: getattr(self, name) for name in own},
-        }
 
     def place(self, machine: Machine) -> str | None:
         return machine.place(self.point)

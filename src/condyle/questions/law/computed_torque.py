@@ -22,7 +22,7 @@ import numpy as np
 from pydantic import Field
 
 from ..builder import Lanes
-from ..entries import Gain, Gains, Machine, each
+from ..entries import Gain, Gains, Machine
 from .controller import EACH_COORDINATE, Control, ControllerTable
 
 
@@ -42,11 +42,9 @@ class ComputedTorque(ControllerTable):
     )
 
     def numbers(self, machine: Machine) -> Mapping[str, Any]:
-        Kp = each(self.stiffness, machine.independent, "controller.stiffness")
-        if self.damping is None:
-            return {"stiffness": Kp, "damping": 2 * np.sqrt(Kp)}
-        Kv = each(self.damping, machine.independent, "controller.damping")
-        return {"stiffness": Kp, "damping": Kv}
+        found = super().numbers(machine)
+        critical = 2 * np.sqrt(found["stiffness"])
+        return {**found, "damping": critical} if self.damping is None else found
 
     @staticmethod
     def equations(c: Control) -> tuple[Lanes, ca.SX]:

@@ -22,39 +22,25 @@ from pydantic import Field
 from ...mechanism.quantities import Name
 from ...mechanism.table import Table
 from ..builder import Builder, Lanes
-from ..entries import Count, File, Frequency, Machine
+from ..entries import Count, File, Frequency, Machine, each, unit
 from ..equations import Wrench
 from ..instant import inertia_matrix
+from ..observer import Seen
 from ..platform import Platform, placed
 
 EACH_COORDINATE, EACH_CHAIN = "coordinate", "chain"  # sizes of ports
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What a controller sees at a tick.
-
-    q, q1: estimated state, (m,) each;  joint, joint_rate: lanes, as encoders have it.
-    force: of the loads on the platform at the controller's point, (3,) [N] in {S}.
-    """
-
-    q: ca.SX
-    q1: ca.SX
-    joint: Lanes
-    joint_rate: Lanes
-    force: ca.SX
-
-
-@dataclass(frozen=True)
 class Aim:
-    """What it should be there: q, q1, q2 (m,), joint, joint_rate, lanes, force [N]."""
+    """What it should be there: q, q1, q2 (m,), joint, joint_rate, a chain's, force [N]."""
 
-    q: ca.SX
-    q1: ca.SX
-    q2: ca.SX
-    joint: Lanes
-    joint_rate: Lanes
-    force: ca.SX
+    q: Any
+    q1: Any
+    q2: Any
+    joint: Any
+    joint_rate: Any
+    force: Any
 
 
 @dataclass(frozen=True)
@@ -117,7 +103,8 @@ class Control:
 class ControllerTable(Table):
     """The `[controller]`; its `kind` says which.
 
-    Of a kind of its own: `ports` and their sizes, what `numbers` gives for them, and `equations`.
+    Of a kind of its own: `ports` and their sizes, what `numbers` gives for them where it is more
+    than entries of their names, and `equations`.
     """
 
     ports: ClassVar[Mapping[str, str | int]] = {}
@@ -149,12 +136,21 @@ class ControllerTable(Table):
     distribution: str | None = Field(default=None, description="how it chooses efforts")
     preload: float = Field(default=0.0, ge=0, allow_inf_nan=False, description="N")
 
-    @abstractmethod
     def numbers(self, machine: Machine) -> Mapping[str, Any]:
-        """What its ports are given, by name.
+        """What its ports are given, by name: its own entries, one for all or one each.
 
         Raises: InputError: where it does not fit the mechanism.
         """
+        owners = {EACH_COORDINATE: machine.independent, EACH_CHAIN: machine.chains, 3: "xyz"}
+        found = {name: getattr(self, name) for name in self.ports}
+        for name, size in self.ports.items():
+            if name == "point":
+                found[name] = machine.point(found[name])[1]
+            elif name == "direction":
+                found[name] = unit(found[name])
+            elif size in owners and found[name] is not None:
+                found[name] = each(found[name], owners[size], f"controller.{name}")
+        return found
 
     def place(self, machine: Machine) -> str | None:
         """Name of the point where it measures force, or None."""

@@ -22,7 +22,7 @@ from pydantic import Field
 from ...dynamics.least_norm import definite_solve
 from ...mechanism.quantities import Name
 from ..builder import Lanes
-from ..entries import Gain, Gains, Machine, each
+from ..entries import Gain, Gains, Machine
 from .controller import Control, ControllerTable
 
 RANK = 1e-10  # of the point's inverse inertia, beside its largest: below, it cannot move that way
@@ -53,14 +53,8 @@ class Impedance(ControllerTable):
     posture_damping: Gain | None = Field(default=None, description="1/s; default 2 sqrt(posture)")
 
     def numbers(self, machine: Machine) -> Mapping[str, Any]:
-        Kn, Kd = self.posture, self.posture_damping
-        return {
-            "stiffness": each(self.stiffness, "xyz", "controller.stiffness"),
-            "damping": each(self.damping, "xyz", "controller.damping"),
-            "posture": Kn,
-            "posture_damping": 2 * Kn**0.5 if Kd is None else Kd,
-            "point": machine.point(self.point)[1],
-        }
+        found, critical = super().numbers(machine), 2 * self.posture**0.5
+        return {**found, "posture_damping": critical} if self.posture_damping is None else found
 
     def place(self, machine: Machine) -> str | None:
         return machine.place(self.point)

@@ -12,13 +12,13 @@ other: gains should be alike. A cable takes no push: it slackens where the law a
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import casadi as ca
 from pydantic import Field
 
 from ..builder import Lanes
-from ..entries import Gains, Machine, each
+from ..entries import Gains
 from .controller import EACH_CHAIN, Control, ControllerTable
 
 
@@ -36,12 +36,6 @@ class JointPD(ControllerTable):
     stiffness: Gains = Field(description="N m/rad or N/m; one, or one a chain")
     damping: Gains = Field(description="N m s/rad or N s/m")
     gravity: bool = Field(default=True, description="add what holds the reference at rest")
-
-    def numbers(self, machine: Machine) -> Mapping[str, Any]:
-        return {
-            name: each(getattr(self, name), machine.chains, f"controller.{name}")
-            for name in self.ports
-        }
 
     @staticmethod
     def equations(c: Control) -> tuple[Lanes, ca.SX]:
