@@ -20,7 +20,7 @@ from ..backends.kernel import OK, Kernel
 from ..backends.numpy_kernel import NumpyKernel
 from ..graph.program import Numbers
 from ..questions import Question
-from ..questions.allocation import TIE
+from ..questions.allocation import TERMS, TIE, TURNS
 from ..questions.numbers import Layout
 from ..questions.structure import Structure
 from .certificate import Answer
@@ -119,8 +119,7 @@ def _by_kernel(
     best = np.full(count, np.inf)
     for sigma in signs:
         inputs["sigma"] = np.broadcast_to(sigma, (count, k))
-        answer = kernel.run(inputs)
-        good, values = answer.status == OK, answer.values
+        good, values = _proved(kernel, inputs, TERMS[objective.term].turns)
         known &= good | (values["none"] == 1)
         with np.errstate(invalid="ignore"):
             less = good & ~(values["value"] >= best - TIE * np.where(found, np.abs(best), 0.0))
@@ -133,6 +132,28 @@ def _by_kernel(
     result.status[good], result.shortfall[good] = Status.ok, 1.0
     result.primal[good] = result.dual[good] = 0.0  # by construction
     return np.flatnonzero(~good)
+
+
+def _proved(
+    kernel: Kernel, inputs: dict[str, np.ndarray], turns: int
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Which samples have efforts for sure, and all results; the rest go on for so many steps."""
+    count = len(inputs["Q"])
+    multipliers, begun = np.broadcast_to(0.0, (count, 6)), np.broadcast_to(0.0, (count, 1))
+    answer = kernel.run(inputs | {"multipliers": multipliers, "begun": begun})
+    good, values, rows = answer.status == OK, answer.values, np.arange(count)
+    for _ in range(TURNS, turns, TURNS):
+        going = ~good[rows] & (values["none"][rows] != 1)
+        if not going.any():
+            break
+        if not going.all():
+            rows, inputs = rows[going], {name: a[going] for name, a in inputs.items()}
+        started = {"multipliers": values["multipliers"].T[rows], "begun": np.ones((len(rows), 1))}
+        answer = kernel.run(inputs | started)
+        good[rows] = answer.status == OK
+        for name, a in answer.values.items():
+            values[name][..., rows] = a
+    return good, values
 
 
 # -- one sample after the other ------------------------------------------------------------

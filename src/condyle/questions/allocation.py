@@ -36,6 +36,7 @@ TIE = 1e-12  # of a value: patterns of friction nearer than this are equal, and 
 ENOUGH = 0.1  # part of the first slope that may be left at the end of a step
 SOFT = 1e-12  # curvature of a cube at 0, of the efforts: less than a certificate shows
 HUGE = 1e290  # more is infinite
+TURNS = 3  # of Newton's method, a call of the question
 PROBES = 2  # of the slope along a step
 
 
@@ -115,7 +116,7 @@ class Allocated:
     """Efforts (lanes), contact forces (k,), and the value of the objective.
 
     sure: 1 where they are proved to be the least, else 0;  none: 1 where it is proved that there
-    are none, else 0;  residual: what the equations miss, of their terms.
+    are none, else 0;  residual: what the equations miss, of their terms;  multipliers: (6,).
     """
 
     effort: Lanes
@@ -124,20 +125,30 @@ class Allocated:
     sure: ca.SX
     none: ca.SX
     residual: ca.SX
+    multipliers: ca.SX
 
 
 def allocate(
-    b: Builder, Q: ca.SX, J: Lanes, D: ca.SX, limits: Limits, term: Term, turns: int = 0
+    b: Builder,
+    Q: ca.SX,
+    J: Lanes,
+    D: ca.SX,
+    limits: Limits,
+    term: Term,
+    turns: int,
+    before: tuple[ca.SX, ca.SX] | None = None,
 ) -> Allocated:
     """Efforts and contact forces that balance Q, (6,).
 
     Args: J: rows of the actuator Jacobian, (6,) a group;  D: wrenches of unit forces, (6, k).
-          turns: Newton's steps; by default those of the term.
+          turns: Newton's steps;  before: multipliers to begin with, (6,), where the second is 1.
     """
     r = _reduced(b, Q, J, D, limits)
     u, quality = _start(b, r, term)
+    if before is not None:
+        u = ca.if_else(before[1], before[0], u)
     here = _point(b, r, term, u)
-    for _ in range(turns or term.turns):
+    for _ in range(turns):
         u, change = _turn(b, r, term, here)
         here = _point(b, r, term, u)
     force = here.force
@@ -153,7 +164,7 @@ def allocate(
     none = r.regular * (1 - (1 - _empty(b, r, here.u)) * (1 - _empty(b, r, change)))
     none = 1 - possible * (1 - none * (1 - here.met))
     effort = [x * s for x, s in zip(here.x, limits.scale, strict=True)]
-    return Allocated(effort, force, value, sure, none, here.missed)
+    return Allocated(effort, force, value, sure, none, here.missed, here.u)
 
 
 def least_pattern(
@@ -173,7 +184,7 @@ def least_pattern(
     best: Allocated | None = None
     for signs in patterns:
         sigma = ca.SX(ca.DM(list(signs)))
-        one = allocate(b, Q, J, N - T @ ca.diag(sigma), limits.signed(sigma), term)
+        one = allocate(b, Q, J, N - T @ ca.diag(sigma), limits.signed(sigma), term, term.turns)
         if best is None:
             best = one
             continue
@@ -188,13 +199,18 @@ def least_pattern(
             known * ca.fmax(one.sure, best.sure),
             one.none * best.none,
             ca.if_else(taken, one.residual, best.residual),
+            ca.if_else(taken, one.multipliers, best.multipliers),
         )
     assert best is not None
     return best
 
 
 def allocation(structure: Structure, term: str = "square", weighs: bool = False) -> Program:
-    """From the balance itself, with signs of contact forces given: a question of numbers alone."""
+    """From the balance itself, with signs of contact forces given: a question of numbers alone.
+
+    It takes `TURNS` steps from the multipliers that it is given, if it is `begun`: what it neither
+    proves nor disproves goes on with those that it gives.
+    """
     b = Builder(structure)
     k = len(structure.contacts)
     masks = [b.lane(group, "mask") for group in range(len(structure.chains))]
@@ -202,12 +218,15 @@ def allocation(structure: Structure, term: str = "square", weighs: bool = False)
     N, T = (ca.reshape(b.sample(name, 6 * k), 6, k) for name in ("normal", "friction"))
     sigma, limits = b.sample("sigma", k), Limits.ports(b, weighs).signed
     J = [ca.if_else(mask, row, 0) for mask, row in zip(masks, J, strict=True)]
-    found = allocate(b, Q, J, N - T @ ca.diag(sigma), limits(sigma), TERMS[term])
+    before = b.sample("multipliers", 6), b.sample("begun", 1)
+    D = N - T @ ca.diag(sigma)
+    found = allocate(b, Q, J, D, limits(sigma), TERMS[term], TURNS, before)
     b.output("effort", found.effort, "N m or N")
     b.output("contact_force", found.force, "N", k)
     b.output("value", found.value, "")
     b.output("none", found.none, "")
     b.output("residual", found.residual, "")
+    b.output("multipliers", found.multipliers, "")
     b.check(found.sure, 0.5)
     return b.finish()
 
@@ -317,25 +336,33 @@ def _allowed(r: _Reduced, u: ca.SX) -> ca.SX:
     return ca.vertcat(u[:m], s)
 
 
-def _point(b: Builder, r: _Reduced, term: Term, u: ca.SX) -> _Point:
-    m, low, high = r.m, r.limits.contact_low, r.limits.contact_high
-    u = b.cut(_allowed(r, u))
-    prices = [ca.dot(G, u) for G in r.G]
+def _touching(r: _Reduced, s: ca.SX, natural: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Contact forces at their multipliers s, yields and free ones, (k,) each: see `_Point`.
+
+    Args: natural: forces that would meet the equations.
+    """
+    low, high, weight = r.limits.contact_low, r.limits.contact_high, r.limits.weight
+    if weight is not None:
+        price = s / weight
+        yields = (price > low) * (price < high) / weight
+        return _clipped(price, low, high), yields, ca.SX.ones(6 - r.m)
+    held = (s == 0) * (natural >= low) * (natural <= high)
+    at_low = ca.if_else(s < 0, 1, (s == 0) * (natural < low))
+    force = ca.if_else(held, natural, ca.if_else(at_low, low, high))
+    return force, ca.SX.zeros(6 - r.m), 1 - held
+
+
+def _efforts(b: Builder, r: _Reduced, term: Term, prices: Lanes) -> Lanes:
     bounds = zip(prices, r.low, r.high, strict=True)
-    x = _cut(b, [term.answer(g, least, most, r.soft) for g, least, most in bounds])
+    return _cut(b, [term.answer(g, least, most, r.soft) for g, least, most in bounds])
+
+
+def _point(b: Builder, r: _Reduced, term: Term, u: ca.SX) -> _Point:
+    m, u = r.m, b.cut(_allowed(r, u))
+    x = _efforts(b, r, term, [ca.dot(G, u) for G in r.G])
     gradient = r.right - b.total([G * own for G, own in zip(r.G, x, strict=True)])
-    s, natural = u[m:], gradient[m:]
-    if r.limits.weight is not None:
-        price = s / r.limits.weight
-        force = _clipped(price, low, high)
-        yields = (price > low) * (price < high) / r.limits.weight
-        free = ca.SX.ones(6 - m)
-    else:
-        held = (s == 0) * (natural >= low) * (natural <= high)
-        at_low = ca.if_else(s < 0, 1, (s == 0) * (natural < low))
-        force = ca.if_else(held, natural, ca.if_else(at_low, low, high))
-        yields, free = ca.SX.zeros(6 - m), 1 - held
-    gradient = b.cut(ca.vertcat(gradient[:m], natural - force))
+    force, yields, free = _touching(r, u[m:], gradient[m:])
+    gradient = b.cut(ca.vertcat(gradient[:m], gradient[m:] - force))
     size = ca.fabs(r.right) + r.steepest * b.total([ca.fabs(own) for own in x])
     size += ca.vertcat(ca.SX.zeros(m), ca.fabs(force))
     missed = ca.SX(0)
@@ -407,11 +434,27 @@ def _turn(b: Builder, r: _Reduced, term: Term, here: _Point) -> tuple[ca.SX, ca.
     change, _ = _solved(M, here.gradient, full)
     change = b.cut(change)
     first = ca.dot(here.gradient, change)
+    m = r.m
+    contacts = [G[m:] for G in r.G]
+    fixed = _cut(b, [ca.dot(G[:m], here.u[:m]) for G in r.G])
+    moving = _cut(b, [ca.dot(G[:m], change[:m]) for G in r.G])
+    level = ca.dot(r.right[:m], change[:m])
+
+    def slope_at(t: ca.SX) -> ca.SX:
+        s = _allowed(r, here.u + t * change)[m:]
+        parts = zip(fixed, moving, contacts, strict=True)
+        x = _efforts(b, r, term, [f + t * g + ca.dot(G, s) for f, g, G in parts])
+        both = zip(moving, contacts, x, strict=True)
+        taken = b.total([ca.vertcat(g, G) * own for g, G, own in both])
+        natural = r.right[m:] - taken[1:, :]
+        force, _, _ = _touching(r, s, natural)
+        return level - taken[0] + ca.dot(natural - force, change[m:])
+
     # Where the slope of d along the step vanishes: sought between lengths of either sign.
     t, top = ca.SX(1), ca.SX(float("inf"))
     low, low_slope, top_slope = ca.SX(0), first, ca.SX(0)
     for _ in range(PROBES):
-        slope = ca.dot(_point(b, r, term, here.u + t * change).gradient, change)
+        slope = slope_at(t)
         rises = slope > 0
         low_slope, top_slope = (
             ca.if_else(rises, slope, low_slope),

@@ -17,6 +17,7 @@ from ...graph.program import Program
 from .printer import Printer, nested
 
 LONG = 700  # statements of a chain above which one at a time is enough
+MANY = 6000  # statements of all chains above which compilers take long
 ABREAST = 2  # chains whose statements alternate, to keep all arithmetic ports busy
 TRIGONOMETRY = 12  # operations of half a sine and cosine
 
@@ -39,8 +40,9 @@ class Loops(Printer):
         self.absorbed = self._absorbed()
         ordered = sorted(self.varying, key=lambda v: self._rank(self._part(v)))
         self.parts = [(part, list(values)) for part, values in groupby(ordered, self._part)]
-        per_chain = sum(1 for v in self.varying if self.g.nodes[v].group is not None)
-        self.rolled = per_chain > LONG
+        groups = [group for v in self.varying if (group := self.g.nodes[v].group) is not None]
+        unrolled = sum(program.counts[group] for group in groups)
+        self.rolled = len(groups) > LONG or unrolled > MANY
         self.kept = self._kept() if self.rolled else set()
         self.here: Part = (0, None)
 
