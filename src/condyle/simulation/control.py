@@ -28,8 +28,7 @@ def drive_of(plan: Plan) -> ClosedLoop:
 class Controller:
     """Kernel, numbers and looks of a plan's controller, or of several alike.
 
-    aims:   (K, numbers, lanes) at the ticks, in the order of the ports;  lanes: 1 for all runs, or
-            one each.
+    aims:   (K, numbers, runs) at the ticks, in the order of the ports.
     looks:  (K, results, runs), what the tick found each time;  states: (K, size, runs), where.
     """
 
@@ -49,10 +48,10 @@ class Controller:
         rows = [self.columns.rows(name) for name in AIMS]
         self._aimed = np.concatenate(rows)
         self.first = int(self._aimed.min())
-        self.aims = np.empty((len(self.ticks), len(self._aimed), runs))
-        kept, self.stride = self.columns.results, self.columns.stride
-        self.looks = np.empty((len(self.ticks), kept, self.stride))
-        self.states = np.empty((len(self.ticks), plan.size, self.stride))
+        sizes = len(self._aimed), self.columns.results, plan.size
+        self.aims, self.looks, self.states = (
+            np.zeros((len(self.ticks), size, self.columns.stride)) for size in sizes
+        )
         self.carry = carried([port.name for port in self.columns.kernel.interface.ports])
         none = [np.zeros(0, dtype=int)]
         self.carry_to = np.concatenate(none + [self.columns.rows(to) for to in self.carry])

@@ -22,14 +22,6 @@ static int64_t passed_by(const double *times, int64_t count, double t)
     return low;
 }
 
-/* Rows of numbers, of which `lanes` is 1 for all runs or one each. */
-static void spread(const Run *r, double *to, const double *from, int64_t rows, int64_t lanes)
-{
-    for (int64_t i = 0; i < rows; i++)
-        for (int64_t v = 0; v < r->runs; v++)
-            to[i * r->stride + v] = from[i * lanes + (lanes > 1 ? v : 0)];
-}
-
 static void copied(const Run *r, const Copy *row, int64_t rows)
 {
     for (const Copy *end = row + rows; row < end; row++)
@@ -96,7 +88,7 @@ static int look(Run *r)
     double *kept = r->looks + k * r->results * stride;
     if (!r->seen && rates(r, r->t, r->y, r->k)) return LOOK;
     r->seen = 1;
-    spread(r, r->aim, r->aims + k * r->aim_rows * r->aim_lanes, r->aim_rows, r->aim_lanes);
+    memcpy(r->aim, r->aims + k * r->aim_rows * stride, (size_t)(r->aim_rows * stride) * sizeof *kept);
     copied(r, r->link, r->links);
     if (evaluate(r, &r->control)) return LOOK;
     memcpy(kept, r->control.found, (size_t)(r->results * stride) * sizeof *kept);

@@ -54,7 +54,7 @@ RUN = {
     "guard": "const int64_t *", "guards": "int64_t", "past": "const uint8_t *",
     "table": "const Table *", "tables": "int64_t",
     # a look: aims to where they go, measured rows, results kept, what is carried on, efforts
-    "aims": NUMBERS, "aim": "double *", "aim_rows": "int64_t", "aim_lanes": "int64_t",
+    "aims": NUMBERS, "aim": "double *", "aim_rows": "int64_t",
     "link": "const Copy *", "links": "int64_t", "carry": "const Copy *", "carried": "int64_t",
     "looks": "double *", "states": "double *", "results": "int64_t", "tick": "int64_t",
     "delay": "int64_t", "effort": "double *", "effort_row": "const int64_t *", "efforts": "int64_t",
@@ -207,7 +207,7 @@ class Steps:
         run, columns, m = self.run, control.columns, len(plan.q)
         run.control = self._kernel(columns)
         run.aims, run.aim = control.aims.ctypes.data, columns.address(control.first)
-        run.aim_rows, run.aim_lanes = control.aims.shape[1:]
+        run.aim_rows = control.aims.shape[1]
         measured = [(plant.columns, name, name) for name in ("joint", "joint_rate")]
         measured += [(plant.columns, "felt", "force")] * bool(plant.columns.result("felt").size)
         links = [
