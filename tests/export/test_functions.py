@@ -107,7 +107,7 @@ def test_poses_from_encoders_follow_a_motion(jaw: Library) -> None:
     q = np.hstack(
         [0.004 * np.sin(t), 0.002 * np.sin(2 * t), 0.08 * (1 - np.cos(t)), 0.03 * np.sin(t)]
     )
-    poses, _ = model.whole(q, 0 * q, 0 * q)
+    poses, _ = model.poses.whole(q, 0 * q, 0 * q)
     joints = model.kernel("encoders").run({"pose": poses["pose"]}).values["joint"].T
     start = np.zeros(6)
     for joint, pose in zip(joints, poses["pose"], strict=True):

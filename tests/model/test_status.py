@@ -142,7 +142,7 @@ def singular_pose(name: str) -> np.ndarray:
 
     def ratio(u: np.ndarray) -> float:
         q = (u * size)[None]
-        poses, reached = model.whole(q, 0 * q, 0 * q)
+        poses, reached = model.poses.whole(q, 0 * q, 0 * q)
         found = model.configuration(poses["pose"])
         if not reached[0] or (found.discriminant < 0).any():
             return 1.0

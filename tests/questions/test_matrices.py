@@ -73,7 +73,7 @@ def test_contacts_project_what_belongs_to_x(name: str) -> None:
     assert error(turned @ M_X @ M_J, m.inertia_matrix(c.q)) < 1e-13
     G = (turned @ m.gravity(c.q, "X")[..., None])[..., 0]
     assert error(G, m.gravity(c.q)) < 1e-13
-    drift = m.whole(c.q, c.q1, 0 * c.q)[0]["pose_acceleration"]
+    drift = m.poses.whole(c.q, c.q1, 0 * c.q)[0]["pose_acceleration"]
     inside = m.bias(c.q, c.q1, "X") + (M_X @ drift[..., None])[..., 0]
     assert error((turned @ inside[..., None])[..., 0], m.bias(c.q, c.q1)) < 1e-12
 
@@ -133,7 +133,7 @@ def test_jacobians_are_slopes_of_the_configuration(name: str) -> None:
     h = 1e-6
     for k in range(c.q.shape[1]):
         step = h * np.eye(c.q.shape[1])[k]
-        moved = [m.whole(c.q + s * step, 0 * c.q, 0 * c.q)[0]["pose"] for s in (1, -1)]
+        moved = [m.poses.whole(c.q + s * step, 0 * c.q, 0 * c.q)[0]["pose"] for s in (1, -1)]
         slope = (moved[0] - moved[1]) / (2 * h)
         assert error(found["M_J"][:, :, k], slope) < 2e-6
         joints = [m.configuration(pose) for pose in moved]

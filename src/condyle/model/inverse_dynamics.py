@@ -12,16 +12,15 @@ from ..backends.kernel import Answer
 from ..errors import InputError, did_you_mean
 from ..questions.inverse import OUTPUTS
 from ..status import Status
-from .checks import LOAD, as_samples, check_states, ports_of_load, samples_of_states
+from .checks import LOAD, Sample, as_samples, check_states, ports_of_load, samples_of_states
 from .data import Efforts, Evaluation
-from .distributing import Distributor, Policy
+from .distributing import Distributor
 from .one_sample import OneByOne
-from .poses import States, configured, singularity
+from .poses import configured, singularity
 from .system import System, mended
 
 Array = np.ndarray
 
-Asked = tuple[str | None, float, float]  # distribution, preload and contact weight
 CONDITION = "condition"
 EVERYTHING = ("contact", "share", "motion", "joint", "configuration")
 # Names of results, by what is asked for.
@@ -35,40 +34,21 @@ RESULTS = {
 
 
 class InverseDynamics:
-    """What efforts a motion takes: a part of `Model`."""
+    """What efforts a motion takes; see `Model`."""
 
-    system: System
-    _asked: Asked
+    def __init__(self, system: System, distributor: Distributor) -> None:
+        self._system, self.distributor = system, distributor
 
-    @cached_property
-    def policy(self) -> Policy:
-        """How efforts are chosen; forward dynamics has no need of it.
-
-        Raises: InputError: where the default does not fit the mechanism.
-        """
-        return Policy.of(self.system.mechanism, *self._asked)
-
-    @cached_property
-    def distributor(self) -> Distributor:
-        """What chooses efforts."""
-        return Distributor(self.system.mechanism, self.policy, self.system.backend)
-
-    def torques(
+    def efforts(
         self,
         q: Array,
         q1: Array,
         q2: Array,
         load: Array,
-        outputs: Collection[str] = (),
-        threads: int | None = None,
+        outputs: Collection[str],
+        threads: int | None,
     ) -> Efforts:
-        """Efforts alone, as fast as the machine.
-
-        Args:    as for `evaluate`; outputs: what is wanted besides, of contact, share, gravity
-                 (what of each share gravity and load alone ask for), motion, joint and condition:
-                 ask for less, pay for less; threads: at most so many.
-        Raises:  InputError: for an output that is none of these.
-        """
+        """As `Model.torques`."""
         known = (*RESULTS, CONDITION)
         for name in outputs:
             if name not in known:
@@ -76,57 +56,47 @@ class InverseDynamics:
         wanted = {*outputs} - {CONDITION}
         if CONDITION in outputs:
             wanted.add("configuration")
-        found = self._solve((q, q1, q2), load, wanted, threads)
+        found = self._solve(q, q1, q2, load, wanted, threads)
         values, status, effort = found.values, found.status, found.values["effort"].T
         if status.any():
             effort[status != Status.ok] = np.nan
         others = {name: _sample_first(name, values[name]) for name in _names(outputs)}
         if CONDITION in outputs:
-            others[CONDITION] = singularity(values, self.system.length).condition
+            others[CONDITION] = singularity(values, self._system.length).condition
         return Efforts(effort, others, status)
 
     def one(self, q: Array, q1: Array, q2: Array, load: Array) -> Array:
-        """Efforts of one sample, (n,) [N m or N], at least latency: for a control loop.
-
-        Args: q, q1, q2: (m,) each, in the order of `independent`;  load: (9,), as of `evaluate`.
-              Arrays of doubles go fastest.
-        Returns: efforts in the order of the chains, a new array; NaN where there are none.
-        Raises:  InputError: for arrays that do not fit.
-        """
-        if (quick := self._one_effort) is not None:
+        """As `Model.one`."""
+        if (quick := self._one_by_one) is not None:
             found = quick.call(q, q1, q2, load)
             if found is not None:
                 return found
-        samples = (*samples_of_states(self.system.independent), LOAD)
-        row = [a[None] for a in as_samples(samples, q, q1, q2, load)]
-        return self.torques(row[0], row[1], row[2], row[3]).effort[0]
+        rows = [a[None] for a in as_samples(self._samples, q, q1, q2, load)]
+        return self.efforts(rows[0], rows[1], rows[2], rows[3], (), None).effort[0]
 
     @cached_property
-    def _one_effort(self) -> OneByOne | None:
+    def _one_by_one(self) -> OneByOne | None:
         """What `one` calls; None where a kernel alone cannot say what the efforts are."""
         question, fixed = self.distributor.question
-        compiled = self.system.backend.name == "compiled"
-        kernel = self.system.kernel(*question) if question and compiled else None
+        compiled = self._system.backend.name == "compiled"
+        kernel = self._system.kernel(*question) if question and compiled else None
         if not isinstance(kernel, CompiledKernel):
             return None
-        samples = (*samples_of_states(self.system.independent), LOAD)
-        return OneByOne(kernel, samples, np.argsort(kernel.order), fixed)
+        return OneByOne(kernel, self._samples, np.argsort(kernel.order), fixed)
 
-    def evaluate(
-        self, q: Array, q1: Array, q2: Array, load: Array, threads: int | None = None
+    @cached_property
+    def _samples(self) -> tuple[Sample, ...]:
+        return (*samples_of_states(self._system.independent), LOAD)
+
+    def everything(
+        self, q: Array, q1: Array, q2: Array, load: Array, threads: int | None
     ) -> Evaluation:
-        """Inverse dynamics at samples of the independent coordinates, with all that follows.
-
-        Args: q, q1, q2: (N, m) each, in the order of `independent` [m, rad; per s; per s^2].
-              load: (N, 9): force [N] and moment [N m] in {S}, and the point they act at, in {M}.
-              threads: at most so many; default: the processors at hand. Results do not depend
-              on it.
-        """
-        found = self._solve((q, q1, q2), load, EVERYTHING, threads)
+        """As `Model.evaluate`."""
+        found = self._solve(q, q1, q2, load, EVERYTHING, threads)
         values, status = found.values, found.status
         return Evaluation(
             **{name: _sample_first(name, values[name]) for name in ("effort", *_names(EVERYTHING))},
-            configuration=configured(values, self.system.length),
+            configuration=configured(values, self._system.length),
             status=status,
             shortfall=values.get("shortfall", np.where(status == Status.ok, 1.0, np.nan)),
             **self._rubbed(values),
@@ -137,7 +107,7 @@ class InverseDynamics:
         force = values["contact_force"]
         if "slip" not in values:
             # Of friction that no kernel goes through the sliding is not known.
-            known = not self.system.structure.friction
+            known = not self._system.structure.friction
             none = np.full((force.shape[1], force.shape[0], 3), 0.0 if known else np.nan)
             return {"slip": none, "friction_force": none}
         drag = np.moveaxis(values["drag"], -1, 0)
@@ -147,14 +117,20 @@ class InverseDynamics:
         }
 
     def _solve(
-        self, states: States, load: Array, wanted: Collection[str], threads: int | None
+        self,
+        q: Array,
+        q1: Array,
+        q2: Array,
+        load: Array,
+        wanted: Collection[str],
+        threads: int | None,
     ) -> Answer:
-        system, choosing = self.system, self.distributor.chooses
+        system, choosing = self._system, self.distributor.chooses
         if choosing:
             wanted = {*wanted, "contact", "motion"}
         kernel = system.kernel("inverse", tuple(o for o in OUTPUTS if o in wanted))
-        inputs = dict(zip(("q", "q1", "q2"), states, strict=True)) | ports_of_load(load)
-        check_states(system.independent, *states)
+        inputs = {"q": q, "q1": q1, "q2": q2, **ports_of_load(load)}
+        check_states(system.independent, q, q1, q2)
         answer = kernel.run(inputs, threads)
         if self.distributor.unsolved_friction:
             self._make_room(answer.values)
@@ -173,7 +149,7 @@ class InverseDynamics:
     def _choose(self, values: dict[str, Array], status: Array, inputs: Mapping[str, Array]) -> None:
         """Replace what the least norm does not serve, in place, by what the policy asks for."""
         values["shortfall"] = np.where(status == Status.ok, 1.0, np.nan)
-        if not self.system.structure.friction:
+        if not self._system.structure.friction:
             _add_parts(values, 1)
         rows = self.distributor.rows(values, status)
         if not rows.size:
@@ -182,7 +158,7 @@ class InverseDynamics:
         ports |= {name: inputs[name][rows] for name in ("force", "moment", "point")}
         # Shares cost more than all the rest.
         question = "system" if {"share", "slip"} & values.keys() else "balance"
-        better = self.distributor.solve(self.system.kernel(question).run(ports).values)
+        better = self.distributor.solve(self._system.kernel(question).run(ports).values)
         status[rows] = better.pop("status")
         for name, value in better.items():
             if name in values:

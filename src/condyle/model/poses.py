@@ -22,30 +22,25 @@ States = tuple[Array, Array, Array]
 
 
 class Poses:
-    """Questions about poses, none of which is about efforts: a part of `Model`."""
+    """Questions about poses, none of which is about efforts; see `Model`."""
 
-    system: System
+    def __init__(self, system: System) -> None:
+        self._system = system
 
-    def configuration(self, pose: Array, threads: int | None = None) -> Configuration:
-        """Joint coordinates, contact points and singularity measures at poses X_EE, (N, 6)."""
+    def configuration(self, pose: Array, threads: int | None) -> Configuration:
+        """As `Model.configuration`."""
         check_array("pose", pose, 6, POSE_COLUMNS)
         inputs = {"pose": pose}
-        answer = self.system.kernel("configuration").run(inputs, threads)
-        mended(answer, inputs, lambda few: (self.system.robust.configuration(few["pose"]), 0))
-        return configured(answer.values, self.system.length)
+        answer = self._system.kernel("configuration").run(inputs, threads)
+        mended(answer, inputs, lambda few: (self._system.robust.configuration(few["pose"]), 0))
+        return configured(answer.values, self._system.length)
 
-    def survey(self, q: Array, wanted: Collection[str] = (), threads: int | None = None) -> Survey:
-        """What poses are like, each judged, as fast as the machine: for maps.
-
-        Args:    q: (N, m), in the order of `independent`.  wanted: of `SURVEYED`: pose, joint,
-                 transmission, rates (of the joints on q', lanes last but one), rows (of the
-                 dimensionless J_W), ratio, points (of the contacts).
-        Raises:  InputError: for a name that is none of these.
-        """
+    def survey(self, q: Array, wanted: Collection[str], threads: int | None) -> Survey:
+        """As `Model.survey`."""
         for name in wanted:
             if name not in SURVEYED:
                 raise InputError(f'no output "{name}".{did_you_mean(name, SURVEYED)}')
-        system = self.system
+        system = self._system
         check_states(system.independent, q)
         wanted = tuple(name for name in SURVEYED if name in wanted)
         answer = system.kernel("survey", wanted).run({"q": q}, threads)
@@ -60,39 +55,17 @@ class Poses:
         iterated = not closed_form_available(forms, system.dependent)
         return judged(answer, iterated, follow, partial(system.robust.survey, wanted))
 
-    def inertia_matrix(self, q: Array, space: str = "q") -> Array:
-        """M_r of [Cheng2023] eqs (57), (63): (N, m, m) in q_EE.
-
-        Args: q: (N, m), in the order of `independent`.
-              space: "X" for the mechanism without contacts, dual to X_EE, (N, 6, 6): eqs (61),
-              (64).
-        Raises: InputError: for another space, or a pose that cannot be reached.
-        """
-        return self._matrices(q, np.zeros_like(q), "inertia_matrix", space)
-
-    def bias(self, q: Array, q1: Array, space: str = "q") -> Array:
-        """C_r q', (N, m) [N, N m]: Coriolis and centrifugal forces; in `space` "X", (N, 6)."""
-        return self._matrices(q, q1, "bias", space)
-
-    def gravity(self, q: Array, space: str = "q") -> Array:
-        """G_r, (N, m) [N, N m]: what holds it against gravity; in `space` "X", (N, 6)."""
-        return self._matrices(q, np.zeros_like(q), "gravity", space)
-
-    def _matrices(self, q: Array, q1: Array, name: str, space: str) -> Array:
+    def matrices(self, q: Array, q1: Array, name: str, space: str) -> Array:
         """One of the results of the question `matrices`, samples first."""
         if space not in ("q", "X"):
             raise InputError(f'no space "{space}".{did_you_mean(space, ("q", "X"))}')
-        check_states(self.system.independent, q, q1)
+        check_states(self._system.independent, q, q1)
         values = self._at("matrices", q, q1)
         return np.moveaxis(values[name if space == "q" else f"{name}_X"], -1, 0)
 
     def jacobians(self, q: Array) -> dict[str, Array]:
-        """Jacobians of [Cheng2023] eqs (9), (15)-(18) at samples (N, m).
-
-        Returns: J_theta (N, n, 6): theta' = J_theta X_EE'; M_J (N, 6, m); M_1 (N, n, 3, 3), M_2 and
-                 M_3 (N, n, 3, 6): M_1 q_r' = M_2 X_EE', q_r' = M_3 X_EE' of every chain.
-        """
-        check_states(self.system.independent, q)
+        """As `Model.jacobians`."""
+        check_states(self._system.independent, q)
         values = self._at("jacobians", q, np.zeros_like(q))
         found = {"J_theta": np.moveaxis(values["J_theta"], -1, 0).transpose(0, 2, 1)}
         found["M_J"] = np.moveaxis(values["M_J"], -1, 0)
@@ -106,57 +79,43 @@ class Poses:
         if not reached.all():
             sample = int(np.argmin(reached))
             raise InputError(f"the contacts cannot be met at sample {sample}: q = {q[sample]}")
-        kernel = self.system.kernel(question)
+        kernel = self._system.kernel(question)
         return kernel.run({port.name: poses[port.name] for port in kernel.interface.ports}).values
 
     def whole(self, q: Array, q1: Array, q2: Array) -> tuple[dict[str, Array], Array]:
         """X_EE and its rates, (N, 6) each, and where the contacts can be met."""
         inputs = {"q": q, "q1": q1, "q2": q2}
-        answer = self.system.kernel("motion").run(inputs)
-        mended(answer, inputs, lambda few: self.system.robust.motion(few))
+        answer = self._system.kernel("motion").run(inputs)
+        mended(answer, inputs, lambda few: self._system.robust.motion(few))
         return {name: a.T for name, a in answer.values.items()}, answer.status == Status.ok
 
-    def independent_motion(self, motion: Motion) -> tuple[States, float | None]:
-        """q_EE and its rates, (N, m) each, from a motion of any kind.
-
-        Also returns the largest distance of a given whole pose from the contacts [m], which the
-        projection removes; None for other kinds.
-        """
+    def of_motion(self, motion: Motion) -> tuple[States, float | None]:
+        """As `Model.independent_motion`."""
         given = (motion.value, motion.rate, motion.acceleration)
         if motion.kind == "pose":
-            columns = indices(self.system.independent)
+            columns = indices(self._system.independent)
             q, q1, q2 = (a[:, columns] for a in given)
             return (q, q1, q2), self.contact_residual(motion.value)
         landmark = None
         if motion.kind == "landmark":
-            landmark = resolve_landmark(motion.landmark, self.system.mechanism.platform.points)
-        return self.independent_states(motion.names, *given, landmark), None
+            landmark = resolve_landmark(motion.landmark, self._system.mechanism.platform.points)
+        return self.states(motion.names, given, landmark, None), None
 
     def contact_residual(self, pose: Array) -> float:
-        """Largest |phi| of the contacts over poses, (N, 6) [m]."""
-        if not self.system.mechanism.contacts:
+        """As `Model.contact_residual`."""
+        if not self._system.mechanism.contacts:
             return 0.0
-        phi = self.system.kernel("encoders").run({"pose": pose}).values["phi"]
+        phi = self._system.kernel("encoders").run({"pose": pose}).values["phi"]
         return float(np.nanmax(np.abs(phi)))
 
-    def independent_states(
-        self,
-        names: Collection[str],
-        value: Array,
-        rate: Array,
-        acceleration: Array,
-        landmark: str | None = None,
-        threads: int | None = None,
+    def states(
+        self, names: Collection[str], given: States, landmark: str | None, threads: int | None
     ) -> States:
-        """q_EE and its rates from another set of coordinates or a landmark's displacement.
-
-        Samples that the contacts cannot meet come back as NaN.
-        """
-        given = value, rate, acceleration
-        names, independent = list(names), self.system.independent
+        """As `Model.independent_states`."""
+        names, independent = list(names), self._system.independent
         if landmark is None and sorted(names) == sorted(independent):
             return given if tuple(names) == independent else _ordered(given, names, independent)
-        closure = self.system.closure(tuple(names), landmark)
+        closure = self._system.closure(tuple(names), landmark)
         if landmark is None:
             given = _ordered(given, names, closure.names)
         else:

@@ -114,7 +114,7 @@ def test_robust_path_says_the_same(name: str) -> None:
     outputs = ("motion", "joint", "sliding")
     given = (*state(c, model), efforts(c), load_of(c))
     quick = model.kernel("forward", ("contact", *outputs))
-    inputs = model._inputs(*given)
+    inputs = model.accelerations._inputs(*given)
     answer = quick.run(inputs)
     found, status = model.system.robust.forward(inputs)
     assert not answer.status.any()
