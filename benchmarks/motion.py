@@ -17,7 +17,7 @@ from types import ModuleType
 import numpy as np
 
 from condyle.backends.c.compiled_kernel import CompiledKernel
-from condyle.mechanism import bundled_text, load
+from condyle.mechanism import bundled_text, load_mechanism
 from condyle.model.model import Model
 
 from .own import Timer
@@ -38,7 +38,7 @@ def motion_rows(name: str, peers: ModuleType | None, unavailable: dict[str, str]
     Args: name: a mechanism of X, Y, alpha, beta;  peers: `benchmarks.peers.closed_loops`.
           unavailable: engines that do not run, and why; filled here.
     """
-    model, timer = Model(load(name), backend="compiled"), Timer()
+    model, timer = Model(load_mechanism(name), backend="compiled"), Timer()
     kernel = model.kernel("forward", ())
     assert isinstance(kernel, CompiledKernel)
     right, _ = _ours(kernel, timer, RIGHT)

@@ -345,7 +345,7 @@ def ready_rows(mechanism: str) -> Iterator[Row]:
         "import time; t = time.perf_counter()\n"
         "import numpy as np, condyle\n"
         "from condyle.model.model import Model\n"
-        f"k = Model(condyle.load({mechanism!r})).kernel('inverse', ())\n"
+        f"k = Model(condyle.load_mechanism({mechanism!r})).kernel('inverse', ())\n"
         "k.one(np.zeros(k.interface.columns))\n"
         "print(time.perf_counter() - t)\n"
     )

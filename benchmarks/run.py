@@ -18,7 +18,7 @@ import numpy as np
 from condyle import __version__
 from condyle.backends.compiler import find_compiler
 from condyle.dynamics import FORMULATIONS
-from condyle.mechanism import bundled_text, load
+from condyle.mechanism import bundled_text, load_mechanism
 from condyle.model.model import Model
 from condyle.progress import step
 
@@ -109,17 +109,20 @@ def run_benchmark(seconds: float = 1.0) -> Benchmark:
     probes = [Probe(CYCLE, lambda: 1 / timer.clock_rate(), 0.0)]
     with _one_core() as processors:
         with step("building kernels"):
-            probes += own_probes(load(REFERENCE), list(FORMULATIONS))
+            probes += own_probes(load_mechanism(REFERENCE), list(FORMULATIONS))
             for name in OTHERS:
-                probes += own_probes(load(name), ["virtual_power"])
+                probes += own_probes(load_mechanism(name), ["virtual_power"])
         with step("building other engines"):
             probes += _peer_probes(unavailable)
-        probes += [*asked_probes(load(REFERENCE)), *map_probes(load(REFERENCE))]
+        probes += [*asked_probes(load_mechanism(REFERENCE)), *map_probes(load_mechanism(REFERENCE))]
         with step("building exported C"):
-            probes += exported_probes(load(REFERENCE))
-        probes += [*policy_probes(load(REFERENCE)), *jaw_probes(load("human-jaw"))]
-        probes += limit_probes(load(REFERENCE), load("human-jaw"), unavailable)
-        probes += simulation_probes(load(REFERENCE))
+            probes += exported_probes(load_mechanism(REFERENCE))
+        probes += [
+            *policy_probes(load_mechanism(REFERENCE)),
+            *jaw_probes(load_mechanism("human-jaw")),
+        ]
+        probes += limit_probes(load_mechanism(REFERENCE), load_mechanism("human-jaw"), unavailable)
+        probes += simulation_probes(load_mechanism(REFERENCE))
         probes.append(Probe(OPERATION, timer.vector_operation, 0.0))
         rows = _timed(probes, rounds)
         with step("swinging for a second"):
@@ -127,7 +130,7 @@ def run_benchmark(seconds: float = 1.0) -> Benchmark:
         with step("starting afresh"):
             rows += ready_rows(REFERENCE)
     if processors > 1:
-        rows += _timed(list(thread_probes(load(REFERENCE))), rounds)
+        rows += _timed(list(thread_probes(load_mechanism(REFERENCE))), rounds)
         with step("solving studies"):
             rows += sweep_rows()
     compiler = find_compiler()
@@ -179,7 +182,7 @@ def _heat(probe: Probe) -> int:
 def _peer_probes(unavailable: dict[str, str]) -> Iterator[Probe]:
     """The other engines that can be had."""
     raw = tomllib.loads(bundled_text(REFERENCE))
-    mechanism = load(REFERENCE)
+    mechanism = load_mechanism(REFERENCE)
     model = Model(mechanism, backend="numpy")
     m = mechanism.degrees_of_freedom
     samples = reachable_samples(model, 64)

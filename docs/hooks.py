@@ -63,7 +63,7 @@ def generate(folder: Path) -> None:
     solution = reference_solution(1000.0)
     for name in FIGURES:
         PLOTS[name](solution).savefig(folder / f"{name}.png", dpi=110)
-    draw_mechanism(condyle.load("masticatory")).savefig(folder / "mechanism.png", dpi=110)
+    draw_mechanism(condyle.load_mechanism("masticatory")).savefig(folder / "mechanism.png", dpi=110)
     draw_maps(folder, solution)
     draw_studies(folder)
     plt.close("all")
@@ -94,7 +94,7 @@ def draw_studies(folder: Path) -> None:
         SWEEP_PLOTS[name](table).savefig(folder / f"{name}.png", dpi=110)
     motion = Motion.from_csv(bundled_reference()[0], rate=20)
     load = condyle.reference_load()
-    jaw = condyle.derive(condyle.load("human-jaw"), distribution="weighted")
+    jaw = condyle.derive(condyle.load_mechanism("human-jaw"), distribution="weighted")
     known = read_study(EXAMPLES / "studies" / "human-jaw.toml")
     banded = with_bands(jaw.solve(motion, load), known, motion, load, workers=1)
     PLOTS["contact_force"](banded).savefig(folder / "bands.png", dpi=110)
@@ -117,7 +117,7 @@ def reference_solution(rate: float, reactions: bool = False) -> Any:
     from condyle.motion import Motion, bundled_reference
 
     motion = Motion.from_csv(bundled_reference()[0], rate=rate)
-    model = condyle.derive(condyle.load("masticatory"), backend="numpy")
+    model = condyle.derive(condyle.load_mechanism("masticatory"), backend="numpy")
     return model.solve(motion, condyle.reference_load(), reactions=reactions)
 
 
@@ -136,7 +136,7 @@ def draw_maps(folder: Path, solution: Any) -> None:
         ("map-ratio", "masticatory", jaw, "", "", run),
         ("map-singular", "gough-stewart", legs, "alpha=10 deg", "*=-1500:1500 mm", None),
     ):
-        model = condyle.derive(condyle.load(name), backend="numpy")
+        model = condyle.derive(condyle.load_mechanism(name), backend="numpy")
         asked = asked_of(model, strokes=strokes or ())
         slices = list(slices_of(asked.reach, grid_of(model.mechanism, over, hold)))
         found = condyle.workspace_map(model, over, "ratio", hold, strokes=strokes or ())
@@ -159,7 +159,7 @@ def variable_table() -> str:
     import condyle
     from condyle.results.variables import VARIABLES
 
-    mechanism = condyle.load("masticatory")
+    mechanism = condyle.load_mechanism("masticatory")
     lines = ["| variable | dimensions | unit | what it is |", "|---|---|---|---|"]
     for variable in VARIABLES:
         about = variable.attributes(mechanism)
@@ -205,7 +205,7 @@ def operation_counts() -> str:
     from condyle.questions.platform import closed, given
     from condyle.questions.structure import structure_of
 
-    mechanism = condyle.load("masticatory")
+    mechanism = condyle.load_mechanism("masticatory")
     lines = [
         "| formulation | shared, Model 1 | shared, Model 2 | ratio "
         "| written out, Model 1 | written out, Model 2 | ratio |",
@@ -318,7 +318,10 @@ def readme_picture() -> Any:
     solution = reference_solution(1000.0)
     t, chains = solution["time"], solution["chain"].values
     figure = plt.figure(figsize=(11, 4.2))
-    draw_on(figure.add_axes((0.03, 0.08, 0.38, 0.92), projection="3d"), condyle.load("masticatory"))
+    draw_on(
+        figure.add_axes((0.03, 0.08, 0.38, 0.92), projection="3d"),
+        condyle.load_mechanism("masticatory"),
+    )
     motion, torque = (figure.add_axes((0.51, bottom, 0.31, 0.33)) for bottom in (0.6, 0.12))
     for name in ("X", "Z"):
         motion.plot(t, 1e3 * solution["pose"].sel(coordinate=name), label=f"{name} [mm]")

@@ -15,7 +15,7 @@ HERE = Path(__file__).parent
 RESULTS = Path("results")
 SECONDS = 5.0
 
-known = condyle.load("masticatory")
+known = condyle.load_mechanism("masticatory")
 platform = known.platform
 heavier = known.set(
     {

@@ -4,7 +4,7 @@ import condyle
 
 peaks = {}
 for name in ("masticatory", "masticatory-curved"):
-    model = condyle.derive(condyle.load(name))
+    model = condyle.derive(condyle.load_mechanism(name))
     solution = model.solve(condyle.reference_motion(), condyle.reference_load())
     peaks[name] = float(abs(solution["contact_force"]).max())
     print(f"{name:<20} largest contact force {peaks[name]:8.4f} N")

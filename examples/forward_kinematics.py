@@ -5,7 +5,7 @@ import numpy as np
 import condyle
 from condyle.model.forward_kinematics import ForwardKinematics
 
-mechanism = condyle.load("masticatory")
+mechanism = condyle.load_mechanism("masticatory")
 solution = condyle.derive(mechanism).solve(condyle.reference_motion())
 encoders = solution["joint"].values + np.random.default_rng(0).normal(0, 1e-5, (5001, 6))
 

@@ -8,7 +8,7 @@ import numpy as np
 import condyle
 
 # A heavier platform, and condyles that slide on steeper planes through the same home points.
-bundled = condyle.load("masticatory")
+bundled = condyle.load_mechanism("masticatory")
 changes = {"name": "heavy", "platform.mass": 0.3}
 for contact in bundled.contacts:
     x, _, z = contact.point
@@ -19,7 +19,7 @@ robot = bundled.set(changes)
 with tempfile.TemporaryDirectory() as folder:
     path = Path(folder) / "heavy.toml"
     condyle.dump(robot, path)
-    robot = condyle.load(path)
+    robot = condyle.load_mechanism(path)
 
 # Open and close once, a push of 20 N on the incisor.
 t = np.linspace(0.0, 1.0, 201)

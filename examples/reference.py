@@ -2,7 +2,7 @@
 
 import condyle
 
-mechanism = condyle.load("masticatory")
+mechanism = condyle.load_mechanism("masticatory")
 model = condyle.derive(mechanism)
 solution = model.solve(condyle.reference_motion(), condyle.reference_load())
 peak = abs(solution["torque"]).max(dim="time")

@@ -4,7 +4,7 @@ import numpy as np
 
 import condyle
 
-model = condyle.derive(condyle.load("masticatory"))
+model = condyle.derive(condyle.load_mechanism("masticatory"))
 count = 20_000
 rng = np.random.default_rng(1)
 q = rng.uniform(-1, 1, (count, 4)) * [1e-3, 1e-3, 0.02, 0.05]  # X, Y [m], alpha, beta [rad]

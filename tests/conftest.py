@@ -40,7 +40,7 @@ os.environ["COLUMNS"] = "100"
 @pytest.fixture(scope="session")
 def reference() -> condyle.Mechanism:
     """The bundled mechanism of the paper."""
-    return condyle.load("masticatory")
+    return condyle.load_mechanism("masticatory")
 
 
 @pytest.fixture

@@ -1,6 +1,6 @@
 """condyle: dynamics of redundantly actuated parallel mechanisms held at point contacts.
 
-mechanism = condyle.load("masticatory")
+mechanism = condyle.load_mechanism("masticatory")
 model = condyle.derive(mechanism, formulation="momentum", route="core")
 solution = model.solve(condyle.reference_motion(), condyle.reference_load())
 """
@@ -27,7 +27,7 @@ _HOMES = {
     "bundled_mechanisms": "mechanism",
     "dump": "mechanism",
     "dumps": "mechanism",
-    "load": "mechanism",
+    "load_mechanism": "mechanism",
     "Model": "model.model",
     "derive": "model.model",
     "Load": "motion",
@@ -61,7 +61,7 @@ if TYPE_CHECKING:
         UnreachableError,
         UnsupportedError,
     )
-    from .mechanism import Mechanism, bundled_mechanisms, dump, dumps, load
+    from .mechanism import Mechanism, bundled_mechanisms, dump, dumps, load_mechanism
     from .model.model import Model, derive
     from .motion import Load, Motion, reference_load, reference_motion, trial_motion
     from .results.solution import Solution, open_solution

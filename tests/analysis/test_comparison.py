@@ -78,14 +78,14 @@ def test_one_formulation_and_the_run_of_a_name(reference: Comparison) -> None:
 
 
 def test_unknown_formulation() -> None:
-    mechanism = condyle.load("masticatory")
+    mechanism = condyle.load_mechanism("masticatory")
     with pytest.raises(condyle.InputError, match="Did you mean"):
         compare(mechanism, condyle.reference_motion(), formulations=["momentums"])
 
 
 def test_models_that_there_are_not() -> None:
     """Three contacts: no closed form, so no route `direct`; the message says which to take."""
-    mechanism = condyle.load("masticatory")
+    mechanism = condyle.load_mechanism("masticatory")
     chin = Contact(
         name="chin",
         point=(0.05, 0, 0),
@@ -100,7 +100,7 @@ def test_models_that_there_are_not() -> None:
 
 
 def test_nothing_to_free() -> None:
-    mechanism = condyle.load("masticatory")
+    mechanism = condyle.load_mechanism("masticatory")
     four = mechanism.replace(chains=mechanism.chains[:4])
     none = mechanism.replace(contacts=(), dependent=None)
     for machine, reason in ((four, "4 chains cannot drive"), (none, "no contacts to remove")):
@@ -112,7 +112,7 @@ def test_nothing_to_free() -> None:
 
 
 def test_samples_that_cannot_be_computed() -> None:
-    mechanism = condyle.load("masticatory")
+    mechanism = condyle.load_mechanism("masticatory")
     t = np.linspace(0, 1, 10)
     far = Motion.from_arrays(t, np.outer(t, [0.2, 0, 0, 0]), ["X", "Y", "alpha", "beta"])
     with pytest.raises(condyle.UnreachableError):
@@ -138,7 +138,7 @@ def test_no_garbage_is_collected_while_a_model_is_derived() -> None:
     before = gc.get_threshold()
     gc.set_threshold(10)
     try:
-        mechanism = condyle.load("masticatory")
+        mechanism = condyle.load_mechanism("masticatory")
         TimedModel(mechanism, "momentum", "core")
         runs.clear()
         TimedModel(mechanism, "lagrange", "core")

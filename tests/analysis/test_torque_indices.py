@@ -88,7 +88,7 @@ def test_percentages_as_printed() -> None:
 
 
 def test_what_may_stand_beside_the_paper() -> None:
-    mechanism = condyle.load("masticatory")
+    mechanism = condyle.load_mechanism("masticatory")
     assert paper.is_paper_class(mechanism) and paper.is_stand_in(mechanism)
     other = mechanism.replace(gravity=(0, 0, -1.62))
     assert paper.is_paper_class(other) and not paper.is_stand_in(other)

@@ -17,12 +17,12 @@ WEIGHTS = (0.0, 0.1, 1.0, 10.0, 1e3)
 
 @pytest.fixture(scope="module")
 def motion() -> Motion:
-    return condyle.trial_motion(condyle.load("masticatory"), rate=10)
+    return condyle.trial_motion(condyle.load_mechanism("masticatory"), rate=10)
 
 
 @pytest.fixture(scope="module")
 def curve(motion: Motion) -> Tradeoff:
-    return tradeoff(condyle.load("masticatory"), motion, weights=WEIGHTS, backend="numpy")
+    return tradeoff(condyle.load_mechanism("masticatory"), motion, weights=WEIGHTS, backend="numpy")
 
 
 def test_more_effort_buys_less_load(curve: Tradeoff) -> None:
@@ -74,10 +74,10 @@ def test_table_and_figure(curve: Tradeoff) -> None:
 
 def test_what_has_no_curve(motion: Motion) -> None:
     with pytest.raises(condyle.InputError, match="has no contacts"):
-        tradeoff(condyle.load("gough-stewart"), motion)
+        tradeoff(condyle.load_mechanism("gough-stewart"), motion)
     with pytest.raises(condyle.InputError, match="numbers that rise"):
-        tradeoff(condyle.load("masticatory"), motion, weights=(1.0, 0.5))
-    jaw = condyle.load("human-jaw")
+        tradeoff(condyle.load_mechanism("masticatory"), motion, weights=(1.0, 0.5))
+    jaw = condyle.load_mechanism("human-jaw")
     first = jaw.chains[0]
     free = first.model_copy(
         update={"actuator": first.actuator.model_copy(update={"force_limit": None})}
@@ -89,7 +89,10 @@ def test_what_has_no_curve(motion: Motion) -> None:
 def test_models_agree_under_every_distribution(motion: Motion) -> None:
     for name in ("bounded", "weighted"):
         found = compare(
-            condyle.load("masticatory"), motion, formulations=["momentum"], distribution=name
+            condyle.load_mechanism("masticatory"),
+            motion,
+            formulations=["momentum"],
+            distribution=name,
         )
         assert max(pair.torque for pair in found.differences()) < 1e-9
         assert found.solution.options["distribution"] == name

@@ -45,7 +45,7 @@ def bumpy(p: ca.SX) -> ca.SX:
 @pytest.mark.usefixtures("quick")
 def test_kernels_agree_with_casadi(backend: str) -> None:
     reference: Case = case("masticatory")
-    mechanism = condyle.load("masticatory")
+    mechanism = condyle.load_mechanism("masticatory")
     left, right = mechanism.contacts
     left = left.model_copy(update={"surface": Expression(bumpy)})
     mechanism = mechanism.replace(contacts=(left, right))
@@ -59,7 +59,7 @@ def test_kernels_agree_with_casadi(backend: str) -> None:
         values, status = ones(kernel, reference.samples)
         np.testing.assert_array_equal(status, answer.status)
         assert error(values["effort"].T[good], wanted.effort[good]) < 1e-10
-    plane = Interpreter(condyle.load("masticatory")).solve(*reference.arguments)
+    plane = Interpreter(condyle.load_mechanism("masticatory")).solve(*reference.arguments)
     assert error(plane.effort[good], wanted.effort[good]) > 1e-4  # the bumps are felt
 
 

@@ -21,12 +21,12 @@ from benchmarks.rows import TOLERANCE, Probe, Row, spread, timed
 from benchmarks.run import Benchmark
 from condyle.distribution import distribute
 from condyle.distribution.eliminated import Sample
-from condyle.mechanism import load
+from condyle.mechanism import load_mechanism
 from condyle.model.model import Model
 
 
 def test_every_row_is_right() -> None:
-    machine = load("gough-stewart")
+    machine = load_mechanism("gough-stewart")
     rows = list(timed([*own_probes(machine, ["virtual_power"]), *thread_probes(machine)], 1))
     names = [row.name for row in rows]
     for what in ("one", "one, dependent", "batch", "batch, two threads"):
@@ -49,7 +49,7 @@ def test_what_a_batch_reads_stays(monkeypatch: pytest.MonkeyPatch) -> None:
         return found
 
     monkeypatch.setattr(own.np, "asfortranarray", columns)
-    probes = list(own_probes(load("gough-stewart"), ["virtual_power"]))
+    probes = list(own_probes(load_mechanism("gough-stewart"), ["virtual_power"]))
     gc.collect()
     assert made and all(ref() is not None for ref in made)
     del probes
@@ -118,7 +118,9 @@ def test_solvers_that_are_missing_are_named(monkeypatch: pytest.MonkeyPatch) -> 
 
     some = {"DAQP": SOLVERS["DAQP"], "none": missing}
     monkeypatch.setattr("benchmarks.programs.SOLVERS", some)
-    model = Model(tight(load("masticatory"), 0.2), backend="numpy", distribution="bounded")
+    model = Model(
+        tight(load_mechanism("masticatory"), 0.2), backend="numpy", distribution="bounded"
+    )
     given = Case.of(model.mechanism).many(40)
     unavailable: dict[str, str] = {}
     probes = list(program_probes(Bites("some", model, given), unavailable))

@@ -16,7 +16,7 @@ from condyle.export import export
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs clock_nanosleep")
 def test_loops_count_every_tick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(realtime, "RATES", (1000,))
-    found = real_time(condyle.load("gough-stewart"), 0.05)
+    found = real_time(condyle.load_mechanism("gough-stewart"), 0.05)
     empty, busy = found.loops
     assert [empty.work, busy.work] == [False, True] and empty.rate == 1000
     for loop in found.loops:
@@ -34,10 +34,10 @@ def test_shares_come_from_the_histogram() -> None:
 
 
 def test_exported_rows_are_right() -> None:
-    for probe in exported_probes(condyle.load("gough-stewart")):
+    for probe in exported_probes(condyle.load_mechanism("gough-stewart")):
         assert probe.error < 1e-12 and probe.run() > 0
 
 
 def test_a_call_names_every_argument() -> None:
-    made = export(condyle.load("gough-stewart"), ("inverse",), prefix="h")
+    made = export(condyle.load_mechanism("gough-stewart"), ("inverse",), prefix="h")
     assert call(made) == "h_inverse(in + 0, in + 6, in + 12, in + 18, in + 21, in + 24, out)"

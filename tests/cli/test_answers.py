@@ -81,7 +81,7 @@ values = [0.2, 0.3]
 @pytest.fixture(scope="module")
 def solution() -> condyle.Solution:
     motion = condyle.Motion.from_csv(bundled_reference()[0], rate=20)
-    model = condyle.derive(condyle.load("masticatory"), backend="numpy")
+    model = condyle.derive(condyle.load_mechanism("masticatory"), backend="numpy")
     return model.solve(motion, condyle.reference_load())
 
 
@@ -105,7 +105,7 @@ def command(
     Path("pd.toml").write_text(drives)
     Path("my path.csv").write_bytes(bundled_reference()[0].read_bytes())
     states = [prefix + name for prefix in ("", "d", "dd") for name in ("X", "Y", "alpha", "beta")]
-    joints = [f"joint_{name}" for name in condyle.load("masticatory").chain_names]
+    joints = [f"joint_{name}" for name in condyle.load_mechanism("masticatory").chain_names]
     efforts = [*states[:8], *(name.replace("joint_", "tau_") for name in joints)]
     tables = {
         "states": (states, 0),

@@ -84,12 +84,12 @@ def test_new_writes_a_file_that_checks(condyle_command: Callable[..., Any]) -> N
     outcome = condyle_command("new", "my-robot")
     assert outcome.status == 0 and "condyle check my-robot.toml" in outcome.out
     assert condyle_command("check", "my-robot.toml").status == 0
-    assert condyle.load("my-robot.toml").name == "my-robot"
+    assert condyle.load_mechanism("my-robot.toml").name == "my-robot"
     Path("my-robot.toml").write_text("mine")
     assert condyle_command("new", "my-robot").status == 2
     assert Path("my-robot.toml").read_text() == "mine"
     assert condyle_command("new", "my-robot.toml", "--force").status == 0
-    assert condyle.load("my-robot.toml").name == "my-robot"
+    assert condyle.load_mechanism("my-robot.toml").name == "my-robot"
 
 
 def test_reference_writes_the_bundled_files(condyle_command: Callable[..., Any]) -> None:

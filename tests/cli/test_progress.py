@@ -176,7 +176,7 @@ def watcher() -> Iterator[Watcher]:
 
 
 def interpreted() -> condyle.Model:
-    return condyle.derive(condyle.load("masticatory"), backend="numpy")
+    return condyle.derive(condyle.load_mechanism("masticatory"), backend="numpy")
 
 
 def path(**options: Any) -> Motion:
@@ -209,7 +209,9 @@ def test_steps_of_a_comparison(
     watcher: Watcher, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     comparison = compare(
-        condyle.load("masticatory"), path(rate=20), formulations=["momentum", "virtual_power"]
+        condyle.load_mechanism("masticatory"),
+        path(rate=20),
+        formulations=["momentum", "virtual_power"],
     )
     assert watcher.steps["deriving every model"] == [4, 4]
     assert watcher.steps["running every model"] == [6, 6]
@@ -228,7 +230,7 @@ def test_building_a_kernel(
     except CompilerError as error:
         pytest.skip(f"kernels need a compiler: {error}")
     monkeypatch.setenv("CONDYLE_CACHE", str(tmp_path))
-    model = condyle.derive(condyle.load("gough-stewart"), backend="compiled")
+    model = condyle.derive(condyle.load_mechanism("gough-stewart"), backend="compiled")
     zero = np.zeros((1, 6))
     model.torques(zero, zero, zero, np.zeros((1, 9)))
     assert "building a kernel" in watcher.steps
@@ -237,7 +239,7 @@ def test_building_a_kernel(
 def test_finding_poses(watcher: Watcher, tmp_path: Path) -> None:
     from condyle.results.pose_rows import pose_file
 
-    mechanism = condyle.load("masticatory")
+    mechanism = condyle.load_mechanism("masticatory")
     joints = tmp_path / "joints.csv"
     joints.write_text(",".join(f"joint_{n}" for n in mechanism.chain_names) + "\n0,0,0,0,0,0\n")
     pose_file(mechanism, joints, tmp_path / "out.csv")

@@ -33,7 +33,7 @@ def test_the_main_job(
     assert solution["torque"].attrs["units"] == "N m"
     assert all("units" in variable.attrs for variable in solution.values())
     assert solution.attrs["condyle_version"] == condyle.__version__
-    assert solution.mechanism == condyle.load("masticatory")
+    assert solution.mechanism == condyle.load_mechanism("masticatory")
     assert solution.options["load_point"] == "right_molar"
     assert (
         "synthetic" in solution.attrs["options"] or "chewing-incisor" in solution.options["motion"]
@@ -52,7 +52,7 @@ def test_the_main_job(
 
 
 def test_the_same_through_python() -> None:
-    mechanism = condyle.load("masticatory")
+    mechanism = condyle.load_mechanism("masticatory")
     model = condyle.derive(mechanism, formulation="momentum", route="core", backend="numpy")
     solution = model.solve(condyle.reference_motion(), condyle.reference_load())
     assert solution.sizes["time"] == 5001 and solution.options["formulation"] == "momentum"
@@ -61,7 +61,7 @@ def test_the_same_through_python() -> None:
 def test_summary_as_json_and_in_silence(condyle_command: Callable[..., Any]) -> None:
     data = json.loads(condyle_command("run", "--json", "--rate", 50).out)
     assert data["samples"] == 251 and data["failed_samples"] == 0
-    assert set(data["peak_effort"]) == set(condyle.load("masticatory").chain_names)
+    assert set(data["peak_effort"]) == set(condyle.load_mechanism("masticatory").chain_names)
     assert data["samples_near_singularity"] == 0
     outcome = condyle_command("run", "--quiet", "--rate", 50, "--out", "there/below")
     assert (outcome.status, outcome.out, outcome.err) == (0, "", "")
@@ -93,7 +93,7 @@ def motion(kind: str, count: int = 41) -> tuple[list[str], np.ndarray]:
     if kind == "other order":
         return ["beta", "t", "Y", "alpha", "X"], np.column_stack([q[:, 3], t, q[:, [1, 2, 0]]])
     if kind == "pose":
-        model = condyle.derive(condyle.load("masticatory"))
+        model = condyle.derive(condyle.load_mechanism("masticatory"))
         pose = model.evaluate(q, 0 * q, 0 * q, np.zeros((count, 9))).pose
         return ["t", "X", "Y", "Z", "alpha", "beta", "gamma"], np.column_stack([t, pose])
     return ["t", "X", "Y", "alpha", "beta"], np.column_stack([t, q])
@@ -178,7 +178,7 @@ def test_contacts_of_any_number_have_a_run(
     for contacts in (0, 1, 3, 5):
         raw = random_mechanism(np.random.default_rng(contacts), contacts=contacts)
         Path("jaw.toml").write_text(toml_text(raw))
-        names = condyle.derive(condyle.load("jaw.toml")).independent
+        names = condyle.derive(condyle.load_mechanism("jaw.toml")).independent
         t = np.linspace(0, 1, 9)
         write_csv(["t", *names], np.column_stack([t] + [1e-4 * t] * len(names)), "motion.csv")
         assert condyle_command("check", "jaw.toml").status == 0
@@ -192,7 +192,7 @@ def test_samples_near_a_singularity_are_counted(
     condyle_command: Callable[..., Any], write_csv: Callable[..., Path]
 ) -> None:
     """A way along X to a nanometre before the temporal cranks are stretched."""
-    model = condyle.derive(condyle.load("masticatory"), backend="numpy")
+    model = condyle.derive(condyle.load_mechanism("masticatory"), backend="numpy")
     low, high = 0.0, 0.05
     while high - low > 1e-10:
         q = np.array([[(low + high) / 2, 0, 0, 0]])

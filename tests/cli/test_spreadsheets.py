@@ -27,7 +27,9 @@ def plain(command: str) -> str:
     if command == "solve":
         columns = {p + name: 0.001 * (TIMES + 0.5) for p in ("", "d", "dd") for name in NAMES}
     elif command == "pose":
-        columns = {f"joint_{n}": 0.01 * TIMES for n in condyle.load("masticatory").chain_names}
+        columns = {
+            f"joint_{n}": 0.01 * TIMES for n in condyle.load_mechanism("masticatory").chain_names
+        }
         columns = dict.fromkeys(columns, 0 * TIMES) | {"t": TIMES}
     elif command == "motion":
         columns = {"t": TIMES} | {name: 0.001 * np.sin(3 * TIMES) for name in NAMES}

@@ -54,7 +54,7 @@ SOLVE = ("solve", "masticatory", "--states", "in.csv", "--out", "out.csv")
 RUN = ("run", "--motion", "in.csv", "--out", "out")
 CHECK = ("check", "in.toml")
 POSE = ("pose", "masticatory", "--joints", "in.csv", "--out", "out.csv")
-JOINTS = [f"joint_{name}" for name in condyle.load("masticatory").chain_names]
+JOINTS = [f"joint_{name}" for name in condyle.load_mechanism("masticatory").chain_names]
 
 Case = tuple[tuple[str, ...], str | bytes | None, str]
 CASES: dict[str, Case] = {

@@ -118,7 +118,7 @@ def put_files_of_a_reader(folder: Path) -> None:
     names = [prefix + name for prefix in ("", "d", "dd") for name in q]
     (folder / "bite.csv").write_text("X,Y,alpha,beta,Fz\n0,0,0,0,-100\n")
     chains, legs = (
-        [f"joint_{chain}" for chain in condyle.load(name).chain_names]
+        [f"joint_{chain}" for chain in condyle.load_mechanism(name).chain_names]
         for name in ("masticatory", "gough-stewart")
     )
     driven = [*names[:8], *(chain.replace("joint_", "tau_") for chain in chains)]

@@ -28,7 +28,7 @@ class Folder:
 def written(name: str, path: Path, **options: Any) -> Folder:
     """The package of a bundled mechanism or a test case."""
     if name in condyle.bundled_mechanisms():
-        mechanism = condyle.load(name)
+        mechanism = condyle.load_mechanism(name)
     else:
         mechanism = CHANGED[name]() if name in CHANGED else case(name).mechanism
     exported = export(mechanism, options.pop("questions", DEFAULT), **options)
@@ -39,7 +39,7 @@ def written(name: str, path: Path, **options: Any) -> Folder:
 
 def limited() -> condyle.Mechanism:
     """The reference mechanism with limits that bind, and a contact that can only push."""
-    machine = condyle.load("masticatory")
+    machine = condyle.load_mechanism("masticatory")
     actuator = machine.chains[0].actuator.model_copy(update={"torque_limit": (-0.35, 0.35)})
     chains = tuple(c.model_copy(update={"actuator": actuator}) for c in machine.chains)
     left, right = machine.contacts
@@ -49,7 +49,9 @@ def limited() -> condyle.Mechanism:
 
 def rubbing() -> condyle.Mechanism:
     """The reference mechanism with friction at a contact."""
-    return condyle.load("masticatory").set({"contact.left_condyle.friction": {"coefficient": 0.1}})
+    return condyle.load_mechanism("masticatory").set(
+        {"contact.left_condyle.friction": {"coefficient": 0.1}}
+    )
 
 
 CHANGED = {"limited": limited, "rubbing": rubbing}

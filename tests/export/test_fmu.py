@@ -36,13 +36,15 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, int], Path
     """Every kind and version of the reference mechanism, compiled without optimising: quicker."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(target, "FLAGS", tuple(f for f in target.FLAGS if f != "-O2"))
-        models = {kind: target.fmu_model(condyle.load("masticatory"), kind) for kind in KINDS}
+        models = {
+            kind: target.fmu_model(condyle.load_mechanism("masticatory"), kind) for kind in KINDS
+        }
         patch.setattr(target, "fmu_model", lambda mechanism, kind: models[kind])
         folder, made = tmp_path_factory.mktemp("fmu"), {}
         for kind in KINDS:
             for version in VERSIONS:
                 made[kind, version] = path = folder / f"{kind}{version}.fmu"
-                assert target.write_fmu(condyle.load("masticatory"), kind, version, path)
+                assert target.write_fmu(condyle.load_mechanism("masticatory"), kind, version, path)
     return made
 
 
@@ -192,7 +194,7 @@ def test_masses_can_be_tuned(fmus: dict[tuple[str, int], Path], version: int) ->
     """As in a mechanism that has them."""
     heavier = {"platform.mass": 0.3, "platform.inertia.xx": 2e-4, "gravity[2]": -3.0}
     heavier |= {f"chain.{c}.crank.inertia": 1e-4 for c in ("masseter_left", "masseter_right")}
-    changed = condyle.load("masticatory").set(heavier)
+    changed = condyle.load_mechanism("masticatory").set(heavier)
     states = (a[None] for a in (*STATE, AHEAD))
     right = condyle.derive(changed, backend="numpy").torques(*states, ROW).effort[0]
     given = HERE | LOAD | row("q2", Q, AHEAD)
@@ -319,7 +321,7 @@ def test_units_are_powers_of_base_units() -> None:
 
 
 def test_wrong_wishes(tmp_path: Path) -> None:
-    jaw = condyle.load("masticatory")
+    jaw = condyle.load_mechanism("masticatory")
     with pytest.raises(InputError, match="Did you mean"):
         target.write_fmu(jaw, "plants", 3, tmp_path / "x.fmu")
     with pytest.raises(InputError, match="version 1"):

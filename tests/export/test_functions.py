@@ -71,7 +71,7 @@ def test_out_of_reach(jaw: Library) -> None:
 
 def test_a_singular_pose_is_named_and_others_balance(tmp_path: Path) -> None:
     """A hexapod a quarter turn about Z is singular; towards it by tenths, what is ok balances."""
-    mechanism = condyle.load("gough-stewart")
+    mechanism = condyle.load_mechanism("gough-stewart")
     hexapod = Library(export(mechanism, ("inverse",), prefix="hexapod", lanes=0), tmp_path)
     status, found = hexapod("inverse", q=[0, 0, 0, 0, 0, np.pi / 2], force=[1.0, 0, 0])
     assert status == SINGULAR and (found["effort"] == KEPT).all()
@@ -102,7 +102,7 @@ def test_small_and_denormal_numbers_are_numbers(jaw: Library) -> None:
 
 def test_poses_from_encoders_follow_a_motion(jaw: Library) -> None:
     """Each from the one before, as the library finds them; from far off they are not guessed."""
-    model = condyle.derive(condyle.load("masticatory"))
+    model = condyle.derive(condyle.load_mechanism("masticatory"))
     t = np.linspace(0, 2 * np.pi, 60)[:, None]
     q = np.hstack(
         [0.004 * np.sin(t), 0.002 * np.sin(2 * t), 0.08 * (1 - np.cos(t)), 0.03 * np.sin(t)]
@@ -133,7 +133,7 @@ def test_the_controller_is_the_inverse_at_a_corrected_acceleration(jaw: Library)
     wanted = {"q_d": q_d, "q1_d": q1_d, "q2_d": q2_d, "kp": kp, "kd": kd}
     status, found = jaw("computed_torque", q=q, q1=q1, **wanted, **load)
     q2 = q2_d + kd * (q1_d - q1) + kp * (q_d - q)
-    model = condyle.derive(condyle.load("masticatory"))
+    model = condyle.derive(condyle.load_mechanism("masticatory"))
     acting = np.hstack([load["force"], np.zeros(3), load["point"]])
     right = model.one(q, q1, q2, acting)
     assert status == OK
@@ -158,7 +158,7 @@ class Homing(ControllerTable):
 
 def test_a_law_of_ones_own_is_exported(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setitem(CONTROLLERS, "homing", Homing)
-    mechanism = condyle.load("gough-stewart")
+    mechanism = condyle.load_mechanism("gough-stewart")
     law = Library(export(mechanism, ("homing",), prefix="arm", lanes=0), tmp_path)
     given = [a.name for a in law.exported["homing"].inputs]
     assert given == ["q", "q1", "memory_before", "stiffness", "loss"]
@@ -205,7 +205,7 @@ def test_forward_undoes_inverse(jaw: Library) -> None:
 
 def test_numbers_that_change_are_another_mechanism(tmp_path: Path) -> None:
     """A calibrated mechanism's numbers in the same code: its efforts."""
-    nominal = condyle.load("gough-stewart")
+    nominal = condyle.load_mechanism("gough-stewart")
     chains = list(nominal.chains)
     chains[2] = chains[2].model_copy(update={"platform": tuple(np.add(chains[2].platform, 1e-3))})
     calibrated = nominal.model_copy(update={"chains": tuple(chains)})

@@ -37,7 +37,9 @@ CASES = {
 
 @cache
 def made(name: str) -> Mjcf:
-    return mjcf(condyle.load(name) if name in bundled_mechanisms() else case(name).mechanism)
+    return mjcf(
+        condyle.load_mechanism(name) if name in bundled_mechanisms() else case(name).mechanism
+    )
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -74,7 +76,7 @@ def test_efforts_are_those_of_mj_inverse(name: str) -> None:
 def test_cables_pull_and_real_contacts_push() -> None:
     """Weight and a load at home are balanced by the tensions and the contact forces."""
     name = "human-jaw"
-    mechanism = condyle.load(name)
+    mechanism = condyle.load_mechanism(name)
     player, model = Player(made(name).text), Model(mechanism, backend="numpy")
     load = np.array([[0, 0, -50.0, 0, 0, 0, *mechanism.platform.points["incisor"]]])
     z = np.zeros((1, mechanism.degrees_of_freedom))
@@ -98,7 +100,7 @@ def test_mujoco_holds_it_for_five_seconds_without_a_warning(name: str) -> None:
     hold = d.ctrl.copy()
     mujoco.mj_forward(m, d)
     home = d.actuator_length.copy()
-    turning = condyle.load(name).chains[0].kind == "RSS"
+    turning = condyle.load_mechanism(name).chains[0].kind == "RSS"
     stiff, damped = (1.0, 0.01) if turning else (np.linalg.norm(hold) * np.array([1e3, 10.0]))
 
     def control() -> None:
@@ -127,7 +129,7 @@ def test_mujoco_follows_the_reference_motion(
     Alone for 3 s, two of them moving, to 1 mm: without control what MuJoCo's soft equations let go
     is never brought back.
     """
-    mechanism, run = condyle.load("masticatory"), reference_run
+    mechanism, run = condyle.load_mechanism("masticatory"), reference_run
     t, point = run["time"], np.array(mechanism.platform.points["right_molar"])
     player = Player(made("masticatory").text)
     m, d = player.model, player.data
@@ -159,7 +161,7 @@ def test_mujoco_follows_the_reference_motion(
 def test_limits_and_losses_of_actuators() -> None:
     losses = {"rotor_inertia": 1e-6, "gear": 10.0, "viscous": 0.004, "coulomb": 0.03}
     changes = {"torque_limit": (-1.0, 3.0), **losses}.items()
-    jaw = condyle.load("masticatory")
+    jaw = condyle.load_mechanism("masticatory")
     exported = mjcf(jaw.set({f"chain.masseter_left.actuator.{k}": v for k, v in changes}))
     m = mujoco.MjModel.from_xml_string(exported.text)
     dof = m.joint("masseter_left").dofadr[0]
@@ -199,7 +201,7 @@ def test_the_seat_keeps_the_platform_on_a_curved_surface(
 
 
 def test_landmarks_and_contacts_are_sites() -> None:
-    mechanism, m = condyle.load("masticatory"), Player(made("masticatory").text).model
+    mechanism, m = condyle.load_mechanism("masticatory"), Player(made("masticatory").text).model
     for name, point in mechanism.platform.points.items():
         assert m.site(name).pos == pytest.approx(point)
     assert m.site("left_condyle_contact").pos == pytest.approx(mechanism.contacts[0].point)
@@ -207,7 +209,9 @@ def test_landmarks_and_contacts_are_sites() -> None:
 
 def test_what_is_left_out_is_said() -> None:
     """Where MuJoCo has nothing that is the same, the file and the caller are told."""
-    jaw = condyle.load("masticatory").set("contact.left_condyle.friction", {"coefficient": 0.1})
+    jaw = condyle.load_mechanism("masticatory").set(
+        "contact.left_condyle.friction", {"coefficient": 0.1}
+    )
     exported = mjcf(jaw)
     assert any('"left_condyle": its friction is left out' in note for note in exported.notes)
     assert all(note in exported.text for note in exported.notes)
@@ -217,7 +221,7 @@ def test_what_is_left_out_is_said() -> None:
 
 
 def test_friction_of_a_real_contact() -> None:
-    jaw = condyle.load("human-jaw")
+    jaw = condyle.load_mechanism("human-jaw")
     rubbing = jaw.set("contact.left_condyle.friction", {"coefficient": 0.1})
     m = mujoco.MjModel.from_xml_string(mjcf(rubbing).text)
     assert list(m.pair_dim) == [3, 1]
@@ -225,7 +229,7 @@ def test_friction_of_a_real_contact() -> None:
 
 
 def test_names_that_would_meet_are_refused() -> None:
-    jaw = condyle.load("masticatory")
+    jaw = condyle.load_mechanism("masticatory")
     points = dict(jaw.platform.points) | {"left_condyle_contact": (0.0, 0.0, 0.0)}
     with pytest.raises(UnsupportedError, match="left_condyle_contact"):
         mjcf(jaw.set("platform.points", points))

@@ -16,7 +16,7 @@ import condyle
 from condyle.errors import InputError, UnsupportedError
 from condyle.export.mjcf import write_mjcf
 from condyle.export.mjcf_import import Found, from_mjcf
-from condyle.mechanism import load
+from condyle.mechanism import load_mechanism
 
 TEMPLATE = Path(__file__).with_name("stewart.xml")
 LENGTH = 0.5  # of a leg's two capsules
@@ -44,7 +44,7 @@ def same(a: Any, b: Any, place: str = "") -> None:
 
 @pytest.mark.parametrize("name", ["gough-stewart", "hexaglide", "masticatory", "human-jaw"])
 def test_there_and_back(name: str, tmp_path: Path) -> None:
-    mechanism = condyle.load(name)
+    mechanism = condyle.load_mechanism(name)
     write_mjcf(mechanism, tmp_path / "m.xml")
     found = from_mjcf(tmp_path / "m.xml", name)
     same(mechanism, found.mechanism)
@@ -58,7 +58,7 @@ def test_there_and_back(name: str, tmp_path: Path) -> None:
 def test_losses_and_every_family_come_back(tmp_path: Path) -> None:
     losses = {"rotor_inertia": 1e-4, "viscous": 0.004, "coulomb": 0.03}
     changes = {"torque_limit": (-1.0, 3.0), **losses}.items()
-    jaw = condyle.load("masticatory")
+    jaw = condyle.load_mechanism("masticatory")
     mechanism = jaw.set({f"chain.masseter_left.actuator.{k}": v for k, v in changes})
     write_mjcf(mechanism, tmp_path / "m.xml")
     same(mechanism, from_mjcf(tmp_path / "m.xml", mechanism.name).mechanism)
@@ -172,7 +172,7 @@ def test_the_command(condyle_command: Callable[..., Any], tmp_path: Path) -> Non
     stewart(tmp_path)
     outcome = condyle_command("new", "six", "--from-mjcf", "stewart.xml")
     assert outcome.status == 0, outcome.err
-    assert load(tmp_path / "six.toml").name == "six"
+    assert load_mechanism(tmp_path / "six.toml").name == "six"
     assert "symmetric" not in outcome.err
     refused = condyle_command("new", "six", "--from-mjcf", "missing.xml", "--force")
     assert refused.status == 2 and "missing.xml" in refused.err

@@ -40,7 +40,7 @@ def test_prefixes_that_c_does_not_take(prefix: str) -> None:
 
 
 def test_names_that_change_are_listed() -> None:
-    machine = condyle.load("masticatory")
+    machine = condyle.load_mechanism("masticatory")
     chains = [c.model_copy(update={"name": f"chain-{i}"}) for i, c in enumerate(machine.chains)]
     renamed = machine.model_copy(update={"chains": tuple(chains), "name": "3-jaw"})
     e = export(renamed, ("motion",))
@@ -49,12 +49,14 @@ def test_names_that_change_are_listed() -> None:
 
 
 def test_every_argument_is_documented() -> None:
-    e = export(condyle.load("masticatory"), ("motion", "pose"))
+    e = export(condyle.load_mechanism("masticatory"), ("motion", "pose"))
     for f in e.functions:
         for a in f.arguments:
             assert f"{a.name}[{a.size}]  {'in' if a.given else 'out'}: {a.text} [" in e.header
             assert a.size == len(a.units) == len(a.labels)
-    assert e["pose"].inputs[0].labels == tuple(c.name for c in condyle.load("masticatory").chains)
+    assert e["pose"].inputs[0].labels == tuple(
+        c.name for c in condyle.load_mechanism("masticatory").chains
+    )
     assert e.prototype(e["pose"]).startswith("int masticatory_pose(const double joint[6], ")
 
 
@@ -74,12 +76,12 @@ def test_every_argument_is_documented() -> None:
 def test_refusals_say_what_is_wrong(options: dict[str, Any], said: str) -> None:
     refusal = UnsupportedError if said == "in double" else InputError
     with pytest.raises(refusal, match=said):
-        export(condyle.load("masticatory"), **{"questions": ("motion",), **options})
+        export(condyle.load_mechanism("masticatory"), **{"questions": ("motion",), **options})
 
 
 @pytest.mark.parametrize("question", ["inverse", "bounded"])
 def test_friction_at_many_contacts_has_no_closed_form(question: str) -> None:
-    machine = condyle.load("masticatory")
+    machine = condyle.load_mechanism("masticatory")
     rough = [c.model_copy(update={"friction": Friction(coefficient=0.1)}) for c in machine.contacts]
     flat = Plane(kind="plane", slope=(0.0, 0.0), offset=0.0)
     other = {"name": "third", "point": (0.05, 0.0, 0.0), "surface": flat}
@@ -118,7 +120,7 @@ def test_names_that_look_like_c_are_only_words(
 ) -> None:
     """What ends a comment or begins a format elsewhere does nothing here."""
     need("gcc", "make")
-    machine = condyle.load("gough-stewart").set({"name": "a */ int x /* b"})
+    machine = condyle.load_mechanism("gough-stewart").set({"name": "a */ int x /* b"})
     machine = machine.set({f"chain.{machine.chain_names[0]}.name": "50 % ?? \\ leg */"})
     condyle.dump(machine, tmp_path / "odd.toml")
     done = condyle_command("export", "c", "odd.toml", "--question", "inverse", "--out", "odd")

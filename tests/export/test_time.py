@@ -37,7 +37,7 @@ def adverse(f: Function, rng: np.random.Generator) -> dict[str, np.ndarray]:
 
 def test_instructions_do_not_depend_on_the_state(tmp_path: Path) -> None:
     need("valgrind", "gcc")
-    exported = export(condyle.load("masticatory"), QUESTIONS, lanes=0, landmark="incisor")
+    exported = export(condyle.load_mechanism("masticatory"), QUESTIONS, lanes=0, landmark="incisor")
     rng = np.random.default_rng(0)
     found = counts(exported, {f.question: adverse(f, rng) for f in exported.functions}, tmp_path)
     for question, instructions in found.items():

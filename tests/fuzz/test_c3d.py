@@ -46,7 +46,7 @@ def test_a_broken_recording(tmp_path: Path, fuzz_seeds: range) -> None:
     path = jaw.write(tmp_path / "a.c3d", analog=analog, channels=channels, plates=plates)
     emg = {"channels": {"deep_masseter_left": "F6"}}
     whole, tables, read = path.read_bytes(), jaw.tables(forces={"plate": 1}, emg=emg), 0
-    machine = condyle.load("human-jaw")
+    machine = condyle.load_mechanism("human-jaw")
     for seed in fuzz_seeds:
         path.write_bytes(broken(random.Random(seed), whole))
         try:

@@ -67,7 +67,7 @@ def test_broken_bytes(fuzz_seeds: range, tmp_path: Path) -> None:
 
     def attempt(rng: random.Random) -> bool:
         path.write_bytes(mutations.broken_bytes(rng))
-        return outcome(lambda: condyle.load(path))
+        return outcome(lambda: condyle.load_mechanism(path))
 
     run(fuzz_seeds, attempt)
 

@@ -87,7 +87,7 @@ def test_command_runs(installed: Path, tmp_path: Path) -> None:
 def test_library_counts(installed: Path, tmp_path: Path) -> None:
     script = (
         "import condyle, importlib.resources as r\n"
-        "s = condyle.derive(condyle.load('masticatory')).solve(\n"
+        "s = condyle.derive(condyle.load_mechanism('masticatory')).solve(\n"
         "    condyle.reference_motion(), condyle.reference_load())\n"
         "print(float(abs(s['torque']).max()))\n"
     )

@@ -29,7 +29,7 @@ COUNT = 1000
 @cache
 def mechanism(kind: str, contacts: int, ball: float, seed: int = 3) -> Mechanism:
     if kind == "masticatory-curved":
-        return condyle.load(kind)
+        return condyle.load_mechanism(kind)
     rng = np.random.default_rng(seed)
     raw = random_mechanism(rng, contacts=contacts, surface=kind, ball_radius=ball)
     return parse(toml_text(raw))

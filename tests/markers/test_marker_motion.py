@@ -113,7 +113,9 @@ def test_registered_by_markers(tmp_path: Path) -> None:
     """Markers that stand at points of the mechanism at home, on either body, or numbers."""
     jaw = record()
     jaw.at("Lower_FL")[20:22] = np.nan  # not seen at all times of home
-    machine = condyle.load("masticatory").set("platform.points.chin", (0.085, 0.025, -0.020))
+    machine = condyle.load_mechanism("masticatory").set(
+        "platform.points.chin", (0.085, 0.025, -0.020)
+    )
     machine = machine.set("platform.points.brow", UPPER["Upper_BR"])
     register = {"chin": "Lower_FL", "brow": "upper br", "incisor": jaw.register["incisor"]}
     got = measured(jaw, tmp_path, tables=jaw.tables(register=register), mechanism=machine)
@@ -137,7 +139,7 @@ def test_registered_by_directions(tmp_path: Path) -> None:
             assert (error(measured(jaw, tmp_path, tables=outside), jaw) < ROUNDING).all()
     # A marker of the name of the point.
     jaw.labels[jaw.labels.index("Lower_FR")] = "chin"
-    machine = condyle.load("masticatory").set("platform.points.chin", LOWER["Lower_FR"])
+    machine = condyle.load_mechanism("masticatory").set("platform.points.chin", LOWER["Lower_FR"])
     register = {"forward": forward.tolist(), "up": up.tolist(), "origin": "chin"}
     platform = ["chin" if name == "Lower_FR" else name for name in PLATFORM]
     tables = jaw.tables(register=register, platform=platform)
@@ -323,7 +325,9 @@ def test_a_chewing_motion_is_solved(tmp_path: Path) -> None:
     jaw = record(noise=5e-5)
     got = measured(jaw, tmp_path, cutoff="auto")
     assert got.motion.smoothing is not None and got.motion.sha256 is not None
-    solution = condyle.derive(condyle.load("masticatory"), backend="numpy").solve(got.motion)
+    solution = condyle.derive(condyle.load_mechanism("masticatory"), backend="numpy").solve(
+        got.motion
+    )
     assert np.isfinite(solution["torque"]).all()
 
 

@@ -117,7 +117,7 @@ def test_a_press_becomes_its_wrench(pressed: Any) -> None:
     R, p = in_base(jaw, path)
     want = np.einsum("fij,fj->fi", R, force)
     np.testing.assert_allclose(load.wrench[:, :3], want, atol=1e-3)
-    molar = np.array(condyle.load("masticatory").platform.points["right_molar"])
+    molar = np.array(condyle.load_mechanism("masticatory").platform.points["right_molar"])
     at = Rotation.from_euler("XYZ", jaw.pose[:, 3:]).apply(molar) + jaw.pose[:, :3]
     free = np.einsum("fij,j->fi", R, 0.3 * TURN[:, 2])
     arm = np.einsum("fij,fj->fi", R, place - p) - at

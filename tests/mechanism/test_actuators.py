@@ -252,5 +252,5 @@ def test_use_and_text_of_limits() -> None:
 
 
 def test_bundled_limits() -> None:
-    assert limits(condyle.load("hexaglide").chains[0]) == (-200.0, 200.0, 1.5)
-    assert limits(condyle.load("gough-stewart").chains[0]) == (-INF, INF, INF)
+    assert limits(condyle.load_mechanism("hexaglide").chains[0]) == (-200.0, 200.0, 1.5)
+    assert limits(condyle.load_mechanism("gough-stewart").chains[0]) == (-INF, INF, INF)

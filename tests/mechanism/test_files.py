@@ -14,7 +14,7 @@ from oracles.random_mechanism import random_mechanism, toml_text
 import condyle
 from condyle import InputError, MechanismError
 from condyle.kinematics.chain import FAMILIES
-from condyle.mechanism import Mechanism, bundled_text, dump, dumps, load, parse
+from condyle.mechanism import Mechanism, bundled_text, dump, dumps, load_mechanism, parse
 from condyle.mechanism.files import from_data
 from condyle.mechanism.home import home_warnings
 from condyle.mechanism.library import starter_text
@@ -57,13 +57,13 @@ def test_millimetres_and_metres_are_the_same() -> None:
 @pytest.mark.parametrize("seed", range(6))
 def test_a_written_mechanism_is_read_back_bit_for_bit(seed: int, tmp_path: Path) -> None:
     raw = random_mechanism(np.random.default_rng(seed), contacts=seed, tilted_gravity=True)
-    mechanism = parse(toml_text(raw)) if seed else load("masticatory")
+    mechanism = parse(toml_text(raw)) if seed else load_mechanism("masticatory")
     again = parse(dumps(mechanism))
     assert again == mechanism
     assert dumps(again) == dumps(mechanism)
     dump(mechanism, tmp_path / "jaw.toml")
-    assert load(tmp_path / "jaw.toml") == mechanism
-    assert load(str(tmp_path / "jaw.toml")) == mechanism
+    assert load_mechanism(tmp_path / "jaw.toml") == mechanism
+    assert load_mechanism(str(tmp_path / "jaw.toml")) == mechanism
 
 
 def test_the_bundled_file_keeps_its_comments_and_marks() -> None:
@@ -149,14 +149,14 @@ def spoil(path: Path, kind: str) -> Path:
 def test_what_is_no_mechanism_file(tmp_path: Path, kind: str, message: str) -> None:
     (tmp_path / "jaws.toml").write_text(bundled_text("masticatory"))
     with pytest.raises(InputError, match=f"(?s)jaw.toml.*{message}"):
-        load(spoil(tmp_path / "jaw.toml", kind))
+        load_mechanism(spoil(tmp_path / "jaw.toml", kind))
 
 
 def test_a_bundled_name_is_guessed() -> None:
     with pytest.raises(InputError, match='Did you mean "masticatory"'):
-        load("mastikatory")
+        load_mechanism("mastikatory")
 
 
 def test_a_byte_order_mark_does_no_harm(tmp_path: Path, reference: Mechanism) -> None:
     (tmp_path / "jaw.toml").write_text("\ufeff" + bundled_text("masticatory"), encoding="utf-8")
-    assert load(tmp_path / "jaw.toml") == reference
+    assert load_mechanism(tmp_path / "jaw.toml") == reference

@@ -11,7 +11,7 @@ import pytest
 
 import condyle
 from condyle.errors import CondyleError, InputError, MechanismError
-from condyle.mechanism import Mechanism, bundled_text, dumps, load, parse
+from condyle.mechanism import Mechanism, bundled_text, dumps, load_mechanism, parse
 from condyle.mechanism.files import from_data
 
 TEXT = bundled_text("masticatory")
@@ -32,7 +32,7 @@ TEXTS = {
 def test_texts_that_mean_harm(case: str, tmp_path: Path) -> None:
     text, message = TEXTS[case]
     (tmp_path / "jaw.toml").write_text(text + "\n" + TEXT)
-    for read in (lambda: parse(text + "\n" + TEXT), lambda: load(tmp_path / "jaw.toml")):
+    for read in (lambda: parse(text + "\n" + TEXT), lambda: load_mechanism(tmp_path / "jaw.toml")):
         with pytest.raises(InputError) as caught:
             read()
         assert message in str(caught.value) and len(str(caught.value)) < 1000
@@ -42,13 +42,13 @@ def test_a_megabyte_is_counted_in_bytes(tmp_path: Path) -> None:
     """A file is never cut and then read as if it were whole."""
     (tmp_path / "jaw.toml").write_text(TEXT + "\n# " + "é" * 600_000, encoding="utf-8")
     with pytest.raises(InputError, match="more than a megabyte"):
-        load(tmp_path / "jaw.toml")
+        load_mechanism(tmp_path / "jaw.toml")
 
 
 @pytest.mark.parametrize("source", [3, None, b"masticatory", "a\0b", "x" * 5000, {}])
 def test_what_is_no_path(source: Any) -> None:
     with pytest.raises(InputError) as caught:
-        load(source)
+        load_mechanism(source)
     assert str(caught.value).isprintable() and len(str(caught.value)) < 1000
     with pytest.raises(InputError):
         from_data(source)

@@ -68,7 +68,7 @@ def height(contact: condyle.mechanism.Contact, x: float, y: float) -> float:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_muscles_are_the_published_ones(name: str) -> None:
-    mechanism = condyle.load(name)
+    mechanism = condyle.load_mechanism(name)
     rows = {f"{row['muscle']}_{row['side']}": row for row in csv.DictReader(TABLE.open())}
     assert list(mechanism.chain_names) == list(rows)
     for chain in mechanism.chains:
@@ -82,7 +82,7 @@ def test_muscles_are_the_published_ones(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_both_sides_are_mirror_images(name: str) -> None:
-    mechanism = condyle.load(name)
+    mechanism = condyle.load_mechanism(name)
     mirror = np.array([1, -1, 1])
     for chain in mechanism.chains:
         if chain.name.endswith("_left"):
@@ -103,7 +103,7 @@ def test_both_sides_are_mirror_images(name: str) -> None:
 
 def test_static_bites_of_the_jaw_on_planes() -> None:
     """Found independently with the same numbers."""
-    jaw = condyle.load("human-jaw")
+    jaw = condyle.load_mechanism("human-jaw")
     (left, right), activation = bite(jaw, 100.0, "right_molar")
     assert (left, right) == (pytest.approx(25.2, abs=0.05), pytest.approx(18.5, abs=0.05))
     assert activation.max() == pytest.approx(0.178, abs=5e-4)
@@ -117,7 +117,7 @@ def test_static_bites_of_the_jaw_on_planes() -> None:
 
 def test_the_model_puts_the_same_wrenches_on_the_platform() -> None:
     """Jacobian and normals of the model are those that the bites were computed with."""
-    jaw = condyle.load("human-jaw")
+    jaw = condyle.load_mechanism("human-jaw")
     rows = Model(jaw, backend="numpy").jacobians(np.zeros((1, 4)))["J_theta"][0]
     for chain, row in zip(jaw.chains, rows, strict=True):
         line = np.subtract(chain.base, chain.platform)
@@ -127,7 +127,7 @@ def test_the_model_puts_the_same_wrenches_on_the_platform() -> None:
 
 def test_the_curve_is_the_published_one() -> None:
     """34.9 degrees falling to 9.9 over 12 mm, and never beyond a micrometre off."""
-    for contact in condyle.load("human-jaw-curved").contacts:
+    for contact in condyle.load_mechanism("human-jaw-curved").contacts:
         x, y, z = contact.point
         u = np.linspace(0, 12, 121)
         down = 0.69813 * u - 0.026733 * u**2 + 0.00027313 * u**3
@@ -143,7 +143,7 @@ def test_the_curve_is_the_published_one() -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_it_chews(name: str) -> None:
     """`condyle run` gives it the bundled path of the incisor, which it can follow on its curves."""
-    jaw = condyle.load(name)
+    jaw = condyle.load_mechanism(name)
     motion = reference_motion()
     solution = condyle.derive(jaw, backend="numpy").solve(motion)
     assert (solution["status"].values == 0).all()
@@ -158,7 +158,7 @@ def test_muscles_can_chew_the_bundled_load(name: str) -> None:
 
     What is to be balanced is what efforts of least norm balance, pulling condyles or not.
     """
-    jaw = condyle.load(name)
+    jaw = condyle.load_mechanism(name)
     solution = condyle.derive(jaw, backend="numpy").solve(reference_motion(), reference_load())
     rows = slice(1000, 5001, 100)
     pulls, normals = [], []

@@ -22,7 +22,7 @@ def kinds(machine: Mechanism) -> set[str]:
 
 @pytest.mark.parametrize("name", condyle.bundled_mechanisms())
 def test_real_machines_are_plausible(name: str) -> None:
-    assert not plausibility_warnings(condyle.load(name))
+    assert not plausibility_warnings(condyle.load_mechanism(name))
 
 
 def test_the_starter_is_plausible() -> None:
@@ -77,11 +77,11 @@ CASES: dict[str, tuple[Callable[[Mechanism], Mechanism], set[str], str]] = {
 AXES = ("xx", "yy", "zz")
 LEFT_FAR = tuple(
     np.add(
-        condyle.load("masticatory").get("chain.masseter_left.crank_tip"),
+        condyle.load_mechanism("masticatory").get("chain.masseter_left.crank_tip"),
         550
         * np.subtract(
-            condyle.load("masticatory").get("chain.masseter_left.base"),
-            condyle.load("masticatory").get("chain.masseter_left.crank_tip"),
+            condyle.load_mechanism("masticatory").get("chain.masseter_left.base"),
+            condyle.load_mechanism("masticatory").get("chain.masseter_left.crank_tip"),
         ),
     ).tolist()
 )
@@ -101,7 +101,7 @@ def test_units_that_were_mixed_up() -> None:
     assert first.kind == "length_large" and "characteristic length 59.51 m" in str(first)
     assert 'millimetres in a file of length_unit "m"' in str(first)
     assert first.data["lengths"]["the characteristic length"] == pytest.approx(59.51, rel=1e-3)
-    small = condyle.dumps(condyle.load("masticatory"))
+    small = condyle.dumps(condyle.load_mechanism("masticatory"))
     as_millimetres = parse(small.replace('length_unit = "m"', 'length_unit = "mm"'))
     assert {"length_small", "gyration_large"} <= kinds(as_millimetres)
     assert "metres in a file of length_unit" in str(plausibility_warnings(as_millimetres)[0])

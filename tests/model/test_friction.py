@@ -376,7 +376,7 @@ def test_power_balance_along_a_trajectory(name: str) -> None:
 
 
 def reference_with_friction(mu: float) -> condyle.Mechanism:
-    robot = condyle.load("masticatory")
+    robot = condyle.load_mechanism("masticatory")
     friction = Friction(coefficient=mu, smoothing_speed=0.002)
     contacts = [c.model_copy(update={"friction": friction}) for c in robot.contacts]
     return robot.replace(contacts=tuple(contacts))

@@ -22,7 +22,7 @@ SURFACES = ("plane", "quadratic", "sphere", "ellipsoid")
 @cache
 def mechanism(surface: str) -> Mechanism:
     if surface in ("masticatory", "masticatory-curved"):
-        return condyle.load(surface)
+        return condyle.load_mechanism(surface)
     raw = random_mechanism(np.random.default_rng(12), surface=surface)
     return parse(toml_text(raw))
 
@@ -89,7 +89,7 @@ def test_the_reference_path_is_certified_by_the_kernel(monkeypatch: pytest.Monke
     monkeypatch.setattr(
         FollowedClosure, "solve", lambda *given: pytest.fail("a sample was followed")
     )
-    m, motion = condyle.load("masticatory"), condyle.reference_motion()
+    m, motion = condyle.load_mechanism("masticatory"), condyle.reference_motion()
     assert motion.kind == "landmark" and motion.landmark == "incisor"
     model = condyle.derive(m, backend="numpy")
     (q, _, _), _ = model.independent_motion(motion)

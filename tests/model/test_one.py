@@ -247,7 +247,7 @@ def test_another_choice_of_efforts_is_another_answer() -> None:
 
 @pytest.mark.parametrize("question", QUESTIONS)
 def test_another_mechanism_of_the_structure(question: str) -> None:
-    base = condyle.load("masticatory")
+    base = condyle.load_mechanism("masticatory")
     other = base.set({"platform.mass": 0.31})
     general = Model(base, backend="compiled", general=True)
     c = case("masticatory")

@@ -231,13 +231,13 @@ def test_compiled_limits_and_shortfalls_are_those_of_numpy(objective: str) -> No
 
 
 def test_a_preload_without_one_sided_contacts_is_told(capsys: pytest.CaptureFixture[str]) -> None:
-    machine = condyle.load("masticatory").replace(name="two-sided")
+    machine = condyle.load_mechanism("masticatory").replace(name="two-sided")
     for _ in range(2):
         condyle.derive(machine, backend="numpy", distribution="bounded", preload=3.0)
     said = capsys.readouterr().err
     assert said.count("condyle: preload 3 N presses on nothing") == 1
     assert '"two-sided"' in said and "one_sided = true" in said
-    chosen = condyle.load("masticatory")
+    chosen = condyle.load_mechanism("masticatory")
     one = chosen.contacts[0].model_copy(update={"one_sided": True, "side": "below"})
     pushed = chosen.replace(contacts=(one, *chosen.contacts[1:]))
     condyle.derive(pushed, backend="numpy", distribution="bounded", preload=3.0)
@@ -268,7 +268,7 @@ def test_weights_are_numbers(bad: float) -> None:
 
 
 def test_one_sample_within_limits_is_one_evaluation_of_a_kernel() -> None:
-    robot = condyle.load("masticatory")
+    robot = condyle.load_mechanism("masticatory")
     chains = []
     for chain in robot.chains:
         actuator = chain.actuator.model_copy(update={"torque_limit": 0.35})

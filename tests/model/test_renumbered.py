@@ -21,7 +21,7 @@ CHANGES = {
 @pytest.mark.parametrize("name", CHANGES)
 @pytest.mark.parametrize("backend", ["numpy", "auto"])
 def test_a_renumbered_model_is_the_mechanisms_own(name: str, backend: str) -> None:
-    base = condyle.load(name)
+    base = condyle.load_mechanism(name)
     other = base.set(CHANGES[name])
     general = Model(base, backend=backend, general=True)
     motion = condyle.trial_motion(base, rate=4.0)
@@ -38,7 +38,7 @@ def test_a_renumbered_model_is_the_mechanisms_own(name: str, backend: str) -> No
 
 
 def test_a_landmarks_path_too() -> None:
-    base = condyle.load("masticatory")
+    base = condyle.load_mechanism("masticatory")
     other = base.set("platform.points.incisor[0]", base.get("platform.points.incisor[0]") + 0.004)
     motion = condyle.Motion.from_csv(condyle.motion.bundled_reference()[0], rate=4.0)
     general = Model(base, backend="numpy", general=True)
@@ -50,7 +50,7 @@ def test_a_landmarks_path_too() -> None:
 
 
 def test_copies_share_their_kernels_and_travel() -> None:
-    general = Model(condyle.load("gough-stewart"), backend="numpy", general=True)
+    general = Model(condyle.load_mechanism("gough-stewart"), backend="numpy", general=True)
     kernel = general.kernel("motion")
     assert copy.copy(general).kernel("motion") is kernel
     assert general.choosing("bounded").kernel("motion") is kernel
@@ -59,6 +59,6 @@ def test_copies_share_their_kernels_and_travel() -> None:
 
 
 def test_what_was_chosen_stays_chosen() -> None:
-    base = condyle.load("masticatory")
+    base = condyle.load_mechanism("masticatory")
     chosen = Model(base, backend="numpy", general=True).choosing("bounded")
     assert chosen.renumbered(base.set(CHANGES["masticatory"])).policy == chosen.policy

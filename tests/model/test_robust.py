@@ -24,12 +24,12 @@ def near_stewart() -> tuple[Mechanism, np.ndarray]:
     q[:, :5] = [0.01, -0.02, 0.015, 0.02, -0.03]
     singular = turn_of_stewart(q[0])
     q[:, 5] = singular - 10.0 ** -np.arange(1, COUNT + 1)
-    return condyle.load("gough-stewart"), q
+    return condyle.load_mechanism("gough-stewart"), q
 
 
 def turn_of_stewart(q: np.ndarray) -> float:
     """gamma near pi / 2 where the legs' Jacobian is singular, by bisection of its sign."""
-    model = Model(condyle.load("gough-stewart"), backend="numpy")
+    model = Model(condyle.load_mechanism("gough-stewart"), backend="numpy")
 
     def sign(gamma: float) -> float:
         return np.linalg.slogdet(model.jacobians(np.array([[*q[:5], gamma]]))["J_theta"][0])[0]
@@ -115,7 +115,7 @@ def test_near_singularities(case: str) -> None:
 
 
 def test_no_effort_that_overflows_is_ok() -> None:
-    model = Model(condyle.load("masticatory"), backend="numpy")
+    model = Model(condyle.load_mechanism("masticatory"), backend="numpy")
     zero = np.zeros((3, 4))
     load = np.zeros((3, 9))
     load[1, 0] = 1e308

@@ -76,7 +76,7 @@ def test_coarse_and_fine_output_of_the_reference_have_the_same_accelerations():
 
 @pytest.mark.parametrize("name", condyle.bundled_mechanisms())
 def test_every_bundled_mechanism_follows_it(name: str) -> None:
-    mechanism = condyle.load(name)
+    mechanism = condyle.load_mechanism(name)
     motion = condyle.trial_motion(mechanism)
     assert motion.names == tuple(independent_coordinates(mechanism))
     solution = condyle.derive(mechanism, backend="interpreted").solve(motion)
@@ -84,7 +84,7 @@ def test_every_bundled_mechanism_follows_it(name: str) -> None:
 
 
 def test_it_begins_at_rest_and_moves_everything() -> None:
-    motion = condyle.trial_motion(condyle.load("gough-stewart"), rate=200)
+    motion = condyle.trial_motion(condyle.load_mechanism("gough-stewart"), rate=200)
     assert len(motion) == 1001
     for of in (motion.value, motion.rate, motion.acceleration):
         np.testing.assert_allclose(of[0], 0, atol=1e-6)

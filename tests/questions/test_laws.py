@@ -25,7 +25,7 @@ Arrays = dict[str, np.ndarray]
 
 @cache
 def jaw() -> Model:
-    return Model(condyle.load("masticatory"), backend="numpy")
+    return Model(condyle.load_mechanism("masticatory"), backend="numpy")
 
 
 @cache

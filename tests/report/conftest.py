@@ -14,7 +14,7 @@ def comparison() -> Comparison:
     """The reference motion at 20 Hz by the paper's models."""
     motion = Motion.from_csv(bundled_reference()[0], rate=20)
     models = ["momentum", "lagrange"]
-    machine = condyle.load("masticatory")
+    machine = condyle.load_mechanism("masticatory")
     return compare(machine, motion, condyle.reference_load(), formulations=models)
 
 
@@ -26,7 +26,7 @@ def solution(comparison: Comparison) -> Solution:
 @pytest.fixture(scope="session")
 def fewer_contacts() -> dict[int, Solution]:
     """The stand-in with none and one of its contacts, under a force and a moment."""
-    mechanism = condyle.load("masticatory")
+    mechanism = condyle.load_mechanism("masticatory")
     found = {}
     t = np.linspace(0, 1, 30)
     for k in (0, 1):

@@ -460,7 +460,7 @@ def test_first_printed_page_is_used(tab: Tab) -> None:
 
 @pytest.mark.parametrize("name", ["gough-stewart", "hexaglide"])
 def test_other_families_are_drawn(open_tab: Callable[..., Tab], name: str, tmp_path: Path) -> None:
-    model = condyle.derive(condyle.load(name), backend="interpreted")
+    model = condyle.derive(condyle.load_mechanism(name), backend="interpreted")
     t = np.linspace(0, 1, 41)
     motion = Motion.from_arrays(t, {n: 0.02 * np.sin(6 * t) for n in model.independent})
     path = write_report(model.solve(motion), tmp_path / "report.html")

@@ -229,7 +229,7 @@ def test_parts_of_no_consequence_are_left_out(robot: Solution) -> None:
 
 
 def test_shares_of_actuators_and_friction_have_figures_and_panels() -> None:
-    machine = condyle.load("masticatory")
+    machine = condyle.load_mechanism("masticatory")
     lossy = machine.replace(
         chains=tuple(
             c.model_copy(update={"actuator": c.actuator.model_copy(update={"coulomb": 0.05})})

@@ -22,7 +22,7 @@ FIRST, SECOND, THIRD = "pterygoid_left", "pterygoid_right", "masseter_left"
 @pytest.fixture(scope="module")
 def solution() -> Solution:
     """The reference robot where one motor pushes little, and one may only pull."""
-    machine = condyle.load("masticatory").set(
+    machine = condyle.load_mechanism("masticatory").set(
         {
             f"chain.{FIRST}.actuator.torque_limit": [LOW, HIGH],
             f"chain.{SECOND}.actuator.torque_limit": [0, np.inf],

@@ -14,7 +14,7 @@ from condyle.report.figures.map_figures import LINES, drawn, grown, map_figure
 
 @pytest.fixture(scope="module")
 def model() -> condyle.Model:
-    return condyle.derive(condyle.load("masticatory"), backend="numpy")
+    return condyle.derive(condyle.load_mechanism("masticatory"), backend="numpy")
 
 
 def drawing(model: condyle.Model, over: list[str], quantity: str | list[str]):

@@ -263,7 +263,7 @@ def test_surface_that_cannot_be_drawn_is_named(
 
 @pytest.mark.parametrize("name", ["gough-stewart", "hexaglide"])
 def test_other_families_have_a_page(name: str) -> None:
-    mechanism = condyle.load(name)
+    mechanism = condyle.load_mechanism(name)
     model = condyle.derive(mechanism)
     t = np.linspace(0, 1, 21)
     motion = Motion.from_arrays(t, {n: 0.01 * np.sin(t) for n in model.independent})

@@ -24,7 +24,7 @@ from condyle.report.tables import (
 @pytest.fixture(scope="module")
 def without_paper() -> Comparison:
     """Four chains: a mechanism that the paper says nothing about."""
-    mechanism = condyle.load("masticatory")
+    mechanism = condyle.load_mechanism("masticatory")
     t = np.linspace(0, 1, 20)
     motion = Motion.from_arrays(t, np.zeros((20, 4)), ["X", "Y", "alpha", "beta"])
     four = mechanism.replace(chains=mechanism.chains[:4])

@@ -121,7 +121,7 @@ def test_options_say_how_efforts_were_chosen() -> None:
 
 
 def test_reference_force() -> None:
-    jaw = condyle.derive(condyle.load("human-jaw"), backend="numpy")
+    jaw = condyle.derive(condyle.load_mechanism("human-jaw"), backend="numpy")
     greatest = max(chain.actuator.force_limit[1] for chain in jaw.mechanism.chains)
     assert jaw.reference_force == greatest
     unlimited = parse(bundled_text("masticatory").replace("torque_limit = 3.0, ", ""))

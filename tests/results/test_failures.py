@@ -22,7 +22,7 @@ COUNT = 201
 
 @pytest.fixture(scope="module")
 def model() -> condyle.Model:
-    return condyle.derive(condyle.load("masticatory"), backend="numpy")
+    return condyle.derive(condyle.load_mechanism("masticatory"), backend="numpy")
 
 
 @pytest.fixture(scope="module")

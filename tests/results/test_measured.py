@@ -24,7 +24,7 @@ def beside(tmp_path_factory: pytest.TempPathFactory) -> Beside:
     emg = np.abs(np.sin(jaw.t))[:, None, None]
     path = tmp_path_factory.mktemp("beside") / "a.c3d"
     jaw.write(path, channels=[("E", "V")], analog=emg)
-    name = condyle.load("masticatory").chain_names[2]
+    name = condyle.load_mechanism("masticatory").chain_names[2]
     tables = jaw.tables(emg={"channels": {name: "E"}, "high_pass": 0.0})
     return from_c3d(path, tables, "masticatory").beside
 
@@ -34,7 +34,7 @@ def solution() -> Solution:
     """A pose of which all is known, at every third sample."""
     jaw = record(seconds=2.0)
     motion = Motion.from_arrays(jaw.t, jaw.pose, ("X", "Y", "Z", "alpha", "beta", "gamma"))
-    model = condyle.derive(condyle.load("masticatory"), backend="numpy")
+    model = condyle.derive(condyle.load_mechanism("masticatory"), backend="numpy")
     return model.solve(motion).isel(time=slice(20, None, 3))
 
 

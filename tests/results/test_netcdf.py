@@ -20,7 +20,7 @@ FULL = """
     import resource, signal, sys
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     import condyle
-    model = condyle.derive(condyle.load("masticatory"), backend="numpy")
+    model = condyle.derive(condyle.load_mechanism("masticatory"), backend="numpy")
     solution = model.solve(condyle.reference_motion(), condyle.reference_load())
     resource.setrlimit(resource.RLIMIT_FSIZE, (20480, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
     for name in ("full.nc", "full.csv"):
@@ -50,7 +50,7 @@ def test_a_full_disk(tmp_path: Path) -> None:
 
 
 def test_the_file_is_the_dataset(tmp_path: Path) -> None:
-    model = condyle.derive(condyle.load("hexaglide"), backend="numpy")
+    model = condyle.derive(condyle.load_mechanism("hexaglide"), backend="numpy")
     t = np.linspace(0, 1, 9)
     motion = condyle.Motion.from_arrays(
         t, np.zeros((9, len(model.independent))), names=model.independent

@@ -12,7 +12,7 @@ from condyle.results.variables import DIMENSIONS, VARIABLES
 
 @pytest.fixture(scope="module")
 def model() -> condyle.Model:
-    return condyle.derive(condyle.load("masticatory"), backend="numpy")
+    return condyle.derive(condyle.load_mechanism("masticatory"), backend="numpy")
 
 
 def along_x(model: condyle.Model, reach: float, count: int = 41) -> Motion:
@@ -35,7 +35,7 @@ def test_a_solution_is_the_table(model: condyle.Model) -> None:
 
 
 def test_units_follow_the_joints() -> None:
-    slides = condyle.load("hexaglide")
+    slides = condyle.load_mechanism("hexaglide")
     units = {v.name: v.attributes(slides)["units"] for v in VARIABLES}
     assert units["torque"] == "N" and units["joint_acceleration"] == "m/s^2"
     assert units["J_A"] == "m^2/m"

@@ -88,8 +88,11 @@ def test_blocks_say_what_the_whole_says(one_sided: condyle.Mechanism) -> None:
 
 
 def test_limits_of_every_family() -> None:
-    chains = [*condyle.load("hexaglide").chains, *condyle.load("gough-stewart").chains]
-    chains += condyle.load("masticatory").chains
+    chains = [
+        *condyle.load_mechanism("hexaglide").chains,
+        *condyle.load_mechanism("gough-stewart").chains,
+    ]
+    chains += condyle.load_mechanism("masticatory").chains
     for chain in chains:
         stated = chain.actuator.model_dump()
         effort = stated.get("torque_limit", stated.get("force_limit"))
@@ -108,7 +111,7 @@ def test_strict_goes_by_kind_not_by_words() -> None:
 
 def test_rounding_is_no_alarm() -> None:
     """A contact point at its bound to the last bit but one."""
-    mechanism = condyle.load("masticatory")
+    mechanism = condyle.load_mechanism("masticatory")
     model = condyle.derive(mechanism, backend="numpy")
     t = np.linspace(0, 1, 9)
     motion = Motion.from_arrays(t, np.zeros((9, 4)), names=model.independent)

@@ -20,7 +20,7 @@ def jaw() -> Model:
 @pytest.fixture(scope="session")
 def rubbing() -> Model:
     """The same with friction at a contact, and actuators that lose power and have rotors."""
-    machine = condyle.load("masticatory")
+    machine = condyle.load_mechanism("masticatory")
     changes = {"contact.left_condyle.friction": FRICTION}
     for name in machine.chain_names:
         changes[f"chain.{name}.actuator"] = LOSSES | {"rotor_inertia": 1e-7, "gear": 10}

@@ -293,7 +293,7 @@ def test_laws_from_outside_in_lockstep(
 
 def test_drives_that_chatter_stay_in_compiled_code() -> None:
     """Limits cut efforts in hundreds of looks; none of them comes back to Python."""
-    machine = condyle.load("masticatory")
+    machine = condyle.load_mechanism("masticatory")
     limits = {f"chain.{name}.actuator.torque_limit": 0.02 for name in machine.chain_names}
     hard = {"kind": "joint_pd", "stiffness": 200.0, "damping": 1.0, "rate": 2000.0}
     told = {"duration": 0.3, "controller": hard, "start": {"beta": 0.02}}

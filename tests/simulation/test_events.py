@@ -156,7 +156,7 @@ def test_a_full_disk_leaves_nothing(jaw: Model, tmp_path: Path) -> None:
 
 def test_a_jam_ends_the_run() -> None:
     """With mu = 3 a condyle that slides comes to a state that no pattern of friction explains."""
-    machine = condyle.load("masticatory")
+    machine = condyle.load_mechanism("masticatory")
     rough = {"coefficient": 3.0, "smoothing_speed": 1e-3}
     changes = {f"contact.{name}.friction": rough for name in machine.contact_names}
     model = condyle.derive(machine.set(changes))

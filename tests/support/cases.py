@@ -12,7 +12,7 @@ from oracles.random_mechanism import random_mechanism, random_state, toml_text
 
 from condyle.backends.c.compiled_kernel import CompiledKernel
 from condyle.backends.kernel import results_of
-from condyle.mechanism import Mechanism, load, parse
+from condyle.mechanism import Mechanism, load_mechanism, parse
 
 Array = np.ndarray
 BUNDLED = ("masticatory", "masticatory-curved", "gough-stewart", "hexaglide")
@@ -78,7 +78,7 @@ class Case:
 def case(name: str) -> Case:
     """A bundled mechanism, or one of `RANDOM`, at home, near it and away from it."""
     if name in BUNDLED:
-        raw, mechanism = description.load(BUNDLED_FOLDER / f"{name}.toml"), load(name)
+        raw, mechanism = description.load(BUNDLED_FOLDER / f"{name}.toml"), load_mechanism(name)
     else:
         rng = np.random.default_rng(sum(map(ord, name)))
         raw = random_mechanism(rng, condition=100.0, **RANDOM[name])

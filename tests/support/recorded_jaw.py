@@ -111,7 +111,7 @@ def record(
     base = np.concatenate([base, np.broadcast_to(face, (len(t), 4, 3))], axis=1)
     lab = (base @ A.T + b) @ H.transpose(0, 2, 1) + h[:, None]
     lab += rng.normal(0, noise, lab.shape) if noise else 0.0
-    machine = condyle.load(mechanism)
+    machine = condyle.load_mechanism(mechanism)
     there = {c.name: c.point for c in machine.contacts} | dict(machine.platform.points)
     # Numbers are where the point is on the mean of home, as the fixed markers are.
     home = t <= 0.5

@@ -13,7 +13,7 @@ from condyle.view.session import MOST_INTERNAL, Session
 
 @pytest.fixture(scope="module")
 def jaw() -> condyle.Mechanism:
-    return condyle.load("human-jaw")
+    return condyle.load_mechanism("human-jaw")
 
 
 def test_cables_and_contacts_balance_by_hand(jaw: condyle.Mechanism) -> None:
@@ -40,7 +40,7 @@ def test_cables_and_contacts_balance_by_hand(jaw: condyle.Mechanism) -> None:
 
 @pytest.mark.parametrize(("name", "count"), [("masticatory", 2), ("hexaglide", 1)])
 def test_directions_do_no_work_at_any_pose(name: str, count: int) -> None:
-    session = Session(condyle.load(name))
+    session = Session(condyle.load_mechanism(name))
     session.set_coordinate("beta", 0.08)
     session.snapshot()
     model = session.model
@@ -101,7 +101,7 @@ def test_what_no_muscles_can_hold_is_called_infeasible(jaw: condyle.Mechanism) -
 
 
 def test_no_directions_without_redundancy() -> None:
-    session = Session(condyle.load("gough-stewart"))
+    session = Session(condyle.load_mechanism("gough-stewart"))
     assert session.directions().count == len(session.internal) == 0
     assert "As many actuators as freedoms" in internal_text(0, 0)
 

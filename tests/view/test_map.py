@@ -18,7 +18,7 @@ OVER = ["X=-5:12:12 mm", "beta=-15:30:12 deg", "Y=-6:6:5 mm"]
 
 @pytest.fixture(scope="module")
 def model() -> condyle.Model:
-    return condyle.derive(condyle.load("masticatory"), backend="numpy")
+    return condyle.derive(condyle.load_mechanism("masticatory"), backend="numpy")
 
 
 @pytest.fixture(scope="module")

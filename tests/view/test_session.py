@@ -129,7 +129,7 @@ def test_dragging_goes_to_the_nearest_pose_on_the_contacts(session: Session) -> 
 
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_sliders_reach_from_home_and_a_little_beyond(name: str) -> None:
-    session = Session(condyle.load(name))
+    session = Session(condyle.load_mechanism(name))
     found = session.coordinates()
     assert [c.name for c in found] == list(session.model.independent)
     for c in found:
@@ -309,7 +309,7 @@ def volume(vertices: np.ndarray, faces: np.ndarray) -> float:
 
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_bodies_are_closed_and_look_outwards(name: str) -> None:
-    mechanism = condyle.load(name)
+    mechanism = condyle.load_mechanism(name)
     vertices, faces = platform_hull(mechanism)
     assert volume(vertices, faces) > 0
     points = [np.asarray(c.platform) for c in mechanism.chains]
@@ -322,7 +322,7 @@ def test_bodies_are_closed_and_look_outwards(name: str) -> None:
 
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_drawn_rods_join_the_platform_and_keep_their_length(name: str) -> None:
-    mechanism = condyle.load(name)
+    mechanism = condyle.load_mechanism(name)
     model = condyle.derive(mechanism, backend="interpreted")
     t = np.linspace(0, 1, 31)
     motion = Motion.from_arrays(t, {n: 0.004 * np.sin(5 * t) for n in model.independent})

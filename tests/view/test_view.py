@@ -164,7 +164,7 @@ def test_files_open_and_bad_ones_are_refused(tab: Tab, view: View, tmp_path: Pat
     told.wait_for()
     assert view.session.mechanism.name == "masticatory"
     good = tmp_path / "good.toml"
-    condyle.dump(condyle.load("hexaglide"), good)
+    condyle.dump(condyle.load_mechanism("hexaglide"), good)
     tab.page.set_input_files("input[type=file]", str(good))
     tab.page.get_by_text("condyle - hexaglide").wait_for()
     wait_for_level(tab, "calm")

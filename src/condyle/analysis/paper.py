@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import PurePath
 
-from ..mechanism import load
+from ..mechanism import load_mechanism
 from ..mechanism.mechanism import Mechanism
 from ..motion.reference_case import LOAD_FILE, MOTION_FILE, SYNTHETIC
 
@@ -59,7 +59,7 @@ def is_paper_class(mechanism: Mechanism) -> bool:
 
 def is_stand_in(mechanism: Mechanism) -> bool:
     """Whether this is the bundled mechanism, number by number."""
-    return mechanism.name == STAND_IN and mechanism == load(STAND_IN)
+    return mechanism.name == STAND_IN and mechanism == load_mechanism(STAND_IN)
 
 
 def is_synthetic(source: str) -> bool:

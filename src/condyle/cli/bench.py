@@ -32,7 +32,7 @@ def bench(
         seconds: How long each row of the table is timed (s).
     """
     from ..atomic import replacing
-    from ..mechanism import load
+    from ..mechanism import load_mechanism
 
     benchmarks = _benchmarks()
 
@@ -41,7 +41,7 @@ def bench(
             output_folder(out.parent)
             temporary = stack.enter_context(replacing(out))
         if realtime:
-            result = benchmarks.real_time(load("masticatory"), seconds)
+            result = benchmarks.real_time(load_mechanism("masticatory"), seconds)
         else:
             result = benchmarks.run_benchmark(seconds)
         if out is not None:

@@ -25,7 +25,7 @@ def check(mechanism: options.Mechanism, project: bool = False) -> Answer:
 
     if project and (nearest := _projection(mechanism)) is not None:
         return nearest
-    machine = condyle.load(mechanism)
+    machine = condyle.load_mechanism(mechanism)
     description = describe(machine)
     warn([*home_warnings(machine), *(one["message"] for one in description.data["warnings"])])
     then = command_line("run", mechanism)

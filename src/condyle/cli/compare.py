@@ -51,7 +51,7 @@ def compare(
     from ..report.tables import save_tables, tables, with_tables
     from ..report.tables.tradeoff_table import tradeoff_table
 
-    machine = condyle.load(mechanism)
+    machine = condyle.load_mechanism(mechanism)
     path, acting = motion_and_load(machine, motion, load, units, landmark, smooth, rate, trim)
     if tradeoff:
         if distribution not in (None, "weighted") or contact_weight:

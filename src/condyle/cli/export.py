@@ -52,7 +52,7 @@ def c(
     from ..export import export as exported_of
     from ..export.c_package import write_facts, write_package
 
-    machine = condyle.load(mechanism)
+    machine = condyle.load_mechanism(mechanism)
     given = (one.strip() for one in coordinates.split(",")) if coordinates else ()
     names = in_order(tuple(given))
     closing = ("closure",) if coordinates or landmark else ()

@@ -32,7 +32,7 @@ def fmu(
 
     from ..export.fmu import write_fmu
 
-    machine = condyle.load(mechanism)
+    machine = condyle.load_mechanism(mechanism)
     folder, files, bare = output_folder(out), [], False
     kinds = list(dict.fromkeys(kind or completion.FMUS[:3]))
     for one in kinds:

@@ -27,7 +27,7 @@ def matlab(
 
     from ..export.matlab import write_matlab
 
-    machine = condyle.load(mechanism)
+    machine = condyle.load_mechanism(mechanism)
     files = write_matlab(machine, output_folder(out))
     data = {"mechanism": machine.name, "files": files}
     return Answer(files_line(files), data, command_line("check", mechanism))

@@ -28,7 +28,7 @@ def mjcf(
 
     from ..export.mjcf import write_mjcf
 
-    machine = condyle.load(mechanism)
+    machine = condyle.load_mechanism(mechanism)
     path = output_folder(out) / f"{file_stem(machine.name)}.xml"
     made = write_mjcf(machine, path)
     warn(list(made.notes))

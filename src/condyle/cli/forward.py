@@ -36,7 +36,7 @@ def forward(
 
     from ..results.forward_rows import forward_file
 
-    model = condyle.derive(condyle.load(mechanism), formulation, backend=backend)
+    model = condyle.derive(condyle.load_mechanism(mechanism), formulation, backend=backend)
     rows, warnings = forward_file(model, states, out, load_point, flag, threads)
     warn(warnings)
     data = {

@@ -112,7 +112,7 @@ def study_for(path: Path, machine: Mechanism) -> Study:
     from ..analysis.sweep import read_study
 
     study = read_study(path)
-    if study.mechanism is not None and condyle.load(study.mechanism) != machine:
+    if study.mechanism is not None and condyle.load_mechanism(study.mechanism) != machine:
         raise InputError(
             f'--vary {path}: the study is of "{study.mechanism}", the run of "{machine.name}"; '
             "name one of them in both, or leave it out of the study"

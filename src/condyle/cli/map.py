@@ -88,7 +88,7 @@ def map_(
     from ..analysis.workers import check_scheduler
     from ..report.map_text import numbers_text
 
-    machine = condyle.load(mechanism)
+    machine = condyle.load_mechanism(mechanism)
     grid = grid_of(machine, over or default_over(machine), hold)
     names = tuple(part.strip() for one in quantity or ["ratio"] for part in one.split(","))
     model = chosen_model(machine, "virtual_power", "core", backend, distribution, preload, 0.0)

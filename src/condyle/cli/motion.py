@@ -80,7 +80,7 @@ def from_c3d(
     found = marked.from_c3d(
         recording,
         markers,
-        condyle.load(mechanism),
+        condyle.load_mechanism(mechanism),
         max_residual=max_residual / 1e3,
         max_gap=max_gap,
         longest=longest,

@@ -43,7 +43,7 @@ def pose(
         raise UnsupportedError("--all lists all poses of a row, be it none; leave out --flag")
     if seed is not None and not every:
         raise UnsupportedError("--seed is of the search of --all; add that, or leave --seed out")
-    machine = condyle.load(mechanism)
+    machine = condyle.load_mechanism(mechanism)
     report: ModesReport | PoseReport
     if every:
         report = modes_file(machine, joints, out, seed or 0, tolerance)

@@ -65,7 +65,7 @@ def run(
     from ..results.summary import summarize
     from ..results.warnings import refuse
 
-    machine = condyle.load(mechanism)
+    machine = condyle.load_mechanism(mechanism)
     study = None if vary is None else study_for(vary, machine)
     path, acting = motion_and_load(machine, motion, load, units, landmark, smooth, rate, trim)
     policy = distribution, preload, contact_weight

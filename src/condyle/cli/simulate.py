@@ -50,7 +50,7 @@ def simulate(
     from ..simulation.gains import check_gains as check
     from ..simulation.simulating import as_scenario
 
-    machine = condyle.load(mechanism)
+    machine = condyle.load_mechanism(mechanism)
     told = default_scenario() if scenario is None else as_scenario(scenario)
     source = "the default scenario" if scenario is None else str(scenario)
     model = condyle.derive(machine, backend=backend)

@@ -45,7 +45,7 @@ def solve(
 
     if mat and out.suffix.lower() == ".mat":
         raise InputError(f"--out {out}: --mat writes that file; give the table another name")
-    machine, policy = condyle.load(mechanism), (distribution, preload, contact_weight)
+    machine, policy = condyle.load_mechanism(mechanism), (distribution, preload, contact_weight)
     model = chosen_model(machine, formulation, route, backend, *policy)
     files = [out, out.with_suffix(".mat")] if mat else [out]
     how = load_point, flag, strict, reactions, threads

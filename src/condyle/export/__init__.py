@@ -1,6 +1,6 @@
 """Mechanisms as something else: C for controllers, and what other targets make of that.
 
-    exported = export(condyle.load("masticatory"), ("inverse", "motion"))
+    exported = export(condyle.load_mechanism("masticatory"), ("inverse", "motion"))
     exported.source, exported.header, exported["inverse"].arguments
 
 A target is a file that writes what it is for from an `Exported`.

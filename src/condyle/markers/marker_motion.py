@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from ..errors import InputError
-from ..mechanism import load as load_mechanism
+from ..mechanism import load_mechanism
 from ..mechanism.mechanism import Mechanism
 from ..motion.column_units import POSE
 from ..motion.file_words import listed

@@ -21,7 +21,7 @@ from .schema import schema_of
 from .toml import nests_too_deep, read_tables, read_text, too_deep
 
 
-def load(source: str | Path) -> Mechanism:
+def load_mechanism(source: str | Path) -> Mechanism:
     """Read a mechanism.
 
     Args:   source: path of a TOML file, or the name of a bundled mechanism.

@@ -21,7 +21,7 @@ from ..accessors import extend
 from ..backends.kernel import Kernel
 from ..distribution import OBJECTIVES
 from ..errors import InputError
-from ..mechanism import load as load_mechanism
+from ..mechanism import load_mechanism
 from ..mechanism.mechanism import Mechanism
 from ..motion import Load, Motion, resolve_load_point
 from ..questions.equations import INTERNAL, part_names

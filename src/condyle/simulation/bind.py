@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError, ScenarioError
 from ..kinematics.chain import FAMILIES
-from ..mechanism import load as load_mechanism
+from ..mechanism import load_mechanism
 from ..mechanism.chain import limits
 from ..mechanism.home import characteristic_length
 from ..model.model import Model

@@ -14,7 +14,7 @@ import viser
 
 from ..errors import InputError
 from ..kinematics.chain import FAMILIES
-from ..mechanism import Mechanism, bundled_mechanisms, load, parse
+from ..mechanism import Mechanism, bundled_mechanisms, load_mechanism, parse
 from ..results.solution import Solution, open_solution
 from ..simulation.knobs import Knob
 from .live_player import LivePlayer
@@ -280,7 +280,7 @@ class Panel:
 
     def open_bundled(self, name: str) -> None:
         if name != "-":
-            self._view.open_mechanism(load(name))
+            self._view.open_mechanism(load_mechanism(name))
 
     def open_toml(self, file: Any) -> None:
         """Open an uploaded mechanism."""

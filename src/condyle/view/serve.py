@@ -19,7 +19,7 @@ import viser
 
 from ..analysis.map.map_files import mechanism_of, open_map
 from ..errors import CondyleError, InputError
-from ..mechanism import Mechanism, load
+from ..mechanism import Mechanism, load_mechanism
 from ..results.solution import Solution, open_solution
 from .controls import Panel
 from .gate import Gate, guarded
@@ -234,7 +234,11 @@ def open_view(
         solution = open_solution(solution)
     if not isinstance(mechanism, Mechanism):
         solved = solution.mechanism if solution is not None else None
-        mechanism = load(mechanism) if mechanism is not None else solved or load(DEFAULT)
+        mechanism = (
+            load_mechanism(mechanism)
+            if mechanism is not None
+            else solved or load_mechanism(DEFAULT)
+        )
     live = None if scenario is None else LivePlayer(planned(mechanism, scenario))
     return View(mechanism, solution, host, port, map, live)
 

@@ -18,7 +18,7 @@ def model_of() -> Models:
 
     def model(name: str) -> Model:
         if name not in made:
-            made[name] = condyle.derive(condyle.load(name), backend="numpy")
+            made[name] = condyle.derive(condyle.load_mechanism(name), backend="numpy")
         return made[name]
 
     return model

@@ -41,7 +41,7 @@ def test_largest_load_is_that_of_a_linear_program(
 
     Q_0 and w come from inverse dynamics in the whole pose, which knows nothing of zonotopes.
     """
-    mechanism = condyle.load("masticatory")
+    mechanism = condyle.load_mechanism("masticatory")
     if side:
         changes: dict[str, object] = {f"contact.{n}.side": side for n in mechanism.contact_names}
         changes |= {f"contact.{n}.one_sided": True for n in mechanism.contact_names}

@@ -36,7 +36,7 @@ STUDY: dict[str, Any] = {
 @pytest.fixture(scope="session")
 def machine() -> condyle.Mechanism:
     """The mechanism of the study."""
-    return condyle.load("masticatory")
+    return condyle.load_mechanism("masticatory")
 
 
 @pytest.fixture(scope="session")

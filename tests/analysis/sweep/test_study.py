@@ -148,7 +148,7 @@ def test_a_file_that_is_none(make: Callable[[Path], Path], tmp_path: Path) -> No
 def test_what_follows_moves_with_what_varies() -> None:
     y = "chain.masseter_{}.base[1]".format
     mirror = [f"-{y('right')}", {"what": "gravity[2]", "times": 2.0, "plus": -10.0}]
-    left = condyle.load("masticatory").get(y("left"))
+    left = condyle.load_mechanism("masticatory").get(y("left"))
     vary = [{"what": y("left"), "values": [left, left + 1e-4], "mirror": mirror}]
     job = prepared(read_study(spoiled(vary=vary)))
     changes = job.changes(job.design.rows(1, 2)[0])

@@ -209,7 +209,7 @@ def test_a_changed_study_is_refused_with_the_difference(
     other = {**small, "vary": [{**small["vary"][0], "range": [0.2, 0.35]}]}
     with pytest.raises(condyle.InputError, match=r"range\[1\] was 0.3, is 0.35"):
         condyle.sweep(other, tmp_path, workers=1, resume=True)
-    heavier = condyle.load("masticatory").set("chain.masseter_left.coupler.com", 0.4)
+    heavier = condyle.load_mechanism("masticatory").set("chain.masseter_left.coupler.com", 0.4)
     with pytest.raises(condyle.InputError, match=r"coupler\.com was"):
         condyle.sweep(small, tmp_path, workers=1, resume=True, mechanism=heavier)
     kept = json.loads((tmp_path / study_folder.STUDY).read_text())

@@ -50,7 +50,7 @@ def test_round_trip(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["gough-stewart", "hexaglide"])
 def test_bundled_files(name: str) -> None:
-    mechanism = condyle.load(name)
+    mechanism = condyle.load_mechanism(name)
     assert parse(dumps(mechanism)) == mechanism
     assert name in condyle.bundled_mechanisms()
 

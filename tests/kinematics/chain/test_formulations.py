@@ -10,7 +10,7 @@ from support.families import MECHANISMS, Case, case, of_raw, same
 
 import condyle
 from condyle.dynamics import FORMULATIONS
-from condyle.mechanism import load
+from condyle.mechanism import load_mechanism
 from condyle.questions.numbers import has_closed_form
 
 OTHERS = [name for name in FORMULATIONS if name != "virtual_power"]
@@ -52,5 +52,5 @@ def bundled(name: str) -> Case:
 @pytest.mark.parametrize("name", ["gough-stewart", "hexaglide"])
 def test_bundled_mechanisms(name: str, formulation: str) -> None:
     c = bundled(name)
-    assert c.mechanism == load(name)
+    assert c.mechanism == load_mechanism(name)
     same(c.evaluate(formulation), c.evaluate(), 1e-10)

@@ -77,7 +77,7 @@ def plain_newton_euler(pose: Jet, wrench: Array) -> dict[str, Any]:
 
 def test_published_numbers() -> None:
     """Radii 3 and 1 m, height 2 m, 2.5 and 10 degrees; steel tubes and bars of 3/4 the length."""
-    mechanism, density = condyle.load("gough-stewart"), 76000 / 9.81
+    mechanism, density = condyle.load_mechanism("gough-stewart"), 76000 / 9.81
 
     def ring(radius: float, height: float, degrees: list[float]) -> Array:
         a = np.radians(degrees)
@@ -112,7 +112,7 @@ def wanted() -> list[dict[str, Any]]:
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_efforts(wanted: list[dict[str, Any]], formulation: str) -> None:
-    model = Model(condyle.load("gough-stewart"), formulation, backend="numpy")
+    model = Model(condyle.load_mechanism("gough-stewart"), formulation, backend="numpy")
     q, q1, q2, wrench = states()
     load = np.hstack([wrench, np.tile(PAYLOAD, (len(q), 1))])
     close(model.evaluate(q, q1, q2, load).effort, [w["tau"] for w in wanted], 1e-11)
@@ -121,7 +121,7 @@ def test_efforts(wanted: list[dict[str, Any]], formulation: str) -> None:
 def test_reactions(wanted: list[dict[str, Any]]) -> None:
     from condyle.model.joint_reactions import reactions
 
-    model = Model(condyle.load("gough-stewart"), backend="numpy")
+    model = Model(condyle.load_mechanism("gough-stewart"), backend="numpy")
     q, q1, q2, wrench = states()
     load = np.hstack([wrench, np.tile(PAYLOAD, (len(q), 1))])
     found = reactions(model, model.evaluate(q, q1, q2, load))
@@ -136,7 +136,7 @@ def test_weight_alone_at_home() -> None:
     """At rest the vertical forces at the base carry the whole weight."""
     from condyle.model.joint_reactions import reactions
 
-    mechanism = condyle.load("gough-stewart")
+    mechanism = condyle.load_mechanism("gough-stewart")
     model = Model(mechanism, backend="numpy")
     zero = np.zeros((1, 6))
     found = reactions(model, model.evaluate(zero, zero, zero, np.zeros((1, 9))))

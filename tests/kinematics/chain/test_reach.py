@@ -15,7 +15,7 @@ from condyle.status import Status
 
 
 def hexaglide() -> Mechanism:
-    return condyle.load("hexaglide")
+    return condyle.load_mechanism("hexaglide")
 
 
 def test_a_rail_too_far_from_its_joint() -> None:
@@ -74,7 +74,7 @@ def test_leg_coordinate_is_the_change_of_length() -> None:
 
 def test_extension_pushes() -> None:
     """A load that presses a Gough-Stewart platform down needs positive, pushing efforts."""
-    mechanism = condyle.load("gough-stewart")
+    mechanism = condyle.load_mechanism("gough-stewart")
     model = Model(mechanism, backend="numpy")
     zero = np.zeros((1, 6))
     load = np.zeros((1, 9))
@@ -90,6 +90,6 @@ def test_extension_pushes() -> None:
 def test_units_in_the_check(name: str, joint: str, effort: str) -> None:
     from condyle.report.description import describe
 
-    text = str(describe(condyle.load(name)))
+    text = str(describe(condyle.load_mechanism(name)))
     assert f"joint [{joint}], effort [{effort}]" in text
     assert ("6 chains, 1 contact, 5 degrees" in text) == (name == "hexaglide")

@@ -170,7 +170,7 @@ def test_a_profile_through_a_quadratic(reference: Mechanism) -> None:
 
 
 def test_direct_route_names_the_core(reference: Mechanism) -> None:
-    curved = condyle.load("masticatory-curved")
+    curved = condyle.load_mechanism("masticatory-curved")
     with pytest.raises(condyle.UnsupportedError, match=r"quadratic, quadratic.*Use route core"):
         condyle.derive(curved, route="direct")
     walls = with_surfaces(

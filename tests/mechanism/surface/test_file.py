@@ -136,7 +136,7 @@ def test_check_says_what_a_contact_is(raw: dict[str, Any]) -> None:
 
 def test_the_bundled_curved_mechanism(reference: Mechanism) -> None:
     """Tangent to the paper's planes at home, and it runs the reference motion."""
-    curved = condyle.load("masticatory-curved")
+    curved = condyle.load_mechanism("masticatory-curved")
     assert [c.surface.kind for c in curved.contacts] == ["quadratic", "quadratic"]
     for ours, plane in zip(curved.contacts, reference.contacts, strict=True):
         s, (x, y, _) = ours.surface, ours.point

@@ -28,7 +28,7 @@ def by_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def model() -> Model:
-    return Model(condyle.load("masticatory"), backend="numpy")
+    return Model(condyle.load_mechanism("masticatory"), backend="numpy")
 
 
 def drawn(model: Model) -> tuple[np.ndarray, ...]:

@@ -49,7 +49,7 @@ def test_inverse_undoes_forward(name: str) -> None:
 @pytest.mark.parametrize("name", ["human-jaw", "human-jaw-curved"])
 def test_inverse_undoes_forward_of_muscles(name: str) -> None:
     """Tensions below zero too: what limits them does not matter to the equations."""
-    model = Model(condyle.load(name), distribution="minimum_norm", backend="numpy")
+    model = Model(condyle.load_mechanism(name), distribution="minimum_norm", backend="numpy")
     rng = np.random.default_rng(5)
     sizes = np.array([0.002 if c in "XYZ" else 0.03 for c in model.independent])
     q, q1, q2 = (k * rng.normal(0, 1, (3, len(sizes))) * sizes for k in (1, 10, 300))

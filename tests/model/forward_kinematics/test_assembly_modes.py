@@ -16,7 +16,7 @@ from condyle.results.pose_rows import modes_file, pose_file
 
 def test_modes_of_a_stewart_platform() -> None:
     """At home: home, its mirror image below the base, and pairs; each has the joints of home."""
-    mechanism = condyle.load("gough-stewart")
+    mechanism = condyle.load_mechanism("gough-stewart")
     modes = ForwardKinematics(mechanism).modes(np.zeros(6))
     assert len(modes.pose) >= 8
     # Legs that leave a flat base for a flat platform do not tell above from below.
@@ -37,7 +37,7 @@ def test_modes_of_a_stewart_platform() -> None:
 
 
 def test_the_search_repeats_and_has_a_seed() -> None:
-    forward = ForwardKinematics(condyle.load("gough-stewart"))
+    forward = ForwardKinematics(condyle.load_mechanism("gough-stewart"))
     joints = np.array([0.1, -0.05, 0.02, 0.03, -0.1, 0.07])
     first, again, other = (forward.modes(joints, seed) for seed in (0, 0, 1))
     np.testing.assert_array_equal(first.pose, again.pose)
@@ -46,13 +46,13 @@ def test_the_search_repeats_and_has_a_seed() -> None:
 
 
 def test_modes_of_joints_that_no_pose_has() -> None:
-    modes = ForwardKinematics(condyle.load("gough-stewart")).modes(np.full(6, -50.0))
+    modes = ForwardKinematics(condyle.load_mechanism("gough-stewart")).modes(np.full(6, -50.0))
     assert modes.pose.shape == (0, 6) and modes.residual.shape == (0, 6)
 
 
 @pytest.mark.parametrize("name", ["masticatory", "masticatory-curved", "hexaglide"])
 def test_the_pose_that_is_followed_is_among_the_modes(name: str) -> None:
-    mechanism = condyle.load(name)
+    mechanism = condyle.load_mechanism(name)
     forward = ForwardKinematics(mechanism)
     for pose in (np.zeros(6), forward.solve(np.zeros((1, len(mechanism.chains)))).pose[0]):
         modes = forward.modes(np.zeros(len(mechanism.chains)))
@@ -62,7 +62,7 @@ def test_the_pose_that_is_followed_is_among_the_modes(name: str) -> None:
 
 def test_modes_of_a_file(tmp_path: Path) -> None:
     """One mode a row; the pose that `pose_file` finds is one of them."""
-    mechanism = condyle.load("gough-stewart")
+    mechanism = condyle.load_mechanism("gough-stewart")
     joints = np.array([[0.0] * 6, [0.1, -0.05, 0.02, 0.03, -0.1, 0.07], [-50.0] * 6])
     names = [f"joint_{name}" for name in mechanism.chain_names]
     write_table(tmp_path / "in.csv", dict(zip(names, joints.T, strict=True)))

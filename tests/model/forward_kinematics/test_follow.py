@@ -39,7 +39,7 @@ def encoders(d: Description, poses: np.ndarray) -> np.ndarray:
 
 def stewart() -> tuple[ForwardKinematics, Description]:
     raw = tomllib.loads(bundled_text("gough-stewart"))
-    return ForwardKinematics(condyle.load("gough-stewart")), read(raw)
+    return ForwardKinematics(condyle.load_mechanism("gough-stewart")), read(raw)
 
 
 def line(end: tuple[float, ...], rows: int) -> np.ndarray:
@@ -86,7 +86,7 @@ def test_round_trips_of_random_mechanisms(
 
 def test_far_from_home_rows_follow_the_row_before() -> None:
     """Alone, such rows end in minima whose joints differ; in time they are reached exactly."""
-    mechanism = condyle.load("masticatory")
+    mechanism = condyle.load_mechanism("masticatory")
     model, forward = condyle.derive(mechanism, backend="numpy"), ForwardKinematics(mechanism)
     unit = [model.characteristic_length] * 2 + [1.0] * 2
     ends = np.random.default_rng(5).uniform(-0.5, 0.5, (200, 4)) * unit
@@ -112,7 +112,7 @@ def test_far_from_home_rows_follow_the_row_before() -> None:
 def test_paths_through_singularities_are_lost_there() -> None:
     """Encoders cannot tell passing a singularity from turning back: no row behind it has a pose."""
     forward, d = stewart()
-    steps = joint_steps(condyle.load("gough-stewart"))
+    steps = joint_steps(condyle.load_mechanism("gough-stewart"))
     rng, passed = np.random.default_rng(1), 0
     for rows in (81, 301):
         for _ in range(25):
@@ -152,12 +152,12 @@ def test_swinging_about_home_is_no_reason_to_be_lost() -> None:
 
 
 def test_one_wrong_encoder_row_is_inconsistent_alone() -> None:
-    model = condyle.derive(condyle.load("masticatory"), backend="numpy")
+    model = condyle.derive(condyle.load_mechanism("masticatory"), backend="numpy")
     q = line((0.004, 0.002, 0.1, 0.05), 30)
     result = model.evaluate(q, 0 * q, 0 * q, np.zeros((30, 9)))
     joints = model.configuration(result.pose).joint
     joints[11, 2] += 0.01
-    found = ForwardKinematics(condyle.load("masticatory")).solve(joints, np.arange(30.0))
+    found = ForwardKinematics(condyle.load_mechanism("masticatory")).solve(joints, np.arange(30.0))
     np.testing.assert_array_equal(np.flatnonzero(found.status), [11])
     assert found.status[11] == INCONSISTENT and 1e-4 < np.abs(found.residual[11]).max() < 0.01
 
@@ -173,7 +173,7 @@ def test_a_lost_track_in_a_file(tmp_path: Path) -> None:
     _, d = stewart()
     # Turning about the vertical by a quarter, this machine is at a singularity.
     poses = line((0, 0, 0, 0, 0, 2.0), 101)
-    mechanism = condyle.load("gough-stewart")
+    mechanism = condyle.load_mechanism("gough-stewart")
     joints = encoders(d, poses)
     names = [f"joint_{name}" for name in mechanism.chain_names]
     columns = {"t": np.arange(101.0)} | dict(zip(names, joints.T, strict=True))

@@ -23,7 +23,7 @@ from condyle.status import Status
 
 
 def poses_and_joints(name: str, count: int, size: float) -> tuple[np.ndarray, np.ndarray]:
-    model = condyle.derive(condyle.load(name), backend="numpy")
+    model = condyle.derive(condyle.load_mechanism(name), backend="numpy")
     m = model.mechanism.degrees_of_freedom
     unit = [model.characteristic_length if c in "XYZ" else 1.0 for c in model.independent]
     q = np.random.default_rng(7).uniform(-size, size, (count, m)) * unit
@@ -35,7 +35,7 @@ def poses_and_joints(name: str, count: int, size: float) -> tuple[np.ndarray, np
 @pytest.mark.parametrize("name", bundled_mechanisms())
 def test_inverts_inverse_kinematics(name: str) -> None:
     pose, joints = poses_and_joints(name, 200, 0.1)
-    found = ForwardKinematics(condyle.load(name)).solve(joints)
+    found = ForwardKinematics(condyle.load_mechanism(name)).solve(joints)
     assert found.found.all()
     np.testing.assert_allclose(found.pose, pose, rtol=0, atol=1e-12)
     assert np.abs(found.residual).max() < 1e-11
@@ -45,13 +45,13 @@ def test_inverts_inverse_kinematics(name: str) -> None:
 def test_turns_of_a_joint_do_not_matter() -> None:
     pose, joints = poses_and_joints("masticatory", 20, 0.05)
     joints[:, 2] += 2 * np.pi
-    found = ForwardKinematics(condyle.load("masticatory")).solve(joints)
+    found = ForwardKinematics(condyle.load_mechanism("masticatory")).solve(joints)
     np.testing.assert_allclose(found.pose, pose, rtol=0, atol=1e-12)
 
 
 def test_noise_is_spread_in_the_least_squares_sense() -> None:
     """At the solution the residual is orthogonal to every motion that the contacts allow."""
-    mechanism = condyle.load("masticatory")
+    mechanism = condyle.load_mechanism("masticatory")
     _pose, joints = poses_and_joints("masticatory", 30, 0.05)
     noise = 1e-4 * np.random.default_rng(1).normal(size=joints.shape)
     forward = ForwardKinematics(mechanism)
@@ -81,13 +81,13 @@ def test_noise_is_spread_in_the_least_squares_sense() -> None:
 def test_a_sample_without_a_pose_is_missing_alone() -> None:
     _pose, joints = poses_and_joints("gough-stewart", 5, 0.05)
     joints[2] = np.nan
-    found = ForwardKinematics(condyle.load("gough-stewart")).solve(joints)
+    found = ForwardKinematics(condyle.load_mechanism("gough-stewart")).solve(joints)
     np.testing.assert_array_equal(found.found, [True, True, False, True, True])
     assert np.isnan(found.pose[2]).all() and not np.isnan(found.pose[[0, 1, 3, 4]]).any()
 
 
 def test_file_in_file_out(tmp_path: Path) -> None:
-    mechanism = condyle.load("masticatory")
+    mechanism = condyle.load_mechanism("masticatory")
     pose, joints = poses_and_joints("masticatory", 20, 0.05)
     columns = {f"joint_{name}": joints[:, i] for i, name in enumerate(mechanism.chain_names)}
     write_table(tmp_path / "joints.csv", {"t": np.arange(20.0), **columns})
@@ -123,7 +123,7 @@ def test_residuals_of_chains_that_turn_and_slide(tmp_path: Path) -> None:
 
 
 def test_joints_that_no_pose_has(tmp_path: Path) -> None:
-    mechanism = condyle.load("gough-stewart")
+    mechanism = condyle.load_mechanism("gough-stewart")
     columns = {f"joint_{name}": np.array([0.0, -50.0]) for name in mechanism.chain_names}
     write_table(tmp_path / "joints.csv", columns)
     with pytest.raises(UnreachableError, match="row 2"):
@@ -139,7 +139,7 @@ def test_rows_without_times_never_influence_each_other() -> None:
     _pose, joints = poses_and_joints("masticatory", 60, 0.3)
     joints = np.vstack([joints, joints[:5] + 0.5, np.full((1, 6), np.nan)])
     order = np.random.default_rng(2).permutation(len(joints))
-    forward = ForwardKinematics(condyle.load("masticatory"))
+    forward = ForwardKinematics(condyle.load_mechanism("masticatory"))
     together, mixed = forward.solve(joints), forward.solve(joints[order])
     alone = [forward.solve(row[None]) for row in joints]
     for name in ("pose", "status", "residual"):
@@ -151,7 +151,7 @@ def test_rows_without_times_never_influence_each_other() -> None:
 
 
 def test_times_must_rise() -> None:
-    forward = ForwardKinematics(condyle.load("gough-stewart"))
+    forward = ForwardKinematics(condyle.load_mechanism("gough-stewart"))
     with pytest.raises(InputError, match=r"times must rise: 1 s follows 1 s \(row 3\)"):
         forward.solve(np.zeros((3, 6)), np.array([0.0, 1.0, 1.0]))
 

@@ -105,7 +105,7 @@ def test_contact_forces_along_the_normals() -> None:
 
 
 def test_names() -> None:
-    places = reaction_places(condyle.load("masticatory"))
+    places = reaction_places(condyle.load_mechanism("masticatory"))
     names = [p.name for p in places]
     assert len(set(names)) == len(names) == 6 * 5 + 2
     assert names[:5] == [
