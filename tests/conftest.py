@@ -26,8 +26,8 @@ from support.building import (  # noqa: F401 - fixtures
     kernel_cache,
     kernel_folder,
     nothing_said,
-    quick,
-    quick_command,
+    unoptimised,
+    unoptimised_command,
 )
 
 # What says of a terminal how wide and how coloured it is: no test may depend on it. Typer looks as

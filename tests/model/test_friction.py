@@ -240,7 +240,7 @@ def test_every_formulation_and_route(formulation: str, route: str) -> None:
         np.testing.assert_allclose(a, b, atol=1e-10 * np.abs(b).max())
 
 
-@pytest.mark.usefixtures("quick")
+@pytest.mark.usefixtures("unoptimised")
 def test_compiled() -> None:
     case, wanted = found("k2 plane")
     model = Model(case.mechanism, backend="compiled")

@@ -11,7 +11,7 @@ from condyle.model.inverse_dynamics import RESULTS
 from condyle.model.model import Model
 
 
-@pytest.mark.usefixtures("quick")
+@pytest.mark.usefixtures("unoptimised")
 @pytest.mark.parametrize("backend", ["compiled", "numpy"])
 def test_condition_is_that_of_the_jacobian(backend: str) -> None:
     """Against singular values of the Jacobian that forward differences of the joints give."""
@@ -35,7 +35,7 @@ def test_condition_is_that_of_the_jacobian(backend: str) -> None:
 
 @pytest.mark.parametrize("backend", ["compiled", "numpy"])
 @pytest.mark.parametrize("output", [*RESULTS, "condition"])
-@pytest.mark.usefixtures("quick")
+@pytest.mark.usefixtures("unoptimised")
 def test_what_is_asked_for_is_what_evaluate_says(output: str, backend: str) -> None:
     """Samples first, chains where the file has them, and nothing else comes along."""
     c = case("mixed_k2_n8")
@@ -55,7 +55,7 @@ def test_what_is_asked_for_is_what_evaluate_says(output: str, backend: str) -> N
 
 @pytest.mark.parametrize("name", ["masticatory", "mixed_k3_n9_curved"])
 @pytest.mark.parametrize("backend", ["compiled", "numpy"])
-@pytest.mark.usefixtures("quick")
+@pytest.mark.usefixtures("unoptimised")
 def test_gravity_is_the_shares_at_rest(name: str, backend: str) -> None:
     """What gravity and load alone ask for, whatever the rates are."""
     c = case(name)
@@ -81,7 +81,7 @@ def test_an_unknown_output_is_named() -> None:
         Model(c.mechanism, backend="numpy").torques(*c.arguments, outputs=("contacts",))
 
 
-@pytest.mark.usefixtures("quick")
+@pytest.mark.usefixtures("unoptimised")
 def test_a_call_derives_nothing_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """What the mechanism alone decides is found once: a call of few samples would pay for it."""
     c = case("masticatory")

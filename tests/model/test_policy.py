@@ -198,7 +198,7 @@ def test_torques_one_and_evaluate_agree(name: str) -> None:
     np.testing.assert_allclose(rows, wanted.effort, rtol=1e-8, atol=1e-9)
 
 
-@pytest.mark.usefixtures("quick")
+@pytest.mark.usefixtures("unoptimised")
 def test_one_sample_of_a_compiled_model_keeps_the_policy() -> None:
     case, _, wanted = found("bounded k2 one-sided")
     model = Model(case.mechanism, backend="compiled", distribution="bounded", preload=0.5)
@@ -206,7 +206,7 @@ def test_one_sample_of_a_compiled_model_keeps_the_policy() -> None:
     np.testing.assert_allclose(rows, wanted.effort, rtol=1e-8, atol=1e-9)
 
 
-@pytest.mark.usefixtures("quick")
+@pytest.mark.usefixtures("unoptimised")
 @pytest.mark.parametrize("objective", ["bounded", "weighted"])
 def test_compiled_limits_and_shortfalls_are_those_of_numpy(objective: str) -> None:
     """With and without shares, which take other equations; where limits are met and where not."""

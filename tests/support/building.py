@@ -53,14 +53,14 @@ def compiler_command() -> tuple[str, ...]:
 
 
 @pytest.fixture(scope="session")
-def quick_command(kernel_folder: Path, compiler_command: tuple[str, ...]) -> str:
+def unoptimised_command(kernel_folder: Path, compiler_command: tuple[str, ...]) -> str:
     """The compiler without optimisation: builds take half a second."""
-    return script(kernel_folder / "quick", f'exec {shlex.join(compiler_command)} "$@" -O0')
+    return script(kernel_folder / "unoptimised", f'exec {shlex.join(compiler_command)} "$@" -O0')
 
 
 @pytest.fixture
-def quick(quick_command: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("CC", quick_command)
+def unoptimised(unoptimised_command: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", unoptimised_command)
 
 
 def script(path: Path, body: str) -> str:
