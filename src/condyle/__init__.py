@@ -28,6 +28,7 @@ _HOMES = {
     "dump": "mechanism",
     "dumps": "mechanism",
     "load_mechanism": "mechanism",
+    "motion_from_c3d": "markers",
     "Model": "model.model",
     "derive": "model.model",
     "Load": "motion",
@@ -61,6 +62,7 @@ if TYPE_CHECKING:
         UnreachableError,
         UnsupportedError,
     )
+    from .markers import motion_from_c3d
     from .mechanism import Mechanism, bundled_mechanisms, dump, dumps, load_mechanism
     from .model.model import Model, derive
     from .motion import Load, Motion, reference_load, reference_motion, trial_motion

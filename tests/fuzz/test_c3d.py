@@ -11,7 +11,7 @@ from support.recorded_jaw import record
 
 import condyle
 from condyle.errors import CondyleError
-from condyle.markers import from_c3d
+from condyle.markers import motion_from_c3d
 
 HEAD = 3 * 512  # header and parameters, where single bytes matter
 
@@ -52,7 +52,7 @@ def test_a_broken_recording(tmp_path: Path, fuzz_seeds: range) -> None:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("error")
-                got = from_c3d(path, tables, machine)
+                got = motion_from_c3d(path, tables, machine)
         except CondyleError as error:
             message = str(error)
             assert len(message) < 4000 and message.isprintable(), (seed, message)
@@ -60,6 +60,6 @@ def test_a_broken_recording(tmp_path: Path, fuzz_seeds: range) -> None:
             read += 1
             assert np.isfinite(got.motion.acceleration).all(), seed
             assert got.load is not None and np.isfinite(got.load.wrench).all(), seed
-            assert all(np.isfinite(one).all() for one in got.beside.emg.values()), seed
+            assert all(np.isfinite(one).all() for one in got.channels.emg.values()), seed
             assert all(w.isprintable() for w in got.warnings), seed
     assert 0.02 * len(fuzz_seeds) < read < 0.9 * len(fuzz_seeds)

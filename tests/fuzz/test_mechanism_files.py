@@ -15,7 +15,7 @@ import condyle
 from condyle.errors import CondyleError
 from condyle.mechanism import Mechanism, dumps, parse
 from condyle.mechanism.files import from_data
-from condyle.mechanism.plausibility import plausibility_warnings
+from condyle.mechanism.mechanism_checks import mechanism_warnings
 from fuzz import mutations
 
 LONGEST = 4000  # characters of a message
@@ -37,7 +37,7 @@ def outcome(read: Callable[[], Any]) -> bool:
             return False
         assert isinstance(machine, Mechanism)
         readable(repr(machine))
-        for warning in plausibility_warnings(machine):
+        for warning in mechanism_warnings(machine):
             readable(str(warning))
             json.dumps(warning.data, allow_nan=False)
     return True

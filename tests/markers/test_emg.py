@@ -10,7 +10,7 @@ import pytest
 from support.recorded_jaw import Jaw, record
 
 from condyle.errors import InputError
-from condyle.markers import from_c3d
+from condyle.markers import motion_from_c3d
 
 SAMPLES = 10  # a frame, 1000 Hz
 CHAINS = ("superficial_masseter_left", "superficial_masseter_right")
@@ -35,7 +35,7 @@ def test_an_envelope_is_the_amplitude_over_its_greatest(tmp_path: Path) -> None:
     low = 2 * np.sin(2 * np.pi * 0.8 * t)  # and a cable that moved
     path = recorded(tmp_path, jaw, burst(t) * np.sin(2 * np.pi * 130.7 * t) + low + 3.0, carrier)
     table = {"channels": {CHAINS[0]: "EMG0", CHAINS[1]: "emg0"}, "greatest": {CHAINS[1]: 2.0}}
-    got = from_c3d(path, jaw.tables(emg=table), "human-jaw").beside.emg
+    got = motion_from_c3d(path, jaw.tables(emg=table), "human-jaw").channels.emg
     inside = slice(30, -30)  # away from the filters' ends
     # The low pass, twice of second order, takes (f / 6 Hz)^4 off 1 Hz: 8e-4.
     np.testing.assert_allclose(got[CHAINS[0]][inside], burst(jaw.t)[inside] / 0.9, atol=0.02)
@@ -50,7 +50,7 @@ def test_an_envelope_that_is_made_already(tmp_path: Path) -> None:
     jaw = record(mechanism="human-jaw")
     path = recorded(tmp_path, jaw, 7 * burst(jaw.t))
     table = {"channels": {CHAINS[0]: "EMG0"}, "high_pass": 0.0, "low_pass": 20.0}
-    got = from_c3d(path, jaw.tables(emg=table), "human-jaw").beside.emg
+    got = motion_from_c3d(path, jaw.tables(emg=table), "human-jaw").channels.emg
     np.testing.assert_allclose(got[CHAINS[0]][20:-20], burst(jaw.t)[20:-20] / 0.9, atol=5e-3)
 
 
@@ -80,5 +80,5 @@ def test_what_cannot_be(tmp_path: Path, emg: Any, said: str) -> None:
     noise = np.random.default_rng(0).normal(0, 1, len(jaw.t) * SAMPLES)
     path = recorded(tmp_path, jaw, noise, np.ones_like(noise), np.full_like(noise, np.nan))
     with pytest.raises(InputError, match=said) as caught:
-        from_c3d(path, jaw.tables(emg=emg), "human-jaw")
+        motion_from_c3d(path, jaw.tables(emg=emg), "human-jaw")
     assert len(str(caught.value).splitlines()) <= 3

@@ -12,7 +12,7 @@ from support.recorded_jaw import FIXED, LOWER, PLATFORM, UPPER, Jaw, record
 
 import condyle
 from condyle.errors import InputError
-from condyle.markers import MarkerMotion, from_c3d, read_markers
+from condyle.markers import MarkerMotion, motion_from_c3d, read_markers
 from condyle.markers.marker_bodies import home_frames
 
 # Single precision of some 1.5 m, over the least breadth of a brace, 15 mm.
@@ -23,7 +23,9 @@ def measured(jaw: Jaw, folder: Path, per_metre: float = 1e3, **options: Any) -> 
     tables = options.pop("tables", None) or jaw.tables()
     mechanism = options.pop("mechanism", "masticatory")
     write = {k: options.pop(k) for k in ("units", "first_frame", "missing") if k in options}
-    return from_c3d(jaw.write(folder / "a.c3d", per_metre, **write), tables, mechanism, **options)
+    return motion_from_c3d(
+        jaw.write(folder / "a.c3d", per_metre, **write), tables, mechanism, **options
+    )
 
 
 def refused(said: str, jaw: Jaw, folder: Path, **options: Any) -> None:
@@ -340,7 +342,7 @@ def test_a_force_turns_with_the_head(tmp_path: Path) -> None:
     analog = np.repeat(lab[:, None], 10, axis=1)
     options = {"channels": [("Fx", "kN"), ("Fy", "kN"), ("Fz", "kN")], "analog": analog}
     path = jaw.write(tmp_path / "a.c3d", **options)
-    got = from_c3d(path, jaw.tables(), "masticatory", force=("fx", "Fy", "Fz"))
+    got = motion_from_c3d(path, jaw.tables(), "masticatory", force=("fx", "Fy", "Fz"))
     assert got.load is not None
     np.testing.assert_allclose(got.load.wrench[:, :3], in_base, atol=1e-3)
     options["channels"] = [("Fx", "V"), ("Fy", "N"), ("Fz", "N")]
@@ -351,7 +353,7 @@ def test_a_force_turns_with_the_head(tmp_path: Path) -> None:
         (("Fy", "Fz"), "got 2 channels, expected three"),
     ):
         with pytest.raises(InputError, match=said):
-            from_c3d(path, jaw.tables(), "masticatory", force=channels)
+            motion_from_c3d(path, jaw.tables(), "masticatory", force=channels)
 
 
 def _turn(jaw: Jaw, frame: int) -> np.ndarray:

@@ -13,7 +13,7 @@ from support.recorded_jaw import Jaw, record
 
 import condyle
 from condyle.errors import InputError
-from condyle.markers import from_c3d, read_c3d
+from condyle.markers import motion_from_c3d, read_c3d
 
 RNG = np.random.default_rng(5)
 TURN = Rotation.from_rotvec([0.3, -0.2, 0.5]).as_matrix()
@@ -112,7 +112,7 @@ def in_base(jaw: Jaw, path: Path) -> tuple[np.ndarray, np.ndarray]:
 
 def test_a_press_becomes_its_wrench(pressed: Any) -> None:
     jaw, path, force, place = pressed
-    load = from_c3d(path, jaw.tables(forces={"plate": 1}), "masticatory").load
+    load = motion_from_c3d(path, jaw.tables(forces={"plate": 1}), "masticatory").load
     assert load is not None and load.point == "right_molar" and load.warnings == ()
     R, p = in_base(jaw, path)
     want = np.einsum("fij,fj->fi", R, force)
@@ -127,7 +127,7 @@ def test_a_press_becomes_its_wrench(pressed: Any) -> None:
 def test_a_named_point_takes_the_force_alone(pressed: Any) -> None:
     jaw, path, force, _ = pressed
     table = {"plate": 1, "point": "incisor", "reverse": True, "zero": [0.0, 0.5]}
-    load = from_c3d(path, jaw.tables(forces=table), "masticatory").load
+    load = motion_from_c3d(path, jaw.tables(forces=table), "masticatory").load
     assert load is not None and load.point == "incisor" and not load.wrench[:, 3:].any()
     R, _ = in_base(jaw, path)
     rest = force[jaw.t <= 0.5].mean(axis=0)
@@ -142,7 +142,7 @@ def test_a_sensor_turns_with_what_it_sits_on(tmp_path: Path, axes: str) -> None:
     channels = [(f"F{i}", "kN") for i in range(3)]
     jaw.write(tmp_path / "a.c3d", channels=channels, analog=force[:, None] / 1e3)
     tables = jaw.tables(forces={"channels": ["F0", "F1", "F2"], "axes": axes})
-    load = from_c3d(tmp_path / "a.c3d", tables, "masticatory").load
+    load = motion_from_c3d(tmp_path / "a.c3d", tables, "masticatory").load
     assert load is not None and load.point is None
     R, _ = in_base(jaw, tmp_path / "a.c3d")
     # Axes that turn with a body are the laboratory's at home, which is the mean of its stretch.
@@ -165,7 +165,7 @@ def test_a_sensor_above_its_surface_is_turned_over(tmp_path: Path) -> None:
         origin = sign * np.array([[1.0, 2.0, -40.0]], np.float32).T
         plates = described(2, ORIGIN=origin)
         jaw.write(tmp_path / "a.c3d", channels=channels, analog=analog, plates=plates)
-        got = from_c3d(tmp_path / "a.c3d", jaw.tables(forces={"plate": 1}), "masticatory")
+        got = motion_from_c3d(tmp_path / "a.c3d", jaw.tables(forces={"plate": 1}), "masticatory")
         loads.append(got.load.wrench)
         assert [w for w in got.warnings if "N mm was assumed" in w]
         assert bool([w for w in got.warnings if "turned over" in w]) == (sign < 0)
@@ -208,7 +208,7 @@ def test_what_cannot_be(tmp_path: Path, forces: Any, plates: Any, said: str) -> 
     told = None if plates is None else described(2, **plates)
     jaw.write(tmp_path / "a.c3d", channels=channels, analog=analog, plates=told)
     with pytest.raises(InputError, match=said) as caught:
-        from_c3d(tmp_path / "a.c3d", jaw.tables(forces=forces), "masticatory")
+        motion_from_c3d(tmp_path / "a.c3d", jaw.tables(forces=forces), "masticatory")
     assert len(str(caught.value).splitlines()) <= 2
 
 
@@ -218,7 +218,7 @@ def test_samples_that_are_no_numbers(tmp_path: Path) -> None:
     analog[40] = np.nan
     jaw.write(tmp_path / "a.c3d", channels=[(f"F{i}", "N") for i in range(3)], analog=analog)
     with pytest.raises(InputError, match='channel "F0" has samples that are no numbers'):
-        from_c3d(tmp_path / "a.c3d", jaw.tables(), "masticatory", force=("F0", "F1", "F2"))
+        motion_from_c3d(tmp_path / "a.c3d", jaw.tables(), "masticatory", force=("F0", "F1", "F2"))
 
 
 def test_where_the_head_is_not_seen_a_load_is_between_its_neighbours(tmp_path: Path) -> None:
@@ -227,6 +227,8 @@ def test_where_the_head_is_not_seen_a_load_is_between_its_neighbours(tmp_path: P
         jaw.at(name)[40:44] = np.nan
     analog = np.arange(3.0 * len(jaw.t)).reshape(-1, 1, 3)
     jaw.write(tmp_path / "a.c3d", channels=[(f"F{i}", "N") for i in range(3)], analog=analog)
-    load = from_c3d(tmp_path / "a.c3d", jaw.tables(), "masticatory", force=("F0", "F1", "F2")).load
+    load = motion_from_c3d(
+        tmp_path / "a.c3d", jaw.tables(), "masticatory", force=("F0", "F1", "F2")
+    ).load
     assert load is not None and len(load.t) == len(jaw.t) - 4
     assert not set(np.round(load.t * 100)) & {40, 41, 42, 43}

@@ -16,7 +16,7 @@ from condyle.mechanism import Mechanism, dumps, parse
 from condyle.mechanism.actuator import Limits
 from condyle.mechanism.chain import limits
 from condyle.mechanism.files import from_data, json_schema
-from condyle.mechanism.plausibility import plausibility_warnings
+from condyle.mechanism.mechanism_checks import mechanism_warnings
 from condyle.report.description import describe
 
 INF, NAN = math.inf, math.nan
@@ -145,7 +145,7 @@ def test_check_tells_what_there_is(reference: Mechanism) -> None:
 def test_what_is_hardly_meant(
     reference: Mechanism, changes: dict[str, Any], kind: str | None
 ) -> None:
-    found = {warning.kind for warning in plausibility_warnings(reference.set(changes))}
+    found = {warning.kind for warning in mechanism_warnings(reference.set(changes))}
     assert found == ({kind} if kind else set())
 
 

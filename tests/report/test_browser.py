@@ -11,7 +11,7 @@ import pytest
 from support.browser import Tab
 
 import condyle
-from condyle.markers import Beside
+from condyle.markers import MeasuredChannels
 from condyle.motion import Motion
 from condyle.report.page import write_report
 from condyle.results.solution import Solution
@@ -481,7 +481,7 @@ def test_a_jaw_draws_activations_and_planes_of_all_its_muscles(
     t = solution["time"].values
     wave = np.column_stack([0.09 + 0 * t, 0 * t, -0.02 + 0.01 * np.sin(t)])
     wave[7] = np.nan  # not seen
-    measured = Beside(
+    measured = MeasuredChannels(
         t,
         ("Upper", "Lower"),
         ("fixed", "platform"),

@@ -8,7 +8,7 @@ from matplotlib.collections import QuadMesh
 from support.report_pages import column, payload
 
 import condyle
-from condyle.markers import Beside
+from condyle.markers import MeasuredChannels
 from condyle.motion import Motion, bundled_reference
 from condyle.report.figures import PLOTS
 from condyle.report.page import reduce as reducing
@@ -32,7 +32,7 @@ def jaw() -> Solution:
     residual = np.outer(1e-4 * (1 + np.sin(3 * t)), [1, 2, np.nan])
     emg = {"deep_masseter_right": np.abs(np.sin(t)), "geniohyoid_left": np.abs(np.cos(t))}
     bodies = ("fixed", "platform", "")
-    return solution.with_measured(Beside(t, NAMES, bodies, points, residual, emg))
+    return solution.with_measured(MeasuredChannels(t, NAMES, bodies, points, residual, emg))
 
 
 def test_the_page_has_markers_and_their_residuals(jaw: Solution) -> None:

@@ -11,22 +11,22 @@ from support.recorded_jaw import FIXED, LOWER, PLATFORM, record
 
 import condyle
 from condyle.errors import InputError
-from condyle.markers import Beside, from_c3d, read_beside
+from condyle.markers import MeasuredChannels, motion_from_c3d, read_channels
 from condyle.motion import Motion, write_table
 from condyle.results.solution import Solution, open_solution
 
 
 @pytest.fixture(scope="module")
-def beside(tmp_path_factory: pytest.TempPathFactory) -> Beside:
+def channels(tmp_path_factory: pytest.TempPathFactory) -> MeasuredChannels:
     """Eight markers, one of them not seen for a while, and EMG of a crank."""
     jaw = record(seconds=2.0)
     jaw.at("Lower_FL")[150:155] = np.nan
     emg = np.abs(np.sin(jaw.t))[:, None, None]
-    path = tmp_path_factory.mktemp("beside") / "a.c3d"
+    path = tmp_path_factory.mktemp("channels") / "a.c3d"
     jaw.write(path, channels=[("E", "V")], analog=emg)
     name = condyle.load_mechanism("masticatory").chain_names[2]
     tables = jaw.tables(emg={"channels": {name: "E"}, "high_pass": 0.0})
-    return from_c3d(path, tables, "masticatory").beside
+    return motion_from_c3d(path, tables, "masticatory").channels
 
 
 @pytest.fixture(scope="module")
@@ -39,28 +39,30 @@ def solution() -> Solution:
 
 
 @pytest.mark.parametrize("name", ["p.csv", "p.parquet"])
-def test_a_table_comes_back(beside: Beside, tmp_path: Path, name: str) -> None:
-    write_table(tmp_path / name, beside.columns())
-    got = read_beside(tmp_path / name)
-    assert (got.names, got.bodies) == (beside.names, beside.bodies)
+def test_a_table_comes_back(channels: MeasuredChannels, tmp_path: Path, name: str) -> None:
+    write_table(tmp_path / name, channels.columns())
+    got = read_channels(tmp_path / name)
+    assert (got.names, got.bodies) == (channels.names, channels.bodies)
     for one, two in (
-        (got.t, beside.t),
-        (got.points, beside.points),
-        (got.residual, beside.residual),
-        *((got.emg[chain], values) for chain, values in beside.emg.items()),
+        (got.t, channels.t),
+        (got.points, channels.points),
+        (got.residual, channels.residual),
+        *((got.emg[chain], values) for chain, values in channels.emg.items()),
     ):
         np.testing.assert_array_equal(one, two)
     assert np.isnan(got.points[150, 4]).all()
 
 
-def test_markers_ride_on_the_solution(solution: Solution, beside: Beside, tmp_path: Path) -> None:
-    got = solution.with_measured(beside)
+def test_markers_ride_on_the_solution(
+    solution: Solution, channels: MeasuredChannels, tmp_path: Path
+) -> None:
+    got = solution.with_measured(channels)
     assert "marker_place" not in solution and isinstance(got, Solution)
     assert got["marker"].values.tolist() == [*FIXED, *PLATFORM]
     assert got["marker_body"].values.tolist() == ["fixed"] * 4 + ["platform"] * 4
-    pick = np.searchsorted(beside.t, solution["time"].values - 1e-9)
-    np.testing.assert_allclose(got["marker_place"].values, beside.points[pick], atol=1e-12)
-    np.testing.assert_allclose(got["marker_residual"].values, beside.residual[pick], atol=1e-12)
+    pick = np.searchsorted(channels.t, solution["time"].values - 1e-9)
+    np.testing.assert_allclose(got["marker_place"].values, channels.points[pick], atol=1e-12)
+    np.testing.assert_allclose(got["marker_residual"].values, channels.residual[pick], atol=1e-12)
     # The solution's platform is where the markers are, but for what its contacts take away.
     seen = np.isfinite(got["marker_offset"].values)
     assert 1e-6 < np.nanmax(got["marker_offset"].values[:, 4:]) < 2e-3
@@ -72,11 +74,13 @@ def test_markers_ride_on_the_solution(solution: Solution, beside: Beside, tmp_pa
     back = open_solution(tmp_path / "s.nc")
     np.testing.assert_array_equal(back["marker_place"].values, got["marker_place"].values)
     assert back["marker_place"].attrs["units"] == "m"
-    again = back.with_measured(Beside(beside.t, emg=beside.emg))
+    again = back.with_measured(MeasuredChannels(channels.t, emg=channels.emg))
     assert "marker_place" not in again and "marker" not in again.dims and "emg" in again
 
 
-def test_offsets_are_distances_from_the_computed_motion(solution: Solution, beside: Beside) -> None:
+def test_offsets_are_distances_from_the_computed_motion(
+    solution: Solution, channels: MeasuredChannels
+) -> None:
     """A marker that swings by 4 mm about its place on the platform."""
     t, pose = solution["time"].values, solution["pose"].values
     from scipy.spatial.transform import Rotation
@@ -84,16 +88,18 @@ def test_offsets_are_distances_from_the_computed_motion(solution: Solution, besi
     swing = 4e-3 * np.sign(np.sin(40 * t))
     own = np.array(LOWER["Lower_BR"]) + swing[:, None] * [0, 0, 1]
     place = Rotation.from_euler("XYZ", pose[:, 3:]).apply(own) + pose[:, :3]
-    only = Beside(t, ("M",), ("platform",), place[:, None], np.zeros((len(t), 1)))
+    only = MeasuredChannels(t, ("M",), ("platform",), place[:, None], np.zeros((len(t), 1)))
     got = solution.with_measured(only)["marker_offset"].values[:, 0]
     np.testing.assert_allclose(got, np.abs(swing - swing.mean()), atol=1e-9)
-    nameless = Beside(t, ("M",), ("",), place[:, None], np.full((len(t), 1), np.nan))
+    nameless = MeasuredChannels(t, ("M",), ("",), place[:, None], np.full((len(t), 1), np.nan))
     assert np.isnan(solution.with_measured(nameless)["marker_offset"].values).all()
 
 
-def test_outside_its_times_nothing_was_measured(solution: Solution, beside: Beside) -> None:
+def test_outside_its_times_nothing_was_measured(
+    solution: Solution, channels: MeasuredChannels
+) -> None:
     t = solution["time"].values
-    short = beside.at(beside.t[beside.t < 1.0])
+    short = channels.at(channels.t[channels.t < 1.0])
     got = solution.with_measured(short)["marker_place"].values
     assert np.isnan(got[t >= 1.0]).all() and np.isfinite(got[t < 0.98]).all()
 
@@ -117,9 +123,9 @@ Spoil = Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]
     ],
 )
 def test_tables_that_cannot_be_used(
-    solution: Solution, beside: Beside, tmp_path: Path, spoil: Spoil, said: str
+    solution: Solution, channels: MeasuredChannels, tmp_path: Path, spoil: Spoil, said: str
 ) -> None:
-    write_table(tmp_path / "p.csv", spoil(beside.columns()))
+    write_table(tmp_path / "p.csv", spoil(channels.columns()))
     with pytest.raises(InputError, match=said) as caught:
         solution.with_measured(tmp_path / "p.csv")
     assert "\n" not in str(caught.value)
@@ -132,5 +138,5 @@ def test_files_that_are_none(solution: Solution, tmp_path: Path) -> None:
     with pytest.raises(InputError, match='got "x", expected a number'):
         solution.with_measured(tmp_path / "p.csv")
     (tmp_path / "p.csv").write_text("t;A_x;A_y;A_z\n0,5;;2;3\n1;1;;\n")
-    got = read_beside(tmp_path / "p.csv")
+    got = read_channels(tmp_path / "p.csv")
     np.testing.assert_array_equal(got.points[0, 0], [np.nan, 2, 3])

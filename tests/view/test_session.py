@@ -9,7 +9,7 @@ import pytest
 
 import condyle
 from condyle.errors import InputError
-from condyle.markers import Beside
+from condyle.markers import MeasuredChannels
 from condyle.mechanism.coordinates import bryant_angles
 from condyle.motion import Load, Motion
 from condyle.report.scene import contact_patch, place, platform_hull, rotations
@@ -256,7 +256,7 @@ def test_measured_markers_are_where_they_were_measured(chewing: Solution) -> Non
     places = np.stack([np.full((len(t), 3), 0.08), np.outer(t, [1e-3, 0, 0])], axis=1)
     places[50, 1] = np.nan
     nothing = np.full((len(t), 2), np.nan)
-    measured = Beside(t, ("Upper", "Lower"), ("fixed", "platform"), places, nothing)
+    measured = MeasuredChannels(t, ("Upper", "Lower"), ("fixed", "platform"), places, nothing)
     view = open_view(solution=chewing.with_measured(measured), port=0)
     try:
         assert view.playback is not None

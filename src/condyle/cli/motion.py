@@ -77,7 +77,7 @@ def from_c3d(
     if force is not None and load is None:
         raise UnsupportedError("--force names channels; --load names the file for their load")
     channels = None if force is None else tuple(name.strip() for name in force.split(","))
-    found = marked.from_c3d(
+    found = marked.motion_from_c3d(
         recording,
         markers,
         condyle.load_mechanism(mechanism),
@@ -91,7 +91,7 @@ def from_c3d(
     forgotten = []
     if found.load is not None and load is None:
         forgotten.append("the marker file names a load (forces), and --load no file for it")
-    if found.beside.emg and measured is None:
+    if found.channels.emg and measured is None:
         forgotten.append("the marker file names EMG (emg), and --measured no file for it")
     warn([*found.warnings, *forgotten])
     point = found.load.point if found.load is not None and load is not None else None

@@ -7,27 +7,27 @@ from .marker_motion import (
     MAX_RESIDUAL,
     MarkerMotion,
     MarkerResidual,
-    from_c3d,
+    motion_from_c3d,
 )
 from .marker_report import as_data, write_motion
-from .measured_channels import Beside, read_beside
+from .measured_channels import MeasuredChannels, read_channels
 from .recording import Recording, read_c3d
 from .registration import Registration
 
 __all__ = [
     "MAX_GAP",
     "MAX_RESIDUAL",
-    "Beside",
     "Gap",
     "MarkerFile",
     "MarkerMotion",
     "MarkerResidual",
+    "MeasuredChannels",
     "Recording",
     "Registration",
     "as_data",
-    "from_c3d",
-    "read_beside",
+    "motion_from_c3d",
     "read_c3d",
+    "read_channels",
     "read_markers",
     "write_motion",
 ]

@@ -43,7 +43,7 @@ def why_none(bodies: Bodies, max_residual: float, run: slice) -> str:
     return f"{said}; the limit is {max_residual * 1e3:g} mm"
 
 
-def suspects_in(recording: Recording, bodies: Bodies, bad: np.ndarray) -> list[str]:
+def exchanged_and_loose(recording: Recording, bodies: Bodies, bad: np.ndarray) -> list[str]:
     """Exchanged labels in the frames whose residuals are too large, and loose markers elsewhere."""
     found, clean = [], np.ones(len(bad), dtype=bool)
     for run in sorted(runs_of(bad), key=lambda run: run.start - run.stop)[:_STRETCHES]:

@@ -21,11 +21,11 @@ from ..motion.path import Motion
 from .emg import envelopes
 from .forces import measured_load
 from .marker_bodies import Bodies, Body, find_bodies
-from .marker_checks import odd_sizes, off_contacts, suspects_in, why_none
+from .marker_checks import exchanged_and_loose, odd_sizes, off_contacts, why_none
 from .marker_file import Forces, MarkerFile, Place, read_markers
 from .marker_gaps import close_gaps
 from .marker_report import MarkerMotion, MarkerResidual
-from .measured_channels import Beside
+from .measured_channels import MeasuredChannels
 from .recording import Recording, find_label, read_c3d
 from .registration import register
 from .rigid import continuous_angles
@@ -34,7 +34,7 @@ MAX_RESIDUAL = 2e-3  # m
 MAX_GAP = 0.1  # s
 
 
-def from_c3d(
+def motion_from_c3d(
     path: str | os.PathLike[str],
     markers: str | os.PathLike[str] | Mapping[str, Any] | MarkerFile,
     mechanism: Mechanism | str,
@@ -73,16 +73,16 @@ def from_c3d(
     R, p = registration.pose(bodies.platform.fit.rotation, bodies.platform.fit.position)
     worst = np.maximum(*(body.fit.largest() for body in bodies.both))  # NaN where either is
     used = worst <= max_residual
-    suspects = suspects_in(recording, bodies, ~used & np.isfinite(worst))
+    checks = exchanged_and_loose(recording, bodies, ~used & np.isfinite(worst))
 
     pose = np.where(used[:, None], np.hstack([p, continuous_angles(R)]), np.nan)
     try:
         why = partial(why_none, bodies, max_residual)
         kept, whole, gaps = close_gaps(recording.source, recording.t, pose, max_gap, longest, why)
     except InputError as error:
-        if not suspects:
+        if not checks:
             raise
-        raise InputError(f"{'. '.join(suspects)}. {error.message}", error.hint) from None
+        raise InputError(f"{'. '.join(checks)}. {error.message}", error.hint) from None
     motion = Motion.from_arrays(
         recording.t[kept], whole, POSE, cutoff=cutoff, source=recording.source
     )
@@ -98,12 +98,12 @@ def from_c3d(
         *bodies.warnings,
         *odd_sizes(recording, bodies),
         *registration.warnings,
-        *suspects,
+        *checks,
         *motion.warnings,
         *(() if load is None else load.warnings),
     )
     markers_there = np.concatenate([body.points for body in bodies.both], axis=1)
-    beside = Beside(
+    channels = MeasuredChannels(
         t=motion.t,
         names=tuple(name for body in bodies.both for name in body.names),
         bodies=tuple(body.what for body in bodies.both for _ in body.names),
@@ -119,7 +119,7 @@ def from_c3d(
         gaps=tuple(gaps),
         registration=registration,
         off_contacts={n: (_rms(d), float(np.abs(d).max())) for n, d in off.items()},
-        beside=beside,
+        channels=channels,
         load=load,
         recording=recording,
         warnings=warnings,

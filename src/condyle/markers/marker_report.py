@@ -16,7 +16,7 @@ from ..motion.path import Motion
 from ..motion.platform_load import Load
 from ..motion.table_writer import TableWriter
 from .marker_gaps import Gap
-from .measured_channels import Beside
+from .measured_channels import MeasuredChannels
 from .recording import Recording
 from .registration import Registration
 
@@ -50,7 +50,7 @@ class MarkerMotion:
         gaps: filled or cut off, in their order.
         registration: from the laboratory to {S}.
         off_contacts: distance of each ball from its surface, root mean square and largest [m].
-        beside: what was measured beside it, at its times: markers in {S} with the base's motion
+        channels: what was measured with it, at its times: markers in {S} with the base's motion
             taken out, their residuals, and EMG, where the marker file names channels.
         load: from force channels or a force plate, where some were named.
         recording: what the file holds.
@@ -63,7 +63,7 @@ class MarkerMotion:
     gaps: tuple[Gap, ...]
     registration: Registration
     off_contacts: dict[str, tuple[float, float]]
-    beside: Beside
+    channels: MeasuredChannels
     load: Load | None
     recording: Recording
     warnings: tuple[str, ...]
@@ -71,7 +71,7 @@ class MarkerMotion:
     @property
     def markers(self) -> dict[str, np.ndarray]:
         """The markers used, by name, in {S}, (N, 3) [m]; NaN where not seen."""
-        return dict(zip(self.beside.names, self.beside.points.transpose(1, 0, 2), strict=True))
+        return dict(zip(self.channels.names, self.channels.points.transpose(1, 0, 2), strict=True))
 
     def __str__(self) -> str:
         return in_words(self)
@@ -106,7 +106,7 @@ def in_words(found: MarkerMotion) -> str:
         at = f" at {load.point}" if load.point else ""
         about = f", moment up to {moment:.4g} N m there" if moment else ""
         lines.append(f"Load: force up to {force:.4g} N{at}{about}")
-    if emg := found.beside.emg.items():
+    if emg := found.channels.emg.items():
         peaks = [f"{n} {v.max():.3g} at {motion.t[v.argmax()]:.4g} s" for n, v in emg]
         lines.append(f"EMG, largest of each: {', '.join(peaks)}")
     lines.append(f"Gaps: {len(found.gaps) or 'none'}")
@@ -132,7 +132,7 @@ def as_data(found: MarkerMotion) -> dict[str, Any]:
         },
         "gaps": [vars(gap) for gap in found.gaps],
         "load": load and {"point": load.point, "largest": np.abs(load.wrench).max(axis=0).tolist()},
-        "emg": {chain: float(values.max()) for chain, values in found.beside.emg.items()},
+        "emg": {chain: float(values.max()) for chain, values in found.channels.emg.items()},
         "warnings": list(found.warnings),
     }
 
@@ -149,15 +149,16 @@ def write_motion(
 ) -> list[Path]:
     """Write all files or none; returns their names.
 
-    Args:   out: t, X ... gamma;  measured: the columns of `Beside`, empty where nothing was seen;
-            load: t, Fx, Fy, Fz [N] and, of a plate, Mx, My, Mz [N m] in {S}. CSV, or Parquet by the
-            name's end.
+    Args:   out: t, X ... gamma;
+            measured: the columns of `MeasuredChannels`, empty where nothing was seen;
+            load: t, Fx, Fy, Fz [N] and, of a plate, Mx, My, Mz [N m] in {S}.
+            A name that ends in .parquet makes a Parquet file, any other a CSV file.
     Raises: InputError: if a file cannot be written, or two are one.
     """
     motion = found.motion
     tables = {out: {"t": motion.t} | dict(zip(POSE, motion.value.T, strict=True))}
     if measured is not None:
-        tables[measured] = found.beside.columns()
+        tables[measured] = found.channels.columns()
     if load is not None:
         if found.load is None:
             raise InputError(

@@ -24,7 +24,7 @@ EMG = "emg_"
 
 
 @dataclass(frozen=True, eq=False)
-class Beside:
+class MeasuredChannels:
     """Markers and EMG at times of their own.
 
     Attributes: t: (N,) [s], rising.
@@ -52,7 +52,7 @@ class Beside:
                 found[f"{name}_residual_{body}"] = self.residual[:, i]
         return found | {f"{EMG}{chain}": values for chain, values in self.emg.items()}
 
-    def at(self, times: np.ndarray) -> Beside:
+    def at(self, times: np.ndarray) -> MeasuredChannels:
         """The same at other times, linear between the samples; NaN beside a gap and outside."""
 
         def along(values: np.ndarray) -> np.ndarray:
@@ -65,12 +65,12 @@ class Beside:
         return replace(self, t=times, points=points, residual=residual, emg=emg)
 
 
-def read_beside(source: Beside | str | os.PathLike[str]) -> Beside:
+def read_channels(source: MeasuredChannels | str | os.PathLike[str]) -> MeasuredChannels:
     """Read a table (CSV or Parquet) of what was measured beside a motion.
 
     Raises: InputError: for a file without markers or EMG, or of which a column is none of them.
     """
-    if isinstance(source, Beside):
+    if isinstance(source, MeasuredChannels):
         return source
     table = read_table(source, gaps=True)
     where, columns = table.source, dict(table.columns)
@@ -99,4 +99,4 @@ def read_beside(source: Beside | str | os.PathLike[str]) -> Beside:
         )
     if not names and not emg:
         raise InputError(f"{where}: has no markers (<marker>_x, _y, _z) and no EMG (emg_<chain>)")
-    return Beside(t, tuple(names), tuple(bodies), points, residual, emg, where)
+    return MeasuredChannels(t, tuple(names), tuple(bodies), points, residual, emg, where)

@@ -15,7 +15,7 @@ from ..mechanism.actuator import Limits
 from ..mechanism.chain import limits
 from ..mechanism.home import HOME_WARNING, home_residuals
 from ..mechanism.mechanism import Contact, Mechanism
-from ..mechanism.plausibility import extent, length_text, plausibility_warnings
+from ..mechanism.mechanism_checks import extent, length_text, mechanism_warnings
 from ..model.model import Model
 
 
@@ -199,7 +199,7 @@ def describe(mechanism: Mechanism) -> Description:
             },
             "warnings": [
                 {"kind": found.kind, "message": found.message, **found.data}
-                for found in plausibility_warnings(mechanism)
+                for found in mechanism_warnings(mechanism)
             ],
         }
     )

@@ -7,7 +7,7 @@ from math import pi
 
 from ..analysis.map.extent import Numbers
 from ..mechanism.mechanism import COORDINATES
-from ..mechanism.plausibility import length_text
+from ..mechanism.mechanism_checks import length_text
 
 
 def numbers_text(numbers: Numbers) -> str:

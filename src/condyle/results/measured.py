@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from ..errors import InputError, did_you_mean
-from ..markers import Beside, read_beside
+from ..markers import MeasuredChannels, read_channels
 from ..mechanism.coordinates import rotations
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ _MEANINGS = {
 }
 
 
-def with_measured(solution: S, measured: Beside | str | os.PathLike[str]) -> S:
+def with_measured(solution: S, measured: MeasuredChannels | str | os.PathLike[str]) -> S:
     """A copy with the variables above, as far as they were measured.
 
     They are linear between the samples of the measurement, NaN in its gaps and outside. An offset
@@ -33,7 +33,7 @@ def with_measured(solution: S, measured: Beside | str | os.PathLike[str]) -> S:
 
     Raises: InputError: for chains that are not there, or times that do not meet the solution's.
     """
-    found = read_beside(measured)
+    found = read_channels(measured)
     time, chains = solution["time"].values, [str(name) for name in solution["chain"].values]
     if found.t[-1] < time[0] or found.t[0] > time[-1]:
         raise InputError(
@@ -68,7 +68,7 @@ def _attributes(name: str) -> dict[str, str]:
     return {"units": units, "long_name": meaning}
 
 
-def _offset(here: Beside, pose: np.ndarray) -> np.ndarray:
+def _offset(here: MeasuredChannels, pose: np.ndarray) -> np.ndarray:
     """Distance of each marker from its mean place on its body, carried along, (N, m) [m]."""
     R, p = rotations(pose[:, 3:]), pose[:, :3]
     found = np.full(here.points.shape[:2], np.nan)

@@ -17,7 +17,7 @@ from ..accessors import extend
 from ..atomic import replacing
 from ..errors import InputError, no_such_file
 from ..extras import require
-from ..markers import Beside
+from ..markers import MeasuredChannels
 from ..mechanism.files import recall
 from ..mechanism.mechanism import Mechanism
 from ..motion import write_table
@@ -92,10 +92,10 @@ class Solution(xr.Dataset):
         require("matplotlib", "figures")
         return extend("solution.plot", self)
 
-    def with_measured(self, measured: Beside | str | os.PathLike[str]) -> Solution:
+    def with_measured(self, measured: MeasuredChannels | str | os.PathLike[str]) -> Solution:
         """The solution with what was measured beside the motion, for report, figures and view.
 
-        Args:   measured: markers and EMG (`from_c3d(...).beside`), or their table's file.
+        Args:   measured: markers and EMG (`motion_from_c3d(...).channels`), or their table's file.
         Raises: InputError: for other columns, chains that are not there, or other times.
         """
         from .measured import with_measured

@@ -21,7 +21,7 @@ from ..kinematics.singularities import NEAR_SINGULAR
 from ..mechanism.chain import limits
 from ..mechanism.home import HOME_WARNING, home_residuals, home_warnings
 from ..mechanism.mechanism import Mechanism
-from ..mechanism.plausibility import plausibility_warnings
+from ..mechanism.mechanism_checks import mechanism_warnings
 from ..status import STATUS_NAMES, Status
 from .contacts import BOUND_TOLERANCE
 from .derived import Derived
@@ -273,7 +273,7 @@ class Watch:
 
 def home_notices(mechanism: Mechanism) -> Iterable[Notice]:
     """What the file alone gives rise to: odd sizes, contacts a little off their surfaces."""
-    for odd in plausibility_warnings(mechanism):
+    for odd in mechanism_warnings(mechanism):
         yield Notice("implausible", str(odd))
     off = zip(mechanism.contact_names, home_residuals(mechanism), strict=True)
     told = [(name, float(value)) for name, value in off if abs(value) > HOME_WARNING]

@@ -36,7 +36,7 @@ from .stage_data import machine
 if TYPE_CHECKING:
     import xarray as xr
 
-    from ...markers import Beside
+    from ...markers import MeasuredChannels
     from ...results.solution import Solution
     from ..tables import Table
 
@@ -76,7 +76,7 @@ def write_report(
     *,
     tables: Sequence[Table] | None = None,
     files: Sequence[str | os.PathLike[str]] | None = None,
-    measured: Beside | str | os.PathLike[str] | None = None,
+    measured: MeasuredChannels | str | os.PathLike[str] | None = None,
     sweep: xr.Dataset | None = None,
 ) -> Path:
     """Write the report, whole or not at all.

@@ -11,22 +11,22 @@ import pytest
 import condyle
 from condyle.mechanism import Mechanism, bundled_text, parse
 from condyle.mechanism.library import starter_text
-from condyle.mechanism.plausibility import extent, length_text, plausibility_warnings
+from condyle.mechanism.mechanism_checks import extent, length_text, mechanism_warnings
 
 TEXT = bundled_text("masticatory")
 
 
 def kinds(machine: Mechanism) -> set[str]:
-    return {warning.kind for warning in plausibility_warnings(machine)}
+    return {warning.kind for warning in mechanism_warnings(machine)}
 
 
 @pytest.mark.parametrize("name", condyle.bundled_mechanisms())
 def test_real_machines_are_plausible(name: str) -> None:
-    assert not plausibility_warnings(condyle.load_mechanism(name))
+    assert not mechanism_warnings(condyle.load_mechanism(name))
 
 
 def test_the_starter_is_plausible() -> None:
-    assert not plausibility_warnings(parse(starter_text("start")))
+    assert not mechanism_warnings(parse(starter_text("start")))
 
 
 CASES: dict[str, tuple[Callable[[Mechanism], Mechanism], set[str], str]] = {
@@ -90,21 +90,21 @@ LEFT_FAR = tuple(
 @pytest.mark.parametrize("case", CASES)
 def test_what_a_person_would_see(reference: Mechanism, case: str) -> None:
     change, expected, message = CASES[case]
-    found = plausibility_warnings(change(reference))
+    found = mechanism_warnings(change(reference))
     assert {warning.kind for warning in found} == expected
     assert any(message in str(warning) for warning in found) or not expected
 
 
 def test_units_that_were_mixed_up() -> None:
     in_metres = parse(TEXT.replace('length_unit = "mm"', 'length_unit = "m"'))
-    (first, *_) = plausibility_warnings(in_metres)
+    (first, *_) = mechanism_warnings(in_metres)
     assert first.kind == "length_large" and "characteristic length 59.51 m" in str(first)
     assert 'millimetres in a file of length_unit "m"' in str(first)
     assert first.data["lengths"]["the characteristic length"] == pytest.approx(59.51, rel=1e-3)
     small = condyle.dumps(condyle.load_mechanism("masticatory"))
     as_millimetres = parse(small.replace('length_unit = "m"', 'length_unit = "mm"'))
     assert {"length_small", "gyration_large"} <= kinds(as_millimetres)
-    assert "metres in a file of length_unit" in str(plausibility_warnings(as_millimetres)[0])
+    assert "metres in a file of length_unit" in str(mechanism_warnings(as_millimetres)[0])
 
 
 def test_a_ball_touches_where_its_wall_is(raw: dict[str, Any]) -> None:
@@ -124,7 +124,7 @@ def test_a_ball_touches_where_its_wall_is(raw: dict[str, Any]) -> None:
     }
     machine = from_data(raw)
     np.testing.assert_allclose(machine.contacts[0].touching_point, touch / 1e3, atol=1e-15)
-    assert not plausibility_warnings(machine)
+    assert not mechanism_warnings(machine)
     raw["contact"][0]["bounds"] = {"x": [x - 1, x + 1]}
     assert kinds(from_data(raw)) == {"home_outside_bounds"}
 

@@ -26,7 +26,7 @@ ROUNDING = 1e-12  # metres outside a bound
 
 
 @dataclass(frozen=True)
-class Implausible:
+class CheckWarning:
     """Something to look at; `str` for people.
 
     kind: one word for programs, the same for ever;  data: the numbers of the message, SI.
@@ -40,7 +40,7 @@ class Implausible:
         return self.message
 
 
-def plausibility_warnings(mechanism: Mechanism) -> list[Implausible]:
+def mechanism_warnings(mechanism: Mechanism) -> list[CheckWarning]:
     """Sizes, masses, gravity, limits and bounds that look like a slip of units or of a sign."""
     return [
         *_sizes(mechanism),
@@ -74,7 +74,7 @@ def length_text(metres: float) -> str:
 
 def _beyond(
     kind: str, text: str, found: Mapping[str, Any], show: str, key: str, what: str = "chain"
-) -> Iterator[Implausible]:
+) -> Iterator[CheckWarning]:
     """What several parts of a mechanism have in common, if they do.
 
     Args: text: of the message, with {} for the list;  show: a name and its numbers in it.
@@ -82,10 +82,10 @@ def _beyond(
     if found:
         numbers = {n: v if isinstance(v, list) else [v] for n, v in found.items()}
         listed = few(show.format(*v, name=f'{what} "{n}"') for n, v in numbers.items())
-        yield Implausible(kind, text.format(listed), {key: found})
+        yield CheckWarning(kind, text.format(listed), {key: found})
 
 
-def _sizes(mechanism: Mechanism) -> Iterator[Implausible]:
+def _sizes(mechanism: Mechanism) -> Iterator[CheckWarning]:
     whole = {"the characteristic length": characteristic_length(mechanism)}
     parts = {
         f'the {name} of chain "{chain.name}"': length
@@ -106,19 +106,19 @@ def _sizes(mechanism: Mechanism) -> Iterator[Implausible]:
         for (kind, question), some in zip(slips.items(), (large, small), strict=True):
             if some:
                 listed = few(f"{name} {length_text(v)}" for name, v in some.items())
-                yield Implausible(kind, f"lengths: {listed}; {question}", {"lengths": some})
+                yield CheckWarning(kind, f"lengths: {listed}; {question}", {"lengths": some})
         if large or small:
             return
 
 
-def _platform(mechanism: Mechanism) -> Iterator[Implausible]:
+def _platform(mechanism: Mechanism) -> Iterator[CheckWarning]:
     mass = mechanism.platform.mass
     gyration = float(np.sqrt(mechanism.platform.inertia.principal()[-1] / mass))
     size = float(np.linalg.norm(platform_points(mechanism), axis=1).max())
     whole = max(float(extent(mechanism).max()), size)
     data = {"gyration": gyration, "size": size, "mass": mass}
     if gyration > whole:
-        yield Implausible(
+        yield CheckWarning(
             "gyration_large",
             f"platform: its radius of gyration, {length_text(gyration)}, is beyond the size of the "
             f"mechanism, {length_text(whole)}; inertia is in kg m^2 and mass in kg, whatever the "
@@ -126,7 +126,7 @@ def _platform(mechanism: Mechanism) -> Iterator[Implausible]:
             data,
         )
     elif gyration < POINTLIKE * size:
-        yield Implausible(
+        yield CheckWarning(
             "gyration_small",
             f"platform: its radius of gyration is {length_text(gyration)}, and its joints are up "
             f"to {length_text(size)} from its mass centre; inertia is in kg m^2",
@@ -134,7 +134,7 @@ def _platform(mechanism: Mechanism) -> Iterator[Implausible]:
         )
     most = DENSEST * whole**3
     if mass > most:
-        yield Implausible(
+        yield CheckWarning(
             "mass_large",
             f"platform: {mass:g} kg in a mechanism of {length_text(whole)} is denser than any "
             "metal; mass is in kg",
@@ -142,7 +142,7 @@ def _platform(mechanism: Mechanism) -> Iterator[Implausible]:
         )
 
 
-def _rods(mechanism: Mechanism) -> Iterator[Implausible]:
+def _rods(mechanism: Mechanism) -> Iterator[CheckWarning]:
     beyond = {
         f'{name} of chain "{chain.name}"': (radius, chain.lengths[name])
         for chain in mechanism.chains
@@ -154,28 +154,28 @@ def _rods(mechanism: Mechanism) -> Iterator[Implausible]:
             f"the {name} {length_text(radius)} (it is {length_text(length)} long)"
             for name, (radius, length) in beyond.items()
         )
-        yield Implausible(
+        yield CheckWarning(
             "rod_gyration",
             f"radius of gyration beyond the body's length: {listed}; transverse is in kg m^2",
             {"rods": {name: list(pair) for name, pair in beyond.items()}},
         )
 
 
-def _gravity(mechanism: Mechanism) -> Iterator[Implausible]:
+def _gravity(mechanism: Mechanism) -> Iterator[CheckWarning]:
     gravity = np.array(mechanism.gravity)
     size = float(np.linalg.norm(gravity))
     data = {"gravity": list(mechanism.gravity)}
     if size and abs(size - EARTH) > EARTH_SPREAD:
-        yield Implausible(
+        yield CheckWarning(
             "gravity_size", f"gravity: {size:g} m/s^2 is neither the Earth's 9.81 nor none", data
         )
     if gravity[2] > 0.5 * size:
-        yield Implausible(
+        yield CheckWarning(
             "gravity_upwards", "gravity: it points up, along +Z; down is negative", data
         )
 
 
-def _speeds(mechanism: Mechanism) -> Iterator[Implausible]:
+def _speeds(mechanism: Mechanism) -> Iterator[CheckWarning]:
     # rad/s of a crank, else m/s
     speeds = {c.name: limits(c).speed * c.lengths.get("crank", 1.0) for c in mechanism.chains}
     beyond = {name: v for name, v in speeds.items() if SOUND < v < np.inf}
@@ -183,7 +183,7 @@ def _speeds(mechanism: Mechanism) -> Iterator[Implausible]:
     yield from _beyond("speed_limit", text, beyond, "{name} {:.4g} m/s", "speeds")
 
 
-def _losses(mechanism: Mechanism) -> Iterator[Implausible]:
+def _losses(mechanism: Mechanism) -> Iterator[CheckWarning]:
     """Actuators that cannot overcome their own friction, or whose friction never acts in full."""
     stuck, fading = {}, {}
     for chain in mechanism.chains:
@@ -199,14 +199,14 @@ def _losses(mechanism: Mechanism) -> Iterator[Implausible]:
     yield from _beyond("smoothing_large", text, fading, show, "chains")
 
 
-def _friction(mechanism: Mechanism) -> Iterator[Implausible]:
+def _friction(mechanism: Mechanism) -> Iterator[CheckWarning]:
     found = {contact.name: contact.friction.coefficient for contact in mechanism.contacts}
     large = {name: mu for name, mu in found.items() if mu > ROUGHEST}
     text = f"friction: a coefficient above {ROUGHEST:g}: {{}}; is it a percentage?"
     yield from _beyond("friction_large", text, large, "{name} {:g}", "contacts", "contact")
 
 
-def _bounds(mechanism: Mechanism) -> Iterator[Implausible]:
+def _bounds(mechanism: Mechanism) -> Iterator[CheckWarning]:
     for contact in mechanism.contacts:
         bounds = contact.bounds.entries()
         if not contact.surface.known or not any(bounds.values()):
@@ -214,7 +214,7 @@ def _bounds(mechanism: Mechanism) -> Iterator[Implausible]:
         for axis, value in zip("xyz", contact.touching_point, strict=True):
             low, high = bounds[axis] or (-np.inf, np.inf)
             if value < low - ROUNDING or value > high + ROUNDING:
-                yield Implausible(
+                yield CheckWarning(
                     "home_outside_bounds",
                     f'contact "{contact.name}": home is outside its bounds: {axis} is '
                     f"{value * 1e3:.6g} mm, and the surface goes from {low * 1e3:.6g} to "
