@@ -46,6 +46,10 @@ _HOMES = {
     "workspace_map": "analysis.map",
     "Study": "analysis.sweep",
     "sweep": "analysis.sweep",
+    "export_c": "export.c_package",
+    "export_fmu": "export.fmu",
+    "export_matlab": "export.matlab",
+    "export_mjcf": "export.mjcf",
 }
 
 if TYPE_CHECKING:
@@ -62,6 +66,10 @@ if TYPE_CHECKING:
         UnreachableError,
         UnsupportedError,
     )
+    from .export.c_package import export_c
+    from .export.fmu import export_fmu
+    from .export.matlab import export_matlab
+    from .export.mjcf import export_mjcf
     from .markers import motion_from_c3d
     from .mechanism import Mechanism, bundled_mechanisms, dump, dumps, load_mechanism
     from .model.model import Model, derive

@@ -205,10 +205,10 @@ class BoundsError(SampleError):
     """A contact outside its bounds, where that was asked to be an error."""
 
 
-def did_you_mean(name: str, available: Iterable[str]) -> str:
+def did_you_mean(name: object, available: Iterable[str]) -> str:
     """' Did you mean "x"? Available: ...' for a name that is not among `available`."""
     choices = sorted(available)
-    near = nearest(name, choices)
+    near = nearest(str(name), choices)
     guess = f' Did you mean "{few(near[:1])}"?' if near else ""
     listed = f" Available: {few(choices)}." if choices else " None is available."
     return guess + listed

@@ -11,7 +11,7 @@ import pytest
 from support.families import case
 
 import condyle
-from condyle.export import DEFAULT, Exported, Wish, export
+from condyle.export import DEFAULT, Exported, export
 from condyle.export.c_package import write_package
 
 
@@ -33,7 +33,7 @@ def written(name: str, path: Path, **options: Any) -> Folder:
         mechanism = CHANGED[name]() if name in CHANGED else case(name).mechanism
     exported = export(mechanism, options.pop("questions", DEFAULT), **options)
     path.mkdir()
-    write_package(exported, mechanism, Wish((), options.get("landmark")), path)
+    write_package(exported, path)
     return Folder(exported, path)
 
 

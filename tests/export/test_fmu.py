@@ -44,7 +44,9 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, int], Path
         for kind in KINDS:
             for version in VERSIONS:
                 made[kind, version] = path = folder / f"{kind}{version}.fmu"
-                assert target.write_fmu(condyle.load_mechanism("masticatory"), kind, version, path)
+                assert condyle.export_fmu("masticatory", path, kind=kind, fmi=version).data[
+                    "binary"
+                ]
     return made
 
 
@@ -321,11 +323,13 @@ def test_units_are_powers_of_base_units() -> None:
 
 
 def test_wrong_wishes(tmp_path: Path) -> None:
-    jaw = condyle.load_mechanism("masticatory")
-    with pytest.raises(InputError, match="Did you mean"):
-        target.write_fmu(jaw, "plants", 3, tmp_path / "x.fmu")
-    with pytest.raises(InputError, match="version 1"):
-        target.write_fmu(jaw, "plant", 1, tmp_path / "x.fmu")
+    for options, said in (
+        ({"kind": "plants"}, "Did you mean"),
+        ({"kind": "plant", "fmi": 1}, "fmi: expected 2 or 3, got 1"),
+        ({}, "name a folder for the FMUs of 3 kinds"),
+    ):
+        with pytest.raises(InputError, match=said):
+            condyle.export_fmu("masticatory", tmp_path / "x.fmu", **options)
     assert not list(tmp_path.iterdir())
 
 

@@ -11,11 +11,10 @@ from support.tools import run
 
 import condyle
 from condyle.errors import InputError
-from condyle.export.matlab import write_matlab
 
 
 def test_every_function_has_a_gateway_and_a_help_text(tmp_path: Path) -> None:
-    files = write_matlab(condyle.load_mechanism("gough-stewart"), tmp_path, ("inverse",))
+    files = condyle.export_matlab("gough-stewart", tmp_path, question="inverse")
     names = {path.name for path in files}
     stem = "gough_stewart"
     assert names == {
@@ -28,14 +27,14 @@ def test_every_function_has_a_gateway_and_a_help_text(tmp_path: Path) -> None:
 
 def test_a_question_that_there_is_not(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="invers"):
-        write_matlab(condyle.load_mechanism("gough-stewart"), tmp_path, ("invers",))
+        condyle.export_matlab("gough-stewart", tmp_path, question="invers")
     assert not list(tmp_path.iterdir())
 
 
 def test_octave_computes_what_condyle_does(tmp_path: Path) -> None:
     """Samples in columns; the example runs; a bad sample is a status, or an error without one."""
     mechanism = condyle.load_mechanism("masticatory")
-    write_matlab(mechanism, tmp_path, ("contact", "forward"))
+    condyle.export_matlab(mechanism, tmp_path, question=("contact", "forward"))
     rng = np.random.default_rng(2)
     scale = np.array([1e-3, 1e-3, 0.02, 0.05])
     q, q1, q2 = (rng.uniform(-1, 1, (5, 4)) * scale * s for s in (1, 10, 100))

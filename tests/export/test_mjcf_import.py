@@ -14,8 +14,7 @@ from support.mujoco_player import Player
 
 import condyle
 from condyle.errors import InputError, UnsupportedError
-from condyle.export.mjcf import write_mjcf
-from condyle.export.mjcf_import import Found, from_mjcf
+from condyle.export.mjcf_import import ImportResult, from_mjcf
 from condyle.mechanism import load_mechanism
 
 TEMPLATE = Path(__file__).with_name("stewart.xml")
@@ -45,7 +44,7 @@ def same(a: Any, b: Any, place: str = "") -> None:
 @pytest.mark.parametrize("name", ["gough-stewart", "hexaglide", "masticatory", "human-jaw"])
 def test_there_and_back(name: str, tmp_path: Path) -> None:
     mechanism = condyle.load_mechanism(name)
-    write_mjcf(mechanism, tmp_path / "m.xml")
+    condyle.export_mjcf(mechanism, tmp_path / "m.xml")
     found = from_mjcf(tmp_path / "m.xml", name)
     same(mechanism, found.mechanism)
     assert not found.notes
@@ -60,7 +59,7 @@ def test_losses_and_every_family_come_back(tmp_path: Path) -> None:
     changes = {"torque_limit": (-1.0, 3.0), **losses}.items()
     jaw = condyle.load_mechanism("masticatory")
     mechanism = jaw.set({f"chain.masseter_left.actuator.{k}": v for k, v in changes})
-    write_mjcf(mechanism, tmp_path / "m.xml")
+    condyle.export_mjcf(mechanism, tmp_path / "m.xml")
     same(mechanism, from_mjcf(tmp_path / "m.xml", mechanism.name).mechanism)
 
 
@@ -121,7 +120,7 @@ def _bryant(R: np.ndarray) -> np.ndarray:
 def test_a_foreign_stewart_platform(tmp_path: Path, carried: bool) -> None:
     """Its numbers follow from the drawing: bases, joints, limits, and weights at rest."""
     path = stewart(tmp_path, carried)
-    found: Found = from_mjcf(path, "six")
+    found: ImportResult = from_mjcf(path, "six")
     m = found.mechanism
     assert [c.kind for c in m.chains] == ["SPS"] * 6 and not m.contacts
     assert m.chain_names == tuple(f"leg{i}" for i in range(6))

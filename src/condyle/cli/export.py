@@ -8,7 +8,7 @@ from pathlib import Path
 from . import options
 from .answer import Answer
 from .command import COMPUTE, command, group
-from .inputs import output_folder, warn
+from .inputs import warn
 
 export = group("export", COMPUTE, "A mechanism for controllers and other programs.")
 
@@ -48,40 +48,23 @@ def c(
     """
     import condyle
 
-    from ..export import Wish, in_order, usual
-    from ..export import export as exported_of
-    from ..export.c_package import write_facts, write_package
-
-    machine = condyle.load_mechanism(mechanism)
-    given = (one.strip() for one in coordinates.split(",")) if coordinates else ()
-    names = in_order(tuple(given))
-    closing = ("closure",) if coordinates or landmark else ()
-    made = exported_of(
-        machine,
-        question or (*usual(machine), *closing),
+    made = condyle.export_c(
+        mechanism,
+        out,
+        question=question,
+        coordinates=coordinates or (),
+        landmark=landmark,
+        precision=precision,
+        constants=constants,
+        prefix=prefix,
+        lanes=lanes,
         formulation=formulation,
         route=route,
-        precision=precision,
-        prefix=prefix,
-        constants=constants,
-        lanes=lanes,
-        coordinates=names,
-        landmark=landmark,
     )
-    files = write_package(made, machine, Wish(names, landmark), output_folder(out))
-    facts = write_facts(made, out)
-    files["facts"] = facts.path
-    warn(facts.warnings)
-    mapped = {name: ours for name, ours in made.names.items() if name != ours}
-    lines = [f'"{machine.name}" in C: {", ".join(f.name for f in made.functions)}']
-    lines += [f"  {name} is {ours}" for name, ours in mapped.items()]
-    lines += [f"Wrote {', '.join(path.name for path in files.values())} to {out}"]
-    data = {
-        "prefix": made.prefix,
-        "functions": [f.name for f in made.functions],
-        "names": mapped,
-        "symbols": list(made.symbols),
-        "facts": facts.data,
-        "files": list(files.values()),
-    }
-    return Answer("\n".join(lines), data, f"make -C {shlex.quote(str(out))} check")
+    warn(made.notes)
+    known = made.data
+    lines = [f'"{known["mechanism"]}" in C: {", ".join(known["functions"])}']
+    lines += [f"  {name} is {ours}" for name, ours in known["names"].items()]
+    lines += [f"Wrote {', '.join(path.name for path in made)} to {out}"]
+    then = f"make -C {shlex.quote(str(out))} check"
+    return Answer("\n".join(lines), known | {"files": list(made)}, then)

@@ -8,7 +8,7 @@ from . import completion, options
 from .answer import Answer, command_line, files_line
 from .command import COMPUTE, command
 from .export import export
-from .inputs import file_stem, output_folder, warn
+from .inputs import warn
 
 
 @command(COMPUTE, example="condyle export fmu masticatory --out fmu", of=export, name="fmu")
@@ -30,18 +30,7 @@ def fmu(
     """
     import condyle
 
-    from ..export.fmu import write_fmu
-
-    machine = condyle.load_mechanism(mechanism)
-    folder, files, bare = output_folder(out), [], False
-    kinds = list(dict.fromkeys(kind or completion.FMUS[:3]))
-    for one in kinds:
-        path = folder / f"{file_stem(machine.name)}-{file_stem(one)}.fmu"
-        bare |= not write_fmu(machine, one, fmi, path)
-        files.append(path)
-    if bare:
-        warn(["no binary for this machine: the files hold sources alone, to be compiled elsewhere"])
-    if {"inverse", "controller"} & set(kinds) and any(c.kind == "cable" for c in machine.chains):
-        warn(["efforts in FMUs are of least norm, without limits: a cable may be asked to push"])
-    data = {"mechanism": machine.name, "fmi": fmi, "binary": not bare, "files": files}
-    return Answer(files_line(files), data, command_line("check", mechanism))
+    made = condyle.export_fmu(mechanism, out, kind=kind or completion.FMUS[:3], fmi=fmi)
+    warn(made.notes)
+    data = made.data | {"files": list(made)}
+    return Answer(files_line(made), data, command_line("check", mechanism))

@@ -8,7 +8,6 @@ from . import options
 from .answer import Answer, command_line, files_line
 from .command import COMPUTE, command
 from .export import export
-from .inputs import output_folder
 
 
 @command(
@@ -25,9 +24,6 @@ def matlab(
     """
     import condyle
 
-    from ..export.matlab import write_matlab
-
-    machine = condyle.load_mechanism(mechanism)
-    files = write_matlab(machine, output_folder(out))
-    data = {"mechanism": machine.name, "files": files}
-    return Answer(files_line(files), data, command_line("check", mechanism))
+    made = condyle.export_matlab(mechanism, out)
+    data = made.data | {"files": list(made)}
+    return Answer(files_line(made), data, command_line("check", mechanism))

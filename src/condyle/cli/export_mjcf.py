@@ -8,7 +8,7 @@ from . import options
 from .answer import Answer, command_line
 from .command import COMPUTE, command
 from .export import export
-from .inputs import file_stem, output_folder, warn
+from .inputs import warn
 
 
 @command(COMPUTE, example="condyle export mjcf masticatory --out mujoco", of=export, name="mjcf")
@@ -26,11 +26,7 @@ def mjcf(
     """
     import condyle
 
-    from ..export.mjcf import write_mjcf
-
-    machine = condyle.load_mechanism(mechanism)
-    path = output_folder(out) / f"{file_stem(machine.name)}.xml"
-    made = write_mjcf(machine, path)
-    warn(list(made.notes))
-    data = {"mechanism": machine.name, "notes": made.notes, "files": [path]}
-    return Answer(f"Wrote {path}", data, command_line("check", mechanism))
+    made = condyle.export_mjcf(mechanism, out)
+    warn(made.notes)
+    data = made.data | {"files": list(made)}
+    return Answer(f"Wrote {made[0]}", data, command_line("check", mechanism))

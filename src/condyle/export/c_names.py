@@ -70,15 +70,13 @@ def packaged(name: str) -> str:
 
 def require_prefix(prefix: str) -> str:
     """Raises InputError for what no name in C can begin with."""
-    taken = prefix.lower() in OTHERS
     if (
-        not re.fullmatch("[A-Za-z][A-Za-z0-9_]*", prefix)
+        not re.fullmatch("[A-Za-z][A-Za-z0-9_]{0,39}", str(prefix))
         or prefix in RESERVED
-        or len(prefix) > 40
-        or taken
+        or str(prefix).lower() in OTHERS
     ):
         raise InputError(
-            f'prefix "{prefix:.60}": expected a name that C takes, of at most 40 letters, digits '
+            f'prefix "{prefix!s:.60}": expected a name that C takes, of at most 40 letters, digits '
             f"and _, a letter first, other than {', '.join(OTHERS)}"
         )
     return prefix

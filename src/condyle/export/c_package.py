@@ -5,12 +5,14 @@ And a page of measured facts: by compiling the folder, where there is a compiler
 
 from __future__ import annotations
 
+import os
 import platform
 import re
 import shutil
 import subprocess
 import tempfile
 from collections import Counter
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,11 +20,14 @@ from typing import Any
 
 from ..atomic import write_text
 from ..backends.compiler import CompilerError, find_compiler
-from ..mechanism.mechanism import Mechanism
+from ..mechanism import Mechanism
+from ..model.model import Model
 from .c_names import in_format, literal, packaged
 from .c_samples import Vectors, vectors
-from .catalogue import Wish
+from .c_source import export
+from .catalogue import in_order, usual
 from .exported import Exported, Function
+from .written import Written, folder_at, mechanism_of, names_of, write_texts
 
 # By precision: what results may differ from the library's by, over the largest entry of each.
 TOLERANCE = {"double": 1e-12, "float": 1e-4}
@@ -33,25 +38,85 @@ NOTHING: dict[str, Any] = {"code": None, "stack": None, "error": None, "wrong": 
 _TOLD = re.compile(r"^(\w+): (\d+) samples, worst error (\S+), (\d+) wrong", re.MULTILINE)
 
 
-def write_package(
-    exported: Exported, mechanism: Mechanism, wish: Wish, folder: Path
-) -> dict[str, Path]:
-    """Write everything but the facts; returns the files by what they are."""
-    made = vectors(exported, mechanism, wish)
-    p = exported.prefix
-    texts = {
-        "header": (f"{p}.h", exported.header),
-        "source": (f"{p}.c", exported.source),
-        "example": ("main.c", example(exported)),
-        "vectors": (f"{p}_vectors.h", recorded(exported, made)),
-        "check": ("check.c", check(exported, made)),
-        "makefile": ("Makefile", makefile(exported)),
+def export_c(
+    model: Model | Mechanism | str | os.PathLike[str],
+    path: str | os.PathLike[str],
+    *,
+    question: str | Sequence[str] | None = None,
+    coordinates: str | Sequence[str] = (),
+    landmark: str | None = None,
+    precision: str = "double",
+    constants: str = "inside",
+    prefix: str | None = None,
+    lanes: int = 8,
+    formulation: str | None = None,
+    route: str | None = None,
+) -> Written:
+    """Write a mechanism as C99 for a controller: source, header, example, tests and facts.
+
+        condyle.export_c("masticatory", "jaw", question=["inverse", "pose"])
+
+    Args:   model: a model, a mechanism, its file, or the name of a bundled one.
+            path: a folder.
+            question: names from `condyle.export.CATALOGUE`, and controllers. Default: those that
+                      need nothing else, and `closure` with `coordinates` or `landmark`.
+            coordinates, landmark: the coordinates that `closure` starts from, or the platform point
+                      whose path it starts from.
+            precision: double or float.
+            constants: inside, or struct: in a structure that a program fills at run time.
+            prefix: of all names in C; default: the mechanism's name.
+            lanes: width of GCC's vector types: 2, 4 or 8 doubles; 0: none.
+            formulation, route: of the equations; default: those of the model.
+    Returns: the files. Its `notes` name functions that differ from the recorded samples; its `data`
+             has the functions, the names changed for C, and the measured facts.
+    Raises: InputError, UnsupportedError: for what cannot be exported, or a folder that cannot be
+            written.
+    """
+    mechanism = mechanism_of(model)
+    if isinstance(model, Model):
+        formulation, route = formulation or model.formulation, route or model.route
+    names = in_order(names_of("coordinates", coordinates or ()))
+    asked = usual(mechanism) + ("closure",) * bool(names or landmark)
+    exported = export(
+        mechanism,
+        asked if question is None else names_of("question", question),
+        formulation=formulation or "virtual_power",
+        route=route or "core",
+        precision=precision,
+        prefix=prefix,
+        constants=constants,
+        lanes=lanes,
+        coordinates=names,
+        landmark=landmark,
+    )
+    folder = folder_at(path)
+    files = write_package(exported, folder)
+    facts = write_facts(exported, folder)
+    data = {
+        "mechanism": mechanism.name,
+        "prefix": exported.prefix,
+        "functions": [f.name for f in exported.functions],
+        "names": {name: ours for name, ours in exported.names.items() if name != ours},
+        "symbols": list(exported.symbols),
+        "facts": facts.data,
     }
-    written = {}
-    for kind, (name, text) in texts.items():
-        written[kind] = folder / name
-        write_text(written[kind], text)
-    return written
+    return Written([*files, facts.path], facts.warnings, data)
+
+
+def write_package(exported: Exported, folder: Path) -> list[Path]:
+    """Write everything but the facts."""
+    p, made = exported.prefix, vectors(exported)
+    return write_texts(
+        folder,
+        {
+            f"{p}.h": exported.header,
+            f"{p}.c": exported.source,
+            "main.c": example(exported),
+            f"{p}_vectors.h": recorded(exported, made),
+            "check.c": check(exported, made),
+            "Makefile": makefile(exported),
+        },
+    )
 
 
 def tolerance(e: Exported, f: Function) -> float:

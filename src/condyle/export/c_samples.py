@@ -10,7 +10,6 @@ import numpy as np
 from ..backends.kernel import AGAIN
 from ..backends.numpy_kernel import NumpyKernel
 from ..mechanism.home import characteristic_length, independent_coordinates
-from ..mechanism.mechanism import Mechanism
 from ..model.closing import Closure
 from ..model.forward_kinematics import ForwardKinematics
 from ..model.model import Model
@@ -138,11 +137,12 @@ class Vectors:
     status: np.ndarray
 
 
-def vectors(exported: Exported, mechanism: Mechanism, wish: Wish) -> list[Vectors]:
+def vectors(exported: Exported) -> list[Vectors]:
     """Seeded samples about home, home itself, and some that have to fail."""
     # By numpy: no code is shared with what prints C.
+    mechanism = exported.mechanism
     model = Model(mechanism, **exported.recipe, backend="numpy", distribution=least_norm(mechanism))
-    reference = Reference(model, wish)
+    reference = Reference(model, exported.wish)
     draw = Samples(reference)
     found = []
     for f in exported.functions:

@@ -92,6 +92,8 @@ def export(
     source = _source(c, bodies, portable)
     code = re.sub(r"/\*.*?\*/", "", portable, flags=re.DOTALL)
     exported = Exported(
+        mechanism=mechanism,
+        wish=wish,
         prefix=name,
         source=source,
         header="",
@@ -104,7 +106,7 @@ def export(
         recipe={"formulation": model.formulation, "route": route},
     )
     extra = c_struct.declared(c) if struct else ""
-    return replace(exported, header=header_text(exported, mechanism, extra))
+    return replace(exported, header=header_text(exported, extra))
 
 
 def _entries(
@@ -169,16 +171,16 @@ def _table(c: Context, name: str) -> str:
     return f"static const {c.precision} {c.prefix}_{name}_table[{len(rows)}] = {{\n    {body}}};\n"
 
 
-def header_text(exported: Exported, mechanism: Mechanism, extra: str) -> str:
+def header_text(exported: Exported, extra: str) -> str:
     """The file `prefix`.h. Args: extra: what constants in a structure need."""
     p = exported.prefix.upper()
     guard = f"{p}_H"
     parts = [
-        _about(exported, mechanism),
+        _about(exported),
         f"#ifndef {guard}\n#define {guard}\n",
         '#ifdef __cplusplus\nextern "C" {\n#endif\n',
         _statuses(p),
-        _sizes(p, exported, mechanism),
+        _sizes(p, exported),
         extra,
         *(_declared(exported, f) for f in exported.functions),
         "#ifdef __cplusplus\n}\n#endif\n",
@@ -187,10 +189,10 @@ def header_text(exported: Exported, mechanism: Mechanism, extra: str) -> str:
     return "\n".join(part for part in parts if part)
 
 
-def _about(exported: Exported, mechanism: Mechanism) -> str:
-    name = mechanism.name
+def _about(e: Exported) -> str:
+    mechanism = e.mechanism
     lines = [
-        f'{exported.prefix}.h - mechanism "{name}" in C, written by condyle {__version__}',
+        f'{e.prefix}.h - mechanism "{mechanism.name}" in C, written by condyle {__version__}',
         "",
         f"Independent coordinates: {', '.join(independent_coordinates(mechanism))}; the contacts "
         f"determine {', '.join(dependent_coordinates(mechanism)) or 'nothing'}.",
@@ -198,11 +200,11 @@ def _about(exported: Exported, mechanism: Mechanism) -> str:
         "home. Angles are Bryant angles alpha, beta, gamma.",
         "",
         "Functions return a status and write their results only where it is "
-        f"{exported.prefix.upper()}_OK. They keep nothing: no heap, no globals, no input or "
+        f"{e.prefix.upper()}_OK. They keep nothing: no heap, no globals, no input or "
         "output, no recursion; any thread or interrupt may call them. Arrays that go in and out "
         "must not overlap.",
     ]
-    if exported.names and (mapped := {k: v for k, v in exported.names.items() if k != v}):
+    if mapped := {theirs: ours for theirs, ours in e.names.items() if theirs != ours}:
         lines += ["", "Names that C does not take:"]
         lines += [f"  {theirs} is {ours}" for theirs, ours in mapped.items()]
     return _comment(lines)
@@ -214,7 +216,8 @@ def _statuses(p: str) -> str:
     return "\n".join(["/* Statuses. */", "enum {", *rows, "};", ""])
 
 
-def _sizes(p: str, exported: Exported, m: Mechanism) -> str:
+def _sizes(p: str, exported: Exported) -> str:
+    m = exported.mechanism
     named = {"CHAIN": m.chain_names, "CONTACT": m.contact_names}
     sizes = {f"{kind}S": len(names) for kind, names in named.items()}
     lines = ["/* Sizes, and where things stand in arrays. */"]

@@ -15,6 +15,7 @@ from ..graph.program import Port, Result
 from ..kinematics.chain import FAMILIES
 from ..mechanism.home import independent_coordinates
 from ..mechanism.mechanism import COORDINATES, Mechanism
+from .catalogue import Wish
 
 Precision = Literal["double", "float"]
 
@@ -85,6 +86,7 @@ class Function:
 class Exported:
     """A mechanism in C.
 
+    mechanism, wish: what was exported, and what `closure` starts from.
     prefix:    what every name begins with.
     source:    text of `prefix`.c, C99.
     header:    text of `prefix`.h, C99 and C++.
@@ -96,6 +98,8 @@ class Exported:
     recipe:    how the model is made that these functions are of: keywords of `condyle.derive`.
     """
 
+    mechanism: Mechanism
+    wish: Wish
     prefix: str
     source: str
     header: str

@@ -5,11 +5,13 @@ It holds its sources, and a binary for this machine where there is a C compiler.
 
 from __future__ import annotations
 
+import os
 import platform
 import re
 import sys
 import tempfile
 import zipfile
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -20,10 +22,14 @@ from ..atomic import replacing
 from ..backends.compiler import CompilerError, find_compiler
 from ..errors import InputError
 from ..mechanism import Mechanism
+from ..model.model import Model
 from .c_names import in_comment
+from .catalogue import least_norm
 from .fmu_model import Fmu, Scalar, fmu_model
+from .written import Written, file_at, mechanism_of, names_of
 
 VERSIONS = (2, 3)
+DEFAULT = ("plant", "inverse", "controller")
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")
 LONG_AGO = (1980, 1, 1, 0, 0, 0)  # so that the same model is the same file
 ENDINGS = {"linux": ".so", "darwin": ".dylib", "win32": ".dll"}
@@ -44,16 +50,44 @@ BASE = {
 STEP = {"canHandleVariableCommunicationStepSize": "true"}
 
 
-def write_fmu(mechanism: Mechanism, kind: str, version: int, path: Path) -> bool:
-    """Write an FMU, whole or not at all; returns whether it has a binary.
+def export_fmu(
+    model: Model | Mechanism | str | os.PathLike[str],
+    path: str | os.PathLike[str],
+    *,
+    kind: str | Sequence[str] = DEFAULT,
+    fmi: int = 3,
+) -> Written:
+    """Write functional mock-up units (FMI 2.0 or 3.0), each whole or not at all.
 
-    Args:   kind: plant, inverse or controller;  version: of FMI, 2 or 3.
+    They hold their sources, and a binary for this machine where there is a C compiler.
+
+    Args:   model: a model, a mechanism, its file, or the name of a bundled one.
+            path: a folder for NAME-KIND.fmu; or, for one kind, a file that ends in .fmu.
+            kind: plant, inverse, controller, bounded; one or several.
+            fmi: version of the standard: 2 or 3.
+    Returns: the files. Its `data` says whether they hold a binary.
     Raises: InputError: for another kind or version, or a file that cannot be written;
             UnsupportedError: for a mechanism that cannot be exported to C.
     """
-    if version not in VERSIONS:
-        raise InputError(f"there is FMI 2 and 3; got version {version}")
-    fmu = fmu_model(mechanism, kind)
+    mechanism = mechanism_of(model)
+    kinds = list(dict.fromkeys(names_of("kind", kind)))
+    if fmi not in VERSIONS:
+        raise InputError(f"fmi: expected 2 or 3, got {fmi!r:.40}")
+    if str(path).endswith(".fmu") and len(kinds) != 1:
+        raise InputError(f"{path}: name a folder for the FMUs of {len(kinds)} kinds")
+    models = [fmu_model(mechanism, one) for one in kinds]
+    files = [file_at(path, f"{mechanism.name}-{one}", ".fmu") for one in kinds]
+    binary = all([_write(fmu, fmi, file) for fmu, file in zip(models, files, strict=True)])
+    notes = []
+    if not binary:
+        notes.append("no binary for this machine: the FMUs hold sources only")
+    if {"inverse", "controller"} & set(kinds) and least_norm(mechanism):
+        notes.append("efforts in FMUs are of least norm, without limits: a cable may be pushed")
+    return Written(files, notes, {"mechanism": mechanism.name, "fmi": fmi, "binary": binary})
+
+
+def _write(fmu: Fmu, version: int, path: Path) -> bool:
+    """Write an FMU; returns whether it holds a binary."""
     sources = fmu_sources(fmu, version)
     content = {"modelDescription.xml": description(fmu, version).encode()}
     if version == 3:

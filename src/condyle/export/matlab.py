@@ -1,45 +1,50 @@
 """Target `matlab`: MEX functions of the exported C, with help texts, a build script and an example.
 
-A function takes matrices with a row an entry and a column a sample; one column serves all samples.
-Results are likewise; the last output is the status of every sample. MATLAB and Octave.
+In matrices a row is an entry and a column a sample; one column serves all samples. The last output
+is the status of every sample. MATLAB and Octave.
 """
 
 from __future__ import annotations
 
+import os
 import textwrap
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
-from ..atomic import write_text
 from ..mechanism import Mechanism
+from ..model.model import Model
 from .c_names import identifier, packaged
 from .c_source import export
 from .exported import Argument, Exported, Function
+from .written import Written, folder_at, mechanism_of, names_of, write_texts
 
 DEFAULT = ("contact", "inverse", "bounded", "forward", "motion", "pose", "computed_torque")
 LONGEST = 63  # letters of a name in MATLAB
 
 
-def write_matlab(
-    mechanism: Mechanism, folder: Path, questions: Sequence[str] = DEFAULT
-) -> list[Path]:
-    """Write sources, gateways, help, `build.m` and `NAME_example.m`.
+def export_matlab(
+    model: Model | Mechanism | str | os.PathLike[str],
+    path: str | os.PathLike[str],
+    *,
+    question: str | Sequence[str] = DEFAULT,
+) -> Written:
+    """Write MEX functions for MATLAB and Octave: C, help texts, `build.m`, `NAME_example.m`.
 
-    Raises: InputError, UnsupportedError: for what cannot be exported to C, or a file that cannot be
-            written.
+    Args:   model: a model, a mechanism, its file, or the name of a bundled one.
+            path: a folder.
+            question: names from `condyle.export.CATALOGUE`, and controllers.
+    Raises: InputError, UnsupportedError: for what cannot be exported to C, or a folder that cannot
+            be written.
     """
+    mechanism = mechanism_of(model)
     # Short enough that every function's name is one in MATLAB.
-    e = export(mechanism, questions, lanes=0, prefix=identifier(mechanism.name).lower()[:40])
+    prefix = identifier(mechanism.name).lower()[:40]
+    e = export(mechanism, names_of("question", question), lanes=0, prefix=prefix)
     texts = {f"{e.prefix}.c": e.source, f"{e.prefix}.h": e.header}
     for f in e.functions:
         texts[f"{f.name}_mex.c"] = gateway(e, f)
-        texts[f"{f.name}.m"] = help_text(e, f, mechanism)
-    texts |= {"build.m": build(e), f"{e.prefix}_example.m": example(e, mechanism)}
-    paths = []
-    for name, text in texts.items():
-        paths.append(folder / name)
-        write_text(paths[-1], text)
-    return paths
+        texts[f"{f.name}.m"] = help_text(e, f)
+    texts |= {"build.m": build(e), f"{e.prefix}_example.m": example(e)}
+    return Written(write_texts(folder_at(path), texts), (), {"mechanism": mechanism.name})
 
 
 def gateway(e: Exported, f: Function) -> str:
@@ -63,15 +68,16 @@ def gateway(e: Exported, f: Function) -> str:
     return "\n".join(parts) + packaged("matlab_mex.c")
 
 
-def help_text(e: Exported, f: Function, mechanism: Mechanism) -> str:
+def help_text(e: Exported, f: Function) -> str:
     """The .m file that `help` shows, and that says what to do before there is a MEX function."""
     outputs = ", ".join([a.name for a in f.outputs] + ["status"])
     inputs = ", ".join(a.name for a in f.inputs)
     lines = [f"{f.name.upper()}  {f.text}", f"  [{outputs}] = {f.name}({inputs})", ""]
     lines += [
-        f'  Of the mechanism "{mechanism.name}", written by condyle. Samples stand in columns;'
+        f'  Mechanism "{e.mechanism.name}", written by condyle. A column is a sample;',
+        "  one column serves all samples.",
+        "",
     ]
-    lines += ["  one column serves all samples.", ""]
     for a in f.arguments:
         lines += _wrapped(f"{a.name} ({a.size} x N): {a.text} [{a.unit}]: {', '.join(a.labels)}")
     words = "; ".join(f"{name.lower()}: {why}" for name, why in f.statuses.items())
@@ -95,11 +101,11 @@ def build(e: Exported) -> str:
     return "\n".join([*lines, "rehash", ""])
 
 
-def example(e: Exported, mechanism: Mechanism) -> str:
+def example(e: Exported) -> str:
     """NAME_example.m: a sway about home, there and back."""
     f = e.functions[0]
     lines = [
-        f'% What the functions of "{mechanism.name}" are for: run build.m once before this.',
+        f'% How to call the functions of "{e.mechanism.name}". Run build.m once before this.',
         "t = linspace(0, 1, 101);",
     ]
     for a in f.inputs:

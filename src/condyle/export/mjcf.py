@@ -36,6 +36,7 @@ from ..mechanism.surface import Plane
 from ..model.model import Model
 from .mjcf_tracks import Freedom, Track, track
 from .mjcf_xml import Document, element, inertial, quaternion, rgba
+from .written import Written, file_at, mechanism_of
 
 RUNNER = 1e-3  # mass of a runner over the platform's
 PARALLEL = 1e-12
@@ -54,14 +55,22 @@ class Mjcf:
     notes: tuple[str, ...]
 
 
-def write_mjcf(mechanism: Mechanism, path: str | os.PathLike[str]) -> Mjcf:
-    """Write the document, whole or not at all.
+def export_mjcf(
+    model: Model | Mechanism | str | os.PathLike[str], path: str | os.PathLike[str]
+) -> Written:
+    """Write a model for MuJoCo (MJCF), whole or not at all.
 
-    Raises: InputError: if the file cannot be written;  as of `mjcf`.
+    Args:   model: a model, a mechanism, its file, or the name of a bundled one.
+            path: a folder for NAME.xml, or a file that ends in .xml.
+    Returns: the file. Its `notes` say what of the mechanism is approximate or left out.
+    Raises: UnsupportedError: where a surface cannot be followed, or two names agree.
+            InputError: if the file cannot be written.
     """
+    mechanism = mechanism_of(model)
     made = mjcf(mechanism)
-    write_text(path, made.text)
-    return made
+    file = file_at(path, mechanism.name, ".xml")
+    write_text(file, made.text)
+    return Written([file], made.notes, {"mechanism": mechanism.name, "notes": list(made.notes)})
 
 
 def mjcf(mechanism: Mechanism) -> Mjcf:

@@ -37,7 +37,7 @@ OFF_LINE = 1e-3  # of a rod: what is nearer to its line is on it
 
 
 @dataclass(frozen=True)
-class Found:
+class ImportResult:
     """mechanism, and notes: what of the model it does not have."""
 
     mechanism: Mechanism
@@ -45,7 +45,7 @@ class Found:
 
 
 @dataclass(frozen=True)
-class Way:
+class Limb:
     """From the world to the platform: bodies between, elementary joints, and a name."""
 
     bodies: tuple[int, ...]
@@ -53,7 +53,7 @@ class Way:
     name: str
 
 
-def from_mjcf(path: str | Path, name: str) -> Found:
+def from_mjcf(path: str | Path, name: str) -> ImportResult:
     """A mechanism called `name` from a file that MuJoCo reads.
 
     Raises: InputError, UnsupportedError: with what was found instead;  MechanismError: if it
@@ -67,12 +67,12 @@ def from_mjcf(path: str | Path, name: str) -> Found:
     for edge in graph.at(platform):
         if edge.end == WORLD and edge.steps[0].index >= 0:  # it stands in the tree by itself
             contacts += seat(graph, platform, turned(edge.steps))
-    for way in _ways(graph, platform):
-        made = contact_of(graph, way.steps, way.name)
+    for limb in _limbs(graph, platform):
+        made = contact_of(graph, limb.steps, limb.name)
         if made is not None:
             contacts.append(made)
         else:
-            chains.append(_chain(graph, way))
+            chains.append(_chain(graph, limb))
     chains += _cables(graph, platform)
     if not chains:
         raise UnsupportedError(f"{path}: nothing drives its platform, {graph.name(platform)}")
@@ -85,7 +85,7 @@ def from_mjcf(path: str | Path, name: str) -> Found:
         **({"contact": contacts} if contacts else {}),
         "chain": sorted(chains, key=lambda chain: order.get(chain["name"], len(order))),
     }
-    return Found(from_data(data, str(path)), tuple(graph.notes))
+    return ImportResult(from_data(data, str(path)), tuple(graph.notes))
 
 
 def _platform(graph: Graph, path: str | Path) -> int:
@@ -106,7 +106,7 @@ def _platform(graph: Graph, path: str | Path) -> int:
     return best
 
 
-def _ways(graph: Graph, platform: int) -> Iterator[Way]:
+def _limbs(graph: Graph, platform: int) -> Iterator[Limb]:
     for first in graph.at(platform):
         if first.end == WORLD and first.steps[0].index >= 0:
             continue
@@ -124,7 +124,7 @@ def _ways(graph: Graph, platform: int) -> Iterator[Way]:
             path.append((here, edge.steps))
             name = edge.name or name
         steps, bodies = _merged(graph, [(body, turned(s)) for body, s in reversed(path)])
-        yield Way(bodies, steps, _named(graph, steps, name, bodies))
+        yield Limb(bodies, steps, _named(graph, steps, name, bodies))
 
 
 def _merged(
@@ -163,50 +163,50 @@ def _named(graph: Graph, steps: tuple[Step, ...], connect: str, bodies: tuple[in
     return next(filter(None, [*named, connect, *map(graph.name, bodies)]), "chain")
 
 
-def _chain(graph: Graph, way: Way) -> dict[str, Any]:
-    kinds = " ".join(step.kind for step in way.steps)
+def _chain(graph: Graph, limb: Limb) -> dict[str, Any]:
+    kinds = " ".join(step.kind for step in limb.steps)
     makers = {"ball slide ball": _sps, "slide ball ball": _pss, "hinge ball ball": _rss}
     if kinds not in makers:
         raise UnsupportedError(
-            f'chain "{way.name}": from the world to the platform it has {kinds or "no joint"}; '
+            f'chain "{limb.name}": from the world to the platform it has {kinds or "no joint"}; '
             f"expected {LINES}, where two or three hinges at one point count as a ball"
         )
-    platform = graph.point(way.steps[-1].point)
-    return {"name": way.name, "platform": platform, **makers[kinds](graph, way)}
+    platform = graph.point(limb.steps[-1].point)
+    return {"name": limb.name, "platform": platform, **makers[kinds](graph, limb)}
 
 
-def _sps(graph: Graph, way: Way) -> dict[str, Any]:
-    base, slide, top = way.steps
+def _sps(graph: Graph, limb: Limb) -> dict[str, Any]:
+    base, slide, top = limb.steps
     leg = top.point - base.point
     n = leg / np.linalg.norm(leg)
     if np.linalg.norm(np.cross(slide.axis, n)) > PARALLEL:
-        raise UnsupportedError(f'chain "{way.name}": its slide is not along the leg')
-    lower, upper = way.bodies
+        raise UnsupportedError(f'chain "{limb.name}": its slide is not along the leg')
+    lower, upper = limb.bodies
     return {
         "kind": "SPS",
         "base": graph.point(base.point),
-        "cylinder": part(graph, f"cylinder of {way.name}", lower, base.point, n),
-        "piston": part(graph, f"piston of {way.name}", upper, top.point, -n),
-        **actuator_of(graph, slide, slide.up * float(np.sign(slide.axis @ n)), way.name),
+        "cylinder": part(graph, f"cylinder of {limb.name}", lower, base.point, n),
+        "piston": part(graph, f"piston of {limb.name}", upper, top.point, -n),
+        **actuator_of(graph, slide, slide.up * float(np.sign(slide.axis @ n)), limb.name),
     }
 
 
-def _pss(graph: Graph, way: Way) -> dict[str, Any]:
-    slide, ball, top = way.steps
-    slider, rod = way.bodies
+def _pss(graph: Graph, limb: Limb) -> dict[str, Any]:
+    slide, ball, top = limb.steps
+    slider, rod = limb.bodies
     return {
         "kind": "PSS",
         "base": graph.point(ball.point),
         "axis": [float(v) for v in slide.up * slide.axis],
         "slider": {"mass": graph.body(slider).weight},
-        "rod": part(graph, f"rod of {way.name}", rod, ball.point, top.point - ball.point, True),
-        **actuator_of(graph, slide, 1.0, way.name),
+        "rod": part(graph, f"rod of {limb.name}", rod, ball.point, top.point - ball.point, True),
+        **actuator_of(graph, slide, 1.0, limb.name),
     }
 
 
-def _rss(graph: Graph, way: Way) -> dict[str, Any]:
-    shaft, ball, top = way.steps
-    crank, coupler = graph.body(way.bodies[0]), way.bodies[1]
+def _rss(graph: Graph, limb: Limb) -> dict[str, Any]:
+    shaft, ball, top = limb.steps
+    crank, coupler = graph.body(limb.bodies[0]), limb.bodies[1]
     axis = shaft.up * shaft.axis
     pivot = shaft.point + axis * (axis @ (ball.point - shaft.point))
     arm = crank.centre - pivot
@@ -215,7 +215,7 @@ def _rss(graph: Graph, way: Way) -> dict[str, Any]:
     line, high = top.point - ball.point, float(np.linalg.norm(off))
     if high > 1e-3 * np.linalg.norm(ball.point - pivot):
         graph.note(
-            f"crank of {way.name}: its mass centre is {high * 1e3:.3g} mm off the shaft; its "
+            f"crank of {limb.name}: its mass centre is {high * 1e3:.3g} mm off the shaft; its "
             "weight is left out"
         )
     return {
@@ -224,8 +224,8 @@ def _rss(graph: Graph, way: Way) -> dict[str, Any]:
         "axis": [float(v) for v in axis],
         "crank_tip": graph.point(ball.point),
         "crank": {"inertia": float(inertia)},
-        "coupler": part(graph, f"coupler of {way.name}", coupler, ball.point, line, True),
-        **actuator_of(graph, shaft, 1.0, way.name),
+        "coupler": part(graph, f"coupler of {limb.name}", coupler, ball.point, line, True),
+        **actuator_of(graph, shaft, 1.0, limb.name),
     }
 
 
