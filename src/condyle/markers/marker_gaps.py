@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import InputError
 from ..motion.arrays import runs_of
 from ..motion.path import MIN_ROWS
+from ..motion.spline import Spline
 
 _SLACK = 1e-6  # of a frame
 _NAMED = 5  # gaps that an error names
@@ -86,9 +87,7 @@ def _filled(t: np.ndarray, values: np.ndarray) -> np.ndarray:
     known = np.isfinite(values).all(axis=1)
     if known.all():
         return values
-    from scipy.interpolate import make_interp_spline
-
-    spline = make_interp_spline(t[known] - t[0], values[known], k=_DEGREE)
+    spline = Spline.through(t[known] - t[0], values[known], _DEGREE)
     return np.where(known[:, None], values, spline(t - t[0]))
 
 

@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
+from typing import Any, Literal, TypedDict, Unpack
 
 import numpy as np
 
@@ -18,11 +18,9 @@ from .frame import as_sampled, table_from_frame
 from .memory import memory_at_hand
 from .number_table import Table
 from .smoothing import Smoothing, parse_cutoff, smoothing_spline
+from .spline import Spline
 from .table_reader import read_table
 from .unit_checks import motion_warnings
-
-if TYPE_CHECKING:
-    from scipy.interpolate import BSpline
 
 Kind = Literal["coordinates", "pose", "landmark"]
 
@@ -167,7 +165,7 @@ class Motion:
         since_start = t - t[0]  # keeps large times, such as those of a clock, exact
         smoothing = None
         if cutoff is None:
-            spline = _interpolant(since_start, samples, source)
+            spline = Spline.through(since_start, samples)
         else:
             frequency = parse_cutoff(cutoff)
             spline = smoothing_spline(since_start, samples, frequency)
@@ -222,16 +220,6 @@ def _kind(columns: Mapping[str, Any], source: str) -> tuple[Kind, tuple[str, ...
     if not set(columns) <= set(POSE):
         raise InputError(f"{got}; expected {rules}, not both")
     return ("pose", POSE) if len(columns) == len(POSE) else ("coordinates", tuple(columns))
-
-
-def _interpolant(t: np.ndarray, values: np.ndarray, source: str) -> BSpline:
-    """Quintic spline through the samples."""
-    from scipy.interpolate import make_interp_spline
-
-    try:
-        return make_interp_spline(t, values, k=5)
-    except (ValueError, np.linalg.LinAlgError) as error:
-        raise InputError(f"{source}: no spline goes through the samples ({error})") from error
 
 
 def _output_times(t: np.ndarray, rate: float | None, times: Any, source: str) -> np.ndarray:

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .. import progress
 from ..errors import InputError
 from .column_units import ANGLE_UNITS, POSE
-
-if TYPE_CHECKING:
-    from scipy.interpolate import BSpline
+from .spline import Spline
 
 AUTO_CUTOFF = 10.0
 """Cut-off of "auto" [Hz]. Chewing repeats one to two times a second, so at least five harmonics
@@ -62,7 +59,7 @@ def parse_cutoff(cutoff: float | str) -> float:
     return value
 
 
-def smoothing_spline(t: np.ndarray, values: np.ndarray, cutoff: float) -> BSpline:
+def smoothing_spline(t: np.ndarray, values: np.ndarray, cutoff: float) -> Spline:
     """Quintic spline of what is slower than `cutoff` in the samples.
 
         min over c:  sum_i |y_i - s(t_i)|^2 + mu sum_j |D^4 c_j|^2,   s = sum_j c_j B_j
@@ -99,7 +96,7 @@ def smoothing_spline(t: np.ndarray, values: np.ndarray, cutoff: float) -> BSplin
     A = B.T @ B + mu * samples_per_knot * (D.T @ D)
     with progress.step("smoothing"):
         coefficients = spsolve(A.tocsc(), B.T @ values).reshape(size, -1)
-    return BSpline(knots, coefficients, _DEGREE)
+    return Spline(knots, coefficients, _DEGREE)
 
 
 def _check_cutoff(t: np.ndarray, cutoff: float) -> None:

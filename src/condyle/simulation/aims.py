@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
 from ..model.model import Model
 from ..motion import Motion, read_table
-
-DEGREE = 5  # of the spline through q, as of motions
+from ..motion.spline import Spline
 
 
 @dataclass(frozen=True)
@@ -30,10 +28,8 @@ class Path:
     force: np.ndarray
 
     @cached_property
-    def _spline(self) -> Any:
-        from scipy.interpolate import make_interp_spline
-
-        return make_interp_spline(self.times - self.times[0], self.q, k=DEGREE)
+    def _spline(self) -> Spline:
+        return Spline.through(self.times - self.times[0], self.q)
 
     def states(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """q, q' and q'' at times (K,), (K, m) each."""
