@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from .errors import InputError
+from .errors import InputError, as_path
 
 _PART = re.compile(r"\..*\.([0-9a-f]{8})-(\d+)-[0-9a-f]{8}\.part", re.DOTALL)
 _FORGOTTEN = 86400.0  # s without a change, after which a temporary file belongs to nobody
@@ -54,7 +54,7 @@ def replacing_folder(path: str | os.PathLike[str], mark: str) -> Iterator[Path]:
     Args:   mark: a file that folders of this kind have; others are not replaced.
     Raises: InputError: if `path` cannot be written, or is something else.
     """
-    target = Path(os.path.realpath(path))
+    target = Path(os.path.realpath(as_path(path)))
     if target.exists() and not (target / mark).is_file():
         raise InputError(f"{path}: exists and is something else; give another name, or remove it")
     if not target.parent.is_dir():
@@ -120,8 +120,7 @@ def _lives(process: int) -> bool:
 
 
 def _checked(path: str | os.PathLike[str]) -> Path:
-    if "\0" in os.fspath(path):
-        raise InputError(f"{os.fspath(path)!r}: is not the name of a file")
+    path = as_path(path)
     if os.path.isdir(path):
         raise InputError(f"{path}: is a folder; give the name of a file to write")
     if os.path.exists(path) and not os.path.isfile(path):

@@ -9,13 +9,19 @@ from __future__ import annotations
 
 import difflib
 import os
+import reprlib
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, ClassVar
 
 MANY = 10  # names of a list that a message shows
 LONGEST = 3900  # characters of a message
-LONGEST_NAME, MANY_CHOICES = 200, 5000  # among which a name that is alike is looked for
+LONGEST_NAME, MANY_CHOICES = 200, 5000  # limits of the search for a similar name
+
+_SHORT = reprlib.Repr()
+_SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 60
+_SHORT.maxlevel = 3
 
 
 class CondyleError(Exception):
@@ -240,6 +246,14 @@ def shortened(text: str, length: int) -> str:
     return text if len(text) <= length else f"{text[: length - 3]}..."
 
 
+def shown(value: object) -> str:
+    """A value in one line of a message, at most 60 characters of it."""
+    try:
+        return shortened(printable(" ".join(_SHORT.repr(value).split()), lines=False), 60)
+    except Exception:  # integers of thousands of digits, objects whose repr fails
+        return f"an {type(value).__name__} that cannot be shown"
+
+
 def nearest(name: str, available: Iterable[str]) -> list[str]:
     """Up to three names like `name`, the most alike first; the same in other letters counts."""
     choices = sorted(available)
@@ -247,6 +261,18 @@ def nearest(name: str, available: Iterable[str]) -> list[str]:
     if same or len(name) > LONGEST_NAME or len(choices) > MANY_CHOICES:
         return same  # the search for near ones takes the time of all pairs of letters
     return difflib.get_close_matches(name, choices, n=3)
+
+
+def as_path(given: Any, name: str = "path", expected: str = "the path of a file") -> str:
+    """The path of a file, as text; `name` is the argument's.
+
+    Raises: InputError: for what cannot name a file.
+    """
+    with suppress(TypeError, ValueError):
+        path = os.fspath(given)
+        if isinstance(path, str) and path and "\0" not in path and os.fsencode(path):
+            return path
+    raise InputError(f"{name}: expected {expected}, got {shown(given)}")
 
 
 def no_such_file(path: str | os.PathLike[str]) -> InputError:

@@ -480,7 +480,7 @@ def test_markers_on_one_line_hold_no_body(tmp_path: Path) -> None:
 def test_options_that_are_wrong(tmp_path: Path) -> None:
     jaw = record()
     for option in ({"max_gap": -1.0}, {"max_residual": float("nan")}):
-        with pytest.raises(InputError, match="expected a number, 0 or more"):
+        with pytest.raises(InputError, match="expected a number of at least 0"):
             measured(jaw, tmp_path, **option)
     refused(
         "frames have a pose, expected at least 6", jaw, tmp_path, max_residual=0.0, max_gap=100.0

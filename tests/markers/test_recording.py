@@ -158,7 +158,7 @@ def test_files_that_cannot_be_used(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be read"):
         read_c3d(tmp_path)
     path.write_bytes(whole)
-    with pytest.raises(InputError, match="units: got 'inch', expected m, cm, mm, um"):
+    with pytest.raises(InputError, match="unit: expected m, cm, mm, um, got 'inch'"):
         read_c3d(path, "inch")
 
 

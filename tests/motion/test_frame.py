@@ -74,11 +74,14 @@ def test_a_path_is_a_motion_or_a_load(tmp_path):
 
 def test_other_things_are_named_with_what_is_taken():
     motion, load = Motion.from_arrays(T, {"X": T}), Load.zero()
-    with pytest.raises(InputError, match=r"got a Load, .* The order is solve\(motion, load\)"):
+    with pytest.raises(InputError, match=r"got Load\. .* The order is motion, load"):
         as_motion(load)
-    with pytest.raises(InputError, match=r"got a Motion, .* The order is solve\(motion, load\)"):
+    with pytest.raises(InputError, match=r"got Motion\. .* The order is motion, load"):
         as_load(motion)
-    with pytest.raises(InputError, match=r"motion: got a ndarray, expected a condyle.Motion, the"):
+    with pytest.raises(
+        InputError,
+        match=r"motion: expected a Motion, the path of a file or a DataFrame, got ndarray",
+    ):
         as_motion(T)
     with pytest.raises(InputError, match=r"load: got a int, .*Load.from_arrays\(t, force, moment"):
         as_load(5)

@@ -60,9 +60,9 @@ def test_the_removed_part_is_reported():
     [
         (2001, 250.0, "must be below half the sampling rate, 250 Hz"),
         (50, 10.0, "needs a recording of at least 0.2 s"),
-        (2001, 0, "expected a frequency in Hz above 0"),
+        (2001, 0, "expected a frequency above 0 Hz"),
         (2001, float("nan"), "expected a frequency"),
-        (2001, "often", "got 'often', expected a frequency in Hz above 0, or \"auto\""),
+        (2001, "often", "above 0 Hz, or \"auto\", got 'often'"),
     ],
 )
 def test_cut_offs_that_cannot_be_used_are_refused(samples, cutoff, message):

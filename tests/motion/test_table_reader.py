@@ -126,7 +126,7 @@ def test_a_missing_file_is_named_with_its_folder_and_its_neighbours(csv_file, tm
         read_table(tmp_path / "nowhere" / "chewing.csv")
     with pytest.raises(InputError, match="is a folder"):
         read_table(tmp_path)
-    with pytest.raises(InputError, match="not the name of a file"):
+    with pytest.raises(InputError, match="expected the path of a file"):
         read_table("a\0b")
 
 

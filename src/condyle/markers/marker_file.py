@@ -12,8 +12,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
-from ..errors import InputError, ProblemsError, few
-from ..mechanism.messages import describe, shown
+from ..errors import InputError, ProblemsError, few, shown
+from ..mechanism.messages import describe
 from ..mechanism.table import Table
 from ..mechanism.toml import LARGEST_FILE, read_tables
 from ..motion.file_words import content_of, listed

@@ -13,8 +13,8 @@ import numpy as np
 from pydantic import ValidationError
 
 from ..errors import InputError
-from ..mechanism import load_mechanism
-from ..mechanism.mechanism import Mechanism
+from ..mechanism import as_mechanism
+from ..motion.arrays import as_number
 from ..motion.column_units import POSE
 from ..motion.file_words import listed
 from ..motion.path import Motion
@@ -37,7 +37,7 @@ MAX_GAP = 0.1  # s
 def motion_from_c3d(
     path: str | os.PathLike[str],
     markers: str | os.PathLike[str] | Mapping[str, Any] | MarkerFile,
-    mechanism: Mechanism | str,
+    model: Any,
     *,
     max_residual: float = MAX_RESIDUAL,
     max_gap: float = MAX_GAP,
@@ -49,7 +49,7 @@ def motion_from_c3d(
     """A motion from the markers of a C3D file.
 
     Args:   markers: a marker file (TOML), or its tables.
-            mechanism: what registers the points, or its file or name.
+            model: whose points are registered: a model or mechanism, its file or bundled name.
             max_residual: a frame in which a marker is farther from its place in its body [m] is a
                 gap.
             max_gap: gaps are filled by a cubic spline up to so long [s].
@@ -60,10 +60,9 @@ def motion_from_c3d(
             cutoff: smooth the motion, as of `Motion.from_arrays`.
     Raises: InputError: for files that cannot be used, and gaps that are too long.
     """
-    for name, value in (("max_residual", max_residual), ("max_gap", max_gap)):
-        if not (math.isfinite(value) and value >= 0):
-            raise InputError(f"{name}: got {value!r}, expected a number, 0 or more")
-    machine = mechanism if isinstance(mechanism, Mechanism) else load_mechanism(mechanism)
+    for name, value, unit_of in (("max_residual", max_residual, "m"), ("max_gap", max_gap, "s")):
+        as_number(value, name, f"a number of at least 0 [{unit_of}]", lambda x: x >= 0)
+    machine = as_mechanism(model)
     file, recording = read_markers(markers), read_c3d(path, unit)
     forces = file.forces if force is None else _three(force)
     activity = {} if file.emg is None else envelopes(file.emg, recording, machine)

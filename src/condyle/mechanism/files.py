@@ -2,33 +2,48 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from ..errors import InputError, MechanismError
+from ..errors import InputError, MechanismError, shown
 from .chain import Chain
 from .contact import Contact
 from .coordinates import COORDINATES
 from .home import holding_problems, off_surface
 from .mechanism import Mechanism, structural_problems
-from .messages import describe, shown, unknown_key
+from .messages import describe, unknown_key
 from .quantities import PER_METRE
 from .schema import schema_of
 from .toml import nests_too_deep, read_tables, read_text, too_deep
 
 
-def load_mechanism(source: str | Path) -> Mechanism:
-    """Read a mechanism.
+def load_mechanism(name_or_path: str | os.PathLike[str]) -> Mechanism:
+    """Read a mechanism from a TOML file, or a bundled one by its name.
 
-    Args:   source: path of a TOML file, or the name of a bundled mechanism.
     Raises: MechanismError: with every problem found in the file.
             InputError:     if there is no such file or it is not TOML.
     """
-    return parse(read_text(source), str(source))
+    return parse(read_text(name_or_path), os.fspath(name_or_path))
+
+
+def as_mechanism(given: Any) -> Mechanism:
+    """The mechanism given: itself, a model's, or one by the path of its file or its bundled name.
+
+    Raises: InputError: for anything else; errors of `load_mechanism`.
+    """
+    mechanism = getattr(given, "mechanism", given)
+    if isinstance(mechanism, Mechanism):
+        return mechanism
+    if isinstance(given, str | os.PathLike):
+        return load_mechanism(given)
+    raise InputError(
+        "mechanism: expected a mechanism, a model, the path of a mechanism file or the name of a "
+        f"bundled mechanism, got {type(given).__name__}"
+    )
 
 
 def parse(text: str, source: str = "mechanism") -> Mechanism:

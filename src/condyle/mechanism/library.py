@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib.resources import files
 
-from ..errors import InputError, did_you_mean, shortened
+from ..errors import InputError, did_you_mean, shown
 
 _BUNDLED = files(__package__) / "bundled"
 
@@ -22,8 +22,7 @@ def bundled_text(name: str) -> str:
     known = bundled_mechanisms()
     if name not in known:
         raise InputError(
-            f'no bundled mechanism is called "{shortened(str(name), 80)}".'
-            f"{did_you_mean(str(name), known)}"
+            f"name: no bundled mechanism is called {shown(name)}.{did_you_mean(name, known)}"
         )
     return (_BUNDLED / f"{name}.toml").read_text(encoding="utf-8")
 

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 import re
-import reprlib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from ..errors import did_you_mean, shortened
+from ..errors import did_you_mean, shortened, shown
 from .schema import keys_at
-
-_SHORT = reprlib.Repr()
-_SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 60
-_SHORT.maxlevel = 3
 
 
 def describe(error: ValidationError, data: Any, root: type[BaseModel]) -> list[str]:
@@ -108,11 +103,3 @@ def unknown_key(key: str, location: Iterable[Any], root: type[BaseModel]) -> str
 def _quoted(text: Any) -> list[str]:
     """a, b of "'a', 'b'"."""
     return re.findall("'([^']*)'", str(text))
-
-
-def shown(value: Any) -> str:
-    """A value in a message, short whatever it is."""
-    try:
-        return shortened(_SHORT.repr(value), 60)
-    except ValueError:  # Python writes no integers of so many digits
-        return "an integer of thousands of digits"

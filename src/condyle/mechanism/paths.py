@@ -15,8 +15,8 @@ from typing import Any, NoReturn
 
 from pydantic import BaseModel
 
-from ..errors import InputError, did_you_mean, printable, shortened
-from .messages import entry, shown
+from ..errors import InputError, did_you_mean, printable, shortened, shown
+from .messages import entry
 from .quantities import listed
 from .schema import SIDE_OPTIONS
 from .table import Table

@@ -2,47 +2,41 @@
 
 from __future__ import annotations
 
+import os
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError, did_you_mean, shortened
+from ..errors import InputError, as_path, did_you_mean, shortened, shown
 from .library import bundled_mechanisms, bundled_text
-from .messages import shown
 
 LARGEST_FILE = 1_000_000  # bytes; the bundled mechanisms have some thousands
+_EXPECTED = "the path of a mechanism file or the name of a bundled mechanism"
 DEEPEST = 20  # tables and lists within each other; the format needs six
 
 
-def read_text(source: str | Path) -> str:
+def read_text(source: str | os.PathLike[str]) -> str:
     """The text of a mechanism file or of a bundled mechanism.
 
     Raises: InputError: if there is no such file, or it is no text of a sensible length.
     """
-    if not isinstance(source, str | Path):
-        raise InputError(
-            f"expected the path of a mechanism file or the name of a bundled mechanism, got "
-            f"{shown(source)}"
-        )
-    path = Path(source)
+    path = Path(source := as_path(source, "mechanism", _EXPECTED))
     try:
-        if str(source) in bundled_mechanisms() and not path.is_file():
-            return bundled_text(str(source))
+        if source in bundled_mechanisms() and not path.is_file():
+            return bundled_text(source)
         with path.open("rb") as file:
             content = file.read(LARGEST_FILE + 1)
     except FileNotFoundError:
         near = {p.name for p in path.parent.glob("*.toml")} if path.parent.is_dir() else set()
         raise InputError(
-            f"mechanism file {shortened(str(source), 200)} does not exist, and no bundled "
+            f"mechanism file {shortened(source, 200)} does not exist, and no bundled "
             "mechanism has that name." + did_you_mean(path.name, {*bundled_mechanisms(), *near})
         ) from None
     except OSError as error:
         raise InputError(
-            f'mechanism file "{shortened(str(source), 200)}" cannot be read: {error.strerror}'
+            f'mechanism file "{shortened(source, 200)}" cannot be read: {error.strerror}'
         ) from None
-    except ValueError:  # a null character
-        raise InputError(f'"{shortened(str(source), 200)}" cannot be the path of a file') from None
     if len(content) > LARGEST_FILE:
         raise InputError(f"{source} is no mechanism file: it has more than a megabyte")
     try:

@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from .files import as_mechanism
 from .mechanism import Mechanism
 from .surface import Unknown
 from .table import Table
 
 
-def dump(mechanism: Mechanism, path: str | Path) -> None:
+def dump(mechanism: Mechanism | str | os.PathLike[str], path: str | os.PathLike[str]) -> None:
     """Write the mechanism as a TOML file in SI, whole or not at all."""
     from ..atomic import write_text
 
     write_text(path, dumps(mechanism))
 
 
-def dumps(mechanism: Mechanism) -> str:
+def dumps(mechanism: Mechanism | str | os.PathLike[str]) -> str:
     """The mechanism as a TOML file in SI; `parse(dumps(m)) == m` to the last bit.
 
     Raises: InputError: if a surface is a Python expression, which a file cannot hold.
     """
+    mechanism = as_mechanism(mechanism)
     if names := written_in_python(mechanism):
         raise InputError(
             f"{mechanism.name}: the surface of {', '.join(names)} is a Python expression; a "

@@ -2,12 +2,40 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from numbers import Real
 from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, shown
+
+
+def as_number(
+    given: Any, name: str, expected: str, accept: Callable[[float], bool] = math.isfinite
+) -> float:
+    """`given` as a finite float that `accept` takes; `expected` says which.
+
+    Raises: InputError: for anything else.
+    """
+    if isinstance(given, Real) and not isinstance(given, bool):
+        try:
+            if math.isfinite(value := float(given)) and accept(value):
+                return value
+        except OverflowError:
+            pass
+    raise InputError(f"{name}: expected {expected}, got {shown(given)}")
+
+
+def as_text(given: Any, name: str, expected: str) -> str | None:
+    """`given` where it is a text or None.
+
+    Raises: InputError: for anything else.
+    """
+    if given is None or isinstance(given, str):
+        return given
+    raise InputError(f"{name}: expected {expected}, got {shown(given)}")
 
 
 def as_samples(values: Any, name: str, source: str, size: int | None = None) -> np.ndarray:
@@ -15,10 +43,7 @@ def as_samples(values: Any, name: str, source: str, size: int | None = None) -> 
 
     Raises: InputError: for anything else, with the sample at fault.
     """
-    try:
-        array = np.array(values, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise InputError(f'{source}: "{name}" is not a series of numbers ({error})') from error
+    array = as_doubles(values, f'{source}: "{name}"')
     if array.ndim != 1 or (size is not None and len(array) != size):
         expected = "(samples,)" if size is None else f"({size},), as t has"
         raise InputError(f'{source}: "{name}" has shape {array.shape}, expected {expected}')
@@ -27,6 +52,20 @@ def as_samples(values: Any, name: str, source: str, size: int | None = None) -> 
         i = bad[0]
         raise InputError(f'{source}, sample {i}: "{name}" is {array[i]}, expected a finite number')
     return array
+
+
+def as_doubles(values: Any, name: str) -> np.ndarray:
+    """`values` as an array of doubles, a new one.
+
+    Raises: InputError: for what are no real numbers.
+    """
+    try:
+        array = np.array(values)
+        if array.dtype.kind in "fiubO" and not (array.dtype == object and None in array.ravel()):
+            return array.astype(float)
+    except (TypeError, ValueError, OverflowError):  # ragged lists, objects, huge integers
+        pass
+    raise InputError(f"{name}: expected an array of numbers, got {shown(values)}")
 
 
 def check_rising(t: np.ndarray, where: Callable[[int], str]) -> None:

@@ -6,7 +6,7 @@ import math
 import re
 from dataclasses import dataclass, field
 
-from ..errors import InputError, did_you_mean
+from ..errors import InputError, did_you_mean, shown
 from .file_words import short
 
 POSE = ("X", "Y", "Z", "alpha", "beta", "gamma")
@@ -117,7 +117,7 @@ def parse_units(text: str | Units | None) -> Units:
     if text is None or isinstance(text, Units):
         return text or Units()
     if not isinstance(text, str):
-        raise InputError(f'units: got {short(repr(text))}, expected text such as "mm,deg"')
+        raise InputError(f'units: got {shown(text)}, expected text such as "mm,deg"')
     tables = {"time": TIME_UNITS, "length": LENGTH_UNITS, "angle": ANGLE_UNITS}
     found: dict[str, float] = {}
     for word in (part.strip() for part in text.split(",")):

@@ -313,8 +313,6 @@ def _checked(source: str, head: Head) -> Head:
 @contextmanager
 def opened(path: str | os.PathLike[str]) -> Iterator[Source]:
     """The file as UTF-8, or an InputError that says why not."""
-    if "\0" in os.fspath(path):
-        raise InputError(f"{os.fspath(path)!r}: is not the name of a file")
     shown = shown_path(path)
     try:
         with FileIO(path) as bare, BufferedReader(bare, 1 << 17) as raw:

@@ -6,7 +6,7 @@ import hashlib
 import os
 from collections.abc import Iterable
 
-from ..errors import MANY, InputError, no_such_file, printable, shortened
+from ..errors import MANY, InputError, as_path, no_such_file, printable, shortened
 
 
 def short(text: str) -> str:
@@ -38,13 +38,12 @@ def content_of(path: str | os.PathLike[str], most: int = -1) -> bytes:
     Raises: InputError: if it cannot be read.
     """
     try:
-        with open(path, "rb") as file:
+        with open(as_path(path), "rb") as file:
             return file.read(most)
     except FileNotFoundError:
         raise no_such_file(path) from None
-    except (OSError, ValueError) as error:
-        why = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"{short(os.fspath(path))}: cannot be read ({why})") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
 
 
 def digest(path: str | os.PathLike[str]) -> str | None:

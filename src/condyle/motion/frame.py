@@ -27,9 +27,9 @@ def as_sampled(given: Any, kind: type, arrays: str) -> Any:
         return made.from_frame(given)
     got, name = type(given).__name__, kind.__name__
     raise InputError(
-        f"{name.lower()}: got a {got}, expected a condyle.{name}, the path of a file, or a "
-        f"DataFrame. Arrays become one by {name}.from_arrays({arrays})"
-        + (". The order is solve(motion, load)" if got in ("Motion", "Load") else "")
+        f"{name.lower()}: expected a {name}, the path of a file or a DataFrame, got {got}. "
+        f"For arrays: {name}.from_arrays({arrays})"
+        + (". The order is motion, load" if got in ("Motion", "Load") else "")
     )
 
 

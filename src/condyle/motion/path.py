@@ -10,8 +10,8 @@ from typing import Any, Literal, TypedDict, Unpack
 
 import numpy as np
 
-from ..errors import InputError
-from .arrays import as_samples, check_rising
+from ..errors import InputError, shown
+from .arrays import as_doubles, as_number, as_samples, as_text, check_rising
 from .column_units import LANDMARK, POSE, Units, parse_units
 from .file_words import digest, listed
 from .frame import as_sampled, table_from_frame
@@ -75,6 +75,12 @@ class Motion:
 
     def __len__(self) -> int:
         return len(self.t)
+
+    def __repr__(self) -> str:
+        """Source, columns and span in one line."""
+        span = f"{len(self)} samples from {self.t[0]:.6g} to {self.t[-1]:.6g} s"
+        of = f" of {self.landmark}" if self.landmark else ""
+        return f"Motion({self.source}: {', '.join(self.names)}{of}, {span})"
 
     @classmethod
     def from_csv(
@@ -149,6 +155,7 @@ class Motion:
         if not isinstance(values, Mapping):
             values = _by_name(values, names, source)
         unit = parse_units(units)
+        as_text(landmark, "landmark", "the name of a platform point")
         t = as_samples(t, "t", source) * unit.time
         columns = {name: as_samples(v, name, source, len(t)) for name, v in values.items()}
         kind, names = _kind(columns, source)
@@ -190,14 +197,18 @@ def as_motion(motion: Any) -> Motion:
 
 
 def _by_name(values: Any, names: Sequence[str] | None, source: str) -> dict[str, np.ndarray]:
-    array = np.asarray(values)
+    array = as_doubles(values, f"{source}: values")
     taken = (
         "expected a mapping name -> (samples,), or (samples, columns) with a different name for "
         f"each column: of {', '.join(POSE)}, or x, y, z"
     )
     if array.ndim != 2:
-        got = f"shape {array.shape}" if array.ndim else f"a {type(values).__name__}"
-        raise InputError(f"{source}: got values of {got}; {taken}")
+        raise InputError(f"{source}: got values of shape {array.shape}; {taken}")
+    if names is not None and not (
+        isinstance(names, str | list | tuple | np.ndarray)
+        and all(isinstance(name, str) for name in names)
+    ):
+        raise InputError(f"{source}: names: expected a list of column names, got {shown(names)}")
     if names is None or len(set(names)) != len(names) or array.shape[1] != len(names):
         hint = "; give its transpose" if names is not None and len(names) == len(array) else ""
         raise InputError(
@@ -233,8 +244,7 @@ def _output_times(t: np.ndarray, rate: float | None, times: Any, source: str) ->
         return wanted
     if rate is None:
         return t
-    if not (math.isfinite(rate) and rate > 0):
-        raise InputError(f"{source}: rate: got {rate!r}, expected samples a second, above 0")
+    rate = as_number(rate, f"{source}: rate", "samples per second, above 0", lambda r: r > 0)
     intervals = (t[-1] - t[0]) * rate
     if intervals * _SAMPLE_BYTES > (free := memory_at_hand()):
         raise InputError(
@@ -249,9 +259,7 @@ def _output_times(t: np.ndarray, rate: float | None, times: Any, source: str) ->
 
 
 def _trimmed(out: np.ndarray, t: np.ndarray, trim: float, source: str) -> np.ndarray:
-    if not (math.isfinite(trim) and trim >= 0):
-        raise InputError(f"{source}: trim: got {trim!r}, expected seconds, 0 or more")
-    if not trim:
+    if not as_number(trim, f"{source}: trim", "seconds, at least 0", lambda s: s >= 0):
         return out
     kept = out[(out >= t[0] + trim - _SLACK) & (out <= t[-1] - trim + _SLACK)]
     if not len(kept):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from .arrays import as_samples, check_rising
+from .arrays import as_doubles, as_samples, as_text, check_rising
 from .column_units import FORCE, MOMENT
 from .file_words import digest
 from .frame import as_sampled, table_from_frame
@@ -17,6 +17,7 @@ from .number_table import Table
 from .table_reader import read_table
 from .unit_checks import load_warnings
 
+POINT = "the name of a platform point"
 _SLACK = 1e-9  # [s], by which times may miss the load's ends through rounding
 
 
@@ -87,8 +88,9 @@ class Load:
             raise InputError(f"{source}: no samples")
         check_rising(t, f"{source}, sample {{}}".format)
         wrench = np.zeros((len(t), 6))
-        if moment is None and np.shape(force) == wrench.shape:
-            force, moment = np.asarray(force)[:, :3], np.asarray(force)[:, 3:]
+        force, point = as_doubles(force, f"{source}: force"), as_text(point, "point", POINT)
+        if moment is None and force.shape == wrench.shape:
+            force, moment = force[:, :3], force[:, 3:]
         wrench[:, :3] = _vectors(force, "force", source, len(t))
         if moment is not None:
             wrench[:, 3:] = _vectors(moment, "moment", source, len(t))
@@ -98,12 +100,23 @@ class Load:
     def constant(cls, force: Any, moment: Any = (0, 0, 0), point: str | None = None) -> Load:
         """The same force [N] and moment [N m], (3,) each, at all times."""
         parts = [_vectors([v], n, "load", 1) for v, n in ((force, "force"), (moment, "moment"))]
+        as_text(point, "point", POINT)
         return cls(np.empty(0), np.hstack(parts), point, "constant load")
 
     @classmethod
     def zero(cls) -> Load:
         """No load."""
         return cls(np.empty(0), np.zeros((1, 6)), None, "no load")
+
+    def __repr__(self) -> str:
+        """Source, span and greatest values in one line."""
+        if not len(self.t):
+            span = "constant"
+        else:
+            span = f"{len(self.t)} samples from {self.t[0]:.6g} to {self.t[-1]:.6g} s"
+        force, moment = (np.linalg.norm(part, axis=1).max() for part in np.split(self.wrench, 2, 1))
+        at = f" at {self.point}" if self.point else ""
+        return f"Load({self.source}: {span}, up to {force:.4g} N and {moment:.4g} N m{at})"
 
     def at(self, times: Any) -> np.ndarray:
         """Wrench at `times`, linear between the samples, (len(times), 6).
@@ -143,10 +156,7 @@ def as_load(load: Any) -> Load:
 
 def _vectors(values: Any, name: str, source: str, rows: int) -> np.ndarray:
     columns = ", ".join(FORCE if name == "force" else MOMENT)
-    try:
-        array = np.array(values, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{source}: {name} is not made of numbers ({error})") from error
+    array = as_doubles(values, f"{source}: {name}")
     if array.shape != (rows, 3):
         hint = "; give its transpose" if array.shape == (3, rows) else ""
         raise InputError(

@@ -16,10 +16,13 @@ from __future__ import annotations
 import os
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..atomic import replacing
+from ..errors import as_path
+from ..mechanism.files import as_mechanism
 from ..mechanism.home import characteristic_length, independent_coordinates
 from ..mechanism.mechanism import Mechanism
 from .column_units import LANDMARK
@@ -57,7 +60,7 @@ def write_reference(folder: str | os.PathLike[str]) -> list[Path]:
     """Copy the bundled motion and load into `folder`, as they are; returns their paths."""
     paths = []
     for source in bundled_reference():
-        paths.append(Path(folder) / source.name)
+        paths.append(Path(as_path(folder, "folder")) / source.name)
         with replacing(paths[-1]) as temporary:
             temporary.write_bytes(source.read_bytes())
     return paths
@@ -74,21 +77,24 @@ def _columns(file: Path) -> np.ndarray:
 
 
 def trial_motion(
-    mechanism: Mechanism,
+    model: Any,
     *,
     cutoff: float | str | None = None,
     rate: float | None = None,
     trim: float = 0.0,
 ) -> Motion:
-    """Five seconds in which the independent coordinates sway about home, each at its own pace.
+    """Five seconds in which the independent coordinates oscillate about home, each at its own rate.
 
         q_i = a_i w(t) sin(2 pi f_i t),    f_i = 0.4, 0.55, 0.7, ... Hz
 
     with a_i = 3 % of the characteristic length or 0.03 rad, and w rising from 0 to 1 in the first
     second. Synthetic.
 
-    Args: cutoff, rate, trim: as of `Motion.from_arrays`.
+    Args:   model: a model or mechanism, the path of a mechanism file or a bundled name.
+            cutoff, rate, trim: as of `Motion.from_arrays`.
+    Raises: InputError: for anything else.
     """
+    mechanism = as_mechanism(model)
     t = np.round(np.linspace(0, 5, 5001), 3)
     names = independent_coordinates(mechanism)
     length = SWAY * characteristic_length(mechanism)

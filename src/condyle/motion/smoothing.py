@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
 from .. import progress
 from ..errors import InputError
+from .arrays import as_number
 from .column_units import ANGLE_UNITS, POSE
 from .spline import Spline
 
@@ -50,13 +52,11 @@ class Smoothing:
 
 def parse_cutoff(cutoff: float | str) -> float:
     """Cut-off in Hz from a number or "auto"."""
-    try:
-        value = AUTO_CUTOFF if cutoff == "auto" else float(cutoff)
-    except (TypeError, ValueError):
-        value = math.nan
-    if not (math.isfinite(value) and value > 0):
-        raise InputError(f'cut-off: got {cutoff!r}, expected a frequency in Hz above 0, or "auto"')
-    return value
+    given: object = AUTO_CUTOFF if isinstance(cutoff, str) and cutoff == "auto" else cutoff
+    if isinstance(given, str):  # of the command line
+        with suppress(ValueError):
+            given = float(given)
+    return as_number(given, "cutoff", 'a frequency above 0 Hz, or "auto"', lambda f: f > 0)
 
 
 def smoothing_spline(t: np.ndarray, values: np.ndarray, cutoff: float) -> Spline:

@@ -10,6 +10,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from ..errors import as_path
 from ..progress import step
 from .number_table import Known, Table
 
@@ -51,7 +52,7 @@ def iter_table(
     Raises: InputError: for whatever is not a table of finite numbers, with line and column. Chunks
             before the one with the error have been yielded by then.
     """
-    if is_parquet(path):
+    if is_parquet(path := as_path(path)):
         from .parquet_file import iter_parquet as read  # pyarrow takes a while
     else:
         from .csv_file import iter_csv as read

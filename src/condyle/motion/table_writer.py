@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Self
 import numpy as np
 
 from ..atomic import replacing
+from ..errors import InputError
 from .table_reader import is_parquet
 
 if TYPE_CHECKING:
@@ -69,10 +70,12 @@ class TableWriter:
 
         names = list(columns)
         if names != (self._names or names):
-            raise ValueError(f"columns {names} differ from those of the first chunk, {self._names}")
+            raise InputError(
+                f"columns: expected those of the first chunk, {self._names}, got {names}"
+            )
         if len({len(column) for column in columns.values()}) != 1:
             sizes = sorted({len(column) for column in columns.values()})
-            raise ValueError(f"expected columns of one length, got lengths {sizes}")
+            raise InputError(f"columns: expected one length, got {sizes}")
         table = pa.table({name: _array(column) for name, column in columns.items()})
         if not self._names:
             self._names = names
