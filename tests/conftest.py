@@ -6,7 +6,7 @@ import os
 import sys
 import tomllib
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -35,6 +35,28 @@ from support.building import (  # noqa: F401 - fixtures
 for _name in ("FORCE_COLOR", "GITHUB_ACTIONS", "LINES", "NO_COLOR", "PY_COLORS", "TERMINAL_WIDTH"):
     os.environ.pop(_name, None)
 os.environ["COLUMNS"] = "100"
+
+# Fixtures that build kernels or drive a browser.
+SLOW_FIXTURES = {"browser", "compiler_command"}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """A test that asks for a compiler or a browser is slow, marked or not."""
+    for item in items:
+        if SLOW_FIXTURES & {*getattr(item, "fixturenames", ())}:
+            item.add_marker(pytest.mark.slow)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+    """Tests without a mark run kernels by numpy, the others as people do; no setting of theirs."""
+    marked = any(item.iter_markers("slow")) or any(item.iter_markers("ci"))
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("CONDYLE_BACKEND", "CONDYLE_LANES"):
+            patch.delenv(name, raising=False)
+        if not marked:
+            patch.setenv("CONDYLE_BACKEND", "numpy")
+        return (yield)
 
 
 @pytest.fixture(scope="session")

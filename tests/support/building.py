@@ -33,8 +33,6 @@ def kernel_cache(request: pytest.FixtureRequest, kernel_folder: Path) -> Iterato
         return
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("CONDYLE_CACHE", str(kernel_folder))
-        for name in ("CONDYLE_BACKEND", "CONDYLE_LANES"):
-            patch.delenv(name, raising=False)
         yield
 
 
