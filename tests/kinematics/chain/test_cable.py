@@ -11,6 +11,7 @@ from oracles.description import read
 from oracles.random_mechanism import toml_text
 from oracles.rotations import platform_motion
 from support.families import LINES, Case, case, close, same
+from support.speeds import few, slow
 
 import condyle
 from condyle.dynamics import FORMULATIONS
@@ -35,7 +36,7 @@ def telescopic(c: Case) -> Case:
 
 @pytest.mark.parametrize("route", ["core", "direct"])
 @pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.parametrize("name", LINES)
+@pytest.mark.parametrize("name", few(LINES, "mixed_k2"))
 def test_formulations_and_routes_agree(name: str, formulation: str, route: str) -> None:
     if route == "direct" and "curved" in name:
         pytest.skip("no parasitic motion in closed form")
@@ -56,8 +57,9 @@ def test_against_free_bodies(name: str) -> None:
         np.testing.assert_allclose(found.configuration.joint[i], theirs["joint"], atol=1e-14)
 
 
+@slow
 @pytest.mark.parametrize("formulation", ["virtual_power", "newton_euler"])
-@pytest.mark.parametrize("name", ["k2_n9", "mixed_k1", "mixed_k2"])
+@pytest.mark.parametrize("name", few(["k2_n9", "mixed_k1", "mixed_k2"], "mixed_k2"))
 def test_compiled_kernels_agree(name: str, formulation: str) -> None:
     """In a batch, and one sample at a time by the kernel of least latency."""
     c = case(name)

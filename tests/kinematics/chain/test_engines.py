@@ -10,11 +10,12 @@ from oracles import newton_euler
 from oracles.mujoco_engine import MujocoEngine
 from oracles.pinocchio_engine import PinocchioEngine
 from support.families import MECHANISMS, case, close
+from support.speeds import few
 
 TOLERANCE = 1e-9
 
 
-@pytest.mark.parametrize("name", MECHANISMS)
+@pytest.mark.parametrize("name", few(MECHANISMS, "rss", "pss_k1", "sps_k3", "mixed_k0_n8"))
 @pytest.mark.parametrize("engine", ["pinocchio", "mujoco", "newton_euler"])
 def test_efforts_contacts_and_joints(name: str, engine: str) -> None:
     c = case(name)

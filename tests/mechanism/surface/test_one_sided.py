@@ -107,6 +107,7 @@ def test_a_file_from_before_there_was_lift_off(
     assert summarize(again).data == summarize(solution).data
 
 
+@pytest.mark.slow
 def test_compiled_kernels_flag_the_same_samples(reference: Mechanism, chewing: Motion) -> None:
     machine = one_sided(reference)
     compiled = condyle.derive(machine).solve(chewing, condyle.reference_load())

@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from oracles.random_mechanism import random_mechanism, toml_text
+from support.speeds import few
 from support.surfaces import CLOSED, KINDS, ball_options
 
 import condyle
@@ -66,7 +67,7 @@ def test_nearest(options: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("ball", [0.0, 4.0])
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", few(KINDS, "quadratic", "sphere"))
 def test_check_gives_points_for_the_file(
     condyle_command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, kind: str, ball: float
 ) -> None:

@@ -53,6 +53,7 @@ def saved(solution: Solution, tmp_path: Path) -> Solution:
     return condyle.open_solution(tmp_path / "s.nc")
 
 
+@pytest.mark.slow
 def test_every_backend_and_model(machine: Mechanism, motion: Motion, solution: Solution) -> None:
     by_default = condyle.derive(machine).solve(motion)
     close(by_default["torque"].values, solution["torque"].values, 1e-11)
