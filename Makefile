@@ -1,29 +1,41 @@
-# make run    solve the reference case      make test   lint, types, tests
-# make bench  compare with other engines    make docs   build the documentation
+# make run    solve the reference case      make quick  laws, files, numpy, command line: 2 minutes
+# make bench  compare with other engines    make test   all that a change can break: 9 minutes
+# make docs   build the documentation       make ci     what is left: with make test, an hour
 # make format  set the code                 make fuzz   the long run of the fuzzers
 # make lint    ruff and mypy alone          make house  which room imports which
-# make coverage  what the tests of four rooms leave out; make test COVER=1 holds it
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 
-.PHONY: run test lint house format fuzz coverage narrow install bench docs clean
+PYTEST := $(BIN)/pytest --numprocesses auto --dist worksteal
+
+.PHONY: run quick test ci lint house format exhaustive coverage fuzz narrow install oldest newest \
+	bench docs clean
 
 run: $(VENV)/run.stamp
 	$(BIN)/condyle run --out results --figures
 
-# Rooms that people's words and files come through. Measuring all takes half as long again.
-ROOMS := cli markers mechanism motion
-COVERED := $(ROOMS:%=tests/%)
+# Three speeds: tests without a mark, slow ones too, the rest (`markers` in pyproject.toml).
+# ARGS are pytest's: make quick ARGS="tests/motion -x".
+quick: $(VENV)/test.stamp
+	$(PYTEST) -m "not slow and not ci" $(ARGS)
 
 test: lint house
-ifdef COVER
-	$(BIN)/pytest --numprocesses 2 $(PYTEST) $(COVERED:%=--ignore=%)
-	$(MAKE) coverage
-else
-	$(BIN)/pytest --numprocesses 2 $(PYTEST)
-endif
+	$(PYTEST) -m "not ci" $(ARGS)
+
+ci: exhaustive coverage fuzz narrow install oldest newest
+
+# Rooms that people's words and files come through: their tests run once more, for the coverage.
+ROOMS := cli markers mechanism motion
+
+exhaustive: $(VENV)/test.stamp
+	$(PYTEST) -m ci $(ROOMS:%=--ignore=tests/%) $(ARGS)
+
+coverage: $(VENV)/test.stamp
+	$(PYTEST) $(ROOMS:%=--cov=condyle.%) --cov-report= $(ROOMS:%=tests/%)
+	@echo "Least covered:"
+	@$(BIN)/coverage report --fail-under=95
 
 lint: $(VENV)/test.stamp
 	$(BIN)/ruff check .
@@ -37,13 +49,9 @@ format: $(VENV)/test.stamp
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
+FUZZ_RUNS := 10000
 fuzz: $(VENV)/test.stamp
-	$(BIN)/pytest --numprocesses 2 tests/fuzz --fuzz-runs 100000
-
-coverage: $(VENV)/test.stamp
-	$(BIN)/pytest --numprocesses 2 $(ROOMS:%=--cov=condyle.%) --cov-report= $(COVERED)
-	@echo "Least covered:"
-	@$(BIN)/coverage report --fail-under=95
+	$(PYTEST) tests/fuzz --fuzz-runs $(FUZZ_RUNS)
 
 narrow: $(VENV)/test.stamp
 	.ci/narrow x86-64-v3
@@ -51,6 +59,9 @@ narrow: $(VENV)/test.stamp
 
 install: $(VENV)/test.stamp
 	CONDYLE_INSTALL=required $(BIN)/pytest tests/install
+
+oldest newest: $(VENV)/test.stamp
+	.ci/versions $@
 
 bench: $(VENV)/bench.stamp
 	$(BIN)/condyle bench --out results/bench.json

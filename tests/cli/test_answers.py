@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support.recorded_jaw import record
+from support.speeds import few, slow
 
 import condyle
 from benchmarks import Benchmark
@@ -123,7 +124,7 @@ def command(
     return condyle_command
 
 
-@pytest.mark.parametrize("name", CALLS)
+@pytest.mark.parametrize("name", few(CALLS, "new", "check", "run", "solve", "plot", rest=slow))
 def test_the_next_step_works(
     command: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:

@@ -137,6 +137,7 @@ def test_mixed_units_are_not_added(condyle_command: Run) -> None:
 # -- the curve ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_tradeoff(condyle_command: Run, read_csv: Read) -> None:
     outcome = condyle_command("compare", "--tradeoff", *SHORT)
     assert outcome.status == 0, outcome.err

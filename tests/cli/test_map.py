@@ -21,6 +21,7 @@ def test_names_are_those_of_the_library() -> None:
     assert tuple(QUANTITIES) == completion.QUANTITIES
 
 
+@pytest.mark.slow
 def test_a_map_with_its_pictures(condyle_command: Callable[..., Any], tmp_path: Path) -> None:
     done = condyle_command(
         "map", "masticatory", *SMALL, "--quantity", "reachable,effort", "--load", "Fz=-9 N",

@@ -205,6 +205,7 @@ def test_steps_of_a_run(watcher: Watcher, tmp_path: Path) -> None:
     assert "writing the report" in watcher.steps
 
 
+@pytest.mark.slow
 def test_steps_of_a_comparison(
     watcher: Watcher, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -222,6 +223,7 @@ def test_steps_of_a_comparison(
     assert watcher.steps["drawing figures"] == [12, 12]
 
 
+@pytest.mark.slow
 def test_building_a_kernel(
     watcher: Watcher, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

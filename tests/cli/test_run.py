@@ -168,6 +168,7 @@ def test_flagged_samples(
     assert 'unreachable, chain "temporalis_' in outcome.out
 
 
+@pytest.mark.slow
 def test_contacts_of_any_number_have_a_run(
     condyle_command: Callable[..., Any],
     write_csv: Callable[..., Path],
@@ -232,6 +233,7 @@ def test_names_never_leave_the_folder(
     assert len(list(Path("results").iterdir())) == 2
 
 
+@pytest.mark.slow
 def test_compare_with_its_page_does_not_propose_to_make_it(
     condyle_command: Callable[..., Any],
 ) -> None:
@@ -253,6 +255,7 @@ def test_figures_for_a_journal_from_the_command(condyle_command: Callable[..., A
     assert wrong.status == 2 and "journal" in wrong.err
 
 
+@pytest.mark.slow
 def test_compare_in_short(condyle_command: Callable[..., Any]) -> None:
     outcome = condyle_command("compare", "--no-figures", "--rate", 20, "--out", "compared")
     assert outcome.status == 0 and outcome.err == ""

@@ -232,6 +232,7 @@ def test_bounds_warn_and_strict_refuses(solve: Solve) -> None:
     assert (outcome.status, outcome.out, outcome.err) == (0, "", "")
 
 
+@pytest.mark.slow
 def test_threads(
     condyle_command: Callable[..., Any], solve: Solve, monkeypatch: pytest.MonkeyPatch
 ) -> None:

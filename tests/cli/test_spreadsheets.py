@@ -65,6 +65,7 @@ WAYS: dict[str, Callable[[str], bytes]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
 def test_the_same_numbers(
     condyle_command: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, command: str
