@@ -124,23 +124,21 @@ def reference_solution(rate: float, reactions: bool = False) -> Any:
 def draw_maps(folder: Path, solution: Any) -> None:
     """Write `MAPS`: the chewing robot under the reference run, and a platform's singular curves."""
     import condyle
-    from condyle.analysis.map.axes import grid_of
-    from condyle.analysis.map.compute import asked_of
     from condyle.analysis.map.lines import slices_of
     from condyle.report.figures.map_figures import map_figure
 
     run = solution["pose"].sel(coordinate=["X", "beta"]).values
     jaw = ["X=-5:15:120 mm", "beta=-15:25:120 deg"]
     legs = ["X=-2500:2500:100 mm", "gamma=-140:140:100 deg"]
-    for picture, name, over, hold, strokes, path in (
+    for picture, name, over, hold, stroke, path in (
         ("map-ratio", "masticatory", jaw, "", "", run),
         ("map-singular", "gough-stewart", legs, "alpha=10 deg", "*=-1500:1500 mm", None),
     ):
         model = condyle.derive(condyle.load_mechanism(name), backend="numpy")
-        asked = asked_of(model, strokes=strokes or ())
-        slices = list(slices_of(asked.reach, grid_of(model.mechanism, over, hold)))
-        found = condyle.workspace_map(model, over, "ratio", hold, strokes=strokes or ())
-        map_figure(found, "ratio", slices, path).savefig(folder / f"{picture}.png", dpi=110)
+        found = condyle.workspace_map(model, over, "ratio", hold, stroke=stroke or ())
+        map_figure(found, "ratio", list(slices_of(found, model)), path).savefig(
+            folder / f"{picture}.png", dpi=110
+        )
 
 
 def quantity_table() -> str:

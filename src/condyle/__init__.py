@@ -44,6 +44,8 @@ _HOMES = {
     "simulate_all": "simulation",
     "ScenarioError": "errors",
     "workspace_map": "analysis.map",
+    "workspace_size": "analysis.map",
+    "open_map": "analysis.map",
     "Study": "analysis.sweep",
     "sweep": "analysis.sweep",
     "export_c": "export.c_package",
@@ -53,7 +55,7 @@ _HOMES = {
 }
 
 if TYPE_CHECKING:
-    from .analysis.map import workspace_map
+    from .analysis.map import open_map, workspace_map, workspace_size
     from .analysis.sweep import Study, sweep
     from .errors import (
         CondyleError,

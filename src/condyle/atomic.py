@@ -78,6 +78,21 @@ def replacing_folder(path: str | os.PathLike[str], mark: str) -> Iterator[Path]:
             shutil.rmtree(folder, ignore_errors=True)
 
 
+def make_folder(path: str | os.PathLike[str]) -> Path:
+    """A folder, and those above it, made unless they are there.
+
+    Raises: InputError: if it cannot be one.
+    """
+    if not isinstance(path, str | os.PathLike):
+        raise InputError(f"path: expected a path, got {type(path).__name__}")
+    try:
+        Path(path).mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: cannot be made a folder for results ({reason})") from None
+    return Path(path)
+
+
 def _beside(target: Path) -> Path:
     """A name in the same folder that tells whose it is."""
     name = f".{target.name[:100]}.{_host()}-{os.getpid()}-{secrets.token_hex(4)}.part"

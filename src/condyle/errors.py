@@ -220,6 +220,18 @@ def did_you_mean(name: object, available: Iterable[str]) -> str:
     return guess + listed
 
 
+def texts_of(argument: str, given: object, separated: bool = True) -> tuple[str, ...]:
+    """One text or several; `separated`: by commas too.
+
+    Raises: InputError: for anything else.
+    """
+    texts = [given] if isinstance(given, str) else given
+    if not isinstance(texts, list | tuple) or not all(isinstance(one, str) for one in texts):
+        raise InputError(f"{argument}: expected a name or several, got {given!r:.60}")
+    parts = (text.split(",") if separated else [text] for text in texts)
+    return tuple(part.strip() for group in parts for part in group)
+
+
 def few(names: Iterable[str]) -> str:
     """'a, b, c' of names, and of many the first ten."""
     names = list(names)

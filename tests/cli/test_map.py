@@ -55,7 +55,7 @@ def test_three_coordinates_and_zarr(condyle_command: Callable[..., Any], tmp_pat
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--over", "X=5:-5:9 mm"), "give the lesser first"),
+        (("--over", "X=5:-5:9 mm"), "must be increasing"),
         (("--quantity", "ratoi"), "ratoi"),
         (("--format", "xls"), 'no format "xls"'),
         (("--run", "missing.nc"), "missing.nc"),

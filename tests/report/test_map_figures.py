@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.analysis.map.axes import grid_of
-from condyle.analysis.map.compute import asked_of
 from condyle.analysis.map.lines import slices_of
 from condyle.report.figures.map_figures import LINES, drawn, grown, map_figure
 
@@ -18,8 +16,8 @@ def model() -> condyle.Model:
 
 
 def drawing(model: condyle.Model, over: list[str], quantity: str | list[str]):
-    asked, grid = asked_of(model), grid_of(model.mechanism, over)
-    return condyle.workspace_map(model, over, quantity), list(slices_of(asked.reach, grid))
+    found = condyle.workspace_map(model, over, quantity)
+    return found, list(slices_of(found, model))
 
 
 def test_two_coordinates(model: condyle.Model) -> None:

@@ -52,12 +52,12 @@ def test_a_click_moves_the_mechanism(open_tab: Callable[..., Tab], view: View) -
     tab = open_tab(view.url)
     tab.page.wait_for_selector("[data-level]")
 
-    def skin(pixels: np.ndarray) -> np.ndarray:
+    def isosurface(pixels: np.ndarray) -> np.ndarray:
         blue = pixels[..., 2].astype(int)
         return (blue > 150) & (blue - pixels[..., 0] > 50) & (pixels[..., 1] > 120)
 
-    pixels = tab.picture_where("canvas", lambda p: skin(p).sum() > 500, "the map")
-    rows, columns = np.nonzero(skin(pixels))
+    pixels = tab.picture_where("canvas", lambda p: isosurface(p).sum() > 500, "the map")
+    rows, columns = np.nonzero(isosurface(pixels))
     box = tab.page.locator("canvas").first.bounding_box()
     assert box is not None
     order = np.argsort(np.hypot(rows - np.median(rows), columns - np.median(columns)))

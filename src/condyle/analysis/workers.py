@@ -42,11 +42,11 @@ class LostWorkerError(CondyleError):
 
 def check_scheduler(workers: int | None, scheduler: str) -> None:
     """Raises InputError for what cannot be a scheduler, or does not answer as one."""
-    if workers is not None and workers < 1:
-        raise InputError(f"workers: expected 1 or more, got {workers}")
+    if workers is not None and not (isinstance(workers, int) and workers >= 1):
+        raise InputError(f"workers: expected a whole number of at least 1, got {workers!r:.40}")
     if scheduler in (PROCESSES, THREADS):
         return
-    if scheduler != DASK and "://" not in scheduler:
+    if scheduler != DASK and "://" not in str(scheduler):
         raise InputError(
             f'scheduler "{scheduler}": expected {PROCESSES}, {THREADS}, {DASK} (a cluster on this '
             "machine), or the address of a Dask scheduler such as tcp://10.0.0.1:8786"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,15 +12,14 @@ from ..extras import require
 from . import completion, options
 from .answer import Answer, command_line, files_line
 from .command import COMPUTE, command
-from .inputs import chosen_model, file_stem, output_folder
+from .inputs import chosen_model, file_stem
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from ..analysis.map.axes import Grid
-    from ..analysis.map.block import Asked
+    from ..model.model import Model
 
-LARGE = 200_000_000  # bytes above which auto streams to Zarr
+SUFFIXES = {"auto": "", "netcdf": ".nc", "zarr": ".zarr"}
 
 
 @command(
@@ -76,77 +75,55 @@ def map_(
     """
     if figures:
         require("matplotlib", "figures")
-    if format not in completion.FORMATS:
+    if format not in SUFFIXES:
         raise InputError(f'no format "{format}"; expected {", ".join(completion.FORMATS)}')
     import condyle
 
-    from ..analysis.map.axes import grid_of
-    from ..analysis.map.compute import asked_of, mapped, size_of
-    from ..analysis.map.extent import numbers_of
-    from ..analysis.map.map_files import save_map
-    from ..analysis.map.map_quantities import chosen
-    from ..analysis.workers import check_scheduler
-    from ..report.map_text import numbers_text
+    from ..report.map_text import size_text
 
+    solution = condyle.open_solution(run) if run is not None else None
     machine = condyle.load_mechanism(mechanism)
-    grid = grid_of(machine, over or default_over(machine), hold)
-    names = tuple(part.strip() for one in quantity or ["ratio"] for part in one.split(","))
     model = chosen_model(machine, "virtual_power", "core", backend, distribution, preload, 0.0)
-    asked = asked_of(model, load, load_point, direction, stiffness, stroke or (), threads)
-    quantities = chosen(names, asked)
-    if scheduler is not None:
-        check_scheduler(workers, scheduler)
-    path = _run_path(run, grid) if run is not None else None
-    streamed = format == "zarr" or (format == "auto" and size_of(asked, grid, quantities) > LARGE)
-    if streamed:
-        require("zarr", "maps")
-    stem = output_folder(out) / f"{file_stem(machine.name)}-map"
-    file = stem.with_suffix(".zarr" if streamed else ".nc")
-    dataset = mapped(asked, grid, quantities, file if streamed else None, workers, scheduler)
-    if not streamed:
-        save_map(dataset, file)
-    numbers = numbers_of(asked, grid, margin)
-    files = [file]
-    if figures:
-        files += _draw(asked, grid, dataset, stem, path)
+    found = condyle.workspace_map(
+        model,
+        over,
+        quantity or "ratio",
+        hold,
+        load,
+        load_point,
+        direction,
+        stiffness,
+        stroke or (),
+        out=out / f"{file_stem(machine.name)}-map{SUFFIXES[format]}",
+        threads=threads,
+        workers=workers,
+        scheduler=scheduler,
+    )
+    size = condyle.workspace_size(found, margin, model)
+    file = Path(found.encoding["source"])
+    files = [file, *(_draw(found, model, file, solution) if figures else [])]
+    axes = {str(name): found[name].values for name in found["status"].dims}
     data = {
         "mechanism": machine.name,
-        "axes": {a.name: {"low": a.low, "high": a.high, "count": a.count} for a in grid.axes},
-        "quantities": list(names),
-        **numbers.data,
+        "axes": {n: {"low": v[0], "high": v[-1], "count": len(v)} for n, v in axes.items()},
+        "quantities": [name for one in quantity or ["ratio"] for name in one.split(",")],
+        **size.data,
         "files": files,
     }
-    text = f"{numbers_text(numbers)}\n\n{files_line(files)}"
-    turned = len(grid.axes) > 1
-    then = command_line("view", map=file) if turned else command_line("check", mechanism)
-    return Answer(text, data, then)
+    then = command_line("view", map=file) if len(axes) > 1 else command_line("check", mechanism)
+    return Answer(f"{size_text(size)}\n\n{files_line(files)}", data, then)
 
 
-def default_over(machine: Any) -> list[str]:
-    """The first two coordinates, a characteristic length or a radian about home."""
-    from ..mechanism.home import characteristic_length, independent_coordinates
-
-    length, names = characteristic_length(machine), independent_coordinates(machine)
-    spans = {name: (length / 2 if name in "XYZ" else 0.5) for name in names[:2]}
-    return [f"{name}={-span!r}:{span!r}:100" for name, span in spans.items()]
-
-
-def _run_path(run: Path, grid: Grid) -> Any:
-    """The motion of a run along the axes, (N, d)."""
-    import condyle
-
-    pose = condyle.open_solution(run)["pose"]
-    return pose.sel(coordinate=[axis.name for axis in grid.axes]).values
-
-
-def _draw(asked: Asked, grid: Grid, dataset: xr.Dataset, stem: Path, path: Any) -> list[Path]:
+def _draw(found: xr.Dataset, model: Model, file: Path, solution: xr.Dataset | None) -> list[Path]:
     from ..analysis.map.lines import slices_of
     from ..report.figures import save
     from ..report.figures.map_figures import drawn, map_figure
 
-    slices = list(slices_of(asked.reach, grid))
+    slices, path = list(slices_of(found, model)), None
+    if solution is not None:
+        path = solution["pose"].sel(coordinate=list(found["status"].dims)).values
     files = []
-    for name in drawn(dataset):
-        figure = map_figure(dataset, name, slices, path)
-        files += save(figure, stem.parent, f"{stem.name}-{'reach' if name == 'cause' else name}")
+    for name in drawn(found):
+        figure = map_figure(found, name, slices, path)
+        files += save(figure, file.parent, f"{file.stem}-{'reach' if name == 'cause' else name}")
     return files

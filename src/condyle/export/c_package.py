@@ -18,8 +18,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..atomic import write_text
+from ..atomic import make_folder, write_text
 from ..backends.compiler import CompilerError, find_compiler
+from ..errors import texts_of
 from ..mechanism import Mechanism
 from ..model.model import Model
 from .c_names import in_format, literal, packaged
@@ -27,7 +28,7 @@ from .c_samples import Vectors, vectors
 from .c_source import export
 from .catalogue import in_order, usual
 from .exported import Exported, Function
-from .written import Written, folder_at, mechanism_of, names_of, write_texts
+from .written import Written, mechanism_of, write_texts
 
 # By precision: what results may differ from the library's by, over the largest entry of each.
 TOLERANCE = {"double": 1e-12, "float": 1e-4}
@@ -75,11 +76,11 @@ def export_c(
     mechanism = mechanism_of(model)
     if isinstance(model, Model):
         formulation, route = formulation or model.formulation, route or model.route
-    names = in_order(names_of("coordinates", coordinates or ()))
+    names = in_order(texts_of("coordinates", coordinates or ()))
     asked = usual(mechanism) + ("closure",) * bool(names or landmark)
     exported = export(
         mechanism,
-        asked if question is None else names_of("question", question),
+        asked if question is None else texts_of("question", question),
         formulation=formulation or "virtual_power",
         route=route or "core",
         precision=precision,
@@ -89,7 +90,7 @@ def export_c(
         coordinates=names,
         landmark=landmark,
     )
-    folder = folder_at(path)
+    folder = make_folder(path)
     files = write_package(exported, folder)
     facts = write_facts(exported, folder)
     data = {

@@ -20,13 +20,13 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from .. import __version__
 from ..atomic import replacing
 from ..backends.compiler import CompilerError, find_compiler
-from ..errors import InputError
+from ..errors import InputError, texts_of
 from ..mechanism import Mechanism
 from ..model.model import Model
 from .c_names import in_comment
 from .catalogue import least_norm
 from .fmu_model import Fmu, Scalar, fmu_model
-from .written import Written, file_at, mechanism_of, names_of
+from .written import Written, file_at, mechanism_of
 
 VERSIONS = (2, 3)
 DEFAULT = ("plant", "inverse", "controller")
@@ -70,7 +70,7 @@ def export_fmu(
             UnsupportedError: for a mechanism that cannot be exported to C.
     """
     mechanism = mechanism_of(model)
-    kinds = list(dict.fromkeys(names_of("kind", kind)))
+    kinds = list(dict.fromkeys(texts_of("kind", kind)))
     if fmi not in VERSIONS:
         raise InputError(f"fmi: expected 2 or 3, got {fmi!r:.40}")
     if str(path).endswith(".fmu") and len(kinds) != 1:

@@ -10,12 +10,14 @@ import os
 import textwrap
 from collections.abc import Iterator, Sequence
 
+from ..atomic import make_folder
+from ..errors import texts_of
 from ..mechanism import Mechanism
 from ..model.model import Model
 from .c_names import identifier, packaged
 from .c_source import export
 from .exported import Argument, Exported, Function
-from .written import Written, folder_at, mechanism_of, names_of, write_texts
+from .written import Written, mechanism_of, write_texts
 
 DEFAULT = ("contact", "inverse", "bounded", "forward", "motion", "pose", "computed_torque")
 LONGEST = 63  # letters of a name in MATLAB
@@ -38,13 +40,13 @@ def export_matlab(
     mechanism = mechanism_of(model)
     # Short enough that every function's name is one in MATLAB.
     prefix = identifier(mechanism.name).lower()[:40]
-    e = export(mechanism, names_of("question", question), lanes=0, prefix=prefix)
+    e = export(mechanism, texts_of("question", question), lanes=0, prefix=prefix)
     texts = {f"{e.prefix}.c": e.source, f"{e.prefix}.h": e.header}
     for f in e.functions:
         texts[f"{f.name}_mex.c"] = gateway(e, f)
         texts[f"{f.name}.m"] = help_text(e, f)
     texts |= {"build.m": build(e), f"{e.prefix}_example.m": example(e)}
-    return Written(write_texts(folder_at(path), texts), (), {"mechanism": mechanism.name})
+    return Written(write_texts(make_folder(path), texts), (), {"mechanism": mechanism.name})
 
 
 def gateway(e: Exported, f: Function) -> str:

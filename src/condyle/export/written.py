@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from ..atomic import write_text
+from ..atomic import make_folder, write_text
 from ..errors import InputError
 from ..mechanism import Mechanism, load_mechanism
 from ..model.model import Model
@@ -45,27 +45,12 @@ def mechanism_of(given: Model | Mechanism | str | os.PathLike[str]) -> Mechanism
     )
 
 
-def folder_at(path: str | os.PathLike[str]) -> Path:
-    """The folder for an export, made if need be.
-
-    Raises: InputError: if it cannot be one.
-    """
-    if not isinstance(path, str | os.PathLike):
-        raise InputError(f"path: expected a path, got {type(path).__name__}")
-    try:
-        Path(path).mkdir(parents=True, exist_ok=True)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{path}: cannot be made a folder for results ({reason})") from None
-    return Path(path)
-
-
 def file_at(path: str | os.PathLike[str], name: str, suffix: str) -> Path:
     """The path itself if it ends in `suffix`, else the file of that name in the folder."""
     if isinstance(path, str | os.PathLike) and str(path).endswith(suffix):
-        folder_at(Path(path).parent)
+        make_folder(Path(path).parent)
         return Path(path)
-    return folder_at(path) / f"{file_stem(name)}{suffix}"
+    return make_folder(path) / f"{file_stem(name)}{suffix}"
 
 
 def file_stem(name: str) -> str:
@@ -78,15 +63,3 @@ def write_texts(folder: Path, texts: Mapping[str, str]) -> list[Path]:
     for name, text in texts.items():
         write_text(folder / name, text)
     return [folder / name for name in texts]
-
-
-def names_of(argument: str, given: str | Sequence[str]) -> tuple[str, ...]:
-    """One name, several separated by commas, or a sequence of them.
-
-    Raises: InputError: for anything else.
-    """
-    if isinstance(given, str):
-        return tuple(part.strip() for part in given.split(","))
-    if not isinstance(given, Sequence) or not all(isinstance(one, str) for one in given):
-        raise InputError(f"{argument}: expected a name or several, got {given!r:.60}")
-    return tuple(given)

@@ -1,21 +1,21 @@
-"""A map's numbers in words."""
+"""The size of a workspace in words."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from math import pi
 
-from ..analysis.map.extent import Numbers
+from ..analysis.map.map_size import WorkspaceSize
 from ..mechanism.mechanism import COORDINATES
 from ..mechanism.mechanism_checks import length_text
 
 
-def numbers_text(numbers: Numbers) -> str:
-    """A paragraph a number."""
-    return "\n".join(_lines(numbers))
+def size_text(size: WorkspaceSize) -> str:
+    """One line each for volume, ball and box."""
+    return "\n".join(_lines(size))
 
 
-def _lines(n: Numbers) -> Iterator[str]:
+def _lines(n: WorkspaceSize) -> Iterator[str]:
     v = n.volume
     yield (
         f"reachable:  {v.share:.4%} of the range, {v.value:.6g} {n.unit}, error about "
@@ -38,7 +38,7 @@ def _lines(n: Numbers) -> Iterator[str]:
     yield f"box:        {sides}; certified at points {_sides(n, n.box.spacing)} apart"
 
 
-def _sides(n: Numbers, values: tuple[float, ...]) -> str:
+def _sides(n: WorkspaceSize, values: tuple[float, ...]) -> str:
     return " x ".join(_size(name, value) for name, value in zip(n.axes, values, strict=True))
 
 

@@ -12,8 +12,8 @@ import numpy as np
 import viser
 
 from ..analysis.map.axes import Axis, Grid
+from ..analysis.map.isosurface import first_hit, isosurface, sheet
 from ..analysis.map.map_files import grid_and_reach
-from ..analysis.map.skin import first_hit, sheet, skin
 from ..kinematics.constraints import indices
 from ..mechanism import COORDINATES
 from ..model.model import Model
@@ -64,7 +64,7 @@ class MapLayer:
             axes = tuple(Axis(a.name, a.low, a.high, FINE) for a in self.grid.axes)
             fine = Grid(self.grid.names, axes, self.grid.held)
             margin = self._reach.margin(fine.block(0, fine.size)).reshape(fine.shape)
-            vertices, faces = skin(margin)
+            vertices, faces = isosurface(margin)
             return vertices, faces, np.zeros(len(faces), dtype=int)
         vertices, faces = sheet(dataset["cause"].values == 0)
         return vertices, faces, shades_of(dataset)[faces[:, 0]]

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import linprog
 
 import condyle
-from condyle.analysis.map import ability
+from condyle.analysis.map import load_capacity
 from condyle.analysis.map.axes import grid_of
 from condyle.mechanism.chain import limits
 
@@ -37,7 +37,7 @@ def test_efforts_are_those_of_inverse_dynamics(model_of: Models) -> None:
 def test_largest_load_is_that_of_a_linear_program(
     model_of: Models, monkeypatch: pytest.MonkeyPatch, side: str, program: bool
 ) -> None:
-    """max s: J^T tau + N lambda = Q_0 - s w, limits of tau, and of lambda where it is one-sided.
+    """max s: J^T tau + N lambda = Q_0 - s w, limits of tau, and of lambda where it is unilateral.
 
     Q_0 and w come from inverse dynamics in the whole pose, which knows nothing of zonotopes.
     """
@@ -47,7 +47,7 @@ def test_largest_load_is_that_of_a_linear_program(
         changes |= {f"contact.{n}.one_sided": True for n in mechanism.contact_names}
         mechanism = mechanism.set(changes)
     if program:
-        monkeypatch.setattr(ability, "MANY", 0)
+        monkeypatch.setattr(load_capacity, "MANY", 0)
     model = condyle.derive(mechanism, backend="numpy")
     direction = np.array([0.3, 0.0, -1.0]) / np.hypot(0.3, 1)
     over = OVER if not program else ["X=0:5:2 mm"]
@@ -71,10 +71,10 @@ def test_holding_by_facets_and_by_chosen_efforts(
     survey = model.survey(q, ("pose",))
     pose = survey.values["pose"].T[survey.reached]
     load = np.array([0, 0, -240.0, 0, 0, 0, *model.load_point("incisor")])
-    own = ability.Ability.of(model)
+    own = load_capacity.LoadCapacity.of(model)
     held = own.holds(pose, load)
     assert 5 < held.sum() < len(held) - 5
-    monkeypatch.setattr(ability, "MANY", 0)
+    monkeypatch.setattr(load_capacity, "MANY", 0)
     np.testing.assert_array_equal(own.holds(pose, load), held)
 
 

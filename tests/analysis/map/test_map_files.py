@@ -28,7 +28,7 @@ def test_streamed_as_in_memory(
     right = condyle.workspace_map(model, OVER, QUANTITIES)
     assert {"ratio", "kind", "status", "cause", "effort"} <= set(right)
     monkeypatch.setattr(compute, "BLOCK", 16)  # two rows of the first axis
-    found = condyle.workspace_map(model, OVER, QUANTITIES, store=tmp_path / "a.zarr")
+    found = condyle.workspace_map(model, OVER, QUANTITIES, out=tmp_path / "a.zarr")
     assert found.sizes == right.sizes
     for name in right.variables:
         assert found[name].dtype.kind == right[name].dtype.kind
@@ -53,7 +53,7 @@ def test_who_computes_does_not_matter(
     right = condyle.workspace_map(model, OVER, QUANTITIES)
     monkeypatch.setattr(compute, "BLOCK", 16)
     others = {"workers": 2, "scheduler": scheduler}
-    found = condyle.workspace_map(model, OVER, QUANTITIES, store=tmp_path / "a.zarr", **others)
+    found = condyle.workspace_map(model, OVER, QUANTITIES, out=tmp_path / "a.zarr", **others)
     for name in right.data_vars:
         np.testing.assert_array_equal(found[name].values, right[name].values)
     with pytest.raises(condyle.InputError, match="expected processes, threads, dask"):
@@ -64,7 +64,7 @@ def test_what_fails_leaves_what_was_there(
     model_of: Models, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     model, store = model_of("masticatory"), tmp_path / "a.zarr"
-    before = condyle.workspace_map(model, OVER, "joint", store=store).load()
+    before = condyle.workspace_map(model, OVER, "joint", out=store).load()
     monkeypatch.setattr(compute, "BLOCK", 16)
     blocks = iter(range(3))
 
@@ -78,7 +78,7 @@ def test_what_fails_leaves_what_was_there(
     for place in (store, tmp_path / "new.zarr"):
         blocks = iter(range(3))
         with pytest.raises(KeyboardInterrupt):
-            condyle.workspace_map(model, OVER, "ratio", store=place)
+            condyle.workspace_map(model, OVER, "ratio", out=place)
     assert [path.name for path in tmp_path.iterdir()] == ["a.zarr"]
     xr.testing.assert_identical(xr.open_zarr(store, chunks=None, consolidated=False).load(), before)
 
@@ -91,14 +91,14 @@ def test_what_a_killed_process_left_is_swept(model_of: Models, tmp_path: Path) -
     for folder in (left, mine):
         folder.mkdir()
         (folder / "x").write_text("")
-    condyle.workspace_map(model_of("masticatory"), OVER, store=tmp_path / "a.zarr")
+    condyle.workspace_map(model_of("masticatory"), OVER, out=tmp_path / "a.zarr")
     assert not left.exists() and mine.exists()
 
 
 def test_other_folders_are_not_replaced(model_of: Models, tmp_path: Path) -> None:
-    (tmp_path / "notes").mkdir()
-    (tmp_path / "notes" / "mine.txt").write_text("keep")
-    for place in ("notes", "notes/mine.txt", "missing/a.zarr"):
-        with pytest.raises(condyle.InputError, match=r"exists and is|does not exist"):
-            condyle.workspace_map(model_of("masticatory"), OVER, store=tmp_path / place)
-    assert (tmp_path / "notes" / "mine.txt").read_text() == "keep"
+    (tmp_path / "notes.zarr").mkdir()
+    (tmp_path / "notes.zarr" / "mine.txt").write_text("keep")
+    for place in ("notes.zarr", "notes.zarr/mine.txt/a.zarr"):
+        with pytest.raises(condyle.InputError, match=r"cannot be|exists"):
+            condyle.workspace_map(model_of("masticatory"), OVER, out=tmp_path / place)
+    assert (tmp_path / "notes.zarr" / "mine.txt").read_text() == "keep"

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from condyle.analysis.map.axes import grid_of
-from condyle.analysis.map.compute import asked_of
+from condyle.analysis.map.compute import setup_of
 from condyle.analysis.map.lines import Line, lines_of
 from condyle.analysis.map.volume import reachable_volume
 from condyle.mechanism import bundled_text
@@ -35,7 +35,7 @@ def test_area_between_spherical_shells(model_of: Models) -> None:
     alpha, beta, gamma = ANGLES
     hold = {"Z": 0.1, "alpha": alpha, "beta": beta, "gamma": gamma}
     grid = grid_of(model.mechanism, {"X": (-3.0, 3.0, 60), "Y": (-3.0, 3.0, 60)}, hold)
-    reach = asked_of(model, strokes=f"*={STROKE[0]}:{STROKE[1]}").reach
+    reach = setup_of(model, stroke=f"*={STROKE[0]}:{STROKE[1]}").reach
     found = reachable_volume(reach.margin, grid, budget=150_000)
     centres, near, far = shells()
     x = (np.arange(40_000) + 0.5) / 40_000 * 6 - 3
@@ -72,7 +72,7 @@ def test_borders_lie_on_the_spheres(model_of: Models) -> None:
     alpha, beta, gamma = ANGLES
     hold = {"Z": 0.1, "alpha": alpha, "beta": beta, "gamma": gamma}
     grid = grid_of(model.mechanism, {"X": (-3.0, 3.0, 41), "Y": (-3.0, 3.0, 41)}, hold)
-    lines = lines_of(asked_of(model, strokes=f"*={STROKE[0]}:{STROKE[1]}").reach, grid)
+    lines = lines_of(setup_of(model, stroke=f"*={STROKE[0]}:{STROKE[1]}").reach, grid)
     borders = [line for line in lines if line.kind == "stroke"]
     assert len(borders) >= 3
     centres, near, far = shells()
@@ -102,7 +102,7 @@ def sigma(pose: np.ndarray) -> np.ndarray:
 
 def singular(model_of: Models, over: list[str], hold: str = "") -> list[Line]:
     model = model_of("gough-stewart")
-    lines = lines_of(asked_of(model).reach, grid_of(model.mechanism, over, hold))
+    lines = lines_of(setup_of(model).reach, grid_of(model.mechanism, over, hold))
     return [line for line in lines if line.kind == "singular"]
 
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from condyle.analysis.map.axes import Axis, Grid
+from condyle.analysis.map.free_space import FreeSpace, best_box, greatest_ball, greatest_box
 from condyle.analysis.map.lines import trace
-from condyle.analysis.map.room import Free, best_box, greatest_ball, greatest_box
 from condyle.analysis.map.volume import reachable_volume
 
 from .conftest import Models
@@ -86,13 +86,13 @@ def known(d: int, *margins: Any) -> Any:
         margins=lambda q: np.array([margin(q) for margin in margins]),
         reasons=["plane", "blob"],
         costly=False,
-        asked=SimpleNamespace(model=model),
+        setup=SimpleNamespace(model=model),
     )
 
 
 @pytest.mark.parametrize("d", [1, 2, 3])
 def test_ball_in_a_known_set(d: int) -> None:
-    """Free but beyond a slanted plane 0.4 away, and in a blob 0.6 away, which has no slope."""
+    """FreeSpace but beyond a slanted plane 0.4 away, and in a blob 0.6 away, which has no slope."""
     way = np.array([0.48, 0.6, 0.64])[:d]
     way /= np.linalg.norm(way)
     far = -np.eye(3)[0, :d]
@@ -116,20 +116,20 @@ def test_ball_in_a_known_set(d: int) -> None:
 def test_room_of_a_mechanism(model_of: Models) -> None:
     """Ball and box against the same conditions at many poses, taken from its own evaluations."""
     from condyle.analysis.map.axes import grid_of
-    from condyle.analysis.map.compute import asked_of
+    from condyle.analysis.map.compute import setup_of
     from condyle.mechanism.chain import limits
     from condyle.results.contacts import bound_margins
 
     model = model_of("masticatory")
     over = grid_of(model.mechanism, ["X=-4:9:20 mm", "beta=-6:12:20 deg"])
-    asked = asked_of(model, "Fz=-30 N")
-    free = Free(asked, margin=0.1)
+    setup = setup_of(model, "Fz=-30 N")
+    free = FreeSpace(setup, margin=0.1)
     ball, box = greatest_ball(free, over, points=3000), greatest_box(free, over)
     assert box is not None
     assert "bounds" in ball.stops
 
     def fine(q: np.ndarray) -> np.ndarray:
-        load = np.tile(asked.load, (len(q), 1))
+        load = np.tile(setup.load, (len(q), 1))
         bounded = model.choosing("bounded")
         e = bounded.evaluate(q, 0 * q, 0 * q, load)
         inside = (bound_margins(model.mechanism, e.configuration.contact_point) >= 0).all(axis=1)
@@ -155,12 +155,12 @@ def test_room_of_a_mechanism(model_of: Models) -> None:
 
 def test_limits_stop_the_ball(model_of: Models) -> None:
     from condyle.analysis.map.axes import grid_of
-    from condyle.analysis.map.compute import asked_of
+    from condyle.analysis.map.compute import setup_of
 
     model = model_of("hexaglide")
     over = grid_of(model.mechanism, ["X=-50:50:20 mm"])
-    assert greatest_ball(Free(asked_of(model)), over, points=200).radius == pytest.approx(0.05)
-    heavy = Free(asked_of(model, "Fz=-715 N"))
+    assert greatest_ball(FreeSpace(setup_of(model)), over, points=200).radius == pytest.approx(0.05)
+    heavy = FreeSpace(setup_of(model, "Fz=-715 N"))
     found = greatest_ball(heavy, over, points=200)
     assert found.stops == "the limits of efforts" and found.radius < 0.049
 

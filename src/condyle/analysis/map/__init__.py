@@ -3,5 +3,13 @@
 from .compute import workspace_map
 from .map_files import open_map, save_map
 from .map_quantities import QUANTITIES
+from .map_size import WorkspaceSize, workspace_size
 
-__all__ = ["QUANTITIES", "open_map", "save_map", "workspace_map"]
+__all__ = [
+    "QUANTITIES",
+    "WorkspaceSize",
+    "open_map",
+    "save_map",
+    "workspace_map",
+    "workspace_size",
+]

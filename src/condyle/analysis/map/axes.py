@@ -1,4 +1,4 @@
-"""What a map goes over: one to three independent coordinates, and what the others are held at.
+"""The grid of a map: one to three independent coordinates vary, the others are held.
 
 As text `X=-5:5:200 mm`: from -5 to 5 mm in 200 values; held coordinates as `Y=1 mm,alpha=2 deg`.
 """
@@ -7,26 +7,30 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import InputError, did_you_mean
-from ...mechanism.home import dependent_coordinates, independent_coordinates
+from ...errors import InputError, did_you_mean, texts_of
+from ...mechanism.home import (
+    characteristic_length,
+    dependent_coordinates,
+    independent_coordinates,
+)
 from ...mechanism.mechanism import COORDINATES, Mechanism
 from ...motion.column_units import dimension, unit_factor
 
 MOST_AXES, MOST_POINTS = 3, 10**10
 _TEXT = re.compile(r"\s*(\S+?)\s*=\s*([^:\s]+(?:\s*:\s*[^:\s]+)*)\s*(.*?)\s*")
 
-Over = Iterable[str] | Mapping[str, tuple[float, float, int]]
+Over = str | Sequence[str] | Mapping[str, tuple[float, float, int]]
 Values = str | Mapping[str, float]
 
 
 @dataclass(frozen=True)
 class Axis:
-    """A coordinate from `low` to `high`, SI, in `count` equal steps less one."""
+    """A coordinate from `low` to `high`, SI: `count` values at equal distances."""
 
     name: str
     low: float
@@ -45,7 +49,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Grid:
-    """Points of the independent coordinates: axes go, the last one fastest; the others stay.
+    """Points of the independent coordinates: the axes vary, the last one fastest.
 
     names: the independent coordinates, (m,);  held: their values where no axis has them, (m,).
     """
@@ -81,27 +85,28 @@ class Grid:
         return self.states(np.column_stack(along))
 
 
-def grid_of(mechanism: Mechanism, over: Over, hold: Values = "") -> Grid:
-    """The grid that was asked for.
+def grid_of(mechanism: Mechanism, over: Over | None, hold: Values = "") -> Grid:
+    """The grid of a map.
 
-    Args:   over: texts such as "X=-5:5:200 mm", or {"X": (low, high, count)} in SI.
+    Args:   over: texts such as "X=-5:5:200 mm", or {"X": (low, high, count)} in SI; default: the
+            first two coordinates.
             hold: text such as "Y=0 mm,alpha=0 deg", or {"Y": value} in SI; 0 for the others.
     Raises: InputError: for what is no independent coordinate, range, count or unit.
     """
-    if isinstance(over, str):
-        over = [over]
-    if isinstance(over, Mapping):
+    if over is None:
+        axes = [_default_axis(mechanism, name) for name in independent_coordinates(mechanism)[:2]]
+    elif isinstance(over, Mapping):
         axes = []
         for name, of in over.items():
             if not isinstance(of, Sequence) or isinstance(of, str) or len(of) != 3:
                 raise InputError(f"{name}: expected (low, high, count), got {of!r:.60}")
             axes.append(_axis(name, *of))
     else:
-        axes = [axis_of(text) for text in over]
+        axes = [axis_of(text) for text in texts_of("over", over, separated=False)]
     names = independent_coordinates(mechanism)
     if not 1 <= len(axes) <= MOST_AXES:
         raise InputError(
-            f"a map goes over one to three coordinates; got {len(axes)}. Give --over for each, of "
+            f"over: expected one to three coordinates, got {len(axes)}; available: "
             f"{', '.join(names)}"
         )
     held = values_of(hold, COORDINATES)
@@ -110,13 +115,18 @@ def grid_of(mechanism: Mechanism, over: Over, hold: Values = "") -> Grid:
         require_independent(mechanism, name)
     for name in moved:
         if moved.count(name) > 1:
-            raise InputError(f"{name}: the map goes over it twice; give each coordinate once")
+            raise InputError(f"over: {name} is given twice")
         if name in held:
-            raise InputError(f"{name}: the map goes over it, so it cannot be held; leave one out")
+            raise InputError(f"hold: {name} is an axis of the map too; leave one out")
     grid = Grid(names, tuple(axes), tuple(held.get(name, 0.0) for name in names))
     if grid.size > MOST_POINTS:
-        raise InputError(f"the map has {grid.size:.3g} points; at most {MOST_POINTS:.0e} are taken")
+        raise InputError(f"over: {grid.size:.3g} points; the maximum is {MOST_POINTS:.0e}")
     return grid
+
+
+def _default_axis(mechanism: Mechanism, name: str) -> Axis:
+    half = characteristic_length(mechanism) / 2 if name in COORDINATES[:3] else 0.5
+    return Axis(name, -half, half, 100)
 
 
 def require_independent(mechanism: Mechanism, name: str) -> None:
@@ -157,6 +167,8 @@ def values_of(given: Values, known: Sequence[str]) -> dict[str, float]:
     """
     if isinstance(given, Mapping):
         pairs = [(name, number(value, f"{name}={value}")) for name, value in given.items()]
+    elif not isinstance(given, str):
+        raise InputError(f"expected text such as Y=1 mm, or numbers by name, got {given!r:.60}")
     else:
         pairs = []
         for part in given.split(",") if given.strip() else []:
@@ -164,9 +176,9 @@ def values_of(given: Values, known: Sequence[str]) -> dict[str, float]:
             pairs.append((name, number(value, part) * _scale(name, unit, part)))
     for name in (names := [name for name, _ in pairs]):
         if name not in known:
-            raise InputError(f'"{name}" is not one of those.{did_you_mean(name, known)}')
+            raise InputError(f'unknown name "{name}".{did_you_mean(name, known)}')
         if names.count(name) > 1:
-            raise InputError(f"{name}: stands twice; give it once")
+            raise InputError(f"{name}: is given twice")
     return dict(pairs)
 
 
@@ -195,9 +207,7 @@ def _axis(name: str, low: object, high: object, count: object) -> Axis:
     ends = [number(value, f"{name}={value}") for value in (low, high)]
     whole = number(count, f"{name}: count {count}")
     if whole != int(whole) or whole < 2:
-        raise InputError(f"{name}: the count is {count}; expected a whole number of at least 2")
+        raise InputError(f"{name}: expected a count of at least 2, got {count}")
     if not ends[0] < ends[1]:
-        raise InputError(
-            f"{name}: the range goes from {ends[0]:g} to {ends[1]:g}; give the lesser first"
-        )
+        raise InputError(f"{name}: the range {ends[0]:g} to {ends[1]:g} must be increasing")
     return Axis(name, ends[0], ends[1], int(whole))

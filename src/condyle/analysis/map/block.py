@@ -1,4 +1,4 @@
-"""What is asked of a map, and one block of its poses, evaluated as far as it is wanted."""
+"""What holds for every pose of a map, and one block of its poses, evaluated on demand."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from ...model.model import Model
 from ...model.surveying import Survey
 from ...results.contacts import bound_margins
 from ...status import Status
-from .ability import Ability
+from .load_capacity import LoadCapacity
 from .reach import Reach
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What does not change from pose to pose.
+class Setup:
+    """What holds for every pose of a map.
 
     load:      force and moment in {S}, and the point they act at in {M}, (9,) [N, N m, m].
-    direction: of the further load whose largest size is looked for, a unit vector in {S}, (3,).
+    direction: of the additional load whose limit is sought, a unit vector in {S}, (3,).
     stiffness: of the actuators, (n,) [N m/rad or N/m]; None if it was not given.
     """
 
@@ -33,24 +33,24 @@ class Asked:
     stiffness: np.ndarray | None = None
 
     @cached_property
-    def ability(self) -> Ability:
-        return Ability.of(self.model)
+    def load_capacity(self) -> LoadCapacity:
+        return LoadCapacity.of(self.model)
 
 
 @dataclass
 class Block:
-    """N poses; everything is computed once, when it is first wanted.
+    """N poses; everything is computed once, when it is first used.
 
     wanted: of the survey, by all quantities.
     """
 
-    asked: Asked
+    setup: Setup
     q: np.ndarray
     wanted: frozenset[str] = field(default_factory=frozenset)
 
     @cached_property
     def _surveyed(self) -> tuple[Survey, np.ndarray]:
-        return self.asked.reach.survey(self.q, self.wanted)
+        return self.setup.reach.survey(self.q, self.wanted)
 
     @property
     def survey(self) -> Survey:
@@ -70,9 +70,9 @@ class Block:
         """What holds the platform at rest under the load; where it cannot be reached, nothing."""
         still, good = np.zeros_like(self.q), self.survey.reached
         q = np.where(good[:, None], self.q, 0.0)
-        load = np.broadcast_to(self.asked.load, (len(q), 9))
-        found = self.asked.model.torques(
-            q, still, still, load, ("contact",), self.asked.reach.threads
+        load = np.broadcast_to(self.setup.load, (len(q), 9))
+        found = self.setup.model.torques(
+            q, still, still, load, ("contact",), self.setup.reach.threads
         )
         status = np.where(good, found.status, Status.unreachable)
         bad = status != Status.ok
@@ -83,7 +83,7 @@ class Block:
     @cached_property
     def bounds(self) -> np.ndarray:
         """How far each contact point is within its bounds, (N, k) [m]; infinite without bounds."""
-        return bound_margins(self.asked.model.mechanism, np.moveaxis(self.value("points"), -1, 0))
+        return bound_margins(self.setup.model.mechanism, np.moveaxis(self.value("points"), -1, 0))
 
     @property
     def pose(self) -> np.ndarray:

@@ -6,25 +6,25 @@ import json
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...atomic import replacing_folder
-from ...errors import InputError, did_you_mean
+from ...atomic import make_folder, replacing_folder
+from ...errors import InputError, did_you_mean, texts_of
 from ...extras import require
 from ...mechanism import dumps
 from ...mechanism.mechanism import COORDINATES, Mechanism
-from ...model.model import Model
+from ...model.model import Model, derive
 from ...motion.column_units import FORCE, MOMENT
 from ...progress import step
 from ...version import __version__
 from ..workers import check_scheduler, run_parts
 from .axes import Grid, Over, Values, grid_of, number, values_of
-from .block import Asked, Block
-from .map_files import MARK, zarr_arrays
+from .block import Block, Setup
+from .map_files import MARK, open_map, save_map, zarr_arrays
 from .map_quantities import Quantity, chosen, variables
 from .reach import Reach, Strokes
 
@@ -32,173 +32,196 @@ if TYPE_CHECKING:
     import xarray as xr
 
 BLOCK = 1 << 16  # poses at a time
+LARGE = 200_000_000  # bytes above which a map without a suffix is streamed to Zarr
 
 
 def workspace_map(
-    model: Model,
-    over: Over,
-    quantity: str | Sequence[str] = "ratio",
+    model: Model | Mechanism | str | os.PathLike[str],
+    over: Over | None = None,
+    quantities: str | Sequence[str] = "ratio",
     hold: Values = "",
     load: Values = "",
     load_point: str | None = None,
     direction: str | Sequence[float] | None = None,
     stiffness: float | Mapping[str, float] | None = None,
-    strokes: Strokes = (),
-    store: str | os.PathLike[str] | None = None,
+    stroke: Strokes = (),
+    out: str | os.PathLike[str] | None = None,
     threads: int | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
 ) -> xr.Dataset:
     """Quantities at rest over one, two or three of the independent coordinates.
 
-        condyle.workspace_map(model, ["X=-5:5:200 mm", "beta=-5:20:200 deg"], "ratio")
+        condyle.workspace_map("masticatory", ["X=-5:5:200 mm", "beta=-5:20:200 deg"], "ratio")
 
-    Args:   model: of `condyle.derive`; its distribution chooses the efforts.
-            over: such texts, or {"X": (low, high, count)} [m, rad].
-            quantity: one or more of `condyle.analysis.map.QUANTITIES`.
+    Args:   model: a model, whose distribution gives the efforts; or a mechanism, its file or name.
+            over: such texts, or {"X": (low, high, count)} [m, rad]. Default: the first two
+            coordinates, half a characteristic length or half a radian to either side of home.
+            quantities: one or more of `condyle.analysis.map.QUANTITIES`.
             hold: the other coordinates, "Y=1 mm,alpha=2 deg" or {"Y": 1e-3}; by default 0.
             load: on the platform, "Fz=-50 N" or {"Fz": -50.0} [N, N m], in {S}.
-            load_point: where it acts; by default as for `solve`.
-            direction: of the further load that quantity `load_limit` looks for, in {S}: "0,0,-1".
+            load_point: the platform point that it acts at; by default as for `solve`.
+            direction: of the additional load of quantity `load_limit`, in {S}: "0,0,-1".
             stiffness: of every actuator, or by chain [N m/rad or N/m].
-            strokes: "leg_*=-200:300 mm": ranges of joint coordinates that count as reach.
-            store: a folder (.zarr) to stream to, for more than memory holds; it appears whole or
-            not at all.  threads: at most so many.
-            workers, scheduler: as of `condyle.sweep`: processes, threads, dask, or the address of
-            a Dask scheduler; by default this process alone, with its threads. Same numbers.
-    Returns: a dataset with a dimension for each axis; `status` and `cause` always.
-    Raises: InputError: for anything that cannot be used as given, before any work.
+            stroke: "leg_*=-200:300 mm": range of joint coordinates that counts as reach.
+            out: file: .nc (NetCDF), or .zarr (a folder, streamed, for more than memory holds).
+            Without a suffix: by size. It appears whole or not at all; its folder is made.
+            threads: maximum number of threads.
+            workers, scheduler: as in `condyle.sweep`: processes, threads, dask, or the address of
+            a Dask scheduler. Default: this process. Same numbers.
+    Returns: a dataset with a dimension for each axis, `status` and `cause` always; its `encoding`
+            names the file as "source".
+    Raises: InputError: for any argument that cannot be used, before the computation starts.
     """
-    grid = grid_of(model.mechanism, over, hold)
-    asked = asked_of(model, load, load_point, direction, stiffness, strokes, threads)
-    quantities = chosen((quantity,) if isinstance(quantity, str) else tuple(quantity), asked)
+    made = model if isinstance(model, Model) else derive(model)
+    grid = grid_of(made.mechanism, over, hold)
+    setup = setup_of(made, load, load_point, direction, stiffness, stroke, threads)
+    wanted = chosen(texts_of("quantities", quantities), setup)
     if scheduler is not None:
         check_scheduler(workers, scheduler)
-    return mapped(asked, grid, quantities, store, workers, scheduler)
+    file = None if out is None else _file(out, setup, grid, wanted)
+    work = Blocks(setup, grid, wanted, BLOCK, workers, scheduler)
+    if file is not None and file.suffix == ".zarr":
+        return _streamed(work, file)
+    dataset = _in_memory(work)
+    if file is not None:
+        save_map(dataset, file)
+        dataset.encoding["source"] = str(file)
+    return dataset
 
 
-def asked_of(
+def setup_of(
     model: Model,
     load: Values = "",
     load_point: str | None = None,
     direction: str | Sequence[float] | None = None,
     stiffness: float | Mapping[str, float] | None = None,
-    strokes: Strokes = (),
+    stroke: Strokes = (),
     threads: int | None = None,
-) -> Asked:
-    """What does not change from pose to pose, checked; arguments as of `workspace_map`."""
+) -> Setup:
+    """What holds for every pose, checked; arguments as in `workspace_map`."""
     wrench = values_of(load, (*FORCE, *MOMENT))
     point = np.zeros(3)
     if wrench or direction is not None or load_point is not None:
         point = _point(model, load_point)
     force = [wrench.get(name, 0.0) for name in (*FORCE, *MOMENT)]
-    reach = Reach.of(model, strokes, threads)
-    return Asked(
+    if threads is not None and not (isinstance(threads, int) and threads >= 1):
+        raise InputError(f"threads: expected a whole number of at least 1, got {threads!r:.40}")
+    return Setup(
         model,
-        reach,
+        Reach.of(model, stroke, threads),
         np.array([*force, *point]),
         _direction(direction),
         _per_chain(model.mechanism, stiffness),
     )
 
 
-def mapped(
-    asked: Asked,
-    grid: Grid,
-    quantities: tuple[Quantity, ...],
-    store: str | os.PathLike[str] | None = None,
-    workers: int | None = None,
-    scheduler: str | None = None,
-) -> xr.Dataset:
-    """The map itself."""
-    import xarray as xr
-
-    like, entries = _like(asked, grid, quantities), _entries(asked)
-    used = {dim for dims, *_ in like.values() for dim in dims}
-    coordinates: dict[str, Any] = {a.name: (a.name, a.values, _unit(a.name)) for a in grid.axes}
-    coordinates |= {dim: (dim, np.array(entries[dim])) for dim in entries if dim in used}
-    frame = xr.Dataset(coords=coordinates, attrs=_attributes(asked, grid))
-    if store is None:
-        arrays = {name: np.empty(shape, dtype) for name, (_, shape, dtype, _) in like.items()}
-        flat = {n: a.reshape(grid.size, *a.shape[len(grid.axes) :]) for n, a in arrays.items()}
-        fill(Pieces(asked, grid, quantities, BLOCK), flat, 1, workers, scheduler)
-        return frame.assign({n: (like[n][0], a, like[n][3]) for n, a in arrays.items()})
-    require("zarr", "maps")
-    row = grid.size // grid.shape[0]
-    rows = max(BLOCK // row, 1)
-    with replacing_folder(store, MARK) as folder:
-        targets = zarr_arrays(folder, frame, like, rows)
-        fill(Pieces(asked, grid, quantities, rows * row), targets, row, workers, scheduler)
-    return xr.open_zarr(Path(store), chunks=None, consolidated=False)
-
-
-def size_of(asked: Asked, grid: Grid, quantities: tuple[Quantity, ...]) -> int:
-    """Bytes that a map takes."""
-    like = _like(asked, grid, quantities).values()
-    return sum(np.dtype(dtype).itemsize * math.prod(shape) for _, shape, dtype, _ in like)
+def _file(
+    out: str | os.PathLike[str], setup: Setup, grid: Grid, quantities: tuple[Quantity, ...]
+) -> Path:
+    """The file of a map, its folder made."""
+    if not isinstance(out, str | os.PathLike):
+        raise InputError(f"out: expected a path, got {type(out).__name__}")
+    file = Path(out)
+    if file.suffix not in (".nc", ".zarr"):
+        like = _like(setup, grid, quantities).values()
+        size = sum(np.dtype(dtype).itemsize * math.prod(shape) for _, shape, dtype, _ in like)
+        file = file.with_name(f"{file.name}{'.zarr' if size > LARGE else '.nc'}")
+    if file.suffix == ".zarr":
+        require("zarr", "maps")
+    make_folder(file.parent)
+    return file
 
 
 @dataclass(frozen=True)
-class Pieces:
-    """A map in blocks of so many poses."""
+class Blocks:
+    """A map in blocks of `size` poses, and who evaluates them."""
 
-    asked: Asked
+    setup: Setup
     grid: Grid
     quantities: tuple[Quantity, ...]
-    block: int
+    size: int
+    workers: int | None = None
+    scheduler: str | None = None
 
-    def ends(self, piece: int) -> tuple[int, int]:
-        """The first pose of a piece, and the first after it."""
-        start = piece * self.block
-        return start, min(start + self.block, self.grid.size)
+    def ends(self, number: int) -> tuple[int, int]:
+        """The first pose of a block, and the first after it."""
+        start = number * self.size
+        return start, min(start + self.size, self.grid.size)
 
 
-def evaluated(pieces: Pieces, piece: int) -> dict[str, np.ndarray]:
-    """All variables at the poses of one piece."""
-    wanted = frozenset(name for quantity in pieces.quantities for name in quantity.needs)
-    here = Block(pieces.asked, pieces.grid.block(*pieces.ends(piece)), wanted)
+def evaluated(blocks: Blocks, number: int) -> dict[str, np.ndarray]:
+    """All variables at the poses of one block."""
+    wanted = frozenset(name for quantity in blocks.quantities for name in quantity.needs)
+    here = Block(blocks.setup, blocks.grid.block(*blocks.ends(number)), wanted)
     with np.errstate(invalid="ignore"):
-        return {v.name: v.values(here) for v in variables(pieces.quantities)}
+        return {v.name: v.values(here) for v in variables(blocks.quantities)}
 
 
-def fill(
-    pieces: Pieces,
-    targets: Mapping[str, Any],
-    row: int,
-    workers: int | None = None,
-    scheduler: str | None = None,
-) -> None:
-    """Evaluate all poses, block by block, here or where `scheduler` says.
+def fill(blocks: Blocks, targets: Mapping[str, Any], row: int) -> None:
+    """Evaluate all poses, block by block.
 
     Args: targets: what takes the values, by name;  row: poses in one entry of theirs.
     """
-    count = -(-pieces.grid.size // pieces.block)
-    with step("mapping", pieces.grid.size) as advance:
-        for piece, arrays in run_parts(pieces, evaluated, range(count), workers, scheduler):
-            start, stop = pieces.ends(piece)
+    count = -(-blocks.grid.size // blocks.size)
+    with step("mapping", blocks.grid.size) as advance:
+        for number, arrays in run_parts(
+            blocks, evaluated, range(count), blocks.workers, blocks.scheduler
+        ):
+            start, stop = blocks.ends(number)
             for name, target in targets.items():
                 shape = (stop - start) // row, *target.shape[1:]
                 target[start // row : stop // row] = arrays[name].reshape(shape)
             advance(stop - start)
 
 
-def _like(asked: Asked, grid: Grid, quantities: tuple[Quantity, ...]) -> dict[str, Any]:
+def _in_memory(blocks: Blocks) -> xr.Dataset:
+    grid, like = blocks.grid, _like(blocks.setup, blocks.grid, blocks.quantities)
+    arrays = {name: np.empty(shape, dtype) for name, (_, shape, dtype, _) in like.items()}
+    flat = {n: a.reshape(grid.size, *a.shape[len(grid.axes) :]) for n, a in arrays.items()}
+    fill(blocks, flat, 1)
+    made = {name: (like[name][0], a, like[name][3]) for name, a in arrays.items()}
+    return _frame(blocks, like).assign(made)
+
+
+def _streamed(blocks: Blocks, file: Path) -> xr.Dataset:
+    like = _like(blocks.setup, blocks.grid, blocks.quantities)
+    row = blocks.grid.size // blocks.grid.shape[0]
+    rows = max(blocks.size // row, 1)
+    with replacing_folder(file, MARK) as folder:
+        targets = zarr_arrays(folder, _frame(blocks, like), like, rows)
+        fill(replace(blocks, size=rows * row), targets, row)
+    return open_map(file)
+
+
+def _frame(blocks: Blocks, like: Mapping[str, Any]) -> xr.Dataset:
+    """Coordinates and attributes."""
+    import xarray as xr
+
+    entries, used = _entries(blocks.setup), {dim for dims, *_ in like.values() for dim in dims}
+    axes = blocks.grid.axes
+    coordinates: dict[str, Any] = {a.name: (a.name, a.values, _unit(a.name)) for a in axes}
+    coordinates |= {dim: (dim, np.array(entries[dim])) for dim in entries if dim in used}
+    return xr.Dataset(coords=coordinates, attrs=_attributes(blocks.setup, blocks.grid))
+
+
+def _like(setup: Setup, grid: Grid, quantities: tuple[Quantity, ...]) -> dict[str, Any]:
     """Dimensions, shape, type and attributes of every variable, by name."""
-    entries, names = _entries(asked), [axis.name for axis in grid.axes]
+    entries, names = _entries(setup), [axis.name for axis in grid.axes]
     return {
         v.name: (
             (*names, *v.dims),
             (*grid.shape, *(len(entries[dim]) for dim in v.dims)),
             v.dtype,
-            v.attributes(asked.model.mechanism),
+            v.attributes(setup.model.mechanism),
         )
         for v in variables(quantities)
     }
 
 
-def _entries(asked: Asked) -> dict[str, list[Any]]:
+def _entries(setup: Setup) -> dict[str, list[Any]]:
     """What stands along each dimension but the axes."""
-    mechanism, names = asked.model.mechanism, list(asked.model.independent)
+    mechanism, names = setup.model.mechanism, list(setup.model.independent)
     return {
         "chain": list(mechanism.chain_names),
         "contact": list(mechanism.contact_names),
@@ -213,17 +236,17 @@ def _unit(name: str) -> dict[str, str]:
     return {"units": "m" if name in COORDINATES[:3] else "rad"}
 
 
-def _attributes(asked: Asked, grid: Grid) -> dict[str, Any]:
-    model, moved = asked.model, [axis.name for axis in grid.axes]
+def _attributes(setup: Setup, grid: Grid) -> dict[str, Any]:
+    model, moved = setup.model, [axis.name for axis in grid.axes]
     held = {n: value for n, value in zip(grid.names, grid.held, strict=True) if n not in moved}
     return {
         "title": "map of a mechanism at rest",
         "mechanism": dumps(model.mechanism),
         "mechanism_name": model.mechanism.name,
         "held": json.dumps(held),
-        "load": asked.load.tolist(),
-        "stroke_low": asked.reach.low.tolist(),
-        "stroke_high": asked.reach.high.tolist(),
+        "load": setup.load.tolist(),
+        "stroke_low": setup.reach.low.tolist(),
+        "stroke_high": setup.reach.high.tolist(),
         "distribution": model.policy.objective,
         "condyle": __version__,
     }
@@ -239,8 +262,8 @@ def _point(model: Model, name: str | None) -> np.ndarray:
 def _direction(given: str | Sequence[float] | None) -> np.ndarray | None:
     if given is None:
         return None
-    parts = given.split(",") if isinstance(given, str) else list(given)
-    if len(parts) != 3:
+    parts = given.split(",") if isinstance(given, str) else given
+    if not isinstance(parts, Sequence | np.ndarray) or len(parts) != 3:
         raise InputError(f'direction "{given}": expected three numbers, as in "0,0,-1"')
     vector = np.array([number(part, f"direction {given}") for part in parts])
     if not (size := np.linalg.norm(vector)):

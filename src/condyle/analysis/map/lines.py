@@ -9,15 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...extras import require
+from ...model.model import Model
 from ...motion.arrays import runs_of
 from ...results.contacts import bound_margins
 from .axes import Axis, Grid
+from .map_files import grid_and_reach
 from .reach import Reach, bounded
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 FINE, SLICES = 161, 6  # points along an axis of a slice at least; slices of three coordinates
 LEAST, MOST = 41, 201  # points along an axis of the grid that lines are looked for on
@@ -232,15 +237,19 @@ class Slice:
     lines: list[Line]
 
 
-def slices_of(reach: Reach, grid: Grid) -> Iterator[Slice]:
-    """The slice of a map over two coordinates, or some along the last of three."""
+def slices_of(dataset: xr.Dataset, model: Model) -> Iterator[Slice]:
+    """The slice of a map over two coordinates, or some along the last of three.
+
+    Args: model: of the map's mechanism.
+    """
+    grid, reach = grid_and_reach(dataset, model)
     if len(grid.axes) == 2:
         yield _slice(reach, grid, None, None)
     elif len(grid.axes) == 3:
         *two, last = grid.axes
         count = min(SLICES, last.count)
         for index in np.unique(np.linspace(0, last.count - 1, count + 2).round()[1:-1]).astype(int):
-            at = float(last.values[index])
+            at = float(dataset[last.name][index])
             held = list(grid.held)
             held[grid.names.index(last.name)] = at
             yield _slice(reach, Grid(grid.names, tuple(two), tuple(held)), int(index), at)

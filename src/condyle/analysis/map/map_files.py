@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,12 +30,15 @@ def save_map(dataset: xr.Dataset, file: Path) -> None:
         write_netcdf(dataset, temporary)
 
 
-def open_map(path: str | Path) -> xr.Dataset:
+def open_map(path: str | os.PathLike[str]) -> xr.Dataset:
     """A map that was written as NetCDF or as Zarr.
 
     Raises: InputError: if the file is missing or is no map.
     """
     import xarray as xr
+
+    if not isinstance(path, str | os.PathLike):
+        raise InputError(f"path: expected the path of a map, got {type(path).__name__}")
 
     try:
         if (Path(path) / MARK).is_file():

@@ -17,8 +17,8 @@ from ...mechanism.mechanism import COORDINATES, Mechanism
 from ...model.model import Model
 from ...results.variables import cause_flags, of_effort, of_joint, of_pose
 from ...status import STATUS_NAMES
-from .ability import limited
-from .block import Asked, Block
+from .block import Block, Setup
+from .load_capacity import limited
 from .reach import bounded
 
 Text = str | Callable[[Mechanism], str]
@@ -58,7 +58,7 @@ class Quantity:
     meaning: str
     needs: tuple[str, ...]
     variables: tuple[Mapped, ...]
-    lacks: Callable[[Asked], str] = lambda asked: ""
+    lacks: Callable[[Setup], str] = lambda setup: ""
 
 
 def _of_survey(name: str) -> Values:
@@ -76,13 +76,13 @@ def _condition(b: Block) -> np.ndarray:
 
 
 def _load(b: Block) -> np.ndarray:
-    assert b.asked.direction is not None
-    return b.asked.ability.largest(b.pose, b.asked.load, b.asked.direction)
+    assert b.setup.direction is not None
+    return b.setup.load_capacity.largest(b.pose, b.setup.load, b.setup.direction)
 
 
 def scaled_rates(b: Block) -> np.ndarray:
     """Rates of the joints, (N, n, m), by those of q, angles multiplied by the length."""
-    model = b.asked.model
+    model = b.setup.model
     angles = [name not in COORDINATES[:3] for name in model.independent]
     scale = np.where(angles, 1.0 / model.characteristic_length, 1.0)
     return b.value("rates").transpose(2, 1, 0) * scale
@@ -91,15 +91,15 @@ def scaled_rates(b: Block) -> np.ndarray:
 def _speed(b: Block) -> np.ndarray:
     """A rate of size v makes joint i turn at |row_i| v in its worst direction."""
     with np.errstate(divide="ignore"):
-        return (np.array(_speeds(b.asked.model)) / np.linalg.norm(scaled_rates(b), axis=2)).min(
+        return (np.array(_speeds(b.setup.model)) / np.linalg.norm(scaled_rates(b), axis=2)).min(
             axis=1
         )
 
 
 def _stiffness(b: Block, rates: np.ndarray) -> np.ndarray:
     """J^T k J, (N, m, m)."""
-    assert b.asked.stiffness is not None
-    return rates.transpose(0, 2, 1) @ (b.asked.stiffness[:, None] * rates)
+    assert b.setup.stiffness is not None
+    return rates.transpose(0, 2, 1) @ (b.setup.stiffness[:, None] * rates)
 
 
 def _stiffness_values(b: Block) -> np.ndarray:
@@ -110,15 +110,15 @@ def _stiffness_values(b: Block) -> np.ndarray:
     return found
 
 
-def _unless(has: Callable[[Asked], object], needed: str) -> Callable[[Asked], str]:
+def _unless(has: Callable[[Setup], object], needed: str) -> Callable[[Setup], str]:
     """What is needed, where a map has it not."""
-    return lambda asked: "" if has(asked) else needed
+    return lambda setup: "" if has(setup) else needed
 
 
-def _no_limits(asked: Asked) -> str:
-    if asked.direction is None:
+def _no_limits(setup: Setup) -> str:
+    if setup.direction is None:
         return "which way the load acts: --direction 0,0,-1"
-    some = limited(asked.model.mechanism)
+    some = limited(setup.model.mechanism)
     return "" if some else "efforts with limits: torque_limit or force_limit in the mechanism file"
 
 
@@ -145,7 +145,7 @@ QUANTITIES: dict[str, Quantity] = {
         "how far contacts are within their bounds", ("points",),
         (Mapped("bounds", ("contact",), "m", "distance of the contact point to its bounds, inside",
                 lambda b: b.bounds),),
-        _unless(lambda asked: bounded(asked.model.mechanism),
+        _unless(lambda setup: bounded(setup.model.mechanism),
                 "contacts with bounds in the mechanism file"),
     ),
     "joint": Quantity(
@@ -180,7 +180,7 @@ QUANTITIES: dict[str, Quantity] = {
         "contact forces under gravity and the load", (),
         (Mapped("contact_force", ("contact",), "N", "contact force at rest, along the unit normal",
                 lambda b: b.held["contact_force"]),),
-        _unless(lambda asked: asked.model.mechanism.contacts, "contacts"),
+        _unless(lambda setup: setup.model.mechanism.contacts, "contacts"),
     ),
     "load_limit": Quantity(
         "largest further load in a direction that limits allow", ("pose",),
@@ -192,7 +192,7 @@ QUANTITIES: dict[str, Quantity] = {
         "speed that speed limits allow in the worst direction", ("rates",),
         (Mapped("speed", (), "m/s", "speed that limits allow in every direction, of q' with angles "
                 "times the characteristic length", _speed),),
-        _unless(lambda asked: np.isfinite(_speeds(asked.model)).any(),
+        _unless(lambda setup: np.isfinite(_speeds(setup.model)).any(),
                 "actuators with a speed_limit in the mechanism file"),
     ),
     "stiffness": Quantity(
@@ -204,13 +204,13 @@ QUANTITIES: dict[str, Quantity] = {
                    "stiffness in q_EE",
                    lambda b: _stiffness(b, b.value("rates").transpose(2, 1, 0))),
         ),
-        _unless(lambda asked: asked.stiffness is not None,
+        _unless(lambda setup: setup.stiffness is not None,
                 "how stiff actuators are: --stiffness 1000"),
     ),
 }  # fmt: skip
 
 
-def chosen(names: tuple[str, ...], asked: Asked) -> tuple[Quantity, ...]:
+def chosen(names: tuple[str, ...], setup: Setup) -> tuple[Quantity, ...]:
     """The quantities by name.
 
     Raises: InputError: for one there is not, or one that the mechanism has not.
@@ -218,7 +218,7 @@ def chosen(names: tuple[str, ...], asked: Asked) -> tuple[Quantity, ...]:
     for name in names:
         if name not in QUANTITIES:
             raise InputError(f'no quantity "{name}".{did_you_mean(name, QUANTITIES)}')
-        if lack := QUANTITIES[name].lacks(asked):
+        if lack := QUANTITIES[name].lacks(setup):
             raise InputError(f"quantity {name} needs {lack}")
     return tuple(QUANTITIES[name] for name in dict.fromkeys(names))
 

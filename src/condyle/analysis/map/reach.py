@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...errors import InputError, did_you_mean
+from ...errors import InputError, did_you_mean, texts_of
 from ...kinematics.chain import FAMILIES
 from ...mechanism.contact import Bounds
 from ...mechanism.mechanism import Mechanism
@@ -36,9 +36,9 @@ class Reach:
     threads: int | None = None
 
     @staticmethod
-    def of(model: Model, strokes: Strokes = (), threads: int | None = None) -> Reach:
+    def of(model: Model, stroke: Strokes = (), threads: int | None = None) -> Reach:
         """Raises InputError for chains that there are not, or ranges that are none."""
-        return Reach(model, *strokes_of(model.mechanism, strokes), threads)
+        return Reach(model, *strokes_of(model.mechanism, stroke), threads)
 
     @cached_property
     def needs(self) -> tuple[str, ...]:
@@ -82,7 +82,7 @@ def strokes_of(mechanism: Mechanism, given: Strokes) -> tuple[np.ndarray, np.nda
     if isinstance(given, Mapping):
         pairs = [(name, ends, "") for name, ends in given.items()]
     else:
-        texts = [given] if isinstance(given, str) else given
+        texts = texts_of("stroke", given, separated=False)
         form = "chain=low:high unit", "leg_*=-200:300 mm"
         pairs = [parsed(text, *form) for text in texts]  # type: ignore[misc]
     for pattern, ends, unit in pairs:

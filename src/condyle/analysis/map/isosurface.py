@@ -15,7 +15,7 @@ TRIANGLES = (
 )
 
 
-def skin(margin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def isosurface(margin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The surface around the points of a grid where the margin is not negative.
 
     Closed where the range ends. By marching tetrahedra, the margin linear along their edges.

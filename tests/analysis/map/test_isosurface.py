@@ -10,8 +10,8 @@ import pytest
 
 import condyle
 from condyle.analysis.map import open_map, save_map
+from condyle.analysis.map.isosurface import first_hit, isosurface, sheet
 from condyle.analysis.map.map_files import grid_and_reach, mechanism_of
-from condyle.analysis.map.skin import first_hit, sheet, skin
 
 from .conftest import Models
 
@@ -32,7 +32,7 @@ def volume_and_area(vertices: np.ndarray, faces: np.ndarray) -> tuple[float, flo
 
 
 def test_skin_of_a_ball() -> None:
-    vertices, faces = skin(ball())
+    vertices, faces = isosurface(ball())
     volume, area = volume_and_area(vertices, faces)
     assert volume == pytest.approx(4 / 3 * pi * 0.027, rel=0.01)
     assert area == pytest.approx(4 * pi * 0.09, rel=0.01)
@@ -44,15 +44,15 @@ def test_skin_is_closed() -> None:
     cut = ball(15, 0.4, 0.3)
     cut[:, :, 10:] = np.nan
     for margin in (ball(12), cut):
-        _, faces = skin(margin)
+        _, faces = isosurface(margin)
         edges = np.sort(np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
         _, count = np.unique(edges, axis=0, return_counts=True)
         assert (count % 2 == 0).all() and (count == 2).mean() > 0.98
-    assert len(skin(np.full((4, 4, 4), -1.0))[1]) == 0
+    assert len(isosurface(np.full((4, 4, 4), -1.0))[1]) == 0
 
 
 def test_rays_meet_surfaces() -> None:
-    vertices, faces = skin(ball())
+    vertices, faces = isosurface(ball())
     hit = first_hit(np.array([0.5, 0.5, -1.0]), np.array([0, 0, 1.0]), vertices, faces)
     assert hit is not None
     np.testing.assert_allclose(hit, [0.5, 0.5, 0.2], atol=2e-3)
@@ -70,7 +70,7 @@ def test_sheet_has_the_whole_cells() -> None:
 def test_files_bring_all_that_was_asked(model_of: Models, tmp_path: Path) -> None:
     model = model_of("masticatory")
     made = condyle.workspace_map(
-        model, "X=-2:5:4 mm", hold="beta=2 deg", strokes="masseter_*=-0.5:0.4"
+        model, "X=-2:5:4 mm", hold="beta=2 deg", stroke="masseter_*=-0.5:0.4"
     )
     save_map(made, tmp_path / "a.nc")
     found = open_map(tmp_path / "a.nc")

@@ -18,9 +18,9 @@ from ...errors import InputError
 from ...kinematics.singularities import NEAR_SINGULAR
 from ...mechanism.mechanism import COORDINATES
 from ...model.model import Model
-from .ability import limited
 from .axes import Axis, Grid
-from .block import Asked, Block
+from .block import Block, Setup
+from .load_capacity import limited
 from .reach import Reach
 
 POINTS, FEW = 20_000, 500  # in the ball; where it has to be quick
@@ -58,39 +58,39 @@ class Box:
 
 
 @dataclass(frozen=True)
-class Free:
+class FreeSpace:
     """Which poses are free.
 
     margin: least singularity ratio;  limits: whether efforts within limits must hold the load.
     """
 
-    asked: Asked
+    setup: Setup
     margin: float = NEAR_SINGULAR
     limits: bool = True
 
     def margins(self, q: np.ndarray) -> np.ndarray:
         """(reasons, N): negative, or no number, where not free; all but the last continuous."""
-        model = self.asked.model
-        block = Block(self.asked, q, frozenset({"ratio", "transmission", "points", "pose"}))
+        model = self.setup.model
+        block = Block(self.setup, q, frozenset({"ratio", "transmission", "points", "pose"}))
         survey = block.survey
         ratio = np.fmin(survey.inverse_ratio, survey.direct_ratio)
         rows = [survey.closing, *block.margin, ratio - self.margin, *block.bounds.T]
         found = np.vstack([*rows, np.ones(len(q))])
         if self.limits and limited(model.mechanism):
             some = np.flatnonzero((found >= 0).all(axis=0))
-            held = self.asked.ability.holds(block.pose[some], self.asked.load)
+            held = self.setup.load_capacity.holds(block.pose[some], self.setup.load)
             found[-1, some[~held]] = -1.0
         return found
 
     @property
     def costly(self) -> bool:
         """Whether efforts have to be chosen at every pose."""
-        return self.limits and limited(self.asked.model.mechanism) and self.asked.ability.many
+        return self.limits and limited(self.setup.model.mechanism) and self.setup.load_capacity.many
 
     @cached_property
     def reasons(self) -> list[str]:
         """What a negative margin is the end of."""
-        mechanism = self.asked.model.mechanism
+        mechanism = self.setup.model.mechanism
         contacts = mechanism.contact_names
         return [
             f"the reach of contacts {' & '.join(contacts)}",
@@ -101,14 +101,14 @@ class Free:
         ]
 
 
-def greatest_ball(free: Free, grid: Grid, points: int = POINTS) -> Ball:
+def greatest_ball(free: FreeSpace, grid: Grid, points: int = POINTS) -> Ball:
     """Around home, within the range of the axes; the other coordinates are held.
 
     The nearest pose that is not free is looked for among many, and from there along the border.
 
     Raises: InputError: if home is outside the range.
     """
-    d, length = len(grid.axes), free.asked.model.characteristic_length
+    d, length = len(grid.axes), free.setup.model.characteristic_length
     scale = np.array([1.0 if a.name in COORDINATES[:3] else 1.0 / length for a in grid.axes])
     radius = _room_in_range(grid, scale)
     points = min(points, 5 * FEW) if free.costly else points
@@ -146,7 +146,7 @@ def ball_around_home(model: Model, points: int = FEW) -> Ball:
     ends = [length if name in COORDINATES[:3] else 1.0 for name in model.independent]
     axes = tuple(Axis(n, -end, end, 2) for n, end in zip(model.independent, ends, strict=True))
     reach = Reach.of(model)
-    free = Free(Asked(model, reach, np.zeros(9)), limits=False)
+    free = FreeSpace(Setup(model, reach, np.zeros(9)), limits=False)
     return greatest_ball(free, Grid(model.independent, axes, (0.0,) * len(axes)), points)
 
 
@@ -213,7 +213,7 @@ def _room_in_range(grid: Grid, scale: np.ndarray) -> float:
     return float(min(ends))
 
 
-def greatest_box(free: Free, grid: Grid) -> Box | None:
+def greatest_box(free: FreeSpace, grid: Grid) -> Box | None:
     """The box of largest volume around home, of one to three axes; None if home is not free.
 
     Raises: InputError: if home is outside the range.

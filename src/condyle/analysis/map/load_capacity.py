@@ -1,6 +1,6 @@
 """What efforts within limits can do at rest: hold a pose, and how large a load they bear besides.
 
-Efforts and one-sided contact forces within limits make a set of generalized forces that is a
+Efforts and unilateral contact forces within limits make a set of generalized forces that is a
 zonotope, a sum of segments and rays. A force g is in it where, for the normal y of each facet,
 
     sum_i min(y.c_i low_i, y.c_i high_i)  <=  y.g  <=  sum_i max(y.c_i low_i, y.c_i high_i),
@@ -32,25 +32,25 @@ ROUNDING = 1e-9  # of forces, relative to the largest
 
 
 @dataclass(frozen=True)
-class Ability:
-    """Limits of one mechanism's efforts and of its one-sided contacts."""
+class LoadCapacity:
+    """Limits of one mechanism's efforts and of its unilateral contacts."""
 
     model: Model
     low: np.ndarray
     high: np.ndarray
     free: list[int]
-    sided: list[int]
+    unilateral: list[int]
 
     @staticmethod
-    def of(model: Model) -> Ability:
+    def of(model: Model) -> LoadCapacity:
         mechanism = model.mechanism
         own = [limits(chain) for chain in mechanism.chains]
-        sided = [i for i, c in enumerate(mechanism.contacts) if c.one_sided]
-        push = [mechanism.contacts[i].push for i in sided]
+        unilateral = [i for i, c in enumerate(mechanism.contacts) if c.one_sided]
+        push = [mechanism.contacts[i].push for i in unilateral]
         low = [x.low for x in own] + [0.0 if p > 0 else -np.inf for p in push]
         high = [x.high for x in own] + [np.inf if p > 0 else 0.0 for p in push]
-        free = [i for i in range(len(mechanism.contacts)) if i not in sided]
-        return Ability(model, np.array(low), np.array(high), free, sided)
+        free = [i for i in range(len(mechanism.contacts)) if i not in unilateral]
+        return LoadCapacity(model, np.array(low), np.array(high), free, unilateral)
 
     def largest(self, pose: np.ndarray, load: np.ndarray, direction: np.ndarray) -> np.ndarray:
         """The largest s, (N,) [N], so that `load` and s times `direction` can be held.
@@ -96,7 +96,8 @@ class Ability:
             sides.append(kernel.run(ports).values)
         s = {name: np.moveaxis(value, -1, 0) for name, value in sides[0].items()}
         Q, more = s["Q"], np.moveaxis(sides[1]["Q"], -1, 0) - s["Q"]
-        columns = np.concatenate([s["J"], s["normal"][:, self.sided].transpose(0, 2, 1)], axis=2)
+        pushing = s["normal"][:, self.unilateral].transpose(0, 2, 1)
+        columns = np.concatenate([s["J"], pushing], axis=2)
         columns, Q, more = (np.nan_to_num(a) for a in (columns, Q, more))
         if not self.free:
             return columns, Q, more

@@ -1,0 +1,75 @@
+"""How large a workspace is, and how much of it around home is free."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...errors import InputError
+from ...kinematics.singularities import NEAR_SINGULAR
+from ...mechanism.mechanism import COORDINATES
+from ...model.model import Model, derive
+from .block import Setup
+from .free_space import Ball, Box, FreeSpace, greatest_ball, greatest_box
+from .map_files import grid_and_reach, mechanism_of, open_map
+from .volume import Volume, reachable_volume
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@dataclass(frozen=True)
+class WorkspaceSize:
+    """Reachable volume, and the greatest free ball and box around home.
+
+    box, ball: None where home is outside the range of the map.  unit: of the volume.
+    """
+
+    volume: Volume
+    unit: str
+    ball: Ball | None
+    box: Box | None
+    axes: tuple[str, ...]
+    margin: float
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """For JSON; SI."""
+        return {
+            "volume": asdict(self.volume) | {"unit": self.unit},
+            "ball": asdict(self.ball) if self.ball else None,
+            "box": asdict(self.box) if self.box else None,
+            "margin": self.margin,
+        }
+
+
+def workspace_size(
+    map: xr.Dataset | str | Path, margin: float = NEAR_SINGULAR, model: Model | None = None
+) -> WorkspaceSize:
+    """Volume of the reachable set of a map, and the greatest free ball and box around home.
+
+    Args:   map: of `workspace_map`, or its file.
+            margin: minimum singularity ratio in ball and box, 0 to 1.
+            model: that of the map, if it is at hand; else it is derived anew.
+    Raises: InputError: for what is no map, or a margin out of range.
+    """
+    if isinstance(margin, bool) or not isinstance(margin, int | float) or not 0 <= margin <= 1:
+        raise InputError(f"margin: expected a number from 0 to 1, got {margin!r:.60}")
+    dataset = open_map(map) if isinstance(map, str | Path) else map
+    made = model or derive(mechanism_of(dataset), distribution=dataset.attrs["distribution"])
+    grid, reach = grid_and_reach(dataset, made)
+    free = FreeSpace(Setup(made, reach, np.array(dataset.attrs["load"], dtype=float)), margin)
+    inside = all(axis.low < 0 < axis.high for axis in grid.axes)
+    units = ["m" if axis.name in COORDINATES[:3] else "rad" for axis in grid.axes]
+    powers = {unit: units.count(unit) for unit in units}
+    return WorkspaceSize(
+        reachable_volume(reach.margin, grid),
+        " ".join(unit + (f"^{n}" if n > 1 else "") for unit, n in powers.items()),
+        greatest_ball(free, grid) if inside else None,
+        greatest_box(free, grid) if inside else None,
+        tuple(axis.name for axis in grid.axes),
+        float(margin),
+    )
