@@ -1,7 +1,7 @@
-"""Distribution: which of all efforts that balance a machine it is given, and its contacts' load.
+"""Effort distribution: how actuation redundancy is resolved, and the contact forces that follow.
 
-Numbers in, numbers out, many samples at once: see `distribute`. What mechanisms, actuators and
-friction are is not known here; `Problem` says what of them counts.
+Arrays in, arrays out, many samples at once: see `distribute`. A `Problem` is the force balance
+with its bounds; mechanisms are not known here.
 """
 
 from .distribute import distribute, within

@@ -1,4 +1,4 @@
-"""The robust solver, one sample at a time: quadratic programs by DAQP, then all digits."""
+"""The robust solver, one sample at a time: quadratic programs by DAQP, polished by Newton."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from .eliminated import Sample
 
 EQUATION = 5  # DAQP's code of one
 TOLERANCES = {"primal_tol": 1e-12, "dual_tol": 1e-12, "iter_limit": 2000}
-NEAR = 1e-9  # of a bound: what is this near is at it
-SOFT, STEPS = 1e-5, 40  # of programs that follow a curved objective: least curvature; at most
-ENDED = 1e-13  # of the greatest effort: a step that ends them
+NEAR = 1e-9  # distance within which a bound is active
+SOFT, STEPS = 1e-5, 40  # sequential quadratic programming: minimum curvature, maximum steps
+CONVERGED = 1e-13  # relative step that ends it
 
 Function = Callable[[np.ndarray], np.ndarray]
 
 
 def least(s: Sample, slope: Function, curvature: Function, curved: bool) -> Answer | None:
-    """The least of a separable convex objective, certified; None where none is found.
+    """Minimise a separable convex objective; None where no certified minimum is found.
 
     Args: slope, curvature: first and second derivative of one term, of arrays;
-          curved: whether curvature changes, so that one quadratic program is not enough.
+          curved: whether the curvature varies, so that one quadratic program is not enough.
     """
     if s.contradictory:
         return None
@@ -43,8 +43,7 @@ def least(s: Sample, slope: Function, curvature: Function, curved: bool) -> Answ
 def least_squares(
     s: Sample, curvature: np.ndarray, target: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """x and u of the least of sum curvature (x - target)^2 / 2 + W |y|^2 / 2; None where
-    DAQP finds none."""
+    """x and u that minimise sum curvature (x - target)^2 / 2 + W |y|^2 / 2; None if DAQP fails."""
     m, n = s.m, s.G.shape[1]
     B, b, c = s.G[m:], s.right[:m], s.right[m:]
     sense = np.zeros(n + 6, dtype=np.int32)
@@ -60,21 +59,21 @@ def least_squares(
     )
     if flag != 1:
         return None
-    x, price = np.array(x), -np.asarray(info["lam"])[n:]
-    return x, np.concatenate([price[:m], price[m:] + s.weight * (c - B @ x)])
+    x, u = np.array(x), -np.asarray(info["lam"])[n:]
+    return x, np.concatenate([u[:m], u[m:] + s.weight * (c - B @ x)])
 
 
 def _followed(
     s: Sample, slope: Function, curvature: Function, x: np.ndarray, u: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Newton's method on the efforts themselves: a quadratic program a step, within all bounds."""
+    """Sequential quadratic programming from x and u."""
     for _ in range(STEPS):
         bent = curvature(x) + SOFT * np.abs(x).max() + np.finfo(float).tiny
         found = least_squares(s, bent, x - slope(x) / bent)
         if found is None:
             break
         step, u = found[0] - x, found[1]
-        # The slope rises along the step: bisect where it vanishes, if that is before its end.
+        # Line search: the slope rises along the step, so bisect for its root.
         low, high = 0.0, 1.0
         if slope(x + step) @ step > 0:
             for _ in range(30):
@@ -84,7 +83,7 @@ def _followed(
         else:
             low = 1.0
         x = np.maximum(x + low * step, s.low)
-        if np.abs(step).max() <= ENDED * np.abs(x).max():
+        if np.abs(step).max() <= CONVERGED * np.abs(x).max():
             break
     return x, u
 
@@ -92,10 +91,9 @@ def _followed(
 def _polished(
     s: Sample, slope: Function, curvature: Function, x: np.ndarray, u: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """x and u to all digits, from those that are nearly right.
+    """x and u to rounding, by Newton's method on both with the active bounds as equations.
 
-    Newton's method on both at once, with the bounds that are met held as equations: near the
-    limit of what is possible multipliers grow, and x does not follow from them alone.
+    Near infeasibility multipliers grow, and x does not follow from them alone.
     """
     n, (G, low, high) = len(x), s.whole()
     z, u = np.clip(np.concatenate([x, s.force(x)]), low, high), u.copy()

@@ -1,4 +1,4 @@
-"""Proof of an answer from its numbers alone: equations, constraints, conditions of optimality."""
+"""Certificates of optimality: the Karush-Kuhn-Tucker conditions, checked on the result alone."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from .result import CERTIFIED
 class Answer:
     """x and contact forces y of a sample, multipliers u (6,) of its equations, and its certificate.
 
-    residual, excess, slack: how far equations are from met, constraints exceeded, and the part of
-    the gradient that no multiplier of the right sign explains, relative.
+    residual, excess, slack: relative residual of the equations, violation of the bounds, and
+    violation of stationarity with multipliers of the right sign.
     """
 
     x: np.ndarray
@@ -33,9 +33,9 @@ class Answer:
 def certified(
     s: Sample, x: np.ndarray, u: np.ndarray, slope: np.ndarray, slack: float | None = None
 ) -> Answer:
-    """An answer whose efforts are put within their limits exactly.
+    """The certified answer, its efforts clipped to their limits.
 
-    Args: slope: gradient of the objective in x;  slack: where it is known otherwise.
+    Args: slope: gradient of the objective in x;  slack: if it is already known.
     """
     x = np.clip(x, s.low, s.high)
     force = s.force(x)
@@ -44,7 +44,7 @@ def certified(
 
 
 def residual(s: Sample, x: np.ndarray, force: np.ndarray) -> float:
-    """How far the equations are from met, relative to the terms of each kind of row."""
+    """Residual of the equations, relative to the terms of each kind of row."""
     G, *_ = s.whole()
     error = np.abs(s.right - G @ np.concatenate([x, force]))
     size = np.abs(s.G).max(axis=1, initial=0.0) * np.abs(x).max(initial=0.0)
@@ -53,7 +53,7 @@ def residual(s: Sample, x: np.ndarray, force: np.ndarray) -> float:
 
 
 def excess(s: Sample, x: np.ndarray, force: np.ndarray) -> float:
-    """How far efforts and contact forces exceed their bounds, relative to the largest."""
+    """Violation of the bounds of efforts and contact forces, relative to the largest."""
     largest = np.abs(x).max(initial=0.0)
     over = np.maximum(s.low - x, x - s.high).max(initial=0.0)
     beyond = np.maximum(s.contact_low - force, force - s.contact_high).max(initial=0.0)
@@ -65,7 +65,7 @@ def _slack(s: Sample, x: np.ndarray, force: np.ndarray, u: np.ndarray, slope: np
     g, greatest = s.G.T @ u, np.abs(x).max(initial=0.0)
     largest = np.abs(slope).max(initial=0.0) or np.abs(g).max(initial=0.0)
     wrong = unexplained(slope - g, x, s.low, s.high, greatest)
-    # A multiplier of a contact counts by what it adds to the price of efforts.
+    # A contact's multiplier counts by its contribution to the gradient of efforts.
     size = np.abs(force).max(initial=0.0) + greatest
     z = s.weight * force - u[s.m :]
     acting = unexplained(z, force, s.contact_low, s.contact_high, size)
@@ -76,7 +76,7 @@ def _slack(s: Sample, x: np.ndarray, force: np.ndarray, u: np.ndarray, slope: np
 def unexplained(
     z: np.ndarray, x: np.ndarray, low: np.ndarray, high: np.ndarray, largest: float
 ) -> np.ndarray:
-    """|z| where no bound is near, and where z has the sign that the bound cannot give."""
+    """|z| where no bound is active, and where z has the wrong sign for the active bound."""
     near = CERTIFIED * largest
     up, down = np.maximum(z, 0.0), np.maximum(-z, 0.0)
     return np.maximum(np.where(x - low <= near, 0.0, up), np.where(high - x <= near, 0.0, down))

@@ -1,7 +1,7 @@
 """Efforts and contact forces of N samples: the public function of this room.
 
-The question `allocation` finds nearly all, as fast as its backend is; what it cannot prove, DAQP
-solves one sample at a time, and says why there is no answer where there is none.
+The question `allocation` solves nearly all samples at the speed of its backend. Samples that it
+cannot prove are solved by DAQP, one at a time, which also classifies the infeasible ones.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ from .stretch import least_stretch
 def distribute(
     problem: Problem, distribution: str = "bounded", backend: Backend | str | None = "numpy"
 ) -> Result:
-    """Share every sample's force among efforts and contacts.
+    """Distribute the generalized force of every sample over efforts and contact forces.
 
-        least objective(effort)  with  Q = J^T (effort - offset) + sum_k lambda_k D_k
+        min objective(effort)  subject to  Q = J^T (effort - offset) + sum_k lambda_k D_k
 
     Args:    distribution: name of an objective, see `OBJECTIVES`.
-             backend: what runs the question, or its name; None: the robust solver alone.
-    Returns: efforts, contact forces, a status a sample, and a certificate.
-    Raises:  InputError: if the objective has no meaning with these limits.
+             backend: backend of the question, or its name; None: the robust solver alone.
+    Returns: efforts, contact forces, status and certificate of every sample.
+    Raises:  InputError: if the objective is undefined for these limits.
     """
     objective = named(distribution)
     objective.check(problem)
@@ -62,10 +62,10 @@ def distribute(
 
 
 def within(problem: Problem, effort: np.ndarray, contact_force: np.ndarray) -> np.ndarray:
-    """Samples whose efforts keep the limits and whose one-sided contacts push enough, (N,).
+    """Samples that respect effort limits and the preload of unilateral contacts, (N,).
 
-    Where efforts of least norm do, they are what `bounded` would give: only the others have to be
-    distributed. Friction's signs are not looked at.
+    Minimum-norm efforts that do are those of `bounded` too; only the others are distributed.
+    Friction signs are ignored.
 
     Args: effort: (N, n).   contact_force: (N, k) [N].
     """
@@ -75,7 +75,7 @@ def within(problem: Problem, effort: np.ndarray, contact_force: np.ndarray) -> n
 
 
 def patterns(problem: Problem) -> np.ndarray:
-    """All signs of the contacts that have friction in any sample, 0 for others, (P, k)."""
+    """All sign patterns of the contacts with friction, 0 for others, (P, k)."""
     rubs = (problem.friction != 0).any(axis=(0, 2))
     found = list(product(*[(1, -1) if rubbing else (0,) for rubbing in rubs]))
     return np.array(found, dtype=float).reshape(len(found), problem.k)
@@ -86,7 +86,7 @@ def patterns(problem: Problem) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def _kernel(n: int, k: int, term: str, weighs: bool, backend: str) -> Kernel:
-    """Serves every mechanism of so many efforts and contacts, whatever they are."""
+    """One kernel for every mechanism with n efforts and k contacts."""
     structure = Structure("virtual_power", "core", (("cable", n),), (("plane", 4),) * k, ())
     layout = Layout.of(structure)
     shared, lane = (
@@ -97,7 +97,7 @@ def _kernel(n: int, k: int, term: str, weighs: bool, backend: str) -> Kernel:
     if backend == "compiled":
         try:
             return CompiledKernel(question.key, question.variants, numbers)
-        except CompilerError:  # of which the model's own kernels tell
+        except CompilerError:  # the model's own kernels give notice of it
             pass
     return NumpyKernel(question.variants(), numbers)
 
@@ -105,7 +105,7 @@ def _kernel(n: int, k: int, term: str, weighs: bool, backend: str) -> Kernel:
 def _by_kernel(
     p: Problem, objective: Objective, signs: np.ndarray, result: Result, backend: Backend
 ) -> np.ndarray:
-    """Fill in what the question proves; returns the samples that it leaves to others."""
+    """Fill in the samples that the question proves; returns the others."""
     assert objective.term is not None
     bounds, count, k = objective.ports(p), p.count, p.k
     kernel = _kernel(p.n, k, objective.term, "weight" in bounds, backend.name)
@@ -137,7 +137,7 @@ def _by_kernel(
 def _proved(
     kernel: Kernel, inputs: dict[str, np.ndarray], turns: int
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Which samples have efforts for sure, and all results; the rest go on for so many steps."""
+    """Which samples are proved, and all results; the others continue up to `turns` steps."""
     count = len(inputs["Q"])
     multipliers, begun = np.broadcast_to(0.0, (count, 6)), np.broadcast_to(0.0, (count, 1))
     answer = kernel.run(inputs | {"multipliers": multipliers, "begun": begun})
@@ -160,7 +160,7 @@ def _proved(
 
 
 def _alone(p: Problem, i: int, objective: Objective, signs: np.ndarray, result: Result) -> None:
-    """Solve one sample under every pattern, and write the least answer, or why there is none."""
+    """Solve one sample for every sign pattern; write the best answer, or why there is none."""
     scale, weight = objective.scale(p), objective.weight(p)
     samples = [Sample.of(p, i, sigma, scale, weight, objective.limits) for sigma in signs]
     programs = [s for s in samples if s is not None]
@@ -193,7 +193,7 @@ def _alone(p: Problem, i: int, objective: Objective, signs: np.ndarray, result: 
 
 
 def _before(a: Sequence[float], b: Sequence[float]) -> bool:
-    """Whether values a come before b, level by level; those within `TIE` are equal."""
+    """Whether a precedes b lexicographically; entries within `TIE` are equal."""
     for one, other in zip(a, b, strict=True):
         if abs(one - other) > TIE * max(abs(one), abs(other)):
             return one < other
@@ -203,15 +203,15 @@ def _before(a: Sequence[float], b: Sequence[float]) -> bool:
 def _explained(
     programs: Sequence[Sample], signs: np.ndarray, unknown: np.ndarray, answered: bool
 ) -> tuple[Status, float]:
-    """Status and shortfall of a sample that some patterns of friction gave no answer to.
+    """Status and shortfall of a sample.
 
-    Args: unknown: patterns with no answer, (P,);  answered: whether another has one, which is the
-          least if the unknown ones turn out to be empty.
+    Args: unknown: sign patterns without an answer, (P,);  answered: whether another has one, which
+          is the minimum if the unknown ones are infeasible.
     """
     if not unknown.any():
         return Status.ok, 1.0
     needed = np.array([_needed(s) if u else 0.0 for s, u in zip(programs, unknown, strict=True)])
-    # Nearer to 1, what fits is a point to rounding: then a solver that finds nothing may be right.
+    # Nearer to 1 the feasible set is a point to rounding: a solver that finds none may be right.
     if (unknown & (needed < 1 - CERTIFIED)).any():
         return Status.uncertified, np.nan
     if answered:
@@ -225,7 +225,7 @@ def _explained(
 
 
 def _needed(s: Sample) -> float:
-    """The least number by which the limits of a sample must be multiplied, inf if none does."""
+    """The smallest feasible factor on the limits of a sample, inf if there is none."""
     if s.contradictory:
         return np.inf
     none = np.full_like(s.low, np.inf)
@@ -233,7 +233,7 @@ def _needed(s: Sample) -> float:
 
 
 def _signs_only(s: Sample, sigma: np.ndarray) -> Sample:
-    """Without limits and one-sided contacts."""
+    """Without effort limits and unilateral contacts."""
     none = np.full_like(s.low, np.inf)
     return replace(
         s,

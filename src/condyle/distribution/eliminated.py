@@ -1,4 +1,4 @@
-"""One sample under one pattern of friction's signs, its contacts eliminated.
+"""One sample with given friction signs, its contact forces eliminated.
 
 An orthogonal transformation turns the six equations into m = 6 - k for the efforts, with
 orthonormal rows, and the contact forces that follow from them:
@@ -14,7 +14,7 @@ import numpy as np
 
 from .problem import Problem
 
-DEPENDENT = 1e-11  # sine of an angle to other columns below which a contact adds nothing new
+DEPENDENT = 1e-11  # sine of the angle to other columns below which a contact is redundant
 SINGULAR = 1e-12  # ratio of singular values of A below which efforts are not determined
 
 
@@ -23,8 +23,8 @@ class Sample:
     """G (6, n) and right (6,), rows of efforts alone first; bounds of x and of contact forces y.
 
     weight:  W of half the sum of squares of y.
-    unit:    by which all were divided, so that the greatest are of the order of one.
-    measure: by which contact forces were divided besides, to weigh on equations as efforts do.
+    unit:    common scale, which makes the largest entries of the order of one.
+    measure: additional scale of contact forces, which balances them against the efforts.
     """
 
     G: np.ndarray
@@ -43,9 +43,9 @@ class Sample:
     ) -> Sample | None:
         """Sample i; None where efforts or contact forces are not determined.
 
-        Args: sigma: signs of the contacts with friction, (k,), 0 for others: their force must have
-              this sign, or be 0.
-              limits: whether efforts have limits and one-sided contacts push.
+        Args: sigma: signs of the contact forces with friction, (k,), 0 for others; a force may
+              also vanish.
+              limits: whether effort limits and unilateral contacts apply.
         """
         n, k = p.n, p.k
         D = (p.normal[i] - sigma[:, None] * p.friction[i]).T
@@ -88,7 +88,7 @@ class Sample:
 
     @property
     def contradictory(self) -> bool:
-        """Whether a contact force would need a sign that it must not have."""
+        """Whether the bounds of a contact force exclude each other."""
         return bool((self.contact_low > self.contact_high).any())
 
     def force(self, x: np.ndarray) -> np.ndarray:

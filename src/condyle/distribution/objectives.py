@@ -14,7 +14,7 @@ from .eliminated import Sample
 from .problem import Problem
 from .stretch import least_stretch
 
-ROOM = 1e-10  # above the least greatest effort, within which other efforts may be
+ROOM = 1e-10  # relative tolerance on the minimal maximum in the second stage of minimax
 
 
 @dataclass(frozen=True)
@@ -22,12 +22,12 @@ class Objective:
     """Sum of squares of efforts over `scale`, plus W times those of contact forces.
 
     summary:     one line for help and docs.
-    limits:      efforts have limits, one-sided contacts push.
+    limits:      effort limits and unilateral contacts apply.
     mixes_units: efforts may be of different units: each is divided by its limit.
     weighs:      contact forces may have a weight.
     """
 
-    term: ClassVar[str | None] = "square"  # of `allocation`, None where it is no sum of such
+    term: ClassVar[str | None] = "square"  # of the question `allocation`; None: not separable
 
     name: str
     summary: str
@@ -36,7 +36,7 @@ class Objective:
     weighs: bool = False
 
     def check(self, problem: Problem) -> None:
-        """Refuse what has no meaning under this objective."""
+        """Raise InputError where the objective is undefined for these limits."""
         if self.mixes_units and not np.isfinite(problem.scale).all():
             without = np.flatnonzero(~np.isfinite(problem.scale)).tolist()
             raise InputError(
@@ -45,7 +45,7 @@ class Objective:
             )
 
     def scale(self, problem: Problem) -> np.ndarray:
-        """What efforts are divided by, (n,): 1, or the larger of their limits."""
+        """Scale of the efforts, (n,): 1, or the larger of their limits."""
         limit = problem.scale
         return np.where(limit > 0, limit, 1.0) if self.mixes_units else np.ones(problem.n)
 
@@ -54,7 +54,7 @@ class Objective:
         return problem.contact_weight if self.weighs else 0.0
 
     def ports(self, problem: Problem) -> dict[str, np.ndarray]:
-        """Limits as the questions `allocation` and `limited` take them, a row each."""
+        """Limits as ports of the questions `allocation` and `limited`."""
         p, free = problem, np.full(problem.n, np.inf)
         low, high, push = (p.low, p.high, p.push) if self.limits else (-free, free, 0 * p.push)
         ports = {
@@ -68,18 +68,18 @@ class Objective:
         return ports | ({"weight": np.array([weight])} if weight else {})
 
     def solve(self, s: Sample) -> Answer | None:
-        """The least of one sample, certified; None where none was found."""
+        """The certified minimum of one sample; None where none was found."""
         return least(s, lambda x: x, np.ones_like, curved=False)
 
     def values(self, s: Sample, answer: Answer) -> tuple[float, ...]:
-        """What is least: the first before all; a second only breaks ties."""
+        """Value of the objective; a second entry breaks ties."""
         square = answer.x @ answer.x + s.weight * answer.force @ answer.force
         return (0.5 * s.unit**2 * float(square),)
 
 
 @dataclass(frozen=True)
 class Cubic(Objective):
-    """Sum of cubes of efforts over their limits, of efforts that only pull."""
+    """Sum of cubes of efforts over their limits, for efforts that only pull."""
 
     term: ClassVar[str | None] = "cube"
 
@@ -101,7 +101,7 @@ class Cubic(Objective):
 
 @dataclass(frozen=True)
 class Minimax(Objective):
-    """The greatest effort over its limit; of those that share it, the least sum of squares."""
+    """Maximum effort over its limit; ties are broken by the sum of squares."""
 
     term: ClassVar[str | None] = None
 
@@ -116,7 +116,7 @@ class Minimax(Objective):
             answer = certified(s, found.x, found.u, ones, found.error)
             if answer.proved:
                 return answer
-        # For a t that is known better than its x.
+        # Second stage: t is known better than its x.
         most = found.t * (1 + ROOM)
         narrow = replace(s, low=np.maximum(s.low, -most), high=np.minimum(s.high, most))
         other = super().solve(narrow)
@@ -149,23 +149,17 @@ def named(name: str) -> Objective:
 
 
 for _objective in (
-    Objective("bounded", "least sum of squares of efforts within limits; one-sided contacts push"),
+    Objective("bounded", "minimum norm within effort limits and unilateral contacts"),
     Cubic(
         "cubic",
-        "sum of cubes of efforts over their limits, efforts >= 0: muscle recruitment",
+        "minimum sum of cubed activations (muscle recruitment); efforts are >= 0",
         mixes_units=True,
     ),
-    Minimax(
-        "minimax",
-        "least of the greatest effort over its limit; of those, as weighted",
-        mixes_units=True,
-    ),
-    Objective(
-        "minimum_norm", "least sum of squares of efforts; limits are not looked at", limits=False
-    ),
+    Minimax("minimax", "minimum largest activation, then minimum norm", mixes_units=True),
+    Objective("minimum_norm", "minimum norm; limits are ignored", limits=False),
     Objective(
         "weighted",
-        "as bounded, each effort divided by its limit; contact forces may weigh as well",
+        "minimum norm of activations (effort / limit), with an optional contact-force weight",
         mixes_units=True,
         weighs=True,
     ),

@@ -1,9 +1,9 @@
-"""What is asked at N samples: which efforts and contact forces balance a generalized force.
+"""The force balance at N samples: efforts and contact forces against a generalized force.
 
     Q = J^T tau + sum_k lambda_k D_k,    D_k = N_k - sigma_k T_k,    sigma_k = sign(lambda_k),
 
-six equations for n efforts and k contact forces. The effort is tau + offset, where the offset is
-what the actuator loses (or gives) by itself; limits and objective apply to the effort.
+six equations for n efforts and k contact forces. The effort is tau + offset, the offset being the
+actuator's own loss; limits and objective apply to the effort.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ class Problem:
     Q:        generalized force that efforts and contacts balance, (N, 6) [N, N m].
     J:        rows of the actuator Jacobian on the platform's twist, (N, n, 6).
     normal:   wrench of a unit contact force without friction, (N, k, 6).
-    friction: what friction takes off it where the contact pushes, mu [u; c x u], (N, k, 6);
+    friction: its reduction by friction where the contact pushes, mu [u; c x u], (N, k, 6);
               zero where there is none.
     low, high: limits of the efforts, (n,); infinite where there is none.
-    push:     sign of a one-sided contact's force, 0 where the contact is two-sided, (k,).
-    preload:  least size of a one-sided contact's force [N].
+    push:     sign of a unilateral contact's force, 0 where the contact is bilateral, (k,).
+    preload:  minimum compressive force of unilateral contacts [N].
     offset:   effort less tau, (N, n).
     contact_weight: W / N_ref^2 [1/N^2]: `weighted` adds W (lambda_k / N_ref)^2 of every contact.
     """
@@ -45,7 +45,7 @@ class Problem:
     contact_weight: float = 0.0
 
     def __post_init__(self) -> None:
-        """Fill in what was left out, and refuse what does not fit together."""
+        """Fill in the defaults and check shapes and values."""
         if np.ndim(self.J) != 3 or np.ndim(self.normal) != 3:
             raise InputError(
                 f"J must be (N, n, 6) and normal (N, k, 6); got {np.shape(self.J)} and "
@@ -108,7 +108,7 @@ class Problem:
 
     @property
     def finite(self) -> np.ndarray:
-        """Samples whose numbers are all finite, (N,)."""
+        """Samples whose inputs are all finite, (N,)."""
         parts = (self.Q, self.J, self.normal, self.friction, self.offset)
         return np.all([np.isfinite(a).all(axis=tuple(range(1, a.ndim))) for a in parts], axis=0)
 

@@ -1,12 +1,12 @@
-"""The least t for which x fits between t times some limits: one linear program a sample.
+"""The smallest factor t on the limits for which x is feasible: one linear program a sample.
 
     min t    with  G x + (0, lambda) = right,  t lower <= x <= t upper,  low <= x <= high,  t >= 0
 
-With lower, upper = -1, 1 this is `minimax`; with the efforts' limits it is the shortfall. A linear
-program plus a small enough multiple of a strictly convex function keeps its least value, and picks
-of its solutions the one where that function is least (Mangasarian and Meyer 1979): so a quadratic
-program, solved by DAQP, answers both at once. That the multiple was small enough is shown by
-duality; where it is not shown, HiGHS solves the linear program.
+With lower, upper = -1, 1 this is `minimax`; with the efforts' limits it is the shortfall. A small
+enough quadratic regularisation keeps the minimum of a linear program and selects its solution of
+least norm (Mangasarian and Meyer 1979), so one quadratic program, solved by DAQP, gives both.
+Duality shows whether the regularisation was small enough; otherwise HiGHS solves the linear
+program.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from .active_set import EQUATION, TOLERANCES
 from .certificate import unexplained
 from .eliminated import Sample
 
-SMALL = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-2)  # multiples that are tried
-GAP = 1e-10  # of t, between what was found and the bound of duality
+SMALL = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-2)  # regularisations, in the order of trial
+GAP = 1e-10  # duality gap over t
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """t, inf where nothing fits; x (n,) of least sum of squares there; multipliers u, (6,).
+    """t, inf if infeasible; the minimum-norm x (n,) there; multipliers u, (6,).
 
-    gap:    relative to t, by which t may exceed the least.
-    spread: violation of the conditions of the least sum of squares, relative to the largest x.
+    gap:    duality gap, relative to t.
+    spread: violation of the minimum-norm conditions, relative to the largest x.
     """
 
     t: float
@@ -44,7 +44,7 @@ class Stretch:
 
 
 def least_stretch(s: Sample, lower: np.ndarray, upper: np.ndarray) -> Stretch:
-    """Solve for one sample; limits `lower` <= 0 <= `upper` or not, infinite where there is none."""
+    """Solve for one sample; limits of any sign, infinite where there is none."""
     program = _Program.of(s, lower, upper)
     best: Stretch | None = None
     for small in SMALL:
@@ -52,7 +52,7 @@ def least_stretch(s: Sample, lower: np.ndarray, upper: np.ndarray) -> Stretch:
         if first is None or second is None:
             continue
         x, t = second[0][:-1], float(second[0][-1])
-        # Multipliers are linear in the multiple: its limit at 0, and its rate.
+        # Multipliers are linear in the regularisation: their limit at 0, and their rate.
         u, alpha = (2 * b - a for a, b in zip(first[1:], second[1:], strict=True))
         rate = (first[1] - second[1]) / (0.5 * small)
         gap = abs(t - _bound(s, lower, upper, u, alpha)) / max(t, 1e-12)
@@ -72,7 +72,7 @@ def least_stretch(s: Sample, lower: np.ndarray, upper: np.ndarray) -> Stretch:
 
 
 def times(t: float, limit: np.ndarray) -> np.ndarray:
-    """t times limits; what is infinite stays so."""
+    """t times limits; infinite ones stay infinite."""
     return np.where(np.isfinite(limit), t * np.where(np.isfinite(limit), limit, 0.0), limit)
 
 
@@ -108,7 +108,7 @@ class _Program:
         return cls(matrix, least, most, low, high, who, slice(q, q + m))
 
     def regularised(self, small: float) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """z of the least t + small |z|^2 / 2, u (6,) and prices of stretched limits, (n,)."""
+        """z that minimises t + small |z|^2 / 2, multipliers u (6,) and of the limits, (n,)."""
         size, q = len(self.low), len(self.who)
         sense = np.zeros(size + len(self.least), dtype=np.int32)
         sense[size:][self.equations] = EQUATION
@@ -119,11 +119,11 @@ class _Program:
         )
         if flag != 1:
             return None
-        price = -small * np.asarray(info["lam"])[size:]
-        return np.array(z), price[q:], np.bincount(self.who, -price[:q], minlength=size - 1)
+        u = -small * np.asarray(info["lam"])[size:]
+        return np.array(z), u[q:], np.bincount(self.who, -u[:q], minlength=size - 1)
 
     def exact(self) -> np.ndarray | None:
-        """z by HiGHS; None where nothing fits."""
+        """z by HiGHS; None if infeasible."""
         from scipy.optimize import linprog
 
         equal = np.zeros(len(self.least), dtype=bool)
@@ -147,25 +147,25 @@ class _Program:
 def _bound(
     s: Sample, lower: np.ndarray, upper: np.ndarray, u: np.ndarray, alpha: np.ndarray
 ) -> float:
-    """What t cannot be less than, from prices u of the equations, shared by both kinds of limit."""
+    """Dual lower bound on t, from multipliers u of the equations and alpha of scaled limits."""
     g = s.G.T @ u
-    price = np.concatenate([g - alpha, u[s.m :]])
+    multiplier = np.concatenate([g - alpha, u[s.m :]])
     low, high = np.concatenate([s.low, s.contact_low]), np.concatenate([s.high, s.contact_high])
-    bounds = np.where(price > 0, high, low)
+    bounds = np.where(multiplier > 0, high, low)
     noise = 1e-10 * np.abs(np.concatenate([g, u])).max(initial=0.0)
-    bounds = np.where(np.abs(price) <= noise, np.clip(0.0, low, high), bounds)
+    bounds = np.where(np.abs(multiplier) <= noise, np.clip(0.0, low, high), bounds)
     stretched = np.where(alpha > 0, upper, lower)
     stretched = np.where(np.abs(alpha) <= noise, 0.0, stretched)
-    worth, most = float(s.right @ u - price @ bounds), float(alpha @ stretched)
-    return max(worth / most, 0.0) if most > 0 and np.isfinite(worth) else 0.0
+    value, most = float(s.right @ u - multiplier @ bounds), float(alpha @ stretched)
+    return max(value / most, 0.0) if most > 0 and np.isfinite(value) else 0.0
 
 
 def _spread(
     s: Sample, lower: np.ndarray, upper: np.ndarray, x: np.ndarray, u: np.ndarray, rate: np.ndarray
 ) -> float:
-    """How far x is from the least sum of squares among the solutions of the linear program.
+    """Violation of the minimum-norm conditions among the solutions of the linear program.
 
-    Those solutions keep every effort with a price at its bound; the others must balance `rate`.
+    Those solutions keep efforts with a multiplier at their bounds; the others balance `rate`.
     """
     g, largest = s.G.T @ u, np.abs(x).max(initial=0.0)
     low, high = np.maximum(lower, s.low), np.minimum(upper, s.high)

@@ -1,4 +1,4 @@
-"""What a formulation is: the platform's generalized force, and the dynamics of a chain.
+"""The interface of a formulation: the platform's generalized force, and the dynamics of a chain.
 
 A formulation sees the platform through a `State` and each chain through the motion of its joint M
 alone, so that one text serves every route, every family and any number of contacts:
@@ -36,7 +36,7 @@ class Formulation(ABC):
     name: ClassVar[str]
     uses_twist: ClassVar[bool] = False  # whether route `core` works in twist coordinates
     # Whether a chain's bodies can act as one, with end masses that are part of the platform, and
-    # whether idle constants (`Family.idle`) alone make a lane do nothing.
+    # whether padding constants (`Family.padding`) alone make a lane vanish.
     lumps: ClassVar[bool] = False
     pads: ClassVar[bool] = False
 

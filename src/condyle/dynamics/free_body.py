@@ -1,8 +1,8 @@
-"""A chain cut into free bodies: what each of its joints carries.
+"""A chain cut into free bodies: the force and moment in each of its joints.
 
 The links of a chain stand in a row, from the base to the platform joint M, where the last one
 pushes the platform with a force F. Newton and Euler, added up from the platform inwards, give
-what joint i puts on link i: a force and, about the joint's point P_i, a moment,
+the force of joint i on link i and its moment about the joint's point P_i,
 
     W_i = F + sum f_j,
     N_i = (M - P_i) x F + sum [ (E_j - P_i) x f_j + h_j - mu_j w_j ],    j = i, i + 1, ...
@@ -26,7 +26,7 @@ from .joint_space import JointState
 
 @dataclass(frozen=True)
 class Carried:
-    """What joints put on their links about their points, (3,) each, and the guides' moments.
+    """Forces of joints on their links, moments about their points, (3,) each, and guides' moments.
 
     Expressions in F, mu and the `weight` of each link's inertia, which is 1 in the end.
     """

@@ -1,4 +1,4 @@
-"""Torques of least norm in kernels: two ways to solve A^T tau = b without iteration."""
+"""Minimum-norm torques in kernels: two methods for A^T tau = b without iteration."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 
 import casadi as ca
 
-# Where the normal equations are left. |q_k|^2 / |a_k|^2 below which elimination loses too much,
+# Limits of the normal equations: minimum |q_k|^2 / |a_k|^2 in the elimination,
 CONDITIONED = 1e-3
-# and how often longer than tau the terms that it is summed from may be, counted without signs.
+# and maximum length of the terms of tau over its own, counted without signs.
 CANCELLATION = 50.0
 
 Lanes = list[ca.SX]  # one expression a family group
@@ -16,9 +16,9 @@ Total = Callable[[Sequence[ca.SX]], ca.SX]
 
 
 def normal_equations(total: Total, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
-    """Least-norm solutions tau = A y with A^T A y = b.
+    """Minimum-norm solutions tau = A y with A^T A y = b.
 
-    Quick, since all its sums run at once. Elimination leaves A^T tau - b of rounding times
+    Fast, since all its sums run at once. Elimination leaves A^T tau - b of rounding times
     |a_i| sum_j |a_j| |y_j| in equation i, where a backward stable method leaves rounding times
     |A| |tau|; their quotient can be as large as the condition number of A with columns of one
     length, which is how normal equations come to square it. The quotient itself is known, from
@@ -32,9 +32,9 @@ def normal_equations(total: Total, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
 
     Args:    total: sums entries over all chains.
              A: (m,) a group, lane values.  b: (m, r).
-    Returns: tau, (r,) a group as rows; 1, or -1 where `gram_schmidt` has to do the work: a pivot
-             is below `CONDITIONED` times its column's square, or the bound above, summed over
-             the right-hand sides, does not hold.
+    Returns: tau, (r,) a group as rows; 1, or -1 where `gram_schmidt` is needed: a pivot is below
+             `CONDITIONED` times its column's square, or the bound above, summed over the
+             right-hand sides, does not hold.
     """
     m = b.shape[0]
     pairs = [(j, k) for j in range(m) for k in range(j, m)]
@@ -49,7 +49,7 @@ def normal_equations(total: Total, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
     least = excess[0]
     for value in excess[1:]:
         least = ca.fmin(least, value)
-    # Compared apart, since minima do not agree on what is no number.
+    # Compared separately, since backends treat NaN differently in a minimum.
     return [a.T @ y for a in A], 2 * (least >= 0) * (spare >= 0) - 1
 
 
@@ -58,13 +58,13 @@ def definite_solve(
 ) -> tuple[ca.SX, list[ca.SX]]:
     """G^-1 b for a symmetric, positive definite G, eliminating two rows at a time.
 
-    Half as many divisions as row by row, and they are what the rest waits for. Of G the upper
-    triangle counts.
+    Half as many divisions as row by row, and divisions are the critical path. Only the upper
+    triangle of G is used.
 
-    Args:    lengths: (m,), what the pivots were before anything was eliminated.
-             least: what pivots should be of `lengths`.
-    Returns: the solution, and how much the pivots exceed `least` times `lengths`, each
-             times a positive number.
+    Args:    lengths: (m,), the diagonal before elimination.
+             least: minimum pivot over `lengths`.
+    Returns: the solution, and the excess of the pivots over `least` times `lengths`, each times a
+             positive number.
     """
     m = G.shape[0]
     if m == 0:
@@ -88,7 +88,7 @@ def definite_solve(
 
 
 def gram_schmidt(total: Total, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
-    """Least-norm solutions of A^T tau = b by modified Gram-Schmidt on the columns of A.
+    """Minimum-norm solutions of A^T tau = b by modified Gram-Schmidt on the columns of A.
 
     A = Q R with unnormalised columns in Q and ones on the diagonal of R, so no square roots.
     R^T w = b, forwards, gives w = Q^T tau; then tau = Q c with
@@ -102,7 +102,7 @@ def gram_schmidt(total: Total, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
 
     Args:    total: sums entries over all chains.
              A: (m,) a group, lane values.  b: (m, r).
-    Returns: tau, (r,) a group as rows; the least |q_k|^2 / |a_k|^2, which is small where A is
+    Returns: tau, (r,) a group as rows; the smallest |q_k|^2 / |a_k|^2, which is small where A is
              ill conditioned.
     """
     m = b.shape[0]
@@ -113,7 +113,7 @@ def gram_schmidt(total: Total, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
     quality = ca.SX(1.0)
     for k in range(m):
         q = columns[k]
-        # With the columns before it what is left of orthogonality, with those after it R.
+        # With earlier columns the loss of orthogonality, with later ones R.
         products = total(
             [ca.vertcat(*(x * column[g] for column in columns)) for g, x in enumerate(q)]
         )

@@ -1,8 +1,8 @@
 """Torques of a redundantly actuated mechanism ([Cheng2023] Section 6.1).
 
-m equations A^T tau = b for n >= m torques. Of all solutions, the one of least 2-norm is
-tau = (A^T)^+ b (eqs 65, 66), computed from singular values of A itself: the normal equations
-A^T A would square its condition number.
+m equations A^T tau = b for n >= m torques. The minimum-norm solution is tau = (A^T)^+ b
+(eqs 65, 66), computed from singular values of A itself: the normal equations A^T A would square
+its condition number.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Distribution:
-    """Factors of A at N samples: A = U diag(sigma) V^T.
+class Factorisation:
+    """A at N samples: A = U diag(sigma) V^T.
 
     U: (N, n, m)   sigma: (N, m)   V: (N, m, m)
     """
@@ -33,11 +33,11 @@ class Distribution:
             return self.U @ ((self.V.transpose(0, 2, 1) @ b) / self.sigma[..., None])
 
 
-def minimum_norm(A: np.ndarray, scale: np.ndarray) -> Distribution:
+def minimum_norm(A: np.ndarray, scale: np.ndarray) -> Factorisation:
     """Factor the actuator Jacobian A, (N, n, m), of samples; NaN where A is not finite.
 
-    Args: scale: (m,), what the columns are divided by to make them of one unit; it changes no
-          torque, since it multiplies equations.
+    Args: scale: (m,), divisors that give the columns one unit; they scale equations and so do not
+          change torques.
     """
     good = np.isfinite(A).all(axis=(1, 2))
     count, n, m = A.shape
@@ -47,4 +47,4 @@ def minimum_norm(A: np.ndarray, scale: np.ndarray) -> Distribution:
     U[good], sigma[good], Vt = np.linalg.svd(A[good] / scale, full_matrices=False)
     # A = U sigma (Vt scale): the scaling moves into the right-hand side.
     V[good] = Vt.transpose(0, 2, 1) / scale[:, None]
-    return Distribution(U, sigma, V)
+    return Factorisation(U, sigma, V)

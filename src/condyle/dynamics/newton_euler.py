@@ -1,7 +1,7 @@
 """Newton-Euler: free bodies and every joint force.
 
 The platform and each link of each chain are cut free, and the joint forces found link by link
-(`free_body`). What a chain's last link puts on the platform at M is
+(`free_body`). The force of a chain's last link on the platform at M is
 
     F = J tau - sum of the forces that its links need,
 
@@ -40,7 +40,7 @@ class NewtonEuler(Formulation):
 
     def chain(self, family: Family, c: Constants, M: PointMotion, g: ca.SX) -> ChainDynamics:
         if not family.bodies:
-            # Nothing to cut free: what the actuator puts on M is dual to the joint coordinate.
+            # Nothing to cut free: the actuator's force on M is dual to the joint coordinate.
             return joint_motion(family, c, M).dynamics({})
         s = JointState.symbols()
         bodies = free_bodies(family, c, s, g)

@@ -13,10 +13,10 @@ import casadi as ca
 
 from .least_norm import Lanes, Total
 
-STEPS = {3: 4, 4: 5, 5: 5, 6: 5}  # rows left -> steps that take one eigenvalue off
-LEFT = 1e-15  # what an eigenvalue may be off by, over the trace
-SPREAD = 1e-6  # least square of the second smallest singular value over the sum of all squares
-FLOOR = 1e-60  # what squares of pivots are kept off zero by
+STEPS = {3: 4, 4: 5, 5: 5, 6: 5}  # remaining rows -> QL steps for one eigenvalue
+LEFT = 1e-15  # error of an eigenvalue over the trace
+SPREAD = 1e-6  # minimum square of the second smallest singular value over the sum of squares
+FLOOR = 1e-60  # minimum square of a pivot
 TINY = 1e-300  # added to divisors that may be zero
 
 
@@ -25,9 +25,8 @@ def singular_values(total: Total, A: Lanes) -> tuple[ca.SX, ca.SX]:
 
     Args:    total: sums entries over all chains.
              A: (m,) a group, lane values, 1 <= m <= 6.
-    Returns: sigma, (m,), falling; 1, or -1 where they must be computed in another way: the steps
-             were too few, the second smallest is under a thousandth of the largest, or A is not
-             finite.
+    Returns: sigma, (m,), falling; 1, or -1 where they are not reliable: the steps were too few,
+             the second smallest is under a thousandth of the largest, or A is not finite.
     """
     q, e = _bidiagonal(total, A)
     trace = ca.sum1(ca.vertcat(*q, *e))
@@ -36,7 +35,7 @@ def singular_values(total: Total, A: Lanes) -> tuple[ca.SX, ca.SX]:
         return ca.sqrt(trace), 2 * good - 1
     scale = 1 / (trace + TINY)
     q, e = [x * scale for x in q], [x * scale for x in e]
-    # From the last row on, where B tends to be small: QL takes the smallest values off first.
+    # From the last row on, where B tends to be small: QL finds the smallest values first.
     d = [*(x + y for x, y in zip(q[:0:-1], e[::-1], strict=True)), q[0]]
     s = [x * y for x, y in zip(q[-2::-1], e[::-1], strict=True)]
     found: list[ca.SX] = []
@@ -57,8 +56,8 @@ def singular_values(total: Total, A: Lanes) -> tuple[ca.SX, ca.SX]:
 
 
 def _bidiagonal(total: Total, A: Lanes) -> tuple[list[ca.SX], list[ca.SX]]:
-    """Squares of B's diagonal, (m,), and of the entries right of it, (m - 1,)."""
-    lanes = [ca.vertsplit(a) for a in A]  # a group: its columns, those that are left
+    """Squares of B's diagonal, (m,), and of its superdiagonal, (m - 1,)."""
+    lanes = [ca.vertsplit(a) for a in A]  # a group: its remaining columns
     q, e = [], []
     while lanes[0]:
         square, *x = ca.vertsplit(total([ca.vertcat(*(row[0] * y for y in row)) for row in lanes]))
@@ -89,7 +88,7 @@ def _reflected(row: list[ca.SX], w: list[ca.SX], v: list[ca.SX]) -> list[ca.SX]:
 
 
 def _projected(row: list[ca.SX], ratio: ca.SX) -> list[ca.SX]:
-    """The columns after the first, the next one without what it has of it."""
+    """The columns after the first, the next one orthogonal to it."""
     return [row[1] - ratio * row[0], *row[2:]]
 
 

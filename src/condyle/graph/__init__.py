@@ -1,1 +1,1 @@
-"""The operations of a question as a graph: read, changed, put in order."""
+"""The operations of a question as a graph: reading, transforming, fusing, scheduling."""

@@ -1,8 +1,8 @@
 """Sums of products as chains of fused multiply-adds.
 
-A tree of additions whose inner values nobody else wants is one sum of terms; a term that is a
-product nobody else wants joins it by a fused multiply-add, the one operation that does two. Terms
-join in the order in which they are ready.
+A tree of additions whose inner values are used only there is one sum of terms; a term that is a
+product used only there joins it by a fused multiply-add. Terms join in the order in which they
+become ready.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def fuse(graph: Graph, roots: Sequence[Value], chain: int) -> tuple[Graph, list[
 
 
 def _inside(graph: Graph, order: Sequence[Value], uses: dict[Value, int]) -> set[Value]:
-    """Values that only a sum around them wants, so that they vanish in it."""
+    """Values used only by one sum or product, which absorbs them."""
     inside = set()
     for v in order:
         node = graph.nodes[v]

@@ -5,8 +5,8 @@ Two properties decide how a node is computed:
 - `group`: None for values that all lanes share, else the group of lanes that it varies over;
 - `varies`: whether it changes from sample to sample; the rest is computed once a mechanism.
 
-Reductions (`sum`, `least`) take lane values to shared ones. Arc functions whose angle is only
-wanted for its sine and cosine disappear on the way.
+Reductions (`sum`, `least`) take lane values to shared ones. Arc functions whose angle is used only
+for its sine and cosine are eliminated.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ VARYING = ("input", "lane_input")  # leaves that change from sample to sample
 
 @dataclass(frozen=True)
 class Node:
-    """One operation. args: nodes; data: what a leaf is (a number, or where it is stored)."""
+    """One operation. args: nodes; data: of a leaf, its number or place of storage."""
 
     op: str
     args: tuple[Value, ...]
@@ -169,7 +169,7 @@ class Graph:
 
 
 def reachable(graph: Graph, roots: Sequence[Value]) -> list[Value]:
-    """Nodes that the roots need, arguments first, depth first."""
+    """Nodes that the roots depend on, arguments first, depth first."""
     order: list[Value] = []
     seen: set[Value] = set()
     for root in roots:

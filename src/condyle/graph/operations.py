@@ -1,4 +1,4 @@
-"""The operations of a graph, one row each: what CasADi calls them, their C, numpy and derivatives.
+"""The operations of a graph, one row each: their CasADi code, C, numpy and derivatives.
 
     f(a, b)' = (df/da) a' + (df/db) b'
 

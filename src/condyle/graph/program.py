@@ -1,4 +1,4 @@
-"""A question's graph with its ports: what goes in, what comes out, and what has to hold."""
+"""A question's graph with its ports: inputs, outputs and checks."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .graph import Graph, Value, reachable
 
 @dataclass(frozen=True)
 class Port:
-    """An input of every sample: `size` numbers, or so many for each lane.
+    """An input of every sample: `size` numbers, or `size` per lane.
 
     start: its first column; lanes of a group stand side by side.
     """
@@ -51,7 +51,7 @@ class Output:
 
 @dataclass(frozen=True)
 class Result:
-    """What a caller must know of an output; `groups`: of lanes that have it."""
+    """The interface of an output; `groups`: of lanes that have it."""
 
     name: str
     shape: tuple[int, ...]
@@ -62,7 +62,7 @@ class Result:
 
 @dataclass(frozen=True)
 class Interface:
-    """What a caller must know of a program: enough to run it where it is compiled already.
+    """The interface of a program: enough to run it once it is compiled.
 
     counts: lanes of each group;  columns: inputs of a sample.
     """
@@ -98,10 +98,10 @@ class Interface:
 
 @dataclass(frozen=True)
 class Check:
-    """What decides whether a sample counts.
+    """A condition on a sample.
 
-    Below zero its status is `below`, or to be looked at again if that is None; under the
-    tolerance, or where the value is no number, it is to be looked at again.
+    Negative values give the status `below`; NaN, values under the tolerance, and negative ones
+    where `below` is None, mark the sample to be repeated by a more robust method.
     """
 
     value: Value
@@ -130,12 +130,12 @@ class Program:
 
     @cached_property
     def roots(self) -> tuple[Value, ...]:
-        """Every value that is wanted."""
+        """Values of all outputs and checks."""
         found = [v for o in self.outputs for entry in o.entries for v in entry if v is not None]
         return tuple(dict.fromkeys([*found, *(c.value for c in self.checks)]))
 
     def stored(self) -> Iterator[tuple[int, Value, int]]:
-        """First column, value and lanes of all that a sample gives: results, then checks."""
+        """First column, value and lanes of every result, then of every check."""
         at = 0
         for o in self.outputs:
             for entry in o.entries:
@@ -148,7 +148,7 @@ class Program:
 
     @cached_property
     def order(self) -> tuple[Value, ...]:
-        """What the roots need, arguments first."""
+        """Values that the roots depend on, arguments first."""
         return tuple(reachable(self.graph, self.roots))
 
     def moved(self, graph: Graph, where: dict[Value | None, Value]) -> Program:
@@ -164,7 +164,7 @@ class Program:
 
     @cached_property
     def digest(self) -> str:
-        """A hash of all that the program computes."""
+        """A hash of the computation."""
         number = {v: i for i, v in enumerate(self.order)}
         h = hashlib.sha256(repr((self.counts, self.columns)).encode())
         for v in self.order:
@@ -180,11 +180,11 @@ class Program:
 
 @dataclass(frozen=True)
 class Variants:
-    """A question as it is run, with equal ports, outputs and checks.
+    """The programs of a question, with equal ports, outputs and checks.
 
-    main:    quick; a sample that it cannot vouch for goes to `robust`, if there is one.
-    latency: the same as main, with fewer operations after one another, for one evaluation.
-    single:  whether one evaluation is asked for at all, besides batches.
+    main:    fast; samples that fail its checks are repeated by `robust`, if there is one.
+    latency: the same as main with a shorter critical path, for single evaluations.
+    single:  whether single evaluations are compiled as well as batches.
     """
 
     main: Program
@@ -210,8 +210,8 @@ def _shape(program: Program) -> tuple[object, ...]:
 class Numbers:
     """A mechanism's numbers: parameters (p,), and lane constants (size, lanes) of each group.
 
-    padding: (size,) of each group, for lanes that stand for none.
-    order:   where each lane, group by group, stands among the callers' lanes.
+    padding: (size,) of each group, for lanes without a chain.
+    order:   position of each lane, group by group, among the callers' lanes.
     """
 
     parameters: np.ndarray

@@ -1,8 +1,8 @@
-"""List scheduling: the order in which one evaluation's statements keep the processor busy.
+"""List scheduling of a single evaluation's statements.
 
-Statements are issued two a cycle, of those whose arguments are ready the one with the longest way
-still to go first. Compilers keep that order on the whole. (A batch gains nothing: there the
-neighbouring chain fills the gaps, and long lives of values cost memory traffic.)
+Statements are issued two per cycle: of those whose arguments are ready, the one with the longest
+remaining path first. Compilers mostly keep that order. (A batch gains nothing: there the
+neighbouring chain fills the gaps, and long live ranges cost memory traffic.)
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ def scheduled(
 ) -> list[Value]:
     """The values in an order that shortens one evaluation; arguments stay first.
 
-    Args: bundles: values that are computed together; the first stands for the others, which are
-          left out.
+    Args: bundles: values that are computed together; the first represents the others, which are
+          omitted.
     """
     stands = {v: bundle[0] for bundle in bundles for v in bundle}
     args = {v: {stands.get(a, a) for a in graph.nodes[v].args} for v in values}
@@ -87,7 +87,7 @@ def _sorted(values: list[Value], args: dict[Value, set[Value]]) -> list[Value]:
 
 
 def ready_times(graph: Graph, values: Sequence[Value]) -> dict[Value, int]:
-    """Cycles after which values can be there at the earliest."""
+    """Earliest cycle in which each value is ready."""
     ready: dict[Value, int] = {}
     for v in values:
         node = graph.nodes[v]

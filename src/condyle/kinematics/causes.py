@@ -1,4 +1,4 @@
-"""Why samples fail: the chain, the contacts, the platform or the numbers that are the cause."""
+"""Causes of failed samples: a chain, the contacts, the platform or the numbers."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ UNBALANCED = (Status.infeasible, Status.jammed, Status.uncertified)
 
 @dataclass(frozen=True)
 class Owner:
-    """What a failure is the fault of.
+    """The cause of a failure.
 
     kind: chain, contact, platform or sample; "" for none.  names: of the chain or the contacts.
     """
@@ -45,9 +45,9 @@ class Owner:
 
 
 def owners(mechanism: Mechanism) -> tuple[Owner, ...]:
-    """All that can be a cause, in the order that `causes` counts them: none, each chain, ...
+    """All possible causes in the order of `causes`: none, each chain, contacts, platform, sample.
 
-    The contacts are met together or not at all, so they are one cause.
+    The contacts are closed together, so they are one cause.
     """
     chains = [Owner("chain", (name,)) for name in mechanism.chain_names]
     contacts = Owner("contact", mechanism.contact_names)
@@ -57,7 +57,7 @@ def owners(mechanism: Mechanism) -> tuple[Owner, ...]:
 def causes(
     status: np.ndarray, pose: np.ndarray, discriminant: np.ndarray, singularity: Singularity
 ) -> np.ndarray:
-    """Index into `owners` of what each sample fails by, (N,) int16; 0 where it does not.
+    """Index into `owners` of the cause of each sample's failure, (N,) int16; 0 for none.
 
     Args: pose: (N, 6), NaN where the contacts cannot be met.
           discriminant: of the chains' assembly, (N, n); negative or NaN out of reach.
@@ -85,7 +85,7 @@ def causes(
 
 
 def cause_text(status: int, owner: Owner) -> str:
-    """A cause in words, as in 'chain "x" cannot reach its platform joint'."""
+    """A cause as text, such as 'chain "x" cannot reach its platform joint'."""
     named = ", ".join(f'"{name}"' for name in owner.names)
     texts: dict[tuple[int, str], str] = {
         (Status.unreachable, "chain"): f"chain {named} cannot reach its platform joint",
@@ -94,14 +94,14 @@ def cause_text(status: int, owner: Owner) -> str:
             if len(owner.names) > 1
             else f"no pose with the given coordinates has the contact {named} on its surface"
         ),
-        (Status.singular, "chain"): f"chain {named} is in line: its actuator has no hold",
+        (Status.singular, "chain"): f"chain {named} is in line: its actuator has no lever arm",
         (Status.singular, "platform"): "the platform can move while all actuators are locked",
     }
     return texts.get((status, owner.kind), list(Status)[status].meaning)
 
 
 def unreachable_text(mechanism: Mechanism, owner: Owner, pose: np.ndarray) -> str:
-    """Why a pose, (6,), is out of reach, in numbers where a chain is the cause."""
+    """Why a pose, (6,), is out of reach, with distances where a chain is the cause."""
     if owner.kind != "chain":
         return cause_text(Status.unreachable, owner)
     chain = mechanism.chains[mechanism.chain_names.index(owner.name)]
@@ -119,10 +119,10 @@ def sample_error(
     first_row: int = 0,
     shortfall: np.ndarray | None = None,
 ) -> SampleError | None:
-    """The error for samples that could not be computed: it names the first and its cause.
+    """The error for failed samples: it names the first and its cause.
 
-    Args: as for `causes`;  t: their times;  without, they are rows of a file from `first_row` on.
-          shortfall: by how much limits would have to be multiplied, (N,), where that is known.
+    Args: as for `causes`;  t: their times; None: they are rows of a file from `first_row` on.
+          shortfall: factor on all limits that would suffice, (N,), where it is known.
     """
     bad = np.flatnonzero(status != Status.ok)
     if not bad.size:
@@ -140,8 +140,8 @@ def sample_error(
     }
     if status[i] == Status.overflow:
         return NumberRangeError(
-            f"the torques at {where} are not finite: its rates, accelerations or load are "
-            f"too large for numbers.{more}",
+            f"the efforts at {where} are not finite: its rates, accelerations or load are "
+            f"too large.{more}",
             **about,
         )
     if status[i] == Status.singular:
@@ -149,7 +149,7 @@ def sample_error(
         return SingularError(
             f"the mechanism is singular at {where}: dimensionless ratio {ratio:.2g}, must be "
             f"above {SINGULAR:g} ({cause_text(Status.singular, owner)}).{more}",
-            hint=f"The torques are not determined there; avoid the pose, {FLAG}",
+            hint=f"The efforts are not determined there; avoid the pose, {FLAG}",
             value=ratio,
             bound=SINGULAR,
             unit="1",
@@ -171,28 +171,28 @@ def sample_error(
 
 
 def shortfall_text(shortfall: float) -> str:
-    """What limits would have to be: 'all limits would have to be 1.3 times as large'."""
+    """As in 'all limits would have to be 1.3 times as large'."""
     if not np.isfinite(shortfall):
-        return "no limits would do, however large"
+        return "no limits would suffice, however large"
     return f"all limits would have to be {shortfall:.4g} times as large"
 
 
 def _unbalanced(
     status: int, where: str, more: str, shortfall: np.ndarray | None, about: dict[str, Any]
 ) -> SampleError:
-    """The error for samples to which no efforts, or none that are certain, were found."""
+    """The error for samples without certified efforts."""
     if status == Status.jammed:
         return JammedError(
-            f"the mechanism jams at {where}: friction at the contacts has no consistent pattern of "
-            f"signs, with any efforts.{more}",
-            hint="There is no answer with rigid bodies; less friction, another motion or contacts "
-            f"at other slopes have one, {FLAG}",
+            f"the mechanism jams at {where}: Coulomb friction has no consistent solution, whatever "
+            f"the efforts.{more}",
+            hint="Rigid bodies have no solution there; reduce friction, or change the motion or "
+            f"the slopes of the contacts, {FLAG}",
             **about,
         )
     if status == Status.uncertified:
         return UncertifiedError(
             f"the efforts found at {where} could not be certified to 1e-9 of the largest.{more}",
-            hint=f"Loosen limits that leave hardly any room, {FLAG}",
+            hint=f"Widen limits that leave hardly any margin, {FLAG}",
             **about,
         )
     text = f"no efforts within the limits balance the mechanism at {where}"
@@ -203,8 +203,8 @@ def _unbalanced(
         advice = "Stronger actuators, a slower motion or a smaller load"
     else:
         advice = (
-            "One-sided contacts would have to pull, or cables to push: less --preload, another "
-            "motion or load, or cables that pull the other way help"
+            "Unilateral contacts would have to pull, or cables to push: reduce --preload, change "
+            "the motion or load, or add cables that pull the other way"
         )
     return InfeasibleError(
         f"{text}: {shortfall_text(least)}.{more}",

@@ -38,7 +38,7 @@ class ContactSymbols:
     anchored: bool = True
 
     def phi(self, position: ca.SX) -> ca.SX:
-        """How far a ball centre at `position`, (3,) in {S}, is off the surface [m]."""
+        """Distance of a ball centre at `position`, (3,) in {S}, from the surface [m]."""
         return self.surface.phi(position, self.constants)
 
     def gradient(self, position: ca.SX) -> ca.SX:
@@ -50,11 +50,11 @@ class ContactSymbols:
         return self.surface.bending(position, velocity, self.constants)
 
     def started_at(self, position: ca.SX) -> ContactSymbols:
-        """For ball centres near `position`: see `Smooth.started_at`."""
+        """Linked to the foot point of `position`: see `Smooth.started_at`."""
         return replace(self, surface=self.surface.started_at(position, self.constants))
 
-    def part_of_way(self, part: float) -> ContactSymbols:
-        """At a part of the way from home: surfaces stay, guides move."""
+    def along_path(self, part: float) -> ContactSymbols:
+        """At a fraction of the path from home: surfaces stay, guides move."""
         return self
 
     @property
@@ -63,7 +63,7 @@ class ContactSymbols:
         return ca.dot(self.point, self.point)
 
     def at(self, position: ca.SX, R: ca.SX) -> ca.SX:
-        """Where the ball centre is when O_M is at `position`, (3,)."""
+        """The ball centre for O_M at `position`, (3,)."""
         lever = R @ self.point
         return position + lever if self.anchored else lever
 
@@ -89,7 +89,7 @@ def independent_indices(dependent: Sequence[str]) -> list[int]:
 
 
 def residuals(contacts: Sequence[ContactSymbols], pose: ca.SX) -> ca.SX:
-    """phi(X_EE), (k,) [m]: how far each ball centre is off its surface."""
+    """phi(X_EE), (k,) [m]: distances of the ball centres from their surfaces."""
     R = rotation(pose[3:])
     return ca.vertcat(ca.SX(0, 1), *(c.phi(c.at(pose[:3], R)) for c in contacts))
 
@@ -129,7 +129,7 @@ def contact_frame(contacts: Sequence[ContactSymbols], position: ca.SX, R: ca.SX)
 def contact_bias(
     contacts: Sequence[ContactSymbols], frame: ContactFrame, position: ca.SX, twist: ca.SX
 ) -> ca.SX:
-    """The part of phi'' that velocities alone make, (k,): C' X' in twist coordinates.
+    """The velocity-dependent part of phi'', (k,): C' X' in twist coordinates.
 
     v^T H v + grad phi . (omega x (omega x r)), with H the second derivative of phi.
     """
@@ -201,10 +201,10 @@ def closed_form_available(kinds: Sequence[str], dependent: Sequence[str]) -> boo
 
 @dataclass(frozen=True)
 class Placement:
-    """A pose that satisfies the contacts: O_M, the Bryant angles, and whether it is real.
+    """A pose that satisfies the contacts: O_M, the Bryant angles, and whether it exists.
 
-    discriminant: dimensionless; the contacts can be met where it is not negative (None: always).
-    iterated: found in a fixed number of steps; `discriminant` is then 0 where they were too few.
+    discriminant: dimensionless; the contacts can be closed where it is >= 0 (None: always).
+    iterated: by a fixed number of steps; `discriminant` is then 1 if they converged, else 0.
     """
 
     position: ca.SX
@@ -220,7 +220,7 @@ class Placement:
 
 @dataclass(frozen=True)
 class AngleEquation:
-    """A cos + B sin = k for the one dependent angle, and what is left for the positions.
+    """A cos + B sin = k for the one dependent angle, and the equations of the positions.
 
     base:      O_M with zeros for the dependent positions.
     equations: phi of the contacts there, in the unknown cosine and sine, `unknown` (2,).

@@ -36,9 +36,9 @@ class AcrossAxis:
 
 @dataclass(frozen=True)
 class Guide(ContactSymbols):
-    """A platform point that is where its displacement from home says, along one axis.
+    """A platform point with a given displacement from home along one axis.
 
-    displacement: at the end of the way [m].
+    displacement: at the end of the path from home [m].
     """
 
     displacement: Any = 0.0
@@ -48,5 +48,5 @@ class Guide(ContactSymbols):
         """Args: point: (3,) in {M}; displacement: from home, in {S}."""
         return Guide(AcrossAxis(axis), point, point[axis], displacement=displacement)
 
-    def part_of_way(self, part: float) -> Guide:
+    def along_path(self, part: float) -> Guide:
         return replace(self, constants=self.point[self.surface.axis] + part * self.displacement)

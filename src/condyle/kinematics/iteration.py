@@ -1,7 +1,7 @@
 """Dependent coordinates where they have no closed form: Newton's method as one expression.
 
-A fixed number of steps, for kernels that cannot loop until it is enough. What they leave behind
-says whether it was; where not, the sample needs `Closure`, which follows it from home.
+A fixed number of steps, for kernels, which cannot loop until convergence. The last residual says
+whether they converged; otherwise the sample needs `Closure`, which follows it from home.
 
 Most mechanisms on curved surfaces z = f(x, y) depend in Z and one angle; see `one_angle`. The
 others follow the sample from home in steps, as `Closure` does.
@@ -28,17 +28,17 @@ from .parasitic import rate_bias
 from .rotation import Bryant, turn_by, turned
 
 TINY = 1e-10  # steps that need not shrink
-CLOSED = 1e-13  # a last step that is as good as none
-NOTHING = 1e-30  # keeps steps of zero from making 0 / 0
+CLOSED = 1e-13  # maximum last step
+NOTHING = 1e-30  # avoids 0 / 0 for steps of zero
 
 
 @dataclass(frozen=True)
 class _Plan:
-    """How the way from home is followed, and when to believe it.
+    """How the path from home is followed, and the conditions for trusting it.
 
-    shrink: of a step to the next in the same piece, at the most; `Closure`: a quarter.
-    fold:   least 1 - 2 h, and least determinant of C_dep over home's.
-    far:    the longest way whose steps are short enough.
+    shrink: maximum ratio of consecutive steps in a piece; `Closure`: a quarter.
+    fold:   minimum 1 - 2 h, and minimum determinant of C_dep over home's.
+    far:    maximum length of the path.
     """
 
     steps: int
@@ -47,8 +47,8 @@ class _Plan:
     far: float
 
 
-# By the number of dependent coordinates: the more there are the nearer lie the folds, the fewer
-# the ways. Six: a landmark follows its path.
+# By the number of dependent coordinates: the more there are, the nearer the folds. Six: a landmark
+# follows its path.
 PLANS = (
     _Plan(4, 0.25, 0.05, 1.5),
     _Plan(4, 0.1, 0.1, 1.5),
@@ -62,7 +62,7 @@ PLANS = (
 def newton(contacts: Sequence[ContactSymbols], dependent: Sequence[str], q: ca.SX) -> Placement:
     """A pose with phi = 0, from q in the order of X_EE.
 
-    Its `discriminant` is 1 where the steps sufficed, and 0 where they did not.
+    Its `discriminant` is 1 where the steps converged, else 0.
     """
     dep = indices(dependent)
     if all(_is_graph(c) for c in contacts) and 2 in dep:
@@ -88,13 +88,11 @@ def _height(contact: ContactSymbols, q: ca.SX) -> Placement:
 
 
 def followed(contacts: Sequence[ContactSymbols], dep: list[int], q: ca.SX) -> Placement:
-    """All dependent coordinates at once, along the straight way from home.
+    """All dependent coordinates at once, along the straight path from home; guides move with it.
 
-    Guides move along with the way.
-
-    Each piece is a step that follows the bending of the contacts, and one of Newton that shows how
-    good it was. Branches meet at folds, where the determinant of C_dep changes its sign; steps
-    that shrink quickly and determinants away from zero leave a fold little room between them.
+    Each piece is a step that follows the curvature of the contacts, and a Newton step that shows
+    its error. Branches meet at folds, where the determinant of C_dep changes sign; steps that
+    shrink quickly and determinants away from zero exclude a fold between them.
     """
     unit = _Unit.of(contacts)
     pose = _Pose(ca.SX.zeros(3), [ca.SX([1, 0])] * 3)
@@ -117,7 +115,7 @@ def followed(contacts: Sequence[ContactSymbols], dep: list[int], q: ca.SX) -> Pl
     pose = pose.moved(dep, there.curved_step(unit)[0])
     last = there.at_pose(pose)
     pose = pose.moved(dep, last.step())
-    phi = _phi([c.part_of_way(1.0) for c in contacts], pose)
+    phi = _phi([c.along_path(1.0) for c in contacts], pose)
     sure.append(unit.square(solve_small(last.C, phi), dep) < CLOSED**2)
     sure.append(pose.square(unit) < plan.far**2)
     discriminant = ca.SX(1)
@@ -128,7 +126,7 @@ def followed(contacts: Sequence[ContactSymbols], dep: list[int], q: ca.SX) -> Pl
 
 @dataclass(frozen=True)
 class _Unit:
-    """Sizes of steps where lengths and angles meet: lengths count as angles by the levers'.
+    """Norm of steps in lengths and angles: lengths are divided by the levers' mean.
 
     lever: mean square of the contact points' distances from O_M [m^2].
     """
@@ -159,7 +157,7 @@ class _Pose:
         return Bryant(*(ca.vertcat(*(turn[i] for turn in self.turns)) for i in (0, 1)))
 
     def square(self, unit: _Unit) -> ca.SX:
-        """Squared size of the move from home: lengths by the levers', angles by their chords."""
+        """Squared norm of the move from home: lengths over the levers', angles by their chords."""
         chords = sum((2 * (1 - turn[0]) for turn in self.turns), ca.SX(0))
         return ca.dot(self.position, self.position) / unit.lever + chords
 
@@ -223,7 +221,7 @@ class _Contacts:
 
     def guided(self, part: float) -> _Contacts:
         """The contacts with their guides at a part of the way."""
-        return replace(self, contacts=[c.part_of_way(part) for c in self.contacts])
+        return replace(self, contacts=[c.along_path(part) for c in self.contacts])
 
     @property
     def determinant(self) -> ca.SX:

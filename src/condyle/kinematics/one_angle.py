@@ -2,8 +2,8 @@
 
 The difference E of their phi is free of Z. It is solved by sinusoids that agree with it to second
 order, the first where the angle is that of home, and at last by Halley's method. The angle's
-cosine and sine are turned along, without trigonometry. On surfaces of second order E has five
-coefficients, and a step costs next to nothing.
+cosine and sine are rotated along, without trigonometry. On surfaces of second order E has five
+coefficients, and a step is cheap.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ import casadi as ca
 from .constraints import ContactSymbols, Placement, contact_frame
 from .rotation import Bryant, turned, turned_slightly
 
-CLOSED = 1e-13  # radians that are as good as none
-WITHIN = 0.55  # least product of the angles' cosines: farther off, other branches look the same
-SHORT = 2e-4  # radians of the last step at the most
-CURVED = 0.45  # E E'' / E'^2 at the most: from one half on there need be no root
+CLOSED = 1e-13  # maximum residual [rad]
+WITHIN = 0.55  # minimum product of the angles' cosines: beyond, branches cannot be told apart
+SHORT = 2e-4  # maximum last step [rad]
+CURVED = 0.45  # maximum E E'' / E'^2: from one half on there may be no root
 
 Derivatives = tuple[ca.SX, ca.SX, ca.SX]  # E and its first two in the angle
 
@@ -31,7 +31,7 @@ def one_angle(contacts: Sequence[ContactSymbols], angle: int, q: ca.SX) -> Place
     home = _home_slope(contacts, angle)
     side = home / ca.fabs(home)
     E, slope, curvature = equation(ca.SX([1, 0]))
-    # The branch of home ends at a fold, where the slope changes its sign: none on the way.
+    # The branch of home ends at a fold, where the slope changes sign: there must be none.
     margin = slope * side
     turn = _osculating(E, slope, curvature, side)
     c = ca.substitute(bryant.cos, unknown, turn)
@@ -48,7 +48,7 @@ def one_angle(contacts: Sequence[ContactSymbols], angle: int, q: ca.SX) -> Place
     turn = turned_slightly(turn, step)
     bryant = Bryant(*(ca.substitute(v, unknown, turn) for v in (bryant.cos, bryant.sin)))
     first, second = (c.phi(c.at(base, bryant.rotation())) for c in contacts)
-    # Written so that what is no number is not sure.
+    # Written so that NaN counts as not closed.
     closed = ca.fabs((first - second) * (slope * inverse)) < CLOSED
     return Placement(ca.vertcat(q[:2], -first), bryant, (margin > 0) * closed, iterated=True)
 

@@ -62,7 +62,7 @@ def whole_motion(
 def motion_at(
     frame: ContactFrame, bryant: Bryant, M_J: ca.SX, rate: ca.SX, acceleration: ca.SX
 ) -> WholeMotion:
-    """From rates X_EE' and X_EE'' that the contacts allow."""
+    """From rates X_EE' and X_EE'' compatible with the contacts."""
     E = bryant.twist_jacobian()
     turning = E[3:, 3:] @ acceleration[3:] + angular_bias(bryant, rate[3:])
     twist_rate = ca.vertcat(acceleration[:3], turning)
@@ -76,13 +76,13 @@ def rate_bias(
     bryant: Bryant,
     rate: ca.SX,
 ) -> ca.SX:
-    """C' X', (k,): the part of phi'' that rates X_EE' alone make."""
+    """C' X', (k,): the part of phi'' due to the rates X_EE'."""
     bias = contact_bias(contacts, frame, position, bryant.twist_jacobian() @ rate)
     return bias + frame.N[3:, :].T @ angular_bias(bryant, rate[3:])
 
 
 def angular_bias(bryant: Bryant, angle_rates: ca.SX) -> ca.SX:
-    """R_omega' (alpha', beta', gamma'), (3,): the angular acceleration that rates alone make."""
+    """R_omega' (alpha', beta', gamma'), (3,): the angular acceleration due to the rates."""
     c, s = bryant.cos, bryant.sin
     a1, b1, g1 = angle_rates[0], angle_rates[1], angle_rates[2]
     return ca.vertcat(

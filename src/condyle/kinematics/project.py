@@ -1,4 +1,4 @@
-"""The nearest home on the surfaces, for contact points that are off them."""
+"""Projection of home onto the contact surfaces."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ON_THE_SURFACE = 1e-12  # metres
 
 @dataclass(frozen=True)
 class Projection:
-    """How a mechanism comes to be on its surfaces at home.
+    """The nearest home on the contact surfaces.
 
     residual:     distance of each ball from its surface as given, (k,) [m].
     displacement: X_EE of the nearest pose that meets the contacts, (6,) [m, rad].
@@ -34,11 +34,11 @@ class Projection:
 
     @property
     def needed(self) -> bool:
-        """Whether a ball is further off its surface than goes without saying."""
+        """Whether a ball is off its surface by more than the tolerance."""
         return bool((np.abs(self.residual) > HOME_WARNING).any())
 
     def data(self) -> dict[str, Any]:
-        """For programs, SI."""
+        """As JSON, SI."""
         return {
             "displacement": dict(zip(COORDINATES, self.displacement.tolist(), strict=True)),
             "contacts": {
@@ -48,9 +48,9 @@ class Projection:
         }
 
     def text(self, per_metre: float) -> str:
-        """For people.
+        """As text.
 
-        Args: per_metre: the file's lengths in a metre, for points to paste into it.
+        Args: per_metre: file units per metre, for points to paste into the file.
         """
         width = max(map(len, self.names), default=0)
         lines = ["off their surfaces at home"]

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-NEAR_SINGULAR = 1e-3  # ratio below which a pose is near a singularity,
-SINGULAR = 1e-12  # and below which it is at one
+NEAR_SINGULAR = 1e-3  # ratio below which a pose is near-singular,
+SINGULAR = 1e-12  # and below which it is singular
 KINDS = ("none", "inverse", "direct", "combined")
 
 
@@ -49,7 +49,7 @@ class Singularity:
         J_A_extremes: np.ndarray,
         length: float,
     ) -> Singularity:
-        """Args: J_A_extremes: least and greatest |transmission|, (2, N)."""
+        """Args: J_A_extremes: smallest and largest |transmission|, (2, N)."""
         inverse = ratio(J_A_extremes[0], J_A_extremes[1])
         direct = ratio(J_W_sigma[:, -1], J_W_sigma[:, 0])
         both = np.minimum(inverse, direct)
@@ -68,7 +68,7 @@ class Singularity:
         return np.add.reduce([sigma > least for sigma in self.J_W_sigma.T], dtype=np.int8)
 
     def kind(self, threshold: float = NEAR_SINGULAR) -> np.ndarray:
-        """Index into `KINDS` of what each sample is near to, (N,)."""
+        """Index into `KINDS` of the nearest singularity, (N,)."""
         return (self.inverse_ratio < threshold) + 2 * (self.direct_ratio < threshold)
 
 

@@ -6,8 +6,8 @@ Three spaces carry the same motion:
     pose          c = X_EE   forces dual to X_EE'      Model 2, route `core`
     twist         c' = [V; omega]  forces dual to it   the operation-minimal formulation
 
-A state answers what every formulation asks of the platform: where one of its points is and how
-it moves, and what a force there is worth in the chosen coordinates.
+A state gives every formulation the motion of a platform point and the generalized force of a
+force that acts there.
 """
 
 from __future__ import annotations

@@ -55,7 +55,7 @@ def closure(structure: Structure, prescribed: Prescribed) -> Program:
     if not prescribed.names:
         contacts = [*single_contacts(structure, b.parameter), *guides(b, s)]
         placement = followed(contacts, list(range(6)), ca.SX(0, 1))
-        here = [c.part_of_way(1.0) for c in contacts]
+        here = [c.along_path(1.0) for c in contacts]
         rate, acceleration = _rates(here, placement.position, placement.bryant, s1, s2)
         pose = placement.pose()
     else:

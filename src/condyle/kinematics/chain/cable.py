@@ -1,9 +1,9 @@
 """Cable: a straight massless line from the base to the platform, which can only pull.
 
-Its length r = |M - B| closes no loop: the joint coordinate is what was wound up, home length minus
+Its length r = |M - B| closes no loop: the joint coordinate is the wound-up length, home length less
 length, so that the tension is the effort and its power effort times joint rate. With e = M - B and
-u = e / r the actuator's row is J = -u: tension pulls the platform towards the base. There is
-nothing between the two points, so the chain has no bodies, and no reaction but its pull.
+u = e / r the actuator's row is J = -u: tension pulls the platform towards the base. The chain has
+no bodies, and no reaction but its pull.
 """
 
 from __future__ import annotations

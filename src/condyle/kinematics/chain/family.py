@@ -1,8 +1,8 @@
-"""What a chain family is: the one place where a new family plugs in.
+"""The interface of a chain family: the one place where a new family plugs in.
 
-A chain meets the platform at one point M, so all that the rest of the system asks of it is a
-function of that point: from its position, velocity and acceleration to the joint coordinate, its
-rates, and the forces its bodies put on the platform. A family answers in two ways:
+A chain meets the platform at one point M. A family maps that point's position, velocity and
+acceleration to the joint coordinate, its rates, and the forces of its bodies on the platform, in
+two ways:
 
 - joint space (Section 3.2): joint coordinates q_r = (joint, beta, gamma) in closed form, the
   loop's tip as an expression in q_r, the moving links and the joints between them. The textbook
@@ -60,12 +60,12 @@ class Link:
 class Joint:
     """Where a link meets the link before it, and the first link the base; expressions in q_r.
 
-    name, place: what reports call it and its point.
+    name, place: of the joint and its point, in reports.
     point:  in {S}, (3,).
-    turns:  axes about which it lets the link turn, (3, a).
-    slides: directions along which it lets the link slide, (3, b).
-    driven: whether the actuator works along its one freedom.
-    guide:  axis of a moment that the base puts on the link besides, (3,), or None.
+    turns:  axes of rotation, (3, a).
+    slides: directions of translation, (3, b).
+    driven: whether the actuator drives its one freedom.
+    guide:  axis of an additional moment of the base on the link, (3,), or None.
     """
 
     name: str
@@ -82,7 +82,7 @@ class Joint:
 
     @staticmethod
     def shaft(name: str, place: str, point: ca.SX, axis: ca.SX) -> Joint:
-        """Turned by the actuator."""
+        """Rotated by the actuator."""
         return Joint(name, place, point, axis, ca.SX(3, 0), driven=True)
 
     @staticmethod
@@ -130,11 +130,11 @@ class ChainDynamics:
     """Forces of a chain's bodies on M, (3,) each, and the joint's motion.
 
     forces:     body name -> force dual to M' (inertia less gravity).
-    efforts:    body name -> effort at the joint, worth J effort on M, that `forces` leaves out.
-    inertias:   body name -> constant inertia at the joint whose effort, inertia times
-                `acceleration`, `efforts` leaves out.
-    end_masses: body name -> constant mass at M whose force, end_mass (M'' - g), `forces` leaves
-                out: it can be folded into the platform's inertia once for all samples.
+    efforts:    body name -> effort at the joint, J effort on M, not included in `forces`.
+    inertias:   body name -> constant inertia at the joint; its effort, inertia times
+                `acceleration`, is not included in `efforts`.
+    end_masses: body name -> constant mass at M; its force, end_mass (M'' - g), is not included in
+                `forces`: it can be added to the platform's inertia once for all samples.
     """
 
     forces: dict[str, ca.SX]
@@ -174,13 +174,13 @@ class Family(ABC):
     joint_unit: ClassVar[str]
     effort_unit: ClassVar[str]
     shapes: ClassVar[dict[str, int]]  # constant -> number of entries (1, 3 or 9)
-    # Constants that, at 0, leave `dynamics` without J and forces: of lanes without a chain.
-    # A family that has none pays for such lanes with a few multiplications.
+    # Constants that make J and forces of `dynamics` vanish at 0, for lanes without a chain. A
+    # family without any is masked by a few multiplications.
     padding: ClassVar[tuple[str, ...]] = ()
 
     @abstractmethod
     def constants(self, chain: Any) -> dict[str, Any]:
-        """Numbers of one chain, by the names of `shapes`: arrays, or what makes them."""
+        """Numbers of one chain, by the names of `shapes`: array-like."""
 
     @abstractmethod
     def end_point(self, c: Constants, q_r: ca.SX) -> ca.SX:
@@ -192,7 +192,7 @@ class Family(ABC):
 
     @abstractmethod
     def joints(self, c: Constants, q_r: ca.SX) -> list[Joint]:
-        """One joint a link, in the order of `bodies`; M, the last one's end, is understood."""
+        """One joint per link, in the order of `bodies`, without the platform joint M."""
 
     @abstractmethod
     def loop(self, c: Constants, M: ca.SX) -> Loop:
@@ -213,10 +213,10 @@ class Family(ABC):
 
     @abstractmethod
     def explain(self, chain: Any, pose: np.ndarray) -> str:
-        """Why the chain cannot reach its platform joint at a pose, in numbers."""
+        """Why the chain cannot reach its platform joint at a pose, with distances."""
 
     def span(self, chain: Any, pose: np.ndarray) -> tuple[float, float] | None:
-        """What the rod would have to span at a pose that is out of reach, and its length [m].
+        """The distance that the rod would have to span at an unreachable pose, and its length [m].
 
         None for families whose reach has no such bound.
         """
@@ -284,8 +284,8 @@ def rod_spin(N: ca.SX, q_r: ca.SX) -> ca.SX:
 def rod_guide(N: ca.SX, q_r: ca.SX) -> ca.SX:
     """Axis of the moment that keeps a rod turning with N_i0 Ry(beta_i) Rz(gamma_i), (3,).
 
-    Two ball joints leave a rod free to spin about itself. That it does not is a constraint, and
-    its moment does no work on beta_i' and gamma_i': it acts along X of N_i0 Ry(beta_i), across
+    Two ball joints leave a rod free to spin about itself. Not to spin is a constraint, and its
+    moment does no work on beta_i' and gamma_i': it acts along X of N_i0 Ry(beta_i), normal to
     both of their axes. The angles are relative to the base, so the base must provide it.
     """
     beta = q_r[1]

@@ -1,4 +1,4 @@
-"""What families with rods share: a rod of constant length, and a line whose length changes."""
+"""Base classes of families with rods: a rod of constant length, and a line of variable length."""
 
 from __future__ import annotations
 
