@@ -115,6 +115,7 @@ def test_parasitic_jacobian(contacts: int) -> None:
         np.testing.assert_array_equal(M_J[free], np.eye(6 - contacts))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 23])
 def test_far_from_home_the_branch_is_that_of_home(seed: int) -> None:
     """A pose found at once is the one found by following small steps."""

@@ -14,6 +14,7 @@ from oracles.rotations import platform_motion
 from oracles.rubbing import Balance
 from scipy.optimize import minimize
 from support.rubbing import Rubbing, drawn
+from support.speeds import few, first, slow
 
 import condyle
 from condyle.dynamics import FORMULATIONS
@@ -77,7 +78,7 @@ def least(b: Balance) -> tuple[float, np.ndarray, np.ndarray] | None:
     return best
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", first(CASES, 5))
 def test_least_of_all_patterns_and_active_sets(name: str) -> None:
     case, got = found(name)
     for i, b in enumerate(case.balances()):
@@ -118,7 +119,7 @@ def test_conditions_of_optimality(name: str) -> None:
                 assert (b.N[:, k] + b.T[:, k]) @ y >= -slack
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", first(CASES, 6))
 def test_free_bodies_balance_with_friction_as_a_load(name: str) -> None:
     """Efforts put on all bodies cut free: friction by a fixed point, and nothing is left over.
 
@@ -176,6 +177,7 @@ def by_slsqp(b: Balance, sigma: tuple[int, ...]) -> float | None:
     return float(done.fun) if np.abs(A @ done.x - b.b).max() < 1e-8 else None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["k2 ball cylinder, ellipsoid", "k2 ellipsoid, profile"])
 def test_sliding_velocity_by_differences_of_the_motion(name: str) -> None:
     """A point fixed to the platform where the ball touches moves at the velocity of sliding."""
@@ -210,6 +212,7 @@ HELD: dict[str, dict[str, Any]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", HELD)
 def test_a_kernel_is_sure_of_forces_that_are_held_at_zero(name: str) -> None:
     """All candidates in one graph against Newton's method on the dual, pattern by pattern."""
@@ -229,8 +232,8 @@ def test_a_kernel_is_sure_of_forces_that_are_held_at_zero(name: str) -> None:
     assert (held == 2).any() == (name == "two")
 
 
-@pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.parametrize("route", ["core", "direct"])
+@pytest.mark.parametrize("formulation", first(FORMULATIONS, 2, rest=slow))
+@pytest.mark.parametrize("route", few(["core", "direct"], "core"))
 def test_every_formulation_and_route(formulation: str, route: str) -> None:
     case, wanted = found("k2 plane")
     model = Model(case.mechanism, formulation, route, "numpy")
@@ -240,6 +243,7 @@ def test_every_formulation_and_route(formulation: str, route: str) -> None:
         np.testing.assert_allclose(a, b, atol=1e-10 * np.abs(b).max())
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("unoptimised")
 def test_compiled() -> None:
     case, wanted = found("k2 plane")
@@ -251,6 +255,7 @@ def test_compiled() -> None:
         np.testing.assert_allclose(model.one(*sample), effort, atol=1e-11 * size)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["k2 plane", "k3 mixed"])
 def test_torques_agree_with_evaluate_whatever_is_asked_and_on_threads(name: str) -> None:
     case, wanted = found(name)
@@ -330,6 +335,7 @@ def test_the_order_of_chains_and_contacts_does_not_matter() -> None:
     np.testing.assert_allclose(got.contact_force, force, atol=1e-10 * np.abs(force).max())
 
 
+@pytest.mark.slow
 def test_friction_takes_work() -> None:
     for name in ("k2 quadratic", "k3 ball", "much friction"):
         _, got = found(name)
@@ -338,7 +344,7 @@ def test_friction_takes_work() -> None:
         assert (power <= 0).all() and power.min() < 0
 
 
-@pytest.mark.parametrize("name", ["k2 ball cylinder, ellipsoid", "k3 mixed", "k1 n8", "SPS"])
+@pytest.mark.parametrize("name", first(["k2 ball cylinder, ellipsoid", "k3 mixed", "k1 n8", "SPS"]))
 def test_power_balance_along_a_trajectory(name: str) -> None:
     """Efforts and load, less friction and losses, change the energy; rotors have theirs."""
     case, _ = found(name)
@@ -382,6 +388,7 @@ def reference_with_friction(mu: float) -> condyle.Mechanism:
     return robot.replace(contacts=tuple(contacts))
 
 
+@pytest.mark.slow
 def test_efforts_are_continuous_but_where_the_least_pattern_changes() -> None:
     """Along the reference motion; every change of a pattern is closed in on by bisection.
 
@@ -473,6 +480,7 @@ def test_the_robust_path_agrees(name: str) -> None:
     np.testing.assert_allclose(share, wanted.share, rtol=1e-7, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_kernel_vouches_only_for_the_least_of_all() -> None:
     """Among many samples are some whose least has a contact force of 0, next to a worse pattern."""
     case = drawn(3, count=150, mu=0.9)

@@ -11,6 +11,7 @@ import pytest
 from distribution.oracle import Full, best_active_set, by_slsqp, least_maximum, least_stretch
 from oracles.rubbing import Balance
 from support.rubbing import Rubbing, balanced, drawn
+from support.speeds import first
 
 import condyle
 from condyle.mechanism.chain import limits
@@ -72,7 +73,9 @@ def programs(model: Model, b: Balance, mixes: bool) -> list[Full]:
     return made
 
 
-@pytest.mark.parametrize("name", [n for n in CASES if n.split()[0] in ("bounded", "weighted")])
+@pytest.mark.parametrize(
+    "name", first([n for n in CASES if n.split()[0] in ("bounded", "weighted")], 3)
+)
 def test_least_of_all_patterns_and_active_sets(name: str) -> None:
     case, model, got = found(name)
     for i, b in enumerate(case.balances()):
@@ -92,7 +95,7 @@ def test_least_of_all_patterns_and_active_sets(name: str) -> None:
         np.testing.assert_allclose(got.contact_force[i], best[1][n:], atol=TIGHTER * size * 100)
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", first(CASES, 5))
 def test_equations_and_limits_hold(name: str) -> None:
     case, model, got = found(name)
     for i, b in enumerate(case.balances()):
@@ -127,6 +130,7 @@ def test_minimax_by_linear_programs(name: str) -> None:
         assert np.abs(got.effort[i] / greatest).max() == pytest.approx(wanted, rel=1e-7)
 
 
+@pytest.mark.slow
 def test_cubic_by_slsqp() -> None:
     case, model, got = found("cubic cables")
     compared = 0
@@ -173,6 +177,7 @@ def test_limits_that_no_effort_meets() -> None:
         assert bool(again.status[at] == Status.ok) is enough
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("contacts", [2, 3])
 def test_wide_limits_leave_the_least_norm(contacts: int) -> None:
     case = drawn(8, count=3, limit=1e6, contacts=contacts)
@@ -186,6 +191,7 @@ def test_wide_limits_leave_the_least_norm(contacts: int) -> None:
     np.testing.assert_allclose(bounded.friction_force, least.friction_force, atol=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["bounded k2 one-sided", "bounded k3 one-sided", "minimax k2"])
 def test_torques_one_and_evaluate_agree(name: str) -> None:
     case, model, wanted = found(name)

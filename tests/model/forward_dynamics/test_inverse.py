@@ -10,6 +10,7 @@ from oracles.random_mechanism import random_mechanism, random_state
 from oracles.rubbing import balance
 from support import families
 from support.rubbing import Rubbing
+from support.speeds import first
 
 import condyle
 from condyle.dynamics import FORMULATIONS
@@ -27,7 +28,9 @@ SURFACES: dict[str, dict[str, Any]] = {
 
 
 # Least norms of three contacts and more with friction take their time.
-@pytest.mark.parametrize("name", [name for name in CASES if name not in ("PSS k4", "RSS k5")])
+@pytest.mark.parametrize(
+    "name", first([name for name in CASES if name not in ("PSS k4", "RSS k5")], 5)
+)
 def test_inverse_undoes_forward(name: str) -> None:
     """Of the efforts that make a motion, the motion; with friction, and the same forces."""
     c, model = case(name), by_numpy(name)

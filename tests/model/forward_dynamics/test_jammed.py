@@ -15,6 +15,7 @@ from condyle.status import Status
 from .cases import by_numpy, case, close, efforts, load_of, state
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("contacts", "mu", "seed"), [(1, 6.0, 3), (2, 6.0, 1), (3, 2.0, 2)])
 def test_patterns_are_those_of_the_tree(contacts: int, mu: float, seed: int) -> None:
     c = drawn(seed, count=25, mu=mu, lossy=False, contacts=contacts)

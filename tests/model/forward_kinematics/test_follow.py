@@ -11,6 +11,7 @@ from oracles.closure import complete_state, independent_coordinates
 from oracles.description import Description, joint, read
 from oracles.random_mechanism import random_mechanism, random_state
 from oracles.rotations import platform_motion
+from support.speeds import first, slow
 
 import condyle
 from condyle.errors import LostError
@@ -59,7 +60,7 @@ def test_a_path_that_used_to_jump(timed: bool) -> None:
 FAMILIES = [(("RSS",), 6, 2), (("PSS", "SPS"), 6, 1), (("SPS",), 6, 0), (("RSS", "SPS"), 6, 3)]
 
 
-@pytest.mark.parametrize(("families", "chains", "contacts"), FAMILIES)
+@pytest.mark.parametrize(("families", "chains", "contacts"), first(FAMILIES, 1, rest=slow))
 def test_round_trips_of_random_mechanisms(
     families: tuple[str, ...], chains: int, contacts: int
 ) -> None:
@@ -84,6 +85,7 @@ def test_round_trips_of_random_mechanisms(
             np.testing.assert_allclose(found.pose, poses, rtol=0, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_far_from_home_rows_follow_the_row_before() -> None:
     """Alone, such rows end in minima whose joints differ; in time they are reached exactly."""
     mechanism = condyle.load_mechanism("masticatory")
@@ -109,6 +111,7 @@ def test_far_from_home_rows_follow_the_row_before() -> None:
     assert minima
 
 
+@pytest.mark.slow
 def test_paths_through_singularities_are_lost_there() -> None:
     """Encoders cannot tell passing a singularity from turning back: no row behind it has a pose."""
     forward, d = stewart()
