@@ -21,7 +21,7 @@ from structure import structure
 os.environ.setdefault("MPLBACKEND", "agg")
 GENERATED = Path(__file__).parent / "generated"
 EXAMPLES = Path(__file__).parents[1] / "examples"
-FIGURES = ("motion", "path", "torque", "share", "contact_force", "contact_track", "singularity")
+FIGURES = ("motion", "path", "effort", "share", "contact_force", "contact_track", "singularity")
 MAPS = ("map-ratio", "map-singular")
 STUDIES = ("sweep-scatter", "sweep-effects", "bands")
 PICTURES = ("mechanism", *FIGURES, *MAPS, *STUDIES)
@@ -326,7 +326,7 @@ def readme_picture() -> Any:
     motion.plot(t, 57.29578 * solution["pose"].sel(coordinate="beta"), label="beta [deg]")
     for i, name in enumerate(chains):
         style = {"color": f"C{i // 2}", "linestyle": ("-", "--")[i % 2]}
-        torque.plot(t, solution["torque"].sel(chain=name), label=name.replace("_", " "), **style)
+        torque.plot(t, solution["effort"].sel(chain=name), label=name.replace("_", " "), **style)
     motion.set(title="motion", xlim=(0, 5), xticklabels=[])
     torque.set(title="torques [N m]", xlabel="time [s]", xlim=(0, 5))
     for axes in (motion, torque):

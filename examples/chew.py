@@ -42,7 +42,7 @@ for controller in ("chew", "bite"):
         axes[2].plot(t, joint, dash)
         print(
             f"{name:30}: error of beta {abs(opening).max().item():.3f} deg, effort "
-            f"{abs(run['torque']).max().item():.3f} N m, food {food.max():.1f} N, joint "
+            f"{abs(run['effort']).max().item():.3f} N m, food {food.max():.1f} N, joint "
             f"{joint.max().item():.2f} N"
         )
 axes[0].set_ylabel("error of the opening [deg]")

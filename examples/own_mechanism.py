@@ -29,7 +29,7 @@ motion = condyle.Motion.from_arrays(
 )
 load = condyle.Load.constant([0.0, 0.0, -20.0], point="incisor")
 solution = condyle.derive(robot).solve(motion, load)
-for warning in solution.warnings:
+for warning in solution.condyle.warnings:
     print("warning:", warning)
-peak = float(abs(solution["torque"]).max())
+peak = float(abs(solution["effort"]).max())
 print(f"largest effort: {peak:.6f} N m")

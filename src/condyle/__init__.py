@@ -36,7 +36,6 @@ _HOMES = {
     "reference_load": "motion",
     "reference_motion": "motion",
     "trial_motion": "motion",
-    "Solution": "results.solution",
     "open_solution": "results.solution",
     "Scenario": "simulation",
     "load_scenario": "simulation",
@@ -76,7 +75,7 @@ if TYPE_CHECKING:
     from .mechanism import Mechanism, bundled_mechanisms, dump, dumps, load_mechanism
     from .model.model import Model, derive
     from .motion import Load, Motion, reference_load, reference_motion, trial_motion
-    from .results.solution import Solution, open_solution
+    from .results.solution import open_solution
     from .simulation import Scenario, load_scenario, simulate, simulate_all
 
 # What later rooms give to models, solutions, comparisons and exports, which do not know them.

@@ -1,6 +1,6 @@
 """What later rooms add to earlier ones, by name: the earlier know no more than the name.
 
-`model.solve` belongs to the results, `solution.plot` to the figures and `print(comparison)` to the
+`model.solve` belongs to the results, `.condyle.plot` to the figures and `print(comparison)` to the
 tables. Each is declared as the place of a function, "module:name", in the package's `__init__`, and
 imported when it is used:
 

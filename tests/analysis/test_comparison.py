@@ -38,29 +38,29 @@ def test_models_agree(comparison: Comparison, contacts: bool) -> None:
     found = comparison.differences(contacts)
     count = len(comparison.runs if contacts else comparison.free_runs)
     assert len(found) == count * (count - 1) // 2
-    assert max(pair.torque for pair in found) < 1e-10
+    assert max(pair.effort for pair in found) < 1e-10
     assert max(pair.contact_force for pair in found) < 1e-10
 
 
 def test_runs_are_what_solve_gives(comparison: Comparison) -> None:
     solution = comparison.solution
     for run in comparison.runs:
-        np.testing.assert_allclose(run.torque, solution["torque"].values, atol=1e-12)
+        np.testing.assert_allclose(run.effort, solution["effort"].values, atol=1e-12)
         np.testing.assert_allclose(run.contact_force, solution["contact_force"].values, atol=1e-9)
-        np.testing.assert_allclose(run.share.sum(axis=0), run.torque, atol=1e-12)
+        np.testing.assert_allclose(run.share.sum(axis=0), run.effort, atol=1e-12)
 
 
 def test_free_platform_needs_all_six_torques(comparison: Comparison) -> None:
     """Without contacts the platform moves identically, and nothing carries what they carried."""
     held, free = comparison.runs[0], comparison.free_runs[0]
     assert free.contact_force.shape == (251, 0)
-    assert free.torque.shape == held.torque.shape
+    assert free.effort.shape == held.effort.shape
     # The contacts' forces do no work, so both efforts give the same power along the motion.
     rate = comparison.solution["joint_rate"].values
-    power = (held.torque * rate).sum(axis=1), (free.torque * rate).sum(axis=1)
+    power = (held.effort * rate).sum(axis=1), (free.effort * rate).sum(axis=1)
     np.testing.assert_allclose(*power, atol=1e-10)
     # With the contacts it is the least of all efforts of that power.
-    assert (np.linalg.norm(held.torque, axis=1) < np.linalg.norm(free.torque, axis=1) + 1e-12).all()
+    assert (np.linalg.norm(held.effort, axis=1) < np.linalg.norm(free.effort, axis=1) + 1e-12).all()
 
 
 def test_seconds_are_measured(comparison: Comparison) -> None:

@@ -43,7 +43,7 @@ def test_every_point_is_the_least_of_all_efforts(curve: Tradeoff, motion: Motion
         for i in range(rows):
             scaled = [
                 np.concatenate([
-                    one["torque"].values[i] / limit,
+                    one["effort"].values[i] / limit,
                     np.sqrt(weight / unit) * one["contact_force"].values[i],
                 ])
                 for one in found
@@ -56,9 +56,9 @@ def test_every_point_is_the_least_of_all_efforts(curve: Tradeoff, motion: Motion
 
 def test_the_first_is_weighted_without_a_weight(curve: Tradeoff, motion: Motion) -> None:
     model = condyle.derive("masticatory", backend="numpy", distribution="weighted")
-    efforts = model.solve(motion)["torque"].values
+    efforts = model.solve(motion)["effort"].values
     assert curve.activation[0] == pytest.approx(np.abs(efforts).max() / 3)
-    np.testing.assert_allclose(curve.solution["torque"], efforts)
+    np.testing.assert_allclose(curve.solution["effort"], efforts)
 
 
 def test_table_and_figure(curve: Tradeoff) -> None:
@@ -94,5 +94,5 @@ def test_models_agree_under_every_distribution(motion: Motion) -> None:
             formulations=["momentum"],
             distribution=name,
         )
-        assert max(pair.torque for pair in found.differences()) < 1e-9
-        assert found.solution.options["distribution"] == name
+        assert max(pair.effort for pair in found.differences()) < 1e-9
+        assert found.solution.condyle.options["distribution"] == name

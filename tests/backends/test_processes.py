@@ -220,9 +220,9 @@ def test_a_library_put_in_place_of_ours_is_never_loaded(folder: Path, tmp_path: 
     child = start(SOLVE + RUN)
     out, err = child.communicate("\n", timeout=PATIENCE)
     assert err == "" and not mark.exists()
-    cached, torque = json.loads(out)
+    cached, effort = json.loads(out)
     assert not cached
-    assert error(torque, efforts(first)) == 0
+    assert error(effort, efforts(first)) == 0
     check_clean(folder)
 
 

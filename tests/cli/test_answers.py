@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from support.recorded_jaw import record
 from support.speeds import few, slow
 
@@ -80,7 +81,7 @@ values = [0.2, 0.3]
 
 
 @pytest.fixture(scope="module")
-def solution() -> condyle.Solution:
+def solution() -> xr.Dataset:
     motion = condyle.Motion.from_csv(bundled_reference()[0], rate=20)
     model = condyle.derive(condyle.load_mechanism("masticatory"), backend="numpy")
     return model.solve(motion, condyle.reference_load())
@@ -89,7 +90,7 @@ def solution() -> condyle.Solution:
 @pytest.fixture
 def command(
     condyle_command: Callable[..., Any],
-    solution: condyle.Solution,
+    solution: xr.Dataset,
     monkeypatch: pytest.MonkeyPatch,
     tmp_path: Path,
 ) -> Callable[..., Any]:
@@ -120,7 +121,7 @@ def command(
     jaw = record(noise=5e-5)
     jaw.write(Path("a trial.c3d"))
     jaw.write_tables(Path("markers.toml"))
-    solution.save("a run.nc")
+    solution.condyle.save("a run.nc")
     return condyle_command
 
 

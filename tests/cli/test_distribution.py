@@ -44,10 +44,10 @@ def test_run_chooses_as_it_is_told(condyle_command: Run) -> None:
         outcome = condyle_command("run", *SHORT, *options)
         assert outcome.status == 0, outcome.err
         solution = condyle.open_solution("results/masticatory.nc")
-        assert solution.options["distribution"] == "weighted"
-        assert solution.options["contact_weight"] == pytest.approx(weight)
+        assert solution.condyle.options["distribution"] == "weighted"
+        assert solution.condyle.options["contact_weight"] == pytest.approx(weight)
         loads.append(float((solution["contact_force"] ** 2).sum()))
-        efforts.append(float((solution["torque"] ** 2).sum()))
+        efforts.append(float((solution["effort"] ** 2).sum()))
     assert loads[1] < 0.5 * loads[0] and efforts[1] > efforts[0]
 
 

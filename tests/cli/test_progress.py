@@ -199,7 +199,7 @@ def test_rows_of_a_file(watcher: Watcher, tmp_path: Path) -> None:
 def test_steps_of_a_run(watcher: Watcher, tmp_path: Path) -> None:
     solution = interpreted().solve(path(rate=20, cutoff="auto"))
     assert {"smoothing", "solving"} <= set(watcher.steps)
-    solution.save(tmp_path / "a.nc")
+    solution.condyle.save(tmp_path / "a.nc")
     assert "writing results" in watcher.steps
     write_report(solution, tmp_path / "a.html")
     assert "writing the report" in watcher.steps

@@ -29,21 +29,22 @@ def test_the_main_job(
     assert "closest to the bounds: left_condyle" in outcome.out
     assert "results/masticatory.nc, results/masticatory.csv" in outcome.out
     solution = condyle.open_solution("results/masticatory.nc")
-    assert solution.sizes["time"] == 5001 and solution.warnings == []
-    assert solution["torque"].attrs["units"] == "N m"
+    assert solution.sizes["time"] == 5001 and solution.condyle.warnings == []
+    assert solution["effort"].attrs["units"] == "N m"
     assert all("units" in variable.attrs for variable in solution.values())
     assert solution.attrs["condyle_version"] == condyle.__version__
-    assert solution.mechanism == condyle.load_mechanism("masticatory")
-    assert solution.options["load_point"] == "right_molar"
+    assert solution.condyle.mechanism == condyle.load_mechanism("masticatory")
+    assert solution.condyle.options["load_point"] == "right_molar"
     assert (
-        "synthetic" in solution.attrs["options"] or "chewing-incisor" in solution.options["motion"]
+        "synthetic" in solution.attrs["options"]
+        or "chewing-incisor" in solution.condyle.options["motion"]
     )
     columns, rows = read_csv("results/masticatory.csv")
     table = dict(zip(columns, np.array(rows, dtype=float).T, strict=True))
     np.testing.assert_array_equal(table["t"], solution["time"])
     for name in solution["chain"].values:
-        np.testing.assert_array_equal(table[f"tau_{name}"], solution["torque"].sel(chain=name))
-    peak = np.abs(solution["torque"].sel(chain="masseter_left")).max().item()
+        np.testing.assert_array_equal(table[f"tau_{name}"], solution["effort"].sel(chain=name))
+    peak = np.abs(solution["effort"].sel(chain="masseter_left")).max().item()
     assert f"{peak:.5g} N m" in outcome.out
     assert {p.name for p in (tmp_path / "results").iterdir()} == {
         "masticatory.nc",
@@ -55,7 +56,7 @@ def test_the_same_through_python() -> None:
     mechanism = condyle.load_mechanism("masticatory")
     model = condyle.derive(mechanism, formulation="momentum", route="core", backend="numpy")
     solution = model.solve(condyle.reference_motion(), condyle.reference_load())
-    assert solution.sizes["time"] == 5001 and solution.options["formulation"] == "momentum"
+    assert solution.sizes["time"] == 5001 and solution.condyle.options["formulation"] == "momentum"
 
 
 def test_summary_as_json_and_in_silence(condyle_command: Callable[..., Any]) -> None:
@@ -77,7 +78,7 @@ def test_output_grids_do_not_change_the_motion(
     fine, coarse = (condyle.open_solution(f"at{rate}/masticatory.nc") for rate in (1000, 200))
     assert (fine.sizes["time"], coarse.sizes["time"]) == (5001, 1001)
     np.testing.assert_allclose(fine["time"][::5], coarse["time"], rtol=0, atol=1e-15)
-    for name in ("pose", "pose_rate", "pose_acceleration", "joint_acceleration", "torque"):
+    for name in ("pose", "pose_rate", "pose_acceleration", "joint_acceleration", "effort"):
         got, wanted = fine[name].values[::5], coarse[name].values
         assert np.abs(got - wanted).max() < 1e-9 * max(1.0, np.abs(wanted).max())
 
@@ -109,7 +110,7 @@ def test_a_motion_may_come_in_many_ways(
     assert condyle_command("run", "--motion", "plain.csv", "--out", "plain").status == 0
     assert condyle_command("run", "--motion", "other.csv", "--out", "other", *units).status == 0
     plain, other = (condyle.open_solution(f"{n}/masticatory.nc") for n in ("plain", "other"))
-    for name in ("pose", "pose_acceleration", "torque"):
+    for name in ("pose", "pose_acceleration", "effort"):
         size = np.abs(plain[name]).max().item()
         np.testing.assert_allclose(other[name], plain[name], rtol=0, atol=1e-11 * size)
 
@@ -124,7 +125,7 @@ def test_poses_off_the_contacts_are_projected_and_told(
     assert outcome.status == 0 and "up to 0.2 mm off the contact surfaces" in outcome.err
     solution = condyle.open_solution("results/masticatory.nc")
     np.testing.assert_allclose(solution["pose"].values[:, 2], rows[:, 3] - 2e-4, atol=1e-15)
-    residual = solution.options["contact_residual_of_given_pose"]
+    residual = solution.condyle.options["contact_residual_of_given_pose"]
     assert residual == pytest.approx(2e-4, rel=1e-9)
 
 

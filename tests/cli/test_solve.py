@@ -115,8 +115,8 @@ def test_any_valid_set_of_coordinates(solve: Solve, model: Model, names: tuple[s
     outcome, _, rows = solve([header(names)[i] for i in mix], cells[:, mix])
     assert outcome.status == 0, outcome.err
     table = np.array(rows, dtype=float)
-    torque = found.effort
-    np.testing.assert_allclose(table[:, :6], torque, atol=1e-11 * np.abs(torque).max())
+    effort = found.effort
+    np.testing.assert_allclose(table[:, :6], effort, atol=1e-11 * np.abs(effort).max())
     np.testing.assert_allclose(table[:, 8:14], found.pose, atol=1e-13)
 
 

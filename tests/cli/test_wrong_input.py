@@ -234,7 +234,7 @@ CASES: dict[str, Case] = {
         "",
         "shows no solution",
     ),
-    "figure": (("plot", "--figure", "torq"), None, 'Did you mean "torque"'),
+    "figure": (("plot", "--figure", "efort"), None, 'Did you mean "effort"'),
     # commands, options and numbers
     "command": (("chekc",), None, "'check'"),
     "option": (("run", "--montion", "a.csv"), None, "--motion"),

@@ -376,7 +376,7 @@ JSON = {
     "condyle export c": ("export", "c", "gough-stewart", "--question", "motion", "--out", "c"),
     "condyle plot": ("plot",),
     "condyle plot SOLUTION": (
-        *("plot", "results/masticatory.nc", "--figure", "torque", "--out", "figures"),
+        *("plot", "results/masticatory.nc", "--figure", "effort", "--out", "figures"),
     ),
     "condyle report": ("report", "results/masticatory.nc"),
     "condyle sweep": ("sweep", "masses.toml", "--out", "rows", "--workers", "1"),

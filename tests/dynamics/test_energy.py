@@ -68,8 +68,8 @@ def generalized(model: Model, q: np.ndarray, q1: np.ndarray, q2: np.ndarray) -> 
     """Forces dual to q', (m,): A^T tau, with A the joint rates of unit velocities."""
     m = len(q)
     units = model.evaluate(np.tile(q, (m, 1)), np.eye(m), np.zeros((m, m)), np.zeros((m, 9)))
-    torque = model.evaluate(q[None], q1[None], q2[None], np.zeros((1, 9))).effort[0]
-    return units.joint_rate @ torque
+    effort = model.evaluate(q[None], q1[None], q2[None], np.zeros((1, 9))).effort[0]
+    return units.joint_rate @ effort
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)

@@ -83,11 +83,11 @@ def test_shafts_that_are_upright_or_nearly(tilt: float) -> None:
     states = random_state(np.random.default_rng(1), raw, 2, scale=0.3)
     model = condyle.derive(parse(toml_text(raw)), backend="numpy")
     load = with_point(states["wrench"], model.load_point("right_molar"))
-    torque = model.evaluate(states["q"], states["qd"], states["qdd"], load).effort
+    effort = model.evaluate(states["q"], states["qd"], states["qdd"], load).effort
     given = ("pose", "pose_rate", "pose_acceleration", "wrench")
     for i in range(2):
         wanted = by_engine(*(states[key][i] for key in given), "right_molar")["tau"]
-        np.testing.assert_allclose(torque[i], wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())
+        np.testing.assert_allclose(effort[i], wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())
 
 
 @pytest.mark.parametrize("name", MODULES)

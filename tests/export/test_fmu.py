@@ -162,7 +162,7 @@ def test_a_simulated_chew(fmus: dict[tuple[str, int], Path], model: condyle.Mode
     states = model.independent_motion(motion)[0]
     solution = model.solve(motion)
     first, count = 1400, 30
-    t, effort = solution["time"].values[first:], solution["torque"].values[first:]
+    t, effort = solution["time"].values[first:], solution["effort"].values[first:]
     x = np.concatenate([states[0][first], states[1][first]])
     given = row("q", Q, x[:4]) | row("q1", Q, x[4:])
     chains = model.mechanism.chain_names

@@ -115,7 +115,7 @@ def reference_run() -> dict[str, np.ndarray]:
     """Rows of the reference motion under the bite, and speeds of the joints."""
     model = condyle.derive("masticatory", backend="numpy")
     solution = model.solve(condyle.reference_motion(), condyle.reference_load())
-    names = ("time", "torque", "joint", "load", "pose")
+    names = ("time", "effort", "joint", "load", "pose")
     rows = {name: solution[name].values for name in names}
     return rows | {"speed": np.gradient(rows["joint"], rows["time"], axis=0)}
 
@@ -145,7 +145,7 @@ def test_mujoco_follows_the_reference_motion(
         return (1 - part) * run[name][k] + part * run[name][k + 1]
 
     def control() -> None:
-        d.ctrl[:] = now("torque") + gain * (now("joint") - d.qpos[q_at])
+        d.ctrl[:] = now("effort") + gain * (now("joint") - d.qpos[q_at])
         d.ctrl[:] += 0.01 * gain * (now("speed") - d.qvel[v_at])
         mujoco.mj_kinematics(m, d)
         where = player.position() + d.xmat[player.platform].reshape(3, 3) @ point

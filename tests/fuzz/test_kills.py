@@ -35,8 +35,8 @@ solution = model.solve(Motion.from_csv(bundled_reference()[0], rate=20))
 
 def write_for_ever():
     for n in count():
-        solution["torque"].values[:] = n
-        solution.save("s.nc", "s.csv")
+        solution["effort"].values[:] = n
+        solution.condyle.save("s.nc", "s.csv")
         write_table("t.csv", {"a": np.full(20000, float(n)), "b": np.full(20000, float(n))})
         write_table("t.parquet", {"a": np.full(20000, float(n)), "b": np.full(20000, float(n))})
         write_text("t.html", str(n) * 100_000)
@@ -80,8 +80,8 @@ def test_kills_leave_no_torn_file(tmp_path: Path, fuzz_seeds: range) -> None:
 
 def check(folder: Path) -> None:
     """Every file is of one writing, from its first number to its last."""
-    torque = open_solution(folder / "s.nc")["torque"].values
-    assert torque.shape == (101, 6) and len(np.unique(torque)) == 1
+    effort = open_solution(folder / "s.nc")["effort"].values
+    assert effort.shape == (101, 6) and len(np.unique(effort)) == 1
     table = read_table(folder / "s.csv")
     assert table.rows == 101 and len(np.unique(table.columns["tau_temporalis_left"])) == 1
     for name in ("t.csv", "t.parquet"):

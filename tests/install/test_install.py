@@ -89,7 +89,7 @@ def test_library_counts(installed: Path, tmp_path: Path) -> None:
         "import condyle, importlib.resources as r\n"
         "s = condyle.derive(condyle.load_mechanism('masticatory')).solve(\n"
         "    condyle.reference_motion(), condyle.reference_load())\n"
-        "print(float(abs(s['torque']).max()))\n"
+        "print(float(abs(s['effort']).max()))\n"
     )
     printed = run(installed / "python", "-c", script, cwd=tmp_path)
     assert float(printed) == pytest.approx(0.925334, abs=2e-6)

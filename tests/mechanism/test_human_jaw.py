@@ -147,7 +147,7 @@ def test_it_chews(name: str) -> None:
     motion = reference_motion()
     solution = condyle.derive(jaw, backend="numpy").solve(motion)
     assert (solution["status"].values == 0).all()
-    assert not [n for n in solution.notices if n.kind in ("bounds", "near_singularity")]
+    assert not [n for n in solution.condyle.notices if n.kind in ("bounds", "near_singularity")]
     travel = np.ptp(solution["contact_point"].values[:, :, 0], axis=0)
     assert (travel > 1e-3).all() and (travel < 12e-3).all()
 
@@ -170,7 +170,7 @@ def test_muscles_can_chew_the_bundled_load(name: str) -> None:
         at = [motion.point(np.asarray(c.point))[0] - motion.origin for c in jaw.contacts]
         normals.append([[*v, *np.cross(r, v)] for r, v in zip(at, n, strict=True)])
     J, N = np.array(pulls), np.array(normals)
-    effort, force = (solution[v].values[rows] for v in ("torque", "contact_force"))
+    effort, force = (solution[v].values[rows] for v in ("effort", "contact_force"))
     balanced = np.einsum("nij,ni->nj", J, effort) + np.einsum("nij,ni->nj", N, force)
     low, high = np.array([limits(chain)[:2] for chain in jaw.chains]).T
     push = np.full(2, -1.0)

@@ -2,11 +2,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import condyle
 from condyle.analysis.comparison import Comparison, compare
 from condyle.motion import Load, Motion, bundled_reference
-from condyle.results.solution import Solution
 
 
 @pytest.fixture(scope="session")
@@ -19,12 +19,12 @@ def comparison() -> Comparison:
 
 
 @pytest.fixture(scope="session")
-def solution(comparison: Comparison) -> Solution:
+def solution(comparison: Comparison) -> xr.Dataset:
     return comparison.solution
 
 
 @pytest.fixture(scope="session")
-def fewer_contacts() -> dict[int, Solution]:
+def fewer_contacts() -> dict[int, xr.Dataset]:
     """The stand-in with none and one of its contacts, under a force and a moment."""
     mechanism = condyle.load_mechanism("masticatory")
     found = {}
@@ -40,7 +40,7 @@ def fewer_contacts() -> dict[int, Solution]:
 
 
 @pytest.fixture
-def mixed(solution: Solution) -> Solution:
+def mixed(solution: xr.Dataset) -> xr.Dataset:
     """Two cranks and four sliders by name and unit, with samples that failed."""
     names = ["crank_left", "crank_right", "rail_1", "rail_2", "rail_3", "rail_4"]
     found = solution.copy(deep=True).assign_coords(
@@ -48,10 +48,10 @@ def mixed(solution: Solution) -> Solution:
         effort_unit=("chain", ["N m"] * 2 + ["N"] * 4),
         joint_unit=("chain", ["rad"] * 2 + ["m"] * 4),
     )
-    machine = solution.mechanism
+    machine = solution.condyle.mechanism
     pairs = zip(machine.chains, names, strict=True)
     chains = [chain.model_copy(update={"name": name}) for chain, name in pairs]
     found.attrs["mechanism"] = condyle.dumps(machine.replace(chains=tuple(chains)))
     found["status"].values[10:15] = 1
-    found["torque"].values[10:15] = np.nan
+    found["effort"].values[10:15] = np.nan
     return found

@@ -8,27 +8,27 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from support.browser import Tab
 
 import condyle
 from condyle.markers import MeasuredChannels
 from condyle.motion import Motion
 from condyle.report.page import write_report
-from condyle.results.solution import Solution
 
 WINDOWS = {"wide": (1440, 900), "narrow": (390, 844)}
 INDEX = "() => Number(document.getElementById('scrub').value)"
 
 
 @pytest.fixture(scope="module")
-def solution() -> Solution:
+def solution() -> xr.Dataset:
     """All 5001 samples of the reference case."""
     model = condyle.derive("masticatory", backend="interpreted")
     return model.solve(condyle.reference_motion(), condyle.reference_load())
 
 
 @pytest.fixture(scope="module")
-def report(solution: Solution, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def report(solution: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_report(solution, tmp_path_factory.mktemp("report") / "report.html")
 
 
@@ -123,7 +123,7 @@ def test_play_advances_time_and_pause_stops_it(tab: Tab) -> None:
     assert np.abs(tab.picture("#stage") - before).max() > 50, "the mechanism moved"
 
 
-def test_scrubbing_moves_every_cursor_to_the_same_time(tab: Tab, solution: Solution) -> None:
+def test_scrubbing_moves_every_cursor_to_the_same_time(tab: Tab, solution: xr.Dataset) -> None:
     for sample in (1640, 4003):
         scrub(tab, sample)
         t = float(solution["time"].values[sample])
@@ -135,7 +135,7 @@ def test_scrubbing_moves_every_cursor_to_the_same_time(tab: Tab, solution: Solut
         assert tab.page.inner_text("#now").startswith(f"{t:.3f}")
 
 
-def test_hovering_a_plot_moves_the_cursor(tab: Tab, solution: Solution) -> None:
+def test_hovering_a_plot_moves_the_cursor(tab: Tab, solution: xr.Dataset) -> None:
     plot = tab.page.locator("#panel-pose-angles .plot")
     plot.scroll_into_view_if_needed()
     box = plot.bounding_box()
@@ -147,12 +147,12 @@ def test_hovering_a_plot_moves_the_cursor(tab: Tab, solution: Solution) -> None:
     assert 2 < times.pop() < 4
 
 
-def test_values_shown_equal_the_data(tab: Tab, solution: Solution) -> None:
+def test_values_shown_equal_the_data(tab: Tab, solution: xr.Dataset) -> None:
     sample = 1626
     scrub(tab, sample)
     at = solution.isel(time=sample)
     for panel, variable, scale in (
-        ("torque-Nm", "torque", 1.0),
+        ("effort-Nm", "effort", 1.0),
         ("joint-rad", "joint", 180 / np.pi),
         ("joint_rate-rad", "joint_rate", 180 / np.pi),
         ("transmission", "transmission", 1.0),
@@ -171,10 +171,10 @@ def test_values_shown_equal_the_data(tab: Tab, solution: Solution) -> None:
         joint, speed, torque = readout(tab, str(chain))
         assert joint == pytest.approx(np.degrees(float(at["joint"].values[i])), abs=0.0051)
         assert speed == pytest.approx(np.degrees(float(at["joint_rate"].values[i])), abs=0.051)
-        assert torque == pytest.approx(float(at["torque"].values[i]), abs=0.000051)
+        assert torque == pytest.approx(float(at["effort"].values[i]), abs=0.000051)
 
 
-def test_drawn_mechanism_is_where_the_data_say(tab: Tab, solution: Solution) -> None:
+def test_drawn_mechanism_is_where_the_data_say(tab: Tab, solution: xr.Dataset) -> None:
     """Vertices of plotly's meshes against the contact balls and landmarks of the solution."""
     sample = 2040
     scrub(tab, sample)
@@ -278,10 +278,10 @@ def test_zooming_one_plot_zooms_all(tab: Tab) -> None:
 
 
 def test_legend_hides_a_line_and_shares_can_be_chosen(tab: Tab) -> None:
-    button = tab.page.locator("#panel-torque-Nm .legend button").first
+    button = tab.page.locator("#panel-effort-Nm .legend button").first
     button.click()
     assert button.get_attribute("aria-pressed") == "false"
-    hidden = "() => document.querySelector('#panel-torque-Nm .plot').firstChild.data[0].visible"
+    hidden = "() => document.querySelector('#panel-effort-Nm .plot').firstChild.data[0].visible"
     assert tab.page.evaluate(hidden) is False
     tab.page.select_option("#panel-share-Nm select", label="masseter_left")
     tab.wait("() => document.querySelectorAll('#panel-share-Nm .legend button').length === 4")
@@ -311,7 +311,7 @@ def test_paper_gets_light_colours_and_a_still(tab: Tab) -> None:
     assert len(tab.page.pdf(format="A4")) > 50_000
 
 
-def torn_run(reference: condyle.Mechanism) -> Solution:
+def torn_run(reference: condyle.Mechanism) -> xr.Dataset:
     """Away and back under a load: samples 15 to 88 of 200 are out of reach."""
     t = np.linspace(0, 1, 201)
     names = ("X", "Y", "alpha", "beta")
@@ -361,9 +361,9 @@ def test_samples_without_a_result_say_so_and_show_no_forces(
         assert tab.page.get_attribute("#stage", "data-drawn") == str(first - 1)
         tab.wait("() => document.getElementById('stage').dataset.grey === 'true'")
         assert grey_share(tab) == 1.0 and arrow_size(tab) < 1e-6
-    assert tab.page.locator("#panel-torque-Nm .value").first.inner_text() == "–"
+    assert tab.page.locator("#panel-effort-Nm .value").first.inner_text() == "–"
     shades = tab.page.evaluate(
-        "() => document.querySelector('#panel-torque-Nm .plot').firstChild.layout.shapes"
+        "() => document.querySelector('#panel-effort-Nm .plot').firstChild.layout.shapes"
         ".filter((s) => s.type === 'rect').map((s) => [s.x0, s.x1])"
     )
     assert shades[0] == [float(torn["time"].values[first]), pytest.approx(0.445)]
@@ -373,7 +373,7 @@ def test_samples_without_a_result_say_so_and_show_no_forces(
     assert grey_share(tab) < 0.8 and arrow_size(tab) > 1
 
 
-def test_curves_are_drawn_as_they_are(tab: Tab, solution: Solution) -> None:
+def test_curves_are_drawn_as_they_are(tab: Tab, solution: xr.Dataset) -> None:
     """At rest for a second, then up: no line from 0 s to the first bend, no kink at a peak."""
     drawn = tab.page.evaluate(
         """() => {
@@ -387,22 +387,22 @@ def test_curves_are_drawn_as_they_are(tab: Tab, solution: Solution) -> None:
 
 
 def test_peaks_of_a_long_run_are_drawn(
-    open_tab: Callable[..., Tab], solution: Solution, tmp_path: Path
+    open_tab: Callable[..., Tab], solution: xr.Dataset, tmp_path: Path
 ) -> None:
     count = 60_000
     long = solution.isel(time=np.arange(count) % solution.sizes["time"])
     long = long.assign_coords(time=("time", np.arange(count) / 1000, {"units": "s"}))
-    long["torque"].values[31_234, 2] = 9.75
+    long["effort"].values[31_234, 2] = 9.75
     tab = ready(open_tab(write_report(long, tmp_path / "long.html").as_uri()))
     x, y = tab.page.evaluate(
         """() => {
-            const plot = document.querySelector('#panel-torque-Nm .plot').firstChild;
+            const plot = document.querySelector('#panel-effort-Nm .plot').firstChild;
             return [Array.from(plot.data[2].x), Array.from(plot.data[2].y)];
         }"""
     )
     assert np.all(np.diff(x) >= -1e-9)
     assert x[int(np.argmax(y))] == pytest.approx(31.234, abs=1e-4) and max(y) == 9.75
-    assert min(y) == pytest.approx(float(solution["torque"].values[:, 2].min()), rel=1e-6)
+    assert min(y) == pytest.approx(float(solution["effort"].values[:, 2].min()), rel=1e-6)
 
 
 ODD_NAMES = ["constructor", "__proto__", "toString", "hasOwnProperty", "valueOf", "<b>x</b>"]
@@ -420,7 +420,7 @@ def test_names_of_the_language_are_names(
     motion = Motion.from_arrays(t, {n: 0 * t for n in ("X", "Y", "alpha", "beta")})
     solved = condyle.derive(machine, backend="interpreted").solve(motion)
     tab = ready(open_tab(write_report(solved, tmp_path / "odd.html").as_uri()))
-    names = tab.page.locator("#panel-torque-Nm .legend .name").all_inner_texts()
+    names = tab.page.locator("#panel-effort-Nm .legend .name").all_inner_texts()
     assert names == ODD_NAMES
     labels = tab.page.evaluate("document.getElementById('stage').data[5].text.join(' ')")
     assert "constructor" in labels and "__proto__" in labels
@@ -524,5 +524,5 @@ def test_a_jaw_draws_activations_and_planes_of_all_its_muscles(
             return layout.yaxis.p2d(parseFloat(dot.style.top) - layout.yaxis._offset);
         })"""
     )
-    expected = solution["torque"].values[sample, ::2]
+    expected = solution["effort"].values[sample, ::2]
     assert np.allclose(at, expected, atol=0.02 * np.nanmax(expected))

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from matplotlib.collections import QuadMesh
 from support.report_pages import column, payload
 
@@ -17,34 +18,33 @@ from condyle.report.actuators import DutyMeter, activations, duty, edges, joint_
 from condyle.report.figures import PLOTS, save_solution_figures
 from condyle.report.naming import parts_in_use
 from condyle.report.page import report_html
-from condyle.results.solution import Solution
 
 INF = float("inf")
 
 
-def chewed(name: str, rate: float, **policy: Any) -> Solution:
+def chewed(name: str, rate: float, **policy: Any) -> xr.Dataset:
     motion = Motion.from_csv(bundled_reference()[0], rate=rate)
     model = condyle.derive(name, backend="numpy", **policy)
     return model.solve(motion, condyle.reference_load())
 
 
 @pytest.fixture(scope="module")
-def robot() -> Solution:
+def robot() -> xr.Dataset:
     return chewed("masticatory", 40)
 
 
 @pytest.fixture(scope="module")
-def jaw() -> Solution:
+def jaw() -> xr.Dataset:
     return chewed("human-jaw", 20)
 
 
 @pytest.fixture(scope="module")
-def page(jaw: Solution) -> dict[str, Any]:
+def page(jaw: xr.Dataset) -> dict[str, Any]:
     return payload(report_html(jaw))
 
 
-def test_rms_and_power_by_hand(robot: Solution) -> None:
-    t, effort = robot["time"].values, robot["torque"].values
+def test_rms_and_power_by_hand(robot: xr.Dataset) -> None:
+    t, effort = robot["time"].values, robot["effort"].values
     for i, one in enumerate(duty(robot)):
         mean = np.trapezoid(effort[:, i] ** 2, t) / (t[-1] - t[0])
         assert one.rms == pytest.approx(np.sqrt(mean), rel=1e-12)
@@ -53,19 +53,19 @@ def test_rms_and_power_by_hand(robot: Solution) -> None:
         assert one.text == f"rms {one.rms:.3g} N m, {one.power:.3g} W"
 
 
-def test_duty_is_the_same_piece_by_piece_and_skips_gaps(robot: Solution) -> None:
+def test_duty_is_the_same_piece_by_piece_and_skips_gaps(robot: xr.Dataset) -> None:
     holed = robot.copy(deep=True)
-    holed["torque"].values[50:60] = np.nan
+    holed["effort"].values[50:60] = np.nan
     meter = DutyMeter()
     for start in range(0, holed.sizes["time"], 17):
         meter.see(holed.isel(time=slice(start, start + 17)))
     for one, whole in zip(meter.read(), duty(holed), strict=True):
         assert (one.rms, one.power) == pytest.approx((whole.rms, whole.power), rel=1e-12)
-    t, square = holed["time"].values, holed["torque"].values[:, 0] ** 2
+    t, square = holed["time"].values, holed["effort"].values[:, 0] ** 2
     parts = [(t[:50], square[:50]), (t[60:], square[60:])]
     mean = sum(np.trapezoid(y, x) for x, y in parts) / sum(x[-1] - x[0] for x, _ in parts)
     assert duty(holed)[0].rms == pytest.approx(np.sqrt(mean), rel=1e-12)
-    holed["torque"].values[:] = np.nan
+    holed["effort"].values[:] = np.nan
     assert {one.text for one in duty(holed)} == {"no result"}
 
 
@@ -85,7 +85,7 @@ def test_edges_of_the_box_near_the_data() -> None:
     assert edges(Limits(-3.0, 3.0, 6.0), 0.0, 0.0)[-1] == ([6.0, 6.0], [-3.0, 3.0])
 
 
-def test_effort_speed_draws_every_chain_in_its_limits(robot: Solution, jaw: Solution) -> None:
+def test_effort_speed_draws_every_chain_in_its_limits(robot: xr.Dataset, jaw: xr.Dataset) -> None:
     for solution, count in ((robot, 3), (jaw, 12)):
         figure = PLOTS["effort_speed"](solution)
         assert len(figure.axes) == count
@@ -94,7 +94,7 @@ def test_effort_speed_draws_every_chain_in_its_limits(robot: Solution, jaw: Solu
         assert len(tracks) == solution.sizes["chain"]
         found = {(tuple(line.get_xdata()), tuple(line.get_ydata())) for line in tracks}
         for i in range(solution.sizes["chain"]):
-            pair = solution["joint_rate"].values[:, i], solution["torque"].values[:, i]
+            pair = solution["joint_rate"].values[:, i], solution["effort"].values[:, i]
             assert (tuple(pair[0]), tuple(pair[1])) in found
     first = PLOTS["effort_speed"](robot).axes[0]
     assert first.get_legend().get_title().get_text() == "limits: ±3 N m, 6 rad/s"
@@ -103,13 +103,13 @@ def test_effort_speed_draws_every_chain_in_its_limits(robot: Solution, jaw: Solu
     assert titles[0] == "limits: 0 to 158 N"
 
 
-def test_activation_rows_are_effort_over_greatest_effort(jaw: Solution) -> None:
+def test_activation_rows_are_effort_over_greatest_effort(jaw: xr.Dataset) -> None:
     figure = PLOTS["activation"](jaw)
     field, loads = figure.axes
     [mesh] = [item for item in field.collections if isinstance(item, QuadMesh)]
     rows = [label.get_text() for label in field.get_yticklabels()]
     names = [str(name) for name in jaw["chain"].values]
-    greatest = {c.name: c.actuator.effort_range[1] for c in jaw.mechanism.chains}
+    greatest = {c.name: c.actuator.effort_range[1] for c in jaw.condyle.mechanism.chains}
     assert [row.rpartition(" ")[0] for row in rows[::2]] == [
         r.rpartition(" ")[0] for r in rows[1::2]
     ]
@@ -117,7 +117,7 @@ def test_activation_rows_are_effort_over_greatest_effort(jaw: Solution) -> None:
     for row, drawn in zip(rows, values, strict=True):
         i = names.index(row.replace(" ", "_"))
         np.testing.assert_allclose(
-            drawn, jaw["torque"].values[:, i] / greatest[names[i]], atol=1e-15
+            drawn, jaw["effort"].values[:, i] / greatest[names[i]], atol=1e-15
         )
     assert mesh.get_clim() == (0.0, 1.0)
     curves = [line.get_ydata() for line in loads.get_lines()]
@@ -125,23 +125,23 @@ def test_activation_rows_are_effort_over_greatest_effort(jaw: Solution) -> None:
     assert (jaw["contact_force"].values <= 0).all(), "the fossa pushes downwards, along -n"
 
 
-def test_a_pair_apart_in_the_file_stands_together(robot: Solution) -> None:
-    machine = robot.mechanism
+def test_a_pair_apart_in_the_file_stands_together(robot: xr.Dataset) -> None:
+    machine = robot.condyle.mechanism
     order = [0, 2, 4, 1, 3, 5]
     shuffled = robot.isel(chain=order)
     shuffled.attrs["mechanism"] = condyle.dumps(
         machine.replace(chains=tuple(machine.chains[i] for i in order))
     )
-    found = activations(Solution(shuffled.data_vars, shuffled.coords, shuffled.attrs))
+    found = activations(shuffled)
     assert list(found) == [str(name) for name in robot["chain"].values]
-    expected = np.abs(robot["torque"].values[:, 1]) / 3.0
+    expected = np.abs(robot["effort"].values[:, 1]) / 3.0
     np.testing.assert_allclose(found[str(robot["chain"].values[1])], expected)
 
 
-def test_beyond_the_limit_is_said_and_failed_samples_are_blank(robot: Solution) -> None:
+def test_beyond_the_limit_is_said_and_failed_samples_are_blank(robot: xr.Dataset) -> None:
     strong = robot.copy(deep=True)
-    strong["torque"].values[5, 0] = 4.5
-    strong["torque"].values[9] = np.nan
+    strong["effort"].values[5, 0] = 4.5
+    strong["effort"].values[9] = np.nan
     axes = PLOTS["activation"](strong).axes[0]
     assert "beyond" in axes.get_title("left")
     [mesh] = [item for item in axes.collections if isinstance(item, QuadMesh)]
@@ -150,9 +150,9 @@ def test_beyond_the_limit_is_said_and_failed_samples_are_blank(robot: Solution) 
     assert "beyond" not in PLOTS["activation"](robot).axes[0].get_title("left")
 
 
-def test_without_limits_there_is_no_activation(robot: Solution, tmp_path: Path) -> None:
+def test_without_limits_there_is_no_activation(robot: xr.Dataset, tmp_path: Path) -> None:
     free = robot.copy(deep=True)
-    machine = robot.mechanism
+    machine = robot.condyle.mechanism
     bare = tuple(c.model_copy(update={"actuator": type(c.actuator)()}) for c in machine.chains)
     free.attrs["mechanism"] = condyle.dumps(machine.replace(chains=bare))
     text = " ".join(t.get_text() for t in PLOTS["activation"](free).axes[0].texts)
@@ -163,14 +163,14 @@ def test_without_limits_there_is_no_activation(robot: Solution, tmp_path: Path) 
     assert "activation" not in ids and "contact-force" in ids
 
 
-def test_joint_load_of_a_contact_that_may_pull_has_no_sign(robot: Solution) -> None:
+def test_joint_load_of_a_contact_that_may_pull_has_no_sign(robot: xr.Dataset) -> None:
     force = robot["contact_force"].values
-    for i, contact in enumerate(robot.mechanism.contacts):
+    for i, contact in enumerate(robot.condyle.mechanism.contacts):
         expected = contact.push * force[:, i] if contact.one_sided else abs(force[:, i])
         np.testing.assert_array_equal(joint_loads(robot)[contact.name], expected)
 
 
-def test_page_has_every_plane_and_activation(page: dict[str, Any], jaw: Solution) -> None:
+def test_page_has_every_plane_and_activation(page: dict[str, Any], jaw: xr.Dataset) -> None:
     names = [str(name) for name in jaw["chain"].values]
     planes = [panel for panel in page["panels"] if panel["kind"] == "plane"]
     assert len(planes) == 12
@@ -179,17 +179,17 @@ def test_page_has_every_plane_and_activation(page: dict[str, Any], jaw: Solution
     for i, (plane, line) in enumerate(lines):
         speed, effort = (column(page, line[key]) for key in ("across", "column"))
         np.testing.assert_allclose(speed, jaw["joint_rate"].values[:, i], rtol=1e-6, atol=1e-9)
-        np.testing.assert_allclose(effort, jaw["torque"].values[:, i], rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(effort, jaw["effort"].values[:, i], rtol=1e-6, atol=1e-9)
         assert (
             plane["axes"] == ["speed [m/s]", "force"]
             and plane["unit"] == "N"
             and names[i].endswith(line["label"])
         )
     field = next(p for p in page["panels"] if p["id"] == "activation")
-    greatest = {c.name: c.actuator.effort_range[1] for c in jaw.mechanism.chains}
+    greatest = {c.name: c.actuator.effort_range[1] for c in jaw.condyle.mechanism.chains}
     assert field["kind"] == "field" and len(field["sets"][0]["lines"]) == 24
     for line in field["sets"][0]["lines"]:
-        expected = jaw["torque"].values[:, names.index(line["label"])] / greatest[line["label"]]
+        expected = jaw["effort"].values[:, names.index(line["label"])] / greatest[line["label"]]
         drawn = column(page, line["column"]) * line["scale"]
         np.testing.assert_allclose(drawn, expected, rtol=1e-6, atol=1e-9)
     load = next(p for p in page["panels"] if p["id"] == "load-on-joints")
@@ -197,20 +197,20 @@ def test_page_has_every_plane_and_activation(page: dict[str, Any], jaw: Solution
     np.testing.assert_allclose(drawn, -jaw["contact_force"].values[:, 0], rtol=1e-6)
 
 
-def test_many_limits_are_kept_but_not_drawn(page: dict[str, Any], robot: Solution) -> None:
+def test_many_limits_are_kept_but_not_drawn(page: dict[str, Any], robot: xr.Dataset) -> None:
     """Eleven lines would hide the curves; the table at the cursor needs each."""
-    force = next(p for p in page["panels"] if p["id"] == "torque-N")
+    force = next(p for p in page["panels"] if p["id"] == "effort-N")
     assert not force["limitsDrawn"] and not force["limitsInView"]
     assert len(force["limits"]) == 11 and sum(len(one["of"]) for one in force["limits"]) == 24
-    torque = next(p for p in payload(report_html(robot))["panels"] if p["id"] == "torque-Nm")
+    torque = next(p for p in payload(report_html(robot))["panels"] if p["id"] == "effort-Nm")
     assert torque["limitsDrawn"] and len(torque["limits"]) == 1
 
 
-def test_a_thinned_page_keeps_tracks_and_the_duty_of_every_sample(jaw: Solution) -> None:
+def test_a_thinned_page_keeps_tracks_and_the_duty_of_every_sample(jaw: xr.Dataset) -> None:
     count = 6000
     index = np.linspace(0, jaw.sizes["time"] - 1, count).astype(int)
     long = jaw.isel(time=index).assign_coords(time=np.linspace(0, 5, count))
-    long = Solution(long.data_vars, long.coords, long.attrs)
+    long = long
     data = payload(report_html(long))
     assert data["columns"]["total"] == count
     assert 500 < data["columns"]["samples"] < count
@@ -219,12 +219,12 @@ def test_a_thinned_page_keeps_tracks_and_the_duty_of_every_sample(jaw: Solution)
     assert texts == [one.text for one in duty(long)]
 
 
-def test_parts_of_no_consequence_are_left_out(robot: Solution) -> None:
+def test_parts_of_no_consequence_are_left_out(robot: xr.Dataset) -> None:
     parts = [str(part) for part in robot["part"].values]
     more = robot.isel(part=[*range(len(parts)), 0, 0]).copy(deep=True)
     more = more.assign_coords(part=[*parts, "friction", "internal"])
     more["share"].values[-2] = 0.0
-    shown = parts_in_use(Solution(more.data_vars, more.coords, more.attrs))
+    shown = parts_in_use(more)
     assert "friction" not in shown and "internal" in shown
 
 
@@ -247,5 +247,5 @@ def test_shares_of_actuators_and_friction_have_figures_and_panels() -> None:
     lines = {line["label"]: line for line in panel["sets"][1]["lines"]}
     data = payload(report_html(solution))
     drawn = sum(column(data, line["column"]) for line in lines.values())
-    np.testing.assert_allclose(drawn, solution["torque"].values[:, 0], rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(drawn, solution["effort"].values[:, 0], rtol=1e-5, atol=1e-6)
     assert "actuators" in lines

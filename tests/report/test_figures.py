@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 import matplotlib as mpl
 import numpy as np
 import pytest
+import xarray as xr
 from matplotlib._pylab_helpers import Gcf
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -36,7 +37,6 @@ from condyle.report.figures.paper_figures import track
 from condyle.report.figures.style import new_figure
 from condyle.report.naming import groups, heading
 from condyle.report.panel import Curve, Panel
-from condyle.results.solution import Solution
 
 NOTHING = {"marker": "no markers", "reaction": "no reactions"}  # where a run has none
 
@@ -53,7 +53,7 @@ def words(figure: Figure) -> str:
 
 
 @pytest.mark.parametrize("name", PLOTS)
-def test_every_plot_has_title_labels_units_and_provenance(name: str, solution: Solution) -> None:
+def test_every_plot_has_title_labels_units_and_provenance(name: str, solution: xr.Dataset) -> None:
     figure = PLOTS[name](solution)
     assert isinstance(figure, Figure)
     assert figure.get_suptitle()
@@ -65,7 +65,7 @@ def test_every_plot_has_title_labels_units_and_provenance(name: str, solution: S
 
 
 @pytest.mark.parametrize("name", PLOTS)
-def test_any_number_of_contacts(name: str, fewer_contacts: dict[int, Solution]) -> None:
+def test_any_number_of_contacts(name: str, fewer_contacts: dict[int, xr.Dataset]) -> None:
     for k, solution in fewer_contacts.items():
         figure = PLOTS[name](solution)
         nothing = "no contacts" in words(figure)
@@ -73,7 +73,7 @@ def test_any_number_of_contacts(name: str, fewer_contacts: dict[int, Solution]) 
 
 
 @pytest.mark.parametrize("name", PLOTS)
-def test_mixed_units_never_share_axes(name: str, mixed: Solution) -> None:
+def test_mixed_units_never_share_axes(name: str, mixed: xr.Dataset) -> None:
     figure = PLOTS[name](mixed)
     for axes in figure.axes:
         kinds = {label.split()[0] for label in curves(axes) if label[:4] in ("cran", "rail")}
@@ -81,19 +81,19 @@ def test_mixed_units_never_share_axes(name: str, mixed: Solution) -> None:
     figure.draw_without_rendering()
 
 
-def test_torque_shows_the_torques_and_their_limits(solution: Solution) -> None:
-    figure = PLOTS["torque"](solution)
+def test_torque_shows_the_torques_and_their_limits(solution: xr.Dataset) -> None:
+    figure = PLOTS["effort"](solution)
     drawn = {k: v for axes in figure.axes for k, v in curves(axes).items()}
     for i, name in enumerate(solution["chain"].values):
         np.testing.assert_array_equal(
-            drawn[name.replace("_", " ")], solution["torque"].values[:, i]
+            drawn[name.replace("_", " ")], solution["effort"].values[:, i]
         )
     assert [axes.get_ylabel() for axes in figure.axes] == ["torque [N m]"] * 3
     assert all("limit ±3 N m is outside the view" in a.get_title("left") for a in figure.axes)
     assert len({axes.get_ylim() for axes in figure.axes}) == 1
 
 
-def test_limit_near_the_data_is_a_line(solution: Solution) -> None:
+def test_limit_near_the_data_is_a_line(solution: xr.Dataset) -> None:
     figure = PLOTS["joint"](solution)
     rate = figure.axes[1]
     assert rate.get_ylabel() == "rate [°/s]"
@@ -103,7 +103,7 @@ def test_limit_near_the_data_is_a_line(solution: Solution) -> None:
     assert "limit ±343.8 °/s" in words(figure)
 
 
-def test_units_on_the_axes(solution: Solution, mixed: Solution) -> None:
+def test_units_on_the_axes(solution: xr.Dataset, mixed: xr.Dataset) -> None:
     motion = PLOTS["motion"](solution).axes
     assert motion[0].get_ylabel() == "position [mm]"
     np.testing.assert_allclose(curves(motion[0])["Z"], solution["pose"].values[:, 2] * 1e3)
@@ -117,11 +117,11 @@ def test_units_on_the_axes(solution: Solution, mixed: Solution) -> None:
     assert rail.get_ylabel() == "$J_A$ [mm]"
     np.testing.assert_allclose(curves(rail)["rail 1"], solution["J_A"].values[:, 2] * 1e3)
 
-    labels = [axes.get_ylabel() for axes in PLOTS["torque"](mixed).axes]
+    labels = [axes.get_ylabel() for axes in PLOTS["effort"](mixed).axes]
     assert labels == ["torque [N m]", "force [N]", "force [N]"]
 
 
-def test_path_of_the_landmark(solution: Solution) -> None:
+def test_path_of_the_landmark(solution: xr.Dataset) -> None:
     point = np.array([0.05, 0.01, -0.02])
     anywhere = solution.copy(deep=True)
     anywhere["pose"].values[:] = np.random.default_rng(5).uniform(-1, 1, anywhere["pose"].shape)
@@ -134,31 +134,31 @@ def test_path_of_the_landmark(solution: Solution) -> None:
     assert sagittal.get_xdata()[0] == pytest.approx(52.75)
 
 
-def test_failed_samples_are_shaded_and_explained(solution: Solution, mixed: Solution) -> None:
-    def shades(one: Solution) -> int:
-        return len(PLOTS["torque"](one).axes[0].patches)
+def test_failed_samples_are_shaded_and_explained(solution: xr.Dataset, mixed: xr.Dataset) -> None:
+    def shades(one: xr.Dataset) -> int:
+        return len(PLOTS["effort"](one).axes[0].patches)
 
     assert (shades(solution), shades(mixed)) == (0, 1)
-    text = words(PLOTS["torque"](mixed))
+    text = words(PLOTS["effort"](mixed))
     assert "no result" in text and "Grey: no result (unreachable: " in text
-    assert "no result" not in words(PLOTS["torque"](solution))
+    assert "no result" not in words(PLOTS["effort"](solution))
 
 
-def test_a_limit_names_the_chains_that_have_it(solution: Solution) -> None:
+def test_a_limit_names_the_chains_that_have_it(solution: xr.Dataset) -> None:
     """One of two has it: the other is not said to."""
-    machine = solution.mechanism
+    machine = solution.condyle.mechanism
     first, *others = machine.chains
     free = first.model_copy(
         update={"actuator": first.actuator.model_copy(update={"torque_limit": None})}
     )
     partly = solution.copy(deep=True)
     partly.attrs["mechanism"] = condyle.dumps(machine.replace(chains=(free, *others)))
-    titles = [axes.get_title("left") for axes in PLOTS["torque"](partly).axes]
+    titles = [axes.get_title("left") for axes in PLOTS["effort"](partly).axes]
     assert "limit ±3 N m (temporalis right) is outside the view" in titles[0]
     assert "(" not in titles[1]
 
 
-def test_no_load_no_share_of_it(solution: Solution) -> None:
+def test_no_load_no_share_of_it(solution: xr.Dataset) -> None:
     titles = [axes.get_title("left") for axes in PLOTS["share"](solution).axes[:4]]
     assert titles == ["platform", "couplers", "cranks", "load"]
     idle = solution.copy(deep=True)
@@ -170,7 +170,7 @@ def test_no_load_no_share_of_it(solution: Solution) -> None:
 
 
 @pytest.mark.parametrize("name", PLOTS)
-def test_figures_for_a_journal(name: str, solution: Solution) -> None:
+def test_figures_for_a_journal(name: str, solution: xr.Dataset) -> None:
     figure = PLOTS[name](solution, style="journal", title=False, letters=True)
     assert figure.get_size_inches()[0] * 25.4 == pytest.approx(175 if name == "share" else 85)
     assert not figure.get_suptitle().strip() and "stand-in" not in words(figure)
@@ -182,16 +182,16 @@ def test_figures_for_a_journal(name: str, solution: Solution) -> None:
     assert tuple(wide.get_size_inches()) == (5, 4) and wide.get_suptitle()
 
 
-def test_wishes_end_with_the_figure(solution: Solution) -> None:
+def test_wishes_end_with_the_figure(solution: xr.Dataset) -> None:
     with pytest.raises(condyle.InputError, match="jurnal"):
         PLOTS["load"](solution, style="jurnal")
-    solution.plot.load(style="journal", title=False)
+    solution.condyle.plot.load(style="journal", title=False)
     after = PLOTS["load"](solution)
     assert after.get_suptitle() and after.get_size_inches()[0] == 7
 
 
 @pytest.mark.parametrize("name", [n for n in PLOTS if n not in ("path", "contact_track")])
-def test_lines_differ_in_colour_and_in_dashes(name: str, solution: Solution) -> None:
+def test_lines_differ_in_colour_and_in_dashes(name: str, solution: xr.Dataset) -> None:
     """Of any two lines in a panel; a left and a right one share the colour alone."""
     for axes in PLOTS[name](solution).axes:
         named = [line for line in axes.get_lines() if not str(line.get_label()).startswith("_")]
@@ -199,7 +199,7 @@ def test_lines_differ_in_colour_and_in_dashes(name: str, solution: Solution) -> 
         assert len(set(dashes)) == len(dashes), axes.get_title("left")
 
 
-def test_contact_track_fills_its_page(solution: Solution) -> None:
+def test_contact_track_fills_its_page(solution: xr.Dataset) -> None:
     figure = PLOTS["contact_track"](solution)
     figure.draw_without_rendering()
     boxes = [
@@ -209,46 +209,49 @@ def test_contact_track_fills_its_page(solution: Solution) -> None:
 
 
 def test_panels_of_ones_own_are_a_figure_and_on_the_page(
-    solution: Solution, monkeypatch: pytest.MonkeyPatch
+    solution: xr.Dataset, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(panel, "PANEL_GROUPS", dict(panel.PANEL_GROUPS))
     monkeypatch.setitem(PLOTS, "power", None)
 
     @panel.panels("actuators", "Power of the actuators")
-    def power(given: Solution) -> Iterator[Panel]:
+    def power(given: xr.Dataset) -> Iterator[Panel]:
         """Power of each actuator."""
-        watts = given["torque"].values * given["joint_rate"].values
+        watts = given["effort"].values * given["joint_rate"].values
         yield Panel("power", "Power", "power", "W", panel.of_names(given, "power", "chain", watts))
 
-    figure = solution.plot.power(figsize=(3, 2))
+    figure = solution.condyle.plot.power(figsize=(3, 2))
     assert figure.axes[0].get_ylabel() == "power [W]" and PLOTS["power"].__doc__ == power.__doc__
-    watts = solution["torque"].values[:, 0] * solution["joint_rate"].values[:, 0]
+    watts = solution["effort"].values[:, 0] * solution["joint_rate"].values[:, 0]
     np.testing.assert_array_equal(curves(figure.axes[0])["temporalis left"], watts)
     assert [one.id for section, one in panel.panels_of(solution) if section == "actuators"] == [
         "activation", "load-on-joints", "plane-0", "plane-1", "plane-2", "power",
     ]  # fmt: skip
 
 
-def test_a_figure_registers_itself(solution: Solution, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_figure_registers_itself(solution: xr.Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(registry, "PLOTS", PLOTS)
     monkeypatch.setitem(PLOTS, "power", None)
 
     @registry.plot()
-    def power(given: Solution, factor: float = 1.0) -> Figure:
+    def power(given: xr.Dataset, factor: float = 1.0) -> Figure:
         """Power of each actuator."""
         made = new_figure("Power", "", 4, 3)
         axes = made.add_subplot()
-        axes.plot(given["time"], factor * given["torque"] * given["joint_rate"])
+        axes.plot(given["time"], factor * given["effort"] * given["joint_rate"])
         return made
 
-    made = solution.plot.power(factor=2.0, figsize=(3, 2))
+    made = solution.condyle.plot.power(factor=2.0, figsize=(3, 2))
     assert tuple(made.get_size_inches()) == (3, 2)
-    assert "power" in dir(solution.plot) and solution.plot.power.__doc__ == power.__doc__
-    with pytest.raises(AttributeError, match="torque"):
-        solution.plot.torqe  # noqa: B018
+    assert (
+        "power" in dir(solution.condyle.plot)
+        and solution.condyle.plot.power.__doc__ == power.__doc__
+    )
+    with pytest.raises(AttributeError, match="effort"):
+        solution.condyle.plot.efort  # noqa: B018
 
 
-def test_results_know_figures_by_name_alone(solution: Solution) -> None:
+def test_results_know_figures_by_name_alone(solution: xr.Dataset) -> None:
     """No file of results or analysis imports the report, which registers itself."""
     for room in ("results", "analysis"):
         for path in (Path(condyle.__file__).parent / room).glob("*.py"):
@@ -286,7 +289,7 @@ def test_a_ball_runs_on_the_line_of_its_centre(reference: condyle.Mechanism) -> 
         assert note in words(figure)
 
 
-def test_contact_track_against_bounds(solution: Solution) -> None:
+def test_contact_track_against_bounds(solution: xr.Dataset) -> None:
     figure = PLOTS["contact_track"](solution)
     above = figure.axes[0]
     assert above.get_title("left") == "left condyle, from above"
@@ -311,10 +314,10 @@ def test_figure_8_shows_the_differences(comparison: Comparison) -> None:
     one, two = (comparison.run("momentum", route) for route in ("direct", "core"))
     assert one is not None and two is not None
     drawn = curves(figure.axes[1])["temporalis left"]
-    np.testing.assert_array_equal(drawn, one.torque[:, 0] - two.torque[:, 0])
+    np.testing.assert_array_equal(drawn, one.effort[:, 0] - two.effort[:, 0])
 
 
-def test_figure_9_leaves_the_bite_out(solution: Solution) -> None:
+def test_figure_9_leaves_the_bite_out(solution: xr.Dataset) -> None:
     figure = figure_9(solution)
     titles = [axes.get_title("left") for axes in figure.axes[:3]]
     assert titles == ["platform", "cranks", "couplers"]
@@ -339,17 +342,16 @@ def test_pairs_share_a_panel_and_a_colour() -> None:
     assert len({str(look) for look in drawn([f"leg {i}" for i in range(20)])}) == 20
 
 
-def test_accessor_has_every_plot_and_xarrays_own(solution: Solution) -> None:
+def test_accessor_has_every_plot(solution: xr.Dataset) -> None:
     plots = SolutionPlots(solution)
     for name, draw in PLOTS.items():
         assert inspect.getdoc(getattr(plots, name)) == inspect.getdoc(draw)
     for name in ("bite", "load"):  # as the file calls it, and as people do
         figure = plots.share(parts=[name])
         assert figure.axes[0].get_title("left") == "load"
-    assert callable(plots.scatter)
 
 
-def test_callers_settings_are_left_alone(solution: Solution) -> None:
+def test_callers_settings_are_left_alone(solution: xr.Dataset) -> None:
     before, kept = dict(mpl.rcParams), dict(Gcf.figs)
     with mpl.rc_context({"font.size": 30}):
         figure = PLOTS["load"](solution)
@@ -371,14 +373,14 @@ def test_papers_figures_as_files(comparison: Comparison, tmp_path: Path) -> None
         assert ElementTree.parse(path).getroot().tag.endswith("svg")
 
 
-def test_same_figure_same_file(solution: Solution, tmp_path: Path) -> None:
+def test_same_figure_same_file(solution: xr.Dataset, tmp_path: Path) -> None:
     first = figures.save(PLOTS["load"](solution), tmp_path, "first")
     second = figures.save(PLOTS["load"](solution), tmp_path, "second")
     for one, two in zip(first, second, strict=True):
         assert one.read_bytes() == two.read_bytes()
 
 
-def test_whole_or_not_at_all(solution: Solution, tmp_path: Path) -> None:
+def test_whole_or_not_at_all(solution: xr.Dataset, tmp_path: Path) -> None:
     with pytest.raises(condyle.InputError, match="does not exist"):
         figures.save(PLOTS["load"](solution), tmp_path / "nowhere", "load")
     broken = PLOTS["load"](solution)
@@ -389,7 +391,7 @@ def test_whole_or_not_at_all(solution: Solution, tmp_path: Path) -> None:
 
 
 def test_figures_of_a_solution(
-    fewer_contacts: dict[int, Solution], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    fewer_contacts: dict[int, xr.Dataset], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     few = {name: PLOTS[name] for name in ("load", "contact_force")}
     monkeypatch.setattr(figures, "PLOTS", few)
@@ -397,7 +399,7 @@ def test_figures_of_a_solution(
     assert [p.name for p in paths] == ["load.png", "load.svg"]
 
 
-def test_figure_5_holds_path_and_coordinates(solution: Solution) -> None:
+def test_figure_5_holds_path_and_coordinates(solution: xr.Dataset) -> None:
     figure = figure_5(solution)
     assert len(figure.axes) == 4 + 6
     assert [axes.name for axes in figure.axes].count("3d") == 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import condyle
 from condyle.motion import trial_motion
@@ -11,8 +12,8 @@ from condyle.report.figures import PLOTS
 from condyle.report.page.page_columns import Columns, panel_data
 from condyle.report.page.page_facts import alerts, chain_table
 from condyle.report.panel import panels_of
-from condyle.report.panel_list import load, torque
-from condyle.results.solution import Solution
+from condyle.report.panel_list import effort as effort_panels
+from condyle.report.panel_list import load
 from condyle.view.snapshot import state_messages
 
 LOW, HIGH = -0.0005, 0.003  # N m, of efforts from -0.001 to 0.0036
@@ -20,7 +21,7 @@ FIRST, SECOND, THIRD = "pterygoid_left", "pterygoid_right", "masseter_left"
 
 
 @pytest.fixture(scope="module")
-def solution() -> Solution:
+def solution() -> xr.Dataset:
     """The reference robot where one motor pushes little, and one may only pull."""
     machine = condyle.load_mechanism("masticatory").set(
         {
@@ -32,12 +33,12 @@ def solution() -> Solution:
     return condyle.derive(machine, backend="numpy").solve(trial_motion(machine, rate=100))
 
 
-def effort(solution: Solution, name: str) -> np.ndarray:
-    return solution["torque"].sel(chain=name).values
+def effort(solution: xr.Dataset, name: str) -> np.ndarray:
+    return solution["effort"].sel(chain=name).values
 
 
-def test_what_is_beyond_a_limit_is_told_of_on_its_side(solution: Solution) -> None:
-    told = {(n.owner, n.bound): n for n in solution.notices if n.kind == "effort_limit"}
+def test_what_is_beyond_a_limit_is_told_of_on_its_side(solution: xr.Dataset) -> None:
+    told = {(n.owner, n.bound): n for n in solution.condyle.notices if n.kind == "effort_limit"}
     first, second = effort(solution, FIRST), effort(solution, SECOND)
     wanted = {
         (FIRST, LOW): (first < LOW, first.min()),
@@ -51,8 +52,8 @@ def test_what_is_beyond_a_limit_is_told_of_on_its_side(solution: Solution) -> No
         assert ("below its least" in told[key].text) == (key[1] <= 0)
 
 
-def test_panels_draw_both_levels(solution: Solution) -> None:
-    [panel] = torque(solution)
+def test_panels_draw_both_levels(solution: xr.Dataset) -> None:
+    [panel] = effort_panels(solution)
     data = panel_data("chains", panel, Columns(solution["time"].values), {})
     found = {one["of"]: one for one in data["limits"]}
     first, second = found[(FIRST,)], found[(SECOND,)]
@@ -63,7 +64,7 @@ def test_panels_draw_both_levels(solution: Solution) -> None:
     assert not any(THIRD in chains for chains in found)
 
 
-def test_alerts_hold_where_limits_are_exceeded(solution: Solution) -> None:
+def test_alerts_hold_where_limits_are_exceeded(solution: xr.Dataset) -> None:
     columns = Columns(solution["time"].values)
     found = {one["text"]: one for one in alerts(solution, columns)}
     assert f"{FIRST} is beyond its effort limit" in found
@@ -71,19 +72,19 @@ def test_alerts_hold_where_limits_are_exceeded(solution: Solution) -> None:
     assert not any(text.startswith(THIRD) for text in found)
 
 
-def test_the_table_of_peaks_names_the_limit_on_its_side(solution: Solution) -> None:
+def test_the_table_of_peaks_names_the_limit_on_its_side(solution: xr.Dataset) -> None:
     text = str(chain_table(solution))
     peak = effort(solution, FIRST)[np.abs(effort(solution, FIRST)).argmax()]
     bound = HIGH if peak > 0 else LOW
     assert f"{peak / bound:.0%} of {abs(bound):g} N m" in text
     assert "no limit" in text
     slack = solution.copy(deep=True)
-    slack["torque"].loc[{"chain": SECOND}] = -1.0
+    slack["effort"].loc[{"chain": SECOND}] = -1.0
     assert "beyond at least 0 N m" in str(chain_table(slack))
 
 
-def test_the_figure_draws_them(solution: Solution) -> None:
-    figure = PLOTS["torque"](solution)
+def test_the_figure_draws_them(solution: xr.Dataset) -> None:
+    figure = PLOTS["effort"](solution)
     levels = {
         float(np.ravel(line.get_ydata())[0])
         for axes in figure.axes
@@ -96,10 +97,10 @@ def test_the_figure_draws_them(solution: Solution) -> None:
     assert 0.0 not in levels
 
 
-def test_the_view_tells_of_slack(solution: Solution) -> None:
-    machine = solution.mechanism
-    torque = np.array([0.0, 3.1, 9.0, 0.0, -0.01, -0.01])
-    messages = state_messages(machine, np.full(2, np.inf), np.zeros(2), torque, None)
+def test_the_view_tells_of_slack(solution: xr.Dataset) -> None:
+    machine = solution.condyle.mechanism
+    given = np.array([0.0, 3.1, 9.0, 0.0, -0.01, -0.01])
+    messages = state_messages(machine, np.full(2, np.inf), np.zeros(2), given, None)
     assert messages == [
         "temporalis_right is above its effort limit of 3",
         f"{FIRST} is below its least effort of -0.0005",
@@ -107,7 +108,7 @@ def test_the_view_tells_of_slack(solution: Solution) -> None:
     ]
 
 
-def test_a_page_has_a_load_where_there_is_one(fewer_contacts: dict[int, Solution]) -> None:
+def test_a_page_has_a_load_where_there_is_one(fewer_contacts: dict[int, xr.Dataset]) -> None:
     loaded = fewer_contacts[0]
     free = loaded.assign(load=0.0 * loaded["load"])
     for solution, there in ((loaded, {"load", "moment"}), (free, set())):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray as xr
 from matplotlib.collections import QuadMesh
 from support.report_pages import column, payload
 
@@ -13,14 +14,13 @@ from condyle.motion import Motion, bundled_reference
 from condyle.report.figures import PLOTS
 from condyle.report.page import reduce as reducing
 from condyle.report.page import report_html
-from condyle.results.solution import Solution
 from condyle.view.playback import Playback
 
 NAMES = ("Upper", "Lower", "Ear")
 
 
 @pytest.fixture(scope="module")
-def jaw() -> Solution:
+def jaw() -> xr.Dataset:
     """With a marker of each body, one of them unseen for a while, and EMG of two muscles."""
     model = condyle.derive("human-jaw", backend="numpy")
     motion = Motion.from_csv(bundled_reference()[0], rate=20)
@@ -32,10 +32,10 @@ def jaw() -> Solution:
     residual = np.outer(1e-4 * (1 + np.sin(3 * t)), [1, 2, np.nan])
     emg = {"deep_masseter_right": np.abs(np.sin(t)), "geniohyoid_left": np.abs(np.cos(t))}
     bodies = ("fixed", "platform", "")
-    return solution.with_measured(MeasuredChannels(t, NAMES, bodies, points, residual, emg))
+    return solution.condyle.with_measured(MeasuredChannels(t, NAMES, bodies, points, residual, emg))
 
 
-def test_the_page_has_markers_and_their_residuals(jaw: Solution) -> None:
+def test_the_page_has_markers_and_their_residuals(jaw: xr.Dataset) -> None:
     data = payload(report_html(jaw))
     markers = data["machine"]["markers"]
     assert [(m["name"], m["body"]) for m in markers] == list(
@@ -66,7 +66,7 @@ def test_the_page_has_markers_and_their_residuals(jaw: Solution) -> None:
     assert data["machine"]["scales"]["load"]["largest"] > 0
 
 
-def test_emg_stands_under_its_muscle(jaw: Solution) -> None:
+def test_emg_stands_under_its_muscle(jaw: xr.Dataset) -> None:
     data = payload(report_html(jaw))
     (field,) = [p for p in data["panels"] if p["id"] == "activation"]
     labels = [line["label"] for line in field["sets"][0]["lines"]]
@@ -86,7 +86,7 @@ def test_emg_stands_under_its_muscle(jaw: Solution) -> None:
     np.testing.assert_allclose(drawn[at], jaw["emg"].sel(chain="deep_masseter_right"), rtol=1e-12)
 
 
-def test_without_measurements_the_page_is_as_before(jaw: Solution) -> None:
+def test_without_measurements_the_page_is_as_before(jaw: xr.Dataset) -> None:
     plain = jaw.drop_dims("marker").drop_vars("emg")
     data = payload(report_html(plain))
     assert data["machine"]["markers"] == []
@@ -95,7 +95,7 @@ def test_without_measurements_the_page_is_as_before(jaw: Solution) -> None:
 
 
 def test_peaks_of_residuals_stay_on_a_page_that_is_thinned(
-    jaw: Solution, monkeypatch: pytest.MonkeyPatch
+    jaw: xr.Dataset, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     torn = jaw.copy(deep=True)
     torn["marker_residual"].values[33, 1] = 0.02
@@ -107,7 +107,7 @@ def test_peaks_of_residuals_stay_on_a_page_that_is_thinned(
     assert np.nanmax(column(data, line["column"])) == pytest.approx(0.02, rel=1e-6)
 
 
-def test_playback_knows_where_the_markers_are(jaw: Solution) -> None:
+def test_playback_knows_where_the_markers_are(jaw: xr.Dataset) -> None:
     playback = Playback(jaw)
     playback.seek(float(jaw["time"].values[12]))
     markers = playback.snapshot().markers
@@ -115,7 +115,7 @@ def test_playback_knows_where_the_markers_are(jaw: Solution) -> None:
     np.testing.assert_array_equal(markers[0], jaw["marker_place"].values[12, 0])
 
 
-def test_joints_of_many_chains_are_small_multiples(jaw: Solution) -> None:
+def test_joints_of_many_chains_are_small_multiples(jaw: xr.Dataset) -> None:
     figure = PLOTS["joint"](jaw)
     assert len(figure.axes) == 36  # 12 pairs, three columns
     first = figure.axes[0]

@@ -70,7 +70,7 @@ def test_table_2_beside_the_paper(comparison: Comparison) -> None:
 def test_differences(comparison: Comparison) -> None:
     table = differences(comparison)
     assert len(table.records) == 6 + 1
-    assert max(record["torque"] for record in table.records) < 1e-10
+    assert max(record["effort"] for record in table.records) < 1e-10
     assert table.records[-1]["contact_force"] is None
     assert [row[0] for row in table.rows][-1] == "lagrange core, no contacts"
     assert table.rows[-1][2] == "-"

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import condyle
 from condyle.errors import BoundsError, MechanismError, NumberRangeError, UnreachableError
@@ -26,7 +27,7 @@ def model() -> condyle.Model:
 
 
 @pytest.fixture(scope="module")
-def solution(model: condyle.Model) -> condyle.Solution:
+def solution(model: condyle.Model) -> xr.Dataset:
     """There and back along X, twice beyond what the chains can span."""
     t = np.linspace(0, 1, COUNT)
     value = np.column_stack([0.02 * np.sin(2 * np.pi * t), *[0 * t] * 3])
@@ -54,11 +55,11 @@ def out_of_span(model: condyle.Model, x: float) -> set[str]:
     return found
 
 
-def test_intervals_and_their_chains(model: condyle.Model, solution: condyle.Solution) -> None:
+def test_intervals_and_their_chains(model: condyle.Model, solution: xr.Dataset) -> None:
     """They cover the failed samples, and each names a chain that really is too short."""
     t, status = solution["time"].values, solution["status"].values
     covered = np.zeros(COUNT, dtype=bool)
-    for failure in solution.failures:
+    for failure in solution.condyle.failures:
         rows = slice(failure.first, failure.first + failure.count)
         assert not covered[rows].any()
         covered[rows] = True
@@ -70,25 +71,28 @@ def test_intervals_and_their_chains(model: condyle.Model, solution: condyle.Solu
     assert (covered == (status != 0)).all() and covered.any() and not covered.all()
 
 
-def test_they_go_through_files(solution: condyle.Solution, tmp_path: Path) -> None:
-    solution.save(tmp_path / "a.nc", tmp_path / "a.csv")
+def test_they_go_through_files(solution: xr.Dataset, tmp_path: Path) -> None:
+    solution.condyle.save(tmp_path / "a.nc", tmp_path / "a.csv")
     again = condyle.open_solution(tmp_path / "a.nc")
-    assert again.failures == solution.failures and again.notices == solution.notices
+    assert (
+        again.condyle.failures == solution.condyle.failures
+        and again.condyle.notices == solution.condyle.notices
+    )
     header, *rows = (tmp_path / "a.csv").read_text().splitlines()
     assert header.endswith(",status,cause")
-    first = solution.failures[0]
+    first = solution.condyle.failures[0]
     assert rows[first.first].endswith(f",unreachable,chain {first.owner_name}")
     assert rows[0].endswith(",ok,")
 
 
-def test_files_from_before_causes_open(solution: condyle.Solution, tmp_path: Path) -> None:
+def test_files_from_before_causes_open(solution: xr.Dataset, tmp_path: Path) -> None:
     old = solution.drop_vars(["cause", "rank"])
     del old.attrs["notices"]
-    old.save(tmp_path / "old.nc", tmp_path / "old.csv")
+    old.condyle.save(tmp_path / "old.nc", tmp_path / "old.csv")
     again = condyle.open_solution(tmp_path / "old.nc")
-    assert sum(f.count for f in again.failures) == int((solution["status"] != 0).sum())
-    assert [n.kind for n in again.notices] == ["other"] * len(again.warnings)
-    assert "unreachable" in str(again.failures[0])
+    assert sum(f.count for f in again.condyle.failures) == int((solution["status"] != 0).sum())
+    assert [n.kind for n in again.condyle.notices] == ["other"] * len(again.condyle.warnings)
+    assert "unreachable" in str(again.condyle.failures[0])
 
 
 def test_contacts_as_the_cause(model: condyle.Model) -> None:
@@ -96,7 +100,7 @@ def test_contacts_as_the_cause(model: condyle.Model) -> None:
     t = np.linspace(0, 1, 21)
     value = np.column_stack([0 * t, 0 * t, 0 * t, 1.5 * t])
     motion = Motion.from_arrays(t, value, names=("X", "Y", "beta", "gamma"))
-    failed = model.solve(motion, flag=True).failures
+    failed = model.solve(motion, flag=True).condyle.failures
     assert failed[-1].owner_kind == "contact" and failed[-1].status == "unreachable"
     assert failed[-1].owner_name == "left_condyle & right_condyle"
     assert 'the contacts "left_condyle", "right_condyle"' in failed[-1].cause

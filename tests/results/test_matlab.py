@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.io import loadmat
 from support.tools import run
 
@@ -19,19 +20,19 @@ OCTAVE = ("octave-cli", "--quiet", "--no-init-file", "--eval")
 
 
 @pytest.fixture(scope="module")
-def solution() -> condyle.Solution:
+def solution() -> xr.Dataset:
     motion = condyle.Motion.from_csv(bundled_reference()[0], rate=20)
     return condyle.derive("masticatory", backend="numpy").solve(motion, condyle.reference_load())
 
 
 @pytest.fixture(scope="module")
-def saved(solution: condyle.Solution, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def saved(solution: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("mat") / "run.mat"
-    solution.save(path)
+    solution.condyle.save(path)
     return path
 
 
-def test_every_variable_comes_back(solution: condyle.Solution, saved: Path) -> None:
+def test_every_variable_comes_back(solution: xr.Dataset, saved: Path) -> None:
     read = loadmat(saved, simplify_cells=True)
     assert list(read["chain"]) == list(solution["chain"].values)
     assert read["info"]["mechanism_name"] == "masticatory"
@@ -41,20 +42,20 @@ def test_every_variable_comes_back(solution: condyle.Solution, saved: Path) -> N
         assert entry["units"] == variable.attrs["units"]
         assert entry["long_name"] == variable.attrs["long_name"]
         assert list(np.atleast_1d(entry["dims"])) == list(variable.dims)
-    assert read["torque"]["values"].shape == solution["torque"].shape
+    assert read["effort"]["values"].shape == solution["effort"].shape
 
 
-def test_octave_reads_it(solution: condyle.Solution, saved: Path) -> None:
+def test_octave_reads_it(solution: xr.Dataset, saved: Path) -> None:
     lines = (
         f's = load("{saved}");',
-        'printf("%d %d\\n", size(s.torque.values));',
-        'printf("%.17g\\n", s.torque.values(3, 2));',
-        'printf("%s|%s|%s\\n", s.torque.units, s.chain{2}, s.torque.dims{1});',
+        'printf("%d %d\\n", size(s.effort.values));',
+        'printf("%.17g\\n", s.effort.values(3, 2));',
+        'printf("%s|%s|%s\\n", s.effort.units, s.chain{2}, s.effort.dims{1});',
     )
     size, value, words = run(*OCTAVE, "\n".join(lines), folder=saved.parent).split("\n")[:3]
-    assert size.split() == [str(n) for n in solution["torque"].shape]
-    assert float(value) == float(solution["torque"].values[2, 1])
-    assert words == f"N m|{solution.mechanism.chain_names[1]}|time"
+    assert size.split() == [str(n) for n in solution["effort"].shape]
+    assert float(value) == float(solution["effort"].values[2, 1])
+    assert words == f"N m|{solution.condyle.mechanism.chain_names[1]}|time"
 
 
 def test_states_as_a_table(condyle_command: Callable[..., Any], tmp_path: Path) -> None:
@@ -68,8 +69,8 @@ def test_states_as_a_table(condyle_command: Callable[..., Any], tmp_path: Path) 
     written = np.genfromtxt(tmp_path / "x.csv", delimiter=",", names=True)
     chains = list(read["chain"])
     columns = np.column_stack([written[f"tau_{chain}"] for chain in chains])
-    np.testing.assert_array_equal(read["torque"]["values"], columns)
-    assert read["torque"]["units"] == "N m" and read["pose"]["values"].shape == (2, 6)
+    np.testing.assert_array_equal(read["effort"]["values"], columns)
+    assert read["effort"]["units"] == "N m" and read["pose"]["values"].shape == (2, 6)
     reaction = read["reaction_shaft_force_masseter_left"]
     assert reaction["units"] == "N" and reaction["values"].shape == (2, 3)
 

@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 from support.recorded_jaw import FIXED, LOWER, PLATFORM, record
 
 import condyle
 from condyle.errors import InputError
 from condyle.markers import MeasuredChannels, motion_from_c3d, read_channels
 from condyle.motion import Motion, write_table
-from condyle.results.solution import Solution, open_solution
+from condyle.results.solution import open_solution
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +31,7 @@ def channels(tmp_path_factory: pytest.TempPathFactory) -> MeasuredChannels:
 
 
 @pytest.fixture(scope="module")
-def solution() -> Solution:
+def solution() -> xr.Dataset:
     """A pose of which all is known, at every third sample."""
     jaw = record(seconds=2.0)
     motion = Motion.from_arrays(jaw.t, jaw.pose, ("X", "Y", "Z", "alpha", "beta", "gamma"))
@@ -54,10 +55,10 @@ def test_a_table_comes_back(channels: MeasuredChannels, tmp_path: Path, name: st
 
 
 def test_markers_ride_on_the_solution(
-    solution: Solution, channels: MeasuredChannels, tmp_path: Path
+    solution: xr.Dataset, channels: MeasuredChannels, tmp_path: Path
 ) -> None:
-    got = solution.with_measured(channels)
-    assert "marker_place" not in solution and isinstance(got, Solution)
+    got = solution.condyle.with_measured(channels)
+    assert "marker_place" not in solution and isinstance(got, xr.Dataset)
     assert got["marker"].values.tolist() == [*FIXED, *PLATFORM]
     assert got["marker_body"].values.tolist() == ["fixed"] * 4 + ["platform"] * 4
     pick = np.searchsorted(channels.t, solution["time"].values - 1e-9)
@@ -70,16 +71,16 @@ def test_markers_ride_on_the_solution(
     assert not seen[:, 4].all() and seen[:, [0, 5]].all()
     emg = got["emg"].values
     assert np.isfinite(emg).all(axis=0).tolist() == [c == 2 for c in range(6)]
-    got.save(tmp_path / "s.nc")
+    got.condyle.save(tmp_path / "s.nc")
     back = open_solution(tmp_path / "s.nc")
     np.testing.assert_array_equal(back["marker_place"].values, got["marker_place"].values)
     assert back["marker_place"].attrs["units"] == "m"
-    again = back.with_measured(MeasuredChannels(channels.t, emg=channels.emg))
+    again = back.condyle.with_measured(MeasuredChannels(channels.t, emg=channels.emg))
     assert "marker_place" not in again and "marker" not in again.dims and "emg" in again
 
 
 def test_offsets_are_distances_from_the_computed_motion(
-    solution: Solution, channels: MeasuredChannels
+    solution: xr.Dataset, channels: MeasuredChannels
 ) -> None:
     """A marker that swings by 4 mm about its place on the platform."""
     t, pose = solution["time"].values, solution["pose"].values
@@ -89,18 +90,18 @@ def test_offsets_are_distances_from_the_computed_motion(
     own = np.array(LOWER["Lower_BR"]) + swing[:, None] * [0, 0, 1]
     place = Rotation.from_euler("XYZ", pose[:, 3:]).apply(own) + pose[:, :3]
     only = MeasuredChannels(t, ("M",), ("platform",), place[:, None], np.zeros((len(t), 1)))
-    got = solution.with_measured(only)["marker_offset"].values[:, 0]
+    got = solution.condyle.with_measured(only)["marker_offset"].values[:, 0]
     np.testing.assert_allclose(got, np.abs(swing - swing.mean()), atol=1e-9)
     nameless = MeasuredChannels(t, ("M",), ("",), place[:, None], np.full((len(t), 1), np.nan))
-    assert np.isnan(solution.with_measured(nameless)["marker_offset"].values).all()
+    assert np.isnan(solution.condyle.with_measured(nameless)["marker_offset"].values).all()
 
 
 def test_outside_its_times_nothing_was_measured(
-    solution: Solution, channels: MeasuredChannels
+    solution: xr.Dataset, channels: MeasuredChannels
 ) -> None:
     t = solution["time"].values
     short = channels.at(channels.t[channels.t < 1.0])
-    got = solution.with_measured(short)["marker_place"].values
+    got = solution.condyle.with_measured(short)["marker_place"].values
     assert np.isnan(got[t >= 1.0]).all() and np.isfinite(got[t < 0.98]).all()
 
 
@@ -123,20 +124,20 @@ Spoil = Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]
     ],
 )
 def test_tables_that_cannot_be_used(
-    solution: Solution, channels: MeasuredChannels, tmp_path: Path, spoil: Spoil, said: str
+    solution: xr.Dataset, channels: MeasuredChannels, tmp_path: Path, spoil: Spoil, said: str
 ) -> None:
     write_table(tmp_path / "p.csv", spoil(channels.columns()))
     with pytest.raises(InputError, match=said) as caught:
-        solution.with_measured(tmp_path / "p.csv")
+        solution.condyle.with_measured(tmp_path / "p.csv")
     assert "\n" not in str(caught.value)
 
 
-def test_files_that_are_none(solution: Solution, tmp_path: Path) -> None:
+def test_files_that_are_none(solution: xr.Dataset, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
-        solution.with_measured(tmp_path / "p.csv")
+        solution.condyle.with_measured(tmp_path / "p.csv")
     (tmp_path / "p.csv").write_text("t,A_x,A_y,A_z\n0,1,2,x\n")
     with pytest.raises(InputError, match='got "x", expected a number'):
-        solution.with_measured(tmp_path / "p.csv")
+        solution.condyle.with_measured(tmp_path / "p.csv")
     (tmp_path / "p.csv").write_text("t;A_x;A_y;A_z\n0,5;;2;3\n1;1;;\n")
     got = read_channels(tmp_path / "p.csv")
     np.testing.assert_array_equal(got.points[0, 0], [np.nan, 2, 3])

@@ -25,7 +25,7 @@ FULL = """
     resource.setrlimit(resource.RLIMIT_FSIZE, (20480, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
     for name in ("full.nc", "full.csv"):
         try:
-            solution.save(name)
+            solution.condyle.save(name)
         except condyle.InputError as error:
             print(error)
     del solution
@@ -56,5 +56,5 @@ def test_the_file_is_the_dataset(tmp_path: Path) -> None:
         t, np.zeros((9, len(model.independent))), names=model.independent
     )
     solution = model.solve(motion)
-    solution.save(tmp_path / "a.nc")
+    solution.condyle.save(tmp_path / "a.nc")
     xr.testing.assert_identical(solution, condyle.open_solution(tmp_path / "a.nc"))

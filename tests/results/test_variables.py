@@ -37,7 +37,7 @@ def test_a_solution_is_the_table(model: condyle.Model) -> None:
 def test_units_follow_the_joints() -> None:
     slides = condyle.load_mechanism("hexaglide")
     units = {v.name: v.attributes(slides)["units"] for v in VARIABLES}
-    assert units["torque"] == "N" and units["joint_acceleration"] == "m/s^2"
+    assert units["effort"] == "N" and units["joint_acceleration"] == "m/s^2"
     assert units["J_A"] == "m^2/m"
 
 
@@ -66,4 +66,4 @@ def test_the_load_has_a_share_where_there_is_one(model: condyle.Model) -> None:
     assert {*loaded["part"].values} - {*without["part"].values} == {model.parts[-1]}
     for solution in (without, loaded):
         total = solution["share"].sum("part")
-        np.testing.assert_allclose(total, solution["torque"], atol=1e-13)
+        np.testing.assert_allclose(total, solution["effort"], atol=1e-13)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.integrate import simpson
 from support.points import moved
 
@@ -25,7 +26,7 @@ SPRINGS = [
 ]
 
 
-def accounts(solution: condyle.Solution) -> dict[str, np.ndarray]:
+def accounts(solution: xr.Dataset) -> dict[str, np.ndarray]:
     return {str(n): solution["energy"].sel(account=n).values for n in solution["account"].values}
 
 
@@ -44,13 +45,13 @@ def test_energy_of_free_motion(jaw: Model) -> None:
 
 
 @pytest.fixture(scope="module")
-def lossy(rubbing: Model) -> condyle.Solution:
+def lossy(rubbing: Model) -> xr.Dataset:
     return condyle.simulate(
         rubbing, {"duration": 0.05, "rate": 20000, "rtol": 1e-10, "load": SPRINGS}
     )
 
 
-def test_energy_balances(lossy: condyle.Solution) -> None:
+def test_energy_balances(lossy: xr.Dataset) -> None:
     """T + U less what it was is the work of loads and actuators less all losses."""
     e = accounts(lossy)
     kept = e["kinetic"] + e["potential"]
@@ -58,7 +59,7 @@ def test_energy_balances(lossy: condyle.Solution) -> None:
     assert np.abs(kept - kept[0] - work).max() < 1e-7 * e["contact_friction"][-1]
 
 
-def test_losses_are_the_work_of_friction(lossy: condyle.Solution) -> None:
+def test_losses_are_the_work_of_friction(lossy: xr.Dataset) -> None:
     """Integrals of the powers at the results' times, by Simpson's rule (20 kHz)."""
     e, t = accounts(lossy), lossy["time"].values
     assert e["contact_friction"][-1] > 1e-6 and e["actuator_losses"][-1] > 1e-6
@@ -68,7 +69,7 @@ def test_losses_are_the_work_of_friction(lossy: condyle.Solution) -> None:
     assert np.isclose(lost, e["actuator_losses"][-1], rtol=1e-7)
 
 
-def test_shares_add_up_to_the_efforts_that_acted(lossy: condyle.Solution) -> None:
+def test_shares_add_up_to_the_efforts_that_acted(lossy: xr.Dataset) -> None:
     assert "internal" in lossy["part"].values
-    off = lossy["share"].sum("part") - lossy["torque"]
+    off = lossy["share"].sum("part") - lossy["effort"]
     assert np.abs(off).max() < 1e-12

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import condyle
 from condyle.model.model import Model
@@ -14,12 +15,12 @@ from condyle.simulation.integrators import RK4, Settings, hermite
 START = {"X": 0.001, "beta": 0.04, "dbeta": -0.3, "dalpha": 0.2}
 
 
-def free(model: Model, **scenario: Any) -> condyle.Solution:
+def free(model: Model, **scenario: Any) -> xr.Dataset:
     """A fall of 20 ms from START."""
     return condyle.simulate(model, {"duration": 0.02, "start": START, **scenario})
 
 
-def last(solution: condyle.Solution) -> np.ndarray:
+def last(solution: xr.Dataset) -> np.ndarray:
     """Pose and its rate at the end, (12,)."""
     return np.concatenate([solution[name].values[-1] for name in ("pose", "pose_rate")])
 

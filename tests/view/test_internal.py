@@ -68,7 +68,7 @@ def test_internal_efforts_add_to_efforts_and_contacts_live(reference: condyle.Me
     session.set_internal(0, 0.5)
     after = session.snapshot()
     found = session.directions()
-    assert np.allclose(after.torque - before.torque, 0.5 * found.effort[:, 0], atol=1e-12)
+    assert np.allclose(after.effort - before.effort, 0.5 * found.effort[:, 0], atol=1e-12)
     assert np.allclose(after.contact_force - before.contact_force, 0.5 * found.contact[:, 0])
     assert np.allclose(np.linalg.norm(after.force_vector, axis=1), abs(after.contact_force))
     assert after.over == () and np.array_equal(after.pose, before.pose)
@@ -85,7 +85,7 @@ def test_a_muscle_that_would_push_is_named(jaw: condyle.Mechanism) -> None:
     session = Session(jaw)
     session.set_internal(0, 20.0)
     snapshot = session.snapshot()
-    pushing = {name for name, t in zip(jaw.chain_names, snapshot.torque, strict=True) if t < 0}
+    pushing = {name for name, t in zip(jaw.chain_names, snapshot.effort, strict=True) if t < 0}
     assert pushing and pushing <= set(snapshot.over)
     [told] = [message for message in snapshot.messages if message.startswith("Slack")]
     assert told.endswith(f"and {len(pushing) - 4} more") and told.count(" N)") == 4
@@ -96,7 +96,7 @@ def test_what_no_muscles_can_hold_is_called_infeasible(jaw: condyle.Mechanism) -
     session = Session(jaw)
     session.set_load(np.array([0.0, 0.0, -5000.0]), "right_molar")
     snapshot = session.snapshot()
-    assert np.isnan(snapshot.torque).all() and snapshot.over == ()
+    assert np.isnan(snapshot.effort).all() and snapshot.over == ()
     assert snapshot.messages == ("Infeasible: no efforts within the limits hold this",)
 
 

@@ -61,7 +61,7 @@ def test_its_numbers_are_those_of_a_simulation(
     found = player.snapshot()
     solved = condyle.simulate(condyle.derive(reference), {**CHEW, "duration": 0.5, "rate": 100.0})
     last = solved.isel(time=-1)
-    for name, value in {"pose": found.pose, "joint": found.joint, "torque": found.torque}.items():
+    for name, value in {"pose": found.pose, "joint": found.joint, "effort": found.effort}.items():
         np.testing.assert_allclose(value, last[name], rtol=1e-3, atol=1e-6, err_msg=name)
     np.testing.assert_allclose(found.contact_force, last["contact_force"], rtol=1e-3, atol=1e-4)
     assert found.time == pytest.approx(0.5) and found.rate is not None

@@ -6,6 +6,7 @@ import time
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import condyle
 from condyle.errors import InputError
@@ -13,7 +14,6 @@ from condyle.markers import MeasuredChannels
 from condyle.mechanism.coordinates import bryant_angles
 from condyle.motion import Load, Motion
 from condyle.report.scene import contact_patch, place, platform_hull, rotations
-from condyle.results.solution import Solution
 from condyle.view import open_view
 from condyle.view.playback import Playback
 from condyle.view.readout import number, status_html, tables_html
@@ -37,7 +37,7 @@ def test_home_holds_the_platform_against_gravity(session: Session) -> None:
         {n: np.zeros(6) for n in ("X", "Y")} | {"alpha": np.zeros(6), "beta": np.zeros(6)},
     )
     still = condyle.derive(session.mechanism, backend="interpreted").solve(motion)
-    assert np.allclose(home.torque, still["torque"].values[0], rtol=1e-9)
+    assert np.allclose(home.effort, still["effort"].values[0], rtol=1e-9)
     assert np.allclose(home.contact_force, still["contact_force"].values[0], rtol=1e-9)
 
 
@@ -47,7 +47,7 @@ def test_a_coordinate_moves_the_chains_and_the_numbers(session: Session) -> None
     after = session.snapshot()
     assert after.pose[4] == pytest.approx(np.radians(8))
     assert np.all(np.abs(after.joint - before.joint) > 0.1)
-    assert not np.allclose(after.torque, before.torque)
+    assert not np.allclose(after.effort, before.effort)
     tip = after.scene.chains["masseter_left"].points
     assert np.linalg.norm(tip["S"] - tip["M"]) == pytest.approx(0.06, abs=2e-4)
 
@@ -56,7 +56,7 @@ def test_load_changes_efforts_and_contact_forces(session: Session) -> None:
     before = session.snapshot()
     session.set_load(np.array([0.0, 0.0, -60.0]), "right_molar")
     after = session.snapshot()
-    assert after.torque[5] > before.torque[5] + 0.1
+    assert after.effort[5] > before.effort[5] + 0.1
     assert after.contact_force[1] < before.contact_force[1] - 1
     assert np.array_equal(after.load_at, session.mechanism.platform.points["right_molar"])
     with pytest.raises(InputError, match="left_molar"):
@@ -68,7 +68,7 @@ def test_out_of_bounds_is_a_warning(session: Session) -> None:
     found = session.snapshot()
     assert found.level == "warning"
     assert "left_condyle is 2 mm outside its bounds" in found.messages
-    assert np.isfinite(found.torque).all()
+    assert np.isfinite(found.effort).all()
 
 
 def test_a_chain_out_of_reach_is_named_and_stays_drawn(session: Session) -> None:
@@ -78,7 +78,7 @@ def test_a_chain_out_of_reach_is_named_and_stays_drawn(session: Session) -> None
     assert 'chain "temporalis_left" cannot reach M' in found.messages[0]
     assert "temporalis_right" in found.messages[1]
     assert found.broken == ("temporalis_left", "temporalis_right")
-    assert np.isnan(found.torque).all() and found.pose[0] == 0.016
+    assert np.isnan(found.effort).all() and found.pose[0] == 0.016
     drawn = [p for d in found.scene.chains.values() for p in d.points.values()]
     assert all(np.isfinite(p).all() for p in drawn)
     session.go_home()
@@ -145,18 +145,18 @@ def test_unknown_coordinate_is_refused(session: Session) -> None:
 
 
 @pytest.fixture(scope="module")
-def chewing(reference: condyle.Mechanism) -> Solution:
+def chewing(reference: condyle.Mechanism) -> xr.Dataset:
     motion = Motion.from_csv(condyle.motion.bundled_reference()[0], rate=100)
     model = condyle.derive(reference, backend="interpreted")
     return model.solve(motion, condyle.reference_load())
 
 
-def test_playback_shows_the_solutions_numbers(chewing: Solution) -> None:
+def test_playback_shows_the_solutions_numbers(chewing: xr.Dataset) -> None:
     playback = Playback(chewing)
     playback.seek(1.634)
     assert playback.now == pytest.approx(1.63)
     found, at = playback.snapshot(), chewing.isel(time=163)
-    assert np.array_equal(found.torque, at["torque"].values)
+    assert np.array_equal(found.effort, at["effort"].values)
     assert np.array_equal(found.contact_force, at["contact_force"].values)
     assert np.array_equal(found.pose, at["pose"].values)
     assert found.time == playback.now and found.reach is None
@@ -165,12 +165,12 @@ def test_playback_shows_the_solutions_numbers(chewing: Solution) -> None:
     assert np.allclose(balls, at["contact_point"].values, atol=1e-12)
 
 
-def test_speeds_of_one_unit_have_it_in_the_heading(chewing: Solution) -> None:
+def test_speeds_of_one_unit_have_it_in_the_heading(chewing: xr.Dataset) -> None:
     tables = tables_html(Playback(chewing).snapshot())
     assert tables.count("rad/s") == 1
 
 
-def test_playback_runs_with_the_clock_and_stops_at_the_end(chewing: Solution) -> None:
+def test_playback_runs_with_the_clock_and_stops_at_the_end(chewing: xr.Dataset) -> None:
     playback = Playback(chewing)
     assert not playback.advance(1.0), "it is not playing"
     playback.play()
@@ -186,7 +186,7 @@ def test_playback_runs_with_the_clock_and_stops_at_the_end(chewing: Solution) ->
     assert playback.index == 0, "from the end, play starts over"
 
 
-def test_play_begins_where_it_stands_however_long_it_stood(chewing: Solution) -> None:
+def test_play_begins_where_it_stands_however_long_it_stood(chewing: xr.Dataset) -> None:
     view = open_view(None, chewing, port=0)
     try:
         time.sleep(1.5)
@@ -219,7 +219,7 @@ def test_playback_of_failed_samples_keeps_the_pose_and_shows_no_force(
         found = playback.snapshot()
         assert found.stale and found.level == "unreachable"
         np.testing.assert_array_equal(found.pose, torn["pose"].values[first - 1])
-        assert np.isnan(found.torque).all() and np.isnan(found.force_vector).all()
+        assert np.isnan(found.effort).all() and np.isnan(found.force_vector).all()
         assert np.isnan(found.load).all()
         assert "No result from 0.075 to 0.445 s: unreachable" in found.messages[0]
         assert "t = 0.07 s" in found.messages[1]
@@ -251,13 +251,13 @@ def test_a_stale_pose_is_drawn_grey_and_without_arrows(reference: condyle.Mechan
         view.close()
 
 
-def test_measured_markers_are_where_they_were_measured(chewing: Solution) -> None:
+def test_measured_markers_are_where_they_were_measured(chewing: xr.Dataset) -> None:
     t = chewing["time"].values
     places = np.stack([np.full((len(t), 3), 0.08), np.outer(t, [1e-3, 0, 0])], axis=1)
     places[50, 1] = np.nan
     nothing = np.full((len(t), 2), np.nan)
     measured = MeasuredChannels(t, ("Upper", "Lower"), ("fixed", "platform"), places, nothing)
-    view = open_view(solution=chewing.with_measured(measured), port=0)
+    view = open_view(solution=chewing.condyle.with_measured(measured), port=0)
     try:
         assert view.playback is not None
         upper, lower = view.stage._markers

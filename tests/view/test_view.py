@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 from support.browser import PATIENCE, Tab
 
 import condyle
-from condyle.results.solution import Solution
 from condyle.view import View, open_view
 
 
 @pytest.fixture(scope="module")
-def solution(reference: condyle.Mechanism) -> Solution:
+def solution(reference: condyle.Mechanism) -> xr.Dataset:
     """All 5001 samples of the reference case."""
     model = condyle.derive(reference, backend="interpreted")
     return model.solve(condyle.reference_motion(), condyle.reference_load())
@@ -99,7 +99,7 @@ def test_a_slider_moves_the_mechanism_and_the_numbers(tab: Tab, view: View) -> N
     at = view.snapshot
     assert at.pose[4] == pytest.approx(np.radians(8))
     assert after[1] == f"{np.degrees(at.joint[2]):.2f} °"
-    assert after[2] == f"{at.torque[2]:.4f} N m"
+    assert after[2] == f"{at.effort[2]:.4f} N m"
     tab.changed_picture("canvas", picture)
 
 
@@ -128,10 +128,10 @@ def test_poses_out_of_bounds_and_out_of_reach_say_so_and_the_page_lives(
 
 
 def test_a_solution_is_played_and_scrubbed(
-    tab: Tab, view: View, solution: Solution, tmp_path: Path
+    tab: Tab, view: View, solution: xr.Dataset, tmp_path: Path
 ) -> None:
     path = tmp_path / "chewing.nc"
-    solution.save(path)
+    solution.condyle.save(path)
     tab.page.get_by_role("tab", name="Play").click()
     tab.page.set_input_files("input[type=file]", str(path))
     tab.page.get_by_text("5001 samples").wait_for()
@@ -139,7 +139,7 @@ def test_a_solution_is_played_and_scrubbed(
     tab.page.locator("[data-level]").filter(has_text="t = 1.626 s").wait_for()
     at = solution.sel(time=1.626, method="nearest")
     for i, chain in enumerate(solution["chain"].values):
-        assert row(tab, "chains", str(chain))[2] == f"{float(at['torque'].values[i]):.4f} N m"
+        assert row(tab, "chains", str(chain))[2] == f"{float(at['effort'].values[i]):.4f} N m"
     assert view.playback is not None
     view.playback.speed = 0.02  # slow, so that a slow machine is not at the end
     tab.page.get_by_role("button", name="Play", exact=True).click()
@@ -229,9 +229,9 @@ def test_internal_efforts_move_numbers_and_nothing_else(
     now, directions = view.snapshot, view.session.directions()
     amount = view.session.internal[0]
     assert amount == pytest.approx(0.5, abs=0.01)
-    added = now.torque - before.torque
+    added = now.effort - before.effort
     assert np.allclose(added, amount * directions.effort[:, 0], atol=1e-12)
     assert np.array_equal(now.pose, before.pose)
     tab.page.get_by_role("button", name="No internal efforts").click()
     tab.until(lambda: not view.session.internal.any(), "the efforts are taken off")
-    tab.until(lambda: np.allclose(view.snapshot.torque, before.torque), "they are gone")
+    tab.until(lambda: np.allclose(view.snapshot.effort, before.effort), "they are gone")

@@ -24,8 +24,9 @@ from .runs import Run, Samples, TimedModel, run
 from .torque_indices import Indices, indices
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from ..motion import Load, Motion
-    from ..results.solution import Solution
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class Difference:
 
     first: Run
     second: Run
-    torque: float
+    effort: float
     contact_force: float
 
 
@@ -57,7 +58,7 @@ class Comparison:
                     where there are no free runs.
     """
 
-    solution: Solution
+    solution: xr.Dataset
     runs: tuple[Run, ...]
     free_runs: tuple[Run, ...]
     unavailable: tuple[Unavailable, ...]
@@ -65,7 +66,7 @@ class Comparison:
 
     @property
     def mechanism(self) -> Mechanism:
-        return self.solution.mechanism
+        return self.solution.condyle.mechanism
 
     @property
     def samples(self) -> int:
@@ -85,9 +86,9 @@ class Comparison:
         """Every two runs against each other."""
         found = []
         for a, b in combinations(self.runs if contacts else self.free_runs, 2):
-            torque = relative_difference(a.torque, b.torque, self.units)
+            effort = relative_difference(a.effort, b.effort, self.units)
             force = relative_difference(a.contact_force, b.contact_force)
-            found.append(Difference(a, b, torque, force))
+            found.append(Difference(a, b, effort, force))
         return found
 
     def indices(self, contacts: bool = True) -> list[Indices]:
@@ -157,9 +158,9 @@ def compare(
     )
 
 
-def samples_of(model: Model, solution: Solution) -> Samples:
+def samples_of(model: Model, solution: xr.Dataset) -> Samples:
     """The motion and load of a solution."""
-    wrench, name = solution["load"].values, solution.options["load_point"]
+    wrench, name = solution["load"].values, solution.condyle.options["load_point"]
     point = model.load_point(name) if name is not None or wrench.any() else np.zeros(3)
     return Samples(
         solution["pose"].values,

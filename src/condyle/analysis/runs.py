@@ -79,14 +79,14 @@ class Run:
 
     contacts: whether they hold the platform, or it is free (the 6RSS).
     seconds:  of its derivation, and of its torques at all samples.
-    torque:   (N, n) [N m or N];  share: (parts, N, n);  contact_force: (N, k) [N].
+    effort:   (N, n) [N m or N];  share: (parts, N, n);  contact_force: (N, k) [N].
     """
 
     formulation: str
     route: str
     contacts: bool
     seconds: Seconds
-    torque: np.ndarray
+    effort: np.ndarray
     share: np.ndarray
     contact_force: np.ndarray
 

@@ -23,8 +23,9 @@ from ..status import Status
 from .comparison import samples_of
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from ..motion import Load, Motion
-    from ..results.solution import Solution
 
 WEIGHTS = (0.0, *(float(w) for w in np.logspace(-2, 4, 13)))
 
@@ -42,7 +43,7 @@ class Tradeoff:
     samples:    how many are in these: those with a result at every weight.
     """
 
-    solution: Solution
+    solution: xr.Dataset
     weights: np.ndarray
     reference_force: float
     effort: np.ndarray

@@ -73,7 +73,7 @@ def compare(
     files = save_tables(shown, out)
     solution, stem = with_tables(solution, shown), file_stem(machine.name)
     kept = out / f"{stem}-{'tradeoff' if tradeoff else 'compare'}.nc"
-    solution.save(kept)
+    solution.condyle.save(kept)
     files.append(kept)
     if figures and tradeoff:
         from ..report.figures import save
@@ -90,7 +90,7 @@ def compare(
         inputs = [] if tradeoff else [file for file in (motion, load) if file is not None]
         page = kept.with_suffix(".html") if tradeoff else out / f"{stem}.html"
         files.append(write_report(solution, page, files=inputs))
-    warn([*path.warnings, *acting.warnings, *solution.warnings])
+    warn([*path.warnings, *acting.warnings, *solution.condyle.warnings])
     if tradeoff:
         then = command_line("report", kept)
     elif report:  # the page is there already
@@ -114,5 +114,10 @@ def compare(
             report=True,
         )
     records = {table.name.replace("-", "_"): table.records for table in shown}
-    about = {"mechanism": machine.name, **records, "warnings": solution.warnings, "files": files}
+    about = {
+        "mechanism": machine.name,
+        **records,
+        "warnings": solution.condyle.warnings,
+        "files": files,
+    }
     return Answer(f"{text or shown[0].text()}\n{files_line(files)}", data | about, then)

@@ -38,7 +38,7 @@ QUANTITIES = (
 )
 FIGURES = (
     *("activation", "contact_force", "contact_track", "effort_speed", "jacobian", "joint"),
-    *("load", "marker", "motion", "path", "reaction", "share", "singularity", "torque"),
+    *("load", "marker", "motion", "path", "reaction", "share", "singularity", "effort"),
 )
 
 

@@ -17,7 +17,7 @@ from .inputs import output_folder
 RESULT = Path("results/masticatory.nc")  # of `condyle run` as it stands
 
 
-@command(LOOK, example=f"condyle plot {RESULT} --figure torque --figure load")
+@command(LOOK, example=f"condyle plot {RESULT} --figure effort --figure load")
 def plot(
     solution: Annotated[
         Path | None, typer.Argument(help="Results (.nc) of a run. Without: list the figures.")

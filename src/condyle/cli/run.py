@@ -72,16 +72,16 @@ def run(
     model = chosen_model(machine, formulation, route, backend, *policy)
     solution = model.solve(path, acting, load_point, flag, reactions, threads)
     if measured is not None:
-        solution = solution.with_measured(measured)
+        solution = solution.condyle.with_measured(measured)
     if strict:
-        refuse(solution.notices)
+        refuse(solution.condyle.notices)
     if study is not None:
         from ..analysis.sweep import with_bands
 
         solution = with_bands(solution, study, path, acting, mechanism=machine, workers=threads)
     folder, stem = output_folder(out), file_stem(machine.name)
     files = [folder / f"{stem}{ending}" for ending in (".nc", ".csv", *[".mat"] * mat)]
-    solution.save(*files)
+    solution.condyle.save(*files)
     if figures:
         from ..report.figures import save_solution_figures
 
@@ -92,7 +92,7 @@ def run(
         inputs = [file for file in (motion, load, measured, vary) if file is not None]
         inputs += [Path(mechanism)] if Path(mechanism).is_file() else []
         files.append(write_report(solution, folder / f"{stem}.html", files=inputs))
-    warn([*path.warnings, *acting.warnings, *solution.warnings])
+    warn([*path.warnings, *acting.warnings, *solution.condyle.warnings])
     summary = summarize(solution)
     return Answer(
         f"{summary}\n\n{files_line(files)}",

@@ -62,19 +62,19 @@ def simulate(
     solution = run(model, told, stop_at_bounds=stop_at_bounds, source=source)
     folder, stem = output_folder(out), file_stem(machine.name)
     files = [folder / f"{stem}.nc", folder / f"{stem}.csv"]
-    solution.save(*files)
+    solution.condyle.save(*files)
     if report:
         from ..report.page import write_report
 
         inputs = [scenario] if scenario is not None else []
         inputs += [Path(mechanism)] if Path(mechanism).is_file() else []
         files.append(write_report(solution, folder / f"{stem}.html", files=inputs))
-    warn(solution.warnings)
-    events = solution.events
+    warn(solution.condyle.warnings)
+    events = solution.condyle.events
     summary = summarize(solution)
     lines = [f"  t = {e['time']:.4f} s: {e['kind']} {e['owner']}".rstrip() for e in events[:FEW]]
     if len(events) > FEW:
-        lines.append(f"  and {len(events) - FEW} more (solution.events)")
+        lines.append(f"  and {len(events) - FEW} more (solution.condyle.events)")
     told_of = "\n".join(["events:", *lines]) if lines else "events: none"
     return Answer(
         f"{summary}\n{told_of}\n\n{files_line(files)}",

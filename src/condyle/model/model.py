@@ -215,7 +215,7 @@ class Model:
         reactions: bool = False,
         threads: int | None = None,
     ) -> Any:
-        """Torques along a motion under a load: a `Solution`, labelled and with units.
+        """Torques along a motion under a load: a labelled dataset with units.
 
         Args:   motion: what the platform does; load: what acts on it (none by default).
                 load_point: platform point the load acts at; default: the load's own, else

@@ -11,8 +11,9 @@ from ..mechanism.chain import limits
 from .naming import stem
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from ..mechanism.actuator import Limits
-    from ..results.solution import Solution
 
 EMG_ROW = " EMG"  # after a chain's name, where its measured activity has a row
 REACH = 2.5  # a limit beyond this many times the data would flatten them
@@ -51,18 +52,18 @@ class DutyMeter:
         self._squares: np.ndarray | float = 0.0
         self._spans: np.ndarray | float = 0.0
         self._power: np.ndarray | float = -np.inf
-        self._last: Solution | None = None
+        self._last: xr.Dataset | None = None
         self._units: list[str] = []
 
-    def see(self, piece: Solution) -> None:
+    def see(self, piece: xr.Dataset) -> None:
         """Take up the next piece of the run."""
-        effort, speed = piece["torque"].values, piece["joint_rate"].values
+        effort, speed = piece["effort"].values, piece["joint_rate"].values
         time = piece["time"].values
         self._units = [str(unit) for unit in piece["effort_unit"].values]
         power = np.abs(effort * speed)
         self._power = np.fmax(self._power, np.fmax.reduce(power, axis=0, initial=-np.inf))
         if self._last is not None:
-            effort = np.vstack([self._last["torque"].values, effort])
+            effort = np.vstack([self._last["effort"].values, effort])
             time = np.append(self._last["time"].values, time)
         square, step = effort**2, np.diff(time)[:, None]
         pairs = 0.5 * (square[1:] + square[:-1])
@@ -81,7 +82,7 @@ class DutyMeter:
         ]
 
 
-def duty(solution: Solution) -> list[Duty]:
+def duty(solution: xr.Dataset) -> list[Duty]:
     """Of every chain, in their order."""
     meter = DutyMeter()
     meter.see(solution)
@@ -108,10 +109,10 @@ def edges(box: Limits, speed: float, effort: float) -> list[Edge]:
     return [edge for edge in found if np.isfinite(edge).all()]
 
 
-def drawn_limits(solution: Solution, variable: str) -> list[Limits]:
+def drawn_limits(solution: xr.Dataset, variable: str) -> list[Limits]:
     """Limits of each chain's torque or force, or of its speed, as those of an effort."""
-    found = [limits(chain) for chain in solution.mechanism.chains]
-    return found if variable == "torque" else [one.of_speed for one in found]
+    found = [limits(chain) for chain in solution.condyle.mechanism.chains]
+    return found if variable == "effort" else [one.of_speed for one in found]
 
 
 def limits_text(box: Limits, effort_unit: str, speed_unit: str) -> str:
@@ -120,15 +121,15 @@ def limits_text(box: Limits, effort_unit: str, speed_unit: str) -> str:
     return ", ".join(text for text in (box.effort_text(effort_unit), speed) if text)
 
 
-def activations(solution: Solution) -> dict[str, np.ndarray]:
+def activations(solution: xr.Dataset) -> dict[str, np.ndarray]:
     """Chain -> |effort| over its greatest effort, (N,), of chains that have one.
 
     A left and a right one stand together, in the order of the mechanism.
     """
-    chains = solution.mechanism.chains
+    chains = solution.condyle.mechanism.chains
     stems = list(dict.fromkeys(stem(chain.name) for chain in chains))
     order = sorted(range(len(chains)), key=lambda i: stems.index(stem(chains[i].name)))
-    effort = solution["torque"].values
+    effort = solution["effort"].values
     found = {}
     for i in order:
         greatest = limits(chains[i]).greatest
@@ -137,7 +138,7 @@ def activations(solution: Solution) -> dict[str, np.ndarray]:
     return found
 
 
-def emg(solution: Solution) -> dict[str, np.ndarray]:
+def emg(solution: xr.Dataset) -> dict[str, np.ndarray]:
     """Chain -> envelope of its EMG, (N,), of chains that have some; measured, not computed."""
     if "emg" not in solution:
         return {}
@@ -147,11 +148,11 @@ def emg(solution: Solution) -> dict[str, np.ndarray]:
     }
 
 
-def joint_loads(solution: Solution) -> dict[str, np.ndarray]:
+def joint_loads(solution: xr.Dataset) -> dict[str, np.ndarray]:
     """Contact -> force between ball and surface, (N,) [N]; negative where it would have to pull."""
     force = solution["contact_force"].values
     found = {}
-    for i, contact in enumerate(solution.mechanism.contacts):
+    for i, contact in enumerate(solution.condyle.mechanism.contacts):
         one = force[:, i]
         found[contact.name] = contact.push * one if contact.one_sided else np.abs(one)
     return found

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from ..results.solution import Solution
+    import xarray as xr
 
 MOST = 500
 
@@ -34,7 +33,7 @@ class Gap:
 
 
 def gaps(
-    solution: Solution, time: np.ndarray | None = None, status: np.ndarray | None = None
+    solution: xr.Dataset, time: np.ndarray | None = None, status: np.ndarray | None = None
 ) -> list[Gap]:
     """Runs of failed samples, in the order of time.
 
@@ -43,19 +42,13 @@ def gaps(
     time = solution["time"].values if time is None else time
     status = solution["status"].values if status is None else status
     words = solution["status"].attrs["flag_meanings"].split()
-    known: list[Any] = [
-        one if isinstance(one, Mapping) else vars(one) for one in getattr(solution, "failures", ())
-    ]
+    known = solution.condyle.failures
     found = []
     for first, after in pairwise(np.flatnonzero(np.diff(status, prepend=0, append=0))):
         if status[first] == 0:
             continue
         start, end = float(time[first]), float(time[after - 1])
-        causes = [
-            str(one["cause"])
-            for one in known
-            if one["cause"] and one["start"] <= end and start <= one["end"]
-        ]
+        causes = [one.cause for one in known if one.cause and one.start <= end and start <= one.end]
         why = "; ".join(dict.fromkeys(causes))
         found.append(Gap(int(first), int(after) - 1, start, end, words[int(status[first])], why))
     return found

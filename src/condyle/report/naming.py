@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from ..results.solution import Solution
+    import xarray as xr
 
 LOAD = "load"
 _SIDE = re.compile(r"(?<![a-zA-Z])(left|right|l|r)(?![a-zA-Z])", re.IGNORECASE)
@@ -77,7 +77,7 @@ def part_word(part: object) -> str:
     return LOAD if str(part) in LOAD_PARTS else readable(str(part))
 
 
-def parts_in_use(solution: Solution) -> list[str]:
+def parts_in_use(solution: xr.Dataset) -> list[str]:
     """The parts, without load, friction and internal efforts that are 0."""
     parts, share = [str(part) for part in solution["part"].values], solution["share"].values
     return [

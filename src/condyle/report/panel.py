@@ -15,7 +15,8 @@ import numpy as np
 from ..mechanism.actuator import Limits
 
 if TYPE_CHECKING:
-    from ..results.solution import Solution
+    import xarray as xr
+
     from .actuators import Duty
 
 GROUP = "condyle.panels"
@@ -132,13 +133,13 @@ class PanelGroup:
 
     name: str
     section: str
-    heading: str | Callable[[Solution], str]
+    heading: str | Callable[[xr.Dataset], str]
     panels: Callable[..., Iterator[Panel]]
     split: int | None = None
     same: bool = False
     empty: str = "this solution has nothing of it"
 
-    def title(self, solution: Solution) -> str:
+    def title(self, solution: xr.Dataset) -> str:
         return self.heading if isinstance(self.heading, str) else self.heading(solution)
 
 
@@ -147,7 +148,7 @@ listeners: list[Callable[[PanelGroup], Any]] = []
 
 
 def panels(
-    section: str, heading: str | Callable[[Solution], str], **options: Any
+    section: str, heading: str | Callable[[xr.Dataset], str], **options: Any
 ) -> Callable[[Give], Give]:
     """Register a function that gives panels of a solution; see `PanelGroup` for the options."""
 
@@ -170,7 +171,7 @@ def known_groups() -> list[PanelGroup]:
 
 
 def panels_of(
-    solution: Solution, duties: Sequence[Duty] | None = None, every: bool = False
+    solution: xr.Dataset, duties: Sequence[Duty] | None = None, every: bool = False
 ) -> Iterator[tuple[str, Panel]]:
     """Every panel of a solution with its section of the page, in the page's order.
 
@@ -185,7 +186,7 @@ def panels_of(
 
 
 def of_names(
-    solution: Solution, variable: str, dimension: str, values: np.ndarray | None = None
+    solution: xr.Dataset, variable: str, dimension: str, values: np.ndarray | None = None
 ) -> list[Curve]:
     """A curve for each entry of `dimension` of a variable (time, dimension), with its bands."""
     values = solution[variable].values if values is None else values

@@ -3,9 +3,9 @@
 A function that gives panels is all that another one needs: it is a figure and a part of the page.
 
 @panels("actuators", "Power of the actuators")
-def power(solution: Solution) -> Iterator[Panel]:
+def power(solution: xr.Dataset) -> Iterator[Panel]:
     '''Power of each actuator over time.'''
-    watts = solution["torque"].values * solution["joint_rate"].values
+    watts = solution["effort"].values * solution["joint_rate"].values
     curves = of_names(solution, "power", "chain", watts)
     yield Panel("power", "Actuator power", "power", "W", curves)
 
@@ -41,7 +41,7 @@ from .panel import Curve, Limit, Panel, Shown, distinct, of_names, panels, shown
 from .scene import contact_profile
 
 if TYPE_CHECKING:
-    from ..results.solution import Solution
+    import xarray as xr
 
 MOST = 8  # chains in one panel of a figure; beyond, no curve can be followed
 ORDERS = ("", "_rate", "_acceleration")  # of a variable's derivatives
@@ -59,7 +59,7 @@ def effort_word(unit: str) -> str:
     return "force" if unit == "N" else "torque"
 
 
-def chains_of(solution: Solution) -> tuple[list[str], list[str], list[str]]:
+def chains_of(solution: xr.Dataset) -> tuple[list[str], list[str], list[str]]:
     """Names of the chains, and units of their efforts and joints."""
     keys = ("chain", "effort_unit", "joint_unit")
     names, efforts, joints = ([str(value) for value in solution[key].values] for key in keys)
@@ -67,7 +67,7 @@ def chains_of(solution: Solution) -> tuple[list[str], list[str], list[str]]:
 
 
 @panels("motion", "Motion of the platform")
-def motion(solution: Solution) -> Iterator[Panel]:
+def motion(solution: xr.Dataset) -> Iterator[Panel]:
     """Pose coordinates, their rates and accelerations over time."""
     words = (
         ("position", "velocity", "acceleration"),
@@ -90,7 +90,7 @@ def motion(solution: Solution) -> Iterator[Panel]:
 
 
 @panels("chains", "Joint coordinates", split=MOST, same=True)
-def joint(solution: Solution) -> Iterator[Panel]:
+def joint(solution: xr.Dataset) -> Iterator[Panel]:
     """Joint coordinates from home, their rates with the limits, and accelerations."""
     names, _, units = chains_of(solution)
     for order, (suffix, word) in enumerate(
@@ -118,14 +118,14 @@ def joint(solution: Solution) -> Iterator[Panel]:
 
 
 @panels("chains", "Efforts of the actuators", split=0, same=True)
-def torque(solution: Solution) -> Iterator[Panel]:
+def effort(solution: xr.Dataset) -> Iterator[Panel]:
     """Effort of each chain over time, with its actuator's limit."""
     names, units, _ = chains_of(solution)
-    curves, bounds = of_names(solution, "torque", "chain"), drawn_limits(solution, "torque")
+    curves, bounds = of_names(solution, "effort", "chain"), drawn_limits(solution, "effort")
     for unit, mine in by_unit(units).items():
         own = [names[i] for i in mine]
         yield Panel(
-            f"torque-{unit}".replace(" ", ""),
+            f"effort-{unit}".replace(" ", ""),
             f"Actuator {effort_word(unit)}",
             effort_word(unit),
             unit,
@@ -138,18 +138,18 @@ NO_LIMITS = "no actuator of this mechanism states a limit of its effort"
 
 
 @panels("actuators", "Activation: effort over greatest effort", empty=NO_LIMITS)
-def activation(solution: Solution) -> Iterator[Panel]:
+def activation(solution: xr.Dataset) -> Iterator[Panel]:
     """Activation, effort over greatest effort, of each actuator or muscle; joint loads below.
 
-    Where EMG was measured (`Solution.with_measured`), its envelope stands under its muscle's row.
+    Where EMG was measured (`with_measured`), its envelope stands under its muscle's row.
     """
     computed, measured = activations(solution), emg(solution)
-    chains = {chain.name: i for i, chain in enumerate(solution.mechanism.chains)}
-    effort, rows = solution["torque"].values, []
+    chains = {chain.name: i for i, chain in enumerate(solution.condyle.mechanism.chains)}
+    effort, rows = solution["effort"].values, []
     for name in dict.fromkeys([*computed, *measured]):
         if name in computed:  # |effort| times a scale: the page has the efforts already
-            scale = 1.0 / actuator_limits(solution.mechanism.chains[chains[name]]).greatest
-            rows.append(Curve(name, f"torque.{name}", effort[:, chains[name]], scale=scale))
+            scale = 1.0 / actuator_limits(solution.condyle.mechanism.chains[chains[name]]).greatest
+            rows.append(Curve(name, f"effort.{name}", effort[:, chains[name]], scale=scale))
         if name in measured:
             rows.append(Curve(f"{name}{EMG_ROW}", f"emg.{name}", measured[name]))
     if not rows:
@@ -164,12 +164,12 @@ def activation(solution: Solution) -> Iterator[Panel]:
 
 
 @panels("actuators", "Efforts against speeds, with limits")
-def effort_speed(solution: Solution, duties: Sequence[Duty] | None = None) -> Iterator[Panel]:
+def effort_speed(solution: xr.Dataset, duties: Sequence[Duty] | None = None) -> Iterator[Panel]:
     """Effort of each actuator against its speed, in the box of its limits; rms and peak power."""
     names, efforts, joints = chains_of(solution)
     duties = duties or duty(solution)
-    rates, values = solution["joint_rate"].values, solution["torque"].values
-    boxes = [actuator_limits(chain) for chain in solution.mechanism.chains]
+    rates, values = solution["joint_rate"].values, solution["effort"].values
+    boxes = [actuator_limits(chain) for chain in solution.condyle.mechanism.chains]
     for number, mine in enumerate(groups(names, efforts)):
         unit, speed = efforts[mine[0]], f"{joints[mine[0]]}/s"
         size = [float(np.nanmax(np.abs(v[:, mine]), initial=0.0)) for v in (rates, values)]
@@ -177,7 +177,7 @@ def effort_speed(solution: Solution, duties: Sequence[Duty] | None = None) -> It
         curves = [
             Curve(
                 names[i],
-                f"torque.{names[i]}",
+                f"effort.{names[i]}",
                 values[:, i],
                 across=(f"joint_rate.{names[i]}", rates[:, i]),
                 text=duties[i].text,
@@ -199,7 +199,7 @@ def effort_speed(solution: Solution, duties: Sequence[Duty] | None = None) -> It
 
 @panels("shares", "Efforts by the part of the mechanism that needs them", split=0, same=True)
 def share(
-    solution: Solution, parts: Sequence[str] | None = None, every: bool = False
+    solution: xr.Dataset, parts: Sequence[str] | None = None, every: bool = False
 ) -> Iterator[Panel]:
     """Efforts by part: a column a part, a row a pair of chains.
 
@@ -226,7 +226,7 @@ def share(
         )
 
 
-def named_part(solution: Solution, part: str) -> str:
+def named_part(solution: xr.Dataset, part: str) -> str:
     """The part in the solution that a caller means; the load has two names."""
     there = [str(name) for name in solution["part"].values]
     meant = [name for name in there if name == part or {name, part} <= set(LOAD_PARTS)]
@@ -240,7 +240,7 @@ FORCES = "Contact forces on the platform, along the unit normals"
 
 
 @panels("contacts", FORCES, empty=NO_CONTACTS)
-def contact_force(solution: Solution) -> Iterator[Panel]:
+def contact_force(solution: xr.Dataset) -> Iterator[Panel]:
     """Force of each contact on the platform along the unit normal, and how far its bounds are."""
     if not solution.sizes["contact"]:
         return
@@ -255,18 +255,21 @@ def contact_force(solution: Solution) -> Iterator[Panel]:
         yield Panel("bound-margin", title, "to a bound", "m", margins, note=note)
 
 
-def _load_heading(solution: Solution) -> str:
-    point = solution.options.get("load_point")
+def _load_heading(solution: xr.Dataset) -> str:
+    point = solution.condyle.options.get("load_point")
     return "Load on the platform" + (f" at {readable(point)}" if point else "")
 
 
 @panels("contacts", _load_heading)
-def load(solution: Solution, every: bool | None = None) -> Iterator[Panel]:
+def load(solution: xr.Dataset, every: bool | None = None) -> Iterator[Panel]:
     """Force on the platform over time, and its moment where there is one.
 
     Args: every: also what is 0 throughout; by default the force, where the moment is 0 too.
     """
-    point, curves = solution.options.get("load_point"), of_names(solution, "load", "component")
+    point, curves = (
+        solution.condyle.options.get("load_point"),
+        of_names(solution, "load", "component"),
+    )
     some = [any(np.nan_to_num(c.values).any() for c in part) for part in (curves[:3], curves[3:])]
     at = f" at {point}" if point else ""
     if every or some[0] or (every is None and not some[1]):
@@ -277,10 +280,10 @@ def load(solution: Solution, every: bool | None = None) -> Iterator[Panel]:
 
 
 @panels("tracks", "Tracks of the contact points", empty=NO_CONTACTS)
-def contact_track(solution: Solution) -> Iterator[Panel]:
+def contact_track(solution: xr.Dataset) -> Iterator[Panel]:
     """Track of each contact point, from above and from the side, against its bounds."""
     points, outside = solution["contact_point"].values, solution["bound_margin"].values < 0
-    for k, contact in enumerate(solution.mechanism.contacts):
+    for k, contact in enumerate(solution.condyle.mechanism.contacts):
         track, own = points[:, k], [contact.bounds.x, contact.bounds.y, contact.bounds.z]
         columns = [(f"contact_point.{contact.name}.{i}", track[:, i]) for i in range(3)]
         for view, (across, up) in VIEWS.items():
@@ -303,7 +306,7 @@ def contact_track(solution: Solution) -> Iterator[Panel]:
 
 
 @panels("singularity", "Distance from singularities")
-def singularity(solution: Solution) -> Iterator[Panel]:
+def singularity(solution: xr.Dataset) -> Iterator[Panel]:
     """Dimensionless measures: transmission of each chain, singular values of J_W, their ratio."""
     condition = solution["condition"].values
     sigma = solution["J_W_sigma"].values
@@ -325,7 +328,7 @@ def singularity(solution: Solution) -> Iterator[Panel]:
 
 
 @panels("singularity", "Diagonal of J_A", split=0)
-def jacobian(solution: Solution) -> Iterator[Panel]:
+def jacobian(solution: xr.Dataset) -> Iterator[Panel]:
     """Diagonal of J_A, eq. (26): a chain is at an inverse singularity where its entry is zero."""
     curves = of_names(solution, "J_A", "chain")
     for unit, mine in by_unit(chains_of(solution)[2]).items():
@@ -334,7 +337,7 @@ def jacobian(solution: Solution) -> Iterator[Panel]:
 
 
 @panels("markers", "Distances of the markers", empty="no markers were measured")
-def marker(solution: Solution) -> Iterator[Panel]:
+def marker(solution: xr.Dataset) -> Iterator[Panel]:
     """Distances of measured markers from where the body and the computed motion have them."""
     if "marker_place" not in solution:
         return
@@ -360,7 +363,7 @@ def marker(solution: Solution) -> Iterator[Panel]:
 
 
 @panels("reactions", "Reactions", empty="this solution has no reactions; run with reactions")
-def reaction(solution: Solution) -> Iterator[Panel]:
+def reaction(solution: xr.Dataset) -> Iterator[Panel]:
     """Magnitudes of joint reactions and contact forces, where a run was asked for them."""
     for name in map(str, solution.data_vars):
         if not (name.startswith("reaction_") or name == "contact_force_vector"):
@@ -379,7 +382,7 @@ def reaction(solution: Solution) -> Iterator[Panel]:
         )
 
 
-def magnitudes(solution: Solution, name: str) -> dict[str, np.ndarray]:
+def magnitudes(solution: xr.Dataset, name: str) -> dict[str, np.ndarray]:
     """Magnitudes (N,) of a reaction by the labels of the dimensions between time and axes."""
     variable = solution[name]
     values, dimensions = variable.values, list(variable.dims[1:])

@@ -24,7 +24,7 @@ def bound_margins(mechanism: Mechanism, points: np.ndarray) -> np.ndarray:
     return margins
 
 
-def lift_off(mechanism: Mechanism, force: np.ndarray) -> np.ndarray:
+def contact_loss(mechanism: Mechanism, force: np.ndarray) -> np.ndarray:
     """Whether one-sided contacts would have to pull at contact forces (N, k), (N, k)."""
     push = np.array([c.push if c.one_sided else 0 for c in mechanism.contacts], dtype=float)
     if not push.any():
@@ -32,10 +32,10 @@ def lift_off(mechanism: Mechanism, force: np.ndarray) -> np.ndarray:
     return push * force < -FORCE_TOLERANCE
 
 
-def lift_off_columns(mechanism: Mechanism, lifted: np.ndarray) -> dict[str, np.ndarray]:
-    """Columns lift_off_<contact>, 0 or 1, of the contacts that can lift off."""
+def contact_loss_columns(mechanism: Mechanism, lost: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns contact_loss_<contact>, 0 or 1, of the unilateral contacts."""
     return {
-        f"lift_off_{contact.name}": lifted[:, i].astype(int)
+        f"contact_loss_{contact.name}": lost[:, i].astype(int)
         for i, contact in enumerate(mechanism.contacts)
         if contact.one_sided
     }

@@ -14,7 +14,7 @@ from ..kinematics.singularities import NEAR_SINGULAR
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
 from ..status import Status
-from .contacts import bound_margins, lift_off
+from .contacts import bound_margins, contact_loss
 
 
 @dataclass(frozen=True)
@@ -58,12 +58,12 @@ class Derived:
         return bound_margins(self.mechanism, self.evaluation.configuration.contact_point)
 
     @cached_property
-    def lifted(self) -> np.ndarray:
-        """Whether a one-sided contact would have to pull, (N, k): never within limits."""
+    def contact_loss(self) -> np.ndarray:
+        """Whether a unilateral contact would have to pull, (N, k): never within limits."""
         if self.limited:  # they push, to the accuracy of the certificate
             return np.zeros(self.evaluation.contact_force.shape, dtype=bool)
-        lifted = lift_off(self.mechanism, self.evaluation.contact_force)
-        return lifted if self.all_ok else lifted & self.ok[:, None]
+        lost = contact_loss(self.mechanism, self.evaluation.contact_force)
+        return lost if self.all_ok else lost & self.ok[:, None]
 
     @cached_property
     def sliding_speed(self) -> np.ndarray:

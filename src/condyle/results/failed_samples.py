@@ -49,7 +49,7 @@ def failures(solution: xr.Dataset) -> list[Failure]:
     if not status.any():
         return []
     cause = solution["cause"].values if "cause" in solution else np.zeros_like(status)
-    possible = owners(solution.mechanism)
+    possible = owners(solution.condyle.mechanism)
     turns = np.flatnonzero((np.diff(status) != 0) | (np.diff(cause) != 0)) + 1
     starts, ends = np.append(0, turns), np.append(turns, len(status))
     return [

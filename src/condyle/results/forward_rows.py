@@ -15,7 +15,7 @@ from ..model.data import Accelerations
 from ..model.model import Model
 from ..motion import Table
 from ..status import Status
-from .contacts import lift_off, lift_off_columns
+from .contacts import contact_loss, contact_loss_columns
 from .failed_samples import status_columns
 from .state_rows import Columns, StateColumns
 from .variables import named_columns
@@ -39,7 +39,7 @@ def forward_file(
              their rates dX... (none: at rest), tau_<chain> of every chain, and optionally some of
              Fx, Fy, Fz, Mx, My, Mz. Other columns are named in a warning.
              out: ddX... of the given coordinates, contact_<contact>, the pose, joint_<chain>, and
-             lift_off_<contact> of one-sided contacts; with `flag` also status and cause.
+             contact_loss_<contact> of one-sided contacts; with `flag` also status and cause.
              flag: keep rows that have no accelerations, empty, with a status.
     Returns: number of rows, and warnings.
     Raises:  InputError, SampleError: nothing is written then.
@@ -69,9 +69,9 @@ def forward_file(
         columns |= named_columns("contact_", mechanism.contact_names, found.contact_force)
         columns |= named_columns("", COORDINATES, pose)
         columns |= named_columns("joint_", mechanism.chain_names, joint)
-        lifted = lift_off(mechanism, np.nan_to_num(found.contact_force))
-        pulled[:] += lifted.sum(axis=0)
-        columns |= lift_off_columns(mechanism, lifted)
+        lost = contact_loss(mechanism, np.nan_to_num(found.contact_force))
+        pulled[:] += lost.sum(axis=0)
+        columns |= contact_loss_columns(mechanism, lost)
         return columns | status_columns(mechanism, found.status, cause) if flag else columns
 
     rows, said = given.stream(states, out, solved)

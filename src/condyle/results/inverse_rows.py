@@ -15,7 +15,7 @@ from ..model.data import require_ok
 from ..model.joint_reactions import reactions as joint_reactions
 from ..model.model import Model
 from ..motion import Table
-from .contacts import AXES, lift_off_columns
+from .contacts import AXES, contact_loss_columns
 from .derived import Derived
 from .failed_samples import status_columns
 from .mat_file import table_variables, write_mat
@@ -154,7 +154,7 @@ def solve_table(
         for name, reaction in joint_reactions(model, evaluation).items():
             array = filled(reaction.array)
             columns |= {f"reaction_{name}_{axis}": array[:, i] for i, axis in enumerate(AXES)}
-    columns |= lift_off_columns(mechanism, derived.lifted)
+    columns |= contact_loss_columns(mechanism, derived.contact_loss)
     if flag:
         shortfall = derived.shortfall if derived.limited else None
         columns |= status_columns(mechanism, evaluation.status, derived.cause, shortfall)

@@ -1,6 +1,6 @@
 """Results for MATLAB: one struct a variable, with its unit, its meaning and its dimensions.
 
-    s = load("run.mat");  plot(s.time.values, s.torque.values);  legend(s.chain)
+    s = load("run.mat");  plot(s.time.values, s.effort.values);  legend(s.chain)
 
 `values` has the shape of the labelled array, time first. Names along a dimension are cell arrays of
 their own (`chain`, `contact`, `coordinate`); `info` says what the file is. Version 7 of the

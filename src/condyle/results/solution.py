@@ -22,34 +22,40 @@ from ..mechanism.files import recall
 from ..mechanism.mechanism import Mechanism
 from ..motion import write_table
 from ..progress import step
-from .contacts import AXES, BOUND_TOLERANCE, bound_margins, lift_off, lift_off_columns
+from .contacts import AXES, BOUND_TOLERANCE, bound_margins, contact_loss, contact_loss_columns
 from .failed_samples import Failure, failures, status_columns
 from .mat_file import dataset_variables, write_mat
-from .variables import VARIABLES, WRENCH, named_columns, variable_columns
+from .variables import BY_NAME, VARIABLES, WRENCH, named_columns, variable_columns
 from .warnings import Notice
 
 __all__ = [
     "AXES",
     "BOUND_TOLERANCE",
     "WRENCH",
-    "Solution",
+    "Results",
     "bound_margins",
-    "lift_off",
-    "lift_off_columns",
+    "contact_loss",
+    "contact_loss_columns",
     "named_columns",
     "open_solution",
 ]
 
+# Variables of older files.
+RENAMED = {
+    "torque": "effort", "torque_quantile": "effort_quantile", "lift_off": "contact_loss"
+}  # fmt: skip
 
-class Solution(xr.Dataset):
-    """Inverse dynamics along a motion, or a simulation; it knows its mechanism.
 
-    An `xarray.Dataset`. Dimensions time, chain, contact, coordinate, part, axis. The variables and
-    their units are in the documentation's table of results; each has the attributes `units` and
-    `long_name`.
+class Results:
+    """What a dataset of results knows besides its variables: `solution.condyle.mechanism`.
+
+    A solution is inverse dynamics along a motion, or a simulation. Its dimensions are time, chain,
+    contact, coordinate, part and axis; its variables and their units are in the documentation's
+    table of results, and each has the attributes `units` and `long_name`.
     """
 
-    __slots__ = ()
+    def __init__(self, dataset: xr.Dataset) -> None:
+        self._dataset = dataset
 
     @property
     def mechanism(self) -> Mechanism:
@@ -57,42 +63,42 @@ class Solution(xr.Dataset):
 
         In the place of a surface written in Python is an `Unknown` one, which has no equation.
         """
-        return recall(self.attrs["mechanism"], self.attrs["mechanism_name"])
+        return recall(self._dataset.attrs["mechanism"], self._dataset.attrs["mechanism_name"])
 
     @property
     def warnings(self) -> list[str]:
         """What the run had to say, for people."""
-        return json.loads(self.attrs["warnings"])
+        return json.loads(self._dataset.attrs["warnings"])
 
     @property
     def notices(self) -> list[Notice]:
         """The same as data: kind, whose, when, how much, and the bound."""
-        if "notices" not in self.attrs:  # written before warnings were data
+        if "notices" not in self._dataset.attrs:  # written before warnings were data
             return [Notice("other", text) for text in self.warnings]
-        return [Notice(**facts) for facts in json.loads(self.attrs["notices"])]
+        return [Notice(**facts) for facts in json.loads(self._dataset.attrs["notices"])]
 
     @property
     def failures(self) -> list[Failure]:
         """Intervals of samples that could not be computed, each with its cause."""
-        return failures(self)
+        return failures(self._dataset)
 
     @property
     def options(self) -> dict[str, Any]:
         """How the solution was made: formulation, route, sources, seconds."""
-        return json.loads(self.attrs["options"])
+        return json.loads(self._dataset.attrs["options"])
 
     @property
     def events(self) -> list[dict[str, Any]]:
         """What happened in a simulation: time, kind, owner, text, state, ends; else nothing."""
-        return json.loads(self.attrs.get("events", "[]"))
+        return json.loads(self._dataset.attrs.get("events", "[]"))
 
     @property
-    def plot(self) -> Any:  # type: ignore[override]
-        """Figures: `solution.plot.torque()` and friends; xarray's own are there too."""
+    def plot(self) -> Any:
+        """Figures, by name: `solution.condyle.plot.effort()`."""
         require("matplotlib", "figures")
-        return extend("solution.plot", self)
+        return extend("solution.plot", self._dataset)
 
-    def with_measured(self, measured: MeasuredChannels | str | os.PathLike[str]) -> Solution:
+    def with_measured(self, measured: MeasuredChannels | str | os.PathLike[str]) -> xr.Dataset:
         """The solution with what was measured beside the motion, for report, figures and view.
 
         Args:   measured: markers and EMG (`motion_from_c3d(...).channels`), or their table's file.
@@ -100,7 +106,7 @@ class Solution(xr.Dataset):
         """
         from .measured import with_measured
 
-        return with_measured(self, measured)
+        return with_measured(self._dataset, measured)
 
     def save(self, *paths: str | Path) -> None:
         """Write as NetCDF (.nc), CSV, Parquet or MATLAB (.mat): every file whole, or none."""
@@ -114,39 +120,45 @@ class Solution(xr.Dataset):
                     )
                 temporary = stack.enter_context(replacing(path))
                 if suffix == ".nc":
-                    write_netcdf(self, temporary)
+                    write_netcdf(self._dataset, temporary)
                 elif suffix == ".mat":
-                    write_mat(temporary, dataset_variables(self))
+                    write_mat(temporary, dataset_variables(self._dataset))
                 else:
                     write_table(temporary, self.columns(), parquet=suffix == ".parquet")
 
     def columns(self) -> dict[str, np.ndarray | list[str]]:
         """Columns of the CSV: t, and those of `VARIABLES`.
 
-        Then reactions, if there are any, lift_off_<contact> (0 or 1) of one-sided contacts, and
-        status, cause and, where efforts were chosen within limits, shortfall, if a sample failed.
+        Then reactions, if there are any, contact_loss_<contact> (0 or 1) of unilateral contacts,
+        and, if a sample failed, status, cause and, with efforts within limits, shortfall.
         """
-        columns: dict[str, np.ndarray | list[str]] = {"t": self["time"].values}
-        labels = {str(name): along.values for name, along in self.coords.items()}
+        d = self._dataset
+        columns: dict[str, np.ndarray | list[str]] = {"t": d["time"].values}
+        labels = {str(name): along.values for name, along in d.coords.items()}
         for variable in VARIABLES:
-            if variable.column is not None and variable.name in self:
-                columns |= variable_columns(variable, self[variable.name].values, labels)
-        for name in map(str, self.data_vars):
+            if variable.column is not None and variable.name in d:
+                columns |= variable_columns(variable, d[variable.name].values, labels)
+        for name in map(str, d.data_vars):
             if name.startswith("reaction_") or name == "contact_force_vector":
-                entries, values = self[self[name].dims[1]].values, self[name].values
+                entries, values = d[d[name].dims[1]].values, d[name].values
                 prefix = "reaction_contact" if name == "contact_force_vector" else name
                 for i, axis in enumerate(AXES):
                     along = named_columns(f"{prefix}_", entries, values[:, :, i])
                     columns |= {f"{column}_{axis}": one for column, one in along.items()}
-        columns |= lift_off_columns(self.mechanism, self["lift_off"].values)
-        if (status := self["status"].values).any():
-            cause = self["cause"].values if "cause" in self else np.zeros_like(status)
-            shortfall = self["shortfall"].values if "shortfall" in self else None
+        columns |= contact_loss_columns(self.mechanism, d["contact_loss"].values)
+        if (status := d["status"].values).any():
+            cause = d["cause"].values if "cause" in d else np.zeros_like(status)
+            shortfall = d["shortfall"].values if "shortfall" in d else None
             columns |= status_columns(self.mechanism, status, cause, shortfall)
         return columns
 
 
-def open_solution(path: str | Path) -> Solution:
+# xarray's own decorator keeps the accessor in the dataset, a circle of references that would hold
+# the arrays of every dataset until Python collects garbage.
+xr.Dataset.condyle = property(Results)  # type: ignore[attr-defined]
+
+
+def open_solution(path: str | Path) -> xr.Dataset:
     """Read a solution that was saved as NetCDF.
 
     Raises: InputError: if the file is missing or is not a condyle solution.
@@ -159,13 +171,23 @@ def open_solution(path: str | Path) -> Solution:
         raise no_such_file(path) from None
     except Exception as error:
         raise InputError(f"{path} is not a NetCDF solution: {error}") from None
-    if "mechanism" not in dataset.attrs or "torque" not in dataset:
+    return as_solution(dataset, path)
+
+
+def as_solution(dataset: xr.Dataset, path: str | os.PathLike[str]) -> xr.Dataset:
+    """What was read from a file of any version, with the names of this one.
+
+    Raises: InputError: if it is not a condyle solution.
+    """
+    solution = dataset.rename({old: new for old, new in RENAMED.items() if old in dataset})
+    if "mechanism" not in solution.attrs or "effort" not in solution:
         raise InputError(f"{path} is NetCDF, but not a condyle solution")
-    solution = Solution(dataset.data_vars, dataset.coords, dataset.attrs)
-    if "lift_off" not in solution:  # written before there were one-sided contacts
-        variable = next(v for v in VARIABLES if v.name == "lift_off")
-        lifted = lift_off(solution.mechanism, solution["contact_force"].values)
-        solution["lift_off"] = variable.dims, lifted, variable.attributes(solution.mechanism)
+    for name in {"notices", "events"} & {*solution.attrs}:
+        solution.attrs[name] = solution.attrs[name].replace('"lift_off"', '"contact_loss"')
+    if "contact_loss" not in solution:  # written before there were unilateral contacts
+        variable, machine = BY_NAME["contact_loss"], solution.condyle.mechanism
+        lost = contact_loss(machine, solution["contact_force"].values)
+        solution["contact_loss"] = variable.dims, lost, variable.attributes(machine)
     return solution
 
 

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from ..kinematics.chain import FAMILIES
 from ..mechanism.mechanism import COORDINATES, Mechanism
@@ -20,9 +21,9 @@ from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
 from ..progress import step
 from ..questions.equations import LOAD as LOAD_PART
 from ..version import __version__
+from . import solution as _accessor  # noqa: F401  # registers `dataset.condyle`
 from .contacts import AXES
 from .derived import Derived
-from .solution import Solution
 from .variables import VARIABLES, WRENCH, Variable, chosen
 from .warnings import Notice, Watch
 
@@ -35,7 +36,7 @@ def solve(
     flag: bool = False,
     reactions: bool = False,
     threads: int | None = None,
-) -> Solution:
+) -> xr.Dataset:
     """As `Model.solve`."""
     start = time.perf_counter()
     motion, load = as_motion(motion), as_load(load)
@@ -67,7 +68,7 @@ def assemble(
     evaluation: Evaluation,
     residual: float | None,
     seconds: float,
-) -> Solution:
+) -> xr.Dataset:
     """The labelled dataset of an evaluation along a motion.
 
     Arrays of the evaluation become those of the solution, without a copy where no sample failed.
@@ -79,7 +80,7 @@ def assemble(
     options = _options(model, motion, load, load_point, residual, seconds)
     title = f"Inverse dynamics of {model.mechanism.name}"
     solution = labelled(model, derived, motion.t, model.parts, title, options, watch.notices())
-    solution["torque"].attrs["long_name"] = chosen(model.policy.objective)
+    solution["effort"].attrs["long_name"] = chosen(model.policy.objective)
     return solution
 
 
@@ -91,7 +92,7 @@ def labelled(
     title: str,
     options: Mapping[str, Any],
     notices: Sequence[Notice],
-) -> Solution:
+) -> xr.Dataset:
     """The dataset of samples at times (N,) [s]; `parts` are those of `share`."""
     mechanism = model.mechanism
     loaded = bool(np.any(derived.wrench))
@@ -100,7 +101,7 @@ def labelled(
     if len(kept) < len(parts):
         dims, share, attributes = variables["share"]
         variables["share"] = dims, share[kept], attributes
-    solution = Solution(variables, _coordinates(model, times, [parts[i] for i in kept]))
+    solution = xr.Dataset(variables, _coordinates(model, times, [parts[i] for i in kept]))
     solution.attrs = {
         "title": title,
         "source": f"condyle {__version__}",

@@ -12,7 +12,7 @@ from .contacts import BOUND_TOLERANCE
 from .failed_samples import Failure
 
 if TYPE_CHECKING:
-    from .solution import Solution
+    import xarray as xr
 
 FEW = 6  # intervals without a result that a screen shows
 
@@ -59,10 +59,9 @@ class Summary:
                 f"closest to the bounds: {name}, {abs(bound['margin']) * 1e3:.4g} mm "
                 f"{'OUTSIDE' if bound['margin'] < 0 else 'inside'} at t = {bound['time']:g} s"
             )
-        for name, lift in d["lift_off"].items():
-            lines.append(
-                f"lift-off: {name} in {lift['samples']} samples, first at t = {lift['time']:g} s"
-            )
+        for name, loss in d["contact_loss"].items():
+            first = f"first at t = {loss['time']:g} s"
+            lines.append(f"contact loss: {name} in {loss['samples']} samples, {first}")
         if d["failed_samples"]:
             lines.append(f"samples without a result: {d['failed_samples']}")
             if d["shortfall"] is not None:
@@ -73,14 +72,14 @@ class Summary:
         return "\n".join(lines)
 
 
-def summarize(solution: Solution) -> Summary:
+def summarize(solution: xr.Dataset) -> Summary:
     """Samples, time, peaks, and the closest approach to singularities and bounds."""
     time = solution["time"].values
-    torque, contact = solution["torque"].values, solution["contact_force"].values
+    effort, contact = solution["effort"].values, solution["contact_force"].values
     ok = solution["status"].values == 0
     units = solution["effort_unit"].values
     margins, ratio = solution["bound_margin"].values, solution["singularity_ratio"].values
-    options, failed = solution.options, solution.failures
+    options, failed = solution.condyle.options, solution.condyle.failures
     some = bool(ok.any())
     bounds = {}
     for i, name in enumerate(solution["contact"].values):
@@ -90,7 +89,7 @@ def summarize(solution: Solution) -> Summary:
             if abs(margin) < BOUND_TOLERANCE:  # rounding is no distance
                 margin = 0.0
             bounds[str(name)] = {"margin": margin, "time": float(time[k])}
-    lifted = solution["lift_off"].values
+    lost = solution["contact_loss"].values
     closest = int(np.nanargmin(ratio)) if some else None
     return Summary(
         {
@@ -103,7 +102,7 @@ def summarize(solution: Solution) -> Summary:
             "route": options["route"],
             "seconds": options["solve_seconds"],
             "peak_effort": {
-                str(name): [float(np.nanmax(np.abs(torque[:, i]))), str(units[i])]
+                str(name): [float(np.nanmax(np.abs(effort[:, i]))), str(units[i])]
                 for i, name in enumerate(solution["chain"].values)
                 if some
             },
@@ -124,21 +123,21 @@ def summarize(solution: Solution) -> Summary:
             else {"ratio": float(ratio[closest]), "time": float(time[closest])},
             "samples_near_singularity": int((solution["singularity"].values != 0).sum()),
             "closest_to_bounds": bounds,
-            "lift_off": {
+            "contact_loss": {
                 str(name): {
-                    "samples": int(lifted[:, i].sum()),
-                    "time": float(time[np.argmax(lifted[:, i])]),
+                    "samples": int(lost[:, i].sum()),
+                    "time": float(time[np.argmax(lost[:, i])]),
                 }
                 for i, name in enumerate(solution["contact"].values)
-                if lifted[:, i].any()
+                if lost[:, i].any()
             },
-            "warnings": solution.warnings,
-            "notices": [notice.to_dict() for notice in solution.notices],
+            "warnings": solution.condyle.warnings,
+            "notices": [notice.to_dict() for notice in solution.condyle.notices],
         }
     )
 
 
-def _greatest_activation(solution: Solution) -> dict[str, Any] | None:
+def _greatest_activation(solution: xr.Dataset) -> dict[str, Any] | None:
     """The largest |effort| over its limit: how much, whose and when; None without limits."""
     if "activation" not in solution:
         return None
@@ -162,7 +161,7 @@ def work(power: np.ndarray, time: np.ndarray) -> np.ndarray:
     return np.nansum(np.ascontiguousarray(pieces), axis=0)
 
 
-def _power(solution: Solution) -> dict[str, dict[str, float]]:
+def _power(solution: xr.Dataset) -> dict[str, dict[str, float]]:
     """Peak power [W] and work [J] of every actuator; nothing where nothing moves."""
     if "actuator_power" not in solution:  # written before there was one
         return {}
@@ -177,7 +176,7 @@ def _power(solution: Solution) -> dict[str, dict[str, float]]:
     }
 
 
-def _friction_work(solution: Solution) -> dict[str, float]:
+def _friction_work(solution: xr.Dataset) -> dict[str, float]:
     """Work of friction on the platform [J] at the contacts where there is some."""
     if "friction_power" not in solution:
         return {}

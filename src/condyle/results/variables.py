@@ -18,7 +18,7 @@ from ..status import STATUS_NAMES
 from .contacts import AXES
 from .derived import Derived
 
-# How efforts were chosen, as the description of `torque` says it.
+# How efforts were chosen, as the description of `effort` says it.
 LEAST = "minimum_norm"
 CHOICES = {
     LEAST: "of least norm",
@@ -118,7 +118,7 @@ def of_independent(form: str) -> Rule:
 
 
 def chosen(distribution: str) -> str:
-    """What `torque` is under a distribution; one from elsewhere is called by its name."""
+    """What `effort` is under a distribution; one from elsewhere is called by its name."""
     return f"actuator effort {CHOICES.get(distribution, f'by distribution {distribution}')}"
 
 
@@ -143,7 +143,9 @@ def cause_flags(mechanism: Mechanism) -> str:
 
 
 def _each(units: Iterable[str], form: str) -> str:
-    return ", ".join(form.format(unit) for unit in dict.fromkeys(units))
+    """The unit that all entries have, or one an entry."""
+    found = [form.format(unit) for unit in units]
+    return found[0] if len({*found}) == 1 else ", ".join(found)
 
 
 _CHAIN, _POSE, _CONTACT = ("time", "chain"), ("time", "coordinate"), ("time", "contact")
@@ -153,7 +155,7 @@ _FREE = ("time", "independent")
 # Those with columns come first, in the order of the columns.
 # fmt: off
 VARIABLES = (
-    Variable("torque", _CHAIN, of_effort(), chosen(LEAST), "evaluation.effort", column="tau_"),
+    Variable("effort", _CHAIN, of_effort(), chosen(LEAST), "evaluation.effort", column="tau_"),
     Variable(
         "contact_force", _CONTACT, "N",
         "contact force on the platform along the unit normal of the surface",
@@ -238,8 +240,8 @@ VARIABLES = (
         "evaluation.share",
     ),
     Variable(
-        "lift_off", _CONTACT, "1",
-        "whether a one-sided contact would have to pull: the ball lifts off", "lifted",
+        "contact_loss", _CONTACT, "1",
+        "whether a unilateral contact would have to pull: contact is lost", "contact_loss",
     ),
     Variable(
         "contact_point", _PLACE, "m", "centre of the contact ball in {S}",
@@ -290,6 +292,7 @@ VARIABLES = (
     Variable("cause", ("time",), "1", "what the sample fails by", "cause", flags=cause_flags),
 )
 # fmt: on
+BY_NAME = {variable.name: variable for variable in VARIABLES}
 
 # Dimension -> what stands along it.
 DIMENSIONS = {
@@ -299,7 +302,7 @@ DIMENSIONS = {
     "coordinate": ", ".join(COORDINATES),
     "independent": "the independent coordinates; `J_W_sigma` has as many values, falling",
     "part": "platform, links of the chains and, where there is one, the load; shares add up to "
-    "the torque",
+    "the effort",
     "axis": f"{', '.join(AXES)} in {{S}}",
     "component": ", ".join(WRENCH),
     "source": "loads of a scenario, by name",

@@ -50,8 +50,8 @@ KINDS = {
         "scale the motion, or move the bounds; `--strict` makes it an error",
         strict=True,
     ),
-    "lift_off": Kind(
-        "a one-sided contact lifts off",
+    "contact_loss": Kind(
+        "a unilateral contact is lost",
         "the ball would leave the surface: the model no longer holds there; "
         "`--distribution bounded` chooses efforts that press it on, where there are some",
     ),
@@ -78,7 +78,8 @@ KINDS = {
         "`--distribution bounded` keeps them",
     ),
     "ended": Kind(
-        "a simulation that ended before its time", "`solution.events` says why, in which state"
+        "a simulation that ended before its time",
+        "`solution.condyle.events` says why, in which state",
     ),
     "speed_limit": Kind("speed above a limit", "another actuator, or another motion"),
     "rod_angles": Kind(
@@ -169,7 +170,7 @@ class Watch:
             for i in range(len(self.mechanism.contacts)):
                 margin = derived.margin[:, i]
                 tally("bounds", i, margin < -BOUND_TOLERANCE, -margin)
-                tally("lift_off", i, derived.lifted[:, i], np.abs(e.contact_force[:, i]))
+                tally("contact_loss", i, derived.contact_loss[:, i], np.abs(e.contact_force[:, i]))
             tally("near_singularity", 0, derived.near != 0, -derived.ratio)
             for i, chain in enumerate(self.mechanism.chains):
                 limit, effort, speed = limits(chain), e.effort[:, i], np.abs(e.joint_rate[:, i])
@@ -229,11 +230,11 @@ class Watch:
             return Notice(kind, text, named, status=STATUS_NAMES[status], **about)
         # Whose it is, what is said of it, what was met, and what it is held against.
         name: str | None
-        if kind in ("bounds", "lift_off"):
+        if kind in ("bounds", "contact_loss"):
             name, value, bound = self.mechanism.contact_names[i], size, 0.0
-            if kind == "lift_off":
+            if kind == "contact_loss":
                 unit = "N"
-                text = f"lifts off {when}: there its surface would have to pull the ball"
+                text = f"loses contact {when}: its surface would have to pull the ball"
             else:
                 unit, text = "m", f"leaves its bounds {when}, by up to {size * 1e3:.3g} mm {worst}"
             text = f'contact "{name}" {text}'

@@ -8,7 +8,7 @@ from typing import Any
 # What each kind means; in the order in which a page lists them.
 KINDS = {
     "bound": "a contact reaches the end of its surface",
-    "lift_off": "a one-sided contact would have to pull",
+    "contact_loss": "a one-sided contact would have to pull",
     "unreachable": "a chain or a contact cannot be closed any more",
     "singular": "the mechanism is singular, and accelerations have no bound",
     "jammed": "friction jams: none or several of its patterns are consistent",

@@ -114,7 +114,8 @@ class Plant:
             for i in self._bounded
         ]
         found += [
-            Guard(next(rows), "lift_off", KINDS["lift_off"], names[i], True) for i in self._sided
+            Guard(next(rows), "contact_loss", KINDS["contact_loss"], names[i], True)
+            for i in self._sided
         ]
         for i in np.flatnonzero(np.isfinite(plan.speed)).tolist():
             chain, row = machine.chains[i], int(self.columns.result("too_fast")[i])

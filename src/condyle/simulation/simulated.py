@@ -7,6 +7,7 @@ import time
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from ..errors import InputError
 from ..model.data import Evaluation
@@ -14,7 +15,6 @@ from ..model.distributing import shares
 from ..model.model import Model, with_point
 from ..questions.equations import INTERNAL
 from ..results.derived import Derived
-from ..results.solution import Solution
 from ..results.solving import labelled
 from ..results.variables import ACCOUNTS
 from ..results.warnings import Notice, Watch
@@ -24,7 +24,7 @@ from .scenario import Scenario
 from .slips import odd_things
 
 
-def solved(plan: Plan, trace: Trace, scenario: Scenario, source: str, started: float) -> Solution:
+def solved(plan: Plan, trace: Trace, scenario: Scenario, source: str, started: float) -> xr.Dataset:
     """The solution of a run; `started`: of the clock `perf_counter`."""
     if not len(trace.t):
         end = trace.ended
@@ -61,7 +61,7 @@ def solved(plan: Plan, trace: Trace, scenario: Scenario, source: str, started: f
         _options(plan, scenario, source, seconds),
         notices,
     )
-    solution["torque"].attrs["long_name"] = "actuator effort as it acted"
+    solution["effort"].attrs["long_name"] = "actuator effort as it acted"
     solution.attrs["events"] = json.dumps([event.to_dict() for event in trace.events])
     labels: dict[str, Any] = {"account": list(ACCOUNTS)}
     if plan.loads:

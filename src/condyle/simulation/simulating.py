@@ -7,11 +7,12 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
+import xarray as xr
+
 from ..errors import InputError
 from ..mechanism.mechanism import Mechanism
 from ..model.model import Model, derive
 from ..motion import Motion
-from ..results.solution import Solution
 from .bind import bind
 from .crowd import run_all
 from .running import run
@@ -28,7 +29,7 @@ def simulate(
     motion: Motion | None = None,
     stop_at_bounds: bool = False,
     source: str | None = None,
-) -> Solution:
+) -> xr.Dataset:
     """Forward in time: what a mechanism does under efforts or a controller, and under loads.
 
     Args:   model: a model, a mechanism, or one by its file or name.
@@ -66,7 +67,7 @@ def simulate_all(
     model: Model | Mechanism | str | os.PathLike[str],
     scenarios: Iterable[Scenario | Mapping[str, Any] | str | os.PathLike[str]],
     threads: int | None = None,
-) -> list[Solution]:
+) -> list[xr.Dataset]:
     """Simulations of one model, side by side; see `simulate`.
 
     Runs of method `rk4` that differ in numbers alone (gains, starts, loads, paths, limits, files)

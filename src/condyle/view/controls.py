@@ -11,11 +11,12 @@ from typing import Any, Protocol
 
 import numpy as np
 import viser
+import xarray as xr
 
 from ..errors import InputError
 from ..kinematics.chain import FAMILIES
 from ..mechanism import Mechanism, bundled_mechanisms, load_mechanism, parse
-from ..results.solution import Solution, open_solution
+from ..results.solution import open_solution
 from ..simulation.knobs import Knob
 from .live_player import LivePlayer
 from .playback import Playback
@@ -44,7 +45,7 @@ class Page(Protocol):
     def set_dark(self, dark: bool) -> None: ...
     def look_from(self, name: str) -> None: ...
     def open_mechanism(self, mechanism: Mechanism) -> None: ...
-    def play_solution(self, solution: Solution) -> None: ...
+    def play_solution(self, solution: xr.Dataset) -> None: ...
 
 
 class Panel:
@@ -203,7 +204,7 @@ class Panel:
         self._time.step = max((last - first) / max(len(playback.time) - 1, 1), 1e-6)
         self._time.disabled = self._play.disabled = False
         playback.speed = SPEEDS[self._speed.value]
-        options = playback.solution.options
+        options = playback.solution.condyle.options
         self._player_note.content = (
             f"{len(playback.time)} samples, {options['formulation']}/{options['route']}"
         )

@@ -127,7 +127,7 @@ class LivePlayer:
             now.joint,
             joint=now.joint,
             rate=now.joint_rate,
-            torque=now.effort,
+            effort=now.effort,
             contact_force=now.contact_force,
             margin=margin,
             load=np.zeros(3),

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import xarray as xr
 
 from ..kinematics.singularities import KINDS
 from ..report.failed_spans import Gap, at_sample, gaps
 from ..report.scene import place
-from ..results.solution import Solution
 from .snapshot import Level, Snapshot, state_messages
 
 
@@ -17,9 +17,9 @@ class Playback:
     Attributes: index: the sample shown;  playing;  speed: times real time.
     """
 
-    def __init__(self, solution: Solution) -> None:
+    def __init__(self, solution: xr.Dataset) -> None:
         self.solution = solution
-        self.mechanism = solution.mechanism
+        self.mechanism = solution.condyle.mechanism
         self.time = solution["time"].values
         self.index = 0
         self.playing = False
@@ -27,7 +27,7 @@ class Playback:
         self._clock = 0.0
         self._good = np.flatnonzero(solution["status"].values == 0)
         self._failures = gaps(solution)
-        names = ("pose", "joint", "joint_rate", "torque", "contact_force", "bound_margin", "load")
+        names = ("pose", "joint", "joint_rate", "effort", "contact_force", "bound_margin", "load")
         self._values = {name: solution[name].values for name in names}
 
     @property
@@ -79,7 +79,7 @@ class Playback:
         pose, joint = self._values["pose"][drawn], self._values["joint"][drawn]
         pose = np.nan_to_num(pose)  # home, where there is not one good sample
         points = self.mechanism.platform.points
-        at = points.get(s.options["load_point"] or "", (0.0, 0.0, 0.0))
+        at = points.get(s.condyle.options["load_point"] or "", (0.0, 0.0, 0.0))
         load = here["load"][:3] if failed is None else np.full(3, np.nan)
         level, messages = self._messages(failed, drawn, here)
         return Snapshot.at(
@@ -88,7 +88,7 @@ class Playback:
             np.nan_to_num(joint),
             joint=here["joint"],
             rate=here["joint_rate"],
-            torque=here["torque"],
+            effort=here["effort"],
             contact_force=here["contact_force"],
             margin=here["bound_margin"],
             load=load,
@@ -118,5 +118,5 @@ class Playback:
                 f"Grey: the mechanism at t = {self.time[drawn]:g} s, without forces",
             )
         margin, force = here["bound_margin"], here["contact_force"]
-        messages = state_messages(self.mechanism, margin, force, here["torque"], here["joint_rate"])
+        messages = state_messages(self.mechanism, margin, force, here["effort"], here["joint_rate"])
         return ("warning" if messages else "calm"), tuple(messages)

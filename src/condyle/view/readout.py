@@ -117,11 +117,11 @@ def _chains(s: Snapshot) -> str:
         family = FAMILIES[chain.kind]
         angle = family.joint_unit == "rad"
         unit, scale = ("°", 180 / np.pi) if angle else ("mm", 1e3)
-        use = limits(chain).use(s.torque[i])
+        use = limits(chain).use(s.effort[i])
         row = [
             chain.name,
             number(s.joint[i] * scale, 2, unit),
-            number(s.torque[i], 4, family.effort_unit),
+            number(s.effort[i], 4, family.effort_unit),
             (f"{SIGNS['warning']} " if chain.name in s.over else "")
             + ("" if use is None else "slack" if np.isinf(use) else number(100 * use, 0, "%")),
         ]

@@ -16,11 +16,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import viser
+import xarray as xr
 
 from ..analysis.map.map_files import mechanism_of, open_map
 from ..errors import CondyleError, InputError
 from ..mechanism import Mechanism, load_mechanism
-from ..results.solution import Solution, open_solution
+from ..results.solution import open_solution
 from .controls import Panel
 from .gate import Gate, guarded
 from .live_player import LivePlayer
@@ -31,8 +32,6 @@ from .snapshot import Snapshot
 from .stage import Stage
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from ..simulation import Scenario
     from ..simulation.plan import Plan
 
@@ -57,7 +56,7 @@ class View:
     def __init__(
         self,
         mechanism: Mechanism,
-        solution: Solution | None = None,
+        solution: xr.Dataset | None = None,
         host: str = "127.0.0.1",
         port: int = 8080,
         dataset: xr.Dataset | None = None,
@@ -116,7 +115,7 @@ class View:
         self.playback = self.live = None
         self._enter(session)
 
-    def play_solution(self, solution: Solution) -> None:
+    def play_solution(self, solution: xr.Dataset) -> None:
         """Show a solution and its mechanism, at its first sample; for the worker."""
         playback = Playback(solution)
         if playback.mechanism != self.session.mechanism:
@@ -215,7 +214,7 @@ class View:
 
 def open_view(
     mechanism: Mechanism | str | Path | None = None,
-    solution: Solution | str | Path | None = None,
+    solution: xr.Dataset | str | Path | None = None,
     host: str = "127.0.0.1",
     port: int = 8080,
     map: xr.Dataset | str | Path | None = None,
@@ -233,7 +232,7 @@ def open_view(
     if isinstance(solution, str | Path):
         solution = open_solution(solution)
     if not isinstance(mechanism, Mechanism):
-        solved = solution.mechanism if solution is not None else None
+        solved = solution.condyle.mechanism if solution is not None else None
         mechanism = (
             load_mechanism(mechanism)
             if mechanism is not None
@@ -258,7 +257,7 @@ def planned(mechanism: Mechanism, scenario: Any) -> Plan:
 
 def serve(
     mechanism: Mechanism | str | Path | None = None,
-    solution: Solution | str | Path | None = None,
+    solution: xr.Dataset | str | Path | None = None,
     host: str = "127.0.0.1",
     port: int = 8080,
     open_browser: bool = False,

@@ -174,10 +174,10 @@ class Session:
         if met:
             self._joint = np.where(in_reach, joint, self._joint)
         force = _or_nan(found.contact_force, len(self.mechanism.contacts), status == Status.ok)
-        torque = _or_nan(found.effort, len(in_reach), status == Status.ok)
+        effort = _or_nan(found.effort, len(in_reach), status == Status.ok)
         if met and self.internal.any():
             directions = self.directions()
-            torque = torque + directions.effort @ self.internal
+            effort = effort + directions.effort @ self.internal
             force = force + directions.contact @ self.internal
         measures = measured(found.configuration.singularity)
         margin = bound_margins(self.mechanism, found.configuration.contact_point)[0]
@@ -191,7 +191,7 @@ class Session:
             messages += bound_messages(self.mechanism, margin)
         else:
             messages = [] if status == Status.ok else [NO_EFFORTS[status]]
-            messages += state_messages(self.mechanism, margin, force, torque, None)
+            messages += state_messages(self.mechanism, margin, force, effort, None)
             if (near := measures["near"]) != KINDS[0] and status == Status.ok:
                 text = f"Near a singularity of the kind {near} (ratio below {NEAR_SINGULAR:g})"
                 messages.append(text)
@@ -203,7 +203,7 @@ class Session:
             wanted=wanted,
             broken=tuple(broken) if met else (),
             joint=np.where(in_reach, joint, np.nan),
-            torque=torque,
+            effort=effort,
             reach=reach,
             contact_force=force,
             margin=margin,

@@ -11,7 +11,7 @@ from ..kinematics.singularities import KINDS, Singularity
 from ..mechanism import Mechanism
 from ..mechanism.chain import limits
 from ..report.scene import Scene, contact_normals, place
-from ..results.contacts import BOUND_TOLERANCE, lift_off
+from ..results.contacts import BOUND_TOLERANCE, contact_loss
 
 Level = Literal["calm", "warning", "unreachable"]
 MOST_NAMED = 4  # cables that one message names
@@ -26,7 +26,7 @@ class Snapshot:
     wanted:         X_EE that was asked for and cannot be met, (6,), or None.
     scene:          points at `pose`, of one sample.
     broken:         chains that cannot reach the platform.
-    joint, rate, torque: (n,) [rad or m; per s; N m or N];  reach: (n,), negative out of reach, or
+    joint, rate, effort: (n,) [rad or m; per s; N m or N];  reach: (n,), negative out of reach, or
                     None.
     contact_force:  (k,) [N];  force_vector: (k, 3) [N] in {S};  margin: (k,) [m], inf unbounded.
     load, load_at:  force in {S} [N] and its point in {M} [m], (3,) each.
@@ -44,7 +44,7 @@ class Snapshot:
     pose: np.ndarray
     scene: Scene
     joint: np.ndarray
-    torque: np.ndarray
+    effort: np.ndarray
     contact_force: np.ndarray
     force_vector: np.ndarray
     margin: np.ndarray
@@ -82,7 +82,7 @@ class Snapshot:
             pose=pose,
             scene=scene,
             force_vector=np.array(vectors).reshape(-1, 3),
-            over=over_limits(mechanism, numbers["torque"]),
+            over=over_limits(mechanism, numbers["effort"]),
             **numbers,
         )
 
@@ -98,25 +98,25 @@ def state_messages(
     mechanism: Mechanism,
     margin: np.ndarray,
     force: np.ndarray,
-    torque: np.ndarray,
+    effort: np.ndarray,
     rate: np.ndarray | None,
 ) -> list[str]:
     """Contacts out of bounds or lifting off, and actuators above a limit."""
     messages = bound_messages(mechanism, margin)
-    lifted = lift_off(mechanism, force[None])[0] if len(force) else []
+    lost = contact_loss(mechanism, force[None])[0] if len(force) else []
     messages += [
-        f"{name} lifts off: its surface would have to pull"
-        for name, up in zip(mechanism.contact_names, lifted, strict=True)
+        f"{name} loses contact: its surface would have to pull"
+        for name, up in zip(mechanism.contact_names, lost, strict=True)
         if up
     ]
     slack: list[str] = []
     for i, chain in enumerate(mechanism.chains):
         low, high, speed = limits(chain)
-        if chain.kind == "cable" and torque[i] < 0:
-            slack.append(f"{chain.name} ({-torque[i]:.3g} N)")
-        elif torque[i] > high or (low == -high and torque[i] < low):
+        if chain.kind == "cable" and effort[i] < 0:
+            slack.append(f"{chain.name} ({-effort[i]:.3g} N)")
+        elif effort[i] > high or (low == -high and effort[i] < low):
             messages.append(f"{chain.name} is above its effort limit of {high:g}")
-        elif torque[i] < low:
+        elif effort[i] < low:
             messages.append(f"{chain.name} is below its least effort of {low:g}")
         if rate is not None and abs(rate[i]) > speed:
             messages.append(f"{chain.name} is above its speed limit of {speed:g}")
@@ -126,13 +126,13 @@ def state_messages(
     return messages
 
 
-def over_limits(mechanism: Mechanism, torque: np.ndarray) -> tuple[str, ...]:
+def over_limits(mechanism: Mechanism, effort: np.ndarray) -> tuple[str, ...]:
     """Chains whose effort, of (n,), is outside its limits."""
     with np.errstate(invalid="ignore"):
         return tuple(
             chain.name
-            for chain, effort in zip(mechanism.chains, torque, strict=True)
-            if limits(chain).beyond(effort)
+            for chain, one in zip(mechanism.chains, effort, strict=True)
+            if limits(chain).beyond(one)
         )
 
 

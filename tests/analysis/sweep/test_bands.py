@@ -25,9 +25,9 @@ def test_efforts_are_linear_in_the_mass(machine: condyle.Mechanism) -> None:
         condyle.derive(machine.set("platform.mass", mass)).solve(motion) for mass in (0.2, 0.4)
     )
     found = with_bands(light, study(), motion, condyle.Load.zero(), mechanism=machine, workers=1)
-    assert found["torque_quantile"].dims == ("quantile", "time", "chain")
+    assert found["effort_quantile"].dims == ("quantile", "time", "chain")
     assert found["quantile"].values.tolist() == list(QUANTILES)
-    for name in ("torque", "contact_force"):
+    for name in ("effort", "contact_force"):
         a, b = light[name].values, heavy[name].values
         low, high = np.minimum(a, b), np.maximum(a, b)
         for i, q in enumerate(QUANTILES):
@@ -37,7 +37,7 @@ def test_efforts_are_linear_in_the_mass(machine: condyle.Mechanism) -> None:
                 found[f"{name}_quantile"].values[i], wanted, rtol=0, atol=1e-9 * scale
             )
     assert json.loads(found.attrs["bands"])["variants"] == 21
-    assert found.warnings == light.warnings
+    assert found.condyle.warnings == light.condyle.warnings
 
 
 def test_variants_without_a_result_are_left_out_and_told(machine: condyle.Mechanism) -> None:
@@ -47,10 +47,12 @@ def test_variants_without_a_result_are_left_out_and_told(machine: condyle.Mechan
     vary = {"what": "chain.masseter_left.base[2]", "values": [base, base, base + 0.3]}
     some = read_study({"vary": [vary], "load": "none"})
     found = with_bands(solution, some, motion, condyle.Load.zero(), workers=1)
-    middle = found["torque_quantile"].sel(quantile=0.5).values
-    np.testing.assert_allclose(middle, solution["torque"].values, rtol=1e-9, atol=1e-12)
-    assert found.notices[-1].kind == "failed_variants" and found.notices[-1].count == 1
-    assert "1 of 3 variants" in found.warnings[-1]
+    middle = found["effort_quantile"].sel(quantile=0.5).values
+    np.testing.assert_allclose(middle, solution["effort"].values, rtol=1e-9, atol=1e-12)
+    assert (
+        found.condyle.notices[-1].kind == "failed_variants" and found.condyle.notices[-1].count == 1
+    )
+    assert "1 of 3 variants" in found.condyle.warnings[-1]
 
 
 def test_quantiles_are_numpys_and_leave_nan_out() -> None:
@@ -70,9 +72,9 @@ def test_a_band_saves_and_opens(machine: condyle.Mechanism, tmp_path: Any) -> No
     motion = condyle.trial_motion(machine, rate=2.0)
     solution = condyle.derive(machine).solve(motion)
     found = with_bands(solution, study(count=2), motion, condyle.Load.zero(), workers=1)
-    found.save(tmp_path / "bands.nc")
+    found.condyle.save(tmp_path / "bands.nc")
     again = condyle.open_solution(tmp_path / "bands.nc")
-    np.testing.assert_array_equal(again["torque_quantile"], found["torque_quantile"])
+    np.testing.assert_array_equal(again["effort_quantile"], found["effort_quantile"])
     assert json.loads(again.attrs["bands"])["variants"] == 2
 
 

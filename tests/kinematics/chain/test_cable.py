@@ -165,11 +165,11 @@ def test_results_tell_of_slack() -> None:
     mechanism = case("k2_n9").mechanism
     model = condyle.derive(mechanism, backend="numpy", distribution="minimum_norm")
     solution = model.solve(trial_motion(mechanism, rate=200))
-    slack = {n.owner for n in solution.notices if n.kind == "effort_limit"}
-    pushing = solution["torque"].values.min(axis=0) < 0
+    slack = {n.owner for n in solution.condyle.notices if n.kind == "effort_limit"}
+    pushing = solution["effort"].values.min(axis=0) < 0
     assert slack == {name for name, p in zip(mechanism.chain_names, pushing, strict=True) if p}
     assert slack and all(
-        "below its least of 0" in n.text for n in solution.notices if n.owner in slack
+        "below its least of 0" in n.text for n in solution.condyle.notices if n.owner in slack
     )
 
 

@@ -79,8 +79,8 @@ def test_extension_pushes() -> None:
     zero = np.zeros((1, 6))
     load = np.zeros((1, 9))
     load[0, 2] = -1e4
-    torque = model.evaluate(zero, zero, zero, load).effort
-    assert (torque > 1e4 / 6).all()
+    effort = model.evaluate(zero, zero, zero, load).effort
+    assert (effort > 1e4 / 6).all()
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
+import xarray as xr
 from support.surfaces import close
 
 import condyle
@@ -18,7 +19,6 @@ from condyle.model.model import Model
 from condyle.motion import Motion
 from condyle.report.figures import PLOTS
 from condyle.report.page import write_report
-from condyle.results.solution import Solution
 
 
 def wave(p: ca.SX) -> ca.SX:
@@ -43,22 +43,22 @@ def motion() -> Motion:
 
 
 @pytest.fixture(scope="module")
-def solution(machine: Mechanism, motion: Motion) -> Solution:
+def solution(machine: Mechanism, motion: Motion) -> xr.Dataset:
     return Model(machine, backend="numpy").solve(motion)
 
 
 @pytest.fixture
-def saved(solution: Solution, tmp_path: Path) -> Solution:
-    solution.save(tmp_path / "s.nc", tmp_path / "s.csv")
+def saved(solution: xr.Dataset, tmp_path: Path) -> xr.Dataset:
+    solution.condyle.save(tmp_path / "s.nc", tmp_path / "s.csv")
     return condyle.open_solution(tmp_path / "s.nc")
 
 
 @pytest.mark.slow
-def test_every_backend_and_model(machine: Mechanism, motion: Motion, solution: Solution) -> None:
+def test_every_backend_and_model(machine: Mechanism, motion: Motion, solution: xr.Dataset) -> None:
     by_default = condyle.derive(machine).solve(motion)
-    close(by_default["torque"].values, solution["torque"].values, 1e-11)
+    close(by_default["effort"].values, solution["effort"].values, 1e-11)
     comparison = compare(machine, motion, formulations=["virtual_power", "lagrange"])
-    assert all(pair.torque < 1e-11 for pair in comparison.differences())
+    assert all(pair.effort < 1e-11 for pair in comparison.differences())
     assert "virtual_power direct" in str(comparison)  # not available, and why
     assert comparison.mechanism.contact_names == machine.contact_names
 
@@ -85,9 +85,9 @@ def test_a_mechanism_file_cannot_hold_it(machine: Mechanism, tmp_path: Path) -> 
     assert not (tmp_path / "m.toml").exists()
 
 
-def test_a_solution_keeps_a_note_of_it(machine: Mechanism, saved: Solution) -> None:
+def test_a_solution_keeps_a_note_of_it(machine: Mechanism, saved: xr.Dataset) -> None:
     """All but the equation comes back, and nothing computes without it."""
-    again = saved.mechanism
+    again = saved.condyle.mechanism
     left, right = again.contacts
     assert left == machine.contacts[0].model_copy(update={"surface": Unknown()})
     assert right == machine.contacts[1]
@@ -111,19 +111,19 @@ def test_options_of_the_note(machine: Mechanism, motion: Motion) -> None:
     ball = {"surface": shell, "side": "inside", "ball_radius": 0.004}
     left = machine.contacts[0].model_copy(update=ball)
     held = machine.replace(contacts=(left, machine.contacts[1]))
-    found = Model(held, backend="numpy").solve(motion).mechanism.contacts[0]
+    found = Model(held, backend="numpy").solve(motion).condyle.mechanism.contacts[0]
     assert found.surface == Unknown(closed=True)
     assert (found.side, found.ball_radius) == ("inside", 0.004)
 
 
-def test_unit_normals_are_kept(machine: Mechanism, saved: Solution) -> None:
+def test_unit_normals_are_kept(machine: Mechanism, saved: xr.Dataset) -> None:
     point, normal = (saved[name].values[:, 0] for name in ("contact_point", "contact_normal"))
     slope = 1.1 - 6e-3 * np.cos(60 * (point[:, 0] + 0.02665))
     wanted = np.column_stack([slope, 0 * slope, 1 + 0 * slope]) / np.hypot(slope, 1)[:, None]
     close(normal, wanted, 1e-14)
 
 
-def test_figures_and_report_of_a_saved_solution(saved: Solution, tmp_path: Path) -> None:
+def test_figures_and_report_of_a_saved_solution(saved: xr.Dataset, tmp_path: Path) -> None:
     for draw in PLOTS.values():
         draw(saved)
     page = write_report(saved, tmp_path / "s.html").read_text()
@@ -131,14 +131,16 @@ def test_figures_and_report_of_a_saved_solution(saved: Solution, tmp_path: Path)
     assert "contact_vector.left_condyle" in page
 
 
-def test_commands_on_a_saved_solution(solution: Solution, condyle_command, tmp_path: Path) -> None:
-    solution.save(tmp_path / "s.nc")
+def test_commands_on_a_saved_solution(
+    solution: xr.Dataset, condyle_command, tmp_path: Path
+) -> None:
+    solution.condyle.save(tmp_path / "s.nc")
     assert condyle_command("report", "s.nc").status == 0
     viewed = condyle_command("view", "--solution", "s.nc", "--no-browser")
     assert viewed.status == 2 and "written in Python" in viewed.err
 
 
-def test_a_file_cannot_write_the_note(machine: Mechanism, saved: Solution) -> None:
+def test_a_file_cannot_write_the_note(machine: Mechanism, saved: xr.Dataset) -> None:
     with pytest.raises(MechanismError, match="the kind 'expression' is unknown"):
         parse(saved.attrs["mechanism"])
 

@@ -184,7 +184,7 @@ def test_columns_of_files_have_the_names_of_the_reactions(tmp_path: Path) -> Non
     model = Model(machine, backend="numpy")
     t = np.linspace(0, 1, 6)
     motion = condyle.Motion.from_arrays(t, {name: 0 * t for name in model.independent})
-    columns = model.solve(motion, reactions=True).columns()
+    columns = model.solve(motion, reactions=True).condyle.columns()
     places = reaction_places(machine)
     wanted = {f"reaction_{place.name}_{axis}" for place in places for axis in "xyz"}
     assert {name for name in columns if name.startswith("reaction_")} == wanted

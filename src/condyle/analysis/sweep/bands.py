@@ -6,13 +6,13 @@ import json
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from ...errors import InputError
 from ...mechanism.mechanism import Mechanism
 from ...motion import Load, Motion
 from ...motion.memory import memory_at_hand
 from ...progress import step
-from ...results.solution import Solution
 from ...results.warnings import Notice
 from ...status import Status
 from ..workers import PROCESSES, check_scheduler, run_parts
@@ -26,7 +26,7 @@ SUFFIX = "_quantile"
 
 
 def with_bands(
-    solution: Solution,
+    solution: xr.Dataset,
     study: Study,
     motion: Motion,
     load: Load,
@@ -34,7 +34,7 @@ def with_bands(
     mechanism: Mechanism | None = None,
     workers: int | None = None,
     scheduler: str = PROCESSES,
-) -> Solution:
+) -> xr.Dataset:
     """The solution with quantiles of efforts and contact forces at every time.
 
     Of the study what varies and the sampling count; its other keys give way to how the solution was
@@ -46,12 +46,12 @@ def with_bands(
     Raises: InputError: for a study that does not fit, or more numbers than memory holds.
     """
     check_scheduler(workers, scheduler)
-    machine, options = mechanism or solution.mechanism, solution.options
+    machine, options = mechanism or solution.condyle.mechanism, solution.condyle.options
     own = study.model_copy(update={name: options[name] for name in AS_SOLVED})
     job = prepared(own, machine, (motion,), load)
     efforts, forces, failed = _all(job, workers, scheduler)
     count, variables = job.design.count, dict[str, Any]()
-    for name, values in (("torque", efforts), ("contact_force", forces)):
+    for name, values in (("effort", efforts), ("contact_force", forces)):
         about = {"units": solution[name].attrs["units"]}
         about["long_name"] = f"quantiles of {name} over {count} variants"
         dims = ("quantile", *solution[name].dims)
@@ -63,7 +63,7 @@ def with_bands(
         text = (
             f"{failed} of {count} variants have samples without a result; the bands are of the rest"
         )
-        notices = [*made.notices, Notice("failed_variants", text, count=failed)]
+        notices = [*made.condyle.notices, Notice("failed_variants", text, count=failed)]
         made.attrs["warnings"] = json.dumps([one.text for one in notices])
         made.attrs["notices"] = json.dumps([one.to_dict() for one in notices])
     return made

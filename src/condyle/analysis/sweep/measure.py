@@ -13,11 +13,8 @@ from ...mechanism.mechanism import COORDINATES
 from ...model.model import Model
 from ...results.contacts import AXES
 from ...results.derived import Derived
-from ...results.variables import VARIABLES, WRENCH, Variable
+from ...results.variables import BY_NAME, VARIABLES, WRENCH, Variable
 from .study import Measure
-
-_BY_NAME = {variable.name: variable for variable in VARIABLES}
-ALIASES = {"effort": "torque"}
 
 Reduction = Callable[..., np.ndarray]
 TAKES: dict[str, Reduction] = {
@@ -48,7 +45,7 @@ class Reading:
 
     def values(self, derived: Derived) -> np.ndarray:
         """The columns, (len(names),), of a solution whose samples are all good."""
-        a = _BY_NAME[self.variable].values(derived)[self.place]
+        a = BY_NAME[self.variable].values(derived)[self.place]
         if a.dtype == bool:
             a = a.astype(float)
         return np.atleast_1d(TAKES[self.take](a, axis=self.axes)).ravel()
@@ -95,12 +92,12 @@ def reading(name: str, measure: Measure, model: Model) -> Reading:
 
 
 def _variable(name: str, measure: Measure, model: Model) -> Variable:
-    variable = _BY_NAME.get(ALIASES.get(measure.of, measure.of))
+    variable = BY_NAME.get(measure.of)
     there = [v for v in VARIABLES if v.when(Derived(model.mechanism, None, limited=model.limited))]
     if variable is None:
         raise InputError(
             f'measure {name}: no variable "{measure.of}".'
-            f"{did_you_mean(measure.of, [*ALIASES, *(v.name for v in there)])}"
+            f"{did_you_mean(measure.of, [v.name for v in there])}"
         )
     if variable not in there:
         raise InputError(

@@ -133,7 +133,7 @@ def _netcdf(job: Job, one: Solved) -> bytes:
     )
     with TemporaryDirectory() as folder:
         path = Path(folder) / "solution.nc"
-        solution.save(path)
+        solution.condyle.save(path)
         return path.read_bytes()
 
 

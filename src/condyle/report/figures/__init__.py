@@ -1,7 +1,7 @@
 """Figures of a solution, in one house style; among them Figures 5 to 9 of the paper.
 
 from condyle.report.figures import PLOTS
-PLOTS["torque"](solution).savefig("torque.png")
+PLOTS["effort"](solution).savefig("effort.png")
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ from .saving import save, save_each
 from .style import STYLES
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from ...analysis.comparison import Comparison
-    from ...results.solution import Solution
 
 find_figures(figure_of)
 
@@ -40,7 +41,7 @@ __all__ = [
 
 
 def save_figures(
-    solution: Solution, comparison: Comparison, folder: str | os.PathLike[str]
+    solution: xr.Dataset, comparison: Comparison, folder: str | os.PathLike[str]
 ) -> list[Path]:
     """Write Figures 5 to 9 of the paper as PNG and SVG into a folder that exists.
 
@@ -56,7 +57,7 @@ def save_figures(
     return save_each(figures, solution, folder)
 
 
-def save_solution_figures(solution: Solution, folder: str | os.PathLike[str]) -> list[Path]:
+def save_solution_figures(solution: xr.Dataset, folder: str | os.PathLike[str]) -> list[Path]:
     """Write the plots of `PLOTS` as PNG and SVG into a folder that exists; returns the paths.
 
     Those that the solution has nothing for are left out, such as of contacts or of activations.

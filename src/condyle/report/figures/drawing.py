@@ -39,7 +39,7 @@ from .style import (
 )
 
 if TYPE_CHECKING:
-    from ...results.solution import Solution
+    import xarray as xr
 
 Columns = Mapping[str, Mapping[str, tuple[Curve, Panel]]]
 
@@ -59,7 +59,7 @@ def figure_of(group: PanelGroup) -> Callable[..., Figure]:
     """The figure of a group of panels, registered by the group's name."""
 
     @wraps(group.panels)
-    def draw(solution: Solution, *args: Any, **options: Any) -> Figure:
+    def draw(solution: xr.Dataset, *args: Any, **options: Any) -> Figure:
         found, title = list(group.panels(solution, *args, **options)), group.title(solution)
         if not found:
             return nothing_to_draw(title, caption(solution), group.empty)
@@ -114,7 +114,7 @@ def grid_size(panels: Sequence[Panel]) -> tuple[float, float, int]:
     return width, 1.0 + sum(row_heights(panels)), journal
 
 
-def draw_grid(figure: FigureBase, solution: Solution, panels: Sequence[Panel]) -> None:
+def draw_grid(figure: FigureBase, solution: xr.Dataset, panels: Sequence[Panel]) -> None:
     """Draw panels, each on axes of its own."""
     at, rows, columns = places(panels)
     over_time = panels[0].kind in ("time", "field")
@@ -185,7 +185,7 @@ def split_columns(panels: Sequence[Panel], chains: Sequence[str]) -> Columns:
     return columns
 
 
-def draw_pairs(title: str, solution: Solution, columns: Columns, same: bool) -> Figure:
+def draw_pairs(title: str, solution: xr.Dataset, columns: Columns, same: bool) -> Figure:
     """A row for each pair of chains; with `same`, one scale in a column for those of one unit."""
     first = next(iter(columns.values()))
     names = list(first)
@@ -288,7 +288,7 @@ def looks(panel: Panel, curves: Sequence[Curve]) -> Sequence[dict[str, Any]]:
     return [look(i if banded else stems.index(stem(name)), i) for i, name in enumerate(names)]
 
 
-def draw_time(axes: Axes, solution: Solution, panel: Panel) -> None:
+def draw_time(axes: Axes, solution: xr.Dataset, panel: Panel) -> None:
     """Curves over time, with what they mean."""
     curves = panel.curves
     labels = [written(c.label) if panel.components else readable(c.label) for c in curves]
@@ -307,7 +307,7 @@ def draw_time(axes: Axes, solution: Solution, panel: Panel) -> None:
 
 def draw_curves(
     axes: Axes,
-    solution: Solution,
+    solution: xr.Dataset,
     panel: Panel,
     curves: Sequence[Curve],
     labels: Sequence[str],
@@ -351,7 +351,7 @@ def draw_limits(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
 # -- the other kinds
 
 
-def draw_field(axes: Axes, solution: Solution, panel: Panel) -> None:
+def draw_field(axes: Axes, solution: xr.Dataset, panel: Panel) -> None:
     """Rows of colour from 0 to 1; beyond 1 and without a result they have colours of their own."""
     names = [curve.label for curve in panel.curves]
     values = np.array([np.abs(c.values) * (c.scale or 1.0) for c in panel.curves])
@@ -384,7 +384,7 @@ def boundaries(time: np.ndarray) -> np.ndarray:
     return np.concatenate([time[:1], 0.5 * (time[1:] + time[:-1]), time[-1:]])
 
 
-def draw_plane(axes: Axes, solution: Solution, panel: Panel) -> None:
+def draw_plane(axes: Axes, solution: xr.Dataset, panel: Panel) -> None:
     """Curves over what is across, and the box of their limits as far as it is near."""
     names = short([curve.label for curve in panel.curves])
     for i, (curve, name) in enumerate(zip(panel.curves, names, strict=True)):
@@ -403,7 +403,7 @@ def draw_plane(axes: Axes, solution: Solution, panel: Panel) -> None:
     axes.set(xlabel=panel.across, ylabel=f"{panel.axis} [{panel.unit}]")
 
 
-def draw_track(axes: Axes, solution: Solution, panel: Panel) -> None:
+def draw_track(axes: Axes, solution: xr.Dataset, panel: Panel) -> None:
     """A track on equal scales with its bounds; where it is out of them stands out."""
     [curve], scale = panel.curves, panel.shown.scale
     assert curve.across is not None and panel.outside is not None

@@ -10,22 +10,23 @@ from matplotlib.figure import Figure, FigureBase
 
 from ..naming import LOAD_PARTS
 from ..panel import Curve
-from ..panel_list import motion, torque
+from ..panel_list import effort, motion
 from ..scene import rotations
 from .drawing import draw_grid, draw_pairs
 from .registry import PLOTS, plot
 from .style import PALETTE, caption, house, narrow, new_figure
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from ...analysis.comparison import Comparison
     from ...analysis.runs import Run
-    from ...results.solution import Solution
 
 PAPER_ORDER = ("platform", "cranks", "couplers")
 
 
 @house
-def figure_5(solution: Solution) -> Figure:
+def figure_5(solution: xr.Dataset) -> Figure:
     """The paper's Fig. 5: path and coordinates."""
     title = f"Motion of the platform: path of {landmark(solution)[0]}, and coordinates"
     figure = new_figure(title, caption(solution), 10, 9)
@@ -35,12 +36,12 @@ def figure_5(solution: Solution) -> Figure:
     return figure
 
 
-def figure_6(solution: Solution) -> Figure:
+def figure_6(solution: xr.Dataset) -> Figure:
     """The paper's Fig. 6: the diagonal of J_A."""
     return PLOTS["jacobian"](solution)
 
 
-def figure_7(solution: Solution) -> Figure:
+def figure_7(solution: xr.Dataset) -> Figure:
     """The paper's Fig. 7: the bite force."""
     return PLOTS["load"](solution)
 
@@ -50,10 +51,10 @@ def figure_8(comparison: Comparison) -> Figure:
     """The paper's Fig. 8: torques of Model 1, and how far other models are from them."""
     solution = comparison.solution
     first, others = first_and_others(comparison)
-    columns = {first.label: first.torque}
-    columns |= {f"{first.label} − {one.label}": first.torque - one.torque for one in others}
+    columns = {first.label: first.effort}
+    columns |= {f"{first.label} − {one.label}": first.effort - one.effort for one in others}
     names = [str(name) for name in solution["chain"].values]
-    panels = {c.label: replace(p, limits=()) for p in torque(solution) for c in p.curves}
+    panels = {c.label: replace(p, limits=()) for p in effort(solution) for c in p.curves}
     cells = {
         title: {n: (Curve(n, "", values[:, i]), panels[n]) for i, n in enumerate(names)}
         for title, values in columns.items()
@@ -62,7 +63,7 @@ def figure_8(comparison: Comparison) -> Figure:
     return draw_pairs(title, solution, cells, same=True)
 
 
-def figure_9(solution: Solution) -> Figure:
+def figure_9(solution: xr.Dataset) -> Figure:
     """The paper's Fig. 9: end effector, cranks and couplers, without the load."""
     there = [str(part) for part in solution["part"].values if part not in LOAD_PARTS]
     first = [part for part in PAPER_ORDER if part in there]
@@ -86,7 +87,7 @@ DEFAULT_LANDMARK = "incisor"
 
 
 @plot()
-def path(solution: Solution) -> Figure:
+def path(solution: xr.Dataset) -> Figure:
     """Path of a platform point from the side, the front, above and in space."""
     height = 4.4 if narrow() else 2.9
     figure = new_figure(f"Path of {landmark(solution)[0]}", caption(solution), 10, height)
@@ -94,7 +95,7 @@ def path(solution: Solution) -> Figure:
     return figure
 
 
-def draw_path(figure: FigureBase, solution: Solution) -> None:
+def draw_path(figure: FigureBase, solution: xr.Dataset) -> None:
     point = landmark(solution)[1]
     place = track(solution, point) * 1e3
     if narrow():
@@ -124,17 +125,17 @@ def draw_path(figure: FigureBase, solution: Solution) -> None:
     axes.set_box_aspect(None, zoom=0.78)  # leaves room for the labels
 
 
-def landmark(solution: Solution) -> tuple[str, np.ndarray]:
+def landmark(solution: xr.Dataset) -> tuple[str, np.ndarray]:
     """The point whose path is drawn: of the motion, the only one, the incisor, or O_M."""
-    points = solution.mechanism.platform.points
+    points = solution.condyle.mechanism.platform.points
     only = next(iter(points)) if len(points) == 1 else DEFAULT_LANDMARK
-    name = solution.options["landmark"] or only
+    name = solution.condyle.options["landmark"] or only
     if name in points:
         return name, np.array(points[name])
     return "the mass centre", np.zeros(3)
 
 
-def track(solution: Solution, point: np.ndarray) -> np.ndarray:
+def track(solution: xr.Dataset, point: np.ndarray) -> np.ndarray:
     """Places of a platform point in {S}, (N, 3) [m]."""
     pose = solution["pose"].values
     return pose[:, :3] + rotations(pose[:, 3:]) @ point

@@ -1,7 +1,7 @@
 """The figures by name, those of panels (`condyle.report.panel_list`) and others:
 
 @plot()
-def power(solution: Solution) -> Figure:
+def power(solution: xr.Dataset) -> Figure:
     '''Power of each actuator over time.'''
     made = new_figure("Power of the actuators", caption(solution), 7.5, 3.0)
     ...
@@ -14,14 +14,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import update_wrapper
 from importlib.metadata import entry_points
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
 from matplotlib.figure import Figure
-from xarray.plot.accessor import DatasetPlotAccessor
 
 from ...errors import did_you_mean
 from ..panel import PanelGroup, known_groups, listeners
 from .style import house
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 P = ParamSpec("P")
 S = TypeVar("S")
@@ -60,20 +62,20 @@ def find_figures(figure_of: Callable[[PanelGroup], Any]) -> None:
     PLOTS.update(found)
 
 
-class SolutionPlots(DatasetPlotAccessor):
-    """Figures of a solution: `solution.plot.torque()` returns a matplotlib Figure.
+class SolutionPlots:
+    """Figures of a solution: `solution.condyle.plot.effort()` returns a matplotlib Figure.
 
-    There is a method for every figure that is registered. xarray's own plots of datasets, such as
-    `solution.plot.scatter`, stay where they were.
+    There is a method for every figure that is registered.
     """
 
-    __slots__ = ()
+    def __init__(self, solution: xr.Dataset) -> None:
+        self._solution = solution
 
     def __getattr__(self, name: str) -> Callable[..., Figure]:
         if name not in PLOTS:
             known = did_you_mean(name, PLOTS)
             raise AttributeError(f'a solution has no figure "{name}".{known}')
-        draw, solution = PLOTS[name], self._ds
+        draw, solution = PLOTS[name], self._solution
 
         def method(*args: Any, **kwargs: Any) -> Figure:
             return draw(solution, *args, **kwargs)

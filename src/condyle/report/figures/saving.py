@@ -16,7 +16,7 @@ from ...progress import step
 from .style import STYLE
 
 if TYPE_CHECKING:
-    from ...results.solution import Solution
+    import xarray as xr
 
 FORMATS = ("png", "svg")
 
@@ -46,8 +46,8 @@ def laid_out(figure: Figure) -> Iterator[None]:
 
 
 def save_each(
-    plots: Mapping[str, Callable[[Solution], Figure]],
-    solution: Solution,
+    plots: Mapping[str, Callable[[xr.Dataset], Figure]],
+    solution: xr.Dataset,
     folder: str | os.PathLike[str],
 ) -> list[Path]:
     """Draw and write figures by name."""

@@ -26,7 +26,7 @@ from ...errors import InputError, did_you_mean
 from ..failed_spans import gaps
 
 if TYPE_CHECKING:
-    from ...results.solution import Solution
+    import xarray as xr
 
 # Okabe and Ito's colours, told apart by colour-blind readers; without yellow, which pales on white.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -244,10 +244,10 @@ def written(coordinate: str) -> str:
     return COORDINATE.get(name, name) + coordinate[len(name) :]
 
 
-def caption(solution: Solution) -> str:
+def caption(solution: xr.Dataset) -> str:
     """Where the data come from, and what they must not be taken for."""
-    options, name = solution.options, solution.attrs["mechanism_name"]
-    stand_in = is_stand_in(solution.mechanism)
+    options, name = solution.condyle.options, solution.attrs["mechanism_name"]
+    stand_in = is_stand_in(solution.condyle.mechanism)
     invented = [what for what in ("motion", "load") if is_synthetic(options[what])]
     parts = [f"Mechanism {name}" + (": stand-in, not the authors' robot" if stand_in else "")]
     if invented:

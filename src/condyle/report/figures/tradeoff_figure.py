@@ -28,7 +28,7 @@ def tradeoff_figure(found: Tradeoff) -> Figure:
     left.set_title("from least effort to least load")
     left.set_xlabel("effort: root of mean sum (effort/limit)² [1]")
     left.set_ylabel("load on the contacts, root mean square [N]")
-    names = found.solution.mechanism.contact_names
+    names = found.solution.condyle.mechanism.contact_names
     for k, name in enumerate(names):
         right.plot(found.weights, found.mean[:, k], label=readable(name), **look(k))
     right.set_xscale("symlog", linthresh=found.weights[found.weights > 0].min(initial=1.0))

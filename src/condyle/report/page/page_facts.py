@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ...mechanism.actuator import Limits
-    from ...results.solution import Solution
     from ..tables import Table
     from .reduce import Reduced
 
@@ -77,7 +76,7 @@ def _facts(page: Reduced) -> Iterator[tuple[Any, ...]]:
     units = [str(unit) for unit in solution["effort_unit"].values]
     for unit in dict.fromkeys(units):
         mine = [i for i, u in enumerate(units) if u == unit]
-        peak = _peak(solution["torque"].values[:, mine])
+        peak = _peak(solution["effort"].values[:, mine])
         if peak is not None:
             sample, i, value = peak
             name = solution["chain"].values[mine[i]]
@@ -129,18 +128,18 @@ def _peak(values: np.ndarray) -> tuple[int, int, float] | None:
     return int(sample), int(column), float(values[sample, column])
 
 
-def chain_table(solution: Solution) -> Markup:
+def chain_table(solution: xr.Dataset) -> Markup:
     """Peak effort and speed of each chain beside its limits."""
     rows = []
-    efforts, speeds = (drawn_limits(solution, v) for v in ("torque", "joint_rate"))
-    for i, chain in enumerate(solution.mechanism.chains):
+    efforts, speeds = (drawn_limits(solution, v) for v in ("effort", "joint_rate"))
+    for i, chain in enumerate(solution.condyle.mechanism.chains):
         effort_unit = str(solution["effort_unit"].values[i])
         speed_unit = f"{solution['joint_unit'].values[i]}/s"
         rows.append(
             [
                 chain.name,
                 chain.kind,
-                *_peak_cells(solution, "torque", i, effort_unit, efforts[i]),
+                *_peak_cells(solution, "effort", i, effort_unit, efforts[i]),
                 *_peak_cells(solution, "joint_rate", i, speed_unit, speeds[i]),
             ]
         )
@@ -149,7 +148,7 @@ def chain_table(solution: Solution) -> Markup:
 
 
 def _peak_cells(
-    solution: Solution, variable: str, chain: int, unit: str, limit: Limits
+    solution: xr.Dataset, variable: str, chain: int, unit: str, limit: Limits
 ) -> list[str]:
     peak = _peak(solution[variable].values[:, [chain]])
     if peak is None:
@@ -165,7 +164,7 @@ def _peak_cells(
     return [f"{value:.4g} {unit}", f"{solution['time'].values[sample]:g} s", told]
 
 
-def reaction_tables(solution: Solution) -> Markup:
+def reaction_tables(solution: xr.Dataset) -> Markup:
     """Largest magnitude of every reaction: a table for each kind, a row for each joint."""
     found, time = [], solution["time"].values
     for panel in reaction(solution):
@@ -186,10 +185,10 @@ def given_tables(tables: Sequence[Table]) -> Markup:
     return tag("section", tag("h2", "Tables"), *parts, id="tables") if parts else Markup("")
 
 
-def provenance(solution: Solution, files: Sequence[Path]) -> Markup:
+def provenance(solution: xr.Dataset, files: Sequence[Path]) -> Markup:
     """What was run: options, files and their hashes, version, and the mechanism itself."""
     text = solution.attrs["mechanism"]
-    chosen = solution.options
+    chosen = solution.condyle.options
     listed = [["mechanism as solved (below)", hashlib.sha256(text.encode()).hexdigest()]]
     listed += [
         [file_name(chosen[name]), chosen[f"{name}_sha256"]]
@@ -246,7 +245,7 @@ def _said(value: Any) -> str:
 NEAR_SINGULAR = "near a singularity"
 
 
-def alerts(solution: Solution, columns: Columns) -> list[dict[str, Any]]:
+def alerts(solution: xr.Dataset, columns: Columns) -> list[dict[str, Any]]:
     """Texts, each with the number of a column that is 1 where the text holds.
 
     `failed`: there is nothing to draw at such samples.
@@ -266,13 +265,13 @@ def alerts(solution: Solution, columns: Columns) -> list[dict[str, Any]]:
     ]
 
 
-def _warnings(solution: Solution) -> Iterator[tuple[str, np.ndarray]]:
+def _warnings(solution: xr.Dataset) -> Iterator[tuple[str, np.ndarray]]:
     with np.errstate(invalid="ignore"):
         for i, name in enumerate(solution["contact"].values):
             margin = solution["bound_margin"].values[:, i]
             yield f"{name} is outside its bounds", margin < -BOUND_TOLERANCE
-            yield f"{name} lifts off", solution["lift_off"].values[:, i]
-        for variable, word in (("torque", "effort"), ("joint_rate", "speed")):
+            yield f"{name} loses contact", solution["contact_loss"].values[:, i]
+        for variable, word in (("effort", "effort"), ("joint_rate", "speed")):
             values, limits = solution[variable].values, drawn_limits(solution, variable)
             for i, name in enumerate(solution["chain"].values):
                 yield f"{name} is beyond its {word} limit", limits[i].beyond(values[:, i])
@@ -298,14 +297,14 @@ def sweep_section(found: xr.Dataset | None) -> Markup:
     return tag("section", tag("h2", "Sweep"), *pictures, *tables, id="sweep")
 
 
-def bands_section(solution: Solution) -> Markup:
+def bands_section(solution: xr.Dataset) -> Markup:
     """Efforts and contact forces with their bands, where the solution has some."""
     if "bands" not in solution.attrs:
         return Markup("")
     require("matplotlib", "figures")
     from ..figures import PLOTS
 
-    names = ["torque"] + ["contact_force"] * bool(solution.sizes["contact"])
+    names = ["effort"] + ["contact_force"] * bool(solution.sizes["contact"])
     pictures = [tag("p", _image(PLOTS[n](solution), f"Bands of {n}")) for n in names]
     return tag("section", tag("h2", "Bands over variants"), *pictures, id="bands")
 

@@ -18,7 +18,7 @@ from ..panel import panels_of
 from .page_columns import Envelope
 
 if TYPE_CHECKING:
-    from ...results.solution import Solution
+    import xarray as xr
 
 BUDGET = 3_400_000  # bytes of samples, so that a page of 5001 samples stays under 10 MB
 BUCKETS = 1200  # of an envelope: two of them a pixel of a wide plot
@@ -35,7 +35,7 @@ class Reduced:
     near a singularity.   duties: what each actuator does, of every sample too.
     """
 
-    solution: Solution
+    solution: xr.Dataset
     samples: np.ndarray
     envelope: Envelope | None
     status: np.ndarray
@@ -52,7 +52,7 @@ class Reduced:
         return int((self.status != 0).sum())
 
 
-def reduced(solution: Solution) -> Reduced:
+def reduced(solution: xr.Dataset) -> Reduced:
     """The solution as a page can carry it; one in a file is read piece by piece."""
     time, status = solution["time"].values, solution["status"].values
     count = len(time)
@@ -91,7 +91,7 @@ def reduced(solution: Solution) -> Reduced:
     return Reduced(_at(solution, samples), samples, envelope, status, time, near, meter.read())
 
 
-def curve_values(solution: Solution) -> dict[str, np.ndarray]:
+def curve_values(solution: xr.Dataset) -> dict[str, np.ndarray]:
     """What every panel of the page draws, (N,) by name of its column."""
     found: dict[str, np.ndarray] = {}
     for _, panel in panels_of(solution, every=True):
@@ -130,7 +130,7 @@ def _edges(status: np.ndarray, most: int = 200) -> np.ndarray:
     return np.concatenate([change, change + 1])
 
 
-def _at(solution: Solution, samples: np.ndarray) -> Solution:
+def _at(solution: xr.Dataset, samples: np.ndarray) -> xr.Dataset:
     """The solution at these samples; read in slices, since single rows of a file are slow."""
     import xarray as xr
 

@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from ...markers import MeasuredChannels
-    from ...results.solution import Solution
     from ..tables import Table
 
 _ASSETS = package_files(__package__) / "assets"
@@ -45,18 +44,15 @@ _ASSETS = package_files(__package__) / "assets"
 _SCRIPTS = "data theme clock geometry stage panels fields planes readout controls print main"
 
 
-NEEDED = ("torque", "lift_off", "status")
-
-
 @contextmanager
-def opened(path: str | os.PathLike[str]) -> Iterator[Solution]:
+def opened(path: str | os.PathLike[str]) -> Iterator[xr.Dataset]:
     """The solution in a NetCDF file, whose arrays stay there until they are read.
 
     Raises: InputError: if the file is missing or is not a condyle solution.
     """
     import xarray as xr
 
-    from ...results.solution import Solution, open_solution
+    from ...results.solution import as_solution, open_solution
 
     try:
         dataset = xr.open_dataset(path, engine="h5netcdf", cache=False)
@@ -64,14 +60,11 @@ def opened(path: str | os.PathLike[str]) -> Iterator[Solution]:
         yield open_solution(str(path))  # which says what is wrong
         return
     with dataset:
-        if "mechanism" in dataset.attrs and all(name in dataset for name in NEEDED):
-            yield Solution(dataset.data_vars, dataset.coords, dataset.attrs)
-        else:
-            yield open_solution(str(path))
+        yield as_solution(dataset, path)
 
 
 def write_report(
-    solution: Solution | str | os.PathLike[str],
+    solution: xr.Dataset | str | os.PathLike[str],
     path: str | os.PathLike[str],
     *,
     tables: Sequence[Table] | None = None,
@@ -88,7 +81,7 @@ def write_report(
             tables: of `condyle.report.tables`, to print on it; default: those that the solution
                 keeps, which `condyle compare` puts there.
             files: inputs of the run, to be named with their hashes.
-            measured: markers and EMG, as of `Solution.with_measured`, to show beside it.
+            measured: markers and EMG, as of `with_measured`, to show beside it.
             sweep: of `condyle.sweep`, to be shown too.
     Returns: the path.
     Raises: InputError: if a file cannot be read or the report cannot be written.
@@ -100,14 +93,14 @@ def write_report(
             if isinstance(solution, str | os.PathLike)
             else nullcontext(solution) as found
         ):
-            shown = found if measured is None else found.with_measured(measured)
+            shown = found if measured is None else found.condyle.with_measured(measured)
             page = report_html(shown, tables=tables, files=files, sweep=sweep)
         write_text(path, page)
     return Path(path)
 
 
 def report_html(
-    solution: Solution,
+    solution: xr.Dataset,
     *,
     tables: Sequence[Table] | None = None,
     files: Sequence[str | os.PathLike[str]] | None = None,
@@ -122,7 +115,7 @@ def report_html(
     page = reduced(solution)
     solution = page.solution
     scripts = [_lines(get_plotlyjs()), _script()]
-    name, options = solution.attrs["mechanism_name"], solution.options
+    name, options = solution.attrs["mechanism_name"], solution.condyle.options
     what = "Simulation" if options.get("motion_kind") == "simulation" else "Inverse dynamics"
     parts = {
         "policy": text(_policy(scripts)),
@@ -134,7 +127,7 @@ def report_html(
             f"{PurePath(options['motion']).name}; load: {PurePath(options['load']).name}"
         ),
         "version": text(solution.attrs.get("source", "condyle")),
-        "warnings": warnings_box(solution.warnings),
+        "warnings": warnings_box(solution.condyle.warnings),
         "facts": fact_cards(page),
         "failures": failure_table(page),
         "chains": chain_table(solution),
@@ -155,7 +148,7 @@ def _payload(page: Reduced) -> dict[str, Any]:
     solution = page.solution
     columns = Columns(solution["time"].values)
     drawn = machine(solution, columns)
-    names = solution.mechanism.chain_names
+    names = solution.condyle.mechanism.chain_names
     looks = dict(zip(names, styles(names), strict=True))
     panels = [
         panel_data(section, panel, columns, looks)

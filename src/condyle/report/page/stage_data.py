@@ -31,8 +31,9 @@ from ..scene.place import PLATFORM_JOINT
 from .page_columns import Columns
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from ...mechanism import Mechanism
-    from ...results.solution import Solution
 
 ARROW = 0.9  # longest arrow
 ONE_SCALE = 0.4  # of loads and contact forces, if the smaller ones are at least this part
@@ -41,9 +42,9 @@ ROUND = (1.0, 2.0, 5.0, 10.0)
 WIDE = (1.0, 99.0)  # percent of its samples that the picture must hold of each marker
 
 
-def machine(solution: Solution, columns: Columns) -> dict[str, Any]:
+def machine(solution: xr.Dataset, columns: Columns) -> dict[str, Any]:
     """Everything the 3D view draws."""
-    mechanism = solution.mechanism
+    mechanism = solution.condyle.mechanism
     scene = place(mechanism, solution["pose"].values, solution["joint"].values)
     parts = parts_of(mechanism, scene)
     size, (vertices, faces) = parts.size, parts.hull
@@ -179,10 +180,10 @@ def _scales(arrows: Sequence[Arrow], size: float) -> dict[str, dict[str, float]]
 
 
 def _contact_arrows(
-    solution: Solution, scene: Scene, parts: Parts, columns: Columns
+    solution: xr.Dataset, scene: Scene, parts: Parts, columns: Columns
 ) -> Iterator[Arrow]:
     forces = solution["contact_force"].values
-    for i, contact in enumerate(solution.mechanism.contacts):
+    for i, contact in enumerate(solution.condyle.mechanism.contacts):
         if contact.surface.known:
             normals = contact_normals(contact, scene.contacts[contact.name])
         else:
@@ -193,22 +194,22 @@ def _contact_arrows(
         yield Arrow("contact", contact.point, vector, parts.balls[contact.name], numbers)
 
 
-def _load_arrow(solution: Solution, columns: Columns) -> Iterator[Arrow]:
+def _load_arrow(solution: xr.Dataset, columns: Columns) -> Iterator[Arrow]:
     force = solution["load"].values[:, :3]
     if not np.nan_to_num(force).any():
         return
-    points = solution.mechanism.platform.points
-    at = points.get(solution.options["load_point"] or "", (0.0, 0.0, 0.0))
+    points = solution.condyle.mechanism.platform.points
+    at = points.get(solution.condyle.options["load_point"] or "", (0.0, 0.0, 0.0))
     names = solution["component"].values[:3]
     numbers = [columns.add(f"load.{name}", force[:, i]) for i, name in enumerate(names)]
     yield Arrow("load", at, force, 0.0, numbers)
 
 
-def _traces(solution: Solution) -> Iterator[dict[str, Any]]:
+def _traces(solution: xr.Dataset) -> Iterator[dict[str, Any]]:
     """Paths to draw: the guided landmark (else the incisor, else the first) and the balls."""
-    mechanism = solution.mechanism
+    mechanism = solution.condyle.mechanism
     points = mechanism.platform.points
-    wanted = [solution.options["landmark"], "incisor", *points]
+    wanted = [solution.condyle.options["landmark"], "incisor", *points]
     guide = next((name for name in wanted if name in points), "")
     yield {"name": guide or "platform centre", "at": list(points.get(guide, (0.0, 0.0, 0.0)))}
     for contact in mechanism.contacts:
@@ -228,7 +229,7 @@ def _rounded(length: float) -> float:
     return float(power * min(ROUND, key=lambda digit: abs(digit - length / power)))
 
 
-def markers(solution: Solution, columns: Columns) -> list[dict[str, Any]]:
+def markers(solution: xr.Dataset, columns: Columns) -> list[dict[str, Any]]:
     """Measured markers: name, body, and the numbers of the columns of its place."""
     if "marker_place" not in solution:
         return []
@@ -243,7 +244,7 @@ def markers(solution: Solution, columns: Columns) -> list[dict[str, Any]]:
     ]
 
 
-def reach(solution: Solution) -> np.ndarray:
+def reach(solution: xr.Dataset) -> np.ndarray:
     """Corners, (2 m, 3) [m], between which each marker mostly is."""
     if "marker_place" not in solution:
         return np.empty((0, 3))

@@ -23,7 +23,7 @@ def differences(comparison: Comparison) -> Table:
             {
                 "first": pair.first.label,
                 "second": pair.second.label,
-                "torque": pair.torque,
+                "effort": pair.effort,
                 "contact_force": pair.contact_force if _has_forces(pair.first) else None,
             }
             for pair in pairs
@@ -32,8 +32,8 @@ def differences(comparison: Comparison) -> Table:
             others = [pair for pair in pairs if run in (pair.first, pair.second)]
             if others:
                 contact = f"{max(pair.contact_force for pair in others):.1e}"
-                torque = f"{max(pair.torque for pair in others):.1e}"
-                rows.append([run.label, torque, contact if _has_forces(run) else NOTHING])
+                effort = f"{max(pair.effort for pair in others):.1e}"
+                rows.append([run.label, effort, contact if _has_forces(run) else NOTHING])
     notes = [
         "Each model against all others on the same motion: the largest difference of any torque "
         "and contact force, divided by the largest component along the motion.",
@@ -48,7 +48,7 @@ def _has_forces(run: Run) -> bool:
 
 
 def _what(comparison: Comparison) -> str:
-    options = comparison.solution.options
+    options = comparison.solution.condyle.options
     name = comparison.solution.attrs["mechanism_name"]
     motion = PurePath(options["motion"]).name
     return f"{name}, {motion}, {comparison.samples} samples"
@@ -238,7 +238,7 @@ def _beside(entry: dict[str, Any], form: str) -> str:
 
 
 def _notes_2(comparison: Comparison, beside: bool) -> Iterator[str]:
-    options = comparison.solution.options
+    options = comparison.solution.condyle.options
     formulation = comparison.runs[0].label
     yield (
         f"[Cheng2023] eq. (67): mean over {comparison.samples} samples of the 2-norm over the "

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ...motion import write_table
 
 if TYPE_CHECKING:
-    from ...results.solution import Solution
+    import xarray as xr
 
 NOTHING = "-"
 WIDTH = 100  # of notes in plain text
@@ -88,7 +88,7 @@ def _cell(record: dict[str, Any], told: Cell) -> str:
     return NOTHING if value is None or value == "" else format(value, form)
 
 
-def with_tables(solution: Solution, tables: Sequence[Table]) -> Solution:
+def with_tables(solution: xr.Dataset, tables: Sequence[Table]) -> xr.Dataset:
     """A copy of the solution that keeps the tables, as text, through NetCDF and back."""
     kept = [{field: getattr(table, field) for field in _FIELDS} for table in tables]
     copy = type(solution)(solution.data_vars, solution.coords, solution.attrs)
@@ -96,7 +96,7 @@ def with_tables(solution: Solution, tables: Sequence[Table]) -> Solution:
     return copy
 
 
-def kept_tables(solution: Solution) -> list[Table]:
+def kept_tables(solution: xr.Dataset) -> list[Table]:
     """The tables that `with_tables` put there; their records, for programs, are not kept."""
     return [
         Table(records=[], **table | {"columns": tuple(table["columns"])})

@@ -12,7 +12,7 @@ from .report_table import Table
 def tradeoff_table(found: Tradeoff) -> Table:
     """A row a weight: effort, greatest activation, and the load on the contacts."""
     solution = found.solution
-    names = solution.mechanism.contact_names
+    names = solution.condyle.mechanism.contact_names
     records: list[dict[str, Any]] = []
     for p, weight in enumerate(found.weights):
         record = {
@@ -35,7 +35,7 @@ def tradeoff_table(found: Tradeoff) -> Table:
         cells[f"{name} [N]"] = lambda r, n=name: f"{r[f'mean_{n}']:.4g} ({r[f'peak_{n}']:.4g})"
     title = (
         f"Effort against load on the contacts: {solution.attrs['mechanism_name']}, "
-        f"{PurePath(solution.options['motion']).name}, {found.samples} samples"
+        f"{PurePath(solution.condyle.options['motion']).name}, {found.samples} samples"
     )
     notes = [
         "Least is sum (effort/limit)^2 + W sum (force/N_ref)^2, W in the first column, N_ref = "

@@ -25,7 +25,7 @@ function readoutTable(caption, header, prefixes) {
       if (!line) return;
       const value = element("span", { class: "value" });
       cell.append(value);
-      const limit = prefixes[n].startsWith("torque") ? line.panel.limits.find((l) => l.of.includes(name)) : null;
+      const limit = prefixes[n].startsWith("effort") ? line.panel.limits.find((l) => l.of.includes(name)) : null;
       const bar = limit ? element("span", { class: "use", title: limit.label }, element("i")) : null;
       if (bar) cell.append(bar);
       readoutCells.push({ value, bar, line, limit });
@@ -40,8 +40,8 @@ function fillReadout() {
   const units = (prefix) => [...new Set(payload.panels.filter((p) => p.id.startsWith(prefix)).map((p) => p.unit))].join(", ");
   document.getElementById("readout").append(
     ...readoutTable("Chains at the cursor",
-      ["Chain", `joint [${units("joint-")}]`, `speed [${units("joint_rate-")}]`, `effort [${units("torque-")}]`],
-      ["joint-", "joint_rate-", "torque-"]),
+      ["Chain", `joint [${units("joint-")}]`, `speed [${units("joint_rate-")}]`, `effort [${units("effort-")}]`],
+      ["joint-", "joint_rate-", "effort-"]),
     ...readoutTable("Contacts at the cursor", ["Contact", "force [N]", "to the bounds [mm]"], ["contact-force", "bound-margin"]),
   );
 }
