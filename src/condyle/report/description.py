@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.map.room import ball_around_home
+from ..analysis.map.free_space import ball_around_home
 from ..kinematics.chain import FAMILIES
 from ..kinematics.singularities import KINDS
 from ..mechanism.actuator import Limits
