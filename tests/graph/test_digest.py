@@ -16,7 +16,8 @@ from support.cases import case
 import condyle
 from condyle.graph.graph import Graph
 from condyle.graph.program import Check, Interface, Output, Port, Program, Variants
-from condyle.questions import QUESTIONS, Prescribed, Question
+from condyle.questions import QUESTIONS, Question
+from condyle.questions.closure import Prescribed
 from condyle.questions.structure import structure_of
 from condyle.status import Status
 
@@ -114,7 +115,8 @@ def test_an_interface_survives_json() -> None:
 
 DIGESTS = """
 from support.cases import case
-from condyle.questions import QUESTIONS, Prescribed, Question
+from condyle.questions import QUESTIONS, Question
+from condyle.questions.closure import Prescribed
 from condyle.questions.law import CONTROLLERS
 from condyle.questions.structure import structure_of
 structure = structure_of(case("mixed_k2_n8").mechanism)

@@ -12,8 +12,8 @@ from typing import Any
 from ..errors import InputError, did_you_mean
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..model.distributing import LEAST
-from ..questions import Prescribed
 from ..questions.allocation import TERMS
+from ..questions.closure import Prescribed
 from ..questions.law import CONTROLLERS, ControllerTable
 from ..questions.law.computed_torque import ComputedTorque
 from ..questions.observer import ITERATIONS as OBSERVER_STEPS

@@ -21,7 +21,8 @@ from ..mechanism.home import (
     usable_sets,
 )
 from ..mechanism.mechanism import COORDINATES, Mechanism
-from ..questions import Prescribed, Question
+from ..questions import Question
+from ..questions.closure import Prescribed
 from ..questions.numbers import Layout, characteristic, specialised
 from ..questions.structure import Structure, structure_of
 from ..status import Status

@@ -17,7 +17,8 @@ from ..backends.numpy_kernel import NumpyKernel
 from ..dynamics.minimum_norm import minimum_norm
 from ..graph.program import Numbers
 from ..kinematics.singularities import SINGULAR, ratio
-from ..questions import Prescribed, Question
+from ..questions import Question
+from ..questions.closure import Prescribed
 from ..questions.numbers import characteristic
 from ..questions.structure import Structure
 from ..status import Status, judge

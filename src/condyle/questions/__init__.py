@@ -10,54 +10,49 @@ import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from importlib import import_module
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from ..graph.program import Program, Variants
-from .allocation import allocation
-from .closure import Prescribed, closure, conditions
-from .configuration import configuration
-from .forward import forward, forward_system
-from .instant import energy, instant
-from .inverse import balance, inverse, motion, system
-from .limited import limited
-from .linear import linear
-from .matrices import jacobians, matrices
-from .observer import observer
-from .pose import encoders, pose
-from .rate import rate
-from .reactions import reactions
 from .structure import Structure
-from .survey import survey
-from .tick import tick
 
-QUESTIONS: dict[str, Callable[..., Program | Variants]] = {
-    "allocation": allocation,
-    "inverse": inverse,
-    "limited": limited,
-    "forward": forward,
-    "forward_system": forward_system,
-    "motion": motion,
-    "balance": balance,
-    "system": system,
-    "linear": linear,
-    "closure": closure,
-    "conditions": conditions,
-    "configuration": configuration,
-    "survey": survey,
-    "encoders": encoders,
-    "pose": pose,
-    "instant": instant,
-    "energy": energy,
-    "matrices": matrices,
-    "jacobians": jacobians,
-    "reactions": reactions,
-    "rate": rate,
-    "observer": observer,
-    "tick": tick,
+# Name -> the file in this folder that writes it, or the function itself if it is from outside.
+QUESTIONS: dict[str, str | Callable[..., Program | Variants]] = {
+    "allocation": "allocation",
+    "inverse": "inverse",
+    "limited": "limited",
+    "forward": "forward",
+    "forward_system": "forward",
+    "motion": "inverse",
+    "balance": "inverse",
+    "system": "inverse",
+    "linear": "linear",
+    "closure": "closure",
+    "conditions": "closure",
+    "configuration": "configuration",
+    "survey": "survey",
+    "encoders": "pose",
+    "pose": "pose",
+    "instant": "instant",
+    "energy": "instant",
+    "matrices": "matrices",
+    "jacobians": "matrices",
+    "reactions": "reactions",
+    "rate": "rate",
+    "observer": "observer",
+    "tick": "tick",
 }
+
+
+def written(name: str) -> Callable[..., Program | Variants]:
+    """The function that writes a question; its file opens when it is first wanted."""
+    home = QUESTIONS[name]
+    return getattr(import_module(f".{home}", __name__), name) if isinstance(home, str) else home
+
+
 # What shapes a graph: the rooms that a question is written in.
 SOURCES = ("mechanism", "kinematics", "dynamics", "graph", "questions")
 # Questions that formulation and route make no difference to.
@@ -105,7 +100,7 @@ class Question:
 
     def variants(self) -> Variants:
         """The graph."""
-        found = QUESTIONS[self.name](self.structure, *self.details)
+        found = written(self.name)(self.structure, *self.details)
         return found if isinstance(found, Variants) else Variants(found)
 
 
@@ -133,4 +128,4 @@ def _sources() -> str:
     return h.hexdigest()
 
 
-__all__ = ["QUESTIONS", "Prescribed", "Question"]
+__all__ = ["QUESTIONS", "Question"]
