@@ -37,6 +37,9 @@ _HOMES = {
     "reference_motion": "motion",
     "trial_motion": "motion",
     "open_solution": "results.solution",
+    "forward_states": "results.forward_rows",
+    "pose_states": "results.pose_rows",
+    "solve_states": "results.inverse_rows",
     "Scenario": "simulation",
     "load_scenario": "simulation",
     "simulate": "simulation",
@@ -45,6 +48,7 @@ _HOMES = {
     "workspace_map": "analysis.map",
     "workspace_size": "analysis.map",
     "open_map": "analysis.map",
+    "run": "analysis.run_motion",
     "Study": "analysis.sweep",
     "sweep": "analysis.sweep",
     "export_c": "export.c_package",
@@ -55,6 +59,7 @@ _HOMES = {
 
 if TYPE_CHECKING:
     from .analysis.map import open_map, workspace_map, workspace_size
+    from .analysis.run_motion import run
     from .analysis.sweep import Study, sweep
     from .errors import (
         CondyleError,
@@ -75,6 +80,9 @@ if TYPE_CHECKING:
     from .mechanism import Mechanism, bundled_mechanisms, dump, dumps, load_mechanism
     from .model.model import Model, derive
     from .motion import Load, Motion, reference_load, reference_motion, trial_motion
+    from .results.forward_rows import forward_states
+    from .results.inverse_rows import solve_states
+    from .results.pose_rows import pose_states
     from .results.solution import open_solution
     from .simulation import Scenario, load_scenario, simulate, simulate_all
 

@@ -106,6 +106,19 @@ class UnsupportedError(CondyleError):
     """A combination of options that has no meaning; the message names one that has."""
 
 
+class WarningError(CondyleError):
+    """Warnings, where they are asked to be errors (`--strict`).
+
+    Attributes: warnings: all of them.
+    """
+
+    facts = ("warnings",)
+
+    def __init__(self, warnings: Iterable[str]) -> None:
+        self.warnings = list(warnings)
+        super().__init__("; ".join(self.warnings) + ".", "Without --strict this is a warning")
+
+
 class MissingExtraError(CondyleError):
     """A package that is not installed, because only part of condyle needs it.
 
@@ -205,10 +218,6 @@ class JammedError(SampleError):
 
 class UncertifiedError(SampleError):
     """Efforts that were found, but not within the accuracy that is promised."""
-
-
-class BoundsError(SampleError):
-    """A contact outside its bounds, where that was asked to be an error."""
 
 
 def did_you_mean(name: object, available: Iterable[str]) -> str:

@@ -17,7 +17,7 @@ from condyle.backends.threads import shared_out
 from condyle.errors import InputError
 from condyle.model.model import Model
 from condyle.results import state_rows
-from condyle.results.inverse_rows import solve_file
+from condyle.results.inverse_rows import solve_states
 
 
 @pytest.fixture(scope="module", params=["masticatory", "masticatory-curved"])
@@ -145,7 +145,7 @@ def test_rows_of_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     texts = []
     for rows in (65536, 100, 33):
         monkeypatch.setattr(state_rows, "CHUNK_ROWS", rows)
-        solve_file(model, path, tmp_path / "out.csv")
+        solve_states(model, path, tmp_path / "out.csv")
         texts.append((tmp_path / "out.csv").read_text())
     assert texts[1] == texts[0] and texts[2] == texts[0]
 

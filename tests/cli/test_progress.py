@@ -23,7 +23,8 @@ from condyle.motion import Motion, iter_table
 from condyle.progress import Advance, step, watched_by
 from condyle.report.figures import save_figures, save_solution_figures
 from condyle.report.page import write_report
-from condyle.results.inverse_rows import solve_file
+from condyle.results.inverse_rows import solve_states
+from condyle.results.state_rows import StatesReport
 
 pty = pytest.importorskip("pty", reason="terminals of this kind are on Unix only")
 PATIENCE = 60  # seconds for a picture that never comes
@@ -120,14 +121,14 @@ def test_a_bar_of_a_command(
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv("CONDYLE_BACKEND", "numpy")
 
-    def solve(*_: Any, **options: Any) -> tuple[int, list[str], None]:
+    def solve(*_: Any, **options: Any) -> StatesReport:
         with step("solving a file", 10) as advance:
             advance(4)
             if switch is None:
                 terminal.wait_for("40%")
-        return 10, [], None
+        return StatesReport({"rows": 10, "warnings": [], "files": []})
 
-    monkeypatch.setattr("condyle.results.inverse_rows.solve_file", solve)
+    monkeypatch.setattr("condyle.results.inverse_rows.solve_states", solve)
     on_terminal()
     words = ("solve", "masticatory", "--states", "a.csv", "--out", "b.csv")
     outcome = condyle_command(*words, *([switch] if switch else ()))
@@ -187,7 +188,7 @@ def test_rows_of_a_file(watcher: Watcher, tmp_path: Path) -> None:
     """Progress is by bytes of the file, to its end."""
     states = tmp_path / "states.csv"
     np.savetxt(states, np.zeros((50, 12)), delimiter=",", header=",".join(STATES), comments="")
-    solve_file(interpreted(), states, tmp_path / "out.csv")
+    solve_states(interpreted(), states, tmp_path / "out.csv")
     assert "deriving the equations" in watcher.steps
     total, done = watcher.steps["solving states.csv"]
     header = len(",".join(STATES)) + 1
@@ -239,12 +240,12 @@ def test_building_a_kernel(
 
 
 def test_finding_poses(watcher: Watcher, tmp_path: Path) -> None:
-    from condyle.results.pose_rows import pose_file
+    from condyle.results.pose_rows import pose_states
 
     mechanism = condyle.load_mechanism("masticatory")
     joints = tmp_path / "joints.csv"
     joints.write_text(",".join(f"joint_{n}" for n in mechanism.chain_names) + "\n0,0,0,0,0,0\n")
-    pose_file(mechanism, joints, tmp_path / "out.csv")
+    pose_states(mechanism, joints, tmp_path / "out.csv")
     assert "finding poses" in watcher.steps
 
 

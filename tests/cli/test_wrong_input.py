@@ -204,8 +204,16 @@ CASES: dict[str, Case] = {
         "times must rise",
     ),
     "joints that disagree": (POSE, table(JOINTS, [[1e-3] + [0] * 5]), "raise --tolerance"),
-    "all poses and flags": ((*POSE, "--all", "--flag"), table(JOINTS, [[0] * 6]), "leave out --fl"),
-    "seed of no search": ((*POSE, "--seed", "1"), table(JOINTS, [[0] * 6]), "--seed is of the se"),
+    "all poses and flags": (
+        (*POSE, "--all", "--flag"),
+        table(JOINTS, [[0] * 6]),
+        "--all and --flag",
+    ),
+    "seed of no search": (
+        (*POSE, "--seed", "1"),
+        table(JOINTS, [[0] * 6]),
+        "--seed requires --all",
+    ),
     "tolerance below zero": ((*POSE, "--tolerance", "-1"), table(JOINTS, [[0] * 6]), "tolerance"),
     "tolerance without end": (
         (*POSE, "--tolerance", "inf"),

@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 
 import condyle
-from condyle.errors import BoundsError, MechanismError, NumberRangeError, UnreachableError
+from condyle.errors import MechanismError, NumberRangeError, UnreachableError, WarningError
 from condyle.model.data import require_ok
 from condyle.motion import Motion
 from condyle.status import STATUS_NAMES, Status, judge
@@ -119,7 +119,7 @@ def test_errors_carry_what_they_say(model: condyle.Model) -> None:
     assert "--flag" in error.hint and "--flag" not in error.message
     facts = json.loads(json.dumps(error.to_dict()))
     assert facts["kind"] == "unreachable" and facts["chain"] == error.chain
-    for one in (error, MechanismError("a.toml", ["x: bad"]), BoundsError("out", contact="a")):
+    for one in (error, MechanismError("a.toml", ["x: bad"]), WarningError(["out"])):
         again = pickle.loads(pickle.dumps(one))
         assert (type(again), str(again), vars(again)) == (type(one), str(one), vars(one))
 

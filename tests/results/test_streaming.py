@@ -18,7 +18,7 @@ from support.children import PATIENCE, end, start, wait_for
 from condyle.errors import CondyleError
 from condyle.model.model import Model
 from condyle.results import inverse_rows, state_rows
-from condyle.results.inverse_rows import solve_file
+from condyle.results.inverse_rows import solve_states
 
 NAME = "masticatory"
 CHUNK = 200
@@ -70,7 +70,7 @@ def peak(model: Model, folder: Path, count: int) -> int:
     gc.collect()
     tracemalloc.start()
     try:
-        assert solve_file(model, path, folder / "out.csv")[0] == count
+        assert solve_states(model, path, folder / "out.csv").data["rows"] == count
         return tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
@@ -80,16 +80,16 @@ def peak(model: Model, folder: Path, count: int) -> int:
 @pytest.mark.usefixtures("unoptimised")
 def test_memory_does_not_grow(backend: str, tmp_path: Path) -> None:
     model = Model(case(NAME).mechanism, backend=backend)
-    solve_file(model, write(tmp_path / "first.csv", CHUNK), tmp_path / "out.csv")
+    solve_states(model, write(tmp_path / "first.csv", CHUNK), tmp_path / "out.csv")
     few, many = (peak(model, tmp_path, count) for count in (3 * CHUNK, 15 * CHUNK))
     assert many < 1.5 * few
 
 
 def test_as_in_one_piece(model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write(tmp_path / "states.csv", 2 * CHUNK + 7)
-    solve_file(model, path, tmp_path / "pieces.csv")
+    solve_states(model, path, tmp_path / "pieces.csv")
     monkeypatch.setattr(state_rows, "CHUNK_ROWS", 65536)
-    solve_file(model, path, tmp_path / "whole.csv")
+    solve_states(model, path, tmp_path / "whole.csv")
     assert (tmp_path / "pieces.csv").read_bytes() == (tmp_path / "whole.csv").read_bytes()
     assert names(tmp_path) == ["pieces.csv", "states.csv", "whole.csv"]
 
@@ -118,7 +118,7 @@ def test_a_bad_row_late(model: Model, tmp_path: Path, kind: str, old: str | None
     if old:
         out.write_text(old)
     with pytest.raises(CondyleError) as failure:
-        solve_file(model, path, out)
+        solve_states(model, path, out)
     assert said in str(failure.value)
     assert names(tmp_path) == (["out.csv"] if old else []) + ["states.csv"]
     assert not old or out.read_text() == old
@@ -126,7 +126,7 @@ def test_a_bad_row_late(model: Model, tmp_path: Path, kind: str, old: str | None
 
 def test_bad_rows_late_that_are_kept(model: Model, tmp_path: Path) -> None:
     path = write(tmp_path / "states.csv", 900, row_733=LATE["unreachable"][0])
-    assert solve_file(model, path, tmp_path / "out.csv", flag=True)[0] == 900
+    assert solve_states(model, path, tmp_path / "out.csv", flag=True).data["rows"] == 900
     lines = (tmp_path / "out.csv").read_text().splitlines()
     assert len(lines) == 901 and lines[733].endswith(",unreachable,chain temporalis_left")
     assert all(line.endswith(",ok,") for i, line in enumerate(lines) if i not in (0, 733))
@@ -134,7 +134,7 @@ def test_bad_rows_late_that_are_kept(model: Model, tmp_path: Path) -> None:
 
 def test_warnings_count_rows_of_the_file(model: Model, tmp_path: Path) -> None:
     path = write(tmp_path / "states.csv", 900, row_733="0,0.004" + ",0" * 10)
-    _, warnings, _ = solve_file(model, path, tmp_path / "out.csv")
+    warnings = solve_states(model, path, tmp_path / "out.csv").data["warnings"]
     assert any("in 1 rows" in text and "in row 733" in text for text in warnings)
 
 
@@ -154,7 +154,7 @@ def test_interrupted(
     path = write(tmp_path / "states.csv", 900)
     (tmp_path / "out.csv").write_text("old")
     with pytest.raises(type(error)):
-        solve_file(model, path, tmp_path / "out.csv")
+        solve_states(model, path, tmp_path / "out.csv")
     assert len(calls[-1]) == 3  # the temporary file was there
     assert names(tmp_path) == ["out.csv", "states.csv"]
     assert (tmp_path / "out.csv").read_text() == "old"

@@ -11,14 +11,13 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.errors import BoundsError
 from condyle.kinematics.singularities import Singularity
 from condyle.mechanism import bundled_text, parse
 from condyle.mechanism.chain import limits
 from condyle.motion import Motion
 from condyle.results.derived import Derived
 from condyle.results.summary import summarize
-from condyle.results.warnings import KINDS, Notice, Watch, refuse
+from condyle.results.warnings import KINDS, Watch
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "errors.md"
 
@@ -98,15 +97,6 @@ def test_limits_of_every_family() -> None:
         effort = stated.get("torque_limit", stated.get("force_limit"))
         effort, speed = (np.inf if v is None else v for v in (effort, stated["speed_limit"]))
         assert limits(chain) == (-effort, effort, speed)
-
-
-def test_strict_goes_by_kind_not_by_words() -> None:
-    said = "leaves its bounds"
-    refuse([Notice("effort_limit", f'chain "{said}": effort reaches 4, above its limit of 3')])
-    with pytest.raises(BoundsError, match="anything at all") as caught:
-        refuse([Notice("bounds", "anything at all", "left", time=0.5, value=1e-3, bound=0.0)])
-    assert (caught.value.contact, caught.value.time, caught.value.value) == ("left", 0.5, 1e-3)
-    assert "--strict" in caught.value.hint
 
 
 def test_rounding_is_no_alarm() -> None:

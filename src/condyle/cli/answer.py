@@ -13,6 +13,7 @@ from typing import Any, Literal
 import typer
 
 from ..errors import printable
+from .options import Group
 
 FEW = 4  # files that a line names
 
@@ -26,12 +27,14 @@ class Answer:
     then: what to try next, a command that works as it stands.
     kind: "summary" of files that were written, which --quiet leaves out; "result", asked for
           itself; or "document", to be sent to a file, so that nothing else stands on stdout.
+    failed: the exit status is 1, though nothing went wrong: the answer is no.
     """
 
     text: str
     data: Mapping[str, Any]
     then: str
     kind: Literal["summary", "result", "document"] = "summary"
+    failed: bool = False
 
     def give(self, quiet: bool, as_json: bool) -> None:
         """Print it."""
@@ -52,8 +55,16 @@ def files_line(files: list[Path]) -> str:
 
 
 def command_line(command: str, *words: object, **options: object) -> str:
-    """A command to copy into a shell; options that are None or False are left out."""
-    parts = ["condyle", command, *map(str, words)]
+    """A command to copy into a shell; options that are None or False are left out.
+
+    Args: words: arguments, and groups of options, of which those are said that were given.
+    """
+    parts = ["condyle", command]
+    for word in words:
+        if isinstance(word, Group):
+            options = word.given() | options
+        else:
+            parts.append(str(word))
     for name, value in options.items():
         if value is not None and value is not False:
             parts.append(f"--{name.replace('_', '-')}")

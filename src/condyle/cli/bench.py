@@ -1,4 +1,4 @@
-"""condyle bench: how fast, beside other engines."""
+"""condyle bench: speed of this machine, next to other engines."""
 
 from __future__ import annotations
 
@@ -8,28 +8,30 @@ import sys
 from contextlib import ExitStack
 from pathlib import Path
 from types import ModuleType
+from typing import Annotated
 
 from ..errors import UnsupportedError
 from .answer import Answer, files_line
 from .command import UPKEEP, command
 from .inputs import output_folder
+from .options import option
 
 
 @command(UPKEEP, example="condyle bench --seconds 0.2 --out bench.json")
 def bench(
     out: Path | None = None,
-    seconds: float = 1.0,
+    seconds: Annotated[float, option(min=0.01, max=600)] = 1.0,
     realtime: bool = False,
 ) -> Answer:
-    """How fast it is on this machine.
+    """Benchmark this machine.
 
-    One table: every way to compute, on one core, and other engines. It runs in the repository.
+    One table of every method and of other engines, on one core. It runs in the repository only.
 
     Options:
         out: JSON file for the results.
-        realtime: Instead: exported C in a loop of 1, 5, 10 and 20 kHz, beside an empty one: how
-            late ticks are, the longest, and those missed.
-        seconds: How long each row of the table is timed (s).
+        realtime: Benchmark exported C in loops of 1, 5, 10 and 20 kHz instead: latency of ticks,
+            the longest, and missed ones, next to an empty loop.
+        seconds: Time for each row of the table (s).
     """
     from ..atomic import replacing
     from ..mechanism import load_mechanism

@@ -10,12 +10,12 @@ from .command import UPKEEP, command
 def cache(
     clear: bool = False,
 ) -> Answer:
-    """Compiled code kept on disk: show or clear it.
+    """Show or clear the compiled kernels on disk.
 
-    It is built when it is first needed, in a second or two, and then found again.
+    A kernel is compiled when it is first needed, in a second or two, and then reused.
 
     Options:
-        clear: Remove all of it.
+        clear: Remove all kernels.
     """
     from ..backends import cache as kernels
 

@@ -1,4 +1,4 @@
-"""condyle check: what a mechanism is, and what is wrong with it."""
+"""condyle check: summary of a mechanism, or what is wrong with it."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from .inputs import warn
 
 @command(BEGIN, example="condyle check jaw.toml")
 def check(mechanism: options.Mechanism, project: bool = False) -> Answer:
-    """What a mechanism is, or all that is wrong with its file.
+    """Summary of a mechanism, or every mistake in its file.
 
-    Its chains, contacts and freedoms, sizes, masses, gravity and limits, how near it is to a
-    singular pose where it starts, and a warning where numbers do not go together.
+    Chains, contacts, degrees of freedom, sizes, masses, gravity, limits, distance from a
+    singularity at home, and a warning for implausible numbers.
 
     Options:
-        project: Where contact points are off their surfaces: show the nearest home on them.
+        project: If contact points are off their surfaces, show the nearest home that is on them.
     """
     import condyle
 

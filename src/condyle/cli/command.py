@@ -1,7 +1,7 @@
 """What a command is: a function that does its work and returns an `Answer`.
 
-That the answer is printed for people, as JSON or not at all, and that a bar shows how far the
-work is, is the same for all and stands here.
+That the answer is printed for people, as JSON or not at all, that warnings may be errors, and that
+a bar shows how far the work is, is the same for all and stands here.
 """
 
 from __future__ import annotations
@@ -9,15 +9,19 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Iterator
+from copy import copy
+from dataclasses import fields, is_dataclass
 from functools import wraps
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any, get_args, get_type_hints
 
 import typer
+from typer.models import OptionInfo
 
 from ..version import __version__
 from . import completion, options
 from .answer import Answer
 from .bar import progress_bar
+from .inputs import strictly
 
 # The chapters of the help page.
 BEGIN, COMPUTE, LOOK, UPKEEP = "Begin", "Compute", "Look", "Upkeep"
@@ -28,15 +32,24 @@ app = typer.Typer(
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
     help=(
-        "Motor torques and contact forces of parallel robots whose platform also touches the "
-        "base, as a jaw does."
+        "Dynamics of parallel robots whose platform is also constrained by point contacts with "
+        "the base, as a jaw is: actuator efforts, contact forces, poses, simulation, C code."
     ),
     epilog="Start with [bold]condyle run[/bold]: it solves the bundled chewing robot. "
-    "[bold]condyle COMMAND --help[/bold] shows units and an example.",
+    "[bold]condyle COMMAND --help[/bold] shows units and an example. Every command takes "
+    "[bold]--strict[/bold]: warnings are errors then.",
 )
 
 Command = Callable[..., Answer]
 OPTION = re.compile(r"^ {4}(\w+): (.+(?:\n {8}.+)*)", re.MULTILINE)  # of a docstring
+SWITCHES = [
+    inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
+    for name, kind in (
+        ("quiet", options.Quiet),
+        ("as_json", options.Json),
+        ("strict", options.Strict),
+    )
+]
 
 
 def group(name: str, chapter: str, help: str) -> typer.Typer:
@@ -49,27 +62,38 @@ def group(name: str, chapter: str, help: str) -> typer.Typer:
 def command(
     chapter: str, *, example: str, of: typer.Typer = app, name: str | None = None
 ) -> Callable[[Command], Command]:
-    """Register a function as the command of its name, with `--quiet` and `--json` as well.
+    """Register a function as the command of its name, with the switches that every command has.
 
-    Its docstring says what its options are for, below "Options:"; those that several commands
-    share are in `options`.
+    Its parameters are the command's arguments and options; one whose type is a group of `options`
+    stands for all of its fields. What options of its own are for is said by its docstring, below
+    "Options:".
 
     Args: chapter: of the help page;  example: one line to copy, shown below the options.
           of: the family it belongs to;  name: where it is not the function's.
     """
 
     def register(work: Command) -> Command:
+        hints = get_type_hints(work)
+        del hints["return"]
+        groups: dict[str, Any] = {n: kind for n, kind in hints.items() if is_dataclass(kind)}
+
         @wraps(work)
-        def shown(*, quiet: bool, as_json: bool, **given: Any) -> None:
-            with progress_bar(not quiet and not as_json):
+        def shown(*, quiet: bool, as_json: bool, strict: bool, **given: Any) -> None:
+            for name, group in groups.items():
+                given[name] = group(**{one.name: given.pop(one.name) for one in fields(group)})
+            with progress_bar(not quiet and not as_json), strictly(strict):
                 answer = work(**given)
             answer.give(quiet, as_json)
+            if answer.failed:
+                raise typer.Exit(1)
 
         # The help page breaks lines where the terminal ends, not where the source does.
-        text, _, told = inspect.cleandoc(work.__doc__ or "").partition("\n\nOptions:\n")
+        text, _, said = inspect.cleandoc(work.__doc__ or "").partition("\n\nOptions:\n")
         shown.__doc__ = "\n\n".join(" ".join(part.split()) for part in text.split("\n\n"))
-        helps = {name: " ".join(words.split()) for name, words in OPTION.findall(told)}
-        _take(shown, work, helps, quiet=options.Quiet, as_json=options.Json)
+        helps = {name: " ".join(words.split()) for name, words in OPTION.findall(said)}
+        parameters = [*_parameters(work, helps), *SWITCHES]
+        shown.__annotations__ = {one.name: one.annotation for one in parameters}
+        shown.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
         of.command(name, rich_help_panel=chapter, epilog=f"Example: {example}")(shown)
         return work
 
@@ -85,30 +109,28 @@ def registered() -> Iterator[tuple[str, Any]]:
             yield family + (one.name or one.callback.__name__), one
 
 
-def _take(
-    shown: Callable[..., None], work: Command, helps: dict[str, str], **switches: Any
-) -> None:
-    """Give `shown` the parameters of `work` as options, and some switches."""
-    hints = get_type_hints(work, include_extras=True) | switches
-    hints.pop("return", None)
-    parameters = list(inspect.signature(work).parameters.values())
-    for one in parameters:
-        if not hasattr(hints[one.name], "__metadata__"):
-            hints[one.name] = Annotated[hints[one.name], _option(one, helps)]
-    switch = inspect.Parameter.KEYWORD_ONLY
-    parameters += [inspect.Parameter(name, switch, default=False) for name in switches]
-    parameters = [one.replace(annotation=hints[one.name]) for one in parameters]
-    shown.__annotations__ = hints
-    shown.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+def _parameters(work: Callable[..., Any], helps: dict[str, str]) -> Iterator[inspect.Parameter]:
+    """Arguments and options of a function, groups as their fields, each as typer wants it."""
+    hints = get_type_hints(work, include_extras=True)
+    for one in inspect.signature(work).parameters.values():
+        kind = hints[one.name]
+        if is_dataclass(kind):
+            yield from _parameters(kind, helps)  # type: ignore[arg-type]
+        else:
+            made = one.replace(kind=inspect.Parameter.KEYWORD_ONLY)
+            yield made.replace(annotation=_annotated(made, kind, helps))
 
 
-def _option(one: inspect.Parameter, helps: dict[str, str]) -> Any:
-    """A switch that is off has no opposite."""
-    usual = f"--{one.name.replace('_', '-')}" if one.default is False else None
-    names = [name for name in (options.NAMES.get(one.name, usual),) if name]
-    text = helps.get(one.name) or options.HELP[one.name]
-    offered, numbers = completion.OFFERED.get(one.name), options.RANGE.get(one.name, {})
-    return typer.Option(*names, help=text, autocompletion=offered, **numbers)
+def _annotated(one: inspect.Parameter, kind: Any, helps: dict[str, str]) -> Any:
+    """A type with typer's description of the option; a switch that is off has no opposite."""
+    kind, info = (get_args(kind)) if hasattr(kind, "__metadata__") else (kind, options.option())
+    if isinstance(info, OptionInfo):
+        info = copy(info)
+        info.help = info.help or helps[one.name]
+        info.autocompletion = info.autocompletion or completion.OFFERED.get(one.name)
+        if one.default is False and info.default is ... and not info.param_decls:
+            info.param_decls = (f"--{one.name.replace('_', '-')}",)
+    return Annotated[kind, info]
 
 
 def _version(value: bool) -> None:

@@ -15,12 +15,12 @@ import typer
 
 FORMULATIONS = ("virtual_power", "momentum", "lagrange", "hessian", "newton_euler")
 ROUTES = ("core", "direct")
-DISTRIBUTIONS = {  # name -> what is least, and subject to what
-    "minimum_norm": "sum of squares; no limits",
-    "bounded": "the same within limits, where one-sided contacts push",
-    "weighted": "sum of squares of efforts over their limits, within them",
-    "cubic": "sum of their cubes: muscles, which only pull",
-    "minimax": "the largest of them, then weighted",
+DISTRIBUTIONS = {  # name -> objective, and constraints
+    "minimum_norm": "sum of squared efforts; no limits",
+    "bounded": "the same within limits, unilateral contacts in compression",
+    "weighted": "sum of squares of effort over its limit, within limits",
+    "cubic": "sum of cubes of effort over its limit, for muscles, which only pull",
+    "minimax": "largest effort over its limit, then weighted",
 }
 BACKENDS = ("auto", "compiled", "numpy")
 FMUS = ("plant", "inverse", "controller", "bounded")
@@ -79,16 +79,8 @@ def bundled() -> list[str]:
     return sorted(path.name[:-5] for path in _BUNDLED.iterdir() if path.name.endswith(".toml"))
 
 
-# Parameter of a command -> what is offered for it.
+# Parameter of a single command -> what is offered for it.
 OFFERED: dict[str, Callable[..., list[str]]] = {
-    "formulation": one_of(*FORMULATIONS),
-    "route": one_of(*ROUTES),
-    "distribution": one_of(*DISTRIBUTIONS),
-    "backend": one_of(*BACKENDS),
-    "units": one_of(*UNITS),
-    "smooth": one_of("auto"),
-    "load_point": points,
-    "landmark": points,
     "figure": one_of(*FIGURES),
     "style": one_of(*STYLES),
     "question": one_of(*EXPORTS),

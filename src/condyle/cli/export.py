@@ -1,16 +1,17 @@
-"""condyle export: a mechanism as something else."""
+"""condyle export: code and models for other programs."""
 
 from __future__ import annotations
 
 import shlex
 from pathlib import Path
+from typing import Annotated
 
 from . import options
 from .answer import Answer
 from .command import COMPUTE, command, group
 from .inputs import warn
 
-export = group("export", COMPUTE, "A mechanism for controllers and other programs.")
+export = group("export", COMPUTE, "Code and models for controllers and other programs.")
 
 
 @command(COMPUTE, example="condyle export c masticatory --out masticatory-c", of=export, name="c")
@@ -18,14 +19,14 @@ def c(
     mechanism: options.Mechanism,
     out: Path,
     question: list[str] | None = None,
-    coordinates: str | None = None,
-    landmark: str | None = None,
+    coordinates: Annotated[str | None, options.option("", "--from")] = None,
+    landmark: options.Landmark = None,
     precision: str = "double",
     constants: str = "inside",
     prefix: str | None = None,
     lanes: int = 8,
-    formulation: str = "virtual_power",
-    route: str = "core",
+    formulation: options.Formulation = "virtual_power",
+    route: options.Route = "core",
 ) -> Answer:
     """C99 source and header for a controller.
 

@@ -25,6 +25,8 @@ def fmu(
     is a C compiler.
 
     Options:
+        kind: Unit to export; repeat for more: plant, inverse, controller, bounded. Default: the
+            first three.
         out: Folder for the files.
         fmi: Version of the standard: 2 or 3.
     """

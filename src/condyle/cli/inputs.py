@@ -1,123 +1,72 @@
-"""What several commands do first and last."""
+"""What commands do with their options: models, folders, files of results, warnings."""
 
 from __future__ import annotations
 
-import math
 import re
 import sys
-from dataclasses import replace
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from ..errors import InputError
+from ..errors import InputError, WarningError
 from ..extras import require
+from .answer import command_line
+from .options import DistributionOptions, ModelOptions, OutputOptions
 
 if TYPE_CHECKING:
-    from ..analysis.sweep import Study
-    from ..mechanism import Mechanism
+    import xarray as xr
+
     from ..model.model import Model
-    from ..motion import Load, Motion
+
+STRICT: ContextVar[bool] = ContextVar("strict", default=False)  # of the command that runs
 
 
-def motion_and_load(
-    machine: Mechanism,
-    motion: Path | None,
-    load: Path | None,
-    units: str | None = None,
-    landmark: str | None = None,
-    smooth: str | None = None,
-    rate: float | None = None,
-    trim: float = 0.0,
-) -> tuple[Motion, Load]:
-    """The files named; without a motion the reference case, or a trial motion."""
-    from ..mechanism.home import independent_coordinates
-    from ..motion import Load, Motion, bundled_reference, resolve_landmark, trial_motion
-    from ..motion.reference_case import fits_reference
-
-    if motion is None and units is not None:
-        raise InputError("--units is for a motion of your own; name it with --motion")
-    reference_path, reference_load = bundled_reference()
-    reference = motion is None and fits_reference(machine, landmark)
-    if motion is None and landmark is not None and not reference:
-        raise InputError(
-            f"--landmark {landmark}: the bundled path is for two contacts; "
-            f'"{machine.name}" has {len(machine.contacts)}. Name a motion of t, x, y, z with '
-            "--motion"
-        )
-    if load is not None:
-        acting = Load.from_csv(load)
-    else:
-        acting = Load.from_csv(reference_load) if reference else Load.zero()
-    if motion is None and not reference:
-        warn(
-            [
-                f'no --motion: "{machine.name}" is given a trial motion (synthetic) that sways '
-                f"{', '.join(independent_coordinates(machine))} about home"
-            ]
-        )
-        return trial_motion(machine, cutoff=smooth, rate=rate, trim=trim), acting
-    path = Motion.from_csv(
-        motion or reference_path,
-        units=units,
-        landmark=landmark,
-        cutoff=smooth,
-        rate=rate,
-        trim=trim,
-    )
-    if path.kind == "landmark":
-        path = replace(path, landmark=resolve_landmark(landmark, machine.platform.points))
-    return path, acting
-
-
-def chosen_model(
-    machine: Mechanism,
-    formulation: str,
-    route: str,
-    backend: str,
-    distribution: str | None,
-    preload: float,
-    contact_weight: float,
+def model_of(
+    mechanism: str, model: ModelOptions, distribution: DistributionOptions | None = None
 ) -> Model:
-    """A model whose efforts are chosen as the options say.
-
-    Args: contact_weight: W; the library takes W / N_ref^2.
-    """
+    """The model of a mechanism that the options ask for."""
     import condyle
 
-    weight = weight_of(machine, contact_weight)
-    return condyle.derive(machine, formulation, route, backend, distribution, preload, weight)
+    from ..analysis.run_motion import weight_of
+
+    machine = condyle.load_mechanism(mechanism)
+    policy: dict[str, Any] = {}
+    if distribution is not None:
+        policy = distribution.arguments()
+        policy["contact_weight"] = weight_of(machine, distribution.contact_weight)
+    equations = model.formulation, model.route, model.backend
+    return condyle.derive(machine, *equations, **policy)
 
 
-def weight_of(machine: Mechanism, contact_weight: float) -> float:
-    """W / N_ref^2 [1/N^2] of W.
+def written(
+    solution: xr.Dataset, output: OutputOptions, inputs: Iterable[str | Path | None]
+) -> list[Path]:
+    """Write what is asked for of a solution; returns the files.
 
-    Raises: InputError: unless W is a number of at least 0.
+    Args: inputs: files of the run, to be named in the report.
     """
-    from ..model.distributing import reference_force
+    folder, stem = output_folder(output.out), file_stem(solution.attrs["mechanism_name"])
+    files = [folder / f"{stem}{ending}" for ending in (".nc", ".csv", *[".mat"] * output.mat)]
+    solution.condyle.save(*files)
+    if output.figures:
+        from ..report.figures import save_solution_figures
 
-    if not (math.isfinite(contact_weight) and contact_weight >= 0):
-        raise InputError(
-            f"--contact-weight: expected a number of at least 0, got {contact_weight:g}"
-        )
-    return contact_weight / reference_force(machine) ** 2
+        files += save_solution_figures(solution, folder)
+    if output.report:
+        from ..report.page import write_report
+
+        named = [Path(file) for file in inputs if file is not None and Path(file).is_file()]
+        files.append(write_report(solution, folder / f"{stem}.html", files=named))
+    return files
 
 
-def study_for(path: Path, machine: Mechanism) -> Study:
-    """The study of a file, whose numbers are to vary in a mechanism.
-
-    Raises: InputError: for a file that is none, or that names another mechanism.
-    """
-    import condyle
-
-    from ..analysis.sweep import read_study
-
-    study = read_study(path)
-    if study.mechanism is not None and condyle.load_mechanism(study.mechanism) != machine:
-        raise InputError(
-            f'--vary {path}: the study is of "{study.mechanism}", the run of "{machine.name}"; '
-            "name one of them in both, or leave it out of the study"
-        )
-    return study
+def look_at(files: list[Path], output: OutputOptions) -> str:
+    """What to try next with results: the report, or the view where that is there already."""
+    if output.report:
+        return command_line("view", solution=files[0])
+    return command_line("report", files[0])
 
 
 def output_folder(path: Path) -> Path:
@@ -147,7 +96,23 @@ def require_drawing(figures: bool, report: bool) -> None:
         require("plotly", "report")
 
 
-def warn(warnings: list[str]) -> None:
-    """Warnings on stderr, so that they never mix with results."""
-    for warning in dict.fromkeys(warnings):
+def warn(warnings: Iterable[str]) -> None:
+    """Warnings on stderr, so that they never mix with results.
+
+    Raises: WarningError: where the command is strict; call it before results are written.
+    """
+    said = list(dict.fromkeys(warnings))
+    if said and STRICT.get():
+        raise WarningError(said)
+    for warning in said:
         print(f"condyle: warning: {warning}", file=sys.stderr)
+
+
+@contextmanager
+def strictly(strict: bool) -> Iterator[None]:
+    """Whether warnings are errors within the block."""
+    token = STRICT.set(strict)
+    try:
+        yield
+    finally:
+        STRICT.reset(token)

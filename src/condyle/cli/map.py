@@ -5,14 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from ..errors import InputError
 from ..extras import require
 from . import completion, options
 from .answer import Answer, command_line, files_line
 from .command import COMPUTE, command
-from .inputs import chosen_model, file_stem
+from .inputs import file_stem, model_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,44 +32,48 @@ def map_(
     hold: str = "",
     quantity: list[str] | None = None,
     load: str = "",
-    load_point: str | None = None,
+    load_point: options.LoadPoint = None,
     direction: str | None = None,
     stiffness: float | None = None,
     stroke: list[str] | None = None,
-    margin: float = 1e-3,
-    distribution: str | None = None,
-    preload: float = 0.0,
+    margin: Annotated[float, options.option(min=0.0, max=1.0)] = 1e-3,
+    distribution: options.Distribution = None,
+    preload: options.Preload = 0.0,
     out: Path = Path("maps"),
     format: str = "auto",
     figures: bool = True,
     run: Path | None = None,
-    backend: str = "auto",
-    threads: int | None = None,
+    backend: options.Backend = "auto",
+    threads: options.Threads = None,
     workers: Annotated[
-        int | None, typer.Option(min=1, help="With --scheduler: so many. Default: all processors.")
+        int | None,
+        options.option("Number of workers of --scheduler. Default: all processors.", min=1),
     ] = None,
     scheduler: str | None = None,
 ) -> Answer:
-    """Where a mechanism can go, and what it can do there at rest.
+    """Workspace, and what the mechanism can do in it at rest.
 
-    Over one, two or three independent coordinates: reach and what forbids it, singularities,
-    efforts, loads, speeds, stiffness; how large the reach is, and how much room is around home.
+    Over one, two or three independent coordinates: reach and what limits it, singularities,
+    efforts, loads, speeds, stiffness; volume of the reach, and free room around home.
 
     Options:
-        over: Coordinate to go over, "X=-5:5:200 mm": from, to, how many; one to three. Default: the
-            first two, widely.
-        hold: The others, "Y=1 mm,alpha=2 deg". Default: 0, which is home.
-        load: On the platform at rest, "Fz=-50 N,My=2 N m".
-        direction: Of the further load for load_limit, in {S}: 0,0,-1.
-        stiffness: Of every actuator (N m/rad or N/m), for that quantity.
+        over: Coordinate to sweep, "X=-5:5:200 mm": from, to, number of points; repeat for two or
+            three. Default: the first two, widely.
+        hold: Values of the other coordinates, "Y=1 mm,alpha=2 deg". Default: 0, which is home.
+        quantity: Quantity to map: reachable, pose, bounds, joint, ratio, condition, transmission,
+            effort, contact_force, load_limit, speed, stiffness; repeat for more, or separate by
+            commas. Default: ratio.
+        load: Static load on the platform, "Fz=-50 N,My=2 N m".
+        direction: Direction in {S} of the further load of load_limit: 0,0,-1.
+        stiffness: Stiffness of every actuator (N m/rad or N/m), for the quantity stiffness.
         stroke: Range of joint coordinates that counts as reach, "leg_*=-200:300 mm".
         out: Folder for the results.
         format: netcdf; zarr (a folder, streamed: for more than memory holds); or auto, by size.
-        figures: Draw the pictures too.
-        run: Results (.nc) whose motion is drawn on top.
-        scheduler: Who computes, as for sweep: processes, threads, dask, or the address of a Dask
-            scheduler. Default: this process. Same numbers.
-        margin: Least singularity ratio in ball and box.
+        figures: Draw the maps.
+        run: Results (.nc) whose motion is drawn on the maps.
+        scheduler: Where blocks are computed, as for sweep: processes, threads, dask, or the address
+            of a Dask scheduler. Default: this process. The same numbers.
+        margin: Smallest singularity ratio allowed in ball and box.
     """
     if figures:
         require("matplotlib", "figures")
@@ -82,8 +84,9 @@ def map_(
     from ..report.map_text import size_text
 
     solution = condyle.open_solution(run) if run is not None else None
-    machine = condyle.load_mechanism(mechanism)
-    model = chosen_model(machine, "virtual_power", "core", backend, distribution, preload, 0.0)
+    chosen_by = options.DistributionOptions(distribution, preload)
+    model = model_of(mechanism, options.ModelOptions(backend=backend), chosen_by)
+    machine = model.mechanism
     found = condyle.workspace_map(
         model,
         over,

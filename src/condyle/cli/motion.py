@@ -1,4 +1,4 @@
-"""condyle motion: motions from what laboratories record."""
+"""condyle motion: motions from laboratory recordings."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from . import completion
+from . import completion, options
 from .answer import Answer, command_line, files_line
 from .command import BEGIN, command, group
 from .inputs import warn
 
-motion = group("motion", BEGIN, "Motions from what laboratories record.")
+motion = group("motion", BEGIN, "Motions from laboratory recordings.")
 
 
 @command(
@@ -23,23 +23,23 @@ motion = group("motion", BEGIN, "Motions from what laboratories record.")
     name="from-c3d",
 )
 def from_c3d(
-    recording: Annotated[Path, typer.Argument(help="Recording of markers (C3D).")],
+    recording: Annotated[Path, typer.Argument(help="Marker recording (C3D).")],
     markers: Path,
     mechanism: Annotated[
         str,
         typer.Option(
-            help="Mechanism file (TOML) or name that the points are of.",
+            help="Mechanism file (TOML) or name of a bundled mechanism that the markers belong to.",
             autocompletion=completion.mechanisms,
         ),
     ],
     out: Path,
-    max_residual: float = 2.0,
-    max_gap: float = 0.1,
+    max_residual: Annotated[float, options.option(min=0.0)] = 2.0,
+    max_gap: Annotated[float, options.option(min=0.0)] = 0.1,
     longest: bool = False,
     units: Annotated[
         str | None,
         typer.Option(
-            help="Unit of lengths (m, cm, mm, um) in place of what the recording says.",
+            help="Unit of length (m, cm, mm, um) that overrides the recording's.",
             autocompletion=completion.one_of("mm", "m", "cm", "um"),
         ),
     ] = None,
@@ -47,24 +47,25 @@ def from_c3d(
     load: Path | None = None,
     force: str | None = None,
 ) -> Answer:
-    """Markers of a C3D file as a motion.
+    """Convert the markers of a C3D file to a motion.
 
-    Fits both bodies, takes the motion of the fixed one out and gives the pose of the platform in
+    Fits both bodies, subtracts the motion of the fixed one and gives the pose of the platform in
     the mechanism's frame. Gaps are filled up to --max-gap and listed.
 
     Options:
-        markers: Marker file (TOML): which markers are fixed and which move with the platform, when
-            the mechanism is at home (s), points of it in the laboratory (register), and channels of
-            force (forces) and muscles (emg).
+        markers: Marker file (TOML): fixed markers, markers on the platform, time at which the
+            mechanism is at home (s), its points in the laboratory (register), channels of force
+            (forces) and muscles (emg).
         out: File for the motion (.csv or .parquet): t (s), X, Y, Z (m), alpha, beta, gamma (rad).
-        longest: Of longer gaps take the longest stretch without one, not an error.
-        measured: File for what was measured beside it (.csv or .parquet), to be shown by run
-            --measured: markers in the mechanism's frame, their residuals (m), EMG (emg).
-        load: File for the load that the marker file names (forces), or --force.
-        force: Three channels, as in Fx,Fy,Fz: a force on the platform (N, kN, mN) along the
-            laboratory's axes, in place of what the marker file names.
-        max_residual: A frame in which a marker is farther (mm) from its place in its body is a gap.
-        max_gap: Fill gaps up to so many seconds by a spline.
+        longest: If a gap is too long to fill, keep the longest gap-free interval.
+        measured: File for the other measured channels (.csv or .parquet), for run --measured:
+            markers in the mechanism's frame, their residuals (m), EMG (emg).
+        load: File for the load from the channels of the marker file (forces) or of --force.
+        force: Three channels such as Fx,Fy,Fz: a force on the platform (N, kN, mN) along the
+            laboratory's axes, instead of the marker file's.
+        max_residual: Largest distance of a marker from its place in its body (mm); a frame beyond
+            it is a gap.
+        max_gap: Longest gap to fill by a spline (s).
     """
     import condyle
 
@@ -75,7 +76,7 @@ def from_c3d(
     require("c3d", "c3d")
 
     if force is not None and load is None:
-        raise UnsupportedError("--force names channels; --load names the file for their load")
+        raise UnsupportedError("--force requires --load, the file for the load of its channels")
     channels = None if force is None else tuple(name.strip() for name in force.split(","))
     found = marked.motion_from_c3d(
         recording,
@@ -87,13 +88,13 @@ def from_c3d(
         unit=units,
         force=channels,
     )
-    files = marked.write_motion(found, out, measured, load)
-    forgotten = []
+    unused = []
     if found.load is not None and load is None:
-        forgotten.append("the marker file names a load (forces), and --load no file for it")
+        unused.append("the marker file names a load (forces), and --load no file for it")
     if found.channels.emg and measured is None:
-        forgotten.append("the marker file names EMG (emg), and --measured no file for it")
-    warn([*found.warnings, *forgotten])
+        unused.append("the marker file names EMG (emg), and --measured no file for it")
+    warn([*found.warnings, *unused])
+    files = marked.write_motion(found, out, measured, load)
     point = found.load.point if found.load is not None and load is not None else None
     beside = {"measured": measured, "report": True} if measured is not None else {}
     then = command_line(

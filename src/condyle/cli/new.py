@@ -19,14 +19,14 @@ def new(
     from_mjcf: Path | None = None,
     force: bool = False,
 ) -> Answer:
-    """A mechanism file to start from.
+    """Mechanism file to start from.
 
     A small mechanism that works, with a comment on every number, to change step by step; or, with
-    --from-mjcf, a parallel mechanism of MuJoCo's world.
+    --from-mjcf, a MuJoCo model.
 
     Options:
-        from_mjcf: Take the mechanism from a model of MuJoCo, if its chains and contacts are of the
-            kinds that a mechanism file has.
+        from_mjcf: Convert this MuJoCo model (MJCF), if a mechanism file has its kinds of chains and
+            contacts.
         force: Replace an existing file.
     """
     from ..atomic import write_text

@@ -1,64 +1,25 @@
-"""Options that several commands share: what they are for, and what the shell offers for them."""
+"""Options that several commands share, with help, range and what the shell offers for them.
+
+A command takes a group as one parameter; `command` makes an option of each of its fields.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from . import completion
+from .completion import one_of
 
-HELP = {
-    "formulation": f"How the equations are derived: {', '.join(completion.FORMULATIONS)}. "
-    "All give the same numbers.",
-    "route": "How the contacts enter the equations: core (afterwards; any contacts) or direct "
-    "(at once; flat contacts only). Both give the same numbers.",
-    "distribution": "Which of all efforts that balance are chosen, by what is least. "
-    + "; ".join(f"{name}: {least}" for name, least in completion.DISTRIBUTIONS.items())
-    + ". Default: bounded with cables, else minimum_norm. Where N m and N mix: weighted or "
-    "minimax.",
-    "preload": "Least push of one-sided contacts (N), where efforts are chosen within limits.",
-    "contact_weight": "With weighted: adds W (force/N_ref)^2 of every contact to what is least, "
-    "from least effort (0) to least load on the contacts. N_ref is the largest limit of the "
-    "chains, as a force.",
-    "load_point": "Platform point the load acts at. Default: that of the load, right_molar, or the "
-    "only point.",
-    "motion": "Motion to follow (CSV or Parquet): t (s) and pose coordinates such as X, Y (m), "
-    "alpha, beta (rad), or the path x, y, z (m) of a landmark. Default: the bundled chewing "
-    "path, or a trial motion about home for mechanisms that it does not fit (both synthetic).",
-    "load": "Load on the platform (CSV or Parquet): t (s), some of Fx, Fy, Fz (N), Mx, My, Mz "
-    "(N m). Default: the bundled load (synthetic) with the bundled motion, else none.",
-    "measured": "What was measured beside the motion (.csv or .parquet), to be shown with the "
-    "results: markers and EMG, as condyle motion from-c3d --measured writes them.",
-    "units": "Units of the motion's times (s, ms, us, min), lengths (m, cm, mm, um) and angles "
-    "(rad, deg, mrad), as in ms,mm,deg. A header such as x (mm) says so too.",
-    "landmark": "Platform point whose path x, y, z is given. Default: incisor if there is one, "
-    "else the only point.",
-    "smooth": "Smooth a measured motion: what is quicker than so many Hz goes; auto is 10 Hz.",
-    "rate": "Samples a second (Hz) of the results. Default: those of the motion.",
-    "reactions": "Forces and moments in every joint too.",
-    "mat": "Write results for MATLAB (.mat) too.",
-    "backend": "compiled, numpy (the same numbers, slower), or auto: compiled where there is "
-    "a C compiler.",
-    "flag": "Keep samples that cannot be computed: empty, with a status.",
-    "quantity": f"What to map, of {', '.join(completion.QUANTITIES)}; repeat for more, or "
-    "separate by commas. Default: ratio.",
-    "kind": f"What to export; repeat for more: {', '.join(completion.FMUS)}. Default: the first "
-    "three.",
-    "strict": "A contact outside its bounds is an error.",
-    "threads": "At most so many threads. Default: all processors. Same results.",
-    "trim": "Leave out so many seconds of the motion at either end, where smoothing is least "
-    "certain: 0.2 with --smooth auto.",
-}
-NAMES = {"coordinates": "--from", "every": "--all"}  # of parameters that Python does not like so
-# Parameter of a command -> the numbers that it takes.
-RANGE: dict[str, dict[str, Any]] = {
-    **{name: {"min": 0.0} for name in ("max_gap", "max_residual", "tolerance", "trim")},
-    "margin": {"min": 0.0, "max": 1.0},
-    "seconds": {"min": 0.01, "max": 600},
-    "seed": {"min": 0},
-    "threads": {"min": 1},
-}
+
+def option(help: str = "", *names: str, **how: Any) -> Any:
+    """An option: its help (or that of the command's docstring), names, and what typer takes."""
+    return typer.Option(*names, help=help, **how)
+
+
 Mechanism = Annotated[
     str,
     typer.Argument(
@@ -68,7 +29,178 @@ Mechanism = Annotated[
         autocompletion=completion.mechanisms,
     ),
 ]
-Quiet = Annotated[
-    bool, typer.Option("--quiet", "-q", help="Print only what was asked for, and errors.")
+LoadPoint = Annotated[
+    str | None,
+    option(
+        "Platform point at which the load acts. Default: the load's own point, else right_molar, "
+        "else the only point.",
+        autocompletion=completion.points,
+    ),
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")]
+Landmark = Annotated[str | None, option(autocompletion=completion.points)]
+Formulation = Annotated[
+    str,
+    option(
+        "How the equations of motion are derived: "
+        + ", ".join(completion.FORMULATIONS)
+        + ". All give the same efforts.",
+        autocompletion=one_of(*completion.FORMULATIONS),
+    ),
+]
+Route = Annotated[
+    str,
+    option(
+        "How the contacts enter the equations: core (last; any contacts) or direct (first; flat "
+        "contacts only). Both give the same efforts.",
+        autocompletion=one_of(*completion.ROUTES),
+    ),
+]
+Distribution = Annotated[
+    str | None,
+    option(
+        "How redundancy is resolved: the objective that is minimised. "
+        + "; ".join(f"{name}: {what}" for name, what in completion.DISTRIBUTIONS.items())
+        + ". Default: bounded with cables, else minimum_norm. Where N m and N mix: weighted or "
+        "minimax.",
+        autocompletion=one_of(*completion.DISTRIBUTIONS),
+    ),
+]
+Preload = Annotated[
+    float,
+    option("Minimum compressive force on unilateral contacts (N), for objectives with limits."),
+]
+Backend = Annotated[
+    str,
+    option(
+        "How kernels run: compiled, numpy (the same numbers, slower), or auto: compiled where "
+        "there is a C compiler.",
+        autocompletion=one_of(*completion.BACKENDS),
+    ),
+]
+Threads = Annotated[
+    int | None,
+    option("Maximum number of threads. Default: all processors. The same results.", min=1),
+]
+Measured = Annotated[
+    Path | None,
+    option(
+        "Markers and EMG measured during the motion (.csv or .parquet), shown with the results; "
+        "condyle motion from-c3d --measured writes them."
+    ),
+]
+Flag = Annotated[
+    bool, option("Keep samples that cannot be computed, empty and with a status: no error.")
+]
+Reactions = Annotated[bool, option("Also forces and moments in every joint.")]
+Mat = Annotated[bool, option("Also write the results for MATLAB (.mat).")]
+Figures = Annotated[bool, option("Also draw figures.")]
+Report = Annotated[bool, option("Also write the page of condyle report.")]
+# Every command has these.
+Quiet = Annotated[bool, option("Print only what was asked for, and errors.", "--quiet", "-q")]
+Json = Annotated[bool, option("Print one JSON object, and nothing else.", "--json")]
+Strict = Annotated[bool, option("Treat warnings as errors.", "--strict")]
+
+
+class Group:
+    """Options that go together; a dataclass."""
+
+    def arguments(self) -> dict[str, Any]:
+        """All of them, as the library's functions take them."""
+        return {one.name: getattr(self, one.name) for one in fields(self)}  # type: ignore[arg-type]
+
+    def given(self) -> dict[str, Any]:
+        """Those that differ from their defaults, to be said again."""
+        usual = type(self)().arguments()
+        return {name: one for name, one in self.arguments().items() if one != usual[name]}
+
+
+@dataclass(frozen=True)
+class MotionOptions(Group):
+    """The motion and the load on the platform."""
+
+    motion: Annotated[
+        Path | None,
+        option(
+            "Motion (CSV or Parquet): t (s) and pose coordinates such as X, Y (m), alpha, beta "
+            "(rad), or the path x, y, z (m) of a landmark. Default: the bundled chewing path where "
+            "it fits the mechanism, else a trial motion about home (both synthetic)."
+        ),
+    ] = None
+    load: Annotated[
+        Path | None,
+        option(
+            "Load on the platform (CSV or Parquet): t (s), and any of Fx, Fy, Fz (N), Mx, My, Mz "
+            "(N m). Default: with the bundled motion the bundled bite force (synthetic), else none."
+        ),
+    ] = None
+    load_point: LoadPoint = None
+    units: Annotated[
+        str | None,
+        option(
+            "Units of time (s, ms, us, min), length (m, cm, mm, um) and angle (rad, deg, mrad) in "
+            "the motion file, such as ms,mm,deg. A header such as x (mm) also states its unit.",
+            autocompletion=one_of(*completion.UNITS),
+        ),
+    ] = None
+    landmark: Annotated[
+        str | None,
+        option(
+            "Platform point whose path x, y, z the motion file has. Default: incisor if there is "
+            "one, else the only point.",
+            autocompletion=completion.points,
+        ),
+    ] = None
+    smooth: Annotated[
+        str | None,
+        option(
+            "Low-pass cut-off frequency for a measured motion (Hz); auto: 10 Hz.",
+            autocompletion=one_of("auto"),
+        ),
+    ] = None
+    rate: Annotated[
+        float | None, option("Sampling rate of the results (Hz). Default: that of the motion.")
+    ] = None
+    trim: Annotated[
+        float,
+        option(
+            "Time to cut off at both ends of the motion (s), where smoothing is least accurate: "
+            "0.2 with --smooth auto.",
+            min=0.0,
+        ),
+    ] = 0.0
+
+
+@dataclass(frozen=True)
+class ModelOptions(Group):
+    """How the equations are derived and run."""
+
+    formulation: Formulation = "virtual_power"
+    route: Route = "core"
+    backend: Backend = "auto"
+    threads: Threads = None
+
+
+@dataclass(frozen=True)
+class DistributionOptions(Group):
+    """How redundancy is resolved."""
+
+    distribution: Distribution = None
+    preload: Preload = 0.0
+    contact_weight: Annotated[
+        float,
+        option(
+            "Weight W of contact forces, with weighted: the sum of squares has W (force/N_ref)^2 "
+            "of every contact besides, from least effort (0) to least contact force. N_ref is the "
+            "largest effort limit of the chains, as a force."
+        ),
+    ] = 0.0
+
+
+@dataclass(frozen=True)
+class OutputOptions(Group):
+    """The files of a run."""
+
+    out: Annotated[Path, option("Folder for the results.")] = Path("results")
+    figures: Figures = False
+    report: Report = False
+    mat: Mat = False

@@ -20,7 +20,7 @@ RESULT = Path("results/masticatory.nc")  # of `condyle run` as it stands
 @command(LOOK, example=f"condyle plot {RESULT} --figure effort --figure load")
 def plot(
     solution: Annotated[
-        Path | None, typer.Argument(help="Results (.nc) of a run. Without: list the figures.")
+        Path | None, typer.Argument(help="Results (.nc) of a run. Without it: list the figures.")
     ] = None,
     figure: list[str] | None = None,
     out: Path = Path("figures"),
@@ -28,14 +28,14 @@ def plot(
     title: bool = True,
     letters: bool = False,
 ) -> Answer:
-    """Figures of a run, to look at or to print.
+    """Figures of a run, for screen or print.
 
     Options:
         figure: Figure to draw; repeat for more. Default: all.
         out: Folder for PNG and SVG files.
-        style: screen; journal (85 mm wide, letters of 8 pt); or journal-wide (175 mm).
-        title: Draw the heading, and where the data come from.
-        letters: Mark panels (a), (b) ...
+        style: screen; journal (85 mm wide, 8 pt font); or journal-wide (175 mm).
+        title: Draw title and source of the data.
+        letters: Label panels (a), (b) ...
     """
     require("matplotlib", "figures")
     import condyle

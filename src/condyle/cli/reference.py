@@ -13,7 +13,7 @@ from .inputs import output_folder
 def reference(
     out: Path = Path(),
 ) -> Answer:
-    """The bundled motion and bite force as files.
+    """Write the bundled motion and bite force as files.
 
     Examples of the tables that condyle run reads. Both are synthetic, not measured.
 

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from ..extras import require
+from . import options
 from .answer import Answer, command_line
 from .command import LOOK, command
 
@@ -16,19 +17,18 @@ from .command import LOOK, command
 def report(
     solution: Annotated[Path, typer.Argument(help="Results (.nc) of a run.")],
     out: Path | None = None,
-    measured: Path | None = None,
+    measured: options.Measured = None,
     file: list[Path] | None = None,
     sweep: Path | None = None,
 ) -> Answer:
-    """A run as one web page to send.
+    """Report of a run: one HTML file to send.
 
-    One HTML file that opens without a network: the moving mechanism, linked plots, tables and
-    every warning.
+    It opens without a network: the moving mechanism, linked plots, tables and every warning.
 
     Options:
-        out: HTML file. Default: beside the results.
-        file: Input of the run to name with its hash; repeat for more.
-        sweep: Folder of a sweep, to show on the page too.
+        out: HTML file. Default: next to the results.
+        file: Input file of the run, to be listed with its hash; repeat for more.
+        sweep: Folder of a sweep, to be shown too.
     """
     require("plotly", "report")
     from ..report.page import write_report

@@ -22,13 +22,11 @@ class Format(StrEnum):
 
 @command(UPKEEP, example="condyle schema > condyle.schema.json")
 def schema(
-    of: Annotated[Format, typer.Argument(help="Of mechanisms, scenarios or studies.")] = (
-        Format.mechanism
-    ),
+    of: Annotated[Format, typer.Argument(help="Kind of file.")] = (Format.mechanism),
 ) -> Answer:
-    """The format of mechanism files, of scenarios or of studies, for editors.
+    """JSON schema of mechanism, scenario or study files, for editors.
 
-    A JSON schema: an editor that knows it completes keys and marks mistakes while you type.
+    An editor that has it completes keys and marks mistakes while you type.
     """
     if of is Format.study:
         from ..analysis.sweep import json_schema

@@ -27,19 +27,19 @@ def sweep(
     show: Path | None = None,
     figures: bool = False,
 ) -> Answer:
-    """Many variants of a mechanism: a row of measures for each.
+    """Parameter study: a row of measures for each variant of a mechanism.
 
     A study names the numbers that vary, how they are sampled, and what is measured. Rows are
     written in parts, so that a study that was stopped goes on with --resume.
 
     Options:
-        out: Folder for the rows. Default: as the study is called.
-        workers: Processes. Default: the processors at hand.
-        scheduler: Who does it: processes; threads; dask (a cluster on this machine); or the address
-            of a Dask scheduler, tcp://...
-        resume: Go on with what the folder holds of this study.
-        show: Instead: show what the folder of a sweep tells.
-        figures: Draw figures into the folder too.
+        out: Folder for the rows. Default: the name of the study.
+        workers: Number of processes. Default: all processors.
+        scheduler: Where rows are computed: processes; threads; dask (a cluster on this machine); or
+            the address of a Dask scheduler, tcp://...
+        resume: Continue from the rows in the folder.
+        show: Show the results in the folder of a sweep, instead of running one.
+        figures: Also draw figures into the folder.
     """
     require_drawing(figures, False)
     if (study is None) == (show is None):

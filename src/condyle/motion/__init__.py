@@ -1,6 +1,7 @@
 """Paths and loads: from files and arrays to clean samples, and tables back to files."""
 
 from .column_units import FORCE, LANDMARK, MOMENT, POSE, Units, parse_units
+from .motion_and_load import motion_and_load
 from .number_table import Table
 from .path import Motion, as_motion
 from .platform_load import Load, as_load
@@ -32,6 +33,7 @@ __all__ = [
     "as_motion",
     "bundled_reference",
     "iter_table",
+    "motion_and_load",
     "parse_units",
     "read_table",
     "reference_load",

@@ -17,20 +17,21 @@ from ..motion import Table
 from ..status import Status
 from .contacts import contact_loss, contact_loss_columns
 from .failed_samples import status_columns
-from .state_rows import Columns, StateColumns
+from .state_rows import Columns, StateColumns, StatesReport
 from .variables import named_columns
 
 KINDS = {"N m": "moment", "N": "force"}
 
 
-def forward_file(
+def forward_states(
     model: Model,
     states: str | Path,
     out: str | Path,
     load_point: str | None = None,
     flag: bool = False,
     threads: int | None = None,
-) -> tuple[int, list[str]]:
+    strict: bool = False,
+) -> StatesReport:
     """Forward dynamics of every row of a file; the output appears whole or not at all.
 
     Rows never influence each other.
@@ -41,8 +42,8 @@ def forward_file(
              out: ddX... of the given coordinates, contact_<contact>, the pose, joint_<chain>, and
              contact_loss_<contact> of one-sided contacts; with `flag` also status and cause.
              flag: keep rows that have no accelerations, empty, with a status.
-    Returns: number of rows, and warnings.
-    Raises:  InputError, SampleError: nothing is written then.
+             strict: a warning is an error.
+    Raises:  InputError, SampleError, WarningError: nothing is written then.
     """
     mechanism = model.mechanism
     efforts = [f"tau_{name}" for name in mechanism.chain_names]
@@ -74,15 +75,16 @@ def forward_file(
         columns |= contact_loss_columns(mechanism, lost)
         return columns | status_columns(mechanism, found.status, cause) if flag else columns
 
-    rows, said = given.stream(states, out, solved)
-    return rows, [
-        *said,
-        *(
-            f'one-sided contact "{name}" would have to pull in {count} of {rows} rows'
+    def done() -> list[str]:
+        return [
+            f'the unilateral contact "{name}" would have to pull in {count} rows'
             for name, count in zip(mechanism.contact_names, pulled, strict=True)
             if count
-        ),
-    ]
+        ]
+
+    rows, warnings = given.stream(states, out, solved, done, strict)
+    data = {"mechanism": mechanism.name, "formulation": model.formulation, "rows": rows}
+    return StatesReport(data | {"warnings": warnings, "files": [Path(out)]})
 
 
 def _causes(model: Model, found: Accelerations, flag: bool, first_row: int) -> np.ndarray:

@@ -19,9 +19,9 @@ from .contacts import AXES, contact_loss_columns
 from .derived import Derived
 from .failed_samples import status_columns
 from .mat_file import table_variables, write_mat
-from .state_rows import Columns, StateColumns
+from .state_rows import Columns, StateColumns, StatesReport
 from .variables import VARIABLES, WRENCH, variable_columns
-from .warnings import Watch, refuse
+from .warnings import Watch
 
 
 class Activation(NamedTuple):
@@ -32,21 +32,13 @@ class Activation(NamedTuple):
     row: int
 
 
-class Solved(NamedTuple):
-    """What came of a file of states; `greatest` is None without limits of efforts."""
-
-    rows: int
-    warnings: list[str]
-    greatest: Activation | None
-
-
 def state_columns(model: Model) -> StateColumns:
     """What a file of states has."""
     missing = "no rates (dX ...) and no accelerations (ddX ...) are given"
     return StateColumns(model, ("d", "dd"), missing, "(dX ...) and accelerations (ddX ...)")
 
 
-def solve_file(
+def solve_states(
     model: Model,
     states: str | Path,
     out: str | Path,
@@ -56,7 +48,7 @@ def solve_file(
     reactions: bool = False,
     threads: int | None = None,
     mat: str | Path | None = None,
-) -> Solved:
+) -> StatesReport:
     """Solve every row of a states file; the output appears whole or not at all.
 
     Rows never influence each other.
@@ -67,10 +59,10 @@ def solve_file(
              warning, or refused if they look misspelt.
              out: likewise CSV or Parquet.
              reactions: columns reaction_<joint>_<chain>_x, _y, _z ... too.
+             strict: a warning is an error.
              threads: at most so many; the file does not depend on it.
              mat: file for MATLAB to write as well; it takes the memory of the whole table.
-    Returns: number of rows, warnings, and the greatest activation.
-    Raises:  InputError, UnreachableError, SingularError, BoundsError: nothing is written then.
+    Raises:  InputError, SampleError, WarningError: nothing is written then.
     """
     watch = Watch(model.mechanism, rows=True)
     greatest: Activation | None = None
@@ -87,18 +79,28 @@ def solve_file(
             kept.append(columns)
         return columns
 
-    def done() -> None:
-        if strict:
-            refuse(watch.notices())
+    def done() -> list[str]:
         if matlab is not None:
             names = kept[0] if kept else {}
             whole = {name: np.concatenate([part[name] for part in kept]) for name in names}
             write_mat(matlab, table_variables(model.mechanism, whole))
+        return [notice.text for notice in watch.notices()]
 
     with ExitStack() as stack:
         matlab = None if mat is None else stack.enter_context(replacing(mat))
-        rows, said = state_columns(model).stream(states, out, solved, done)
-    return Solved(rows, [*said, *(notice.text for notice in watch.notices())], greatest)
+        rows, warnings = state_columns(model).stream(states, out, solved, done, strict)
+    return StatesReport(
+        {
+            "mechanism": model.mechanism.name,
+            "formulation": model.formulation,
+            "route": model.route,
+            "distribution": model.policy.objective,
+            "rows": rows,
+            "greatest_activation": None if greatest is None else greatest._asdict(),
+            "warnings": warnings,
+            "files": [Path(out), *([] if mat is None else [Path(mat)])],
+        }
+    )
 
 
 def _greater(before: Activation | None, derived: Derived, first_row: int) -> Activation | None:

@@ -4,11 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from ..errors import InconsistentError, LostError, SampleError, UnreachableError
+from ..errors import (
+    InconsistentError,
+    LostError,
+    SampleError,
+    UnreachableError,
+    UnsupportedError,
+)
 from ..kinematics.chain import FAMILIES
+from ..mechanism.files import as_mechanism
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..model.forward_kinematics import TOLERANCE, ForwardKinematics, PoseStatus
 from ..model.system import check_home
@@ -82,25 +90,42 @@ class ModesReport:
         return f"{each} assembly modes found for {rows}; the search may miss some"
 
 
-def pose_file(
-    mechanism: Mechanism,
+def pose_states(
+    mechanism: Any,
     joints: str | Path,
     out: str | Path,
     flag: bool = False,
     tolerance: float = TOLERANCE,
-) -> PoseReport:
-    """Poses for every row of a file of joint coordinates.
+    every: bool = False,
+    seed: int | None = None,
+) -> PoseReport | ModesReport:
+    """Forward kinematics of every row of a file of joint coordinates.
 
-    Args:   joints: CSV with the columns joint_<chain> [rad or m, zero at home], optionally t [s]:
+    Args:   mechanism: one, a model, the path of a file, or the name of a bundled one.
+            joints: CSV with the columns joint_<chain> [rad or m, zero at home], optionally t [s]:
                     then each row follows the one before, else each follows from home, alone.
             out:    CSV: t if given, X ... gamma, residual (largest of the row, in the unit of the
                     joints; where chains slide and turn, residual_m and residual_rad) and
                     condition; with `flag` also status.
             flag:   keep rows for which no pose is found, empty, with a status.
             tolerance: largest residual of a joint [rad or m].
+            every:  all assembly modes that a search finds, one a row: row (of `joints`, from 1), t
+                    if given, mode (from 1, the nearest to home first), X ... gamma, distance (from
+                    home: characteristic lengths and rad), residual and condition. Rows never
+                    influence each other.
+            seed:   of that search; 0 if not given.
     Raises: UnreachableError, LostError, InconsistentError: for such a row without `flag`; nothing
             is written then.
     """
+    mechanism = as_mechanism(mechanism)
+    if every and flag:
+        raise UnsupportedError(
+            "--all and --flag exclude each other: --all lists every pose of a row, if any"
+        )
+    if seed is not None and not every:
+        raise UnsupportedError("--seed requires --all")
+    if every:
+        return _modes(mechanism, joints, out, seed or 0, tolerance)
     table, given = _read(mechanism, joints)
     time = table.columns.get("t")
     with step("finding poses"):
@@ -144,20 +169,10 @@ def pose_file(
     )
 
 
-def modes_file(
-    mechanism: Mechanism,
-    joints: str | Path,
-    out: str | Path,
-    seed: int = 0,
-    tolerance: float = TOLERANCE,
+def _modes(
+    mechanism: Mechanism, joints: str | Path, out: str | Path, seed: int, tolerance: float
 ) -> ModesReport:
-    """The assembly modes that a seeded search finds for every row of a file.
-
-    Args: joints, tolerance: as of `pose_file`; rows never influence each other.
-          out: CSV, one mode a row: row (of `joints`, from 1), t if given, mode (from 1, the nearest
-               to home first), X ... gamma, distance (from home: characteristic lengths and rad),
-               residual and condition as of `pose_file`.
-    """
+    """The assembly modes that a seeded search finds for every row."""
     table, given = _read(mechanism, joints)
     forward, units = ForwardKinematics(mechanism), _units(mechanism)
     found = []

@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, WarningError
 from ..mechanism.mechanism import COORDINATES
 from ..model.model import Model, with_point
 from ..model.poses import States
@@ -23,6 +24,20 @@ from .variables import WRENCH
 CHUNK_ROWS = 16384
 
 Columns = dict[str, np.ndarray | list[str]]
+
+
+@dataclass(frozen=True)
+class StatesReport:
+    """What came of a file of states: `data` for programs, `str` for people."""
+
+    data: dict[str, Any]
+
+    def __str__(self) -> str:
+        text = f"{self.data['rows']} rows solved: {', '.join(map(str, self.data['files']))}"
+        if most := self.data.get("greatest_activation"):
+            text += f"\nGreatest activation (effort over its limit): {most['value']:.4g}, "
+            text += f"{most['chain']} in row {most['row']}"
+        return text
 
 
 @dataclass(frozen=True)
@@ -86,14 +101,17 @@ class StateColumns:
         source: str | Path,
         out: str | Path,
         solved: Callable[[Table, int], Columns],
-        done: Callable[[], None] = lambda: None,
+        done: Callable[[], list[str]] = list,
+        strict: bool = False,
     ) -> tuple[int, list[str]]:
         """Every row of a file solved; the output appears whole or not at all.
 
         Args:    source: CSV, or Parquet if its name ends in .parquet;  out: likewise.
                  solved: output columns for the rows of a table, from the number of its first row.
-                 done: called before the output appears; may raise.
-        Returns: number of rows, and what is to be said of the file.
+                 done: called before the output appears; returns further warnings.
+                 strict: a warning is an error.
+        Returns: number of rows, and warnings.
+        Raises:  WarningError: for one, if `strict`.
         """
         rows, said = 0, list[str]()
         with TableWriter(out) as writer:
@@ -103,5 +121,7 @@ class StateColumns:
                 said = list(table.warnings)
                 if self.at_rest(table):
                     said.append(f"{table.source}: {self.missing}: the states are at rest")
-            done()
+            said += done()
+            if strict and said:
+                raise WarningError(said)
         return rows, said

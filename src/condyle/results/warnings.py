@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import BoundsError
 from ..kinematics.causes import cause_text, owners, shortfall_text
 from ..kinematics.chain import FAMILIES
 from ..kinematics.singularities import NEAR_SINGULAR
@@ -30,11 +29,10 @@ POSE_RESIDUAL = 1e-9  # metres off the surfaces, beyond which given poses are to
 
 
 class Kind(NamedTuple):
-    """A kind of warning: what it says, what to do, and whether `--strict` makes it an error."""
+    """A kind of warning: what it says, and what to do."""
 
     meaning: str
     advice: str
-    strict: bool = False
 
 
 KINDS = {
@@ -48,7 +46,6 @@ KINDS = {
     "bounds": Kind(
         "a contact leaves its bounds",
         "scale the motion, or move the bounds; `--strict` makes it an error",
-        strict=True,
     ),
     "contact_loss": Kind(
         "a unilateral contact is lost",
@@ -90,7 +87,6 @@ KINDS = {
 }
 
 LOW = "effort_low"  # what is tallied of efforts below a limit of their own; told as effort_limit
-STRICT = frozenset(name for name, kind in KINDS.items() if kind.strict)
 
 
 @dataclass(frozen=True)
@@ -280,19 +276,3 @@ def home_notices(mechanism: Mechanism) -> Iterable[Notice]:
     told = [(name, float(value)) for name, value in off if abs(value) > HOME_WARNING]
     for (name, value), text in zip(told, home_warnings(mechanism), strict=True):
         yield Notice("home_residual", text, name, value=value, bound=HOME_WARNING, unit="m")
-
-
-def refuse(notices: Iterable[Notice]) -> None:
-    """Raises BoundsError for a notice of a kind that `--strict` does not let pass."""
-    refused = [notice for notice in notices if notice.kind in STRICT]
-    if refused:
-        first = refused[0]
-        raise BoundsError(
-            "; ".join(notice.text for notice in refused) + ".",
-            hint="Without --strict this is a warning",
-            contact=first.owner,
-            time=first.time,
-            value=first.value,
-            bound=first.bound,
-            unit=first.unit,
-        )

@@ -11,7 +11,7 @@ from oracles.rotations import bryant
 import condyle
 from condyle.model.forward_kinematics import ForwardKinematics
 from condyle.motion import read_table, write_table
-from condyle.results.pose_rows import modes_file, pose_file
+from condyle.results.pose_rows import pose_states
 
 
 def test_modes_of_a_stewart_platform() -> None:
@@ -61,13 +61,13 @@ def test_the_pose_that_is_followed_is_among_the_modes(name: str) -> None:
 
 
 def test_modes_of_a_file(tmp_path: Path) -> None:
-    """One mode a row; the pose that `pose_file` finds is one of them."""
+    """One mode a row; the pose that `pose_states` finds is one of them."""
     mechanism = condyle.load_mechanism("gough-stewart")
     joints = np.array([[0.0] * 6, [0.1, -0.05, 0.02, 0.03, -0.1, 0.07], [-50.0] * 6])
     names = [f"joint_{name}" for name in mechanism.chain_names]
     write_table(tmp_path / "in.csv", dict(zip(names, joints.T, strict=True)))
-    report = modes_file(mechanism, tmp_path / "in.csv", tmp_path / "modes.csv")
-    pose_file(mechanism, tmp_path / "in.csv", tmp_path / "poses.csv", flag=True)
+    report = pose_states(mechanism, tmp_path / "in.csv", tmp_path / "modes.csv", every=True)
+    pose_states(mechanism, tmp_path / "in.csv", tmp_path / "poses.csv", flag=True)
     table = read_table(tmp_path / "modes.csv")
     coordinates = ("X", "Y", "Z", "alpha", "beta", "gamma")
     assert tuple(table.columns) == (

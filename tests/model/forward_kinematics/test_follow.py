@@ -22,7 +22,7 @@ from condyle.model.forward_kinematics import ForwardKinematics
 from condyle.model.forward_kinematics.joint_steps import joint_steps
 from condyle.model.forward_kinematics.pose_status import PoseStatus
 from condyle.motion import write_table
-from condyle.results.pose_rows import pose_file
+from condyle.results.pose_rows import pose_states
 from condyle.status import Status
 
 Reached = tuple[np.ndarray, np.ndarray]
@@ -182,9 +182,9 @@ def test_a_lost_track_in_a_file(tmp_path: Path) -> None:
     columns = {"t": np.arange(101.0)} | dict(zip(names, joints.T, strict=True))
     write_table(tmp_path / "in.csv", columns)
     with pytest.raises(LostError, match=r"from row 7[89] on it is not certain") as error:
-        pose_file(mechanism, tmp_path / "in.csv", tmp_path / "out.csv")
+        pose_states(mechanism, tmp_path / "in.csv", tmp_path / "out.csv")
     assert error.value.samples[-1] == 100 and not (tmp_path / "out.csv").exists()
-    report = pose_file(mechanism, tmp_path / "in.csv", tmp_path / "out.csv", flag=True)
+    report = pose_states(mechanism, tmp_path / "in.csv", tmp_path / "out.csv", flag=True)
     assert report.failed == {"lost": report.missing} and report.missing >= 22
 
 

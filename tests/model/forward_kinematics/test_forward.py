@@ -18,7 +18,7 @@ from condyle.model.forward_kinematics import ForwardKinematics
 from condyle.model.forward_kinematics.orientation import principal
 from condyle.model.forward_kinematics.pose_status import PoseStatus
 from condyle.motion import read_table, write_table
-from condyle.results.pose_rows import pose_file
+from condyle.results.pose_rows import pose_states
 from condyle.status import Status
 
 
@@ -91,7 +91,7 @@ def test_file_in_file_out(tmp_path: Path) -> None:
     pose, joints = poses_and_joints("masticatory", 20, 0.05)
     columns = {f"joint_{name}": joints[:, i] for i, name in enumerate(mechanism.chain_names)}
     write_table(tmp_path / "joints.csv", {"t": np.arange(20.0), **columns})
-    report = pose_file(mechanism, tmp_path / "joints.csv", tmp_path / "poses.csv")
+    report = pose_states(mechanism, tmp_path / "joints.csv", tmp_path / "poses.csv")
     assert (report.rows, report.missing) == (20, 0)
     table = read_table(tmp_path / "poses.csv")
     names = list(table.columns)
@@ -107,9 +107,9 @@ def test_residuals_of_chains_that_turn_and_slide(tmp_path: Path) -> None:
     write_table(tmp_path / "joints.csv", dict.fromkeys(names, np.zeros(2)) | {names[0]: [0, 1e-4]})
     files = tmp_path / "joints.csv", tmp_path / "poses.csv"
     with pytest.raises(InconsistentError, match=r"row 2.*raise --tolerance") as error:
-        pose_file(mechanism, *files)
+        pose_states(mechanism, *files)
     assert error.value.samples == [1] and not files[1].exists()
-    report = pose_file(mechanism, *files, tolerance=1e-3)
+    report = pose_states(mechanism, *files, tolerance=1e-3)
     table = read_table(files[1])
     assert list(table.columns)[6:] == ["residual_m", "residual_rad", "condition"]
     joints = np.array([[0.0] * 6, [1e-4] + [0.0] * 5])
@@ -127,9 +127,9 @@ def test_joints_that_no_pose_has(tmp_path: Path) -> None:
     columns = {f"joint_{name}": np.array([0.0, -50.0]) for name in mechanism.chain_names}
     write_table(tmp_path / "joints.csv", columns)
     with pytest.raises(UnreachableError, match="row 2"):
-        pose_file(mechanism, tmp_path / "joints.csv", tmp_path / "poses.csv")
+        pose_states(mechanism, tmp_path / "joints.csv", tmp_path / "poses.csv")
     assert not (tmp_path / "poses.csv").exists()
-    report = pose_file(mechanism, tmp_path / "joints.csv", tmp_path / "poses.csv", flag=True)
+    report = pose_states(mechanism, tmp_path / "joints.csv", tmp_path / "poses.csv", flag=True)
     assert (report.missing, report.failed) == (1, {"unreachable": 1})
     assert "1 of 2 poses found (1 unreachable)" in str(report)
     assert (tmp_path / "poses.csv").read_text().splitlines()[2] == "," * 8 + "unreachable"

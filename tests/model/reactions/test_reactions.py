@@ -21,7 +21,7 @@ from condyle.model.joint_reactions import reactions
 from condyle.model.model import Model
 from condyle.motion import read_table, write_table
 from condyle.questions.reactions import reaction_places
-from condyle.results.inverse_rows import solve_file
+from condyle.results.inverse_rows import solve_states
 from condyle.results.solving import reaction_variables
 
 # Our joint -> the oracle's link and whether it is its force or its moment.
@@ -190,7 +190,7 @@ def test_columns_of_files_have_the_names_of_the_reactions(tmp_path: Path) -> Non
     assert {name for name in columns if name.startswith("reaction_")} == wanted
     states = {p + name: 0 * t for p in ("", "d", "dd") for name in model.independent}
     write_table(tmp_path / "states.csv", states)
-    solve_file(model, tmp_path / "states.csv", tmp_path / "out.csv", reactions=True)
+    solve_states(model, tmp_path / "states.csv", tmp_path / "out.csv", reactions=True)
     table = read_table(tmp_path / "out.csv")
     assert {name for name in table.columns if name.startswith("reaction_")} == wanted
     for name in wanted:

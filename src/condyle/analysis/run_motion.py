@@ -1,0 +1,94 @@
+"""The main job: efforts and contact forces of a mechanism along a motion, under a load."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import InputError
+from ..mechanism import Mechanism, as_mechanism, load_mechanism
+from ..model.model import derive
+from ..motion import motion_and_load
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from .sweep import Study
+
+
+def run(
+    mechanism: Any = "masticatory",
+    motion: Any = None,
+    load: Any = None,
+    *,
+    load_point: str | None = None,
+    formulation: str = "virtual_power",
+    route: str = "core",
+    backend: str = "auto",
+    threads: int | None = None,
+    distribution: str | None = None,
+    preload: float = 0.0,
+    contact_weight: float = 0.0,
+    reactions: bool = False,
+    flag: bool = False,
+    measured: str | Path | None = None,
+    vary: Study | str | Path | None = None,
+    **reading: Any,
+) -> xr.Dataset:
+    """Inverse dynamics along a motion, as `condyle run` does it.
+
+    Args:   mechanism: one, a model, the path of a file, or the name of a bundled one.
+            motion, load: files or arrays; default: the bundled chewing path and bite force where
+                they fit, else a trial motion without a load.
+            load_point: platform point at which the load acts.
+            formulation, route, backend, distribution, preload, contact_weight: as of `derive`.
+            reactions, flag, threads: as of `Model.solve`.
+            measured: markers and EMG to keep with the results.
+            vary: a study, or its file, whose numbers vary: quantiles of efforts and contact forces.
+            reading: units, landmark, smooth, rate, trim: how the file of a motion is read.
+    Raises: CondyleError: for input that cannot be used, or samples that cannot be computed.
+    """
+    machine = as_mechanism(mechanism)
+    study = None if vary is None else study_for(vary, machine)
+    path, acting = motion_and_load(machine, motion, load, **reading)
+    weight = weight_of(machine, contact_weight)
+    model = derive(machine, formulation, route, backend, distribution, preload, weight)
+    solution = model.solve(path, acting, load_point, flag, reactions, threads)
+    if measured is not None:
+        solution = solution.condyle.with_measured(measured)
+    if study is not None:
+        from .sweep import with_bands
+
+        solution = with_bands(solution, study, path, acting, mechanism=machine, workers=threads)
+    said = [*path.warnings, *acting.warnings, *solution.condyle.warnings]
+    solution.attrs["warnings"] = json.dumps(said)
+    return solution
+
+
+def study_for(given: Study | str | Path, machine: Mechanism) -> Study:
+    """The study whose numbers are to vary in a mechanism.
+
+    Raises: InputError: for a file that is none, or that names another mechanism.
+    """
+    from .sweep import read_study
+
+    study = read_study(given)
+    if study.mechanism is not None and load_mechanism(study.mechanism) != machine:
+        raise InputError(
+            f'--vary (vary=...): the study is of "{study.mechanism}", the run of "{machine.name}"; '
+            "name the same mechanism in both, or leave it out of the study"
+        )
+    return study
+
+
+def weight_of(machine: Mechanism, contact_weight: float) -> float:
+    """W / N_ref^2 [1/N^2] of W."""
+    from ..model.distributing import reference_force
+
+    if not (math.isfinite(contact_weight) and contact_weight >= 0):
+        raise InputError(
+            f"--contact-weight: expected a number of at least 0, got {contact_weight:g}"
+        )
+    return contact_weight / reference_force(machine) ** 2
