@@ -17,8 +17,9 @@ import condyle
 from condyle.mechanism import bundled_text
 
 # `from oracles import ...` and `from benchmarks import ...` from any folder.
-sys.path.insert(0, str(Path(__file__).parents[1]))
-sys.path.insert(0, str(Path(__file__).parent))
+TESTS = Path(__file__).parent
+sys.path.insert(0, str(TESTS.parent))
+sys.path.insert(0, str(TESTS))
 
 from support.browser import browser, open_tab  # noqa: F401 - fixtures
 from support.building import (  # noqa: F401 - fixtures
@@ -36,25 +37,31 @@ for _name in ("FORCE_COLOR", "GITHUB_ACTIONS", "LINES", "NO_COLOR", "PY_COLORS",
     os.environ.pop(_name, None)
 os.environ["COLUMNS"] = "100"
 
-# Fixtures that build kernels or drive a browser.
+# Tests that need a compiler, a browser or another program, or draw pages, are slow without a mark.
 SLOW_FIXTURES = {"browser", "compiler_command"}
+PAGES = {"docs", "report", "view"}
+SLOW_ROOMS = PAGES | {"backends", "bench", "export"}
+
+
+def room(item: pytest.Item) -> str:
+    return item.path.relative_to(TESTS).parts[0]
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """A test that asks for a compiler or a browser is slow, marked or not."""
     for item in items:
-        if SLOW_FIXTURES & {*getattr(item, "fixturenames", ())}:
+        asks = SLOW_FIXTURES & {*getattr(item, "fixturenames", ())}
+        if asks or room(item) in SLOW_ROOMS:
             item.add_marker(pytest.mark.slow)
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
-    """Tests without a mark run kernels by numpy, the others as people do; no setting of theirs."""
-    marked = any(item.iter_markers("slow")) or any(item.iter_markers("ci"))
+    """Quick tests and pages run kernels by numpy, the others as people do."""
+    timed = any(item.get_closest_marker(speed) for speed in ("slow", "ci"))
     with pytest.MonkeyPatch.context() as patch:
         for name in ("CONDYLE_BACKEND", "CONDYLE_LANES"):
             patch.delenv(name, raising=False)
-        if not marked:
+        if room(item) in PAGES or not timed:
             patch.setenv("CONDYLE_BACKEND", "numpy")
         return (yield)
 

@@ -54,6 +54,7 @@ for line in sys.stdin:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="needs signals")
 def test_kills_leave_no_torn_file(tmp_path: Path, fuzz_seeds: range) -> None:
     kills = min(max(len(fuzz_seeds) // RUNS_A_KILL, 1), MOST)

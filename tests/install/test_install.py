@@ -17,10 +17,13 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-pytestmark = pytest.mark.skipif(
-    os.environ.get("CONDYLE_INSTALL") != "required",
-    reason="builds and installs from a registry: make install",
-)
+pytestmark = [
+    pytest.mark.ci,
+    pytest.mark.skipif(
+        os.environ.get("CONDYLE_INSTALL") != "required",
+        reason="builds and installs from a registry: make install",
+    ),
+]
 # No setting of this environment may help the new one.
 CLEAN = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "CONDYLE_", "VIRTUAL"))}
 

@@ -25,6 +25,7 @@ try:
     find_compiler()
 except CompilerError:
     pytest.skip("needs a C compiler", allow_module_level=True)
+pytestmark = pytest.mark.slow
 
 BASE = {"duration": 0.2, "rate": 700.0, "method": "rk4", "step": 2e-4}
 TORQUE = {"kind": "computed_torque", "stiffness": 400.0, "rate": 500.0}

@@ -83,6 +83,7 @@ def test_several_motions_are_rows_of_their_own(tables: dict[str, Any], alone: xr
     np.testing.assert_array_equal(both["peak"].values[::2], alone["peak"].values)
 
 
+@pytest.mark.slow
 def test_dask_gives_the_same_bits_and_outlives_a_worker(
     tables: dict[str, Any], tmp_path: Path, same: Same
 ) -> None:
