@@ -17,9 +17,8 @@ import condyle
 from condyle.mechanism import bundled_text
 
 # `from oracles import ...` and `from benchmarks import ...` from any folder.
-TESTS = Path(__file__).parent
-sys.path.insert(0, str(TESTS.parent))
-sys.path.insert(0, str(TESTS))
+sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parent))
 
 from support.browser import browser, open_tab  # noqa: F401 - fixtures
 from support.building import (  # noqa: F401 - fixtures
@@ -37,6 +36,7 @@ for _name in ("FORCE_COLOR", "GITHUB_ACTIONS", "LINES", "NO_COLOR", "PY_COLORS",
     os.environ.pop(_name, None)
 os.environ["COLUMNS"] = "100"
 
+TESTS = Path(__file__).parent
 # Tests that need a compiler, a browser or another program, or draw pages, are slow without a mark.
 SLOW_FIXTURES = {"browser", "compiler_command"}
 PAGES = {"docs", "report", "view"}

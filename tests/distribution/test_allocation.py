@@ -66,6 +66,7 @@ def test_as_the_robust_solver(name, shape):
     assert seen >= {Status.ok, Status.infeasible}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["bounded", "weighted", "cubic"])
 def test_few_bites_of_the_jaw_are_left_to_others(name, monkeypatch):
     """As compiled code finds them; from far within the limits to what no bite reaches."""
@@ -108,6 +109,7 @@ def test_a_contact_that_must_push_and_may_not_has_no_efforts():
     assert (found.pattern == wanted.pattern).all() and (found.status == wanted.status).all()
 
 
+@pytest.mark.slow
 def test_compiled_as_by_numpy():
     problem = human_jaw(np.linspace(1.0, 900.0, 50), MOLAR_RIGHT)
     compiled, plain = (distribute(problem, "bounded", name) for name in ("compiled", "numpy"))

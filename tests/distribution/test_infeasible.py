@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.speeds import few
 
 from condyle.distribution import OBJECTIVES, Problem, Status, distribute
 
@@ -17,7 +18,7 @@ def limits_times(problem, factor):
 
 
 @pytest.mark.parametrize("name", LIMITED)
-@pytest.mark.parametrize("friction", [0, 1, 2])
+@pytest.mark.parametrize("friction", few([0, 1, 2], 1))
 def test_shortfall_is_where_it_turns(name, friction):
     rng = np.random.default_rng(friction)
     problem = random_problem(rng, 7, 2, 60, friction=friction, one_sided=True, tight=0.4, pull=True)

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from oracles.random_mechanism import random_mechanism, random_state, toml_text
+from support.speeds import few, slow
 
 import condyle
 from condyle import InputError, UnsupportedError
@@ -95,7 +96,7 @@ def test_the_choice_of_dependent_coordinates_is_free(
     assert difference(got, wanted) < 1e-10
 
 
-@pytest.mark.parametrize("backend", ["numpy", "auto"])
+@pytest.mark.parametrize("backend", few(["numpy", "auto"], "numpy", rest=slow))
 def test_near_crank_singularities(reference: Mechanism, backend: str) -> None:
     """Towards a stretched crank the loss is rounding over the transmission's sine, no more.
 
@@ -124,6 +125,7 @@ def test_near_crank_singularities(reference: Mechanism, backend: str) -> None:
         assert (error < 1e-13 / sine**2).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options", [{"contacts": 3}, {"contacts": 2, "surface": "quadratic"}], ids=str
 )

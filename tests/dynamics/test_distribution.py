@@ -61,7 +61,11 @@ def test_an_ill_conditioned_jacobian_costs_its_condition_number_and_no_more(n: i
 
 
 @pytest.mark.parametrize(
-    "contacts, chains, backend", [(2, 8, "auto"), (2, 8, "numpy"), (1, 6, "numpy"), (5, 6, "numpy")]
+    "contacts, chains, backend",
+    [
+        *((k, n, "numpy") for k, n in ((2, 8), (1, 6), (5, 6))),
+        pytest.param(2, 8, "auto", marks=pytest.mark.slow),
+    ],
 )
 def test_models_choose_the_least_norm(contacts: int, chains: int, backend: str) -> None:
     raw = random_mechanism(np.random.default_rng(9), contacts=contacts, chains=chains)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.speeds import first, slow
 
 import condyle
 from condyle.dynamics import FORMULATIONS, ROUTES
@@ -27,7 +28,7 @@ def close(got: np.ndarray, key: str) -> None:
 
 
 @pytest.mark.parametrize("route", ROUTES)
-@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("formulation", first(FORMULATIONS, 3, rest=slow))
 def test_every_model_meets_the_cases(
     reference: condyle.Mechanism, formulation: str, route: str
 ) -> None:
@@ -51,7 +52,10 @@ def test_every_model_meets_the_cases(
 
 @pytest.mark.parametrize(
     "backend, options",
-    [("auto", ()), ("numpy", ("--formulation", "lagrange", "--route", "direct"))],
+    [
+        pytest.param("auto", (), marks=slow),
+        ("numpy", ("--formulation", "lagrange", "--route", "direct")),
+    ],
 )
 def test_the_command_meets_the_cases(
     condyle_command: Callable[..., Any],

@@ -7,6 +7,7 @@ import pickle
 
 import numpy as np
 import pytest
+from support.speeds import few, slow
 
 import condyle
 from condyle.model.model import Model, with_point
@@ -19,7 +20,7 @@ CHANGES = {
 
 
 @pytest.mark.parametrize("name", CHANGES)
-@pytest.mark.parametrize("backend", ["numpy", "auto"])
+@pytest.mark.parametrize("backend", few(["numpy", "auto"], "numpy", rest=slow))
 def test_a_renumbered_model_is_the_mechanisms_own(name: str, backend: str) -> None:
     base = condyle.load_mechanism(name)
     other = base.set(CHANGES[name])
