@@ -292,7 +292,9 @@ def test_loads_and_the_plant(mode: int) -> None:
         total[:, 3:] += np.cross(lever, forces[:, i]) + moments
         moments = np.zeros((N, 3))
     np.testing.assert_allclose(found["load_force"], forces, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(found["felt"], forces[:, 1] + forces[:, 2], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(
+        found["measured_force"], forces[:, 1] + forces[:, 2], rtol=0, atol=1e-9
+    )
     close(found["wrench"], total, 1e-9)
     load9 = np.hstack([total, np.zeros((N, 3))])
     moved_by = jaw().forward(s["q"], s["q1"], effort, load9, ("motion",))

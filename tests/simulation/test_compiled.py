@@ -16,7 +16,6 @@ from condyle.questions.law.controller import EACH_COORDINATE, Control, Controlle
 from condyle.questions.load.acting import LoadTable, Place
 from condyle.simulation import CONTROLLERS, LOADS, running
 from condyle.simulation.bind import bind
-from condyle.simulation.crowd import run_all
 from condyle.simulation.gains import check_gains
 from condyle.simulation.plan import Plan, Trace
 from condyle.simulation.scenario import scenario_from
@@ -104,7 +103,7 @@ def same(found: Trace, expected: Trace, bound: float = 1e-10) -> None:
 @pytest.mark.parametrize("name", CASES)
 def test_the_same_as_in_python(name: str, model: condyle.Model) -> None:
     plan = plan_of(CASES[name], model)
-    assert running.Run(plan).steps is not None
+    assert running.Run([plan]).steps is not None
     found = running.run(plan)
     same(found, in_python(plan))
     if "food" in name:
@@ -137,24 +136,24 @@ def test_a_table_of_loads(model: condyle.Model, tmp_path: Any) -> None:
 def test_states_that_a_kernel_does_not_vouch_for_are_pythons(
     model: condyle.Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Where C has to give back every look and every step, the run is Python's."""
+    """Where C has to give back every tick and every step, the run is Python's."""
     plan = plan_of({"duration": 0.02, "controller": TORQUE}, model)
     expected = in_python(plan)
-    run = running.Run(plan)
+    run = running.Run([plan])
     assert run.steps is not None
     calls = []
 
     def doubtful(budget: int) -> int:
-        struct, steps = run.steps.run, run.steps  # type: ignore[union-attr]
-        if struct.corner + 1 >= len(plan.corners()):
+        struct, steps = run.clock, run.steps
+        if struct.breakpoint + 1 >= len(plan.breakpoints()[0]):
             return running.DONE
-        calls.append(struct.corner)
+        calls.append(struct.breakpoint)
         ticks = np.isclose(plan.ticks(), struct.t, atol=1e-9)
         assert steps is not None
-        return running.LOOK if struct.fresh and ticks.any() else running.STEP
+        return running.SAMPLE if struct.fresh and ticks.any() else running.STEP
 
     monkeypatch.setattr(run.steps, "advance", doubtful)
-    same(run.trace(), expected)
+    same(run.traces()[0], expected)
     assert len(calls) > 20
 
 
@@ -164,16 +163,16 @@ def test_what_it_is_not_for(model: condyle.Model) -> None:
         {"controller": {**TORQUE, "ideal": True, "rate": None}},
     ):
         merged = {k: v for k, v in {**BASE, **told}.items() if v is not None}
-        assert running.Run(bind(model, scenario_from(merged))).steps is None
+        assert running.Run([bind(model, scenario_from(merged))]).steps is None
     loads = [lambda t, s, v: (0.0, 0.0, -1.0)]
     plan = bind(model, scenario_from(BASE), loads=loads)
-    assert running.Run(plan).steps is None
+    assert running.Run([plan]).steps is None
     plan = bind(condyle.derive("masticatory", backend="numpy"), scenario_from(BASE))
-    assert running.Run(plan).steps is None
+    assert running.Run([plan]).steps is None
 
 
 def test_in_lockstep(model: condyle.Model) -> None:
-    """Runs of a crowd are the runs alone, those with events among them; looks, too."""
+    """Runs of a crowd are the runs alone, those with events among them; samples too."""
 
     def told(i: int) -> dict[str, Any]:
         return {
@@ -186,7 +185,7 @@ def test_in_lockstep(model: condyle.Model) -> None:
     plans = [plan_of(told(i), model) for i in range(11)]
     plans += [plan_of({"start": {"dbeta": 0.02 * i}, "duration": 0.01}, model) for i in range(3)]
     alone = [running.run(plan) for plan in plans]
-    for found, expected in zip(run_all(plans), alone, strict=True):
+    for found, expected in zip(running.run_all(plans), alone, strict=True):
         same(found, expected, 1e-12)
     quiet = [not trace.events for trace in alone]
     assert any(quiet) and not all(quiet)
@@ -206,7 +205,7 @@ def test_side_by_side(model: condyle.Model) -> None:
 
 
 class Damped(ControllerTable):
-    """What the path needs, a damper, and a count of its looks."""
+    """What the path needs, a damper, and a count of its ticks."""
 
     ports: ClassVar[Mapping[str, str | int]] = {"damping": EACH_COORDINATE}
     memory: ClassVar[tuple[float, ...]] = (3.0,)
@@ -246,12 +245,12 @@ def test_laws_from_outside_run_in_compiled_code(
         "load": [{"kind": "wind", "drag": 5.0, "point": "incisor"}],
     }
     plan = plan_of(told, model)
-    run = running.Run(plan)
+    run = running.Run([plan])
     assert run.steps is not None and not check_gains(plan).stable  # nothing holds the place
-    found = run.trace()
+    found = run.traces()[0]
     same(found, in_python(plan))
     assert run.control is not None
-    memory = run.control.looks[:, run.control.columns.result("memory"), 0]
+    memory = run.control.samples[:, run.control.columns.result("memory"), 0]
     np.testing.assert_array_equal(memory[:, 0], 4.0 + np.arange(50))
 
     def law(now: Any, aim: Any) -> np.ndarray:
@@ -286,23 +285,23 @@ def test_laws_from_outside_in_lockstep(
         for i in range(4)
     ]
     alone = [running.run(plan) for plan in plans]
-    for alone_only in ("_between", "_tick_at"):
+    for alone_only in ("_between", "_tick"):
         monkeypatch.setattr(running.Run, alone_only, None)
-    for found, expected in zip(run_all(plans), alone, strict=True):
+    for found, expected in zip(running.run_all(plans), alone, strict=True):
         same(found, expected, 1e-12)
 
 
 def test_drives_that_chatter_stay_in_compiled_code() -> None:
-    """Limits cut efforts in hundreds of looks; none of them comes back to Python."""
+    """Limits cut efforts in hundreds of ticks; none of them comes back to Python."""
     machine = condyle.load_mechanism("masticatory")
     limits = {f"chain.{name}.actuator.torque_limit": 0.02 for name in machine.chain_names}
     hard = {"kind": "joint_pd", "stiffness": 200.0, "damping": 1.0, "rate": 2000.0}
     told = {"duration": 0.3, "controller": hard, "start": {"beta": 0.02}}
-    run = running.Run(plan_of(told, condyle.derive(machine.set(limits))))
+    run = running.Run([plan_of(told, condyle.derive(machine.set(limits)))])
     assert run.steps is not None
     advance, codes = run.steps.advance, []
     run.steps.advance = lambda budget: codes.append(advance(budget)) or codes[-1]  # type: ignore
-    trace = run.trace()
-    assert trace.ended is None and sum(run._seen.values()) > 300
+    trace = run.traces()[0]
+    assert trace.ended is None and sum(run.logs[0].counts.values()) > 300
     assert {event.kind for event in trace.events} == {"saturated"}
     assert set(codes) == {running.DONE, running.PAUSE} and len(codes) < 10

@@ -11,7 +11,7 @@ import pytest
 import condyle
 from condyle.simulation import running
 from condyle.simulation.bind import bind
-from condyle.simulation.by_hand import Live
+from condyle.simulation.live import Live
 from condyle.simulation.scenario import scenario_from
 
 BASE = {"duration": 0.1, "method": "rk4", "step": 2e-4}
@@ -43,8 +43,8 @@ def state(told: dict[str, Any], model: condyle.Model) -> np.ndarray:
 
 
 def now(found: Live) -> np.ndarray:
-    moment = found.moment()
-    velocity = found._run.y[len(moment.q) : 2 * len(moment.q)]
+    moment = found.state()
+    velocity = found._run.state[len(moment.q) : 2 * len(moment.q)]
     return np.concatenate([moment.q, velocity])
 
 
@@ -74,37 +74,37 @@ def test_bit_by_bit_is_the_whole_run(
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_every_knob_is_the_number_of_the_scenario(name: str, jaw: condyle.Model) -> None:
+def test_every_parameter_is_the_number_of_the_scenario(name: str, jaw: condyle.Model) -> None:
     told = CASES[name]
     found = live(told, jaw)
-    owners = {knob.owner for knob in found.knobs}
+    owners = {parameter.owner for parameter in found.parameters}
     assert owners == {"controller", *(load["kind"] for load in told.get("load", ()))}
     before = state(told, jaw)
-    for i, knob in enumerate(found.knobs):
-        value = 0.6 * knob.value
+    for i, parameter in enumerate(found.parameters):
+        value = 0.6 * parameter.value
         other = {**told, "load": [dict(load) for load in told.get("load", ())]}
         tables = {load["kind"]: load for load in other["load"]}
         tables["controller"] = other["controller"] = dict(told["controller"])
-        assert knob.value == tables[knob.owner].get(knob.field, knob.value)
-        tables[knob.owner][knob.field] = value
+        assert parameter.value == tables[parameter.owner].get(parameter.field, parameter.value)
+        tables[parameter.owner][parameter.field] = value
         found.reset()
-        found.turn(i, value)
+        found.set_parameter(i, value)
         found.restart()
         found.go_to(1.0)
         expected = state(other, jaw)
-        np.testing.assert_allclose(now(found), expected, rtol=0, atol=1e-10, err_msg=str(knob))
+        np.testing.assert_allclose(now(found), expected, rtol=0, atol=1e-10, err_msg=str(parameter))
         idle = ("break_force", "threshold")  # numbers of what happens in another run
-        assert knob.field in idle or np.abs(expected - before).max() > 1e-8, knob
+        assert parameter.field in idle or np.abs(expected - before).max() > 1e-8, parameter
 
 
-def test_a_knob_turned_on_the_way(jaw: condyle.Model) -> None:
+def test_a_parameter_changed_on_the_way(jaw: condyle.Model) -> None:
     """The law that goes on is that of the new number: it was not there before."""
     one, other = (live(CASES["in C"], jaw) for _ in range(2))
     for found in (one, other):
         found.go_to(0.04)
     np.testing.assert_array_equal(now(one), now(other))
-    stiffness = next(i for i, k in enumerate(one.knobs) if k.field == "stiffness")
-    one.turn(stiffness, 3e3)
+    stiffness = next(i for i, k in enumerate(one.parameters) if k.field == "stiffness")
+    one.set_parameter(stiffness, 3e3)
     for found in (one, other):
         found.go_to(0.1)
     assert np.abs(now(one) - now(other)).max() > 1e-3
@@ -126,35 +126,35 @@ def test_a_hand_is_three_springs(jaw: condyle.Model) -> None:
     assert not found.pulling
     found.pull(point, point + away, k, c)
     assert found.pulling
-    np.testing.assert_allclose(found.moment().forces[-1][2], k * away[2], rtol=1e-9)
-    np.testing.assert_array_equal(found.moment().points[-1], point)
+    np.testing.assert_allclose(found.state().forces[-1][2], k * away[2], rtol=1e-9)
+    np.testing.assert_array_equal(found.state().points[-1], point)
     found.go_to(1.0)
     expected = state({"controller": TORQUE, "load": springs}, jaw)
     np.testing.assert_allclose(now(found), expected, rtol=0, atol=1e-11)
     found.let_go()
-    assert not found.pulling and not found.moment().forces[-1].any()
+    assert not found.pulling and not found.state().forces[-1].any()
 
 
 def test_food_that_grows_between_the_teeth_touches_them(jaw: condyle.Model) -> None:
     found = live({"controller": TORQUE, "start": START, "load": [FOOD]}, jaw)
-    thickness = next(i for i, k in enumerate(found.knobs) if k.field == "thickness")
-    found.turn(thickness, 1e-4)
+    thickness = next(i for i, k in enumerate(found.parameters) if k.field == "thickness")
+    found.set_parameter(thickness, 1e-4)
     found.restart()
     found.go_to(0.01)
-    assert of_food(found) == [] and not found.moment().forces.any()
-    found.turn(thickness, 0.02)
+    assert of_food(found) == [] and not found.state().forces.any()
+    found.set_parameter(thickness, 0.02)
     assert of_food(found) == ["food_touched"]
-    assert np.linalg.norm(found.moment().forces[0]) > 1
-    found.turn(thickness, 1e-4)
+    assert np.linalg.norm(found.state().forces[0]) > 1
+    found.set_parameter(thickness, 1e-4)
     assert of_food(found) == ["food_touched", "food_left"]
-    assert not found.moment().forces.any()
+    assert not found.state().forces.any()
 
 
 def test_what_ends_it_is_kept_and_it_can_begin_again(jaw: condyle.Model) -> None:
     found = live({"duration": 5.0, "start": {"dbeta": 0.1}}, jaw)
     found.go_to(5.0)
     assert found.over and found.ended is not None and found.ended.ends
-    assert 0 < found.t < 5 and np.isfinite(found.moment().pose).all()
+    assert 0 < found.t < 5 and np.isfinite(found.state().pose).all()
     t = found.t
     found.go_to(5.0)
     found.let_go()

@@ -128,7 +128,7 @@ def test_hands_on_the_page(open_tab: Callable[..., Tab], view: View) -> None:
     tab.page.get_by_role("button", name="Run").wait_for()
     assert not player.playing
     fill(tab, "thickness [mm]", 15)
-    thickness = [knob.field for knob in player.live.knobs].index("thickness")
+    thickness = [p.field for p in player.live.parameters].index("thickness")
     tab.until(lambda: player.live.values[thickness] == pytest.approx(0.015), "the food grows")
     x, y = grip(tab)
     mouse = tab.page.mouse

@@ -191,7 +191,7 @@ def require_question(name: str) -> Entry:
 def _law(kind: str, table: type[ControllerTable]) -> Entry:
     """A controller, for a processor that reads its state and its aims."""
     fields = {name: given.description or name for name, given in table.model_fields.items()}
-    units = {name: table.knobs.get(name, "1").replace("²", "^2") for name in table.ports}
+    units = {name: table.parameters.get(name, "1").replace("²", "^2") for name in table.ports}
     told = {name: (fields.get(name, name), unit) for name, unit in units.items()}
     words = ", ".join(str(number) for number in table.memory)
     choices = tuple((name, table.model_fields[name].default) for name in table.chooses)

@@ -32,7 +32,7 @@ NEVER = -1.0  # a guard of a mode that is not on
 def rate(
     structure: Structure,
     loads: Sequence[type[LoadTable]] = (),
-    felt: Sequence[int] = (),
+    measured: Sequence[int] = (),
     bounded: Sequence[int] = (),
     sided: Sequence[int] = (),
 ) -> Variants:
@@ -42,9 +42,10 @@ def rate(
     numbers, as `load_i_point`; of bounded contacts `bounds`, low then high a contact (6,), of
     one-sided ones `push`, the sign of their normal force.
     Results: rate (2 m + 4,); guards: of bounded contacts, of one-sided ones, of the loads' jumps;
-    too_fast, a lane's. wrench (6,) of all loads about O_M, load_force (loads, 3); felt (3,).
+    too_fast, a lane's. wrench (6,) of all loads about O_M, load_force (loads, 3);
+    measured_force (3,).
 
-    Args: loads: their laws;  felt: loads whose force `felt` is the sum of.
+    Args: loads: their laws;  measured: loads whose forces sum up to `measured_force`.
           bounded, sided: contacts whose bounds and pushes are guarded.
     """
     b = Builder(structure)
@@ -86,8 +87,8 @@ def rate(
         b.output("load_force", forces, "N", len(acting), 3)
         places = ca.horzcat(*(ca.vertcat(one.place.s, one.place.v) for one in acting)).T
         b.output("load_place", places, "m, m/s", len(acting), 6)
-    if felt:
-        b.output("felt", total([acting[i].force for i in felt]), "N", 3)
+    if measured:
+        b.output("measured_force", total([acting[i].force for i in measured]), "N", 3)
     placement = platform.placement
     certain = ca.SX(1) if placement.discriminant is None else placement.discriminant
     b.output("certain", certain if placement.iterated else ca.SX(1), "1")

@@ -40,7 +40,8 @@ def tick(
 
     Ports: q, q1, joint, joint_rate: as they are, or joints alone where there are sensors;
     aims `AIMS`; force at the law's point, (3,); its gains; low, high: limits, a lane's.
-    Results: effort; asked, without limits; q, q1, joint, joint_rate, felt: what it saw; memory.
+    Results: effort; asked, without limits; q, q1, joint, joint_rate, measured_force, as sampled;
+    memory.
 
     Args: law: whose equations, None where efforts are `given`;  choices: entries of its table.
           velocity: how the `observer` comes to rates, None without sensors.
@@ -112,7 +113,7 @@ def _program(
     b.output("asked", asked, "N m or N")
     b.output("q", now.q, "m, rad", m)
     b.output("q1", now.q1, "per s", m)
-    b.output("felt", now.force, "N", 3)
+    b.output("measured_force", now.force, "N", 3)
     if velocity is None:
         b.output("joint", now.joint, "rad or m")
         b.output("joint_rate", now.joint_rate, "rad/s or m/s")

@@ -27,6 +27,14 @@ class Path:
     force_times: np.ndarray
     force: np.ndarray
 
+    def same_as(self, other: Path) -> bool:
+        """Whether it aims at the same at all times."""
+        arrays = ("times", "q", "force_times", "force")
+        return self is other or (
+            self.model is other.model
+            and all(np.array_equal(getattr(self, n), getattr(other, n)) for n in arrays)
+        )
+
     @cached_property
     def _spline(self) -> Spline:
         return Spline.through(self.times - self.times[0], self.q)

@@ -81,11 +81,13 @@ class Columns:
         """Where a result stands; none where there is no such result."""
         return self._results.get(name, np.zeros(0, dtype=int))
 
-    def give(self, port: str, value: Any, run: int | slice = 0) -> None:
-        """Set an input, of one run or alike in several."""
-        rows = self._ports[port]
-        a = np.asarray(value, dtype=float).reshape(-1, 1) if isinstance(run, slice) else value
-        self.given[rows, run] = a
+    def give(self, port: str, value: Any, run: int = 0) -> None:
+        """Set an input of one run."""
+        self.given[self._ports[port], run] = value
+
+    def fill(self, port: str, values: Any) -> None:
+        """Set an input of all runs: a value for each, or one for all."""
+        self.given[self._ports[port]] = np.reshape(values, (len(values), -1)).T
 
     def __getitem__(self, name: str) -> np.ndarray:
         """A result of the first run at the last evaluation, anew."""

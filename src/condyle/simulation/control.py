@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..errors import InputError
@@ -15,8 +17,8 @@ from .plant import WIDE, Plant
 REPEATS = 4  # of the steps from encoders to a pose, before it is lost
 
 
-class Lost(Exception):
-    """The encoders' counts give no pose near the last one."""
+class PoseLostError(Exception):
+    """Forward kinematics of the encoders' counts did not converge from the last pose."""
 
 
 def drive_of(plan: Plan) -> ClosedLoop:
@@ -26,14 +28,14 @@ def drive_of(plan: Plan) -> ClosedLoop:
 
 
 class Controller:
-    """Kernel, numbers and looks of a plan's controller, or of several alike.
+    """Kernel, numbers and samples of controllers that are alike; in Python, of the first run.
 
-    aims:   (K, numbers, runs) at the ticks, in the order of the ports.
-    looks:  (K, results, runs), what the tick found each time;  states: (K, size, runs), where.
+    aims:    (K, numbers, runs) at the ticks, in the order of the ports.
+    samples: (K, results, runs), the results of every tick;  states: (K, size, runs), its state.
     """
 
-    def __init__(self, plan: Plan, runs: int = 1) -> None:
-        drive = drive_of(plan)
+    def __init__(self, plans: Sequence[Plan]) -> None:
+        plan, drive = plans[0], drive_of(plans[0])
         sensing = drive.sensing
         self._model, velocity = drive.model, None if sensing is None else sensing.velocity
         self.details = (drive.law.table, drive.law.choices, velocity)
@@ -42,14 +44,13 @@ class Controller:
         self.outside = function or drive.model.chooses_efforts
         apart = self.outside and not function
         details = (*self.details, True) if apart else self.details
-        self.columns = Columns(drive.model.kernel("tick", *details), runs)
+        self.columns = Columns(drive.model.kernel("tick", *details), len(plans))
         self._apart = self.columns if self.outside else None
         self.ticks = plan.ticks()
-        rows = [self.columns.rows(name) for name in AIMS]
-        self._aimed = np.concatenate(rows)
+        self._aimed = np.concatenate([self.columns.rows(name) for name in AIMS])
         self.first = int(self._aimed.min())
         sizes = len(self._aimed), self.columns.results, plan.size
-        self.aims, self.looks, self.states = (
+        self.aims, self.samples, self.states = (
             np.zeros((len(self.ticks), size, self.columns.stride)) for size in sizes
         )
         self.carry = carried([port.name for port in self.columns.kernel.interface.ports])
@@ -57,44 +58,50 @@ class Controller:
         self.carry_to = np.concatenate(none + [self.columns.rows(to) for to in self.carry])
         found = [self.columns.result(name) for name in self.carry.values()]
         self.carry_from = np.concatenate(none + found)
+        self.fill(plans)
 
-    def fill(self, plan: Plan, run: int = 0) -> None:
-        """Take the numbers of a plan for a run, but not its aims."""
-        self.plan, self.drive, give = plan, drive_of(plan), self.columns.give
-        drive = self.drive
+    def fill(self, plans: Sequence[Plan]) -> None:
+        """Take the numbers of plans, but not their aims."""
+        self.plan, self.drive, fill = plans[0], drive_of(plans[0]), self.columns.fill
+        drives = [drive_of(plan) for plan in plans]
         for name in ("low", "high"):
-            give(name, np.clip(getattr(plan, name), -WIDE, WIDE), run)
-        for name, value in drive.law.numbers.items():
-            give(name, value, run)
-        give("period", drive.period or 1.0, run)
-        if drive.sensing is not None:
-            give("resolution", drive.sensing.resolution, run)
-            give("smoothing", drive.sensing.smoothing, run)
+            fill(name, np.clip([getattr(plan, name) for plan in plans], -WIDE, WIDE))
+        for name in self.drive.law.numbers:
+            fill(name, [drive.law.numbers[name] for drive in drives])
+        fill("period", [self.drive.period or 1.0])
+        if self.drive.sensing is not None:
+            for name in ("resolution", "smoothing"):
+                fill(name, [getattr(drive.sensing, name) for drive in drives])
 
-    def begin(self, plan: Plan, run: int = 0) -> None:
-        """Aims, and memory to begin with: a machine knows where it starts."""
-        drive, give = drive_of(plan), self.columns.give
-        if len(self.ticks):
-            self.aims[:, self._aimed - self.first, run] = drive.path.aims(self.ticks)
-        if drive.law.memory.size:
-            give("memory_before", drive.law.memory, run)
-        if drive.sensing is None:
+    def begin(self, plans: Sequence[Plan]) -> None:
+        """Take aims, and memory to begin with: a machine knows where it starts."""
+        drives = [drive_of(plan) for plan in plans]
+        starts = [i for i, drive in enumerate(drives)
+                  if i == 0 or not drive.path.same_as(drives[i - 1].path)]  # fmt: skip
+        for i, end in zip(starts, [*starts[1:], len(drives)], strict=True):
+            if len(self.ticks):
+                aims = drives[i].path.aims(self.ticks)
+                self.aims[:, self._aimed - self.first, i:end] = aims[..., None]
+        if self.drive.law.memory.size:
+            self.columns.fill("memory_before", [drive.law.memory for drive in drives])
+        if self.drive.sensing is None:
             return
-        assert drive.period is not None
-        at = drive.model.kernel("instant").run({"q": plan.q[None], "q1": plan.q1[None]}).values
-        step, joint = drive.sensing.resolution, plan.model.kernel("instant")
-        true = joint.run({"q": plan.q[None], "q1": plan.q1[None]}).values["joint"][:, 0]
+        at = np.array([plan.q for plan in plans]), np.array([plan.q1 for plan in plans])
+        ports = dict(zip(("q", "q1"), at, strict=True))
+        own, true = (m.kernel("instant").run(ports).values for m in (self._model, self.plan.model))
+        joint = true["joint"].T
+        step = np.array([drive.sensing.resolution for drive in drives])  # type: ignore[union-attr]
         with np.errstate(divide="ignore", invalid="ignore"):
-            counts = np.where(step > 0, step * np.round(true / step), true)
-        self._remember(at["pose"][:, 0], counts, at["joint_rate"][:, 0], run)
+            counts = np.where(step > 0, step * np.round(joint / step), joint)
+        self._remember(own["pose"].T, counts, own["joint_rate"].T)
 
-    def _remember(self, pose: np.ndarray, joint: np.ndarray, rate: np.ndarray, run: int) -> None:
-        """What an observer saw a period ago, the pose at rest."""
-        give, period = self.columns.give, self.drive.period or 1.0
-        give("pose_before", pose, run)
-        give("pose_rate_before", np.zeros(6), run)
-        give("joint_before", joint - period * rate, run)
-        give("joint_rate_before", rate, run)
+    def _remember(self, pose: np.ndarray, joint: np.ndarray, rate: np.ndarray) -> None:
+        """What an observer saw a period ago, the pose at rest; rows are runs."""
+        fill, period = self.columns.fill, self.drive.period or 1.0
+        fill("pose_before", pose)
+        fill("pose_rate_before", np.zeros((1, 6)))
+        fill("joint_before", joint - period * rate)
+        fill("joint_rate_before", rate)
 
     def aim_for(self, path_force: np.ndarray) -> None:
         """Another force to aim at, (K,) [N]."""
@@ -102,15 +109,15 @@ class Controller:
 
     # -- in Python ------------------------------------------------------------------------------
 
-    def look(self, t: float, y: np.ndarray, plant: Plant, k: int) -> np.ndarray:
-        """Look at tick k, where the plant was looked at; returns the efforts asked for.
+    def sample(self, t: float, y: np.ndarray, plant: Plant, k: int) -> np.ndarray:
+        """Tick k, where the plant was evaluated; returns the efforts asked for.
 
-        Raises: Lost: where the encoders give no pose.
+        Raises: PoseLostError: where the encoders give no pose.
         """
         columns = self.columns
         columns.given[self.first : self.first + len(self._aimed), 0] = self.aims[k, :, 0]
         asked = self._solve(t, y, plant)
-        self.looks[k, :, 0], self.states[k, :, 0] = columns.found[: columns.results, 0], y
+        self.samples[k, :, 0], self.states[k, :, 0] = columns.found[: columns.results, 0], y
         if np.isfinite(asked).all():
             columns.given[self.carry_to, 0] = columns.found[self.carry_from, 0]
         return asked
@@ -119,23 +126,23 @@ class Controller:
         """Efforts within limits that act from tick k on, (n,): until the first efforts come, the
         drives hold what they will be."""
         due = max(k - self.drive.delay, 0)
-        return self.looks[due, self.columns.result("effort"), 0]
+        return self.samples[due, self.columns.result("effort"), 0]
 
     def at_once(self, t: float, y: np.ndarray, plant: Plant) -> np.ndarray:
-        """Efforts of an ideal controller where the plant was looked at, (n,)."""
+        """Efforts of an ideal controller where the plant was evaluated, (n,)."""
         self.columns.given[self._aimed, 0] = self.drive.path.aims(np.array([t]))[0]
         return self._solve(t, y, plant)
 
     def steadily(
         self, aim: np.ndarray, memory: np.ndarray, y: np.ndarray, plant: Plant
     ) -> np.ndarray:
-        """Efforts asked for after a while of the same, where the plant was looked at, (n,)."""
+        """Efforts asked for after a while of the same, where the plant was evaluated, (n,)."""
         columns = self.columns
         columns.given[self._aimed, 0] = aim
         if memory.size:
             columns.give("memory_before", memory)
         if columns.has("pose_before"):
-            self._remember(plant["pose"], plant["joint"], plant["joint_rate"], 0)
+            self._remember(*(plant[name][None] for name in ("pose", "joint", "joint_rate")))
         return self._solve(0.0, y, plant)
 
     def _solve(self, t: float, y: np.ndarray, plant: Plant) -> np.ndarray:
@@ -145,8 +152,8 @@ class Controller:
         if columns.has("q"):
             columns.give("q", y[:m])
             columns.give("q1", y[m : 2 * m])
-        if plant.columns.result("felt").size:
-            columns.give("force", plant["felt"])
+        if plant.columns.result("measured_force").size:
+            columns.give("force", plant["measured_force"])
         if self.outside or columns.run():
             self._by_itself(t)
         return columns["asked"]
@@ -170,7 +177,7 @@ class Controller:
                 carried_on = period * apart.given[apart.rows("pose_rate_before"), 0]
                 apart.give("pose_before", apart["pose"] - carried_on)
         if not sure and repeats > 1:
-            raise Lost
+            raise PoseLostError
         apart.give("given", self._given(t, apart))
         apart.run()
         for result in columns.kernel.interface.results:
@@ -186,7 +193,7 @@ class Controller:
             load = np.concatenate([force, np.zeros(3), point])
             return self._model.one(q, q1, q2, load)
         names = ("q", "q1", "joint", "joint_rate")
-        now = Seen(**{name: seen[name] for name in names}, force=seen["felt"], t=t)
+        now = Seen(**{name: seen[name] for name in names}, force=seen["measured_force"], t=t)
         *aim, force = (seen.given[seen.rows(name), 0] for name in AIMS)
         found = self.drive.function(now, Aim(*aim, force=float(force[0])))  # type: ignore[misc]
         effort: np.ndarray = np.asarray(found, dtype=float)

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
+
+import numpy as np
 
 # What each kind means; in the order in which a page lists them.
 KINDS = {
@@ -22,6 +26,9 @@ KINDS = {
     "food_broken": "the food breaks",
     "food_whole": "the food is whole again",
 }
+
+
+MANY = 100  # events of a kind and an owner that are listed
 
 
 @dataclass(frozen=True)
@@ -46,3 +53,26 @@ class Event:
     def to_dict(self) -> dict[str, Any]:
         """As JSON has it."""
         return asdict(self)
+
+
+class EventLog:
+    """Events of a run, at most `MANY` of each kind and owner; counts: how often, listed or not."""
+
+    def __init__(self, independent: Sequence[str]) -> None:
+        """Args: independent: names of the coordinates q, with which states begin."""
+        self.names = (*independent, *(f"d{name}" for name in independent))
+        self.events: list[Event] = []
+        self.counts: Counter[tuple[str, str]] = Counter()
+
+    def note(
+        self, t: float, y: np.ndarray, kind: str, text: str, owner: str = "", ends: bool = False
+    ) -> None:
+        """Add an event at state y, (size,)."""
+        self.counts[kind, owner] += 1
+        count = self.counts[kind, owner]
+        if count > MANY and not ends:
+            return
+        if count == MANY and not ends:
+            text += "; more of these are not listed"
+        state = dict(zip(self.names, y[: len(self.names)].tolist(), strict=True))
+        self.events.append(Event(float(t), kind, text, owner, ends, state))

@@ -10,7 +10,7 @@ periods late,
 
     x+ = Phi x + Gamma u_-d,    Phi = exp(A T),    Gamma = int exp(A s) ds B.
 
-A law that holds a force is looked at while it does, on each load that can bear one. It is stable
+A law that holds a force is checked while it does, on each load that can bear one. It is stable
 where all eigenvalues z lie within the unit circle; s = log(z) / T are those of a continuous loop,
 of damping -Re s / |s|. The margin of phase is how much all efforts may lag together: the smallest
 angle between -1 and an eigenvalue of the open loop L(exp(i w T)) of modulus 1 (generalised Nyquist;
@@ -37,7 +37,7 @@ from ..questions.numbers import Layout, specialised
 from ..questions.structure import structure_of
 from .columns import Columns
 from .control import Controller
-from .integrators import Stuck
+from .integrators import NoRateError
 from .plan import ClosedLoop, Plan
 from .plant import Plant
 
@@ -172,11 +172,10 @@ class Loop:
         )  # fmt: skip
         plan = replace(plan, drive=(drive := replace(drive, sensing=exact)))
         self._plan, self._drive, self._m = plan, drive, len(plan.q)
-        self.plant, self.control = Plant(plan), Controller(plan)
-        self.control.fill(plan)
+        self.plant, self.control = Plant([plan]), Controller([plan])
         self.rate = Derivative(
             plan.model, "rate", self.plant.details, self.plant.columns,
-            ("q", "q1", "effort"), ("rate", "joint", "joint_rate", "felt", "load_place"),
+            ("q", "q1", "effort"), ("rate", "joint", "joint_rate", "measured_force", "load_place"),
         )  # fmt: skip
         self._ports = [p for p in self.control.columns.kernel.interface.ports if p.name in MEASURED]
         self._before = self.control.carry
@@ -203,7 +202,7 @@ class Loop:
             modes[load] = plan.loads[load].law.bears or 0
             memory = np.array(drive.law.table.holding)  # type: ignore[union-attr]
         self.plant.set_modes(modes)
-        self.plant.look(time or 0.0, y)
+        self.plant.evaluate(time or 0.0, y)
         effort = self.control.steadily(aim, memory, y, self.plant)
         self.plant.columns.give("effort", effort)
         rate, tick = self.rate(), self.tick()
@@ -211,7 +210,8 @@ class Loop:
         # What is measured, by x.
         C = {"q": np.eye(2 * m)[:m], "q1": np.eye(2 * m)[m:]}
         C |= {name: rate[name][:, : 2 * m] for name in ("joint", "joint_rate")}
-        C["force"] = rate["felt"][:, : 2 * m] if "felt" in rate else np.zeros((3, 2 * m))
+        force = rate.get("measured_force", np.zeros((3, 2 * m)))
+        C["force"] = force[:, : 2 * m]
         by_x = np.vstack([C[port.name] for port in self._ports])
         results = np.vstack([tick["asked"], *(tick[name] for name in self._before.values())])
         n, seen = len(plan.low), len(by_x)
@@ -236,7 +236,7 @@ class Loop:
         if not self._plan.loads:
             return []
         self.plant.set_modes([0] * len(self._plan.loads))
-        self.plant.look(0.0, y)
+        self.plant.evaluate(0.0, y)
         places = self.plant["load_place"].reshape(-1, 6)
         return [load.begin(at[:3]) for load, at in zip(self._plan.loads, places, strict=True)]
 
@@ -269,13 +269,13 @@ class Loop:
 
         def beyond(way: float) -> float:
             y[:m] = q + way * along
-            plant.look(0.0, y)
+            plant.evaluate(0.0, y)
             return float(-direction @ plant["load_force"].reshape(-1, 3)[load]) - force
 
         plant.set_modes(modes)
         y[:m] = q
         try:
-            plant.look(0.0, y)
+            plant.evaluate(0.0, y)
             row = direction @ self.rate()["load_place"].reshape(len(modes), 6, -1)[load, :3, :m]
             along = row / (row @ row)
             size = characteristic_length(plan.model.mechanism)
@@ -284,7 +284,7 @@ class Loop:
                 while sign * beyond(sign * ends[i]) < 0 and ends[i] < size:
                     ends[i] *= 2
             return q + brentq(beyond, -ends[1], ends[0]) * along
-        except (Stuck, ValueError):  # out of reach, or too soft for it
+        except (NoRateError, ValueError):  # out of reach, or too soft for it
             return None
 
 

@@ -25,7 +25,7 @@ SHORTEST = 1e-10  # seconds: where a state has no rate within such a step, it is
 SHRINK = 0.25
 
 
-class Stuck(Exception):
+class NoRateError(Exception):
     """The state has no rate there, or none that the integrator can follow.
 
     Attributes: status: of `Status`, or None where steps became too small.
@@ -60,7 +60,7 @@ class Settings:
 
 
 class RK4:
-    """Between the corners of the efforts steps are equal, and at most `step` long.
+    """Between the breakpoints of the efforts steps are equal, and at most `step` long.
 
     Between its ends a step is a cubic through both states and rates, of fourth order too.
     """
@@ -72,7 +72,7 @@ class RK4:
         self._rate, self._size = rate, settings.step
 
     def restart(self, t: float, y: np.ndarray, until: float) -> None:
-        """Go on from here, to `until` at most: wherever the rate has a corner."""
+        """Go on from here, to `until` at most: the next breakpoint."""
         self._count = max(math.ceil((until - t) / self._size - ROUNDING), 1)
         self._start, self._until, self._done = t, until, 0
         self._y, self._f = y, self._rate(t, y)
@@ -80,7 +80,7 @@ class RK4:
     def step(self) -> Step:
         """The next step.
 
-        Raises: Stuck: where there is none; the state stays at the end of the last one.
+        Raises: NoRateError: where there is none; the state stays at the end of the last one.
         """
         h, y0, f0 = (self._until - self._start) / self._count, self._y, self._f
         t0, t1 = self._time(self._done), self._time(self._done + 1)
@@ -107,7 +107,7 @@ def hermite(
 
 
 class Adaptive:
-    """One of SciPy's solvers, restarted between corners without a search for its first step."""
+    """One of SciPy's solvers, restarted between breakpoints without a search for its first step."""
 
     fixed: ClassVar[bool] = False
 
@@ -146,14 +146,14 @@ class Adaptive:
             try:
                 problem = running.step()
                 break
-            except Stuck:
+            except NoRateError:
                 size = min(size, self._until - t0) * SHRINK
                 if size < SHORTEST:
                     raise
                 self._begin(t0, y0, size)
                 running = self._running
         if problem is not None:
-            raise Stuck
+            raise NoRateError
         self._size = running.h_abs
         dense: list[Any] = []
 

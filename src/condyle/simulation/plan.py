@@ -92,9 +92,11 @@ class Plan:
         """Of the state: q, q', and the works of `WORKS`."""
         return 2 * len(self.q) + len(WORKS)
 
-    def corners(self) -> np.ndarray:
-        """Times at which the rate of the state has a corner, rising, from 0 to the end [s]."""
-        found = [np.array([0.0, self.duration]), self.ticks()]
+    def breakpoints(self) -> tuple[np.ndarray, np.ndarray]:
+        """Times where the rate of the state may jump or kink, from 0 to the end [s], and which of
+        them are ticks of the controller."""
+        ticks = self.ticks()
+        found = [np.array([0.0, self.duration]), ticks]
         if isinstance(self.drive, OpenLoop):
             found.append(self.drive.times)
         found += [load.times for load in self.loads]
@@ -103,10 +105,13 @@ class Plan:
         apart = np.concatenate([np.diff(every) > 1e-12, [True]])
         kept = every[apart]
         kept[0] = 0.0
-        return kept
+        is_tick = np.zeros(len(kept), dtype=np.uint8)
+        is_tick[np.clip(np.searchsorted(kept, ticks - 1e-12), 0, len(kept) - 1)] = 1
+        is_tick[-1] = 0
+        return kept, is_tick
 
     def ticks(self) -> np.ndarray:
-        """Times at which the controller looks, (K,) [s]; none in open loop."""
+        """Times at which the controller samples, (K,) [s]; none in open loop."""
         if isinstance(self.drive, OpenLoop) or self.drive.period is None:
             return np.empty(0)
         rate = 1.0 / self.drive.period
@@ -119,7 +124,7 @@ class Trace:
     """What happened, at the times that were reached.
 
     t: (N,) [s];  state: (N, 2 m + works), as of `Plan.size`;  modes: (N, loads).
-    effort: (N, n), as it acted;  tick: (N,), index of the controller's last look, -1 without one.
+    effort: (N, n), as it acted;  tick: (N,), index of the controller's last sample, -1 without one.
     command, count: (K, n), efforts asked for at every tick, and encoders' joints;
     estimate: (K, 2 m), the state that the controller took it to be;  force: (K,), of the bite.
     events: in order; the last one may have ended the run.

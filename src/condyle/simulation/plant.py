@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +15,7 @@ from ..questions.load.acting import WRENCH
 from ..status import Status
 from .columns import Columns
 from .events import KINDS
-from .integrators import Stuck
+from .integrators import NoRateError
 from .plan import ClosedLoop, OpenLoop, Plan
 
 WIDE = 1e100  # a limit that is none: products with it stay finite
@@ -40,9 +40,9 @@ class Guard:
 
 @dataclass(frozen=True)
 class Fed:
-    """A table that is fed to ports over time, linear between its rows.
+    """A table over time that feeds a port, linear between its rows.
 
-    port: the first of the rows that it is fed to;  vanishes: whether it is zero outside.
+    times: (N,) [s];  rows: (N, numbers, runs);  vanishes: whether it is zero outside.
     """
 
     port: str
@@ -51,59 +51,48 @@ class Fed:
     vanishes: bool
 
     def at(self, t: float | np.ndarray) -> np.ndarray:
-        """Its row at a time [s], or its rows at several."""
+        """The first run's row at a time [s], or its rows at several."""
         ends = {"left": 0.0, "right": 0.0} if self.vanishes else {}
-        return np.array([np.interp(t, self.times, one, **ends) for one in self.rows.T]).T
+        return np.array([np.interp(t, self.times, one, **ends) for one in self.rows[..., 0].T]).T
 
 
 class Plant:
-    """Kernel and numbers of a plan, or of several alike. It looks at one state at a time."""
+    """Kernel and numbers of plans that are alike; in Python the first of them has its states."""
 
-    def __init__(self, plan: Plan, runs: int = 1) -> None:
+    def __init__(self, plans: Sequence[Plan]) -> None:
+        plan = plans[0]
         self._model, machine = plan.model, plan.model.mechanism
         contacts = machine.contacts
         self._bounded = [i for i, c in enumerate(contacts) if any(c.bounds.entries().values())]
         self._sided = [i for i, c in enumerate(contacts) if c.one_sided]
         self._push = np.array([contacts[i].push for i in self._sided], dtype=float)
-        felt: list[int] = []
+        measured: list[int] = []
         if isinstance(plan.drive, ClosedLoop) and (place := plan.drive.law.place) is not None:
-            felt = [i for i, load in enumerate(plan.loads) if load.place == place]
+            measured = [i for i, load in enumerate(plan.loads) if load.place == place]
         laws = tuple(load.law for load in plan.loads)
-        self.details = (laws, tuple(felt), tuple(self._bounded), tuple(self._sided))
-        self.columns = Columns(plan.model.kernel("rate", *self.details), runs)
-        for run in range(runs):
-            self.fill(plan, run)
+        self.details = (laws, tuple(measured), tuple(self._bounded), tuple(self._sided))
+        self.columns = Columns(plan.model.kernel("rate", *self.details), len(plans))
+        self.fill(plans)
 
-    def fill(self, plan: Plan, run: int = 0) -> None:
-        """Take the numbers of a plan for a run."""
-        self.plan, give = plan, self.columns.give
-        self._tables = self.fed(plan)
+    def fill(self, plans: Sequence[Plan]) -> None:
+        """Take the numbers of plans."""
+        self.plan, fill = plans[0], self.columns.fill
+        self.tables = fed(plans)
         for name in ("low", "high", "speed"):
-            give(name, np.clip(getattr(plan, name), -WIDE, WIDE), run)
+            fill(name, np.clip([getattr(plan, name) for plan in plans], -WIDE, WIDE))
         if self._bounded:
-            give("bounds", bounds(plan, self._bounded), run)
+            fill("bounds", [bounds(plans[0], self._bounded)])
         if self._sided:
-            give("push", self._push, run)
-        for i, load in enumerate(plan.loads):
-            give(f"load_{i}_point", load.point, run)
-            for name, value in load.numbers.items():
-                give(f"load_{i}_{name}", value, run)
+            fill("push", [self._push])
+        for i, load in enumerate(plans[0].loads):
+            fill(f"load_{i}_point", [plan.loads[i].point for plan in plans])
+            for name in load.numbers:
+                fill(f"load_{i}_{name}", [plan.loads[i].numbers[name] for plan in plans])
 
-    def set_modes(self, modes: list[int], run: int = 0) -> None:
-        """Of the loads."""
+    def set_modes(self, modes: Any) -> None:
+        """Set the modes of the loads, (loads,) or (loads, runs)."""
         for i, mode in enumerate(modes):
-            self.columns.give(f"load_{i}_mode", mode, run)
-
-    def fed(self, plan: Plan) -> list[Fed]:
-        """What changes with time alone."""
-        found = [
-            Fed(f"load_{i}_{WRENCH}", load.times, load.rows, True)
-            for i, load in enumerate(plan.loads)
-            if len(load.times)
-        ]
-        if isinstance(plan.drive, OpenLoop):
-            found.append(Fed("effort", plan.drive.times, plan.drive.efforts, False))
-        return found
+            self.columns.fill(f"load_{i}_mode", np.atleast_1d(mode))
 
     def guards(self, plan: Plan) -> list[Guard]:
         """Bounds, pulls of one-sided contacts, speeds; then the loads' own."""
@@ -131,14 +120,14 @@ class Plant:
 
     # -- a state ------------------------------------------------------------------------------
 
-    def look(self, t: float, y: np.ndarray) -> None:
-        """Find out all about a state; results by name are those of the last look.
+    def evaluate(self, t: float, y: np.ndarray) -> None:
+        """Evaluate a state; results by name are those of the last evaluation.
 
-        Raises: Stuck: where there are none.
+        Raises: NoRateError: where there are none.
         """
         columns, m = self.columns, len(self.plan.q)
         columns.given[: 2 * m, 0] = y[: 2 * m]
-        for table in self._tables:
+        for table in self.tables:
             columns.give(table.port, table.at(t))
         status = columns.run()
         if self.plan.functions:
@@ -147,7 +136,7 @@ class Plant:
         if status == AGAIN:
             self._robustly(y)
         elif status:
-            raise Stuck(status)
+            raise NoRateError(status)
 
     def along(self, t: np.ndarray, state: np.ndarray, modes: np.ndarray) -> dict[str, np.ndarray]:
         """Results that do not depend on efforts, at states (N, size) and modes (N, loads)."""
@@ -159,7 +148,7 @@ class Plant:
         ports["q"], ports["q1"] = state[:, :m], state[:, m : 2 * m]
         for i in range(modes.shape[1]):
             ports[f"load_{i}_mode"] = modes[:, i : i + 1].astype(float)
-        for table in self._tables:
+        for table in self.tables:
             ports[table.port] = table.at(t)
         found = columns.kernel.run(ports).values
         for i, function in self.plan.functions.items():
@@ -170,7 +159,7 @@ class Plant:
         return {name: np.moveaxis(a, -1, 0) for name, a in found.items()}
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """A result of the last look."""
+        """A result of the last evaluation."""
         return self.columns[name]
 
     def _ask(self, t: float) -> None:
@@ -195,13 +184,13 @@ class Plant:
         """Accelerations and contact forces where the kernel cannot vouch for its own."""
         columns, m = self.columns, len(self.plan.q)
         if self["certain"][0] < CERTAIN:
-            raise Stuck(Status.unreachable)
+            raise NoRateError(Status.unreachable)
         asked = columns.given[columns.rows("effort"), 0]
         effort = np.clip(asked, self.plan.low, self.plan.high)
         load = np.concatenate([self["wrench"], np.zeros(3)])
         found = self._model.forward(y[None, :m], y[None, m : 2 * m], effort[None], load[None])
         if found.status[0]:
-            raise Stuck(int(found.status[0]))
+            raise NoRateError(int(found.status[0]))
         force, rate = found.contact_force[0], columns.result("rate")
         columns.found[rate[m : 2 * m], 0] = found.acceleration[0]
         columns.found[rate[2 * m + 3], 0] = np.abs(force) @ self["rub"]
@@ -209,6 +198,23 @@ class Plant:
         first = len(self._bounded)
         pulled = columns.result("guards")[first : first + len(self._sided)]
         columns.found[pulled, 0] = -self._push * force[self._sided]
+
+
+def fed(plans: Sequence[Plan]) -> list[Fed]:
+    """Tables of what changes with time alone, of plans that are alike."""
+
+    def stacked(rows: list[np.ndarray]) -> np.ndarray:
+        return np.stack(rows, axis=2)
+
+    found = [
+        Fed(f"load_{i}_{WRENCH}", load.times, stacked([p.loads[i].rows for p in plans]), True)
+        for i, load in enumerate(plans[0].loads)
+        if len(load.times)
+    ]
+    if isinstance(plans[0].drive, OpenLoop):
+        efforts = stacked([p.drive.efforts for p in plans])  # type: ignore[union-attr]
+        found.append(Fed("effort", plans[0].drive.times, efforts, False))
+    return found
 
 
 def bounds(plan: Plan, contacts: list[int]) -> np.ndarray:

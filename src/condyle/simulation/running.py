@@ -1,286 +1,342 @@
-"""Run a plan: from corner to corner, with a look at events after every step."""
+"""Runs of plans: from breakpoint to breakpoint, with a check for events after every step.
+
+A run is a crowd of one. Runs that are alike but for their numbers go on in lockstep by compiled
+code, step by step through the batches of two kernels; one that has an event, or a state that a
+kernel cannot vouch for, leaves the crowd before that step and goes on alone.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from typing import Any, NoReturn
 
 import numpy as np
 
+from ..backends.threads import workers
 from ..progress import step as progress
 from ..status import STATUS_NAMES, Status
-from .control import Controller, Lost
-from .events import KINDS, Event
-from .integrators import Stuck, integrator
+from .control import Controller, PoseLostError
+from .events import KINDS, Event, EventLog
+from .integrators import FIXED, NoRateError, integrator
 from .plan import ClosedLoop, OpenLoop, Plan, Trace
-from .plant import Plant
-from .steps import BUDGET, DONE, LOOK, PAUSE, STEP, Steps, steps_of
+from .plant import Plant, fed
+from .steps import BUDGET, DONE, PAUSE, SAMPLE, STEP, Clock, Steps, steps_of
 from .watch import Crossing, Watch
 
 ROUNDING = 1e-12  # seconds
 CLOSE = 1e-6  # of a step: there already
-MANY = 100  # events of a kind and an owner that are listed
-SAY = 0.01  # seconds of the simulation between two words of progress
+REPORTED = 0.01  # seconds of the simulation between two reports of progress
+TOGETHER = 128  # runs of a crowd: what they work on stays in a cache
 
 
 def run(plan: Plan, compiled: bool = True) -> Trace:
     """What happens; compiled: by compiled code where there is any."""
-    with progress("simulating", plan.duration) as advance:
-        return Run(plan, advance, compiled).trace()
+    with progress("simulating", plan.duration) as report:
+        return Run([plan], report, compiled).traces()[0]
+
+
+def run_all(plans: Sequence[Plan], threads: int | None = None) -> list[Trace]:
+    """What happens in each, those alike in lockstep; results do not depend on the threads."""
+    if len(plans) == 1:
+        return [run(plans[0])]
+    alike: dict[Any, list[int]] = {}
+    for i, plan in enumerate(plans):
+        alike.setdefault(_shape(plan) if plan.method in FIXED else i, []).append(i)
+    parts = [
+        part[start : start + TOGETHER]
+        for part in alike.values()
+        for start in range(0, len(part), TOGETHER)
+    ]
+    found: dict[int, Trace] = {}
+    with progress("simulating", sum(plan.duration for plan in plans)) as report:
+
+        def together(part: list[int]) -> None:
+            crowd = Run([plans[i] for i in part], lambda t: report(t * len(part)))
+            found.update(zip(part, crowd.traces(), strict=True))
+
+        for part in alike.values():
+            Run([plans[part[0]]])  # kernels are there before threads ask for them
+        with ThreadPoolExecutor(workers(threads)) as pool:
+            list(pool.map(together, parts))
+    return [found[i] for i in range(len(plans))]
+
+
+def _shape(plan: Plan) -> Any:
+    """What runs in lockstep have in common."""
+    drive = plan.drive
+    if isinstance(drive, OpenLoop):
+        own: tuple[Any, ...] = (drive.times.tobytes(),)
+    else:
+        sensing = None if drive.sensing is None else drive.sensing.velocity
+        own = (id(drive.model), drive.law.table, drive.law.choices, drive.period, drive.delay)
+        own += (sensing, drive.law.place, drive.function)
+    loads = tuple((load.law, load.place, load.times.tobytes()) for load in plan.loads)
+    limits = np.isfinite(plan.speed).tobytes()
+    time = (plan.duration, plan.times.tobytes(), plan.method, plan.settings.step)
+    return id(plan.model), own, loads, limits, time, tuple(plan.functions)
 
 
 class Run:
-    """One run of a plan, under way.
+    """Plans under way, which are alike; of several, all that is not compiled code's is left alone.
 
-    t, y: where it is [s], and the state there;  modes: of the loads;  events: up to there.
-    kept: (N, size), states at the results' times;  kept_modes: (N, loads).
+    clock: time, tick and breakpoint, shared with compiled code;  y: (size, runs), the states;
+    modes: (loads, runs);  logs: events of each run;  kept: (N, size, runs), states at the results'
+    times;  kept_modes: (N, loads, runs).
     """
 
     def __init__(
         self,
-        plan: Plan,
-        advance: Callable[[float], None] = lambda _: None,
+        plans: Sequence[Plan],
+        report: Callable[[float], None] = lambda _: None,
         compiled: bool = True,
     ) -> None:
-        self._plan, self._advance = plan, advance
-        self.plant = Plant(plan)
-        drive = plan.drive
-        self.control = Controller(plan) if isinstance(drive, ClosedLoop) else None
+        """Args: report: of progress, is given seconds of the simulation."""
+        plan, runs = plans[0], len(plans)
+        self.plans, self._report = list(plans), report
+        self.plant = Plant(plans)
+        self.control = Controller(plans) if isinstance(plan.drive, ClosedLoop) else None
         if self.control is not None:
-            self.control.fill(plan)
-            self.control.begin(plan)
-        self._watch = Watch(plan, self.plant, self._look)
-        self.events: list[Event] = []
-        self._seen: dict[tuple[str, str], int] = {}
-        count = len(plan.times)
-        self.kept = np.empty((count, plan.size))
-        self.kept_modes = np.zeros((count, len(plan.loads)), dtype=np.int8)
-        self._cut = np.zeros(len(plan.low), dtype=bool)
-        self._corners, self._ticks = plan.corners(), plan.ticks()
+            self.control.begin(plans)
+        self._watch = Watch(plan, self.plant, self._evaluate)
+        self.logs = [EventLog(plan.model.independent) for _ in plans]
         self._integrator: Any = integrator(plan.method, self._rate, plan.settings)
-        self._y = np.zeros((plan.size, 1))  # shared with compiled code
-        self.y = np.concatenate([plan.q, plan.q1, np.zeros(plan.size - 2 * len(plan.q))])
-        self.t, self.tick, self.next, self.corner, self.fresh = 0.0, -1, 0, 0, True
-        self.modes = list(plan.modes)
+        self._breakpoints, self._is_tick = plan.breakpoints()
+        self._ticks = plan.ticks()
+        self.y = np.zeros((plan.size, self.plant.columns.stride))
+        self.y[: 2 * len(plan.q), :runs] = np.transpose([[*p.q, *p.q1] for p in plans])
+        self.kept = np.empty((len(plan.times), *self.y.shape))
+        self.modes = np.array([p.modes for p in plans], dtype=np.int8).T.reshape(-1, runs)
+        self.kept_modes = np.zeros((len(plan.times), *self.modes.shape), dtype=np.int8)
         self.plant.set_modes(self.modes)
-        # On the results' rows, of which `kept` is a view of one run.
-        shared = self._watch.guards, self.plant.fed(plan), self._y
-        past = self._watch.past[:, None], np.ones(1, dtype=np.uint8), self.kept
-        self.steps: Steps | None = (
-            steps_of(self.plant, self.control, *shared, *past) if compiled else None
-        )
+        self._cut, self._noted = np.zeros((len(plan.low), runs), dtype=bool), -1
+        self.alive, self._left = np.ones(runs, dtype=np.uint8), dict[int, Trace]()
+        self.clock = Clock()
+        past = self._watch.past[:, None].repeat(runs, axis=1)
+        self._watch.past = past[:, 0]
+        shared = self.clock, self._watch.guards, self.y, past, self.alive, self.kept
+        self.steps: Steps | None = steps_of(self.plant, self.control, *shared) if compiled else None
 
-    def trace(self) -> Trace:
-        """Run to the end, or to what ends it."""
-        with suppress(Ended):
-            self.go_to(self._plan.duration)
-            self._keep_end(self._plan.duration, self.y)
-        return self._trace()
+    @property
+    def state(self) -> np.ndarray:
+        """Of the first run, (size,)."""
+        return self.y[:, 0]
 
-    def take_over(
-        self,
-        steps: Steps,
-        y: np.ndarray,
-        kept: np.ndarray,
-        crowd: Controller | None,
-        plant: Plant,
-        i: int,
-    ) -> None:
-        """Go on alone from where a crowd has brought its run i, without an event so far."""
-        at, columns = steps.run, self.plant.columns
-        self.t, self.tick, self.next = at.t, at.tick, at.next
-        self.corner, self.fresh, self.y = at.corner, bool(at.fresh), y.copy()
-        self.kept[: self.next] = kept[: self.next]
-        self.kept_modes[: self.next] = self.modes
-        columns.given[:, 0] = plant.columns.given[:, i]
-        if crowd is None or self.control is None:
-            return
-        own, looked = self.control, self.tick + 1
-        own.columns.given[:, 0] = crowd.columns.given[:, i]
-        own.looks[:looked, :, 0] = crowd.looks[:looked, :, i]
-        own.states[:looked, :, 0] = crowd.states[:looked, :, i]
-        self._saturated(0)
+    @property
+    def events(self) -> list[Event]:
+        """Of the first run, up to now."""
+        return self.logs[0].events
+
+    def traces(self) -> list[Trace]:
+        """Run to the end, or to what ends each."""
+        with suppress(RunEndedError):
+            self.go_to(self.plans[0].duration)
+            self._keep_end(self.plans[0].duration, self.y)
+        return [self._left.get(i) or self._trace(i) for i in range(len(self.plans))]
 
     def go_to(self, until: float) -> None:
         """Run to a time, or to the next step after it [s].
 
-        Raises: Ended: where the run is over before.
+        Raises: RunEndedError: where the run is over before.
         """
-        if self.steps is not None:
-            self._by_compiled_code(until, self.steps)
-        else:
-            self._by_steps(until)
+        clock, plan, said = self.clock, self.plans[0], self.clock.t
+        while True:
+            kept = clock.next
+            code = self._advance(until)
+            self.kept_modes[kept : clock.next] = self.modes
+            self._note_saturation()
+            if code in (DONE, PAUSE) or clock.t - said >= REPORTED:
+                self._report(clock.t - said)
+                said = clock.t
+            if code == DONE:
+                return
+            if code == PAUSE:
+                assert plan.settings.step is not None
+                if clock.t >= until - CLOSE * plan.settings.step and until < plan.duration:
+                    return
+            elif len(self.plans) > 1:
+                self._part()
+            elif code == SAMPLE:
+                self._tick(clock.tick + 1)
+                clock.fresh = 0
+            else:
+                self._stretch(until)
 
     def change(self, plan: Plan) -> None:
         """Go on with other numbers in the law and in the loads, which stay what they are."""
         force = self._force(plan)
-        if self.control is not None and force is not self._force(self._plan):
+        if self.control is not None and force is not self._force(self.plans[0]):
             self.control.aim_for(np.interp(self._ticks, plan.drive.path.force_times, force))  # type: ignore[union-attr]
-        self._plan = plan
-        self.plant.fill(plan)
+        self.plans = [plan]
+        self.plant.fill(self.plans)
         self._watch.change(plan)
         if self.control is not None:
-            self.control.fill(plan)
-        for crossing in self._watch.overtaken(self.t, self.y, self.modes):
+            self.control.fill(self.plans)
+        for crossing in self._watch.overtaken(self.clock.t, self.state, self.modes[:, 0].tolist()):
             self._happened(crossing)
 
     @staticmethod
     def _force(plan: Plan) -> Any:
         return plan.drive.path.force if isinstance(plan.drive, ClosedLoop) else None
 
-    def look(self) -> np.ndarray:
-        """Look at where it is; returns the efforts that act now, within limits, (n,).
+    def acting(self, t: float, y: np.ndarray) -> np.ndarray:
+        """Evaluate a state; returns the efforts that act there, within limits, (n,).
 
-        Raises: Stuck: where it cannot be.
+        Raises: NoRateError: where it cannot be.
         """
-        return self._acting(self.t, self.y)
-
-    def _acting(self, t: float, y: np.ndarray) -> np.ndarray:
-        self._look(t, y)
+        self._evaluate(t, y)
         asked = self.plant.columns.given[self.plant.columns.rows("effort"), 0]
-        return np.clip(asked, self._plan.low, self._plan.high)
+        return np.clip(asked, self.plans[0].low, self.plans[0].high)
 
-    def _by_steps(self, until: float) -> None:
-        """From corner to corner."""
-        said = self.t
-        while self.t < until - ROUNDING:
-            due = self.tick + 1
-            if due < len(self._ticks) and self._ticks[due] <= self.t + ROUNDING:
-                self._tick_at(self.t, self.y, due)
-            corner = float(self._corners[self.corner + 1])
-            end = min(corner, until)
-            _, self.y = self._between(self.t, end, self.y)
-            self.t = end
-            self.corner += end == corner
-            if end - said >= SAY:
-                self._advance(end - said)
-                said = end
+    # -- on the way -----------------------------------------------------------------------------
 
-    def _by_compiled_code(self, until: float, steps: Steps) -> None:
-        """The same by `steps.c`, but for what it hands back."""
-        size, end, run = self._plan.settings.step, self._plan.duration, steps.run
-        assert size is not None
-        while True:
-            self._y[:, 0] = self.y
-            run.t, run.tick, run.next = self.t, self.tick, self.next
-            run.corner, run.fresh, run.seen = self.corner, self.fresh, 0
-            left = math.ceil((until - self.t) / size - CLOSE)
-            code = steps.advance(min(max(left, 1), BUDGET))
-            said, t, y = self.t, run.t, self._y[:, 0].copy()
-            self.kept_modes[self.next : run.next] = self.modes
-            first, self.tick, self.next = self.tick + 1, run.tick, run.next
-            self.corner, self.fresh, self.t, self.y = run.corner, bool(run.fresh), t, y
-            self._saturated(first)
-            self._advance(t - said)
-            if code == DONE or (code == PAUSE and t >= until - CLOSE * size and until < end):
-                return
-            if code == LOOK:
-                self._tick_at(t, y, self.tick + 1)
-                self.fresh = False
-            elif code == STEP:
-                corner = float(self._corners[self.corner + 1])
-                t, y = self._between(t, corner, y, once=True)
-                self.t, self.y = t, y
-                self.fresh = False
-                if t >= corner - ROUNDING:
-                    self.corner += 1
-                    self.fresh = True
+    def _advance(self, until: float) -> int:
+        """By compiled code up to what it leaves to others: without any, each tick and stretch."""
+        clock = self.clock
+        if self.steps is not None and self.alive.any():
+            clock.seen, size = 0, self.plans[0].settings.step
+            assert size is not None
+            left = math.ceil((until - clock.t) / size - CLOSE)
+            return self.steps.advance(min(max(left, 1), BUDGET))
+        if clock.t >= until - ROUNDING or not self.alive.any():
+            return DONE
+        return SAMPLE if clock.fresh and self._is_tick[clock.breakpoint] else STEP
 
-    def _trace(self) -> Trace:
-        plan, control, looked = self._plan, self.control, self.tick + 1
-        t, state, m, n = plan.times[: self.next], self.kept[: self.next], len(plan.q), len(plan.low)
-        modes, drive = self.kept_modes[: self.next], plan.drive
-        if isinstance(drive, OpenLoop) or not len(self._ticks):
+    def _stretch(self, until: float) -> None:
+        """Integrate to the next breakpoint or to `until`; beside compiled code, for one step."""
+        clock, once = self.clock, self.steps is not None
+        end = float(self._breakpoints[clock.breakpoint + 1])
+        stop = end if once else min(end, until)
+        t, self.y[:, 0] = self._between(clock.t, stop, self.state.copy(), once)
+        clock.fresh = int(t >= end - ROUNDING)
+        clock.t = end if clock.fresh else t
+        clock.breakpoint += clock.fresh
+
+    def _part(self) -> None:
+        """Let runs go on alone that compiled code leaves to others."""
+        gone = self.alive.copy() if self.steps is None else self.steps.gone
+        for i in np.flatnonzero(gone).tolist():
+            own = Run([self.plans[i]])
+            own.take_over(self, i)
+            self._left[i], self.alive[i] = own.traces()[0], False
+
+    def take_over(self, crowd: Run, i: int) -> None:
+        """Go on from where a crowd has brought its run i, without a step of Python's so far."""
+        for name in ("t", "tick", "next", "breakpoint", "fresh"):
+            setattr(self.clock, name, getattr(crowd.clock, name))
+        kept, sampled = self.clock.next, self.clock.tick + 1
+        self.logs, self._noted, self._cut = [crowd.logs[i]], crowd._noted, crowd._cut[:, [i]]
+        pairs = [
+            (self.y, crowd.y),
+            (self.kept[:kept], crowd.kept[:kept]),
+            (self.kept_modes[:kept], crowd.kept_modes[:kept]),
+            (self.plant.columns.given, crowd.plant.columns.given),
+        ]
+        if (own := self.control) is not None and (theirs := crowd.control) is not None:
+            pairs += [
+                (own.columns.given, theirs.columns.given),
+                (own.samples[:sampled], theirs.samples[:sampled]),
+                (own.states[:sampled], theirs.states[:sampled]),
+            ]
+        for to, source in pairs:
+            to[..., 0] = source[..., i]
+
+    def _trace(self, i: int) -> Trace:
+        plan, control, sampled = self.plans[i], self.control, self.clock.tick + 1
+        reached, m, n = self.clock.next, len(plan.q), len(plan.low)
+        t, state = plan.times[:reached], self.kept[:reached, :, i].copy()
+        modes, drive = self.kept_modes[:reached, :, i].copy(), plan.drive
+        if isinstance(drive, OpenLoop) or control is None or not len(self._ticks):
             tick = np.full(len(t), -1)
-        else:
-            tick = np.searchsorted(self._ticks, t + ROUNDING, side="right") - 1
-            tick = np.minimum(tick, self.tick)
-        if control is None or not len(self._ticks):
-            effort = self._efforts(t, state, modes)
             seen: dict[str, np.ndarray] = dict.fromkeys(("command", "count"), np.empty((0, n)))
             seen |= {"estimate": np.empty((0, 2 * m)), "force": np.empty(0)}
+            effort = self._efforts(plan, t, state, modes)
         else:
-            looks, rows = control.looks[:looked, :, 0], control.columns.result
-            due = np.maximum(tick - drive.delay, 0)  # type: ignore[union-attr]
-            effort = looks[due][:, rows("effort")] if looked else np.zeros((len(t), n))
+            tick = np.searchsorted(self._ticks, t + ROUNDING, side="right") - 1
+            tick = np.minimum(tick, self.clock.tick)
+            samples, rows = control.samples[:sampled, :, i], control.columns.result
+            due = np.maximum(tick - drive.delay, 0)
+            effort = samples[:, rows("effort")][due] if sampled else np.zeros((len(t), n))
             seen = {
-                "command": looks[:, rows("asked")],
-                "count": looks[:, rows("joint")],
-                "estimate": looks[:, np.concatenate([rows("q"), rows("q1")])],
-                "force": np.linalg.norm(looks[:, rows("felt")], axis=1),
+                "command": samples[:, rows("asked")],
+                "count": samples[:, rows("joint")],
+                "estimate": samples[:, np.concatenate([rows("q"), rows("q1")])],
+                "force": np.linalg.norm(samples[:, rows("measured_force")], axis=1),
             }
-        return Trace(t, state, modes, effort, tick, **seen, events=tuple(self.events))
+        return Trace(t, state, modes, effort, tick, **seen, events=tuple(self.logs[i].events))
 
-    def _efforts(self, t: np.ndarray, state: np.ndarray, modes: np.ndarray) -> np.ndarray:
+    def _efforts(
+        self, plan: Plan, t: np.ndarray, state: np.ndarray, modes: np.ndarray
+    ) -> np.ndarray:
         """As they acted at the results' times, where they follow from time and state, (N, n)."""
-        plan, drive = self._plan, self._plan.drive
-        if isinstance(drive, OpenLoop):
-            fed = next(table for table in self.plant.fed(plan) if table.port == "effort")
-            return np.clip(fed.at(t), plan.low, plan.high)
+        if isinstance(plan.drive, OpenLoop):
+            (table,) = (table for table in fed([plan]) if table.port == "effort")
+            return np.clip(table.at(t), plan.low, plan.high)
         found = np.empty((len(t), len(plan.low)))
         for i, when in enumerate(t.tolist()):
-            self.plant.set_modes(modes[i].tolist())
-            found[i] = self._acting(when, state[i])
+            self.plant.set_modes(modes[i])
+            found[i] = self.acting(when, state[i])
         return found
 
-    # -- efforts ------------------------------------------------------------------------------
+    # -- efforts --------------------------------------------------------------------------------
 
-    def _look(self, t: float, y: np.ndarray) -> None:
-        """Look at a state with the efforts that act there."""
-        self.plant.look(t, y)
+    def _evaluate(self, t: float, y: np.ndarray) -> None:
+        """Evaluate a state with the efforts that act there."""
+        self.plant.evaluate(t, y)
         if self.control is not None and not len(self._ticks):
             asked = self.control.at_once(t, y, self.plant)
             if not np.isfinite(asked).all():
-                raise Stuck(Status.infeasible)
+                raise NoRateError(Status.infeasible)
             self.plant.columns.give("effort", asked)
-            self.plant.look(t, y)
+            self.plant.evaluate(t, y)
 
     def _rate(self, t: float, y: np.ndarray) -> np.ndarray:
-        self._look(t, y)
+        self._evaluate(t, y)
         return self.plant["rate"]
 
-    def _tick_at(self, t: float, y: np.ndarray, k: int) -> None:
-        """The controller looks, and what it asked for before comes to act."""
+    def _tick(self, k: int) -> None:
+        """The controller samples, and what it asked for before comes to act."""
         assert self.control is not None
+        t, y = self.clock.t, self.state
         try:
-            self.plant.look(t, y)
-            asked = self.control.look(t, y, self.plant, k)
-        except Lost:
-            self._end(t, y, "lost", KINDS["lost"])
-        except Stuck as stuck:
-            self._stuck(t, y, stuck)
+            self.plant.evaluate(t, y)
+            asked = self.control.sample(t, y, self.plant, k)
+        except PoseLostError:
+            self._end(t, y, "lost")
+        except NoRateError as error:
+            self._end_without_rate(t, y, error)
         if not np.isfinite(asked).all():
-            self._end(t, y, "no_effort", KINDS["no_effort"])
+            self._end(t, y, "no_effort")
         self.plant.columns.give("effort", self.control.acting(k))
-        self.tick = k
-        self._saturated(k)
+        self.clock.tick = k
 
-    def _saturated(self, first: int) -> None:
-        """Tell of efforts that limits cut, of the looks from the first on."""
-        control, m = self.control, len(self._plan.q)
-        if control is None or first > self.tick:
+    def _note_saturation(self) -> None:
+        """Note efforts that limits began to cut since the last tick that was noted."""
+        control, ticks = self.control, np.arange(self._noted + 1, self.clock.tick + 1)
+        if control is None or not len(ticks):
             return
-        delay = self._plan.drive.delay  # type: ignore[union-attr]
-        ticks = np.arange(first, self.tick + 1)
-        due = control.looks[np.maximum(ticks - delay, 0), :, 0]
-        asked, gives = (due[:, control.columns.result(name)] for name in ("asked", "effort"))
+        due = np.maximum(ticks - control.drive.delay, 0)[:, None]
+        asked, gives = (
+            control.samples[due, control.columns.result(name), : len(self.plans)]
+            for name in ("asked", "effort")
+        )
         cut = asked != gives
-        new = cut & ~np.vstack([self._cut, cut[:-1]])
-        for i, chain in np.argwhere(new):
-            name = self._plan.model.mechanism.chain_names[chain]
-            text = f"asked for {asked[i, chain]:.4g}, gives {gives[i, chain]:.4g}"
-            k = first + i
-            self._note(self._ticks[k], control.states[k, : 2 * m, 0], "saturated", text, name)
-        self._cut = cut[-1]
+        new = cut & ~np.concatenate([self._cut[None], cut[:-1]])
+        for k, chain, i in np.argwhere(new & (self.alive != 0)):
+            name = self.plans[i].model.mechanism.chain_names[chain]
+            text = f"asked for {asked[k, chain, i]:.4g}, gives {gives[k, chain, i]:.4g}"
+            at = ticks[k]
+            self.logs[i].note(self._ticks[at], control.states[at, :, i], "saturated", text, name)
+        self._cut, self._noted = cut[-1], self.clock.tick
 
-    # -- between two corners ------------------------------------------------------------------
+    # -- between two breakpoints ----------------------------------------------------------------
 
     def _between(
-        self, t: float, until: float, y: np.ndarray, once: bool = False
+        self, t: float, until: float, y: np.ndarray, once: bool
     ) -> tuple[float, np.ndarray]:
-        """Integrate to `until`, or one step; raises Ended where the run is over before."""
+        """Integrate to `until`, or one step; raises RunEndedError where the run is over before."""
         try:
             self._begin(t, until, y)
             while t < until - ROUNDING:
@@ -296,15 +352,9 @@ class Run:
                         self._begin(t, until, y)
                 if once:
                     break
-        except Stuck as stuck:
-            self._stuck(t, y, stuck)
+        except NoRateError as error:
+            self._end_without_rate(t, y, error)
         return t, y
-
-    def _stuck(self, t: float, y: np.ndarray, stuck: Stuck) -> NoReturn:
-        self._keep_end(t, y)
-        kind = "stiff" if stuck.status is None else STATUS_NAMES[stuck.status]
-        kind = kind if kind in KINDS else "stiff"
-        self._end(t, y, kind, KINDS[kind])
 
     def _begin(self, t: float, until: float, y: np.ndarray) -> None:
         self._integrator.restart(t, y, until)
@@ -319,45 +369,39 @@ class Run:
         if guard.ends:
             self._keep_end(t, y)
             self._end(t, y, guard.kind, guard.text, guard.owner)
-        elif guard.kind:
-            self._note(t, y, guard.kind, guard.text, guard.owner)
+        self.logs[0].note(t, y, guard.kind, guard.text, guard.owner)
 
-    def _end(self, t: float, y: np.ndarray, kind: str, text: str, owner: str = "") -> NoReturn:
-        self._note(t, y, kind, text, owner, ends=True)
-        self.t, self.y = t, y
-        raise Ended
+    def _end_without_rate(self, t: float, y: np.ndarray, error: NoRateError) -> NoReturn:
+        self._keep_end(t, y)
+        kind = "stiff" if error.status is None else STATUS_NAMES[error.status]
+        self._end(t, y, kind if kind in KINDS else "stiff")
 
-    def _note(
-        self, t: float, y: np.ndarray, kind: str, text: str, owner: str = "", ends: bool = False
-    ) -> None:
-        names = self._plan.model.independent
-        names = (*names, *(f"d{name}" for name in names))
-        state = dict(zip(names, y[: len(names)].tolist(), strict=True))
-        seen = self._seen[kind, owner] = self._seen.get((kind, owner), 0) + 1
-        if seen > MANY and not ends:
-            return
-        if seen == MANY and not ends:
-            text += "; more of these are not listed"
-        self.events.append(Event(float(t), kind, text, owner, ends, state))
+    def _end(
+        self, t: float, y: np.ndarray, kind: str, text: str | None = None, owner: str = ""
+    ) -> NoReturn:
+        self.logs[0].note(t, y, kind, text or KINDS[kind], owner, ends=True)
+        self.clock.t, self.y[:, 0] = t, y
+        raise RunEndedError
 
-    # -- what is kept ---------------------------------------------------------------------------
+    # -- what is kept -----------------------------------------------------------------------------
 
     def _keep(self, t: float, end: float, at: Callable[[float], np.ndarray]) -> None:
         """States at the results' times from t on, before the end."""
-        times = self._plan.times
-        while self.next < len(times) and times[self.next] < end - ROUNDING:
-            self._keep_one(at(max(times[self.next], t)))
+        times = self.plans[0].times
+        while self.clock.next < len(times) and times[self.clock.next] < end - ROUNDING:
+            self._keep_one(at(max(float(times[self.clock.next]), t)))
 
     def _keep_end(self, t: float, y: np.ndarray) -> None:
         """The last one."""
-        times = self._plan.times
-        while self.next < len(times) and times[self.next] <= t + ROUNDING:
+        times = self.plans[0].times
+        while self.clock.next < len(times) and times[self.clock.next] <= t + ROUNDING:
             self._keep_one(y)
 
     def _keep_one(self, y: np.ndarray) -> None:
-        self.kept[self.next], self.kept_modes[self.next] = y, self.modes
-        self.next += 1
+        now = self.clock.next
+        self.kept[now], self.kept_modes[now] = y.reshape(len(y), -1), self.modes
+        self.clock.next = now + 1
 
 
-class Ended(Exception):
-    """The run is over; why is among the events."""
+class RunEndedError(Exception):
+    """The run is over; its events say why."""

@@ -31,7 +31,7 @@ def solved(plan: Plan, trace: Trace, scenario: Scenario, source: str, started: f
         raise InputError(f"{source}: the run ended before it began: {end}")
     model, m = plan.model, len(plan.q)
     q, q1 = trace.state[:, :m], trace.state[:, m : 2 * m]
-    acted = Plant(plan).along(trace.t, trace.state, trace.modes)
+    acted = Plant([plan]).along(trace.t, trace.state, trace.modes)
     wrench = acted["wrench"]
     load = with_point(wrench, np.zeros(3))
     evaluation = _evaluation(model, q, q1, trace.effort, load)

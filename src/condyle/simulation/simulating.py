@@ -14,8 +14,7 @@ from ..mechanism.mechanism import Mechanism
 from ..model.model import Model, derive
 from ..motion import Motion
 from .bind import bind
-from .crowd import run_all
-from .running import run
+from .running import run, run_all
 from .scenario import Scenario, load_scenario, scenario_from
 from .simulated import solved
 

@@ -7,7 +7,7 @@
  * What is rare is left to the caller, who goes on from there: steps in which a guard changes its
  * sign, states that a kernel cannot vouch for. `gone` says in which runs. */
 
-enum { DONE, PAUSE, STEP, LOOK }; /* why `advance` returns; PAUSE: after `budget` steps */
+enum { DONE, PAUSE, STEP, SAMPLE }; /* why `advance` returns; PAUSE: after `budget` steps */
 #define ROUNDING 1e-12            /* seconds */
 
 /* How many of rising times are at or before t. */
@@ -81,23 +81,23 @@ static int guarded(Run *r)
     return any;
 }
 
-/* The controller looks: 0, or LOOK where the caller has to. */
-static int look(Run *r)
+/* The controller samples: 0, or SAMPLE where the caller has to. */
+static int sample(Run *r)
 {
-    int64_t stride = r->stride, k = r->tick + 1, due = k > r->delay ? k - r->delay : 0;
-    double *kept = r->looks + k * r->results * stride;
-    if (!r->seen && rates(r, r->t, r->y, r->k)) return LOOK;
-    r->seen = 1;
+    int64_t stride = r->stride, k = r->clock->tick + 1, due = k > r->delay ? k - r->delay : 0;
+    double *kept = r->samples + k * r->results * stride;
+    if (!r->clock->seen && rates(r, r->clock->t, r->y, r->k)) return SAMPLE;
+    r->clock->seen = 1;
     memcpy(r->aim, r->aims + k * r->aim_rows * stride, (size_t)(r->aim_rows * stride) * sizeof *kept);
     copied(r, r->link, r->links);
-    if (evaluate(r, &r->control)) return LOOK;
+    if (evaluate(r, &r->control)) return SAMPLE;
     memcpy(kept, r->control.found, (size_t)(r->results * stride) * sizeof *kept);
     memcpy(r->states + k * r->size * stride, r->y, (size_t)(r->size * stride) * sizeof *kept);
     copied(r, r->carry, r->carried);
     for (int64_t i = 0; i < r->efforts; i++)
-        memcpy(r->effort + i * stride, r->looks + (due * r->results + r->effort_row[i]) * stride,
+        memcpy(r->effort + i * stride, r->samples + (due * r->results + r->effort_row[i]) * stride,
                (size_t)stride * sizeof *kept);
-    r->tick = k;
+    r->clock->tick = k;
     return 0;
 }
 
@@ -106,10 +106,10 @@ static void keep(Run *r, double t, double h, double end, const double *y0, const
                  const double *y1, const double *f1)
 {
     int64_t n = r->size * r->stride;
-    for (; r->next < r->count && r->times[r->next] < end - ROUNDING; r->next++) {
-        double s = (fmax(r->times[r->next], t) - t) / h;
+    for (; r->clock->next < r->count && r->times[r->clock->next] < end - ROUNDING; r->clock->next++) {
+        double s = (fmax(r->times[r->clock->next], t) - t) / h;
         double a = s * s * (3 - 2 * s), b = h * s * (1 - s);
-        double *state = r->kept + r->next * n;
+        double *state = r->kept + r->clock->next * n;
         for (int64_t i = 0; i < n; i++)
             state[i] = y0[i] + a * (y1[i] - y0[i]) + b * ((1 - s) * f0[i] - s * f1[i]);
     }
@@ -118,13 +118,13 @@ static void keep(Run *r, double t, double h, double end, const double *y0, const
 /* Equal steps to `until`. */
 static int between(Run *r, double until)
 {
-    int64_t n = r->size * r->stride, steps = (int64_t)fmax(ceil((until - r->t) / r->step - 1e-9), 1);
-    double start = r->t, h = (until - start) / (double)steps, *f1 = r->k + r->stages * n;
-    r->until = until, r->seen = 0;
+    int64_t n = r->size * r->stride, steps = (int64_t)fmax(ceil((until - r->clock->t) / r->step - 1e-9), 1);
+    double start = r->clock->t, h = (until - start) / (double)steps, *f1 = r->k + r->stages * n;
+    r->until = until, r->clock->seen = 0;
     if (rates(r, start, r->y, r->k) || guarded(r)) return STEP;
     for (int64_t k = 0; k < steps; k++) {
         double t0 = start + (double)k * h, t1 = k + 1 < steps ? start + (double)(k + 1) * h : until;
-        r->seen = 0;
+        r->clock->seen = 0;
         if (r->budget-- <= 0) return PAUSE;
         if (runge_kutta(r->method, (int)r->stages, t0, h, r->y, (int)n, r->y1, r->k, rates, r) ||
             guarded(r))
@@ -132,8 +132,8 @@ static int between(Run *r, double until)
         keep(r, t0, h, t1, r->y, r->k, r->y1, f1);
         memcpy(r->y, r->y1, (size_t)n * sizeof *f1);
         memcpy(r->k, f1, (size_t)n * sizeof *f1);
-        r->t = t1;
-        r->seen = 1;
+        r->clock->t = t1;
+        r->clock->seen = 1;
     }
     return 0;
 }
@@ -141,14 +141,14 @@ static int between(Run *r, double until)
 /* From where the runs are to their end, or to what the caller has to see to. */
 int advance(Run *r)
 {
-    for (; r->corner + 1 < r->corners; r->corner++, r->fresh = 1) {
+    for (; r->clock->breakpoint + 1 < r->breakpoints; r->clock->breakpoint++, r->clock->fresh = 1) {
         int code;
-        if (r->fresh) {
-            r->t = r->corner_time[r->corner];
-            if (r->is_tick[r->corner] && (code = look(r))) return code;
-            r->fresh = 0;
+        if (r->clock->fresh) {
+            r->clock->t = r->breakpoint_time[r->clock->breakpoint];
+            if (r->is_tick[r->clock->breakpoint] && (code = sample(r))) return code;
+            r->clock->fresh = 0;
         }
-        if ((code = between(r, r->corner_time[r->corner + 1]))) return code;
+        if ((code = between(r, r->breakpoint_time[r->clock->breakpoint + 1]))) return code;
     }
     return DONE;
 }

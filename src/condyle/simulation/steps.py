@@ -23,10 +23,10 @@ from .columns import Columns
 from .control import Controller
 from .integrators import FIXED, RUNGE_KUTTA
 from .plan import Plan
-from .plant import Fed, Guard, Plant
+from .plant import Guard, Plant
 
-DONE, PAUSE, STEP, LOOK = range(4)  # why `advance` returns
-BUDGET = 20_000  # steps between two words of progress
+DONE, PAUSE, STEP, SAMPLE = range(4)  # why `advance` returns
+BUDGET = 20_000  # steps between two reports of progress
 
 NUMBERS = "const double *"
 # What C and Python share, member by member; the struct in C is written from it.
@@ -38,6 +38,12 @@ TABLE = {
     "times": NUMBERS, "rows": NUMBERS, "to": "double *", "count": "int64_t", "width": "int64_t",
     "lanes": "int64_t", "vanishes": "int64_t",
 }  # fmt: skip
+# Where runs are: t, the last tick, the next result, the breakpoint passed, whether it is `fresh`;
+# `seen`: whether the plant's results are those of the state.
+CLOCK = {
+    "t": "double", "tick": "int64_t", "next": "int64_t", "breakpoint": "int64_t",
+    "fresh": "int64_t", "seen": "int64_t",
+}  # fmt: skip
 COPY = {"to": "double *", "from": NUMBERS}
 RUN = {
     # runs, each a column of `stride`; which are alive, which are gone, what a batch said
@@ -45,23 +51,22 @@ RUN = {
     "status": "uint8_t *", "plant": "Kernel", "control": "Kernel",
     # the state y (size, ..), of which `inputs` rows go into the plant; rates k, stage by stage
     "size": "int64_t", "inputs": "int64_t", "stages": "int64_t", "y": "double *", "y1": "double *",
-    "k": "double *", "method": NUMBERS, "step": "double", "t": "double", "until": "double",
-    "budget": "int64_t",
-    # where the rate has corners, at which of them the controller looks, and where the runs are
-    "corner_time": NUMBERS, "is_tick": "const uint8_t *", "corners": "int64_t", "corner": "int64_t",
-    "fresh": "int64_t", "seen": "int64_t",
+    "k": "double *", "method": NUMBERS, "step": "double", "until": "double", "budget": "int64_t",
+    # where the runs are, where the rate has breakpoints, and which of them are ticks
+    "clock": "Clock *", "breakpoint_time": NUMBERS, "is_tick": "const uint8_t *",
+    "breakpoints": "int64_t",
     # guards: rows of the plant's results, and whether each is beyond zero already
     "guard": "const int64_t *", "guards": "int64_t", "past": "const uint8_t *",
     "table": "const Table *", "tables": "int64_t",
-    # a look: aims to where they go, measured rows, results kept, what is carried on, efforts
+    # a sample: aims to where they go, measured rows, results kept, what is carried on, efforts
     "aims": NUMBERS, "aim": "double *", "aim_rows": "int64_t",
     "link": "const Copy *", "links": "int64_t", "carry": "const Copy *", "carried": "int64_t",
-    "looks": "double *", "states": "double *", "results": "int64_t", "tick": "int64_t",
-    "delay": "int64_t", "effort": "double *", "effort_row": "const int64_t *", "efforts": "int64_t",
+    "samples": "double *", "states": "double *", "results": "int64_t", "delay": "int64_t",
+    "effort": "double *", "effort_row": "const int64_t *", "efforts": "int64_t",
     # results: states at times
-    "times": NUMBERS, "count": "int64_t", "next": "int64_t", "kept": "double *",
+    "times": NUMBERS, "count": "int64_t", "kept": "double *",
 }  # fmt: skip
-STRUCTS = {"Kernel": KERNEL, "Table": TABLE, "Copy": COPY, "Run": RUN}
+STRUCTS = {"Kernel": KERNEL, "Table": TABLE, "Clock": CLOCK, "Copy": COPY, "Run": RUN}
 HEAD = """#include <math.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -84,6 +89,13 @@ def _structure(name: str) -> Any:
 _TYPES: dict[str, Any] = {}
 for _name in STRUCTS:
     _TYPES[_name] = _structure(_name)
+
+
+class Clock(_TYPES["Clock"]):  # type: ignore[misc]
+    """Where runs are, read and set by compiled code and by its owner."""
+
+    def __init__(self) -> None:
+        super().__init__(tick=-1, fresh=1)
 
 
 @lru_cache(maxsize=1)
@@ -135,8 +147,7 @@ def steps_of(plant: Plant, control: Controller | None, *shared: Any) -> Steps | 
 class Steps:
     """Runs in compiled code, on the rows of plant and controller and the arrays of who owns them.
 
-    Attributes: run: the struct, whose t, corner, tick, next, fresh and budget the owner reads and
-                sets;  gone: (runs,), which of them the owner has to see to.
+    Attributes: gone: (runs,), which of them the owner has to see to.
     """
 
     def __init__(
@@ -145,8 +156,8 @@ class Steps:
         library: Any,
         plant: Plant,
         control: Controller | None,
+        clock: Clock,
         guards: Sequence[Guard],
-        fed: Sequence[Fed],
         y: np.ndarray,
         past: np.ndarray,
         alive: np.ndarray,
@@ -154,12 +165,11 @@ class Steps:
     ) -> None:
         """The steps of runs.
 
-        Args: guards: of the first run, which stand where all others' do.
-              fed: tables, of rows for all runs or one each;  past: (guards, runs), of bool.
-              y: (size, stride);  alive: (runs,);  kept: (N, size, stride), of the results' times.
+        Args: guards: of the first run, which stand where all others' do;  y: (size, stride).
+              past: (guards, runs), of bool;  alive: (runs,);  kept: (N, size, stride).
         """
         self._library, self._past = library, past
-        self._keep: list[Any] = [plant, control, y, alive, kept]
+        self._keep: list[Any] = [plant, control, clock, y, alive, kept]
         runs, stride = alive.size, plant.columns.stride
         self.run = run = _TYPES["Run"]()
         self.gone = np.zeros(runs, dtype=np.uint8)
@@ -173,16 +183,12 @@ class Steps:
         run.k = self._at(np.zeros((len(RUNGE_KUTTA) + 1, *y.shape)))
         run.method = self._at(np.concatenate([np.array(row, float) for row in RUNGE_KUTTA]))
         run.step = plan.settings.step
-        corners, ticks = plan.corners(), plan.ticks()
-        is_tick = np.zeros(len(corners), dtype=np.uint8)
-        if len(ticks):
-            is_tick[np.clip(np.searchsorted(corners, ticks - 1e-12), 0, len(corners) - 1)] = 1
-            is_tick[-1] = 0
-        run.corner_time, run.is_tick = self._at(corners), self._at(is_tick)
-        run.corners, run.fresh, run.tick = len(corners), 1, -1
+        times, is_tick = plan.breakpoints()
+        run.breakpoint_time, run.is_tick = self._at(times), self._at(is_tick)
+        run.breakpoints, run.clock = len(times), ctypes.addressof(clock)
         run.guard = self._at(np.array([guard.row for guard in guards], dtype=np.int64))
         run.guards, run.past = len(guards), self._flags.ctypes.data
-        self._feed(fed, plant)
+        self._feed(plant)
         if control is not None:
             self._control(plan, plant, control, y)
         run.times, run.count, run.kept = self._at(plan.times), len(kept), kept.ctypes.data
@@ -192,16 +198,16 @@ class Steps:
         self._flags[:], self.gone[:], self.run.budget = self._past, 0, budget
         return int(self._library.advance(ctypes.addressof(self.run)))
 
-    def _feed(self, fed: Sequence[Fed], plant: Plant) -> None:
-        tables = (_TYPES["Table"] * max(len(fed), 1))()
-        for to, table in zip(tables, fed, strict=False):
+    def _feed(self, plant: Plant) -> None:
+        tables = (_TYPES["Table"] * max(len(plant.tables), 1))()
+        for to, table in zip(tables, plant.tables, strict=False):
             rows, columns = plant.columns.rows(table.port), plant.columns
             to.times, to.rows = self._at(table.times), self._at(table.rows[:, np.argsort(rows)])
-            to.to, to.count, to.width = columns.address(int(rows.min())), *table.rows.shape[:2]
-            to.lanes = table.rows.shape[2] if table.rows.ndim > 2 else 1
+            to.to = columns.address(int(rows.min()))
+            to.count, to.width, to.lanes = table.rows.shape
             to.vanishes = table.vanishes
         self._keep.append(tables)
-        self.run.table, self.run.tables = ctypes.addressof(tables), len(fed)
+        self.run.table, self.run.tables = ctypes.addressof(tables), len(plant.tables)
 
     def _control(self, plan: Plan, plant: Plant, control: Controller, y: np.ndarray) -> None:
         run, columns, m = self.run, control.columns, len(plan.q)
@@ -209,7 +215,9 @@ class Steps:
         run.aims, run.aim = control.aims.ctypes.data, columns.address(control.first)
         run.aim_rows = control.aims.shape[1]
         measured = [(plant.columns, name, name) for name in ("joint", "joint_rate")]
-        measured += [(plant.columns, "felt", "force")] * bool(plant.columns.result("felt").size)
+        measured += [(plant.columns, "measured_force", "force")] * bool(
+            plant.columns.result("measured_force").size
+        )
         links = [
             (columns.address(to), source.address(row, found=True))
             for source, name, port in measured
@@ -224,7 +232,7 @@ class Steps:
         pairs = zip(control.carry_to, control.carry_from, strict=True)
         carry = [(columns.address(to), columns.address(row, found=True)) for to, row in pairs]
         run.carry, run.carried = self._copies(carry), len(carry)
-        run.looks, run.states = control.looks.ctypes.data, control.states.ctypes.data
+        run.samples, run.states = control.samples.ctypes.data, control.states.ctypes.data
         run.results = columns.results
         run.delay = control.drive.delay
         rows = plant.columns.rows("effort")

@@ -1,4 +1,4 @@
-"""What is watched after every step: guards that must stay below zero, and where one passed it."""
+"""What is checked after every step: guards that must stay below zero, and where one passed it."""
 
 from __future__ import annotations
 
@@ -31,9 +31,11 @@ class Watch:
     past: (guards,), whether each is beyond zero already; loads' never are, their modes change.
     """
 
-    def __init__(self, plan: Plan, plant: Plant, look: Callable[[float, np.ndarray], None]) -> None:
-        """Args: look: at a state, with the efforts that act there."""
-        self._plant, self._look = plant, look
+    def __init__(
+        self, plan: Plan, plant: Plant, evaluate: Callable[[float, np.ndarray], None]
+    ) -> None:
+        """Args: evaluate: a state, with the efforts that act there."""
+        self._plant, self._evaluate = plant, evaluate
         self.change(plan)
         self.past = np.zeros(len(self.guards), dtype=bool)
 
@@ -44,7 +46,7 @@ class Watch:
         self._own = np.array([guard.load is None for guard in self.guards], dtype=bool)
 
     def _values(self, t: float, y: np.ndarray) -> np.ndarray:
-        self._look(t, y)
+        self._evaluate(t, y)
         return self._plant.columns.found[self._rows, 0]
 
     def begin(self, t: float, y: np.ndarray) -> list[Crossing]:

@@ -17,7 +17,7 @@ from ..errors import InputError
 from ..kinematics.chain import FAMILIES
 from ..mechanism import Mechanism, bundled_mechanisms, load_mechanism, parse
 from ..results.solution import open_solution
-from ..simulation.knobs import Knob
+from ..simulation.parameters import Parameter
 from .live_player import LivePlayer
 from .playback import Playback
 from .readout import COLOURS, effects_html, internal_text, live_html, status_html, tables_html
@@ -328,7 +328,7 @@ class LivePanel:
         again = gui.add_checkbox("Begin again at the end", player.again)
         panel.hear("again", again, partial(setattr, player, "again"))
         self._add_hand()
-        self._add_knobs()
+        self._add_parameters()
         self._told = gui.add_html("")
 
     def _add_hand(self) -> None:
@@ -347,27 +347,29 @@ class LivePanel:
 
         self._grip.on_update(dragged)
 
-    def _add_knobs(self) -> None:
+    def _add_parameters(self) -> None:
         """A slider for each number of the law and of the loads."""
         self._sliders: list[Any] = []
         owner, folder = "", None
-        for i, knob in enumerate(self.player.live.knobs):
-            if knob.owner != owner:
-                owner, folder = knob.owner, self._gui.add_folder(knob.owner.capitalize())
+        for i, parameter in enumerate(self.player.live.parameters):
+            if parameter.owner != owner:
+                owner, folder = parameter.owner, self._gui.add_folder(parameter.owner.capitalize())
             assert folder is not None
             with folder:
-                self._sliders.append(self._slider(i, knob))
+                self._sliders.append(self._slider(i, parameter))
         if self._sliders:
             self._panel.press("As in the scenario", self.reset)
 
-    def _slider(self, i: int, knob: Knob) -> Any:
-        unit, scale = MILLI.get(knob.unit, (knob.unit, 1.0))
-        low, high, value = (v * scale for v in (knob.low, knob.high, knob.value))
-        name = knob.field.replace("_", " ")
+    def _slider(self, i: int, parameter: Parameter) -> Any:
+        unit, scale = MILLI.get(parameter.unit, (parameter.unit, 1.0))
+        low, high, value = (v * scale for v in (parameter.low, parameter.high, parameter.value))
+        name = parameter.field.replace("_", " ")
         step = (high - low) / STEPS
         slider = self._gui.add_slider(f"{name} [{unit}]", low, high, step, value)
         self._panel.hear(
-            f"knob {i}", slider, lambda value: self.player.live.turn(i, float(value) / scale)
+            f"parameter {i}",
+            slider,
+            lambda value: self.player.live.set_parameter(i, float(value) / scale),
         )
         return slider
 
@@ -399,10 +401,10 @@ class LivePanel:
             self.player.let_go()
 
     def reset(self) -> None:
-        """All knobs as the scenario has them."""
+        """All parameters as the scenario has them."""
         self.player.live.reset()
-        for slider, knob in zip(self._sliders, self.player.live.knobs, strict=True):
-            slider.value = knob.value * MILLI.get(knob.unit, ("", 1.0))[1]
+        for slider, parameter in zip(self._sliders, self.player.live.parameters, strict=True):
+            slider.value = parameter.value * MILLI.get(parameter.unit, ("", 1.0))[1]
 
     # -- what it says -----------------------------------------------------------------------------
 

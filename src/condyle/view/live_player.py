@@ -10,8 +10,8 @@ from ..mechanism import Mechanism
 from ..motion.points import DEFAULT_LOAD_POINT
 from ..report.scene import place
 from ..results.contacts import bound_margins
-from ..simulation.by_hand import Live, Moment
-from ..simulation.integrators import Stuck
+from ..simulation.integrators import NoRateError
+from ..simulation.live import Live, LiveState
 from ..simulation.plan import Plan
 from .session import CENTRE
 from .snapshot import Level, Snapshot, measured, state_messages
@@ -30,7 +30,7 @@ class LivePlayer:
     Attributes: playing;  speed: times real time;  again: whether it begins again at its end;
                 stiffness: of the hand [N/m];  pull_at: name of the point that it holds, of
                 `pull_points`.   independent, load_names: names of q and of the scenario's loads.
-                moment: the last that could be seen.
+                state: the last that could be evaluated.
     """
 
     def __init__(self, plan: Plan) -> None:
@@ -45,7 +45,7 @@ class LivePlayer:
         self.pull_points = (CENTRE, *points)
         self.pull_at = DEFAULT_LOAD_POINT if DEFAULT_LOAD_POINT in points else CENTRE
         self._pace, self._clock = 1.0, 0.0
-        self.moment = self.live.moment()
+        self.state = self.live.state()
 
     @property
     def now(self) -> float:
@@ -102,7 +102,7 @@ class LivePlayer:
 
     def grip(self) -> np.ndarray:
         """Where the point `pull_at` is, (3,) [m] in {S}."""
-        scene = place(self.mechanism, self.moment.pose[None], self.moment.joint[None])
+        scene = place(self.mechanism, self.state.pose[None], self.state.joint[None])
         return np.array(scene.on_platform(tuple(self._pulled()))).ravel()
 
     def _pulled(self) -> np.ndarray:
@@ -114,10 +114,10 @@ class LivePlayer:
         """The mechanism now, or where it could be seen last."""
         stale = False
         try:
-            self.moment = self.live.moment()
-        except Stuck:
+            self.state = self.live.state()
+        except NoRateError:
             stale = True
-        now = self.moment
+        now = self.state
         found = self._model.configuration(now.pose[None])
         margin = bound_margins(self.mechanism, found.contact_point)[0]
         level, messages = self._messages(now, margin)
@@ -141,7 +141,7 @@ class LivePlayer:
             **measured(found.singularity),
         )
 
-    def _messages(self, now: Moment, margin: np.ndarray) -> tuple[Level, tuple[str, ...]]:
+    def _messages(self, now: LiveState, margin: np.ndarray) -> tuple[Level, tuple[str, ...]]:
         state = state_messages(
             self.mechanism, margin, now.contact_force, now.effort, now.joint_rate
         )

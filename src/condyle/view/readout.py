@@ -82,7 +82,7 @@ def effects_html(
 
 def live_html(player: LivePlayer) -> str:
     """Errors of a simulation, forces of its loads, and what has happened, the newest first."""
-    now, parts = player.moment, []
+    now, parts = player.state, []
     if now.error is not None:
         heads, cells = ["Tracking error"], [""]
         for name, error in zip(player.independent, now.error, strict=True):

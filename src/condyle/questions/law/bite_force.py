@@ -55,8 +55,8 @@ class BiteForce(ComputedTorque):
     }
     memory: ClassVar[tuple[float, ...]] = (FREE, 0.0)
     holding: ClassVar[tuple[float, ...] | None] = (BITING, 0.0)
-    knobs: ClassVar[Mapping[str, str]] = {
-        **ComputedTorque.knobs,
+    parameters: ClassVar[Mapping[str, str]] = {
+        **ComputedTorque.parameters,
         "force": "N",
         "proportional": "1",
         "integral": "1/s",
@@ -90,32 +90,32 @@ class BiteForce(ComputedTorque):
     def equations(c: Control) -> tuple[Lanes, ca.SX]:
         now, aim, g = c.now, c.aim, c.gains
         J = g.direction.T @ c.point(now.q, g.point).J
-        felt = -ca.dot(g.direction, now.force)
+        measured = -ca.dot(g.direction, now.force)
         mode, total = ca.vertsplit(c.memory)
-        mode = next_mode(c, mode, felt, J @ (aim.q - now.q), J @ aim.q1)
+        mode = next_mode(c, mode, measured, J @ (aim.q - now.q), J @ aim.q1)
         biting = mode == BITING
         M = c.inertia(now.q)
         by = definite_solve(M, J.T, ca.diag(M))[0]
         q2 = corrected(c)
         along = (J @ q2 + g.bite_damping * (J @ now.q1)) / (J @ by)
-        error = aim.force - felt
+        error = aim.force - measured
         push = aim.force + g.proportional * error + g.integral * total
-        push = ca.if_else(biting, push, felt)
+        push = ca.if_else(biting, push, measured)
         effort = c.inverse(
             now.q, now.q1, q2 - ca.if_else(biting, along, 0) * by, -push * g.direction, g.point
         )
         return effort, ca.vertcat(mode, ca.if_else(biting, total + error * c.period, 0))
 
 
-def next_mode(c: Control, mode: ca.SX, felt: ca.SX, ahead: ca.SX, closing: ca.SX) -> ca.SX:
+def next_mode(c: Control, mode: ca.SX, measured: ca.SX, ahead: ca.SX, closing: ca.SX) -> ca.SX:
     """Which law is next.
 
-    Args: felt: force on the food [N];  ahead: how much further the path is into it [m];
+    Args: measured: force on the food [N];  ahead: how much further the path is into it [m];
           closing: how fast the path goes that way [m/s].
     """
     g = c.gains
     lets_go = ca.logic_and(ahead < -g.release, closing < 0)
-    begins = ca.logic_and(mode == FREE, ca.logic_and(felt > g.threshold, closing > 0))
+    begins = ca.logic_and(mode == FREE, ca.logic_and(measured > g.threshold, closing > 0))
     biting = ca.if_else(lets_go, LEAVING, BITING)
     touching = ca.if_else(mode == BITING, biting, ca.if_else(begins, BITING, mode))
-    return ca.if_else(felt < g.threshold / 2, FREE, touching)
+    return ca.if_else(measured < g.threshold / 2, FREE, touching)

@@ -33,7 +33,7 @@ class ComputedTorque(ControllerTable):
         "stiffness": EACH_COORDINATE,
         "damping": EACH_COORDINATE,
     }
-    knobs: ClassVar[Mapping[str, str]] = {"stiffness": "1/s²", "damping": "1/s"}
+    parameters: ClassVar[Mapping[str, str]] = {"stiffness": "1/s²", "damping": "1/s"}
 
     kind: Literal["computed_torque"]
     stiffness: Gains = Field(description="Kp [1/s^2]; one, or one a coordinate")

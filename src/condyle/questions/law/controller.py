@@ -112,8 +112,8 @@ class ControllerTable(Table):
     memory: ClassVar[tuple[float, ...]] = ()
     # Memory while it holds a force on a load, along its `direction`; None where it never does.
     holding: ClassVar[tuple[float, ...] | None] = None
-    # Numbers that a hand may turn while it runs, with their units; `force` is that of the path.
-    knobs: ClassVar[Mapping[str, str]] = {}
+    # Numbers that may change while it runs, with their units; `force` is that of the path.
+    parameters: ClassVar[Mapping[str, str]] = {}
     # Entries that decide which equations they are.
     chooses: ClassVar[tuple[str, ...]] = ()
 
@@ -185,9 +185,9 @@ class Law:
     place: str | None = None
 
     @property
-    def knobs(self) -> Mapping[str, str]:
-        """Numbers that a hand may turn, with their units."""
-        return {} if self.table is None else self.table.knobs
+    def parameters(self) -> Mapping[str, str]:
+        """Numbers that may change while it runs, with their units."""
+        return {} if self.table is None else self.table.parameters
 
 
 def gains_of(b: Builder, ports: Mapping[str, str | int]) -> SimpleNamespace:

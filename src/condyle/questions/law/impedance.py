@@ -38,7 +38,7 @@ class Impedance(ControllerTable):
         "posture_damping": 1,
         "point": 3,
     }
-    knobs: ClassVar[Mapping[str, str]] = {
+    parameters: ClassVar[Mapping[str, str]] = {
         "stiffness": "N/m",
         "damping": "N s/m",
         "posture": "1/s²",

@@ -26,7 +26,7 @@ class JointPD(ControllerTable):
     """A servo drive at every joint."""
 
     ports: ClassVar[Mapping[str, str | int]] = {"stiffness": EACH_CHAIN, "damping": EACH_CHAIN}
-    knobs: ClassVar[Mapping[str, str]] = {
+    parameters: ClassVar[Mapping[str, str]] = {
         "stiffness": "N m/rad or N/m",
         "damping": "N m s/rad or N s/m",
     }

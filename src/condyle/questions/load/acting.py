@@ -52,8 +52,8 @@ class LoadTable(Table):
     ports: ClassVar[Mapping[str, int]] = {}
     # The mode in which it can bear a force that is held on it, if there is one.
     bears: ClassVar[int | None] = None
-    # Numbers that a hand may turn while it runs, with their units.
-    knobs: ClassVar[Mapping[str, str]] = {}
+    # Numbers that may change while it runs, with their units.
+    parameters: ClassVar[Mapping[str, str]] = {}
 
     kind: Any
     name: Name | None = None
@@ -109,9 +109,9 @@ class Load:
     rows: np.ndarray = field(default_factory=lambda: np.zeros((0, 6)))
 
     @property
-    def knobs(self) -> Mapping[str, str]:
-        """Numbers that a hand may turn, with their units."""
-        return self.law.knobs
+    def parameters(self) -> Mapping[str, str]:
+        """Numbers that may change while it runs, with their units."""
+        return self.law.parameters
 
     @property
     def jumps(self) -> Sequence[Jump]:

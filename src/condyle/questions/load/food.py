@@ -77,7 +77,7 @@ class FoodTable(LoadTable):
 
     ports: ClassVar[Mapping[str, int]] = {"direction": 3, **dict.fromkeys(_KEYS, 1)}
     bears: ClassVar[int | None] = TOUCHING
-    knobs: ClassVar[Mapping[str, str]] = {
+    parameters: ClassVar[Mapping[str, str]] = {
         "thickness": "m",
         "stiffness": "N/m",
         "damping": "N s/m",

@@ -21,7 +21,7 @@ class Spring(LoadTable):
 
     ports: ClassVar[Mapping[str, int]] = {"direction": 3, "stiffness": 1, "damping": 1, "rest": 1}
     bears: ClassVar[int | None] = 0
-    knobs: ClassVar[Mapping[str, str]] = {"stiffness": "N/m", "damping": "N s/m", "rest": "m"}
+    parameters: ClassVar[Mapping[str, str]] = {"stiffness": "N/m", "damping": "N s/m", "rest": "m"}
 
     kind: Literal["spring"]
     direction: Direction = Field(default=(0.0, 0.0, 1.0), description="in {S}")

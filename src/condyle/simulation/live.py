@@ -1,10 +1,10 @@
-"""A simulation under a hand: it goes on as time passes, knobs turn, and the hand pulls.
+"""A simulation to interact with: it goes on as time passes, parameters change, a hand pulls.
 
 The hand is a spring with a damper between a point of the platform and where it is held,
 
     force = -stiffness (p - held) - damping p',
 
-as three springs of one direction each. A controller does not feel it as a bite.
+as three springs of one direction each. A controller does not measure it as a bite.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from ..questions.load import Load
 from ..questions.load.spring import Spring
 from ..status import Status
 from .events import Event
-from .integrators import Stuck
-from .knobs import Knob, at, knobs_of
+from .integrators import NoRateError
+from .parameters import Parameter, parameters_of, with_values
 from .plan import ClosedLoop, Plan
-from .running import ROUNDING, Ended, Run
+from .running import ROUNDING, Run, RunEndedError
 
 STEP = 2e-4  # seconds, in compiled code,
 SLOW_STEP = 1e-3  # and in Python
@@ -29,8 +29,8 @@ HAND = "hand"
 
 
 @dataclass(frozen=True)
-class Moment:
-    """What is where at one time.
+class LiveState:
+    """The mechanism at one time.
 
     pose: X_EE (6,);  joint, joint_rate, effort: (n,);  contact_force: (k,) [N], NaN where there is
     none;  error: reference less q, (m,), or None without a controller.
@@ -55,16 +55,16 @@ class Moment:
 class Live:
     """A plan, run bit by bit, with fixed steps unless it asks for an implicit method.
 
-    Attributes: knobs, values: what can be turned, and where each stands;  pulling: whether a hand
-                holds the platform;  ended: what ended it before its time.
+    Attributes: parameters, values: what can be changed, and the value of each;  pulling: whether
+                a hand holds the platform;  ended: what ended it before its time.
     """
 
     def __init__(self, plan: Plan) -> None:
         if plan.method == "DOP853":
             plan = replace(plan, method="rk4", settings=replace(plan.settings, step=STEP))
-            if Run(replace(plan, times=np.zeros(0))).steps is None:
+            if Run([replace(plan, times=np.zeros(0))]).steps is None:
                 plan = replace(plan, settings=replace(plan.settings, step=SLOW_STEP))
-        self.knobs: Sequence[Knob] = knobs_of(plan)
+        self.parameters: Sequence[Parameter] = parameters_of(plan)
         hand = _hand(np.zeros(3), np.zeros(3), 0.0, 0.0)
         self._plan = replace(
             plan,
@@ -72,22 +72,22 @@ class Live:
             loads=plan.loads + hand,
             modes=(*plan.modes, *(0 for _ in hand)),
         )
-        self._hand, self.values = hand, [knob.value for knob in self.knobs]
+        self._hand, self.values = hand, [parameter.value for parameter in self.parameters]
         self.duration = plan.duration
         self.restart()
 
     # -- time ---------------------------------------------------------------------------------
 
     def restart(self) -> None:
-        """From the start, with knobs and hand as they are."""
+        """Begin again, with parameters and hand as they are."""
         self._now = self._held()
-        self._run = Run(self._now)
+        self._run = Run([self._now])
         self.ended: Event | None = None
 
     @property
     def t(self) -> float:
         """Where it is [s]."""
-        return self._run.t
+        return float(self._run.clock.t)
 
     @property
     def events(self) -> Sequence[Event]:
@@ -105,19 +105,19 @@ class Live:
             return
         try:
             self._run.go_to(min(t, self.duration))
-        except Ended:
+        except RunEndedError:
             self.ended = self._run.events[-1]
 
     # -- hands --------------------------------------------------------------------------------
 
-    def turn(self, number: int, value: float) -> None:
-        """Put a knob to a value, in SI."""
+    def set_parameter(self, number: int, value: float) -> None:
+        """Set a parameter to a value, in SI."""
         self.values[number] = value
         self._change()
 
     def reset(self) -> None:
-        """All knobs as they were to begin with."""
-        self.values = [knob.value for knob in self.knobs]
+        """Set all parameters to their first values."""
+        self.values = [parameter.value for parameter in self.parameters]
         self._change()
 
     def pull(self, point: np.ndarray, held: np.ndarray, stiffness: float, damping: float) -> None:
@@ -136,47 +136,47 @@ class Live:
         return bool(self._hand[0].numbers["stiffness"] > 0)
 
     def _held(self) -> Plan:
-        turned, own = at(self._plan, self.knobs, self.values), -len(self._hand)
-        return replace(turned, loads=turned.loads[:own] + self._hand)
+        changed = with_values(self._plan, self.parameters, self.values)
+        return replace(changed, loads=changed.loads[: -len(self._hand)] + self._hand)
 
     def _change(self) -> None:
         self._now = self._held()
         if self.ended is None:
             self._run.change(self._now)
 
-    # -- what is seen -------------------------------------------------------------------------
+    # -- the state now ------------------------------------------------------------------------
 
-    def moment(self) -> Moment:
+    def state(self) -> LiveState:
         """The mechanism now.
 
-        Raises: Stuck: where it cannot be.
+        Raises: NoRateError: where it cannot be.
         """
         run, m, now = self._run, len(self._plan.q), self._now
         plant, effort = run.plant, np.full(len(now.low), np.nan)
         force = np.full(len(now.model.mechanism.contacts), np.nan)
         try:
-            effort = run.look()
+            effort = run.acting(run.clock.t, run.state)
             force = plant["contact_force"]
-        except Stuck as stuck:
-            if stuck.status == Status.unreachable:
+        except NoRateError as error:
+            if error.status == Status.unreachable:
                 raise
-        q, own = run.y[:m], len(now.loads) - len(self._hand)
+        q, own = run.state[:m], len(now.loads) - len(self._hand)
         forces = plant["load_force"].reshape(-1, 3)
-        error = bite = None
+        off = bite = None
         if isinstance(now.drive, ClosedLoop):
-            error = now.drive.path.states(np.array([run.t]))[0][0] - q
+            off = now.drive.path.states(np.array([run.clock.t]))[0][0] - q
             if now.drive.law.place is not None:
-                felt = [load.place == now.drive.law.place for load in now.loads]
-                bite = float(np.linalg.norm(forces[felt].sum(axis=0)))
-        return Moment(
-            run.t,
+                measured = [load.place == now.drive.law.place for load in now.loads]
+                bite = float(np.linalg.norm(forces[measured].sum(axis=0)))
+        return LiveState(
+            run.clock.t,
             q.copy(),
             plant["pose"],
             plant["joint"],
             plant["joint_rate"],
             effort,
             force,
-            error,
+            off,
             np.vstack([forces[:own], forces[own:].sum(axis=0)]),
             np.array([load.point for load in now.loads[: own + 1]]),
             bite,
