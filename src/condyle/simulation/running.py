@@ -228,7 +228,7 @@ class Run:
             setattr(self.clock, name, getattr(crowd.clock, name))
         kept, sampled = self.clock.next, self.clock.tick + 1
         self.logs, self._noted, self._cut = [crowd.logs[i]], crowd._noted, crowd._cut[:, [i]]
-        pairs = [
+        pairs: list[tuple[np.ndarray, np.ndarray]] = [
             (self.y, crowd.y),
             (self.kept[:kept], crowd.kept[:kept]),
             (self.kept_modes[:kept], crowd.kept_modes[:kept]),
@@ -398,7 +398,7 @@ class Run:
             self._keep_one(y)
 
     def _keep_one(self, y: np.ndarray) -> None:
-        now = self.clock.next
+        now = int(self.clock.next)
         self.kept[now], self.kept_modes[now] = y.reshape(len(y), -1), self.modes
         self.clock.next = now + 1
 

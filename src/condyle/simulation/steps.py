@@ -91,7 +91,7 @@ for _name in STRUCTS:
     _TYPES[_name] = _structure(_name)
 
 
-class Clock(_TYPES["Clock"]):  # type: ignore[misc]
+class Clock(_TYPES["Clock"]):  # type: ignore[misc,valid-type]
     """Where runs are, read and set by compiled code and by its owner."""
 
     def __init__(self) -> None:
