@@ -51,6 +51,7 @@ _HOMES = {
     "run": "analysis.run_motion",
     "Study": "analysis.sweep",
     "sweep": "analysis.sweep",
+    "open_sweep": "analysis.sweep",
     "export_c": "export.c_package",
     "export_fmu": "export.fmu",
     "export_matlab": "export.matlab",
@@ -60,7 +61,7 @@ _HOMES = {
 if TYPE_CHECKING:
     from .analysis.map import open_map, workspace_map, workspace_size
     from .analysis.run_motion import run
-    from .analysis.sweep import Study, sweep
+    from .analysis.sweep import Study, open_sweep, sweep
     from .errors import (
         CondyleError,
         InfeasibleError,

@@ -44,7 +44,11 @@ def test_sweep_and_show(condyle_command: Callable[..., Any], study: Path) -> Non
 
 @pytest.mark.parametrize(
     ("words", "message"),
-    [((), "name a study"), (("--show", "."), "holds no study"), (("a.toml",), "is no file")],
+    [
+        ((), "expected a study"),
+        (("--show", "."), "is not the folder of a sweep"),
+        (("a.toml",), "no such file"),
+    ],
 )
 def test_wrong_calls(condyle_command: Callable[..., Any], words: Any, message: str) -> None:
     done = condyle_command("sweep", *words)

@@ -1,7 +1,7 @@
-"""Runs the parts of a job here, in threads, in processes, or on a cluster of Dask's.
+"""Runs the parts of a job serially, in threads, in processes, or on a Dask cluster.
 
-Scheduling, queues and what becomes of a lost worker are those of `concurrent.futures` and Dask;
-here stands only which of them is asked. Results do not depend on it.
+Scheduling, queues and lost workers are handled by `concurrent.futures` and Dask; this module only
+chooses between them. Results do not depend on the choice.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ Result = TypeVar("Result")
 Work = Callable[[Job, int], Result]
 
 PROCESSES, THREADS, DASK = "processes", "threads", "dask"
-PATIENCE = 10.0  # seconds that a scheduler has to answer
+TIMEOUT = 10.0  # of a scheduler's answer [s]
 
 
 class LostWorkerError(CondyleError):
-    """A process that did a part of a study ended before it was done."""
+    """A worker process ended before it had finished its part of a job."""
 
 
 def check_scheduler(workers: int | None, scheduler: str) -> None:
-    """Raises InputError for what cannot be a scheduler, or does not answer as one."""
+    """Raises InputError for an unknown scheduler, or one that does not answer."""
     if workers is not None and not (isinstance(workers, int) and workers >= 1):
         raise InputError(f"workers: expected a whole number of at least 1, got {workers!r:.40}")
     if scheduler in (PROCESSES, THREADS):
@@ -52,7 +52,7 @@ def check_scheduler(workers: int | None, scheduler: str) -> None:
             "machine), or the address of a Dask scheduler such as tcp://10.0.0.1:8786"
         )
     if scheduler != DASK and workers is not None:
-        raise InputError("workers: a cluster that runs already has its own; leave it out")
+        raise InputError("workers cannot be set for an existing scheduler")
     require("distributed", "cluster")
     if scheduler != DASK:
         with ExitStack() as stack:
@@ -66,12 +66,12 @@ def run_parts(
     workers: int | None,
     scheduler: str | None,
 ) -> Iterator[tuple[int, Result]]:
-    """Parts and what `work(job, part)` made of each, in whatever order they get done.
+    """Parts and the result of `work(job, part)` for each, in the order in which they finish.
 
-    Args:   workers: default: the processors at hand.
-            scheduler: processes, threads, dask, or the address of a Dask scheduler; None: here.
+    Args:   workers: number of them; default: all processors.
+            scheduler: processes, threads, dask, or the address of a Dask scheduler; None: serially.
     Raises: InputError:      if the scheduler does not answer.
-            LostWorkerError: if a worker ended; Dask tries elsewhere first.
+            LostWorkerError: if a worker ended; Dask retries on other workers first.
     """
     count = min(workers or processors(None), len(parts))
     if scheduler is None or not parts or (count == 1 and scheduler in (PROCESSES, THREADS)):
@@ -86,7 +86,7 @@ def run_parts(
 
 @contextmanager
 def _pool(job: Any, count: int, scheduler: str) -> Iterator[tuple[Executor, Any]]:
-    """An executor, and the job as its workers get it; parts not begun are forgotten at the end."""
+    """An executor, and the job as its workers get it; at the end pending parts are cancelled."""
     lost: tuple[type[Exception], ...] = (BrokenExecutor, CancelledError)
     pool: Executor
     with ExitStack() as stack:
@@ -107,8 +107,8 @@ def _pool(job: Any, count: int, scheduler: str) -> Iterator[tuple[Executor, Any]
         except lost as error:
             what = f"the cluster gave up on a part: {error}."
             if isinstance(error, BrokenExecutor):
-                what = "a worker process was killed or ended by itself (is there enough memory?)."
-            raise LostWorkerError(what, "What was done is kept; --resume does the rest.") from error
+                what = "a worker process was killed or crashed (is there enough memory?)."
+            raise LostWorkerError(what, "Finished parts are kept; --resume continues.") from error
         finally:
             if scheduler in (PROCESSES, THREADS):
                 pool.shutdown(cancel_futures=True)
@@ -128,7 +128,7 @@ def _same(job: Any) -> Any:
 
 
 def _begin(job: Any) -> None:
-    """In a worker: Ctrl-C is the parent's to hear, and without a parent there is no work."""
+    """In a worker: Ctrl-C is left to the parent, and the worker ends with its parent."""
     global _job
     _job = job
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -144,7 +144,7 @@ def _end_with_parent() -> None:
 
 
 def _client(stack: ExitStack, count: int | None, scheduler: str) -> Any:
-    """A client of the cluster at an address, or of one on this machine for as long as it takes."""
+    """A client of the cluster at an address, or of a temporary one on this machine."""
     from distributed import Client, LocalCluster
 
     if scheduler == DASK:
@@ -152,7 +152,7 @@ def _client(stack: ExitStack, count: int | None, scheduler: str) -> Any:
         cluster = LocalCluster(n_workers=count, threads_per_worker=1, **quiet)
         return stack.enter_context(Client(stack.enter_context(cluster)))
     try:
-        return stack.enter_context(Client(scheduler, timeout=PATIENCE))
+        return stack.enter_context(Client(scheduler, timeout=TIMEOUT))
     except (OSError, ValueError) as error:
         raise InputError(
             f"no Dask scheduler answers at {scheduler} ({type(error).__name__}). Start one with "

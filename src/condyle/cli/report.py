@@ -37,9 +37,9 @@ def report(
     found = None
     if sweep is not None:
         require("matplotlib", "figures")
-        from ..analysis.sweep import read_sweep
+        from ..analysis.sweep import open_sweep
 
-        found = read_sweep(sweep)
+        found = open_sweep(sweep)
     inputs = [solution, *([measured] if measured else []), *(file or ())]
     path = write_report(solution, out or beside, files=inputs, measured=measured, sweep=found)
     size = path.stat().st_size

@@ -29,8 +29,8 @@ def sweep(
 ) -> Answer:
     """Parameter study: a row of measures for each variant of a mechanism.
 
-    A study names the numbers that vary, how they are sampled, and what is measured. Rows are
-    written in parts, so that a study that was stopped goes on with --resume.
+    A study names the numbers that vary, how they are sampled, and the measures. Rows are written in
+    parts: --resume continues an interrupted study.
 
     Options:
         out: Folder for the rows. Default: the name of the study.
@@ -42,21 +42,22 @@ def sweep(
         figures: Also draw figures into the folder.
     """
     require_drawing(figures, False)
+    import condyle
+
     if (study is None) == (show is None):
-        raise InputError("name a study, or with --show the folder of a sweep")
+        raise InputError("expected a study, or --show with the folder of a sweep")
     if show is not None:
-        from ..analysis.sweep import read_sweep
-
-        return _shown(read_sweep(show), show, figures)
+        return _shown(condyle.open_sweep(show), show, figures)
     assert study is not None
-    from ..analysis.sweep import sweep as solve
-
     folder = out or Path(study.stem)
     try:
-        table = solve(study, folder, workers=workers, scheduler=scheduler, resume=resume)
+        table = condyle.sweep(study, folder, workers=workers, scheduler=scheduler, resume=resume)
     except KeyboardInterrupt:
         again = command_line("sweep", study, out=folder, resume=True)
-        print(f"condyle: stopped; the rows in {folder} are whole. {again}", file=sys.stderr)
+        print(
+            f"condyle: stopped; the rows in {folder} are complete. Continue: {again}",
+            file=sys.stderr,
+        )
         raise
     return _shown(table, folder, figures)
 

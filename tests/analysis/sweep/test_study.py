@@ -76,9 +76,9 @@ def measure(**one: Any) -> dict[str, Any]:
 
 WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "no such path": (vary(what="platform.maas"), 'has no "maas".*Did you mean "mass"'),
-    "a table": (vary(what="platform"), "no single number"),
+    "a table": (vary(what="platform"), "not a single number"),
     "a point": (vary(what="chain.masseter_left.base"), r"base\[0\]"),
-    "left out": (vary(what="contact.left_condyle.ball_radius"), "left out"),
+    "left out": (vary(what="contact.left_condyle.ball_radius"), "not set"),
     "a mirror that is not there": (vary(mirror="chain.nope.base[2]"), 'called "nope"'),
     "twice the same": (vary(mirror="platform.mass"), "twice"),
     "reversed": (vary(range=[0.3, 0.2]), "lower < upper"),
@@ -86,18 +86,18 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "infinite": (vary(range=[0.2, float("inf")]), "finite"),
     "two ways": (vary(scale=[0.9, 1.1]), "got range and scale"),
     "no deviation": (vary(range=None, normal=[0.2, 0.0]), "standard deviation > 0"),
-    "no count": (vary(count=None), "count is missing"),
-    "a count of values": (vary(range=None, values=[0.2]), "their own count"),
+    "no count": (vary(count=None), "count is required"),
+    "a count of values": (vary(range=None, values=[0.2]), "not allowed with values"),
     "nothing varies": (spoiled(vary=[]), "at least 1"),
     "no such kind": (spoiled(sampling={"kind": "sobl"}), "expected 'grid'"),
     "no count of samples": (
         spoiled(vary=[{**MASS, "count": None}], sampling={"kind": "sobol"}),
-        "count is missing",
+        "count is required",
     ),
     "two counts": (spoiled(sampling={"kind": "latin", "count": 4}), "count is for a grid"),
     "too many": (
         spoiled(vary=[{**MASS, "count": None}], sampling={"kind": "latin", "count": 10**8}),
-        "at most",
+        "maximum of",
     ),
     "no variable": (measure(take="max"), "of: is missing"),
     "a variable that is not there": (measure(of="efort", take="max"), 'Did you mean "effort"'),
@@ -141,7 +141,7 @@ def test_python_may_give_numpy_arrays() -> None:
 
 @pytest.mark.parametrize("make", [lambda f: f / "none.toml", lambda f: f])
 def test_a_file_that_is_none(make: Callable[[Path], Path], tmp_path: Path) -> None:
-    with pytest.raises(condyle.InputError, match="is no file"):
+    with pytest.raises(condyle.InputError, match="no such file"):
         read_study(make(tmp_path))
 
 

@@ -22,7 +22,7 @@ import xarray as xr
 
 import condyle
 from condyle.analysis import workers as pool
-from condyle.analysis.sweep import read_sweep, study_folder
+from condyle.analysis.sweep import open_sweep, study_folder
 from condyle.analysis.sweep.variants import solve_part
 from condyle.analysis.workers import LostWorkerError
 
@@ -128,7 +128,7 @@ def test_killed_at_any_instant_it_goes_on(
             wait_for_parts(folder, at)
             time.sleep(random.uniform(0.0, 0.05))
             process.kill()
-        whole = read_sweep(folder)  # what is there can be read
+        whole = open_sweep(folder)  # what is there can be read
         assert whole.sizes["row"] % 4 == 0
     same(condyle.sweep(study, workers=1), condyle.sweep(file, folder, workers=1, resume=True))
 
@@ -196,7 +196,7 @@ def test_a_full_disk_is_told_and_resumed(
         with pytest.raises(condyle.InputError, match="No space left"):
             condyle.sweep(tables, folder, workers=1)
     assert len(list(folder.iterdir())) == 3  # the study and two parts, nothing half
-    assert read_sweep(folder).sizes["row"] == 8
+    assert open_sweep(folder).sizes["row"] == 8
     same(alone, condyle.sweep(tables, folder, workers=1, resume=True))
 
 
@@ -231,7 +231,7 @@ def test_ctrl_c_ends_in_order(
     with monkeypatch.context() as pressed, pytest.raises(KeyboardInterrupt):
         pressed.setattr(study_folder.Store, "write", write)
         condyle.sweep(study, tmp_path, workers=2)
-    there = read_sweep(tmp_path).sizes["row"]
+    there = open_sweep(tmp_path).sizes["row"]
     assert 0 < there <= 40 and there % 4 == 0
     whole = condyle.sweep(study, tmp_path, workers=1, resume=True)
     assert whole["variant"].values.tolist() == list(range(40))
@@ -249,10 +249,10 @@ def test_solutions_are_kept_on_request(tables: dict[str, Any], tmp_path: Path) -
 @pytest.mark.parametrize(
     ("workers", "scheduler", "message"),
     [
-        (0, "processes", "expected 1 or more"),
+        (0, "processes", "at least 1"),
         (None, "slurm", "expected processes, threads, dask"),
         (None, "tcp://127.0.0.1:9", "no Dask scheduler answers"),
-        (3, "tcp://127.0.0.1:9", "leave it out"),
+        (3, "tcp://127.0.0.1:9", "existing scheduler"),
     ],
 )
 def test_wrong_schedulers_are_told_before_any_work(
@@ -263,7 +263,7 @@ def test_wrong_schedulers_are_told_before_any_work(
     message: str,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(pool, "PATIENCE", 1.0)
+    monkeypatch.setattr(pool, "TIMEOUT", 1.0)
     if "://" in scheduler:
         pytest.importorskip("distributed")
     with pytest.raises(condyle.InputError, match=message) as caught:

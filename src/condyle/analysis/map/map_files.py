@@ -49,9 +49,14 @@ def open_map(path: str | os.PathLike[str]) -> xr.Dataset:
         raise no_such_file(path) from None
     except Exception as error:
         raise InputError(f"{path} is not a map: {error}") from None
-    if "held" not in dataset.attrs or "cause" not in dataset:
+    if not is_map(dataset):
         raise InputError(f"{path} is not a map; `condyle map` writes them")
     return dataset
+
+
+def is_map(data: Any) -> bool:
+    """Whether a dataset is a map."""
+    return "held" in getattr(data, "attrs", ()) and "cause" in data
 
 
 def zarr_arrays(folder: Path, frame: xr.Dataset, like: Mapping[str, Any], rows: int) -> Any:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from ...mechanism.mechanism import COORDINATES
 from ...model.model import Model, derive
 from .block import Setup
 from .free_space import Ball, Box, FreeSpace, greatest_ball, greatest_box
-from .map_files import grid_and_reach, mechanism_of, open_map
+from .map_files import grid_and_reach, is_map, mechanism_of, open_map
 from .volume import Volume, reachable_volume
 
 if TYPE_CHECKING:
@@ -47,7 +47,9 @@ class WorkspaceSize:
 
 
 def workspace_size(
-    map: xr.Dataset | str | Path, margin: float = NEAR_SINGULAR, model: Model | None = None
+    map: xr.Dataset | str | os.PathLike[str],
+    margin: float = NEAR_SINGULAR,
+    model: Model | None = None,
 ) -> WorkspaceSize:
     """Volume of the reachable set of a map, and the greatest free ball and box around home.
 
@@ -58,7 +60,9 @@ def workspace_size(
     """
     if isinstance(margin, bool) or not isinstance(margin, int | float) or not 0 <= margin <= 1:
         raise InputError(f"margin: expected a number from 0 to 1, got {margin!r:.60}")
-    dataset = open_map(map) if isinstance(map, str | Path) else map
+    dataset = open_map(map) if isinstance(map, str | os.PathLike) else map
+    if not is_map(dataset):
+        raise InputError(f"map: expected a map or its file, got {type(dataset).__name__}")
     made = model or derive(mechanism_of(dataset), distribution=dataset.attrs["distribution"])
     grid, reach = grid_and_reach(dataset, made)
     free = FreeSpace(Setup(made, reach, np.array(dataset.attrs["load"], dtype=float)), margin)

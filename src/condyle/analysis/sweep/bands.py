@@ -1,4 +1,4 @@
-"""How sure efforts and contact forces are along one motion: quantiles over a study's variants."""
+"""Uncertainty of efforts and contact forces along a motion: quantiles over a study's variants."""
 
 from __future__ import annotations
 

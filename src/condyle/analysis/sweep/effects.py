@@ -1,4 +1,4 @@
-"""What a sweep tells: main effects, shares of the variance, the best rows, the Pareto front."""
+"""Results of a sweep: main effects, Sobol indices, best rows, Pareto front."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from .study import Study
 from .variants import OK
 
 BINS = 10  # of equal counts, over which a main effect is averaged
-FEWEST = 4  # good rows without which nothing can be said
+FEWEST = 4  # good rows for any statement
 
 
 @dataclass(frozen=True)
 class Effect:
-    """The mean of a measure over a parameter, all else as it comes.
+    """The mean of a measure by one parameter, averaged over the others.
 
     place, mean: of each level or bin, (B,).
     share: of the measure's variance that these means explain, 0 to 1; NaN if it does not vary.
@@ -122,12 +122,12 @@ def sobol_indices(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def directions(table: xr.Dataset) -> dict[str, str]:
-    """Measure -> less or more, for those of which the study says what is better."""
+    """Measure -> less or more, for measures with `better` in the study."""
     return json.loads(table.attrs["better"])
 
 
 def best(table: xr.Dataset, measure: str, count: int = 5) -> xr.Dataset:
-    """The rows with the best of a measure, by what the study calls better, else the least."""
+    """The best rows of a measure, by its `better` in the study; default: the least."""
     rows = good(table)
     rows = rows.isel(row=np.flatnonzero(np.isfinite(rows[measure].values)))
     sign = -1.0 if directions(table).get(measure) == "more" else 1.0
@@ -136,9 +136,9 @@ def best(table: xr.Dataset, measure: str, count: int = 5) -> xr.Dataset:
 
 
 def pareto(table: xr.Dataset, measures: Sequence[str] = ()) -> xr.Dataset:
-    """The rows of which no other is better in one measure and as good in the rest.
+    """The Pareto front: rows that no other row dominates.
 
-    Args:   measures: two or three; default: the first three of which the study says what is better.
+    Args:   measures: two or three; default: the first three with `better` in the study.
     Raises: InputError: for fewer than two measures, or one without a direction.
     """
     known = directions(table)

@@ -1,7 +1,8 @@
-"""A study that was checked against its mechanism: all that a worker needs to know."""
+"""A study that was checked against its mechanism: everything that a worker needs."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -31,13 +32,13 @@ from .study import NONE, REFERENCE, TRIAL, MotionFile, Study
 VARIANT, MOTION, STATUS, REASON, SECONDS = "variant", "motion", "status", "reason", "seconds"
 DEFAULT = "masticatory"  # mechanism
 OWN = (VARIANT, MOTION, STATUS, REASON, SECONDS)  # columns beside parameters and measures
-PARTS = 128  # of a study, if it has enough variants for so many
+PARTS = 128  # of a study with enough variants
 LEAST_PART, LARGEST_PART = 4, 4096  # variants
 
 
 @dataclass(frozen=True)
 class Job:
-    """A study, its mechanism, motions and load, looked up and checked.
+    """A study with its mechanism, motions and load, checked.
 
     wrenches: on the platform, (N, 6) [N, N m], of each motion.
     point: the platform's point that the load acts at, by name; None without a load.
@@ -59,7 +60,7 @@ class Job:
 
     @cached_property
     def part(self) -> int:
-        """Variants of a part: it belongs to the study alone, not to who does it."""
+        """Variants of a part: it depends on the study alone, not on the scheduler."""
         return min(max(LEAST_PART, -(-self.design.count // PARTS)), LARGEST_PART)
 
     @property
@@ -100,16 +101,19 @@ class Job:
 
 def prepared(
     study: Study,
-    mechanism: Mechanism | None = None,
+    mechanism: Mechanism | str | os.PathLike[str] | None = None,
     motions: tuple[Motion, ...] | None = None,
     load: Load | None = None,
 ) -> Job:
     """Check a study against its mechanism, read its files, build its kernels.
 
-    Args:   mechanism, motions, load: in the place of those that the study names.
+    Args:   mechanism, motions, load: instead of those that the study names.
     Raises: InputError and others of the library, before any variant is solved.
     """
-    machine = mechanism or load_mechanism(study.mechanism or DEFAULT)
+    if isinstance(mechanism, Mechanism):
+        machine = mechanism
+    else:
+        machine = load_mechanism(study.mechanism or DEFAULT if mechanism is None else mechanism)
     base = tuple(_numbers(study, machine))
     design = Design(study.vary, study.sampling, base)
     design.check()
@@ -140,11 +144,11 @@ def _numbers(study: Study, machine: Mechanism) -> Iterator[float]:
         for path in (one.what, *(follower.what for follower in one.mirror)):
             value = machine.get(path)
             if isinstance(value, bool) or not isinstance(value, int | float):
-                what = "left out in this mechanism" if value is None else "no single number"
+                what = "not set in this mechanism" if value is None else "not a single number"
                 hint = f"; name one, such as {path}[0]" if isinstance(value, tuple) else ""
-                raise InputError(f"vary {path}: it is {what}{hint}")
+                raise InputError(f"vary {path}: {what}{hint}")
             if path in seen:
-                raise InputError(f"vary {path}: it stands twice in the study")
+                raise InputError(f"vary {path}: is given twice")
             seen.add(path)
         yield float(machine.get(one.what))
 
@@ -153,11 +157,11 @@ def _motion(given: MotionFile, machine: Mechanism) -> Motion:
     options: dict[str, Any] = {"cutoff": given.smooth, "rate": given.rate, "trim": given.trim}
     if given.file == TRIAL:
         if given.units or given.landmark:
-            raise InputError('motion: "trial" takes no units and no landmark')
+            raise InputError('motion: "trial" has no units and no landmark')
         return trial_motion(machine, **options)
     if given.file == REFERENCE:
         if given.units:
-            raise InputError('motion: "reference" has its units; leave them out')
+            raise InputError('motion: "reference" has its own units; leave units out')
         if not fits_reference(machine, given.landmark):
             names = ", ".join(independent_coordinates(machine))
             raise InputError(

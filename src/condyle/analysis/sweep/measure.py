@@ -1,4 +1,4 @@
-"""What is measured of a variant: columns of numbers from the variables of a solution."""
+"""Measures of a variant: columns of numbers from the variables of a solution."""
 
 from __future__ import annotations
 

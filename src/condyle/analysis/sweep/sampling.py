@@ -1,6 +1,6 @@
-"""Which values the numbers of a study take: any row of the design, without those before it.
+"""The design of a study: any row can be computed without the rows before it.
 
-So each worker makes its own rows, and they are the same whoever makes them.
+So each worker computes its own rows, and they do not depend on the scheduler.
 """
 
 from __future__ import annotations
@@ -45,13 +45,13 @@ class Design:
         return tuple(len(v.values) if v.values else v.count or 1 for v in self.vary)
 
     def check(self) -> None:
-        """Raises InputError for more rows than the kind can make."""
+        """Raises InputError for more rows than the kind has."""
         kind = self.sampling.kind
         most = MOST_LATIN if kind == "latin" else MOST_ROWS if kind in ("sobol", "saltelli") else 0
         if most and (self.sampling.count or 0) > most:
             raise InputError(
-                f"sampling.count: {kind} has at most {most} rows, got {self.sampling.count}; "
-                "take random"
+                f"sampling.count: {kind} has a maximum of {most} rows, got {self.sampling.count}; "
+                "choose random"
             )
 
     def rows(self, start: int, stop: int) -> np.ndarray:
@@ -111,7 +111,7 @@ def _latin(d: int, count: int, seed: int) -> np.ndarray:
 def _at(
     vary: Vary, unit: np.ndarray, base: float, grid: tuple[int, np.ndarray] | None = None
 ) -> np.ndarray:
-    """Values at places in [0, 1) of a distribution; or on a grid of so many, ends included."""
+    """Values at places in [0, 1) of a distribution; or on a grid, ends included."""
     if vary.values is not None:
         return np.array(vary.values)[(unit * len(vary.values)).astype(int)]
     if vary.normal is not None:

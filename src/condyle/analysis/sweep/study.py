@@ -1,8 +1,9 @@
-"""A study: which numbers of a mechanism vary and how, along which motions, and what is measured."""
+"""A study: the numbers of a mechanism that vary, the motions, and the measures."""
 
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -17,7 +18,7 @@ from ...mechanism.schema import schema_of
 from ...mechanism.table import FrozenTable, Table
 from ...mechanism.toml import nests_too_deep, read_tables, read_text, too_deep
 
-REFERENCE, TRIAL, NONE = "reference", "trial", "none"  # words in the place of a file
+REFERENCE, TRIAL, NONE = "reference", "trial", "none"  # instead of a file
 MOST_SHOWN = 3  # problems in one line
 
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
@@ -25,7 +26,7 @@ Count = Annotated[int, Field(strict=True, ge=1)]
 
 
 def _numbers(value: Any) -> Any:
-    """Numbers are SI; text with a unit is told so."""
+    """Numbers are SI; text with a unit is refused."""
     value = listed(value)
     for one in value if isinstance(value, list | tuple) else (value,):
         if isinstance(one, str):
@@ -37,7 +38,7 @@ Pair = Annotated[tuple[Finite, Finite], BeforeValidator(_numbers)]
 
 
 class Follower(Table):
-    """Another number of the mechanism that follows the one that varies: times * value + plus."""
+    """Another number of the mechanism that depends on the varied one: times * value + plus."""
 
     what: str
     times: Finite = 1.0
@@ -45,7 +46,7 @@ class Follower(Table):
 
 
 def _followers(value: Any) -> Any:
-    """One or several; as text the same number, or with "-" in front the opposite."""
+    """One or several; as text the same number, or the negative of it with "-" in front."""
     given = value if isinstance(value, list | tuple) else [value]
     return tuple(
         {"what": one.lstrip("- "), "times": -1.0 if one.startswith("-") else 1.0}
@@ -56,19 +57,19 @@ def _followers(value: Any) -> Any:
 
 
 class Vary(Table):
-    """A number of the mechanism that varies, by one of range, values, normal and scale."""
+    """A number of the mechanism that varies: one of range, values, normal and scale."""
 
     what: str = Field(description='its path, such as "chain.masseter_left.base[2]"')
     mirror: Annotated[tuple[Follower, ...], BeforeValidator(_followers)] = Field(
-        default=(), description='paths that follow; with "-" in front by the opposite number'
+        default=(), description='dependent paths; with "-" in front the negative value'
     )
     range: Pair | None = Field(default=None, description="[lower, upper], SI")
     values: Annotated[tuple[Finite, ...], BeforeValidator(_numbers), Field(min_length=1)] | None = (
-        Field(default=None, description="these and no others, SI")
+        Field(default=None, description="list of values, SI")
     )
     normal: Pair | None = Field(default=None, description="[mean, standard deviation], SI")
     scale: Pair | None = Field(default=None, description="[lower, upper] factor of its value")
-    count: Count | None = Field(default=None, description="of a grid")
+    count: Count | None = Field(default=None, description="number of values, of a grid")
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
@@ -86,28 +87,30 @@ class Vary(Table):
                 f"normal: expected [mean, standard deviation > 0], got {list(self.normal)}"
             )
         if self.values is not None and self.count is not None:
-            raise ValueError("count: the values are their own count; leave it out")
+            raise ValueError("count: not allowed with values; leave it out")
         return self
 
 
 class Sampling(Table):
-    """How the numbers are taken together."""
+    """How the varied numbers are sampled."""
 
     kind: Literal["grid", "sobol", "latin", "random", "saltelli"] = "grid"
-    count: Count | None = Field(default=None, description="of all samples; of a grid see [[vary]]")
+    count: Count | None = Field(
+        default=None, description="number of samples; of a grid see [[vary]]"
+    )
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
 
     @model_validator(mode="after")
     def _counted(self) -> Self:
         if self.kind == "grid" and self.count is not None:
-            raise ValueError('count: a grid has one in each [[vary]]; or choose kind = "sobol"')
+            raise ValueError('count: a grid has its counts in [[vary]]; or choose kind = "sobol"')
         if self.kind != "grid" and self.count is None:
-            raise ValueError(f"count is missing, and kind {self.kind} needs it")
+            raise ValueError(f"count is required for kind {self.kind}")
         return self
 
 
 class Measure(Table):
-    """One number, or one for each entry that is left, from a variable of the solution."""
+    """A variable of the solution, reduced to one number, or to one for each remaining entry."""
 
     of: str = Field(description='a variable of the solution, or "effort"')
     take: Literal["min", "max", "min_abs", "max_abs", "mean", "rms", "span"]
@@ -154,7 +157,7 @@ DEFAULT_MEASURES = {
 
 
 class Study(Table):
-    """Many variants of one mechanism along one or several motions, and what is measured."""
+    """Many variants of one mechanism along one or several motions, and the measures."""
 
     mechanism: str | None = Field(
         default=None, description="a file, or a bundled mechanism; default: masticatory"
@@ -180,11 +183,11 @@ class Study(Table):
         object.__setattr__(self, "measure", FrozenTable(self.measure))
         if self.sampling.kind == "grid":
             if bare := [v.what for v in self.vary if v.values is None and v.count is None]:
-                raise ValueError(f"vary {bare[0]}: count is missing, and a grid needs it")
+                raise ValueError(f"vary {bare[0]}: count is required for a grid")
         elif counted := [one.what for one in self.vary if one.count is not None]:
             raise ValueError(
-                f"vary {counted[0]}: count is for a grid; [sampling] has the count of "
-                f"kind {self.sampling.kind}"
+                f"vary {counted[0]}: count is for a grid only; kind {self.sampling.kind} has its "
+                "count in [sampling]"
             )
         return self
 
@@ -206,14 +209,14 @@ class Study(Table):
         return "study"
 
     def data(self) -> dict[str, Any]:
-        """The study as JSON has it, what is left out at its default."""
+        """The study as JSON, without defaults."""
         return json.loads(self.model_dump_json(exclude_defaults=True))
 
 
-def read_study(source: str | Path | Mapping[str, Any] | Study) -> Study:
+def read_study(source: str | os.PathLike[str] | Mapping[str, Any] | Study) -> Study:
     """A study from a TOML file, or from its tables.
 
-    Files that it names are looked for beside it.
+    Relative paths in a file start from its folder.
 
     Raises: InputError: with what is wrong, in one line.
     """
@@ -221,6 +224,8 @@ def read_study(source: str | Path | Mapping[str, Any] | Study) -> Study:
         return source
     if isinstance(source, Mapping):
         return Study.checked(source, "study")
+    if not isinstance(source, str | os.PathLike):
+        raise InputError(f"study: expected a study, a file or tables, got {type(source).__name__}")
     text = _text(Path(source))
     study = Study.checked(read_tables(text, str(source)), str(source))
     folder = Path(source).parent
@@ -242,7 +247,7 @@ def _text(path: Path) -> str:
     if not path.is_file():
         near = sorted(p.name for p in path.parent.glob("*.toml")) if path.parent.is_dir() else []
         there = f" There are {', '.join(near[:5])}." if near else ""
-        raise InputError(f"study {path} is no file.{there}")
+        raise InputError(f"study {path}: no such file.{there}")
     return read_text(path)
 
 

@@ -1,4 +1,4 @@
-"""The folder of a study: one Parquet dataset in parts, each whole or absent, and what was asked."""
+"""The folder of a sweep: one Parquet dataset in parts, each whole or absent, and its study."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import xarray as xr
 
-from ...atomic import replacing, write_text
+from ...atomic import make_folder, replacing, write_text
 from ...errors import InputError
 from ...mechanism.toml import read_tables
 from ...mechanism.writing import record
@@ -28,38 +28,39 @@ _MANY = 5  # differences that a message shows
 
 
 class Store:
-    """Where the rows of a job are, and which of its parts are there."""
+    """The rows of a job on disk, and which of its parts are written."""
 
     def __init__(self, job: Job, folder: str | os.PathLike[str], resume: bool) -> None:
-        """Make the folder, or go on in it.
+        """Make the folder, or continue in it.
 
         Raises: InputError: if it holds another study, or this one and `resume` was not asked for.
         """
+        if not isinstance(folder, str | os.PathLike):
+            raise InputError(f"out: expected a folder, got {type(folder).__name__}")
         self.folder, self._job = Path(folder), job
         asked = described(job)
         kept = _kept(self.folder)
         if kept is not None:
             if differences := list(_differences(kept, asked)):
                 raise InputError(
-                    f"{folder} holds another study: {some_of(differences, _MANY)}. Go on with the "
-                    "old one, or take another folder"
+                    f"{folder} holds another study: {some_of(differences, _MANY)}. Continue the "
+                    "old one, or choose another folder"
                 )
             if not resume:
                 raise InputError(
-                    f"{folder} holds this study already: go on with --resume (in Python "
-                    "resume=True), or take another folder"
+                    f"{folder} holds this study already: continue with --resume (in Python "
+                    "resume=True), or choose another folder"
                 )
             return
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"{folder} cannot be made a folder ({error.strerror})") from error
+        make_folder(folder)
         if any(self.folder.glob("part-*.parquet")):
-            raise InputError(f"{folder} holds parts of a study without its {STUDY}; take another")
+            raise InputError(
+                f"{folder} holds parts of a study, but {STUDY} is missing; choose another folder"
+            )
         write_text(self.folder / STUDY, json.dumps(asked, indent=1))
 
     def missing(self) -> list[int]:
-        """Parts that are not there yet."""
+        """Parts that are not written yet."""
         there = {path.name for path in self.folder.glob("part-*.parquet")}
         return [p for p in range(self._job.parts) if PART.format(p) not in there]
 
@@ -90,19 +91,23 @@ def _table(job: Job, rows: Sequence[Row]) -> pa.Table:
     return pa.table({**columns, SECONDS: pa.array(seconds, pa.float64())})
 
 
-def read(folder: str | os.PathLike[str]) -> xr.Dataset:
-    """The rows that a folder holds, in the order of the study, along `row`.
+def open_sweep(folder: str | os.PathLike[str]) -> xr.Dataset:
+    """The rows of a sweep from its folder, in the order of the study, along `row`.
 
     Attributes: study (JSON), rows (of the whole study), parameters, measures.
 
     Raises: InputError: for a folder that holds no study, or no row of it yet.
     """
+    if not isinstance(folder, str | os.PathLike):
+        raise InputError(f"folder: expected the folder of a sweep, got {type(folder).__name__}")
     kept = _kept(Path(folder))
     if kept is None:
-        raise InputError(f"{folder} holds no study: there is no {STUDY}")
+        raise InputError(f"{folder} is not the folder of a sweep: {STUDY} is missing")
     parts = sorted(Path(folder).glob("part-*.parquet"))
     if not parts:
-        raise InputError(f"{folder} has no rows yet; go on with --resume")
+        raise InputError(
+            f"{folder} has no rows yet; continue with --resume (in Python resume=True)"
+        )
     try:
         table = pa.concat_tables(pq.read_table(path) for path in parts)
     except (OSError, pa.ArrowException) as error:
@@ -118,7 +123,7 @@ def read(folder: str | os.PathLike[str]) -> xr.Dataset:
 
 
 def described(job: Job) -> dict[str, Any]:
-    """All that the rows follow from, as JSON has it."""
+    """Everything that determines the rows, as JSON."""
     units = {name: one.units for one in job.readings for name in one.names}
     measures = zip(job.study.measure.values(), job.readings, strict=True)
     better = {n: m.better for m, one in measures for n in one.names if m.better is not None}
@@ -163,7 +168,7 @@ def _differences(kept: Mapping[str, Any], asked: Mapping[str, Any]) -> Iterator[
         if path.startswith(("motions", "load")):
             yield f"the samples of {path} differ"
         else:
-            was, now = (json.dumps(d[path]) if path in d else "not there" for d in (old, new))
+            was, now = (json.dumps(d[path]) if path in d else "absent" for d in (old, new))
             yield f"{path} was {was}, is {now}"
 
 

@@ -1,4 +1,4 @@
-"""A whole study: checked, done in parts by whoever there is, and read back in its order."""
+"""A sweep: a study is checked, solved in parts by any scheduler, and read back in its order."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ...progress import step
 from ..workers import PROCESSES, check_scheduler, run_parts
 from .job import prepared
 from .study import Study, read_study
-from .study_folder import Store, read
+from .study_folder import Store, open_sweep
 from .variants import solve_part
 
 
@@ -28,32 +28,31 @@ def sweep(
     workers: int | None = None,
     scheduler: str = PROCESSES,
     resume: bool = False,
-    mechanism: Mechanism | None = None,
+    mechanism: Mechanism | str | os.PathLike[str] | None = None,
     motion: Motion | None = None,
     load: Load | None = None,
 ) -> xr.Dataset:
-    """Solve every variant of a study; a row each, along `row`, in the order of the study.
+    """Solve every variant of a study; one row each, along `row`, in the order of the study.
 
-    Columns: variant, motion (where there are several), the parameters by their paths, the measures,
+    Columns: variant, motion (if there are several), the parameters by their paths, the measures,
     status, reason, seconds. A variant that is refused or cannot be computed has a reason, and NaN
     for its measures.
 
     Args:   study: as tables, the path of a TOML file, or a mapping of its keys.
-            out: folder for the Parquet dataset; None: it is not kept.
-            workers: processes; default: the processors at hand. Results do not depend on it.
+            out: folder for the Parquet dataset; None: none is kept.
+            workers: number of processes; default: all processors. Results do not depend on it.
             scheduler: processes, threads, dask (a cluster on this machine), or the address of a
             Dask scheduler.
-            resume: go on with what `out` holds of this very study.
-            mechanism, motion, load: in the place of those that the study names.
-    Raises: InputError: for a study that cannot be done, before any work.
-            LostWorkerError: if a worker was killed; what was done is kept.
+            resume: continue what `out` holds of this study.
+            mechanism, motion, load: instead of those that the study names.
+    Raises: InputError: for a study that cannot be solved, before the computation starts.
+            LostWorkerError: if a worker was killed; finished parts are kept.
     """
     check_scheduler(workers, scheduler)
-    asked = study if isinstance(study, Study | Mapping) else Path(study)
     motions = None if motion is None else (as_motion(motion),)
     acting = None if load is None else as_load(load)
     with step("checking the study"):
-        job = prepared(read_study(asked), mechanism, motions, acting)
+        job = prepared(read_study(study), mechanism, motions, acting)
     with ExitStack() as stack:
         if out is None:
             out = Path(stack.enter_context(TemporaryDirectory())) / "sweep"
@@ -64,4 +63,4 @@ def sweep(
             for part, rows in run_parts(job, solve_part, missing, workers, scheduler):
                 store.write(part, rows)
                 advance(len(rows))
-        return read(out)
+        return open_sweep(out)

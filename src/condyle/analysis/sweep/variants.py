@@ -147,7 +147,7 @@ _last: tuple[Any, Solver] | None = None
 
 
 def _solver(job: Job) -> Solver:
-    """The one of the last call, if that was for the same job: its kernels are at hand."""
+    """The solver of the last call if it was for the same job: its kernels are loaded."""
     global _last
     if _last is None or _last[0] is not job:
         _last = job, Solver(job)
