@@ -36,6 +36,7 @@ _HOMES = {
     "reference_load": "motion",
     "reference_motion": "motion",
     "trial_motion": "motion",
+    "write_reference": "motion",
     "open_solution": "results.solution",
     "forward_states": "results.forward_rows",
     "pose_states": "results.pose_rows",
@@ -49,6 +50,11 @@ _HOMES = {
     "workspace_size": "analysis.map",
     "open_map": "analysis.map",
     "run": "analysis.run_motion",
+    "schema": "analysis.schema",
+    "check": "report.mechanism_summary",
+    "write_report": "report.page",
+    "serve_view": "view",
+    "new_mechanism": "export.new_mechanism",
     "Study": "analysis.sweep",
     "sweep": "analysis.sweep",
     "open_sweep": "analysis.sweep",
@@ -61,6 +67,7 @@ _HOMES = {
 if TYPE_CHECKING:
     from .analysis.map import open_map, workspace_map, workspace_size
     from .analysis.run_motion import run
+    from .analysis.schema import schema
     from .analysis.sweep import Study, open_sweep, sweep
     from .errors import (
         CondyleError,
@@ -77,15 +84,26 @@ if TYPE_CHECKING:
     from .export.fmu import export_fmu
     from .export.matlab import export_matlab
     from .export.mjcf import export_mjcf
+    from .export.new_mechanism import new_mechanism
     from .markers import motion_from_c3d
     from .mechanism import Mechanism, bundled_mechanisms, dump, dumps, load_mechanism
     from .model.model import Model, derive
-    from .motion import Load, Motion, reference_load, reference_motion, trial_motion
+    from .motion import (
+        Load,
+        Motion,
+        reference_load,
+        reference_motion,
+        trial_motion,
+        write_reference,
+    )
+    from .report.mechanism_summary import check
+    from .report.page import write_report
     from .results.forward_rows import forward_states
     from .results.inverse_rows import solve_states
     from .results.pose_rows import pose_states
     from .results.solution import open_solution
     from .simulation import Scenario, load_scenario, simulate, simulate_all
+    from .view import serve_view
 
 # What later rooms give to models, solutions, comparisons and exports, which do not know them.
 register("model.solve", "condyle.results.solving:solve")

@@ -17,7 +17,7 @@ from condyle.mechanism.actuator import Limits
 from condyle.mechanism.chain import limits
 from condyle.mechanism.files import from_data, json_schema
 from condyle.mechanism.mechanism_checks import mechanism_warnings
-from condyle.report.description import describe
+from condyle.report.mechanism_summary import check
 
 INF, NAN = math.inf, math.nan
 MOTOR = "chain.masseter_left.actuator"
@@ -123,7 +123,7 @@ def test_speeds_are_si_in_a_file_in_millimetres(raw: dict[str, Any]) -> None:
 
 
 def test_check_tells_what_there_is(reference: Mechanism) -> None:
-    described = describe(everything(reference))
+    described = check(everything(reference))
     text = str(described)
     assert "limits -1 to 2.5 N m, 6 rad/s, rotor 9.2e-07 kg m^2 with gear 14" in text
     assert "viscous 0.004 N m s/rad, Coulomb 0.03 N m, fading below 0.01 rad/s" in text

@@ -177,7 +177,7 @@ def test_a_busy_port_is_said(
     monkeypatch.setattr(sys.modules[View.__module__], "time", clock)
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        sys.modules[View.__module__].serve("masticatory", port=port)
+        sys.modules[View.__module__].serve_view("masticatory", port=port)
         told = capsys.readouterr().out
         assert f"port {port} is in use; took " in told
         took = int(told.split("took ")[1].split()[0])

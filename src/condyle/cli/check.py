@@ -20,16 +20,12 @@ def check(mechanism: options.Mechanism, project: bool = False) -> Answer:
     """
     import condyle
 
-    from ..mechanism.home import home_warnings
-    from ..report.description import describe
-
     if project and (nearest := _projection(mechanism)) is not None:
         return nearest
-    machine = condyle.load_mechanism(mechanism)
-    description = describe(machine)
-    warn([*home_warnings(machine), *(one["message"] for one in description.data["warnings"])])
+    summary = condyle.check(mechanism)
+    warn(summary.warnings)
     then = command_line("run", mechanism)
-    return Answer(f"{description}\n", description.data, then, "result")
+    return Answer(f"{summary}\n", summary.data, then, "result")
 
 
 def _projection(mechanism: str) -> Answer | None:

@@ -20,9 +20,9 @@ def reference(
     Options:
         out: Folder for the files.
     """
-    from ..motion import write_reference
+    import condyle
 
-    motion, load = write_reference(output_folder(out))
+    motion, load = condyle.write_reference(output_folder(out))
     return Answer(
         f"Wrote {motion}\nWrote {load}",
         {"files": [motion, load]},

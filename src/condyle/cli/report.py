@@ -31,7 +31,7 @@ def report(
         sweep: Folder of a sweep, to be shown too.
     """
     require("plotly", "report")
-    from ..report.page import write_report
+    import condyle
 
     beside = solution.parent / f"{solution.stem}.html"
     found = None
@@ -41,7 +41,9 @@ def report(
 
         found = open_sweep(sweep)
     inputs = [solution, *([measured] if measured else []), *(file or ())]
-    path = write_report(solution, out or beside, files=inputs, measured=measured, sweep=found)
+    path = condyle.write_report(
+        solution, out or beside, files=inputs, measured=measured, sweep=found
+    )
     size = path.stat().st_size
     return Answer(
         f"Wrote {path} ({size / 1e6:.1f} MB); open it in a browser",

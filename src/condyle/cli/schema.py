@@ -1,39 +1,32 @@
-"""condyle schema: the file format for editors."""
+"""condyle schema: the file formats for editors."""
 
 from __future__ import annotations
 
 import json
-from enum import StrEnum
 from typing import Annotated
 
 import typer
 
 from .answer import Answer
 from .command import UPKEEP, command
-
-
-class Format(StrEnum):
-    """Files that have a schema."""
-
-    mechanism = "mechanism"
-    scenario = "scenario"
-    study = "study"
+from .completion import one_of
 
 
 @command(UPKEEP, example="condyle schema > condyle.schema.json")
 def schema(
-    of: Annotated[Format, typer.Argument(help="Kind of file.")] = (Format.mechanism),
+    of: Annotated[
+        str,
+        typer.Argument(
+            help="Kind of file: mechanism, scenario or study.",
+            autocompletion=one_of("mechanism", "scenario", "study"),
+        ),
+    ] = "mechanism",
 ) -> Answer:
     """JSON schema of mechanism, scenario or study files, for editors.
 
     An editor that has it completes keys and marks mistakes while you type.
     """
-    if of is Format.study:
-        from ..analysis.sweep import json_schema
-    elif of is Format.scenario:
-        from ..simulation import scenario_schema as json_schema
-    else:
-        from ..mechanism import json_schema
+    import condyle
 
-    data = json_schema()
+    data = condyle.schema(of)
     return Answer(json.dumps(data, indent=2), data, "condyle check masticatory", "document")

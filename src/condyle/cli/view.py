@@ -46,11 +46,13 @@ def view(
     reach, play back a run, or simulate live. It runs until Ctrl-C.
     """
     require("viser", "view")
-    from ..view import serve
+    import condyle
 
     own = mechanism if solution is None and map is None else None
     with strictly(strict):
-        serve(own, solution, port=port, open_browser=browser, map=map, scenario=simulate)
+        condyle.serve_view(
+            own, solution, port=port, open_browser=browser, map=map, scenario=simulate
+        )
     if quiet:
         return
     if simulate is not None:

@@ -17,12 +17,12 @@ from importlib.resources import files
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from .. import __version__
 from ..atomic import replacing
 from ..backends.compiler import CompilerError, find_compiler
 from ..errors import InputError, texts_of
 from ..mechanism import Mechanism
 from ..model.model import Model
+from ..version import __version__
 from .c_names import in_comment
 from .catalogue import least_norm
 from .fmu_model import Fmu, Scalar, fmu_model

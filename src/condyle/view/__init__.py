@@ -1,11 +1,11 @@
 """A mechanism that people can move: a page on this machine, drawn by viser.
 
-condyle.view.serve("masticatory")
+condyle.serve_view("masticatory")
 """
 
 from .playback import Playback
-from .serve import View, open_view, serve
+from .serve import View, open_view, serve_view
 from .session import Session
 from .snapshot import Snapshot
 
-__all__ = ["Playback", "Session", "Snapshot", "View", "open_view", "serve"]
+__all__ = ["Playback", "Session", "Snapshot", "View", "open_view", "serve_view"]

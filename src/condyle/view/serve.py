@@ -220,7 +220,7 @@ def open_view(
     map: xr.Dataset | str | Path | None = None,
     scenario: Scenario | Mapping[str, Any] | str | Path | None = None,
 ) -> View:
-    """Start the page and return at once; see `serve`."""
+    """Start the page and return at once; see `serve_view`."""
     if scenario is not None and (solution is not None or map is not None):
         raise InputError("a page that simulates a scenario shows no solution and no map beside it")
     if isinstance(map, str | Path):
@@ -255,7 +255,7 @@ def planned(mechanism: Mechanism, scenario: Any) -> Plan:
     return bind(derive(mechanism), as_scenario(scenario), source=source)
 
 
-def serve(
+def serve_view(
     mechanism: Mechanism | str | Path | None = None,
     solution: xr.Dataset | str | Path | None = None,
     host: str = "127.0.0.1",

@@ -88,8 +88,8 @@ def test_extension_pushes() -> None:
     [("gough-stewart", "m", "N"), ("hexaglide", "m", "N"), ("masticatory", "rad", "N m")],
 )
 def test_units_in_the_check(name: str, joint: str, effort: str) -> None:
-    from condyle.report.description import describe
+    from condyle.report.mechanism_summary import check
 
-    text = str(describe(condyle.load_mechanism(name)))
+    text = str(check(condyle.load_mechanism(name)))
     assert f"joint [{joint}], effort [{effort}]" in text
     assert ("6 chains, 1 contact, 5 degrees" in text) == (name == "hexaglide")

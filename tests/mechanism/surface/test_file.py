@@ -13,7 +13,7 @@ import condyle
 from condyle.errors import MechanismError
 from condyle.mechanism import Mechanism, dumps, json_schema, parse
 from condyle.mechanism.home import home_residuals
-from condyle.report.description import describe
+from condyle.report.mechanism_summary import check
 
 HOME = np.array([-26.65, 72, 42.53])
 
@@ -128,7 +128,7 @@ def test_schema_knows_the_kinds() -> None:
 def test_check_says_what_a_contact_is(raw: dict[str, Any]) -> None:
     wall = table("sphere") | {"centre": [-26.65, 72, 12.53], "radius": 26.0}
     options = ball_options("sphere", first=False)
-    description = describe(parse(spoiled(raw, wall, **options, one_sided=True)))
+    description = check(parse(spoiled(raw, wall, **options, one_sided=True)))
     assert "sphere, outside, ball of radius 4 mm, one-sided," in str(description)
     found = description.data["contacts"]["left_condyle"]
     assert (found["kind"], found["side"], found["ball_radius"]) == ("sphere", "outside", 0.004)

@@ -11,19 +11,26 @@ import numpy as np
 from ..analysis.map.free_space import ball_around_home
 from ..kinematics.chain import FAMILIES
 from ..kinematics.singularities import KINDS
+from ..mechanism import as_mechanism
 from ..mechanism.actuator import Limits
 from ..mechanism.chain import limits
-from ..mechanism.home import HOME_WARNING, home_residuals
-from ..mechanism.mechanism import Contact, Mechanism
+from ..mechanism.home import HOME_WARNING, home_residuals, home_warnings
+from ..mechanism.mechanism import Contact
 from ..mechanism.mechanism_checks import extent, length_text, mechanism_warnings
 from ..model.model import Model
 
 
 @dataclass(frozen=True)
-class Description:
+class MechanismSummary:
     """A mechanism at home; `data` for programs, `str` for people."""
 
     data: dict[str, Any]
+    home_warnings: tuple[str, ...]
+
+    @property
+    def warnings(self) -> list[str]:
+        """What looks wrong about it."""
+        return [*self.home_warnings, *(one["message"] for one in self.data["warnings"])]
 
     def __str__(self) -> str:
         d = self.data
@@ -154,8 +161,13 @@ def _count(items: Sized, word: str) -> str:
     return f"{len(items)} {word}" + "s" * (len(items) != 1)
 
 
-def describe(mechanism: Mechanism) -> Description:
-    """Describe a mechanism at home."""
+def check(mechanism: Any) -> MechanismSummary:
+    """The summary of a mechanism at home, with warnings of implausible numbers.
+
+    Args:   mechanism: one, a model, the path of a file, or the name of a bundled one.
+    Raises: MechanismError: with every mistake in its file.
+    """
+    mechanism = as_mechanism(mechanism)
     model = Model(mechanism, backend="numpy")  # one pose: building a kernel takes longer
     s = model.configuration(np.zeros((1, 6))).singularity
     room = ball_around_home(model)
@@ -167,7 +179,7 @@ def describe(mechanism: Mechanism) -> Description:
     }
     rods = sum(mass for chain in chains.values() for mass in chain["masses"].values())
     pairs = zip(mechanism.contacts, home_residuals(mechanism), strict=True)
-    return Description(
+    return MechanismSummary(
         {
             "name": mechanism.name,
             "degrees_of_freedom": m,
@@ -201,7 +213,8 @@ def describe(mechanism: Mechanism) -> Description:
                 {"kind": found.kind, "message": found.message, **found.data}
                 for found in mechanism_warnings(mechanism)
             ],
-        }
+        },
+        tuple(home_warnings(mechanism)),
     )
 
 

@@ -1,0 +1,63 @@
+"""A mechanism file to start from."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..atomic import write_text
+from ..errors import InputError, WarningError, shortened
+from ..mechanism import dumps, parse
+from ..mechanism.library import starter_text
+from ..mechanism.quantities import NAME_CHARACTERS
+
+
+@dataclass(frozen=True)
+class NewMechanism:
+    """A mechanism file that was written, and what a converted model lost."""
+
+    path: Path
+    warnings: tuple[str, ...] = ()
+
+
+def new_mechanism(
+    name: str,
+    *,
+    from_mjcf: str | os.PathLike[str] | None = None,
+    force: bool = False,
+    strict: bool = False,
+) -> NewMechanism:
+    """Write a small mechanism that works, with a comment on every number.
+
+    Args:   name: of the mechanism; the file is NAME.toml.
+            from_mjcf: a MuJoCo model to convert instead.
+            force: replace an existing file;  strict: a warning is an error.
+    Raises: InputError: for a name that cannot be one, or a file that exists.
+    """
+    path = Path(name if name.endswith(".toml") else f"{name}.toml")
+    stem = path.name.removesuffix(".toml")
+    text, warnings = starter_text(stem), tuple[str, ...]()
+    try:
+        if stem.startswith("."):
+            raise InputError("a hidden file")
+        parse(text)
+    except InputError:
+        raise InputError(
+            f'"{shortened(stem, 80)}" cannot be the name of a mechanism; use at most '
+            f"{NAME_CHARACTERS} letters, digits, - and _"
+        ) from None
+    if path.exists() and not force:
+        raise InputError(f"{path} exists already; choose another name or add --force (force=True)")
+    if from_mjcf is not None:
+        from .mjcf_import import from_mjcf as imported
+
+        found = imported(Path(from_mjcf), stem)
+        warnings = tuple(found.notes)
+        source = f"From the MuJoCo model {Path(from_mjcf).name}. "
+        head = [f"{source}{{S}} is at the platform's mass centre at home.", *warnings]
+        text = "\n".join([*(f"# {line}" for line in head), "", dumps(found.mechanism)])
+    if strict and warnings:
+        raise WarningError(warnings)
+    write_text(path, text)
+    return NewMechanism(path, warnings)
