@@ -76,7 +76,6 @@ def draw_studies(folder: Path) -> None:
     from condyle.analysis.sweep import read_study, with_bands
     from condyle.motion import Motion, bundled_reference
     from condyle.report.figures import PLOTS
-    from condyle.report.figures.sweep_figures import SWEEP_PLOTS
 
     base = "chain.masseter_{}.base[2]"
     own = {"what": base.format("left"), "mirror": base.format("right"), "scale": [0.97, 1.03]}
@@ -90,8 +89,9 @@ def draw_studies(folder: Path) -> None:
         },
     }
     table = condyle.sweep(study, workers=1)
-    for name in ("sweep-scatter", "sweep-effects"):
-        SWEEP_PLOTS[name](table).savefig(folder / f"{name}.png", dpi=110)
+    plots = table.condyle.plot
+    plots.scatter().savefig(folder / "sweep-scatter.png", dpi=110)
+    plots.effects().savefig(folder / "sweep-effects.png", dpi=110)
     motion = Motion.from_csv(bundled_reference()[0], rate=20)
     load = condyle.reference_load()
     jaw = condyle.derive(condyle.load_mechanism("human-jaw"), distribution="weighted")
@@ -124,21 +124,17 @@ def reference_solution(rate: float, reactions: bool = False) -> Any:
 def draw_maps(folder: Path, solution: Any) -> None:
     """Write `MAPS`: the chewing robot under the reference run, and a platform's singular curves."""
     import condyle
-    from condyle.analysis.map.lines import slices_of
-    from condyle.report.figures.map_figures import map_figure
+    from condyle.report.figures.map_figures import map_plots
 
-    run = solution["pose"].sel(coordinate=["X", "beta"]).values
     jaw = ["X=-5:15:120 mm", "beta=-15:25:120 deg"]
     legs = ["X=-2500:2500:100 mm", "gamma=-140:140:100 deg"]
-    for picture, name, over, hold, stroke, path in (
-        ("map-ratio", "masticatory", jaw, "", "", run),
+    for picture, name, over, hold, stroke, run in (
+        ("map-ratio", "masticatory", jaw, "", "", solution),
         ("map-singular", "gough-stewart", legs, "alpha=10 deg", "*=-1500:1500 mm", None),
     ):
         model = condyle.derive(condyle.load_mechanism(name), backend="numpy")
         found = condyle.workspace_map(model, over, "ratio", hold, stroke=stroke or ())
-        map_figure(found, "ratio", list(slices_of(found, model)), path).savefig(
-            folder / f"{picture}.png", dpi=110
-        )
+        map_plots(found, model).ratio(run).savefig(folder / f"{picture}.png", dpi=110)
 
 
 def quantity_table() -> str:

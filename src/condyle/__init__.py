@@ -107,7 +107,12 @@ if TYPE_CHECKING:
 
 # What later rooms give to models, solutions, comparisons and exports, which do not know them.
 register("model.solve", "condyle.results.solving:solve")
-register("solution.plot", "condyle.report.figures:SolutionPlots")
+register("solution.plot", "condyle.report.figures:solution_plots")
+register("solution.table", "condyle.results.summary:summarize")
+register("map.plot", "condyle.report.figures.map_figures:map_plots")
+register("map.table", "condyle.report.map_text:map_table")
+register("sweep.plot", "condyle.report.figures.sweep_figures:sweep_plots")
+register("sweep.table", "condyle.report.tables.sweep_tables:sweep_text")
 register("comparison.text", "condyle.report.tables:comparison_text")
 register("mechanism.look", "condyle.report.scene.parts:Look")
 

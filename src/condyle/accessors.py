@@ -4,7 +4,7 @@
 tables. Each is declared as the place of a function, "module:name", in the package's `__init__`, and
 imported when it is used:
 
-register("solution.plot", "condyle.report.figures:SolutionPlots")
+register("solution.plot", "condyle.report.figures:solution_plots")
 """
 
 from __future__ import annotations

@@ -26,7 +26,6 @@ from condyle.mechanism.surface import Plane, Quadratic
 from condyle.report import figures, panel
 from condyle.report.figures import (
     PLOTS,
-    SolutionPlots,
     figure_5,
     figure_8,
     figure_9,
@@ -343,7 +342,7 @@ def test_pairs_share_a_panel_and_a_colour() -> None:
 
 
 def test_accessor_has_every_plot(solution: xr.Dataset) -> None:
-    plots = SolutionPlots(solution)
+    plots = solution.condyle.plot
     for name, draw in PLOTS.items():
         assert inspect.getdoc(getattr(plots, name)) == inspect.getdoc(draw)
     for name in ("bite", "load"):  # as the file calls it, and as people do

@@ -118,15 +118,10 @@ def map_(
 
 
 def _draw(found: xr.Dataset, model: Model, file: Path, solution: xr.Dataset | None) -> list[Path]:
-    from ..analysis.map.lines import slices_of
     from ..report.figures import save
-    from ..report.figures.map_figures import drawn, map_figure
+    from ..report.figures.map_figures import map_plots
 
-    slices, path = list(slices_of(found, model)), None
-    if solution is not None:
-        path = solution["pose"].sel(coordinate=list(found["status"].dims)).values
-    files = []
-    for name in drawn(found):
-        figure = map_figure(found, name, slices, path)
-        files += save(figure, file.parent, f"{file.stem}-{'reach' if name == 'cause' else name}")
+    plots, files = map_plots(found, model), []
+    for name in plots:
+        files += save(getattr(plots, name)(solution), file.parent, f"{file.stem}-{name}")
     return files

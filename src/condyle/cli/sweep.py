@@ -75,8 +75,8 @@ def _shown(table: xr.Dataset, folder: Path, figures: bool) -> Answer:
         from ..report.figures import save
         from ..report.figures.sweep_figures import sweep_plots
 
-        for name, draw in sweep_plots(table).items():
-            files += save(draw(table), folder, name)
+        for name in (plots := sweep_plots(table)):
+            files += save(getattr(plots, name)(), folder, f"sweep-{name}")
     data: dict[str, Any] = {
         "rows": table.sizes["row"],
         "asked": int(table.attrs["rows"]),

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import pi
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from ..analysis.map.map_size import WorkspaceSize
 from ..mechanism.mechanism import COORDINATES
 from ..mechanism.mechanism_checks import length_text
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def size_text(size: WorkspaceSize) -> str:
@@ -36,6 +42,20 @@ def _lines(n: WorkspaceSize) -> Iterator[str]:
     pairs = zip(n.axes, n.box.low, n.box.high, strict=True)
     sides = ", ".join(f"{name} {_ends(name, low, high)}" for name, low, high in pairs)
     yield f"box:        {sides}; certified at points {_sides(n, n.box.spacing)} apart"
+
+
+def map_table(dataset: xr.Dataset) -> str:
+    """Which part of a map is reachable, and the range of each quantity there."""
+    good = dataset["cause"].values == 0
+    lines = [f"reachable: {good.mean():.4%} of {good.size} poses"]
+    names = [str(name) for name in dataset.data_vars if dataset[name].dtype.kind == "f"]
+    for name in names:
+        values = dataset[name].values[good]
+        values = values[np.isfinite(values)]
+        ends = f"{values.min():.4g} to {values.max():.4g}" if values.size else "nowhere"
+        about = dataset[name].attrs
+        lines.append(f"{name}: {ends} [{about['units']}], {about['long_name']}")
+    return "\n".join(lines)
 
 
 def _sides(n: WorkspaceSize, values: tuple[float, ...]) -> str:

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+from base64 import b64encode
+from collections.abc import Callable
 from contextlib import ExitStack
+from html import escape
 from io import BytesIO
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +19,7 @@ import xarray as xr
 
 from ..accessors import extend
 from ..atomic import replacing
-from ..errors import InputError, no_such_file
+from ..errors import InputError, UnsupportedError, no_such_file
 from ..extras import require
 from ..markers import MeasuredChannels
 from ..mechanism.files import recall
@@ -40,6 +44,8 @@ __all__ = [
     "open_solution",
 ]
 
+# An attribute that only maps or only sweeps have; the others are solutions.
+KINDS = {"held": "map", "study": "sweep"}
 # Variables of older files.
 RENAMED = {
     "torque": "effort", "torque_quantile": "effort_quantile", "lift_off": "contact_loss"
@@ -51,31 +57,43 @@ class Results:
 
     A solution is inverse dynamics along a motion, or a simulation. Its dimensions are time, chain,
     contact, coordinate, part and axis; its variables and their units are in the documentation's
-    table of results, and each has the attributes `units` and `long_name`.
+    table of results, and each has the attributes `units` and `long_name`. Maps and sweeps have
+    `save`, `columns` and `plot` too.
+
+    As the last line of a notebook's cell, `dataset.condyle` is a picture and a table.
     """
 
     def __init__(self, dataset: xr.Dataset) -> None:
         self._dataset = dataset
 
     @property
+    def kind(self) -> str:
+        """solution, map or sweep."""
+        marks = self._dataset.attrs
+        return next((kind for mark, kind in KINDS.items() if mark in marks), "solution")
+
+    @property
     def mechanism(self) -> Mechanism:
         """The mechanism that was solved.
 
         In the place of a surface written in Python is an `Unknown` one, which has no equation.
+
+        Raises: InputError: if the dataset does not say.
         """
-        return recall(self._dataset.attrs["mechanism"], self._dataset.attrs["mechanism_name"])
+        text = self._said("mechanism")
+        return recall(text, str(self._dataset.attrs.get("mechanism_name", "mechanism")))
 
     @property
     def warnings(self) -> list[str]:
         """What the run had to say, for people."""
-        return json.loads(self._dataset.attrs["warnings"])
+        return json.loads(self._said("warnings", "[]"))
 
     @property
     def notices(self) -> list[Notice]:
         """The same as data: kind, whose, when, how much, and the bound."""
         if "notices" not in self._dataset.attrs:  # written before warnings were data
             return [Notice("other", text) for text in self.warnings]
-        return [Notice(**facts) for facts in json.loads(self._dataset.attrs["notices"])]
+        return [Notice(**facts) for facts in json.loads(self._said("notices"))]
 
     @property
     def failures(self) -> list[Failure]:
@@ -85,18 +103,18 @@ class Results:
     @property
     def options(self) -> dict[str, Any]:
         """How the solution was made: formulation, route, sources, seconds."""
-        return json.loads(self._dataset.attrs["options"])
+        return json.loads(self._said("options", "{}"))
 
     @property
     def events(self) -> list[dict[str, Any]]:
         """What happened in a simulation: time, kind, owner, text, state, ends; else nothing."""
-        return json.loads(self._dataset.attrs.get("events", "[]"))
+        return json.loads(self._said("events", "[]"))
 
     @property
     def plot(self) -> Any:
-        """Figures, by name: `solution.condyle.plot.effort()`."""
+        """Figures, by name: `solution.condyle.plot.effort()`, `map.condyle.plot.ratio()`."""
         require("matplotlib", "figures")
-        return extend("solution.plot", self._dataset)
+        return extend(f"{self.kind}.plot", self._dataset)
 
     def with_measured(self, measured: MeasuredChannels | str | os.PathLike[str]) -> xr.Dataset:
         """The solution with what was measured beside the motion, for report, figures and view.
@@ -113,49 +131,79 @@ class Results:
         with step("writing results"), ExitStack() as stack:
             for path in paths:
                 suffix = Path(path).suffix.lower()
-                if suffix not in (".nc", ".csv", ".parquet", ".mat"):
+                if suffix not in WRITERS:
                     raise InputError(
                         f"{path}: expected a name that ends in .nc, .csv, .parquet or .mat, got "
                         f'"{suffix}"'
                     )
-                temporary = stack.enter_context(replacing(path))
-                if suffix == ".nc":
-                    write_netcdf(self._dataset, temporary)
-                elif suffix == ".mat":
-                    write_mat(temporary, dataset_variables(self._dataset))
-                else:
-                    write_table(temporary, self.columns(), parquet=suffix == ".parquet")
+                WRITERS[suffix](self._dataset, stack.enter_context(replacing(path)))
 
     def columns(self) -> dict[str, np.ndarray | list[str]]:
-        """Columns of the CSV: t, and those of `VARIABLES`.
+        """Columns of the CSV: of a solution t and those of `VARIABLES`.
 
         Then reactions, if there are any, contact_loss_<contact> (0 or 1) of unilateral contacts,
-        and, if a sample failed, status, cause and, with efforts within limits, shortfall.
+        and, if a sample failed, status, cause and, with efforts within limits, shortfall. Maps and
+        sweeps have a row for each pose or variant.
         """
-        d = self._dataset
-        columns: dict[str, np.ndarray | list[str]] = {"t": d["time"].values}
-        labels = {str(name): along.values for name, along in d.coords.items()}
-        for variable in VARIABLES:
-            if variable.column is not None and variable.name in d:
-                columns |= variable_columns(variable, d[variable.name].values, labels)
-        for name in map(str, d.data_vars):
-            if name.startswith("reaction_") or name == "contact_force_vector":
-                entries, values = d[d[name].dims[1]].values, d[name].values
-                prefix = "reaction_contact" if name == "contact_force_vector" else name
-                for i, axis in enumerate(AXES):
-                    along = named_columns(f"{prefix}_", entries, values[:, :, i])
-                    columns |= {f"{column}_{axis}": one for column, one in along.items()}
-        columns |= contact_loss_columns(self.mechanism, d["contact_loss"].values)
-        if (status := d["status"].values).any():
-            cause = d["cause"].values if "cause" in d else np.zeros_like(status)
-            shortfall = d["shortfall"].values if "shortfall" in d else None
-            columns |= status_columns(self.mechanism, status, cause, shortfall)
-        return columns
+        return (solution_columns if self.kind == "solution" else row_columns)(self._dataset)
+
+    def __repr__(self) -> str:
+        return str(extend(f"{self.kind}.table", self._dataset))
+
+    def _repr_html_(self) -> str:
+        """A picture, where there is matplotlib, and the table."""
+        try:
+            image = b64encode(self.plot._repr_png_()).decode("ascii")
+        except UnsupportedError:
+            return f"<pre>{escape(repr(self))}</pre>"
+        return f'<img src="data:image/png;base64,{image}"><pre>{escape(repr(self))}</pre>'
+
+    def _said(self, name: str, missing: str | None = None) -> str:
+        found = self._dataset.attrs.get(name, missing)
+        if found is None:
+            raise InputError(f'this dataset has no "{name}": is it a result of condyle?')
+        return found
 
 
 # xarray's own decorator keeps the accessor in the dataset, a circle of references that would hold
 # the arrays of every dataset until Python collects garbage.
 xr.Dataset.condyle = property(Results)  # type: ignore[attr-defined]
+
+
+def solution_columns(d: xr.Dataset) -> dict[str, np.ndarray | list[str]]:
+    """Columns of a solution, as `Results.columns` says."""
+    columns: dict[str, np.ndarray | list[str]] = {"t": d["time"].values}
+    labels = {str(name): along.values for name, along in d.coords.items()}
+    for variable in VARIABLES:
+        if variable.column is not None and variable.name in d:
+            columns |= variable_columns(variable, d[variable.name].values, labels)
+    for name in map(str, d.data_vars):
+        if name.startswith("reaction_") or name == "contact_force_vector":
+            entries, values = d[d[name].dims[1]].values, d[name].values
+            prefix = "reaction_contact" if name == "contact_force_vector" else name
+            for i, axis in enumerate(AXES):
+                along = named_columns(f"{prefix}_", entries, values[:, :, i])
+                columns |= {f"{column}_{axis}": one for column, one in along.items()}
+    mechanism = d.condyle.mechanism
+    columns |= contact_loss_columns(mechanism, d["contact_loss"].values)
+    if (status := d["status"].values).any():
+        cause = d["cause"].values if "cause" in d else np.zeros_like(status)
+        shortfall = d["shortfall"].values if "shortfall" in d else None
+        columns |= status_columns(mechanism, status, cause, shortfall)
+    return columns
+
+
+def row_columns(d: xr.Dataset) -> dict[str, np.ndarray | list[str]]:
+    """A row for each entry of `status`: where it is, then the variables, one column an entry."""
+    dims, rows = d["status"].dims, d["status"].size
+    axes = [str(dim) for dim in dims if dim in d.coords]
+    grid = np.meshgrid(*(d[axis].values for axis in axes), indexing="ij")
+    columns = {axis: a.ravel() for axis, a in zip(axes, grid, strict=True)}
+    for name, variable in d.data_vars.items():
+        own = [d[dim].values for dim in variable.dims[len(dims) :]]
+        names = ["_".join(map(str, [name, *entry])) for entry in product(*own)]
+        columns |= dict(zip(names, variable.values.reshape(rows, -1).T, strict=True))
+    return {**columns}
 
 
 def open_solution(path: str | Path) -> xr.Dataset:
@@ -203,3 +251,12 @@ def write_netcdf(dataset: xr.Dataset, path: Path) -> None:
     with h5netcdf.File(image, "w") as file:
         dataset.dump_to_store(xr.backends.H5NetCDFStore(file))
     path.write_bytes(image.getbuffer())
+
+
+# How a dataset is written, by the suffix of the file.
+WRITERS: dict[str, Callable[[xr.Dataset, Path], None]] = {
+    ".nc": write_netcdf,
+    ".csv": lambda d, path: write_table(path, d.condyle.columns()),
+    ".parquet": lambda d, path: write_table(path, d.condyle.columns(), parquet=True),
+    ".mat": lambda d, path: write_mat(path, dataset_variables(d)),
+}

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from ..panel import PANEL_GROUPS
 from .drawing import figure_of
 from .paper_figures import figure_5, figure_6, figure_7, figure_8, figure_9
-from .registry import PLOTS, SolutionPlots, find_figures, plot
+from .registry import PLOTS, find_figures, plot, solution_plots
 from .saving import save, save_each
 from .style import STYLES
 
@@ -27,7 +27,6 @@ find_figures(figure_of)
 __all__ = [
     "PLOTS",
     "STYLES",
-    "SolutionPlots",
     "figure_5",
     "figure_6",
     "figure_7",
@@ -37,6 +36,7 @@ __all__ = [
     "save",
     "save_figures",
     "save_solution_figures",
+    "solution_plots",
 ]
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,16 +14,17 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from ...analysis.map.lines import Slice, slices_of
 from ...mechanism.mechanism import COORDINATES
+from ...model.model import Model, derive
 from ...results.variables import WRENCH
 from ..naming import readable
 from ..panel import shown
+from .registry import Plots
 from .style import ALERT, COORDINATE, DARK, DASHES, GREY, PALETTE, house, look, new_figure
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from ...analysis.map.lines import Slice
 
 MOST_PANELS = 12
 LEVELS = 20
@@ -54,6 +56,31 @@ class Panel:
 def drawn(dataset: xr.Dataset) -> list[str]:
     """Variables of a map that have a picture; `cause` shows what can be reached."""
     return [str(name) for name in dataset.data_vars if name not in NOT_DRAWN]
+
+
+def map_plots(dataset: xr.Dataset, model: Model | None = None) -> Plots:
+    """A figure for each variable of a map, by its name; `cause` as `reach`.
+
+    Each takes `run`: a solution, whose motion is drawn on top, or (N, axes) [m or rad].
+
+    Args: model: of the map's mechanism, which traces borders; by default it is derived.
+    """
+    made = cache(lambda: list(slices_of(dataset, model or derive(dataset.condyle.mechanism))))
+
+    def of(variable: str) -> Callable[..., Figure]:
+        def draw(
+            dataset: xr.Dataset, run: xr.Dataset | np.ndarray | None = None, **options: Any
+        ) -> Figure:
+            if run is not None and not isinstance(run, np.ndarray):
+                run = run["pose"].sel(coordinate=list(dataset["status"].dims)).values
+            return map_figure(dataset, variable, made(), run, **options)
+
+        draw.__doc__ = f"{dataset[variable].attrs['long_name']}."
+        return draw
+
+    names = {"reach" if name == "cause" else name: name for name in drawn(dataset)}
+    figures = {name: of(variable) for name, variable in names.items()}
+    return Plots(dataset, figures, next(reversed(figures)))
 
 
 @house

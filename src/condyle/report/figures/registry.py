@@ -11,8 +11,8 @@ A package elsewhere names its module as an entry point of the group `condyle.fig
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import update_wrapper
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial, update_wrapper
 from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 
 from ...errors import did_you_mean
 from ..panel import PanelGroup, known_groups, listeners
-from .style import house
+from .style import house, png
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,25 +62,34 @@ def find_figures(figure_of: Callable[[PanelGroup], Any]) -> None:
     PLOTS.update(found)
 
 
-class SolutionPlots:
-    """Figures of a solution: `solution.condyle.plot.effort()` returns a matplotlib Figure.
+class Plots:
+    """Figures of a dataset: `dataset.condyle.plot.effort()` returns a matplotlib Figure.
 
-    There is a method for every figure that is registered.
+    There is a method for every figure. As the last line of a notebook's cell it is the first one.
     """
 
-    def __init__(self, solution: xr.Dataset) -> None:
-        self._solution = solution
+    def __init__(
+        self, dataset: xr.Dataset, figures: Mapping[str, Callable[..., Figure]], first: str
+    ) -> None:
+        self._dataset, self._figures, self._first = dataset, figures, first
 
     def __getattr__(self, name: str) -> Callable[..., Figure]:
-        if name not in PLOTS:
-            known = did_you_mean(name, PLOTS)
-            raise AttributeError(f'a solution has no figure "{name}".{known}')
-        draw, solution = PLOTS[name], self._solution
-
-        def method(*args: Any, **kwargs: Any) -> Figure:
-            return draw(solution, *args, **kwargs)
-
-        return update_wrapper(method, draw)
+        if name.startswith("_") or name not in self._figures:
+            kind, known = self._dataset.condyle.kind, did_you_mean(name, self._figures)
+            raise AttributeError(f'a {kind} has no figure "{name}".{known}')
+        draw = self._figures[name]
+        return update_wrapper(partial(draw, self._dataset), draw)
 
     def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *PLOTS})
+        return sorted({*super().__dir__(), *self._figures})
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._figures)
+
+    def _repr_png_(self) -> bytes:
+        return png(getattr(self, self._first)())
+
+
+def solution_plots(solution: xr.Dataset) -> Plots:
+    """Figures of a solution."""
+    return Plots(solution, PLOTS, "effort")

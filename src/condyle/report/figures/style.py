@@ -11,6 +11,7 @@ from collections.abc import Callable
 from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import wraps
+from io import BytesIO
 from pathlib import PurePath
 from string import ascii_lowercase
 from textwrap import fill
@@ -105,6 +106,7 @@ STYLES = {
     "journal-wide": Paper(JOURNAL, 175.0, 0.75),
 }
 INCH = 25.4
+SCREEN_DPI = 100
 NARROW = 120.0  # [mm]
 MARGIN = 44  # of a panel, for its numbers and label [pt]
 
@@ -206,6 +208,20 @@ def mark_panels(figure: Figure) -> None:
         axes.set_title(f"({letter}) {axes.get_title(loc='left')}".rstrip(), loc="left")
 
 
+class ShownFigure(Figure):
+    """A figure without pyplot that is its picture as the last line of a notebook's cell."""
+
+    def _repr_png_(self) -> bytes:
+        return png(self)
+
+
+def png(figure: Figure) -> bytes:
+    """A figure as an image in memory, as wide as a screen needs it."""
+    image = BytesIO()
+    figure.savefig(image, format="png", dpi=SCREEN_DPI)
+    return image.getvalue()
+
+
 def new_figure(title: str, caption: str, width: float, height: float, columns: int = 1) -> Figure:
     """An empty figure [inch] with a title, and a caption that says where its data come from.
 
@@ -216,7 +232,7 @@ def new_figure(title: str, caption: str, width: float, height: float, columns: i
     wishes = _wishes.get()
     paper = STYLES["journal-wide"] if narrow() and columns > 2 else wishes.paper
     size = (width if paper.width is None else paper.width / INCH, height * paper.height)
-    figure = Figure(figsize=wishes.figsize or size, layout="constrained")
+    figure = ShownFigure(figsize=wishes.figsize or size, layout="constrained")
     if wishes.title:
         words = mpl.rcParams["font.size"]
         figure.suptitle(title, x=0.01, ha="left")

@@ -11,6 +11,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from ...analysis.sweep.effects import directions, good, main_effects, pareto
+from .registry import Plots
 from .style import ALERT, DARK, GREY, PALETTE, house, new_figure, nothing_to_draw
 
 if TYPE_CHECKING:
@@ -115,19 +116,19 @@ def sweep_front(table: xr.Dataset) -> Figure:
 
 
 SWEEP_PLOTS: dict[str, Callable[..., Figure]] = {
-    "sweep-scatter": sweep_scatter,
-    "sweep-effects": sweep_effects,
-    "sweep-parallel": sweep_parallel,
-    "sweep-front": sweep_front,
+    "scatter": sweep_scatter,
+    "effects": sweep_effects,
+    "parallel": sweep_parallel,
+    "front": sweep_front,
 }
 
 
-def sweep_plots(table: xr.Dataset) -> dict[str, Callable[..., Figure]]:
+def sweep_plots(table: xr.Dataset) -> Plots:
     """The figures that a sweep has the data for."""
     known = dict(SWEEP_PLOTS)
     if len(directions(table)) < 2:
-        del known["sweep-front"]
-    return known
+        del known["front"]
+    return Plots(table, known, "scatter")
 
 
 def sweep_caption(table: xr.Dataset) -> str:

@@ -6,6 +6,7 @@ import base64
 import hashlib
 import re
 from collections.abc import Iterator, Sequence
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -289,9 +290,10 @@ def sweep_section(found: xr.Dataset | None) -> Markup:
     from ..figures.sweep_figures import sweep_plots
     from ..tables.sweep_tables import sweep_tables
 
+    plots = sweep_plots(found)
     pictures = [
-        tag("p", _image(draw(found), (draw.__doc__ or "").splitlines()[0]))
-        for draw in sweep_plots(found).values()
+        tag("p", _image(draw(), (draw.__doc__ or "").splitlines()[0]))
+        for draw in map(partial(getattr, plots), plots)
     ]
     tables = [table(t.columns, t.rows, t.title, t.notes) for t in sweep_tables(found)]
     return tag("section", tag("h2", "Sweep"), *pictures, *tables, id="sweep")

@@ -41,6 +41,11 @@ def sweep_tables(table: xr.Dataset) -> list[Table]:
     return [one for one in found if one.records]
 
 
+def sweep_text(table: xr.Dataset) -> str:
+    """The tables as plain text."""
+    return "\n".join(one.text() for one in sweep_tables(table))
+
+
 def outcome_table(table: xr.Dataset) -> Table:
     """How many rows came to what."""
     status, reason = (table[name].values.astype(str) for name in ("status", "reason"))
