@@ -11,7 +11,7 @@ from pathlib import Path
 
 import condyle
 
-PATIENCE = 60  # seconds
+PATIENCE = 300  # seconds; a loaded machine is slow
 
 
 def start(code: str, *arguments: object, **options: object) -> subprocess.Popen[str]:
