@@ -8,16 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from oracles.random_mechanism import random_mechanism, random_state, toml_text
+from oracles.random_mechanism import random_mechanism
+from support.families import MECHANISMS, MIXED, Case, case, close, of_raw
 from support.speeds import few
-
-import condyle
-from condyle.kinematics.chain import FAMILIES
-from condyle.mechanism import parse
-from condyle.model.model import with_point
-
-# Cables have no bodies; tests/kinematics/chain holds them against the oracle of free bodies.
-RIGID = tuple(kind for kind, family in FAMILIES.items() if family.bodies)
 
 MODULES = {"pinocchio": "pinocchio", "mujoco": "mujoco", "newton_euler": "numpy"}
 PLANES: list[dict[str, Any]] = [
@@ -27,24 +20,22 @@ PLANES += [
     {"contacts": contacts, "chains": chains}
     for contacts, chains in ((2, 4), (5, 6), (5, 1), (3, 3), (2, 12))
 ]
-CLASS: list[dict[str, Any]] = [
-    {"families": (kind,), "contacts": contacts} for kind in RIGID for contacts in (0, 2)
-]
-CLASS += [{"families": RIGID, "chains": 8, "contacts": 1}, {"rod_along_x": True}]
+# Of every family and mixture; tests/kinematics/chain holds cables, which have no bodies.
+CLASS = [*MECHANISMS.values(), {"rod_along_x": True}]
 SURFACES: list[dict[str, Any]] = [
     {"surface": "quadratic", "contacts": contacts, "chains": chains}
     for contacts, chains in ((1, 6), (2, 6), (2, 8), (3, 6), (3, 8))
 ]
 SURFACES += [
     {"surface": "quadratic", "families": families, "contacts": contacts}
-    for families, contacts in ((("PSS",), 1), (("SPS",), 3), (RIGID, 2))
+    for families, contacts in ((("PSS",), 1), (("SPS",), 3), (MIXED, 2))
 ]
 SURFACES += [
     {"surface": ("sphere", "cylinder", "ellipsoid"), "contacts": 3},
-    {"surface": ("profile", "ellipsoid"), "families": RIGID, "chains": 8},
+    {"surface": ("profile", "ellipsoid"), "families": MIXED, "chains": 8},
     {"surface": ("ellipsoid", "plane"), "ball_radius": 4.0},
 ]
-FEW = PLANES[4], CLASS[1], CLASS[-2], SURFACES[3], SURFACES[-2]
+FEW = PLANES[4], *(MECHANISMS[n] for n in ("pss_k1", "sps_k3", "mixed_k0_n8")), *SURFACES[3::7]
 
 
 def engine(name: str, raw: dict[str, Any]) -> Callable[..., dict[str, Any]]:
@@ -77,52 +68,42 @@ def level_cranks(raw: dict[str, Any], tilt: float) -> None:
         chain["axis"] = (sign * (np.array([0, 0, 1]) + tilt * lean)).tolist()
 
 
+def check(c: Case, name: str, tolerance: float = 1e-9) -> None:
+    by_engine = engine(name, c.raw)
+    ours = c.evaluate()
+    assert (ours.status == 0).all()
+    for i in range(len(c.load)):
+        theirs = by_engine(*c.sample(i))
+        close(ours.effort[i], theirs["tau"], tolerance)
+        force = np.abs(c.load[i, :3]).max()  # contact forces are small differences of large ones
+        close(ours.contact_force[i], theirs["contact"], tolerance, floor=force)
+        # Joint coordinates and poses are zero at home.
+        close(ours.configuration.joint[i], theirs["joint"], tolerance, floor=1e-3)
+        close(ours.joint_rate[i], theirs["joint_rate"], tolerance)
+        close(ours.joint_acceleration[i], theirs["joint_acceleration"], tolerance)
+        for key in ("pose", "pose_rate", "pose_acceleration"):
+            close(getattr(ours, key)[i], c.states[key][i], 1e-11, floor=1e-3)
+
+
+@pytest.mark.parametrize("name", MODULES)
+@pytest.mark.parametrize("options", few([*PLANES, *CLASS, *SURFACES], *FEW), ids=str)
+def test_an_outside_engine_agrees(options: dict[str, Any], name: str) -> None:
+    rng = np.random.default_rng(100 + len(str(options)))
+    check(of_raw(random_mechanism(rng, **{"tilted_gravity": True, **options})), name)
+
+
 @pytest.mark.parametrize("tilt", [0.0, 1e-13, 8e-10, 1e-6])
 def test_shafts_that_are_upright_or_nearly(tilt: float) -> None:
     raw = random_mechanism(np.random.default_rng(5))
     level_cranks(raw, tilt)
-    by_engine = engine("newton_euler", raw)
-    states = random_state(np.random.default_rng(1), raw, 2, scale=0.3)
-    model = condyle.derive(parse(toml_text(raw)), backend="numpy")
-    load = with_point(states["wrench"], model.load_point("right_molar"))
-    effort = model.evaluate(states["q"], states["qd"], states["qdd"], load).effort
-    given = ("pose", "pose_rate", "pose_acceleration", "wrench")
-    for i in range(2):
-        wanted = by_engine(*(states[key][i] for key in given), "right_molar")["tau"]
-        np.testing.assert_allclose(effort[i], wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())
+    check(of_raw(raw), "newton_euler", 1e-12)
 
 
-@pytest.mark.parametrize("name", MODULES)
-@pytest.mark.parametrize("options", few(PLANES + CLASS + SURFACES, *FEW), ids=str)
-def test_an_outside_engine_agrees(options: dict[str, Any], name: str) -> None:
-    rng = np.random.default_rng(100 + len(str(options)))
-    raw = random_mechanism(rng, tilted_gravity=True, **options)
-    by_engine = engine(name, raw)
-    mechanism = parse(toml_text(raw))
-    model = condyle.derive(mechanism, backend="numpy")
-    states = random_state(rng, raw, 3)
-    assert model.independent == tuple(states["names"])
-    load = with_point(states["wrench"], model.load_point("right_molar"))
-    got = model.evaluate(states["q"], states["qd"], states["qdd"], load)
-    assert (got.status == 0).all()
-    ours = {
-        "tau": got.effort,
-        "contact": got.contact_force,
-        "joint": got.configuration.joint,
-        "joint_rate": got.joint_rate,
-        "joint_acceleration": got.joint_acceleration,
-    }
-    given = ("pose", "pose_rate", "pose_acceleration", "wrench")
-    for i in range(3):
-        wanted = by_engine(*(states[key][i] for key in given), "right_molar")
-        for key, value in ours.items():
-            size = np.abs(wanted[key]).max(initial=0.0)
-            if key == "contact":  # small differences of large forces
-                size = max(size, np.abs(states["wrench"][i]).max())
-            np.testing.assert_allclose(value[i], wanted[key], rtol=0, atol=1e-9 * size)
-        for key, value in zip(
-            given[:3], (got.pose, got.pose_rate, got.pose_acceleration), strict=False
-        ):
-            np.testing.assert_allclose(
-                value[i], states[key][i], atol=1e-11 * np.abs(value[i]).max()
-            )
+@pytest.mark.parametrize("name", ["pss", "sps_k1", "mixed"])
+def test_rod_angles(name: str) -> None:
+    c = case(name)
+    ours, by_engine = c.evaluate(), engine("pinocchio", c.raw)
+    for i in range(len(c.load)):
+        theirs = by_engine(*c.sample(i))
+        close(ours.configuration.beta[i], theirs["beta_i"], 1e-9, floor=1e-3)
+        close(ours.configuration.gamma[i], theirs["gamma_i"], 1e-9, floor=1e-3)
