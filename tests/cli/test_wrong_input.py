@@ -127,7 +127,7 @@ CASES: dict[str, Case] = {
     "states huge rates": (
         SOLVE,
         states([0], [0, 0, 0, 0, *[1e300] * 8]),
-        "torques at row 2 are not finite",
+        "efforts at row 2 are not finite",
     ),
     "states too large": (SOLVE, states(["1e999"]), "too large"),
     "states out of bounds": ((*SOLVE, "--strict"), states([0, 0.004]), "leaves its bounds"),

@@ -37,8 +37,8 @@ QUANTITIES = (
     *("transmission", "effort", "contact_force", "load_limit", "speed", "stiffness"),
 )
 FIGURES = (
-    *("activation", "contact_force", "contact_track", "effort_speed", "jacobian", "joint"),
-    *("load", "marker", "motion", "path", "reaction", "share", "singularity", "effort"),
+    *("activation", "contact_force", "contact_track", "effort", "effort_speed", "jacobian"),
+    *("joint", "load", "marker", "motion", "path", "reaction", "share", "singularity"),
 )
 
 
