@@ -12,6 +12,7 @@ from oracles.random_mechanism import random_mechanism
 from support.families import MECHANISMS, MIXED, Case, case, close, of_raw
 from support.speeds import few
 
+TOLERANCE = 1e-9
 MODULES = {"pinocchio": "pinocchio", "mujoco": "mujoco", "newton_euler": "numpy"}
 PLANES: list[dict[str, Any]] = [
     {"contacts": contacts, "chains": chains} for contacts in range(4) for chains in (6, 8)
@@ -68,19 +69,19 @@ def level_cranks(raw: dict[str, Any], tilt: float) -> None:
         chain["axis"] = (sign * (np.array([0, 0, 1]) + tilt * lean)).tolist()
 
 
-def check(c: Case, name: str, tolerance: float = 1e-9) -> None:
+def check(c: Case, name: str, efforts: float = TOLERANCE) -> None:
     by_engine = engine(name, c.raw)
     ours = c.evaluate()
     assert (ours.status == 0).all()
     for i in range(len(c.load)):
         theirs = by_engine(*c.sample(i))
-        close(ours.effort[i], theirs["tau"], tolerance)
+        close(ours.effort[i], theirs["tau"], efforts)
         force = np.abs(c.load[i, :3]).max()  # contact forces are small differences of large ones
-        close(ours.contact_force[i], theirs["contact"], tolerance, floor=force)
+        close(ours.contact_force[i], theirs["contact"], TOLERANCE, floor=force)
         # Joint coordinates and poses are zero at home.
-        close(ours.configuration.joint[i], theirs["joint"], tolerance, floor=1e-3)
-        close(ours.joint_rate[i], theirs["joint_rate"], tolerance)
-        close(ours.joint_acceleration[i], theirs["joint_acceleration"], tolerance)
+        close(ours.configuration.joint[i], theirs["joint"], TOLERANCE, floor=1e-3)
+        close(ours.joint_rate[i], theirs["joint_rate"], TOLERANCE)
+        close(ours.joint_acceleration[i], theirs["joint_acceleration"], TOLERANCE)
         for key in ("pose", "pose_rate", "pose_acceleration"):
             close(getattr(ours, key)[i], c.states[key][i], 1e-11, floor=1e-3)
 
@@ -105,5 +106,5 @@ def test_rod_angles(name: str) -> None:
     ours, by_engine = c.evaluate(), engine("pinocchio", c.raw)
     for i in range(len(c.load)):
         theirs = by_engine(*c.sample(i))
-        close(ours.configuration.beta[i], theirs["beta_i"], 1e-9, floor=1e-3)
-        close(ours.configuration.gamma[i], theirs["gamma_i"], 1e-9, floor=1e-3)
+        close(ours.configuration.beta[i], theirs["beta_i"], TOLERANCE, floor=1e-3)
+        close(ours.configuration.gamma[i], theirs["gamma_i"], TOLERANCE, floor=1e-3)
