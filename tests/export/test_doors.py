@@ -46,8 +46,8 @@ def test_what_stands_for_a_mechanism(door: Callable[..., Any], tmp_path: Path) -
 @pytest.mark.parametrize(
     "model, path, said",
     [
-        (3, "x", "model: expected a model, a mechanism, .*got int"),
-        (None, "x", "model: .*NoneType"),
+        (3, "x", "mechanism: expected a mechanism, a model, .*got int"),
+        (None, "x", "mechanism: .*NoneType"),
         ("gough-stuart", "x", "gough-stewart"),
         ("gough-stewart", 3, "path: expected a path, got int"),
         ("gough-stewart", "taken", "taken: cannot be made a folder"),

@@ -1,9 +1,9 @@
-"""Mechanisms as something else: C for controllers, and what other targets make of that.
+"""Exports of a mechanism: C for controllers, FMUs, MEX functions, MuJoCo models.
 
     exported = export(condyle.load_mechanism("masticatory"), ("inverse", "motion"))
     exported.source, exported.header, exported["inverse"].arguments
 
-A target is a file that writes what it is for from an `Exported`.
+A target is one file, which writes its files from an `Exported`.
 """
 
 from .c_source import export

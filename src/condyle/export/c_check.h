@@ -12,7 +12,7 @@ static double error(const real *found, const double *right, int i, int size, int
     return most > 0.0 ? off / most : off;
 }
 
-static int told(const char *name, int samples, int wrong, double worst, double most)
+static int report(const char *name, int samples, int wrong, double worst, double most)
 {
     const int failed = wrong > 0 || !(worst <= most);
     printf("%s: %d samples, worst error %.1e, %d wrong statuses: %s\n", name, samples, worst, wrong,

@@ -44,17 +44,17 @@ CODES = {
 }
 WHY = {
     "OK": "results are written",
-    "UNREACHABLE": "no chain or contact reaches this pose, or none that could be vouched for",
+    "UNREACHABLE": "a chain or contact cannot reach this pose, or this could not be certified",
     "SINGULAR": "the pose is singular to this precision",
-    "OUT_OF_BOUNDS": "an argument is no number, or too large for the arithmetic",
-    "INFEASIBLE": "nothing within the limits, or no pose, fits what is given",
-    "JAMMED": "no pattern of friction is consistent",
-    "UNCERTIFIED": "a result was found that could not be certified",
+    "OUT_OF_BOUNDS": "an argument is not a number, or too large",
+    "INFEASIBLE": "no efforts within the limits, or no pose, fit the arguments",
+    "JAMMED": "Coulomb friction has no solution, or several",
+    "UNCERTIFIED": "the result could not be certified",
 }
 
 
 def require_precision(name: str) -> Precision:
-    """Raises InputError for what is no precision."""
+    """Raises InputError for an unknown precision."""
     for precision in PRECISIONS:
         if precision == name:
             return precision

@@ -36,7 +36,7 @@ class Places:
     """Arrays in the order of the mechanism file; a program's lanes stand family by family.
 
     columns: C for each input of the program.
-    names:   result -> its array in C; what is not there is not wanted.
+    names:   result -> its array in C; absent ones are not computed.
     order:   where each lane of the program stands in the mechanism file.
     """
 
@@ -226,7 +226,7 @@ def function(c: Context, name: str, entry: Entry, wish: Wish) -> Body:
     text, own = entry.text, f"{c.prefix}_{name}"
     efforts = any(a.name == "effort" and not a.given for a in arguments)
     if efforts and not entry.limited and least_norm(c.mechanism):
-        text += " Limits are not regarded: a cable's effort may be negative."
+        text += " Limits are ignored: a cable's effort may be negative."
     why = {status: WHY[status] for *_, status in _judged(c, entry, scalar, arguments)}
     made = Function(own, name, text, arguments, entry.steps, scalar.operations, why)
     if not (entry.quick and c.lanes):
@@ -279,11 +279,11 @@ def _arguments(
     ports = {port.name: port for port in program.ports}
     there = {result.name: result for result in program.interface.results}
     found = [
-        c.arguments.argument(name, ports[port], True, entry.told.get(name))
+        c.arguments.argument(name, ports[port], True, entry.described.get(name))
         for port, name in given.items()
     ]
     found += [
-        c.arguments.argument(name, there[result], False, entry.told.get(name))
+        c.arguments.argument(name, there[result], False, entry.described.get(name))
         for result, name in results.items()
         if result in there
     ]

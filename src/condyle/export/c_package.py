@@ -21,14 +21,14 @@ from typing import Any
 from ..atomic import make_folder, write_text
 from ..backends.compiler import CompilerError, find_compiler
 from ..errors import texts_of
-from ..mechanism import Mechanism
+from ..mechanism import Mechanism, as_mechanism
 from ..model.model import Model
 from .c_names import in_format, literal, packaged
 from .c_samples import Vectors, vectors
 from .c_source import export
 from .catalogue import in_order, usual
 from .exported import Exported, Function
-from .written import Written, mechanism_of, write_texts
+from .written import Written, write_texts
 
 # By precision: what results may differ from the library's by, over the largest entry of each.
 TOLERANCE = {"double": 1e-12, "float": 1e-4}
@@ -73,7 +73,7 @@ def export_c(
     Raises: InputError, UnsupportedError: for what cannot be exported, or a folder that cannot be
             written.
     """
-    mechanism = mechanism_of(model)
+    mechanism = as_mechanism(model)
     if isinstance(model, Model):
         formulation, route = formulation or model.formulation, route or model.route
     names = in_order(texts_of("coordinates", coordinates or ()))
@@ -133,7 +133,7 @@ def makefile(e: Exported) -> str:
 
 
 def example(e: Exported) -> str:
-    """A program that asks the first question at home, at rest."""
+    """A program that calls the first function at home, at rest."""
     f, p = e.functions[0], e.prefix.upper()
     constants, prepared = _constants(e)
     known = [f"    static const {e.precision} {a.name}[{a.size}] = {{0}};" for a in f.inputs]
@@ -144,7 +144,7 @@ def example(e: Exported) -> str:
         for i, (label, unit) in enumerate(zip(a.labels, a.units, strict=True))
     ]
     lines = [
-        f"/* What {f.name} answers at home: every argument is 0 but those set below. */",
+        f"/* {f.name} at home: every argument is 0 except those set below. */",
         f'#include <stdio.h>\n#include "{e.prefix}.h"\n\nint main(void)\n{{',
         *(*known, *constants, "    int status;", *prepared),
         f"    status = {_call(e, f, [a.name for a in f.arguments])};",
@@ -170,7 +170,7 @@ def _call(e: Exported, f: Function, words: list[str]) -> str:
 def recorded(e: Exported, made: list[Vectors]) -> str:
     """Arguments and answers as arrays."""
     lines = [
-        f"/* Samples for {e.prefix}.c, and what condyle answers to them. */",
+        f"/* Samples for {e.prefix}.c, and the results of condyle. */",
         "#include <math.h>",
     ]
     for v in made:
@@ -190,7 +190,7 @@ def recorded(e: Exported, made: list[Vectors]) -> str:
 def check(e: Exported, made: list[Vectors]) -> str:
     """A program that compares every function with its recorded samples."""
     lines = [
-        f"/* Compares {e.prefix}.c with recorded samples; exit status 0 where all agree. */",
+        f"/* Compares {e.prefix}.c with recorded samples; exit status 0 if all agree. */",
         "#include <stdio.h>",
         f'#include "{e.prefix}.h"',
         f'#include "{e.prefix}_vectors.h"',
@@ -222,7 +222,7 @@ def _checked(e: Exported, f: Function) -> list[str]:
             f"{count}));"
             for a in compared
         ),
-        f'    }}\n    return told("{f.name}", {count}, wrong, worst, {tolerance(e, f)!r});\n}}\n',
+        f'    }}\n    return report("{f.name}", {count}, wrong, worst, {tolerance(e, f)!r});\n}}\n',
     ]
 
 
@@ -259,8 +259,8 @@ def write_facts(exported: Exported, folder: Path) -> Facts:
     path = folder / "FACTS.md"
     write_text(path, _page(exported, rows, how))
     warnings = [
-        f"{f.name} does not answer as recorded: worst error {row['error']:.1e}, {row['wrong']} "
-        "wrong statuses; look at it with make check"
+        f"{f.name} differs from its recorded samples: worst error {row['error']:.1e}, "
+        f"{row['wrong']} wrong statuses; run make check"
         for f, row in zip(exported.functions, rows.values(), strict=True)
         if row["wrong"] or (row["error"] or 0.0) > tolerance(exported, f)
     ]
@@ -339,11 +339,11 @@ def _page(e: Exported, rows: dict[str, dict[str, Any]], how: str) -> str:
     lines = [
         f"# {e.prefix}: measured facts",
         "",
-        f"Measured with {how}. Portable code, {e.precision}; yours will differ."
+        f"Measured with {how}. Portable code, {e.precision}; another target differs."
         if how
-        else "Not measured: no C compiler was at hand. `condyle export` again where there is one.",
+        else "Not measured: no C compiler was found. Export again where there is one.",
         "",
-        "| function | operations | steps at most | code [bytes] | stack [bytes] | worst error |",
+        "| function | operations | maximum steps | code [bytes] | stack [bytes] | worst error |",
         "|---|---|---|---|---|---|",
     ]
     for name, row in rows.items():
@@ -354,9 +354,9 @@ def _page(e: Exported, rows: dict[str, dict[str, Any]], how: str) -> str:
     lines += [
         "",
         "- Operations: additions, products, roots and quotients of one call, a fused multiply-add, "
-        "or a sine with its cosine, as one.",
-        "- Code and stack: of a function with all that it calls, but the C library.",
+        "or a sine with its cosine, counted as one.",
+        "- Code and stack: of a function and all functions that it calls, without the C library.",
         "- Worst error: over the recorded samples, of the largest entry of each result.",
-        f"- Of the C library it may call {', '.join(e.symbols) or 'nothing'}.",
+        f"- Functions of the C library that it may call: {', '.join(e.symbols) or 'nothing'}.",
     ]
     return "\n".join([*lines, ""])

@@ -54,9 +54,9 @@ def export(
     coordinates: Sequence[str] = (),
     landmark: str | None = None,
 ) -> Exported:
-    """A mechanism in C: source, header, and what a caller must know.
+    """A mechanism in C: source, header and interface.
 
-    Args:   questions: of `CATALOGUE`; default: all that need nothing more to be said.
+    Args:   questions: of `CATALOGUE`; default: those that need no options.
             precision: double or float.
             prefix:    what every name begins with; default: the mechanism's name.
             constants: inside, or struct: in a structure that can be filled at run time.
@@ -200,12 +200,12 @@ def _about(e: Exported) -> str:
         "home. Angles are Bryant angles alpha, beta, gamma.",
         "",
         "Functions return a status and write their results only where it is "
-        f"{e.prefix.upper()}_OK. They keep nothing: no heap, no globals, no input or "
+        f"{e.prefix.upper()}_OK. They have no state: no heap, no globals, no input or "
         "output, no recursion; any thread or interrupt may call them. Arrays that go in and out "
         "must not overlap.",
     ]
     if mapped := {theirs: ours for theirs, ours in e.names.items() if theirs != ours}:
-        lines += ["", "Names that C does not take:"]
+        lines += ["", "Names changed for C:"]
         lines += [f"  {theirs} is {ours}" for theirs, ours in mapped.items()]
     return _comment(lines)
 
@@ -220,7 +220,7 @@ def _sizes(p: str, exported: Exported) -> str:
     m = exported.mechanism
     named = {"CHAIN": m.chain_names, "CONTACT": m.contact_names}
     sizes = {f"{kind}S": len(names) for kind, names in named.items()}
-    lines = ["/* Sizes, and where things stand in arrays. */"]
+    lines = ["/* Sizes, and indices into arrays. */"]
     sizes["FREEDOMS"] = m.degrees_of_freedom
     lines += [*(f"#define {p}_{name} {size}" for name, size in sizes.items()), "", "enum {"]
     rows = [
@@ -239,7 +239,7 @@ def _declared(exported: Exported, f: Function) -> str:
         lines.append(f"  {a.name}[{a.size}]  {'in' if a.given else 'out'}: {a.text} [{a.unit}]")
         lines.append(f"      order: {', '.join(a.labels)}")
     if f.iterations:
-        lines += ["", f"At most {f.iterations} steps."]
+        lines += ["", f"Maximum number of steps: {f.iterations}."]
     words = [f"{name.lower()} ({why})" for name, why in f.statuses.items()]
     lines += ["", f"Returns ok, or {', '.join(words)}."]
     declared = textwrap.wrap(

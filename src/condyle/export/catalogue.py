@@ -1,6 +1,6 @@
-"""What can be exported, by name: a question, its arguments in C, and what may go wrong.
+"""Questions that can be exported: their arguments in C, and their statuses.
 
-A new one is an entry of `CATALOGUE`. Every controller of `condyle.questions.law` is one without.
+A new one is an entry of `CATALOGUE`. Every controller of `condyle.questions.law` has one already.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from ..questions.law.computed_torque import ComputedTorque
 from ..questions.observer import ITERATIONS as OBSERVER_STEPS
 from ..questions.structure import Structure
 
-POSE_STEPS = 8  # as many as a start that is off by a third of what steps may be takes
+POSE_STEPS = 8  # Newton steps from a start that is off by a third of the largest step
 
 
 @dataclass(frozen=True)
 class Wish:
-    """What is asked for besides the question's name.
+    """Options of a question.
 
     coordinates: names of 6 - k pose coordinates that `closure` starts from, in the order of X_EE,
                  or
@@ -38,7 +38,7 @@ class Wish:
 def in_order(coordinates: Sequence[str]) -> tuple[str, ...]:
     """Pose coordinates in the order of X_EE, in which functions take them.
 
-    Raises: InputError: for what is none.
+    Raises: InputError: for an unknown name.
     """
     for name in coordinates:
         if name not in COORDINATES:
@@ -50,16 +50,16 @@ def in_order(coordinates: Sequence[str]) -> tuple[str, ...]:
 class Entry:
     """One question in C.
 
-    text:     what it answers.
+    text:     what it computes.
     given:    its arguments in turn, each as `port` or `port>name in C`; "": all ports that matter.
               Ports that are not among them are 0, efforts' limits those of the mechanism.
     results:  what it writes, likewise.
     question, details: of `condyle.questions`, where not of the entry's own name.
-    doubt:    the status where a sample cannot be vouched for;  rubbing: with friction.
-    quick:    whether it is worth vector types.
-    within:   result -> bound by precision, beyond which nothing fits.
-    steps:    so many, a fixed number; 0 for none.
-    told:     name in C -> what it is and its unit, where `arguments` knows nothing of it.
+    doubt:    status of samples that cannot be certified;  rubbing: the same with friction.
+    quick:    whether vector types make it faster.
+    within:   result -> bound by precision, beyond which the sample is infeasible.
+    steps:    fixed number of iterations; 0 for none.
+    described: name in C -> description and unit, where `Arguments` has none.
     limited:  whether efforts are within limits.
     """
 
@@ -73,16 +73,16 @@ class Entry:
     quick: bool = False
     within: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     steps: int = 0
-    told: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    described: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     limited: bool = False
 
     def unsure(self, structure: Structure) -> str:
-        """The status of what cannot be vouched for."""
+        """The status of samples that cannot be certified."""
         return self.rubbing if self.rubbing and structure.friction else self.doubt
 
 
 def least_norm(mechanism: Mechanism) -> str | None:
-    """The distribution of exported efforts, as models take it: least norm, limits not regarded."""
+    """The distribution of exported efforts, as models take it: least norm, without limits."""
     cables = any(chain.kind == "cable" for chain in mechanism.chains)
     return LEAST if cables else None
 
@@ -92,13 +92,13 @@ BORNE = "borne_force>force borne_moment>moment borne_point>point"
 WHOLE = "pose pose_rate pose_acceleration"
 CATALOGUE: dict[str, Entry] = {
     "inverse": Entry(
-        "Efforts of least norm that make a motion under a load.",
+        "Inverse dynamics: efforts of least norm for a motion under a load.",
         f"{STATE} {LOAD}",
         rubbing="UNCERTIFIED",
         quick=True,
     ),
     "contact": Entry(
-        "Efforts of least norm that make a motion under a load, and the contact forces.",
+        "Inverse dynamics: efforts of least norm and contact forces for a motion under a load.",
         f"{STATE} {LOAD}",
         "effort contact_force",
         question="inverse",
@@ -107,7 +107,7 @@ CATALOGUE: dict[str, Entry] = {
         quick=True,
     ),
     "bounded": Entry(
-        "Efforts of least norm within the actuators' limits, and the contact forces.",
+        "Inverse dynamics within limits: efforts of least norm, and contact forces.",
         f"{STATE} {LOAD}",
         "effort contact_force",
         question="limited",
@@ -117,7 +117,7 @@ CATALOGUE: dict[str, Entry] = {
         steps=TERMS["square"].turns,
     ),
     "forward": Entry(
-        "Accelerations that efforts and a load make, and the contact forces.",
+        "Forward dynamics: accelerations under efforts and a load, and the contact forces.",
         f"q q1 effort {LOAD}",
         "acceleration contact_force",
         details=lambda wish: (("contact",),),
@@ -125,20 +125,20 @@ CATALOGUE: dict[str, Entry] = {
         quick=True,
     ),
     "motion": Entry(
-        "The whole pose and its rates, from the independent coordinates.",
+        "Pose and its rates from the independent coordinates.",
         STATE,
         WHOLE,
         doubt="UNREACHABLE",
     ),
     "closure": Entry(
-        "The whole pose and its rates, from other coordinates or a landmark's path.",
+        "Pose and its rates from other coordinates or a landmark's path.",
         "s s1 s2",
         WHOLE,
         details=lambda wish: (Prescribed(wish.coordinates),),
         doubt="UNREACHABLE",
     ),
     "pose": Entry(
-        "The pose that joint coordinates belong to, as encoders give them.",
+        "Forward kinematics: the pose from joint coordinates, as encoders give them.",
         "joint start",
         "pose residual",
         details=lambda wish: (POSE_STEPS,),
@@ -147,19 +147,19 @@ CATALOGUE: dict[str, Entry] = {
         steps=POSE_STEPS,
     ),
     "observer": Entry(
-        "The state that encoders give from one period to the next: pose, and rates of counts.",
+        "State from encoders, period by period: pose, and rates of the counts.",
         "joint period resolution smoothing pose_before pose_rate_before joint_before "
         "joint_rate_before",
         "q q1 pose pose_rate joint>joint_read joint_rate>joint_rate_read",
         doubt="UNREACHABLE",
         steps=OBSERVER_STEPS,
-        told={
-            "period": ("between calls", "s"),
-            "smoothing": ("part of the last rates that is kept, 0 to below 1", "1"),
+        described={
+            "period": ("time between calls", "s"),
+            "smoothing": ("weight of the previous rates, 0 to below 1", "1"),
         },
     ),
     "computed_torque": Entry(
-        "A controller: efforts that follow a wanted motion, by "
+        "Controller: efforts that follow a desired motion, by "
         "q'' = q2_d + kd (q1_d - q1) + kp (q_d - q).",
         f"q_d q1_d q2_d q q1 stiffness>kp damping>kd {BORNE}",
         "asked>effort",
@@ -173,12 +173,12 @@ DEFAULT = ("inverse", "contact", "forward", "motion", "pose", "computed_torque")
 
 
 def usual(mechanism: Mechanism) -> tuple[str, ...]:
-    """The questions that need nothing more to be said, and that the mechanism has answers to."""
+    """The default questions of a mechanism."""
     return tuple(q for q in DEFAULT if mechanism.contacts or q != "contact")
 
 
 def require_question(name: str) -> Entry:
-    """Raises InputError for what cannot be exported."""
+    """Raises InputError for an unknown question."""
     if name in CATALOGUE:
         return CATALOGUE[name]
     table = CONTROLLERS.get(name)
@@ -189,26 +189,26 @@ def require_question(name: str) -> Entry:
 
 
 def _law(kind: str, table: type[ControllerTable]) -> Entry:
-    """A controller, for a processor that reads its state and its aims."""
+    """The entry of a controller."""
     fields = {name: given.description or name for name, given in table.model_fields.items()}
     units = {name: table.parameters.get(name, "1").replace("²", "^2") for name in table.ports}
-    told = {name: (fields.get(name, name), unit) for name, unit in units.items()}
+    described = {name: (fields.get(name, name), unit) for name, unit in units.items()}
     words = ", ".join(str(number) for number in table.memory)
     choices = tuple((name, table.model_fields[name].default) for name in table.chooses)
     return Entry(
-        f"A controller: {(table.__doc__ or kind).splitlines()[0]} Inverse dynamics is of "
-        "least norm; of efforts, what is beyond the actuators' limits is cut off.",
+        f"Controller: {(table.__doc__ or kind).splitlines()[0]} Its inverse dynamics is of least "
+        "norm; efforts are clipped at the actuators' limits.",
         results="effort memory",
         question="tick",
         details=lambda wish: (table, choices),
         rubbing="UNCERTIFIED",
         limited=True,
-        told={
-            **told,
-            "period": ("between calls", "s"),
-            "force": ("of the load on the platform at the law's point, axes of {S}", "N"),
-            "force_d": ("wanted force", "N"),
-            "memory_before": (f"memory that the last call gave; at first {words}", "1"),
-            "memory": ("what the next call is given as memory_before", "1"),
+        described={
+            **described,
+            "period": ("time between calls", "s"),
+            "force": ("of the load on the platform at the controller's point, axes of {S}", "N"),
+            "force_d": ("desired force", "N"),
+            "memory_before": (f"memory of the previous call; first {words}", "1"),
+            "memory": ("memory for the next call's memory_before", "1"),
         },
     )

@@ -1,7 +1,7 @@
-"""What an export is: C, and all that a caller of it must know.
+"""An export in C, and its interface.
 
-Other targets (MEX files, FMUs) are written on this: they call `Function`s by their arguments and
-never look into the source.
+Other targets (MEX files, FMUs) build on this: they call `Function`s by their arguments and do not
+depend on the source.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Argument:
     text:   what it is, in a few words.
     labels: name of each entry, as the mechanism file has it.
     units:  of each entry.
-    given:  whether it goes in; else it is written.
+    given:  whether it is an input.
     port:   name of the input or result of the question, if it is one.
     """
 
@@ -59,10 +59,10 @@ class Function:
 
     name:       in C.
     question:   in the catalogue (`inverse`, `motion` ..).
-    text:       what it answers.
-    iterations: so many steps, or at most; 0 where nothing is iterated.
+    text:       what it computes.
+    iterations: maximum number of steps; 0 without iteration.
     operations: floating-point operations, sine and cosine as one.
-    statuses:   what it may return besides ok: name -> why.
+    statuses:   that it may return besides ok: name -> reason.
     """
 
     name: str
@@ -136,9 +136,9 @@ KNOWN = {
     "q1": ("rates of q", FREE, "/s"),
     "q2": ("accelerations of q", FREE, "/s^2"),
     "acceleration": ("accelerations of q", FREE, "/s^2"),
-    "q_d": ("wanted independent coordinates", FREE, ""),
-    "q1_d": ("wanted rates", FREE, "/s"),
-    "q2_d": ("wanted accelerations", FREE, "/s^2"),
+    "q_d": ("desired independent coordinates", FREE, ""),
+    "q1_d": ("desired rates", FREE, "/s"),
+    "q2_d": ("desired accelerations", FREE, "/s^2"),
     "kp": ("stiffness: acceleration by deviation", FREE, "=1/s^2"),
     "kd": ("damping: acceleration by deviation of rate", FREE, "=1/s"),
     "s": ("prescribed coordinates", GIVEN, ""),
@@ -146,24 +146,24 @@ KNOWN = {
     "s2": ("accelerations of s", GIVEN, "/s^2"),
     "force": ("force on the platform, axes of {S}", AXES, "N"),
     "moment": ("moment on the platform, axes of {S}", AXES, "N m"),
-    "point": ("where the force acts, in the platform's frame {M}", AXES, "m"),
+    "point": ("point of action of the force, in the platform's frame {M}", AXES, "m"),
     "direction": ("unit vector, in {S}", AXES, "1"),
     "pose": ("the platform's pose X_EE", WHOLE, ""),
     "pose_rate": ("its rates", WHOLE, "/s"),
     "pose_acceleration": ("its accelerations", WHOLE, "/s^2"),
-    "start": ("where to start: the last pose; at first home, zeros", WHOLE, ""),
-    "pose_before": ("pose that the last call gave; at first where it is", WHOLE, ""),
-    "pose_rate_before": ("pose_rate that the last call gave; at first 0", WHOLE, "/s"),
+    "start": ("initial guess: the previous pose; first home, zeros", WHOLE, ""),
+    "pose_before": ("pose of the previous call; first the present pose", WHOLE, ""),
+    "pose_rate_before": ("pose_rate of the previous call; first 0", WHOLE, "/s"),
     "joint": ("joint coordinates, zero at home", JOINT, ""),
     "joint_rate": ("rates of joints", JOINT, "/s"),
-    "joint_d": ("wanted joint coordinates", JOINT, ""),
-    "joint_rate_d": ("wanted rates of joints", JOINT, "/s"),
-    "joint_read": ("joint coordinates as encoders have them", JOINT, ""),
+    "joint_d": ("desired joint coordinates", JOINT, ""),
+    "joint_rate_d": ("desired rates of joints", JOINT, "/s"),
+    "joint_read": ("joint coordinates as read by the encoders", JOINT, ""),
     "joint_rate_read": ("rates of joints, filtered", JOINT, "/s"),
-    "joint_before": ("joint_read of the last call; at first as joint", JOINT, ""),
-    "joint_rate_before": ("joint_rate_read of the last call; at first 0", JOINT, "/s"),
-    "resolution": ("of encoders; 0: exact", JOINT, ""),
-    "residual": ("joint less joint coordinates of the pose", JOINT, ""),
+    "joint_before": ("joint_read of the previous call; first as joint", JOINT, ""),
+    "joint_rate_before": ("joint_rate_read of the previous call; first 0", JOINT, "/s"),
+    "resolution": ("resolution of the encoders; 0: exact", JOINT, ""),
+    "residual": ("joint minus the joint coordinates of the pose", JOINT, ""),
     "effort": ("efforts of the actuators at their joints", EFFORT, ""),
     "contact_force": (
         "contact forces on the platform, along the unit normals of the surfaces", CONTACT, "N",
@@ -199,16 +199,16 @@ class Arguments:
         }
 
     def argument(
-        self, name: str, port: Port | Result, given: bool, told: tuple[str, str] | None
+        self, name: str, port: Port | Result, given: bool, described: tuple[str, str] | None
     ) -> Argument:
         """What a port or result is in C.
 
-        Args: name: in C;  told: what it is and its unit, where that is not `KNOWN`.
+        Args: name: in C;  described: description and unit, where it is not `KNOWN`.
         """
         size = port.size if isinstance(port, Port) else math.prod(port.shape)
         text, of, per = KNOWN.get(name, (name.replace("_", " "), "", "=1"))
-        if told is not None:
-            text, per = told[0], f"={told[1]}"
+        if described is not None:
+            text, per = described[0], f"={described[1]}"
         if not of:
             of = JOINT if port.lanes else FREE if size == len(self.independent) else AXES
         labels = self._labels.get(of, [f"{LETTERS.get(name, '')}{axis}" for axis in "xyz"])

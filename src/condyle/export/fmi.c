@@ -92,7 +92,7 @@ typedef struct {
     Host host;
 } Instance;
 
-static int told(Instance *me, int status, Text message)
+static int report(Instance *me, int status, Text message)
 {
     const Host *host = &me->host;
     if (host->logger && (me->logging || status > DISCARD))
@@ -107,8 +107,8 @@ static int told(Instance *me, int status, Text message)
 static int answered(Instance *me, int code)
 {
     if (code == NO_VARIABLE)
-        return told(me, ERROR, "there is no such variable, or it cannot be set");
-    return code ? told(me, DISCARD, STATUS_WORDS[me->state.failed]) : OK;
+        return report(me, ERROR, "unknown variable, or one that cannot be set");
+    return code ? report(me, DISCARD, STATUS_WORDS[me->state.failed]) : OK;
 }
 
 static void reset(State *s)
@@ -242,7 +242,7 @@ REAL_API(Get)(Instance *me, const Reference *which, size_t n, double *values COU
 {
     State *s = &me->state;
     if (!COUNTED(n))
-        return told(me, ERROR, "as many values as variables: all are scalar");
+        return report(me, ERROR, "expected one value for each variable");
     for (size_t i = 0; i < n; i++) {
         if (which[i] > MODEL_VALUES)
             return answered(me, NO_VARIABLE);
@@ -257,7 +257,7 @@ REAL_API(Set)(Instance *me, const Reference *which, size_t n, const double *valu
 {
     State *s = &me->state;
     if (!COUNTED(n))
-        return told(me, ERROR, "as many values as variables: all are scalar");
+        return report(me, ERROR, "expected one value for each variable");
     for (size_t i = 0; i < n; i++)
         if (which[i] >= MODEL_COMPUTED)
             return answered(me, NO_VARIABLE);
@@ -282,13 +282,13 @@ NONE(String, Text)
 
 /* And what there is not. */
 #define REFUSED(name, ...)                                                                          \
-    API(name)(Instance *me, __VA_ARGS__) { return told(me, ERROR, #name " is not supported"); }
+    API(name)(Instance *me, __VA_ARGS__) { return report(me, ERROR, #name " is not supported"); }
 
 /* States of the whole unit, which are no pointers: as bytes they are the same. */
 STATE_API(Get, )(Instance *me, State **state)
 {
     if (!*state && !(*state = malloc(sizeof **state)))
-        return told(me, ERROR, "no memory");
+        return report(me, ERROR, "out of memory");
     **state = me->state;
     return OK;
 }
@@ -301,16 +301,16 @@ STATE_API(Serialized, Size)(Instance *me, const State *state, size_t *size)
 STATE_API(Serialize, )(Instance *me, const State *state, Byte *bytes, size_t size)
 {
     if (size < sizeof *state)
-        return told(me, ERROR, "too little room");
+        return report(me, ERROR, "the buffer is too small");
     memcpy(bytes, state, sizeof *state);
     return OK;
 }
 STATE_API(UNPACK, )(Instance *me, const Byte *bytes, size_t size, State **state)
 {
     if (size != sizeof **state || memcmp(bytes, MODEL_TOKEN, sizeof MODEL_TOKEN))
-        return told(me, ERROR, "not a state of this FMU");
+        return report(me, ERROR, "not a state of this FMU");
     if (!*state && !(*state = malloc(sizeof **state)))
-        return told(me, ERROR, "no memory");
+        return report(me, ERROR, "out of memory");
     memcpy(*state, bytes, size);
     return OK;
 }
@@ -323,11 +323,11 @@ API(CompletedIntegratorStep)(Instance *me, Boolean kept, Boolean *event, Boolean
 API(SetTime)(Instance *me, double time) { return me->state.time = time, OK; }
 API(GetEventIndicators)(Instance *me, double *z, size_t n)
 {
-    return n ? told(me, ERROR, "there are no event indicators") : OK;
+    return n ? report(me, ERROR, "this FMU has no event indicators") : OK;
 }
 #define NUMBER_OF_STATES(n)                                                                         \
     if ((n) != MODEL_ORDER)                                                                         \
-        return told(me, ERROR, "that is not the number of states");
+        return report(me, ERROR, "wrong number of states");
 API(SetContinuousStates)(Instance *me, const double *x, size_t n)
 {
     NUMBER_OF_STATES(n)
@@ -360,7 +360,7 @@ API(GetNominalsOfContinuousStates)(Instance *me, double *nominal, size_t n)
 static int stepped(Instance *me, double now, double span)
 {
     if (!(fabs(now - me->state.time) <= 1e-9 * (1.0 + fabs(now)) && span >= 0.0 && span < HUGE_VAL))
-        return told(me, ERROR, "a step begins at the time of the FMU, and is not negative");
+        return report(me, ERROR, "a step must start at the time of the FMU and must not be negative");
     me->state.time = now;
     return answered(me, advance(&me->state, now + span));
 }
@@ -384,7 +384,7 @@ API(NewDiscreteStates)(Instance *me, Events *events)
     return memset(events, 0, sizeof *events), OK;
 }
 API(DoStep)(Instance *me, double now, double span, Boolean kept) { return stepped(me, now, span); }
-API(CancelStep)(Instance *me) { return told(me, ERROR, "steps are not asynchronous"); }
+API(CancelStep)(Instance *me) { return report(me, ERROR, "steps are not asynchronous"); }
 #define STATUS(name, kind)                                                                          \
     API(Get##name)(Instance *me, int what, kind *value) { return DISCARD; }
 STATUS(Status, int)

@@ -20,13 +20,13 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from ..atomic import replacing
 from ..backends.compiler import CompilerError, find_compiler
 from ..errors import InputError, texts_of
-from ..mechanism import Mechanism
+from ..mechanism import Mechanism, as_mechanism
 from ..model.model import Model
 from ..version import __version__
 from .c_names import in_comment
 from .catalogue import least_norm
 from .fmu_model import Fmu, Scalar, fmu_model
-from .written import Written, file_at, mechanism_of
+from .written import Written, file_at
 
 VERSIONS = (2, 3)
 DEFAULT = ("plant", "inverse", "controller")
@@ -69,7 +69,7 @@ def export_fmu(
     Raises: InputError: for another kind or version, or a file that cannot be written;
             UnsupportedError: for a mechanism that cannot be exported to C.
     """
-    mechanism = mechanism_of(model)
+    mechanism = as_mechanism(model)
     kinds = list(dict.fromkeys(texts_of("kind", kind)))
     if fmi not in VERSIONS:
         raise InputError(f"fmi: expected 2 or 3, got {fmi!r:.40}")

@@ -30,7 +30,7 @@ KINDS = {
 TEXTS = {
     "plant": "Forward dynamics: efforts and a load in, motion and contact forces out",
     "inverse": "Inverse dynamics: a motion and a load in, efforts and contact forces out",
-    "controller": "Computed torque: wanted and measured motion in, efforts out",
+    "controller": "Computed torque: desired and measured motion in, efforts out",
     "bounded": "Inverse dynamics within limits: a motion and a load in, efforts and forces out",
 }
 STATES, RATES = ("q", "q1"), ("dq", "acceleration")
@@ -81,7 +81,7 @@ def fmu_model(mechanism: Mechanism, kind: str) -> Fmu:
     Raises: InputError: for another kind;  UnsupportedError: for what cannot be exported to C.
     """
     if kind not in KINDS:
-        raise InputError(f'there is no FMU "{kind}".{did_you_mean(kind, KINDS)}')
+        raise InputError(f'kind: no FMU "{kind}".{did_you_mean(kind, KINDS)}')
     e = export(mechanism, KINDS[kind], constants="struct", lanes=0)
     plant, calls = kind == "plant", [e[question] for question in KINDS[kind]]
     arrays = {a.name: a for f in calls for a in f.arguments}
@@ -110,7 +110,7 @@ def fmu_model(mechanism: Mechanism, kind: str) -> Fmu:
     for t in tuned:
         add_one("parameter", *t[:4])
     if plant:
-        add_one("parameter", "tolerance", "1", "of a step", TOLERANCE)
+        add_one("parameter", "tolerance", "1", "error tolerance of a step", TOLERANCE)
     add("state", states)
     add_one("output", "status", "1", CODES)
     add("rate", rates)
@@ -152,7 +152,7 @@ def _scalars(e: Exported, a: Argument, role: str, first: int) -> Iterable[Scalar
 
 
 def _tuned(mechanism: Mechanism, e: Exported) -> Iterator[Tuned]:
-    """Gravity, the platform's mass and inertia, and what stands for itself of the chains."""
+    """Gravity, mass and inertia of the platform, and numbers of single chains."""
     platform, numbers = mechanism.platform, e.header.partition("_numbers;")[0]
     sized = re.findall(r"double (\w+)", numbers)
     if "gravity" in sized:

@@ -12,12 +12,12 @@ from collections.abc import Iterator, Sequence
 
 from ..atomic import make_folder
 from ..errors import texts_of
-from ..mechanism import Mechanism
+from ..mechanism import Mechanism, as_mechanism
 from ..model.model import Model
 from .c_names import identifier, packaged
 from .c_source import export
 from .exported import Argument, Exported, Function
-from .written import Written, mechanism_of, write_texts
+from .written import Written, write_texts
 
 DEFAULT = ("contact", "inverse", "bounded", "forward", "motion", "pose", "computed_torque")
 LONGEST = 63  # letters of a name in MATLAB
@@ -37,7 +37,7 @@ def export_matlab(
     Raises: InputError, UnsupportedError: for what cannot be exported to C, or a folder that cannot
             be written.
     """
-    mechanism = mechanism_of(model)
+    mechanism = as_mechanism(model)
     # Short enough that every function's name is one in MATLAB.
     prefix = identifier(mechanism.name).lower()[:40]
     e = export(mechanism, texts_of("question", question), lanes=0, prefix=prefix)

@@ -1,15 +1,15 @@
 """A mechanism for MuJoCo: one file of MJCF, its home the mechanism's and its controls our efforts.
 
 Loops are closed by `connect`, contacts by what carries the platform. Joints and
-actuators are called as their chains, so that `data.actuator("masseter_left").ctrl` is an effort
+actuators have the names of their chains, so that `data.actuator("masseter_left").ctrl` is an effort
 in N m or N, and joint coordinates are zero at home.
 
 The first contacts carry the platform: their joints and a ball joint are its place in the tree, so
 that MuJoCo cannot leave those surfaces. Two on parallel planes carry it together, on two slides, a
 hinge along the normal and one along the line between them: all four freedoms, and no equation. Each
 other contact is a runner, a small weightless body that stays on its surface, connected to the
-platform. A one-sided contact on a plane is a real one, which may open: ball against plane, without
-friction or with Coulomb's.
+platform. A unilateral contact on a plane is one of MuJoCo: ball against plane, frictionless or with
+Coulomb friction.
 
 Chains are trees of bodies: `connect` closes each loop at its platform joint. A rod turns on two
 hinges along Y and Z of N_i0, as in `kinematics.chain`; behind a crank these turn with the crank,
@@ -30,13 +30,13 @@ import numpy as np
 from ..atomic import write_text
 from ..errors import CondyleError
 from ..kinematics.chain import FAMILIES
-from ..mechanism import Contact, Mechanism
+from ..mechanism import Contact, Mechanism, as_mechanism
 from ..mechanism.chain import limits
 from ..mechanism.surface import Plane
 from ..model.model import Model
 from .mjcf_tracks import Freedom, Track, track
 from .mjcf_xml import Document, element, inertial, quaternion, rgba
-from .written import Written, file_at, mechanism_of
+from .written import Written, file_at
 
 RUNNER = 1e-3  # mass of a runner over the platform's
 PARALLEL = 1e-12
@@ -66,7 +66,7 @@ def export_mjcf(
     Raises: UnsupportedError: where a surface cannot be followed, or two names agree.
             InputError: if the file cannot be written.
     """
-    mechanism = mechanism_of(model)
+    mechanism = as_mechanism(model)
     made = mjcf(mechanism)
     file = file_at(path, mechanism.name, ".xml")
     write_text(file, made.text)
@@ -96,7 +96,7 @@ def _home(document: Document) -> None:
             raise CondyleError
         document.add("keyframe", "key", name="home", ctrl=efforts.effort[0])
     except CondyleError:
-        document.note("no efforts hold it at home, so there is no keyframe with them")
+        document.note("no efforts hold it at home, so the file has no keyframe")
 
 
 def write_platform(d: Document) -> None:
@@ -125,7 +125,7 @@ def write_platform(d: Document) -> None:
         if contact.friction.coefficient:
             d.note(f'contact "{contact.name}": its friction is left out')
         if contact.one_sided:
-            d.note(f'contact "{contact.name}": it cannot lift off here; only planes can be left')
+            d.note(f'contact "{contact.name}": contact loss is left out, but on planes')
 
 
 def parallel_pair(contacts: list[Contact]) -> list[Contact]:
@@ -168,8 +168,7 @@ def _stages(d: Document, contact: Contact, found: Track, last: str) -> Element:
             _joint(body, joint, freedom)
         if name != "platform":
             d.note(
-                "bodies that only guide a contact weigh nothing and have 0.1 % of the platform's "
-                "mass"
+                "bodies that only guide a contact have 0.1 % of the platform's mass and no weight"
             )
             body.set("gravcomp", "1")
             mass = RUNNER * d.mechanism.platform.mass
@@ -194,7 +193,7 @@ def _platform(d: Document, body: Element) -> None:
     d.add("asset", "mesh", name="platform", vertex=d.look.hull)
     element(body, "geom", class_="platform", type="mesh", mesh="platform")
     sites = {f"{chain.name}_platform": chain.platform for chain in d.mechanism.chains}
-    # Names may meet here, which is said where the document is written.
+    # Two names may agree here, which is reported where the document is written.
     pairs = [*sites.items(), *((f"{c.name}_contact", c.point) for c in d.mechanism.contacts)]
     for name, point in [*pairs, *platform.points.items()]:
         element(body, "site", name=name, pos=point)
@@ -381,7 +380,7 @@ def _massive(
     if not mass:
         mass = LIGHT * d.mechanism.platform.mass
         body.set("gravcomp", "1")
-        d.note("bodies without mass weigh nothing and have a millionth of the platform's")
+        d.note("massless bodies have a millionth of the platform's mass and no weight")
     least = mass * (THIN * length) ** 2
     moments = np.array(inertia, float)
     if (moments <= 0).any():

@@ -1,7 +1,7 @@
-"""The way back: a parallel mechanism of MuJoCo's world as a mechanism of ours, or a clear no.
+"""A parallel mechanism in a MuJoCo model as a mechanism of condyle, or a clear refusal.
 
-The platform is the body that most chains hold. Each way from the world to it, through bodies that
-have no other neighbours, is a chain; its joints, one after another, say which:
+The platform is the body to which most chains lead. Each limb from the world to it, through bodies
+without other neighbours, is a chain; its joints, in turn, determine its kind:
 
     ball slide ball            SPS, two hinges at one point being as good as a ball
     slide ball ball            PSS
@@ -38,7 +38,7 @@ OFF_LINE = 1e-3  # of a rod: what is nearer to its line is on it
 
 @dataclass(frozen=True)
 class ImportResult:
-    """mechanism, and notes: what of the model it does not have."""
+    """notes: what of the MuJoCo model the mechanism leaves out."""
 
     mechanism: Mechanism
     notes: tuple[str, ...]
@@ -319,13 +319,13 @@ def seat(graph: Graph, platform: int, steps: tuple[Step, ...]) -> list[dict[str,
 
 
 def real_contacts(graph: Graph, platform: int) -> list[dict[str, Any]]:
-    """Pairs of a ball of the platform and a plane of the world: one-sided contacts."""
+    """Pairs of a ball of the platform and a plane of the world: unilateral contacts."""
     m, d = graph.model, graph.data
     found = []
     for i in range(m.npair):
         kinds = {int(m.geom_type[g]): int(g) for g in (m.pair_geom1[i], m.pair_geom2[i])}
         if set(kinds) != {PLANE, SPHERE}:
-            graph.note(f"contact pair {i + 1} is not of a sphere and a plane; it is left out")
+            graph.note(f"contact pair {i + 1} is not a sphere on a plane; it is left out")
             continue
         wall, ball = kinds[PLANE], kinds[SPHERE]
         if [graph.group(int(m.geom_bodyid[g])) for g in (wall, ball)] != [WORLD, platform]:
@@ -333,7 +333,7 @@ def real_contacts(graph: Graph, platform: int) -> list[dict[str, Any]]:
         up, centre = d.geom_xmat[wall].reshape(3, 3)[:, 2], d.geom_xpos[ball]
         name = m.pair(i).name or f"contact_{i + 1}"
         if abs(up[2]) < 1e-6:
-            graph.note(f"contact {name}: an upright plane, which a mechanism file cannot have")
+            graph.note(f"contact {name}: upright planes have no equivalent; left out")
             continue
         table = {"name": name, "point": graph.point(centre), "surface": _plane(graph, up, centre)}
         table |= {"side": "above" if up[2] > 0 else "below", "one_sided": True}
@@ -390,9 +390,9 @@ def part(
     uneven = np.linalg.eigvalsh(across @ body.inertia @ across.T) - transverse
     side = body.inertia @ n - axial * n
     if off > OFF_LINE * max(abs(com), 1e-3):
-        graph.note(f"{what}: its mass centre is {off * 1e3:.3g} mm off its line; taken on it")
+        graph.note(f"{what}: its mass centre is {off * 1e3:.3g} mm off its line; moved onto it")
     if max(np.abs(uneven).max(), np.linalg.norm(side)) > 1e-3 * max(transverse, 1e-30):
-        graph.note(f"{what}: it is not symmetric about its line; taken so")
+        graph.note(f"{what}: it is not symmetric about its line; its inertia is averaged")
     return {
         "mass": body.weight if rod else body.mass,
         "com": min(max(com / length, 0.0), 1.0) if rod else max(com, 0.0),
@@ -408,7 +408,7 @@ def actuator_of(graph: Graph, step: Step, sign: float, name: str) -> dict[str, A
     table = _losses(m.dof_armature[dof], m.dof_damping[dof], m.dof_frictionloss[dof])
     drives = _drives(m, step.index, joint=True)
     if not drives:
-        graph.note(f"joint {name} has no actuator; it is taken as the driven one")
+        graph.note(f"joint {name} has no actuator; it is taken as driven")
     if (limit := _limit(m, drives, sign)) is not None:
         low, high = limit
         key = "force_limit" if step.kind == "slide" else "torque_limit"

@@ -25,7 +25,7 @@ SPACES |= {f"{of}{what}": "sensor" for of in ("joint", "tendon") for what in ("p
 
 
 class Document:
-    """A mechanism as it is written: `notes` say what is approximate, or left out."""
+    """An MJCF document; `notes` say what is approximate or left out."""
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism, self.notes = mechanism, list[str]()
@@ -67,8 +67,8 @@ class Document:
         for (space, name), count in counted.items():
             if count > 1:
                 raise UnsupportedError(
-                    f'two {space} elements would be called "{name}"; rename a chain, contact or '
-                    "landmark of the mechanism"
+                    f'two {space} elements would have the name "{name}"; rename a chain, '
+                    "contact or landmark of the mechanism"
                 )
         for node in list(self.root):
             if not len(node) and not node.attrib:
@@ -76,7 +76,7 @@ class Document:
         lines = [
             f"{self.mechanism.name}, written by condyle. SI; home is qpos0, and controls are "
             "efforts.",
-            "Joints, tendons and actuators are called as the chains; keyframe home holds it there.",
+            "Joints, tendons and actuators have the names of the chains; keyframe home is at rest.",
             *(f"Note: {note}." for note in self.notes),
         ]
         self.root.insert(0, Comment("\n" + "\n".join(lines).replace("--", "- -") + "\n"))

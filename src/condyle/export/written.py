@@ -9,9 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from ..atomic import make_folder, write_text
-from ..errors import InputError
-from ..mechanism import Mechanism, load_mechanism
-from ..model.model import Model
 
 
 class Written(list[Path]):
@@ -29,20 +26,6 @@ class Written(list[Path]):
     ) -> None:
         super().__init__(files)
         self.notes, self.data = list(dict.fromkeys(notes)), dict(data or {})
-
-
-def mechanism_of(given: Model | Mechanism | str | os.PathLike[str]) -> Mechanism:
-    """The mechanism of a model, a mechanism itself, or one by its file or name."""
-    if isinstance(given, Model):
-        return given.mechanism
-    if isinstance(given, Mechanism):
-        return given
-    if isinstance(given, str | os.PathLike):
-        return load_mechanism(os.fspath(given))
-    raise InputError(
-        "model: expected a model, a mechanism, its file, or the name of a bundled one, got "
-        f"{type(given).__name__}"
-    )
 
 
 def file_at(path: str | os.PathLike[str], name: str, suffix: str) -> Path:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...mechanism import load_mechanism
+from ...mechanism import as_mechanism
 from ...mechanism.home import independent_coordinates
 from ...mechanism.mechanism import Mechanism
 from ...model.distributing import reference_force
@@ -110,10 +110,7 @@ def prepared(
     Args:   mechanism, motions, load: instead of those that the study names.
     Raises: InputError and others of the library, before any variant is solved.
     """
-    if isinstance(mechanism, Mechanism):
-        machine = mechanism
-    else:
-        machine = load_mechanism(study.mechanism or DEFAULT if mechanism is None else mechanism)
+    machine = as_mechanism(study.mechanism or DEFAULT if mechanism is None else mechanism)
     base = tuple(_numbers(study, machine))
     design = Design(study.vary, study.sampling, base)
     design.check()
