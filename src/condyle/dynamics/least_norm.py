@@ -36,12 +36,7 @@ def normal_equations(total: Total, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
              `CONDITIONED` times its column's square, or the bound above, summed over the
              right-hand sides, does not hold.
     """
-    m = b.shape[0]
-    pairs = [(j, k) for j in range(m) for k in range(j, m)]
-    products = total([ca.vertcat(*(a[j] * a[k] for j, k in pairs)) for a in A])
-    G = ca.SX(m, m)
-    for (j, k), product in zip(pairs, ca.vertsplit(products), strict=True):
-        G[j, k] = G[k, j] = product
+    m, G = b.shape[0], gram(total, A, A)
     lengths = ca.diag(G)
     y, excess = definite_solve(G, b, lengths)
     terms = ca.dot(lengths, ca.sum2(y * y))
@@ -51,6 +46,17 @@ def normal_equations(total: Total, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
         least = ca.fmin(least, value)
     # Compared separately, since backends treat NaN differently in a minimum.
     return [a.T @ y for a in A], 2 * (least >= 0) * (spare >= 0) - 1
+
+
+def gram(total: Total, A: Lanes, B: Lanes) -> ca.SX:
+    """The sum of a b^T over all chains, (m, m), where it is symmetric."""
+    m = A[0].numel()
+    pairs = [(j, k) for j in range(m) for k in range(j, m)]
+    found = total([ca.vertcat(*(a[j] * b[k] for j, k in pairs)) for a, b in zip(A, B, strict=True)])
+    G = ca.SX(m, m)
+    for at, (j, k) in enumerate(pairs):
+        G[j, k] = G[k, j] = found[at]
+    return G
 
 
 def definite_solve(

@@ -19,32 +19,74 @@ Value = int  # a node's number
 
 
 class Algebra(Protocol):
-    """What derivatives are written with: a graph."""
+    """A graph, as derivatives see it."""
 
     def apply(self, op: str, *args: Value) -> Value: ...
 
     def const(self, value: float) -> Value: ...
 
 
-Partials = Callable[[Algebra, Value, Sequence[Value]], Sequence[Value | None]]
+@dataclass(frozen=True)
+class Term:
+    """A value of a graph with operators, to write derivatives with."""
+
+    graph: Algebra
+    value: Value
+
+    def of(self, op: str, *others: Any) -> Term:
+        """An operation on this value and others, terms or numbers."""
+        return Term(self.graph, self.graph.apply(op, *(self._read(x) for x in (self, *others))))
+
+    def _read(self, x: Any) -> Value:
+        return x.value if isinstance(x, Term) else self.graph.const(x)
+
+    def __add__(self, x: Any) -> Term:
+        return self.of("add", x)
+
+    def __sub__(self, x: Any) -> Term:
+        return self.of("sub", x)
+
+    def __mul__(self, x: Any) -> Term:
+        return self.of("mul", x)
+
+    def __neg__(self) -> Term:
+        return self.of("neg")
+
+    def __radd__(self, x: float) -> Term:
+        return Term(self.graph, self.graph.const(x)).of("add", self)
+
+    def __rsub__(self, x: float) -> Term:
+        return Term(self.graph, self.graph.const(x)).of("sub", self)
+
+    def __rmul__(self, x: float) -> Term:
+        return Term(self.graph, self.graph.const(x)).of("mul", self)
+
+    def inverse(self) -> Term:
+        """1 / x."""
+        return Term(self.graph, self.graph.const(1.0)).of("div", self)
+
+    def __getattr__(self, op: str) -> Callable[[], Term]:
+        if op not in OPERATIONS:
+            raise AttributeError(op)
+        return lambda: self.of(op)
 
 
 @dataclass(frozen=True)
 class Operation:
     """One operation.
 
-    casadi:   its number there, None for what is made of others on the way.
-    numpy:    the same on arrays.
-    partials: (graph, value, arguments) -> the derivative in each argument; None where it is zero
-              but at jumps.
-    infix:    C's sign for it; without one it is a function of its name.
-    latency:  cycles from arguments to value.
+    casadi:  its number there, None if only `fuse` makes it.
+    numpy:   the same on arrays.
+    slopes:  (value, *arguments) -> the derivative in each argument, None where it vanishes but at
+             jumps; None: in all.
+    infix:   C's sign for it; without one it is a function of its name.
+    latency: cycles from arguments to value.
     """
 
     name: str
     casadi: int | None
     numpy: Callable[..., Any]
-    partials: Partials
+    slopes: Callable[..., tuple[Any, ...]] | None = None
     infix: str | None = None
     latency: int = 4
 
@@ -56,125 +98,47 @@ class Operation:
         function = self.numpy
         return lambda *args, out: np.copyto(out, function(*args))
 
-
-def _flat(count: int) -> Partials:
-    return lambda g, v, x: [None] * count
-
-
-def _square_below(g: Algebra, a: Value, sign: str) -> Value:
-    """1 - a^2 or 1 + a^2."""
-    return g.apply(sign, g.const(1.0), g.apply("mul", a, a))
-
-
-def _inverse(g: Algebra, a: Value) -> Value:
-    return g.apply("div", g.const(1.0), a)
+    def partials(self, g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
+        """The derivative of value v in each of its arguments x."""
+        if self.slopes is None:
+            return [None] * len(x)
+        value = Term(g, v)
+        found = self.slopes(value, *(Term(g, a) for a in x))
+        return [None if f is None else value._read(f) for f in found]
 
 
-def _scaled(g: Algebra, a: Value, factor: float) -> Value:
-    return g.apply("mul", g.const(factor), a)
+def _quotient(v: Term, a: Term, b: Term) -> tuple[Term, Term]:
+    inverse = b.inverse()
+    return inverse, -(v * inverse)
 
 
-def _product(*names: str) -> Partials:
-    """Derivative of a function of one argument, as a product of functions of that argument."""
-
-    def partials(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
-        total = g.const(1.0)
-        for name in names:
-            total = g.apply("mul", total, g.apply(name, x[0]))
-        return [total]
-
-    return partials
+def _angle(v: Term, a: Term, b: Term) -> tuple[Term, Term]:
+    inverse = (a * a + b * b).inverse()
+    return b * inverse, -(a * inverse)
 
 
-def _root(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
-    return [_scaled(g, _inverse(g, v), 0.5)]
+def _chosen(first: Callable[[Term, Term], Term]) -> Callable[..., tuple[Term, Term]]:
+    """Of a minimum or maximum: 1 for the argument that is taken, else 0."""
+
+    def slopes(v: Term, a: Term, b: Term) -> tuple[Term, Term]:
+        taken = first(a, b)
+        return taken, 1.0 - taken
+
+    return slopes
 
 
-def _arc(sign: str, negative: bool = False) -> Partials:
-    """+-1 / sqrt(1 -+ a^2)."""
-
-    def partials(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
-        slope = _inverse(g, g.apply("sqrt", _square_below(g, x[0], sign)))
-        return [g.apply("neg", slope) if negative else slope]
-
-    return partials
+def _hypotenuse(v: Term, a: Term, b: Term) -> tuple[Term, Term]:
+    inverse = v.inverse()
+    return a * inverse, b * inverse
 
 
-def _acosh(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
-    below = g.apply("sub", g.apply("mul", x[0], x[0]), g.const(1.0))
-    return [_inverse(g, g.apply("sqrt", below))]
+def _remainder(v: Term, a: Term, b: Term) -> tuple[float, Term]:
+    """a - k b with an integer k = (a - v) / b."""
+    return 1.0, -(a - v).of("div", b)
 
 
-def _rational(sign: str) -> Partials:
-    return lambda g, v, x: [_inverse(g, _square_below(g, x[0], sign))]
-
-
-def _erf(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
-    bell = g.apply("exp", g.apply("neg", g.apply("mul", x[0], x[0])))
-    return [_scaled(g, bell, 2 / math.sqrt(math.pi))]
-
-
-def _power(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
-    a, b = x
-    lower = g.apply("pow", a, g.apply("sub", b, g.const(1.0)))
-    return [g.apply("mul", b, lower), g.apply("mul", v, g.apply("log", a))]
-
-
-def _quotient(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
-    inverse = _inverse(g, x[1])
-    return [inverse, g.apply("neg", g.apply("mul", v, inverse))]
-
-
-def _angle(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
-    square = g.apply("add", g.apply("mul", x[0], x[0]), g.apply("mul", x[1], x[1]))
-    inverse = _inverse(g, square)
-    return [g.apply("mul", x[1], inverse), g.apply("neg", g.apply("mul", x[0], inverse))]
-
-
-def _either(first: str) -> Partials:
-    """Of a minimum or maximum: one where the argument is taken, else nothing."""
-
-    def partials(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
-        taken = g.apply("le", *(x if first == "a" else x[::-1]))
-        return [taken, g.apply("sub", g.const(1.0), taken)]
-
-    return partials
-
-
-def _size(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
-    return [g.apply("sign", x[0])]
-
-
-def _hypotenuse(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
-    inverse = _inverse(g, v)
-    return [g.apply("mul", a, inverse) for a in x]
-
-
-def _copied_sign(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
-    same = g.apply("mul", g.apply("sign", x[0]), g.apply("copysign", g.const(1.0), x[1]))
-    return [same, None]
-
-
-def _remaining(name: str) -> Partials:
-    """a - k b with a whole k: (a - value) / b."""
-
-    def partials(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
-        k = g.apply("div", g.apply("sub", x[0], v), x[1])
-        return [g.const(1.0), g.apply("neg", k)]
-
-    return partials
-
-
-def _where(g: Algebra, v: Value, x: Sequence[Value]) -> list[Value | None]:
-    return [None, g.apply("where", x[0], g.const(1.0))]
-
-
-def _fused(sign: float) -> Partials:
-    return lambda g, v, x: [
-        x[1] if sign > 0 else g.apply("neg", x[1]),
-        x[0] if sign > 0 else g.apply("neg", x[0]),
-        g.const(1.0),
-    ]
+def _copied_sign(v: Term, a: Term, b: Term) -> tuple[Term, None]:
+    return a.sign() * Term(a.graph, a.graph.const(1.0)).of("copysign", b), None
 
 
 def _truth(compare: Callable[..., Any]) -> Callable[..., Any]:
@@ -188,69 +152,62 @@ def _erf_of(a: Any) -> Any:
 
 
 _ROWS = (
-    Operation("add", ca.OP_ADD, np.add, lambda g, v, x: [g.const(1.0), g.const(1.0)], "+"),
-    Operation("sub", ca.OP_SUB, np.subtract, lambda g, v, x: [g.const(1.0), g.const(-1.0)], "-"),
-    Operation("mul", ca.OP_MUL, np.multiply, lambda g, v, x: [x[1], x[0]], "*"),
+    Operation("add", ca.OP_ADD, np.add, lambda v, a, b: (1.0, 1.0), "+"),
+    Operation("sub", ca.OP_SUB, np.subtract, lambda v, a, b: (1.0, -1.0), "-"),
+    Operation("mul", ca.OP_MUL, np.multiply, lambda v, a, b: (b, a), "*"),
     Operation("div", ca.OP_DIV, np.divide, _quotient, "/", latency=14),
-    Operation("neg", ca.OP_NEG, np.negative, lambda g, v, x: [g.const(-1.0)]),
+    Operation("neg", ca.OP_NEG, np.negative, lambda v, a: (-1.0,)),
     # A product in a sum, c + a b and c - a b: made by `fuse`.
-    Operation("fma", None, lambda a, b, c: c + a * b, _fused(1.0)),
-    Operation("fnma", None, lambda a, b, c: c - a * b, _fused(-1.0)),
-    Operation("sqrt", ca.OP_SQRT, np.sqrt, _root, latency=18),
-    Operation("sin", ca.OP_SIN, np.sin, _product("cos"), latency=40),
-    Operation(
-        "cos",
-        ca.OP_COS,
-        np.cos,
-        lambda g, v, x: [g.apply("neg", g.apply("sin", x[0]))],
-        latency=40,
-    ),
+    Operation("fma", None, lambda a, b, c: c + a * b, lambda v, a, b, c: (b, a, 1.0)),
+    Operation("fnma", None, lambda a, b, c: c - a * b, lambda v, a, b, c: (-b, -a, 1.0)),
+    Operation("sqrt", ca.OP_SQRT, np.sqrt, lambda v, a: (0.5 * v.inverse(),), latency=18),
+    Operation("sin", ca.OP_SIN, np.sin, lambda v, a: (a.cos(),), latency=40),
+    Operation("cos", ca.OP_COS, np.cos, lambda v, a: (-a.sin(),), latency=40),
     Operation("atan2", ca.OP_ATAN2, np.arctan2, _angle, latency=80),
-    Operation("fabs", ca.OP_FABS, np.abs, _size),
-    # As C's comparison has it: the second argument where either is no number.
-    Operation("fmin", ca.OP_FMIN, lambda a, b: np.where(a < b, a, b), _either("a")),
-    Operation("fmax", ca.OP_FMAX, lambda a, b: np.where(a > b, a, b), _either("b")),
-    Operation("le", ca.OP_LE, _truth(np.less_equal), _flat(2)),
-    Operation("lt", ca.OP_LT, _truth(np.less), _flat(2)),
-    Operation("eq", ca.OP_EQ, _truth(np.equal), _flat(2)),
-    Operation("ne", ca.OP_NE, _truth(np.not_equal), _flat(2)),
-    Operation("and", ca.OP_AND, _truth(np.logical_and), _flat(2)),
-    Operation("or", ca.OP_OR, _truth(np.logical_or), _flat(2)),
-    Operation("not", ca.OP_NOT, lambda a: np.logical_not(a).astype(float), _flat(1)),
-    Operation("where", ca.OP_IF_ELSE_ZERO, lambda a, b: np.where(a != 0, b, 0.0), _where),
-    Operation("sign", ca.OP_SIGN, np.sign, _flat(1)),
-    Operation("floor", ca.OP_FLOOR, np.floor, _flat(1)),
-    Operation("ceil", ca.OP_CEIL, np.ceil, _flat(1)),
-    Operation("fmod", ca.OP_FMOD, np.fmod, _remaining("fmod")),
+    Operation("fabs", ca.OP_FABS, np.abs, lambda v, a: (a.sign(),)),
+    # As in C: the second argument where either is NaN.
     Operation(
-        "remainder",
-        ca.OP_REMAINDER,
-        lambda a, b: a - b * np.rint(a / b),
-        _remaining("remainder"),
+        "fmin", ca.OP_FMIN, lambda a, b: np.where(a < b, a, b), _chosen(lambda a, b: a.of("le", b))
     ),
+    Operation(
+        "fmax", ca.OP_FMAX, lambda a, b: np.where(a > b, a, b), _chosen(lambda a, b: b.of("le", a))
+    ),
+    Operation("le", ca.OP_LE, _truth(np.less_equal)),
+    Operation("lt", ca.OP_LT, _truth(np.less)),
+    Operation("eq", ca.OP_EQ, _truth(np.equal)),
+    Operation("ne", ca.OP_NE, _truth(np.not_equal)),
+    Operation("and", ca.OP_AND, _truth(np.logical_and)),
+    Operation("or", ca.OP_OR, _truth(np.logical_or)),
+    Operation("not", ca.OP_NOT, lambda a: np.logical_not(a).astype(float)),
+    Operation(
+        "where",
+        ca.OP_IF_ELSE_ZERO,
+        lambda a, b: np.where(a != 0, b, 0.0),
+        lambda v, a, b: (None, a.of("where", 1.0)),
+    ),
+    Operation("sign", ca.OP_SIGN, np.sign),
+    Operation("floor", ca.OP_FLOOR, np.floor),
+    Operation("ceil", ca.OP_CEIL, np.ceil),
+    Operation("fmod", ca.OP_FMOD, np.fmod, _remainder),
+    Operation("remainder", ca.OP_REMAINDER, lambda a, b: a - b * np.rint(a / b), _remainder),
     Operation("copysign", ca.OP_COPYSIGN, np.copysign, _copied_sign),
     Operation("hypot", ca.OP_HYPOT, np.hypot, _hypotenuse),
-    Operation("pow", ca.OP_POW, np.power, _power),
-    Operation("exp", ca.OP_EXP, np.exp, lambda g, v, x: [v]),
-    Operation("expm1", ca.OP_EXPM1, np.expm1, _product("exp")),
-    Operation("log", ca.OP_LOG, np.log, lambda g, v, x: [_inverse(g, x[0])]),
-    Operation(
-        "log1p",
-        ca.OP_LOG1P,
-        np.log1p,
-        lambda g, v, x: [_inverse(g, g.apply("add", g.const(1.0), x[0]))],
-    ),
-    Operation("tan", ca.OP_TAN, np.tan, lambda g, v, x: [_square_below(g, v, "add")]),
-    Operation("asin", ca.OP_ASIN, np.arcsin, _arc("sub")),
-    Operation("acos", ca.OP_ACOS, np.arccos, _arc("sub", negative=True)),
-    Operation("atan", ca.OP_ATAN, np.arctan, _rational("add")),
-    Operation("sinh", ca.OP_SINH, np.sinh, _product("cosh")),
-    Operation("cosh", ca.OP_COSH, np.cosh, _product("sinh")),
-    Operation("tanh", ca.OP_TANH, np.tanh, lambda g, v, x: [_square_below(g, v, "sub")]),
-    Operation("asinh", ca.OP_ASINH, np.arcsinh, _arc("add")),
-    Operation("acosh", ca.OP_ACOSH, np.arccosh, _acosh),
-    Operation("atanh", ca.OP_ATANH, np.arctanh, _rational("sub")),
-    Operation("erf", ca.OP_ERF, _erf_of, _erf),
+    Operation("pow", ca.OP_POW, np.power, lambda v, a, b: (b * a.of("pow", b - 1.0), v * a.log())),
+    Operation("exp", ca.OP_EXP, np.exp, lambda v, a: (v,)),
+    Operation("expm1", ca.OP_EXPM1, np.expm1, lambda v, a: (a.exp(),)),
+    Operation("log", ca.OP_LOG, np.log, lambda v, a: (a.inverse(),)),
+    Operation("log1p", ca.OP_LOG1P, np.log1p, lambda v, a: ((1.0 + a).inverse(),)),
+    Operation("tan", ca.OP_TAN, np.tan, lambda v, a: (1.0 + v * v,)),
+    Operation("asin", ca.OP_ASIN, np.arcsin, lambda v, a: ((1.0 - a * a).sqrt().inverse(),)),
+    Operation("acos", ca.OP_ACOS, np.arccos, lambda v, a: (-(1.0 - a * a).sqrt().inverse(),)),
+    Operation("atan", ca.OP_ATAN, np.arctan, lambda v, a: ((1.0 + a * a).inverse(),)),
+    Operation("sinh", ca.OP_SINH, np.sinh, lambda v, a: (a.cosh(),)),
+    Operation("cosh", ca.OP_COSH, np.cosh, lambda v, a: (a.sinh(),)),
+    Operation("tanh", ca.OP_TANH, np.tanh, lambda v, a: (1.0 - v * v,)),
+    Operation("asinh", ca.OP_ASINH, np.arcsinh, lambda v, a: ((1.0 + a * a).sqrt().inverse(),)),
+    Operation("acosh", ca.OP_ACOSH, np.arccosh, lambda v, a: ((a * a - 1.0).sqrt().inverse(),)),
+    Operation("atanh", ca.OP_ATANH, np.arctanh, lambda v, a: ((1.0 - a * a).inverse(),)),
+    Operation("erf", ca.OP_ERF, _erf_of, lambda v, a: (2 / math.sqrt(math.pi) * (-(a * a)).exp(),)),
 )
 OPERATIONS = {row.name: row for row in _ROWS}
 BY_CASADI: dict[int, str] = {r.casadi: r.name for r in _ROWS if r.casadi is not None}

@@ -9,7 +9,7 @@ columns of the dependent and the independent coordinates,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -162,6 +162,14 @@ def solve_small(A: ca.SX, b: ca.SX) -> ca.SX:
     x[columns, :] = rest
     x[j, :] = b[i, :] - A[i, columns] @ rest
     return x
+
+
+def all_of(conditions: Iterable[ca.SX]) -> ca.SX:
+    """1 where all conditions hold, else 0; comparisons with NaN do not hold."""
+    found = ca.SX(1)
+    for condition in conditions:
+        found = found * condition
+    return found
 
 
 def determinant(A: ca.SX) -> ca.SX:

@@ -18,6 +18,7 @@ from .constraints import (
     ContactFrame,
     ContactSymbols,
     Placement,
+    all_of,
     contact_frame,
     determinant,
     indices,
@@ -118,10 +119,7 @@ def followed(contacts: Sequence[ContactSymbols], dep: list[int], q: ca.SX) -> Pl
     phi = _phi([c.along_path(1.0) for c in contacts], pose)
     sure.append(unit.square(solve_small(last.C, phi), dep) < CLOSED**2)
     sure.append(pose.square(unit) < plan.far**2)
-    discriminant = ca.SX(1)
-    for condition in sure:  # 0 and 1: no comparison with what is no number holds
-        discriminant = discriminant * condition
-    return Placement(pose.position, pose.bryant, discriminant, iterated=True)
+    return Placement(pose.position, pose.bryant, all_of(sure), iterated=True)
 
 
 @dataclass(frozen=True)

@@ -76,22 +76,14 @@ class State:
         )
 
 
-def pose_state(pose: ca.SX, rate: ca.SX, acceleration: ca.SX) -> State:
-    """State in the six coordinates X_EE (route `core`)."""
+def pose_state(pose: ca.SX, rate: ca.SX, acceleration: ca.SX, q: ca.SX | None = None) -> State:
+    """State in X_EE (route `core`), or in q with the closed form pose(q) (route `direct`)."""
     bryant = Bryant.of(pose[3:])
-    B = bryant.twist_jacobian()
+    E, c = bryant.twist_jacobian(), pose if q is None else q
+    B = E if q is None else E @ ca.jacobian(pose, q)
     twist = B @ rate
-    twist_rate = B @ acceleration + ca.jtimes(twist, pose, rate)
-    return State(rate, acceleration, pose, bryant.rotation(), twist, twist_rate, B, pose)
-
-
-def independent_state(q: ca.SX, rate: ca.SX, acceleration: ca.SX, pose: ca.SX) -> State:
-    """State in the independent coordinates, from the closed form pose(q) (route `direct`)."""
-    bryant = Bryant.of(pose[3:])
-    B = bryant.twist_jacobian() @ ca.jacobian(pose, q)
-    twist = B @ rate
-    twist_rate = B @ acceleration + ca.jtimes(twist, q, rate)
-    return State(rate, acceleration, pose, bryant.rotation(), twist, twist_rate, B, q)
+    twist_rate = B @ acceleration + ca.jtimes(twist, c, rate)
+    return State(rate, acceleration, pose, bryant.rotation(), twist, twist_rate, B, c)
 
 
 def twist_state(pose: ca.SX, R: ca.SX, twist: ca.SX, twist_rate: ca.SX) -> State:

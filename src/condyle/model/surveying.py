@@ -9,8 +9,8 @@ import numpy as np
 
 from ..backends.kernel import AGAIN, Answer
 from ..kinematics.singularities import SINGULAR, ratio
+from ..questions.configuration import SURVEYED
 from ..questions.platform import CERTAIN
-from ..questions.survey import SURVEYED
 from ..status import Status
 
 Arrays = dict[str, np.ndarray]

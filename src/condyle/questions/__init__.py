@@ -1,4 +1,4 @@
-"""What can be asked: each question once, as expressions over chains as lanes.
+"""The questions: each written once, as expressions with the chains as lanes.
 
 A question is a function of a mechanism's structure that returns the graph of its answer; a new one
 is a file that registers its name.
@@ -19,7 +19,7 @@ from typing import Any
 from ..graph.program import Program, Variants
 from .structure import Structure
 
-# Name -> the file in this folder that writes it, or the function itself if it is from outside.
+# Name -> its file in this folder, or the function itself if it is a user's.
 QUESTIONS: dict[str, str | Callable[..., Program | Variants]] = {
     "allocation": "allocation",
     "inverse": "inverse",
@@ -33,7 +33,7 @@ QUESTIONS: dict[str, str | Callable[..., Program | Variants]] = {
     "closure": "closure",
     "conditions": "closure",
     "configuration": "configuration",
-    "survey": "survey",
+    "survey": "configuration",
     "encoders": "pose",
     "pose": "pose",
     "instant": "instant",
@@ -48,14 +48,14 @@ QUESTIONS: dict[str, str | Callable[..., Program | Variants]] = {
 
 
 def written(name: str) -> Callable[..., Program | Variants]:
-    """The function that writes a question; its file opens when it is first wanted."""
+    """The function of a question; its file is imported on first use."""
     home = QUESTIONS[name]
     return getattr(import_module(f".{home}", __name__), name) if isinstance(home, str) else home
 
 
-# What shapes a graph: the rooms that a question is written in.
+# The rooms whose code shapes a graph.
 SOURCES = ("mechanism", "kinematics", "dynamics", "graph", "questions")
-# Questions that formulation and route make no difference to.
+# Questions that do not depend on formulation and route.
 GEOMETRY = (
     "allocation",
     "motion",
@@ -77,7 +77,7 @@ GEOMETRY = (
 class Question:
     """A question about a structure, not yet written out.
 
-    details: what it takes besides, such as the outputs that are wanted.
+    details: its other arguments, such as the requested outputs.
     """
 
     name: str
@@ -92,10 +92,10 @@ class Question:
 
     @property
     def key(self) -> str:
-        """A text of everything that shapes the answer's graph."""
+        """A text that identifies the answer's graph."""
         s = self.structure
-        told = replace(s, zeros=frozenset()), sorted(s.zeros)
-        known = repr((self.name, told, self.details, _casadi(), _sources()))
+        shape = replace(s, zeros=frozenset()), sorted(s.zeros)
+        known = repr((self.name, shape, self.details, _casadi(), _sources()))
         return known + (self.variants().digest if _foreign(self.details) else "")
 
     def variants(self) -> Variants:
@@ -105,7 +105,7 @@ class Question:
 
 
 def _foreign(details: Any) -> bool:
-    """Whether a law or a load from outside is among them, whose code is not in the rooms."""
+    """Whether a law or a load of a user is among them, whose code is not in the rooms."""
     if isinstance(details, tuple):
         return any(map(_foreign, details))
     return isinstance(details, type) and not details.__module__.startswith(f"{__package__}.")

@@ -1,19 +1,19 @@
-"""Efforts within limits: the least of a separable objective that balances a force.
+"""Efforts within limits: a separable objective minimised subject to the force balance.
 
-    least sum_i f(x_i) + W |lambda|^2 / 2   with   Q = J^T effort + D lambda,   effort = scale x,
-    low <= effort <= high,   contact_low <= lambda <= contact_high
+    min sum_i f(x_i) + W |lambda|^2 / 2   subject to   Q = J^T effort + D lambda,
+    effort = scale x,   low <= effort <= high,   contact_low <= lambda <= contact_high
 
-Reflections eliminate the contacts, which leaves G x + (0, lambda) = right. With multipliers
-u = (v, s) an effort answers to its price g_i = G_i . u by the least of f(x) - g x within its
-limits, and the best multipliers are where
+Householder reflections eliminate the contacts, which leaves G x + (0, lambda) = right. With
+multipliers u = (v, s) of these equations and g_i = G_i . u, every effort minimises f(x) - g x
+within its limits, and the dual
 
     d(u) = right . u - sum_i f*(G_i . u) - sum_k h*(s_k)
 
-is greatest: concave in six unknowns, however many efforts there are. Newton's method climbs it, its
-steps shortened or stretched by the slope of d along them. At its top the gradient vanishes, that
-is, the equations are met; efforts keep limits and conditions of optimality by construction. A
-contact force without a weight, W = 0, allows its multiplier one sign only, or 0 where it has no
-bound: such multipliers are held at 0 until the force would leave its bounds.
+is concave in six unknowns, whatever the number of efforts. Newton's method with a line search
+maximises it. At the maximum the gradient vanishes, that is, the equations hold; limits and
+conditions of optimality hold by construction. A contact force without a weight, W = 0, allows its
+multiplier one sign only, or 0 where it has no bound: such multipliers are held at 0 until the
+force would leave its bounds.
 """
 
 from __future__ import annotations
@@ -23,32 +23,34 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from ..dynamics.least_norm import gram
 from ..graph.program import Program
+from ..kinematics.constraints import all_of
 from .builder import Builder, Lanes
 from .structure import Structure
 
-REGULAR = 1e-10  # square of the sine between contacts below which digits are lost
-CONDITIONED = 1e-6  # least pivot of the efforts' equations, of its diagonal
-FLAT = 1e-13  # a pivot below this part of its full size stands for a direction without curvature
-ROUNDING = 1e-13  # of the terms of a sum
-FARKAS = 1e-9  # of its terms, by which a proof that there are no efforts must hold
-TIE = 1e-12  # of a value: patterns of friction nearer than this are equal, and the first counts
-ENOUGH = 0.1  # part of the first slope that may be left at the end of a step
-SOFT = 1e-12  # curvature of a cube at 0, of the efforts: less than a certificate shows
-HUGE = 1e290  # more is infinite
-TURNS = 3  # of Newton's method, a call of the question
-PROBES = 2  # of the slope along a step
+REGULAR = 1e-10  # minimum squared sine between contacts
+CONDITIONED = 1e-6  # minimum pivot of the efforts' equations, over its diagonal
+FLAT = 1e-13  # relative pivot below which a direction has no curvature
+ROUNDING = 1e-13  # relative to the terms of a sum
+FARKAS = 1e-9  # relative margin of a certificate of infeasibility
+TIE = 1e-12  # relative difference below which sign patterns are equal, and the first counts
+ENOUGH = 0.1  # slope at the end of a line search, over its first
+SOFT = 1e-12  # curvature of a cube at 0, over the efforts: below the certificate
+HUGE = 1e290  # counts as infinite
+TURNS = 3  # Newton steps in a call of the question
+PROBES = 2  # slopes evaluated in a line search
 
 
 @dataclass(frozen=True)
 class Term:
     """One term f of an objective.
 
-    answer:  (g, low, high, soft) -> x, the least of f(x) - g x in [low, high].
+    answer:  (g, low, high, soft) -> x that minimises f(x) - g x in [low, high].
     yields:  (x, soft) -> dx / dg between the limits.
     value:   f(x).
-    degree:  of the price in efforts, by which multipliers of squares are scaled.
-    turns:   Newton's steps that nearly all samples need at most.
+    degree:  of g in the efforts, by which multipliers of squares are scaled.
+    turns:   Newton steps that suffice for nearly all samples.
     """
 
     answer: Callable[[ca.SX, ca.SX, ca.SX, ca.SX], ca.SX]
@@ -64,8 +66,8 @@ def _clipped(x: ca.SX, low: ca.SX, high: ca.SX) -> ca.SX:
 
 def _root(g: ca.SX, low: ca.SX, high: ca.SX, soft: ca.SX) -> ca.SX:
     """The root of x^2 + soft x = g without cancellation."""
-    price = ca.fmax(g, 0)
-    return _clipped(price / (soft / 2 + ca.sqrt(soft * soft / 4 + price)), low, high)
+    g = ca.fmax(g, 0)
+    return _clipped(g / (soft / 2 + ca.sqrt(soft * soft / 4 + g)), low, high)
 
 
 TERMS = {
@@ -82,8 +84,7 @@ TERMS = {
 
 @dataclass(frozen=True)
 class Limits:
-    """Bounds of efforts (lanes) and of contact forces (k,); what efforts are measured by, lanes;
-    W, None where contact forces have no weight."""
+    """Bounds of efforts (lanes) and contact forces (k,); scale of efforts, lanes; W or None."""
 
     low: Lanes
     high: Lanes
@@ -105,7 +106,7 @@ class Limits:
         return Limits(low, high, scale, least, most, b.sample("weight", 1) if weighs else None)
 
     def signed(self, sigma: ca.SX) -> Limits:
-        """Contact forces of these signs, or 0, besides; 0 for any sign."""
+        """With contact forces restricted to these signs, or 0; sigma = 0 for any sign."""
         low = ca.if_else(sigma > 0, ca.fmax(self.contact_low, 0), self.contact_low)
         high = ca.if_else(sigma < 0, ca.fmin(self.contact_high, 0), self.contact_high)
         return Limits(self.low, self.high, self.scale, low, high, self.weight)
@@ -115,8 +116,8 @@ class Limits:
 class Allocated:
     """Efforts (lanes), contact forces (k,), and the value of the objective.
 
-    sure: 1 where they are proved to be the least, else 0;  none: 1 where it is proved that there
-    are none, else 0;  residual: what the equations miss, of their terms;  multipliers: (6,).
+    sure: 1 where optimality is proved, else 0;  none: 1 where infeasibility is proved, else 0;
+    residual: of the equations, relative to their terms;  multipliers: (6,).
     """
 
     effort: Lanes
@@ -141,7 +142,7 @@ def allocate(
     """Efforts and contact forces that balance Q, (6,).
 
     Args: J: rows of the actuator Jacobian, (6,) a group;  D: wrenches of unit forces, (6, k).
-          turns: Newton's steps;  before: multipliers to begin with, (6,), where the second is 1.
+          turns: Newton steps;  before: initial multipliers, (6,), used where the second is 1.
     """
     r = _reduced(b, Q, J, D, limits)
     u, quality = _start(b, r, term)
@@ -155,11 +156,8 @@ def allocate(
     value = b.total([term.value(x) for x in here.x])
     if limits.weight is not None:
         value += limits.weight * ca.sumsqr(force) / 2
-    possible = ca.SX(1)
-    for low, high in zip(
-        *map(ca.vertsplit, (limits.contact_low, limits.contact_high)), strict=True
-    ):
-        possible *= low <= high
+    bounds = map(ca.vertsplit, (limits.contact_low, limits.contact_high))
+    possible = all_of(low <= high for low, high in zip(*bounds, strict=True))
     sure = possible * r.regular * (quality > CONDITIONED) * here.met
     none = r.regular * (1 - (1 - _empty(b, r, here.u)) * (1 - _empty(b, r, change)))
     none = 1 - possible * (1 - none * (1 - here.met))
@@ -176,7 +174,7 @@ def least_pattern(
     limits: Limits,
     term: Term,
 ) -> Allocated:
-    """The least of all signs that contact forces with friction can have.
+    """The minimum over sign patterns of the contact forces with friction.
 
     Args: contacts: N and T, (6, k) each: D = N - sigma T;  patterns: sigma, (k,) each.
     """
@@ -206,10 +204,10 @@ def least_pattern(
 
 
 def allocation(structure: Structure, term: str = "square", weighs: bool = False) -> Program:
-    """From the balance itself, with signs of contact forces given: a question of numbers alone.
+    """From the force balance itself, with given signs of contact forces; no mechanism is needed.
 
-    It takes `TURNS` steps from the multipliers that it is given, if it is `begun`: what it neither
-    proves nor disproves goes on with those that it gives.
+    `TURNS` Newton steps from the port multipliers, if `begun`. Samples that it neither proves nor
+    disproves are continued with the multipliers that it returns.
     """
     b = Builder(structure)
     k = len(structure.contacts)
@@ -238,7 +236,7 @@ def allocation(structure: Structure, term: str = "square", weighs: bool = False)
 class _Reduced:
     """G x + (0, lambda) = right: m rows of efforts alone, then those that give lambda.
 
-    steepest: greatest |G| of every row;  soft: curvature that a term has besides.
+    max_gain: largest |G| of every row;  soft: additional curvature of a term.
     """
 
     G: Lanes
@@ -246,7 +244,7 @@ class _Reduced:
     low: Lanes
     high: Lanes
     limits: Limits
-    steepest: ca.SX
+    max_gain: ca.SX
     soft: ca.SX
     typical: ca.SX
     regular: ca.SX
@@ -292,7 +290,7 @@ def _reduced(b: Builder, Q: ca.SX, J: Lanes, D: ca.SX, limits: Limits) -> _Reduc
         _cut(b, [a / s for a, s in zip(own, limits.scale, strict=True)])
         for own in (limits.low, limits.high)
     )
-    steepest = -b.least([-ca.fabs(x) for x in lanes])
+    max_gain = -b.least([-ca.fabs(x) for x in lanes])
     sizes = b.total([ca.fabs(x[: 6 - k]) for x in lanes])
     typical = ca.SX(0)
     for i in range(6 - k):
@@ -300,7 +298,7 @@ def _reduced(b: Builder, Q: ca.SX, J: Lanes, D: ca.SX, limits: Limits) -> _Reduc
         typical = ca.fmax(typical, own)
     typical = b.cut(ca.if_else(typical > 0, typical, 1))
     soft = SOFT * typical
-    return _Reduced(lanes, right, low, high, limits, steepest, soft, typical, regular)
+    return _Reduced(lanes, right, low, high, limits, max_gain, soft, typical, regular)
 
 
 def _cut(b: Builder, lanes: Sequence[ca.SX]) -> Lanes:
@@ -309,11 +307,10 @@ def _cut(b: Builder, lanes: Sequence[ca.SX]) -> Lanes:
 
 @dataclass(frozen=True)
 class _Point:
-    """Efforts at multipliers u, contact forces, and what the equations then miss.
+    """Efforts and contact forces at multipliers u, and the gradient of the dual.
 
-    inside: 1 where an effort is between its limits, lanes;  free: 1 where a contact's multiplier
-    may move, (k,);  yields: d lambda / ds, (k,);  missed: what equations miss, of their terms;
-    met: whether that is rounding.
+    free: 1 where a contact's multiplier may move, (k,);  yields: d lambda / ds, (k,);
+    missed: relative residual of the equations;  met: whether that is rounding.
     """
 
     u: ca.SX
@@ -327,7 +324,7 @@ class _Point:
 
 
 def _allowed(r: _Reduced, u: ca.SX) -> ca.SX:
-    """Multipliers with those of contacts where they may be."""
+    """Multipliers projected on the domain of the dual."""
     low, high, m = r.limits.contact_low, r.limits.contact_high, r.m
     s = u[m:]
     if r.limits.weight is None:
@@ -343,17 +340,17 @@ def _touching(r: _Reduced, s: ca.SX, natural: ca.SX) -> tuple[ca.SX, ca.SX, ca.S
     """
     low, high, weight = r.limits.contact_low, r.limits.contact_high, r.limits.weight
     if weight is not None:
-        price = s / weight
-        yields = (price > low) * (price < high) / weight
-        return _clipped(price, low, high), yields, ca.SX.ones(6 - r.m)
+        force = s / weight
+        yields = (force > low) * (force < high) / weight
+        return _clipped(force, low, high), yields, ca.SX.ones(6 - r.m)
     held = (s == 0) * (natural >= low) * (natural <= high)
     at_low = ca.if_else(s < 0, 1, (s == 0) * (natural < low))
     force = ca.if_else(held, natural, ca.if_else(at_low, low, high))
     return force, ca.SX.zeros(6 - r.m), 1 - held
 
 
-def _efforts(b: Builder, r: _Reduced, term: Term, prices: Lanes) -> Lanes:
-    bounds = zip(prices, r.low, r.high, strict=True)
+def _efforts(b: Builder, r: _Reduced, term: Term, gains: Lanes) -> Lanes:
+    bounds = zip(gains, r.low, r.high, strict=True)
     return _cut(b, [term.answer(g, least, most, r.soft) for g, least, most in bounds])
 
 
@@ -363,7 +360,7 @@ def _point(b: Builder, r: _Reduced, term: Term, u: ca.SX) -> _Point:
     gradient = r.right - b.total([G * own for G, own in zip(r.G, x, strict=True)])
     force, yields, free = _touching(r, u[m:], gradient[m:])
     gradient = b.cut(ca.vertcat(gradient[:m], gradient[m:] - force))
-    size = ca.fabs(r.right) + r.steepest * b.total([ca.fabs(own) for own in x])
+    size = ca.fabs(r.right) + r.max_gain * b.total([ca.fabs(own) for own in x])
     size += ca.vertcat(ca.SX.zeros(m), ca.fabs(force))
     missed = ca.SX(0)
     for i in range(6):
@@ -373,19 +370,13 @@ def _point(b: Builder, r: _Reduced, term: Term, u: ca.SX) -> _Point:
 
 def _gram(b: Builder, G: Lanes, weight: Lanes, size: int) -> ca.SX:
     """G diag(weight) G^T of the first `size` rows."""
-    pairs = [(i, j) for i in range(size) for j in range(i + 1)]
     weighted = _cut(b, [g[:size] * w for g, w in zip(G, weight, strict=True)])
-    both = zip(weighted, G, strict=True)
-    found = b.total([ca.vertcat(*(w[i] * g[j] for i, j in pairs)) for w, g in both])
-    M = ca.SX(size, size)
-    for at, (i, j) in enumerate(pairs):
-        M[i, j] = M[j, i] = found[at]
-    return M
+    return gram(b.total, [g[:size] for g in G], weighted)
 
 
 def _solved(M: ca.SX, right: ca.SX, full: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """M^-1 right by L D L^T, and the least pivot as part of `full`, the size of M's diagonal,
-    which stands in where M has no curvature."""
+    """M^-1 right by L D L^T, and the smallest pivot over `full`, the size of M's diagonal, which
+    replaces pivots without curvature."""
     size = right.numel()
     rows = [[M[i, j] for j in range(i + 1)] for i in range(size)]
     x, inverse, quality = ca.vertsplit(right), [], ca.SX(1)
@@ -409,7 +400,7 @@ def _solved(M: ca.SX, right: ca.SX, full: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def _start(b: Builder, r: _Reduced, term: Term) -> tuple[ca.SX, ca.SX]:
-    """Multipliers of the least squares without limits, and how well they are known."""
+    """Multipliers of the minimum norm without limits, and their conditioning."""
     M = _gram(b, r.G, [ca.SX(1)] * len(r.G), r.m)
     v, quality = _solved(M, r.right[: r.m], ca.diag(M))
     v = v * r.typical ** (term.degree - 1)
@@ -450,7 +441,7 @@ def _turn(b: Builder, r: _Reduced, term: Term, here: _Point) -> tuple[ca.SX, ca.
         force, _, _ = _touching(r, s, natural)
         return level - taken[0] + ca.dot(natural - force, change[m:])
 
-    # Where the slope of d along the step vanishes: sought between lengths of either sign.
+    # Line search: the root of the slope of d along the step, bracketed.
     t, top = ca.SX(1), ca.SX(float("inf"))
     low, low_slope, top_slope = ca.SX(0), first, ca.SX(0)
     for _ in range(PROBES):
@@ -472,10 +463,10 @@ def _turn(b: Builder, r: _Reduced, term: Term, here: _Point) -> tuple[ca.SX, ca.
 
 
 def _empty(b: Builder, r: _Reduced, u: ca.SX) -> ca.SX:
-    """Whether multipliers prove that nothing within bounds meets the equations: 1, else 0.
+    """Whether multipliers prove that the bounds are infeasible: 1, else 0.
 
-    The equations weighed by u read right . u = g . x + s . lambda, and the right side cannot be as
-    great as the left (Farkas).
+    Weighted by u the equations read right . u = g . x + s . lambda, and within the bounds the
+    right side stays below the left (Farkas).
     """
     u = _allowed(r, u)
     low, high = r.limits.contact_low, r.limits.contact_high
@@ -487,6 +478,6 @@ def _empty(b: Builder, r: _Reduced, u: ca.SX) -> ca.SX:
     return ca.sum1(products) - most > FARKAS * ca.sum1(ca.fabs(products))
 
 
-def _support(price: ca.SX, low: ca.SX, high: ca.SX) -> ca.SX:
-    """The most that a price can earn."""
-    return ca.if_else(price > 0, price * high, ca.if_else(price < 0, price * low, 0))
+def _support(g: ca.SX, low: ca.SX, high: ca.SX) -> ca.SX:
+    """The maximum of g x in [low, high]."""
+    return ca.if_else(g > 0, g * high, ca.if_else(g < 0, g * low, 0))

@@ -1,4 +1,4 @@
-"""What a question is written on: ports, lanes, sums over lanes, symbols to differentiate by.
+"""The builder of a question: ports, lanes, sums over lanes, symbols to differentiate by.
 
 One expression serves every chain of a family, with the chain's numbers as inputs: a `lane` value
 differs from chain to chain, a shared one does not, and `total` sums lanes.
@@ -34,7 +34,7 @@ class Builder:
         self._checks: list[tuple[ca.SX, float, int | None]] = []
         self._known: dict[str, Value] = {}
 
-    # -- what goes in ----------------------------------------------------------------------
+    # -- inputs ----------------------------------------------------------------------------
 
     def sample(self, name: str, size: int, unit: str = "") -> ca.SX:
         """An input of every sample, (size,)."""
@@ -79,12 +79,12 @@ class Builder:
         return self.graph.leaf("lane", group, i, group=group)
 
     def unknown(self, name: str, size: int) -> ca.SX:
-        """Symbols that stand for nothing: to differentiate by, and to be replaced."""
+        """Free symbols, to differentiate by and to be replaced."""
         self._unknowns += size
         first = -self._unknowns
         return self.symbols(name, [self.graph.leaf("input", first + i) for i in range(size)])
 
-    # -- on the way ------------------------------------------------------------------------
+    # -- operations ------------------------------------------------------------------------
 
     def total(self, terms: Sequence[ca.SX]) -> ca.SX:
         """Sum over all chains, entry by entry; one term a group."""
@@ -95,7 +95,7 @@ class Builder:
         return self._reduced("least", terms)
 
     def cut(self, expression: ca.SX) -> ca.SX:
-        """Symbols that stand for an expression, to differentiate with respect to."""
+        """Symbols for the value of an expression, to differentiate with respect to."""
         return self.symbols("cut", self.values([expression])[0])
 
     def tangent(self, expression: ca.SX, wrt: ca.SX, direction: Sequence[float]) -> ca.SX:
@@ -130,12 +130,12 @@ class Builder:
         return read(self.graph, expressions, self._known)
 
     def symbols(self, name: str, values: Sequence[Value]) -> ca.SX:
-        """Symbols that stand for values."""
+        """Symbols for values."""
         made = [ca.SX.sym(f"{name}#{len(self._known) + i}") for i in range(len(values))]
         self._known |= {symbol.name(): value for symbol, value in zip(made, values, strict=True)}
         return ca.vertcat(*made) if made else ca.SX(0, 1)
 
-    # -- what comes out --------------------------------------------------------------------
+    # -- outputs ---------------------------------------------------------------------------
 
     def output(
         self, name: str, value: ca.SX | Sequence[ca.SX | None], unit: str, *shape: int
@@ -150,7 +150,7 @@ class Builder:
         self._outputs.append((name, shape or ((size,) if size != 1 else ()), unit, lanes, parts))
 
     def check(self, value: ca.SX, tolerance: float, below: int | None = None) -> None:
-        """What a sample has to meet: see `Check`."""
+        """A condition on every sample: see `Check`."""
         self._checks.append((value, tolerance, below))
 
     def finish(self) -> Program:

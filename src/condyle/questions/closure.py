@@ -1,4 +1,4 @@
-"""Closing the contacts from what is prescribed: 6 - k pose coordinates, or a landmark's path.
+"""Closing the contacts from 6 - k prescribed coordinates, or from a landmark's path.
 
 Six conditions fix a pose: the k contacts, phi = 0, and 6 - k prescribed functions g of the pose,
 g = s(t). Rates come by the chain rule through the Jacobian K of (phi, g):
@@ -36,7 +36,7 @@ from .structure import Structure
 
 @dataclass(frozen=True)
 class Prescribed:
-    """What is given: 6 - k coordinates by name, or, without names, a landmark's displacement."""
+    """6 - k prescribed coordinates by name; without names, a landmark's displacement."""
 
     names: tuple[str, ...] = ()
 
@@ -86,7 +86,7 @@ def _rates(
 
 
 def conditions(structure: Structure, prescribed: Prescribed) -> Program:
-    """phi and g, (6,), K, (6, 6), and K' X', (6,), at any pose: what Newton's method asks for."""
+    """phi and g, (6,), K, (6, 6), and K' X', (6,), at any pose, for Newton's method."""
     b = Builder(structure)
     pose, rate = b.sample("pose", 6, ANGLE_UNITS), b.sample("pose_rate", 6)
     contacts = single_contacts(structure, b.parameter)

@@ -7,16 +7,29 @@ coupler, and with angles multiplied by the characteristic length, J_W becomes di
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection
+
 import casadi as ca
 
 from ..dynamics.singular_values import singular_values
 from ..graph.program import Program
 from ..kinematics.chain import FAMILIES, Loop
 from .builder import Builder, Lanes
-from .platform import Platform, contacts, given, independent_indices
+from .platform import ANGLE_UNITS, Platform, closed, contacts, given, independent_indices
 from .structure import Structure
 
-CONVERGED = 0.0  # what the quality of singular values must be at least
+CONVERGED = 0.0  # minimum quality of singular values
+# Optional results of a survey, besides the discriminants.
+SURVEYED = ("pose", "joint", "transmission", "rates", "rows", "ratio", "points")
+OF_LOOPS: dict[str, tuple[Callable[[Loop], ca.SX], str]] = {
+    "joint": (lambda loop: loop.q_r[0], "rad or m"),
+    "beta": (lambda loop: loop.q_r[1], "rad"),
+    "gamma": (lambda loop: loop.q_r[2], "rad"),
+    "cos_gamma": (lambda loop: loop.cos_gamma, "1"),
+    "discriminant": (lambda loop: loop.discriminant, "1"),
+    "J_A": (lambda loop: loop.J_A, "m^2 per rad or m"),
+    "transmission": (lambda loop: loop.transmission, "1"),
+}
 
 
 def configuration(structure: Structure) -> Program:
@@ -30,20 +43,53 @@ def configuration(structure: Structure) -> Program:
 def add_configuration(b: Builder, platform: Platform) -> Lanes:
     """The configuration among a question's outputs; returns the dimensionless rows of J_W."""
     loops = loops_of(b, platform)
-    rows = on_rates(b, platform, [loop.rod / loop.rod_length for loop in loops], scaled=True)
-    b.output("joint", [loop.q_r[0] for loop in loops], "rad or m")
-    b.output("beta", [loop.q_r[1] for loop in loops], "rad")
-    b.output("gamma", [loop.q_r[2] for loop in loops], "rad")
-    b.output("cos_gamma", [loop.cos_gamma for loop in loops], "1")
-    b.output("discriminant", [loop.discriminant for loop in loops], "1")
-    b.output("J_A", [loop.J_A for loop in loops], "m^2 per rad or m")
-    b.output("transmission", [loop.transmission for loop in loops], "1")
-    add_singularity(b, loops, rows)
+    rows = _rows_of_J_W(b, platform, loops)
+    _add_loops(b, loops, OF_LOOPS)
+    _add_singularity(b, loops, rows)
     contacts(b, platform).add_places(b)
     return rows
 
 
-def add_singularity(b: Builder, loops: list[Loop], rows: Lanes) -> None:
+def survey(structure: Structure, wanted: Collection[str] = (), at_pose: bool = False) -> Program:
+    """Some of `SURVEYED` at many poses, for maps, and every chain's discriminant.
+
+    `met` is >= 0.5, or >= 0 where it is not iterated, where the contacts can be closed. Results of
+    a chain that cannot reach a pose are NaN there.
+
+    Args: at_pose: from whole poses that meet the contacts; else from q_EE, which closes them.
+    """
+    b = Builder(structure)
+    platform = given(b, still=True) if at_pose else closed(b, rates=0)
+    met = platform.placement.discriminant
+    b.output("met", ca.SX(1) if met is None else met, "1")
+    loops = loops_of(b, platform)
+    rows = _rows_of_J_W(b, platform, loops)
+    _add_loops(b, loops, ("discriminant", *(name for name in OF_LOOPS if name in wanted)))
+    if "pose" in wanted:
+        b.output("pose", platform.pose, ANGLE_UNITS)
+    if "rates" in wanted:
+        b.output("rates", on_rates(b, platform, [c.J for c in loops]), "", structure.m)
+    if "rows" in wanted:
+        b.output("rows", rows, "1", structure.m)
+    if "ratio" in wanted:
+        _add_singularity(b, loops, rows)
+    if "points" in wanted:
+        b.output("points", contacts(b, platform).point.T, "m", len(structure.contacts), 3)
+    return b.finish()
+
+
+def _add_loops(b: Builder, loops: list[Loop], names: Collection[str]) -> None:
+    for name in names:
+        value, unit = OF_LOOPS[name]
+        b.output(name, [value(loop) for loop in loops], unit)
+
+
+def _rows_of_J_W(b: Builder, platform: Platform, loops: list[Loop]) -> Lanes:
+    """The dimensionless rows of J_W."""
+    return on_rates(b, platform, [loop.rod / loop.rod_length for loop in loops], scaled=True)
+
+
+def _add_singularity(b: Builder, loops: list[Loop], rows: Lanes) -> None:
     """Singular values of J_W, from its dimensionless rows, and extremes of J_A."""
     sigma, quality = singular_values(b.total, rows)
     b.output("J_W_sigma", sigma, "1", b.structure.m)

@@ -1,6 +1,6 @@
-"""Exact derivatives of another question, along a direction: by tangents of its graph.
+"""Exact directional derivatives of another question, by tangents of its graph.
 
-With unit directions as samples, all of them are one batch.
+With unit directions as samples, all derivatives are one batch.
 """
 
 from __future__ import annotations

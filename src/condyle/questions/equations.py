@@ -19,7 +19,7 @@ from ..dynamics import FORMULATIONS
 from ..dynamics.formulation import Body, Formulation
 from ..kinematics.chain import FAMILIES, ChainDynamics, Constants, Family
 from ..kinematics.constraints import indices, solve_small
-from ..kinematics.state import PointMotion, State, independent_state, pose_state, twist_state
+from ..kinematics.state import PointMotion, State, pose_state, twist_state
 from .builder import Builder, Lanes
 from .platform import (
     Basis,
@@ -54,9 +54,9 @@ class Wrench:
 
 @dataclass(frozen=True)
 class ChainTerms:
-    """What the chains of one group contribute, lane by lane, dual to the state's rates.
+    """Contributions of the chains of one group, lane by lane, dual to the state's rates.
 
-    loss: effort that the actuator takes for itself.
+    loss: the actuator's own effort, for its rotor and friction.
     """
 
     dynamics: ChainDynamics
@@ -85,11 +85,6 @@ class Equations:
     @property
     def Q(self) -> ca.SX:
         return total(list(self.parts.values()))
-
-    @property
-    def across(self) -> bool:
-        """Whether there are equations across the contacts."""
-        return self.G is not None
 
     @property
     def A(self) -> Lanes:
@@ -121,9 +116,9 @@ def equations(
     """The equations of motion.
 
     Args: formulation, route: if not those of the structure.
-          lump: cut each chain's bodies act as one, with end masses that are part of the platform.
-          low_latency: fewer operations after one another, for more of them in all.
-          state: in which they are written, if not that of route and formulation.
+          lump: each chain's bodies act as one, with end masses that are part of the platform.
+          low_latency: a shorter critical path with more operations.
+          state: if not that of route and formulation.
     """
     s = b.structure
     method = FORMULATIONS[formulation or s.formulation]
@@ -133,15 +128,16 @@ def equations(
     if state is not None:
         basis, G = rate_basis(motion, dependent), state.B.T @ frame.N
     elif (route or s.route) == "direct":
-        state = independent_state(platform.q, platform.q1, platform.q2, platform.placement.pose())
+        pose = platform.placement.pose()
+        state = pose_state(pose, platform.q1, platform.q2, platform.q)
         basis, G = whole_basis(s.m), None
     elif method.uses_twist:
         position = platform.placement.position
         state = twist_state(position, motion.R, motion.twist, motion.twist_rate)
         basis, G = twist_basis(motion, dependent), frame.N
     else:
-        pose = (platform.placement.pose(), motion.rate, motion.acceleration)
-        state = pose_state(*(b.cut(v) for v in pose))
+        given = (platform.placement.pose(), motion.rate, motion.acceleration)
+        state = pose_state(*(b.cut(v) for v in given))
         basis, G = rate_basis(motion, dependent), motion.E.T @ frame.N
     g = b.parameter("gravity")
     chains = [
@@ -158,10 +154,10 @@ def equations(
 
 
 def part_names(structure: Structure) -> tuple[str, ...]:
-    """Parts that share the efforts: platform, links of the chains, actuators, load, friction.
+    """Parts of the efforts: platform, links of the chains, actuators, load, friction.
 
-    Each is what the part asks for with least norm. Where the efforts are others, because the forces
-    of friction depend on them or limits bind, what is left is internal: it balances itself.
+    Each is the minimum-norm effort of its generalized force. Where the efforts differ from their
+    sum, because friction depends on them or limits bind, the rest is internal: it does no work.
     """
     actuators = (ACTUATORS,) if structure.losses else ()
     friction = (FRICTION, INTERNAL) if structure.friction else ()
@@ -194,7 +190,7 @@ def _chain_terms(
         dynamics = method.chain(family, constants, M, g)
         forces = dynamics.forces
     if not (method.pads and family.padding):
-        # A lane without a chain has neither J nor force; elsewhere idle constants see to that.
+        # A lane without a chain has neither J nor force; else its padding constants ensure that.
         mask = b.lane(group, "mask")
         forces = {name: mask * f for name, f in forces.items()}
         dynamics = replace(dynamics, J=mask * dynamics.J)
@@ -204,7 +200,7 @@ def _chain_terms(
 
 
 def loss(b: Builder, group: int, motion: ChainDynamics) -> ca.SX:
-    """What an actuator takes for its rotor and its friction [N m or N]."""
+    """Effort of an actuator for its own rotor and friction [N m or N]."""
     if not b.structure.losses:
         return ca.SX(0)
     inertia, viscous, coulomb, square = ca.vertsplit(b.lane(group, "actuator"))

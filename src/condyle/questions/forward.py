@@ -1,4 +1,4 @@
-"""Forward dynamics: the accelerations that efforts and a load make, and the contact forces.
+"""Forward dynamics: accelerations and contact forces from efforts and a load.
 
 From the independent coordinates q, their rates q', efforts and the load. With the equations affine
 in the accelerations (`inertia`), c'' = start + Pi w and forces G mu of the contacts,
@@ -17,11 +17,12 @@ import casadi as ca
 
 from ..dynamics.least_norm import definite_solve
 from ..graph.program import Program, Variants
-from ..kinematics.constraints import indices, solve_small
+from ..kinematics.constraints import all_of, indices, solve_small
 from ..status import Status
 from .builder import Builder, Lanes
 from .configuration import loops_of
 from .equations import Wrench
+from .friction import consistent
 from .inertia import Affine, affine
 from .inverse import DOUBTFUL, HUGE
 from .platform import (
@@ -34,12 +35,11 @@ from .platform import (
     given,
     normal_forces,
 )
-from .rubbing import consistent
 from .structure import Structure
 
-# What can be asked for besides the accelerations.
+# Optional results besides the accelerations.
 OUTPUTS = ("contact", "motion", "joint", "sliding")
-# |pivot| over the diagonal's entry below which elimination loses too many digits.
+# Minimum |pivot| over the diagonal's entry in the elimination.
 CONDITIONED = 1e-5
 
 
@@ -49,7 +49,7 @@ def forward(structure: Structure, wanted: Collection[str] = ()) -> Variants:
 
 
 def program(structure: Structure, wanted: Collection[str] = ()) -> Program:
-    """The graph; samples that it cannot vouch for go the robust path."""
+    """The graph; samples that fail its checks take the robust path."""
     b = Builder(structure)
     platform = closed(b, rates=1)
     effort = b.lane_sample("effort", unit="N m or N")
@@ -77,7 +77,7 @@ def program(structure: Structure, wanted: Collection[str] = ()) -> Program:
 
 @dataclass(frozen=True)
 class Accelerated:
-    """What efforts and a load do: q'' (m,), the contact forces (k,), and what they come from."""
+    """q'' (m,) and the contact forces (k,), with their equations."""
 
     q2: ca.SX
     force: ca.SX
@@ -89,9 +89,9 @@ class Accelerated:
 def accelerated(
     b: Builder, platform: Platform, load: Wrench, effort: Lanes, forces: bool = True
 ) -> Accelerated:
-    """Accelerations as a part of a question, with the checks that vouch for them.
+    """Accelerations as a part of a question, with their checks.
 
-    Args: forces: whether those of the contacts are wanted.
+    Args: forces: whether contact forces are required.
     """
     eq = affine(b, platform, load, effort)
     touch = contacts(b, platform) if b.structure.friction else None
@@ -106,7 +106,7 @@ def accelerated(
 def forward_system(structure: Structure) -> Program:
     """The equations themselves, at whole poses that meet the contacts, for the robust path.
 
-    Port pose_acceleration is what the rates alone, q'' = 0, make of X_EE''.
+    Port pose_acceleration is X_EE'' for q'' = 0.
     """
     b = Builder(structure)
     platform = given(b)
@@ -130,7 +130,7 @@ def forward_system(structure: Structure) -> Program:
 
 @dataclass(frozen=True)
 class _Solved:
-    """w, the contact forces along the unit normals (where wanted), and whether to trust them."""
+    """w, contact forces along the unit normals (on request), and whether they are reliable."""
 
     w: ca.SX
     force: ca.SX
@@ -154,9 +154,7 @@ def _solved(
         right = ca.horzcat(right, T)
     M, pulled = eq.basis.generalized_force(H), eq.basis.generalized_force(right)
     x, excess = definite_solve(M, pulled, ca.diag(M), CONDITIONED)
-    sure = ca.SX(1)
-    for one in excess:
-        sure = sure * (one > 0)
+    sure = all_of(one > 0 for one in excess)
     w, force = x[:, 0], ca.SX(0, 1)
     if wanted or touch is not None:
         dep = indices(b.structure.dependent)

@@ -1,39 +1,39 @@
-"""Coulomb friction at the contacts: linear in their forces, once the signs of these are given.
+"""Coulomb friction at the contacts, linear in their forces once the signs of these are given.
 
 At the point of contact, with v the velocity of the material point of the platform, the surface puts
 -mu |lambda| u on the platform, u = v / sqrt(|v|^2 + s^2). With sigma = sign(lambda),
 
     Q = J^T tau + sum lambda_k D_k,    D_k = N_k - sigma_k T_k,    T_k = mu [u; c_k x u],
 
-and a pattern sigma is consistent where sigma_k lambda_k >= 0. Wanted are the efforts of least norm
-of all consistent patterns.
+and a sign pattern sigma is consistent where sigma_k lambda_k >= 0. Inverse dynamics takes the
+consistent pattern of minimum norm; forward dynamics requires that there is exactly one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 
 import casadi as ca
 
-from ..kinematics.constraints import independent_indices, indices, solve_small
+from ..kinematics.constraints import all_of, independent_indices, indices, solve_small
 from .builder import Builder, Lanes
 from .equations import Equations
 from .platform import Basis, Contacts
 
-MOST = 2  # contacts with friction whose patterns are all solved in one kernel
+MOST = 2  # maximum number of contacts with friction that a kernel of inverse dynamics takes
 HUGE = 1e300
-FLAT = 1e-3  # part of a square below which what is left of it has lost too many digits
+FLAT = 1e-3  # part of a square below which a difference has lost too many digits
 
 LeastNorm = Callable[..., tuple[Lanes, ca.SX]]
 
 
 @dataclass(frozen=True)
 class Chosen:
-    """Efforts and contact forces of the best pattern.
+    """Efforts and contact forces of the best sign pattern.
 
-    sure: 1 where no other pattern could be better, else 0;  pivots: of the weakest solve.
+    sure: 1 where no other pattern can be better, else 0;  pivots: the smallest of all solves.
     """
 
     effort: Lanes
@@ -44,7 +44,7 @@ class Chosen:
 
 @dataclass(frozen=True)
 class _Candidate:
-    """Least norm with given signs, or with some forces held at 0: `steps` of `_Pattern.free`.
+    """Minimum norm with given signs, or with some forces held at 0: `steps` of `_Pattern.free`.
 
     norm: sum of squares;  kept: whether the other forces have their signs: 1, else 0.
     """
@@ -56,12 +56,12 @@ class _Candidate:
 
 @dataclass(frozen=True)
 class _Pattern:
-    """The least norm under given signs, and the ways from there to forces that are 0.
+    """The minimum norm with given signs, and the directions towards vanishing contact forces.
 
     effort: lanes;  force: (k,);  broken: by contact, whether its force has the wrong sign.
     B:      lanes of d lambda = -B d effort, (k,).
-    free:   by contact, what of B_i the equations leave free, lanes: along it lambda_i changes.
-    flat:   by contact, 1 where so little of B_i is left that it is not known, else 0.
+    free:   by contact, the part of B_i in the null space of the equations, lanes.
+    flat:   by contact, 1 where that part is too small to be known, else 0.
     """
 
     effort: Lanes
@@ -96,11 +96,10 @@ class _Pattern:
 
 
 def least_norm_pattern(b: Builder, eq: Equations, c: Contacts, solve: LeastNorm) -> Chosen:
-    """Of every pattern the least norm, forces of 0 among them; the least that is consistent.
+    """The consistent solution of minimum norm over all sign patterns.
 
-    The least norm under sigma_k lambda_k >= 0 has some of these forces at 0 and the others as the
-    equations leave them. So the least of all patterns is the least of the consistent candidates:
-    every force with one sign, with the other, or 0.
+    The minimum norm under sigma_k lambda_k >= 0 has some of these forces at 0 and the others free.
+    So it is found among the consistent candidates: every force with one sign, the other, or 0.
     """
     s = b.structure
     best = ca.SX(float("inf"))
@@ -138,7 +137,7 @@ def _pattern(
     force = solve_small(D[dep, :], eq.Q[dep] - carried)
     norm = b.total([t * t for t in found])
     broken = {i: 1 - (sign[i] * force[i] >= 0) for i in s.friction}
-    candidates = [_Candidate(norm, _none(broken.values()), {})]
+    candidates = [_Candidate(norm, all_of(1 - one for one in broken.values()), {})]
     free: dict[int, Lanes] = {}
     flat: dict[int, ca.SX] = {}
     B: Lanes = []
@@ -165,7 +164,7 @@ def _held(
     flat: dict[int, ca.SX],
     most: int,
 ) -> list[_Candidate]:
-    """Candidates with one force held at 0, and with both; at most as many as there is freedom."""
+    """Candidates with one force held at 0, and with both; limited by the redundancy."""
     overlap = {
         (i, j): b.total([x * y for x, y in zip(free[i], free[j], strict=True)])
         for i in free
@@ -177,7 +176,9 @@ def _held(
         left = [force[j] - overlap[j, i] * step for j in free if j != i]
         signs = [sign[j] for j in free if j != i]
         broken = [flat[i], *(1 - (s * x >= 0) for s, x in zip(signs, left, strict=True))]
-        found.append(_Candidate(norm + step * force[i], _none(broken), {i: step}))
+        found.append(
+            _Candidate(norm + step * force[i], all_of(1 - one for one in broken), {i: step})
+        )
     if len(free) == 2 and most >= 2 and all(s > 0 for s in sign.values()):
         i, j = free
         a, c, d = overlap[i, i], overlap[i, j], overlap[j, j]
@@ -187,28 +188,20 @@ def _held(
             j: (a * force[j] - c * force[i]) / determinant,
         }
         broken = [flat[i], flat[j], determinant < FLAT * a * d]
-        price = both[i] * force[i] + both[j] * force[j]
-        found.append(_Candidate(norm + price, _none(broken), both))
+        increase = both[i] * force[i] + both[j] * force[j]
+        found.append(_Candidate(norm + increase, all_of(1 - one for one in broken), both))
     return found
 
 
-def _none(broken: Iterable[ca.SX]) -> ca.SX:
-    """1 where nothing is broken, else 0."""
-    kept = ca.SX(1)
-    for one in broken:
-        kept = kept * (1 - one)
-    return kept
-
-
 def _sure(friction: Sequence[int], tried: dict[tuple[int, ...], _Pattern], best: ca.SX) -> ca.SX:
-    """Whether nothing that was not tried is less than the best candidate: 1, else 0.
+    """Whether no untried candidate can be better than the best one: 1, else 0.
 
-    Not tried are forces held at 0 that the equations leave no freedom for, to rounding. Such a
-    force belongs to both patterns that differ in its sign alone, and so is the least of both.
-    Neither is less without the constraint, and from the least of a convex function within bounds
-    the way to the least without them leaves a bound that is active: both patterns break the sign
-    of the force that is 0. With two forces 0 all candidates but that one are broken, and where it
-    was not tried there is no best.
+    Untried are forces held at 0 for which the equations leave no freedom, to rounding. Such a
+    force belongs to both patterns that differ in its sign alone, and so is the minimum of both.
+    Neither has a smaller minimum without the constraint, and from the constrained minimum of a
+    convex function the path to the free one leaves an active bound: both patterns break the sign
+    of the force that is 0. With two forces at 0 all candidates but that one are broken, and where
+    it was not tried there is no best.
     """
     sure = best < HUGE
     for signs, one in tried.items():
@@ -220,3 +213,42 @@ def _sure(friction: Sequence[int], tried: dict[tuple[int, ...], _Pattern], best:
             untried = next((p.flat[i] for p in (one, other) if i in p.flat), 1)
             sure = sure * (1 - neither * untried * (ca.fmax(one.norm, other.norm) < best))
     return sure
+
+
+# -- forward dynamics ----------------------------------------------------------------------
+
+
+def consistent(K: ca.SX, force: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Magnitudes y of the contact forces in forward dynamics, and the number of solutions.
+
+    Friction reduces the contact wrenches by T y, y = |lambda|. All else is linear, so that
+
+        lambda = lambda_0 + K y,    that is    (sigma - K) y = lambda_0,    y >= 0,
+
+    with lambda_0 the solution without friction and sigma a diagonal matrix of signs. Weak friction
+    leaves one consistent sigma, since the absolute value equation then has one solution; with none
+    or several the mechanism jams.
+
+    Args: K: (f, f).  force: lambda_0, (f,).
+    """
+    f = force.numel()
+    chosen, count = ca.SX.zeros(f), ca.SX(0)
+    for y in _solutions(-K, force):
+        kept = all_of((one >= 0) * (one < HUGE) for one in y)
+        count = count + kept
+        chosen = ca.if_else(kept, ca.vertcat(*y), chosen)
+    return chosen, count
+
+
+def _solutions(A: ca.SX, right: ca.SX) -> list[list[ca.SX]]:
+    """Solutions of (sigma + A) y = right for every sigma; eliminations are shared."""
+    inverses = [1 / (A[0, 0] + sign) for sign in (1, -1)]
+    if right.numel() == 1:
+        return [[right * inverse] for inverse in inverses]
+    found = []
+    for inverse in inverses:
+        ratio = A[1:, 0] * inverse
+        for rest in _solutions(A[1:, 1:] - ratio @ A[0, 1:], right[1:] - ratio * right[0]):
+            first = right[0] - A[0, 1:] @ ca.vertcat(*rest)
+            found.append([first * inverse, *rest])
+    return found

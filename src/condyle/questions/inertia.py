@@ -1,15 +1,15 @@
-"""The equations of motion as what they are in the accelerations, affine:
+"""The equations of motion, affine in the accelerations:
 
     Q - J^T tau = H c'' + F,
 
-where c' are the rates of the state that they are written in, (s,). A chain meets the platform at
-one point M, so what it adds to H is a symmetric 3 x 3 matrix, its mass as M feels it:
+where c' are the rates of their state, (s,). A chain meets the platform at one point M, so it adds a
+symmetric 3 x 3 matrix to H, its effective mass at M:
 
     d F_M / d M'' = A_M,        H = H_platform + sum [E; [r]] A_M [E, [r]^T],
 
 with r the lever of M and [r] f = r x f. A_M comes from the chain's own dynamics, by exact
-derivatives within the lane. Formulations that are not written for speed give H by derivatives of
-the whole sum instead.
+derivatives within the lane. Formulations other than `virtual_power` give H by derivatives of the
+whole sum instead.
 """
 
 from __future__ import annotations
@@ -61,10 +61,10 @@ def affine(b: Builder, platform: Platform, load: Wrench, effort: Lanes) -> Affin
 
 
 def _by_chains(b: Builder, platform: Platform, load: Wrench, effort: Lanes) -> Affine:
-    """In twists, from every chain's mass as its platform joint feels it."""
+    """In twists, from every chain's effective mass at its platform joint."""
     s, motion = b.structure, platform.motion
     method, body, g = VirtualPower(), platform_body(b, lumped=True), b.parameter("gravity")
-    # Forces of rates alone: what accelerations add is H times them.
+    # Forces due to the rates alone: accelerations add H times them.
     state = twist_state(platform.placement.position, motion.R, motion.twist, ca.SX.zeros(6))
     chains = [_chain(b, group, state, g, effort[group]) for group in range(len(s.chains))]
     found = b.total([c.terms for c in chains])
@@ -108,7 +108,7 @@ def _chain(b: Builder, group: int, state: State, g: ca.SX, effort: ca.SX) -> _Ch
     taken = chain.effort + loss(b, group, chain) - effort
     on_M = total(list(chain.forces.values())) + chain.J * taken
     slope = ca.jacobian(on_M, A)
-    # A lane without a chain does nothing: its idle constants see to that, or the mask.
+    # A lane without a chain adds nothing, by its padding constants or by the mask.
     mask = ca.SX(1) if family.padding else b.lane(group, "mask")
     mass = mask * symmetric([slope[i, j] for i, j in UPPER])
     force = mass @ M.acceleration + mask * ca.substitute(on_M, A, ca.SX.zeros(3))

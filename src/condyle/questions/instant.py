@@ -1,7 +1,4 @@
-"""The mechanism at an instant: where it is, and how fast; accelerations belong to `forward`.
-
-And the energy of a state, which the dynamics do not need and a balance does.
-"""
+"""Pose, joints and rates at an instant, and the energy of a state."""
 
 from __future__ import annotations
 
@@ -12,12 +9,11 @@ from ..graph.program import Program
 from ..kinematics.chain import FAMILIES
 from ..status import Status
 from .builder import Builder
+from .configuration import loops_of, on_rates
 from .equations import Wrench, platform_body
 from .inertia import affine
-from .platform import ANGLE_UNITS, Platform, closed
+from .platform import ANGLE_UNITS, Platform, check_contacts, closed
 from .structure import Structure
-
-CERTAIN = 0.5  # of a placement's discriminant, which is 0 or 1 where it was iterated
 
 
 def instant(structure: Structure) -> Program:
@@ -27,32 +23,16 @@ def instant(structure: Structure) -> Program:
     """
     b = Builder(structure)
     platform = closed(b, rates=1)
-    motion, s = platform.motion, structure
-    T = motion.E @ motion.M_J
     b.output("pose", platform.pose, ANGLE_UNITS)
-    b.output("pose_rate", motion.rate, "per s")
+    b.output("pose_rate", platform.motion.rate, "per s")
     b.output("R", platform.R, "1", 3, 3)
-    joints, rates, rows, discriminants = [], [], [], []
-    for group, kind in enumerate(s.families):
-        family = FAMILIES[kind]
-        r = platform.R @ b.lane(group, "joint")
-        loop = family.loop(
-            family.named(b.lane(group, "constants")), platform.placement.position + r
-        )
-        row = b.lane(group, "mask") * (T.T @ ca.vertcat(loop.J, ca.cross(r, loop.J)))
-        rate = ca.dot(row, platform.q1)
-        joints.append(loop.q_r[0])
-        rates.append(rate)
-        rows.append(row)
-        discriminants.append(loop.discriminant)
-    b.output("joint", joints, "rad or m")
-    b.output("joint_rate", rates, "rad/s or m/s")
-    b.output("A", rows, "", s.m)
-    placement = platform.placement
-    if placement.discriminant is not None:
-        below = None if placement.iterated else Status.unreachable
-        b.check(placement.discriminant, CERTAIN if placement.iterated else 0.0, below)
-    b.check(b.least(discriminants), 0.0, Status.unreachable)
+    loops = loops_of(b, platform)
+    rows = on_rates(b, platform, [loop.J for loop in loops])
+    b.output("joint", [loop.q_r[0] for loop in loops], "rad or m")
+    b.output("joint_rate", [ca.dot(row, platform.q1) for row in rows], "rad/s or m/s")
+    b.output("A", rows, "", structure.m)
+    check_contacts(b, platform.placement)
+    b.check(b.least([loop.discriminant for loop in loops]), 0.0, Status.unreachable)
     return b.finish()
 
 
@@ -67,10 +47,10 @@ def energy(structure: Structure) -> Program:
     kinetic = body.mass * ca.dot(V, V) / 2 + ca.dot(spin, body.inertia @ spin) / 2
     potential = -body.mass * ca.dot(g, platform.placement.position)
     moving, held = [], []
-    for group, kind in enumerate(structure.families):
-        family, c = FAMILIES[kind], FAMILIES[kind].named(b.lane(group, "constants"))
+    for group, loop in enumerate(loops_of(b, platform)):
+        family = FAMILIES[structure.families[group]]
+        c = family.named(b.lane(group, "constants"))
         r = platform.R @ b.lane(group, "joint")
-        loop = family.loop(c, platform.placement.position + r)
         _, inverse = chain_jacobians(family, c, loop.q_r)
         rate = inverse @ (V + ca.cross(omega, r))
         own, high = ca.SX(0), ca.SX(0)
@@ -92,7 +72,7 @@ def energy(structure: Structure) -> Program:
 
 
 def losses(b: Builder, group: int, rate: ca.SX) -> ca.SX:
-    """Power that an actuator's viscous and Coulomb friction take [W]."""
+    """Power dissipated by an actuator's viscous and Coulomb friction [W]."""
     if not b.structure.losses:
         return 0 * rate
     _, viscous, coulomb, square = ca.vertsplit(b.lane(group, "actuator"))

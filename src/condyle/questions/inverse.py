@@ -1,4 +1,4 @@
-"""Inverse dynamics: the efforts of least norm that make a motion under a load, and what follows.
+"""Inverse dynamics: minimum-norm efforts of a motion under a load, and derived quantities.
 
 From the independent coordinates q, q', q'' and the load; the contacts are closed on the way.
 """
@@ -31,10 +31,10 @@ from .platform import (
 )
 from .structure import Structure
 
-# What can be asked for besides the efforts.
+# Optional results besides the efforts.
 OUTPUTS = ("contact", "share", "gravity", "motion", "joint", "configuration")
-DOUBTFUL = 1e-14  # discriminant below which a sample is looked at again,
-WEAK = 1e-20  # and ratio of a pivot to its column, squared
+DOUBTFUL = 1e-14  # minimum discriminant,
+WEAK = 1e-20  # and squared ratio of a pivot to its column, of samples that are not repeated
 HUGE = 1e300
 
 
@@ -52,18 +52,12 @@ def program(
 ) -> Program:
     """One variant.
 
-    Args: robust: solve for the efforts by `gram_schmidt` where `normal_equations` are quicker.
+    Args: robust: by `gram_schmidt` in place of the faster `normal_equations`.
           low_latency: as in `equations`.
     """
     b = Builder(structure)
-    platform, load = closed(b), Wrench.of(b)
-    apart = bool({"share", "gravity"} & set(wanted))
-    lump = FORMULATIONS[structure.formulation].lumps and not apart
-    # Friction acts across the contacts, where route `direct` has no equations.
-    route = "core" if structure.friction else structure.route
-    eq = equations(b, platform, load, route=route, lump=lump, low_latency=low_latency)
-    solve = gram_schmidt if robust else normal_equations
-    best = _least_norm(b, platform, load, eq, solve, apart, wanted)
+    platform = closed(b)
+    eq, best = _minimum_norm(b, platform, Wrench.of(b), robust, low_latency, wanted)
     b.output("effort", best.effort, "N m or N")
     if "share" in wanted:
         b.output("share", best.share, "N m or N")
@@ -80,35 +74,25 @@ def program(
         add_configuration(b, platform)
         if structure.friction:
             contacts(b, platform).add_sliding(b)
-    _vouch(b, platform, eq, best)
     return b.finish()
 
 
 def efforts(
     b: Builder, platform: Platform, load: Wrench, robust: bool = False, low_latency: bool = False
 ) -> Lanes:
-    """Efforts of least norm as a part of another question, with the checks that vouch for them.
-
-    Args: as of `program`.
-    """
-    lump = FORMULATIONS[b.structure.formulation].lumps
-    route = "core" if b.structure.friction else b.structure.route
-    eq = equations(b, platform, load, route=route, lump=lump, low_latency=low_latency)
-    solve = gram_schmidt if robust else normal_equations
-    best = _least_norm(b, platform, load, eq, solve, False, ())
-    _vouch(b, platform, eq, best)
-    return best.effort
+    """Minimum-norm efforts as a part of another question, with their checks; as `program`."""
+    return _minimum_norm(b, platform, load, robust, low_latency, ())[1].effort
 
 
 def in_variants(
     structure: Structure, program: Callable[[bool, bool], Program], lean: bool = True
 ) -> Variants:
-    """How a program with efforts of least norm is run.
+    """Variants of a program with minimum-norm efforts.
 
-    By normal equations, with a robust variant for samples where those lose digits, and with one for
-    least latency.
+    By normal equations, with a robust variant for samples where those lose digits, and one of
+    minimum latency.
 
-    Args: program: (robust, low_latency) -> the program;  lean: without what takes a robust one.
+    Args: program: (robust, low_latency) -> the program;  lean: whether normal equations suffice.
     """
     robust = program(True, False)
     if not lean:
@@ -121,16 +105,9 @@ def in_variants(
     return Variants(program(False, False), robust, latency, single=True)
 
 
-def _vouch(b: Builder, platform: Platform, eq: Equations, best: _Best) -> None:
-    discriminants = [c.dynamics.discriminant for c in eq.chains]
-    b.check(feasibility(b, platform, discriminants), DOUBTFUL, Status.unreachable)
-    finite = ca.fabs(b.total(best.effort)) < HUGE
-    b.check(best.quality * finite * _every_rate_is_felt(b, eq), WEAK)
-
-
 @dataclass(frozen=True)
 class _Best:
-    """Efforts of least norm, what each part asks of them, and the contact forces."""
+    """Minimum-norm efforts, the share of each part, and the contact forces."""
 
     effort: Lanes
     share: Lanes
@@ -139,7 +116,30 @@ class _Best:
     quality: ca.SX
 
 
-def _least_norm(
+def _minimum_norm(
+    b: Builder,
+    platform: Platform,
+    load: Wrench,
+    robust: bool,
+    low_latency: bool,
+    wanted: Collection[str],
+) -> tuple[Equations, _Best]:
+    """The equations and their minimum-norm efforts, with the checks that certify them."""
+    s, apart = b.structure, bool({"share", "gravity"} & set(wanted))
+    lump = FORMULATIONS[s.formulation].lumps and not apart
+    # Friction acts across the contacts, where route `direct` has no equations.
+    route = "core" if s.friction else s.route
+    eq = equations(b, platform, load, route=route, lump=lump, low_latency=low_latency)
+    solve = gram_schmidt if robust else normal_equations
+    best = _solved(b, platform, load, eq, solve, apart, wanted)
+    discriminants = [c.dynamics.discriminant for c in eq.chains]
+    b.check(feasibility(b, platform, discriminants), DOUBTFUL, Status.unreachable)
+    finite = ca.fabs(b.total(best.effort)) < HUGE
+    b.check(best.quality * finite * _observable(b, eq), WEAK)
+    return eq, best
+
+
+def _solved(
     b: Builder,
     platform: Platform,
     load: Wrench,
@@ -153,14 +153,14 @@ def _least_norm(
     if b.structure.friction:
         touch = contacts(b, platform)
         chosen = least_norm_pattern(b, eq, touch, solve)
-        # What friction asks for, as if it were a load.
+        # Friction as a load.
         parts.append(eq.state.B.T @ (touch.T @ ca.fabs(chosen.force)))
     if chosen is not None and not apart:
         return _Best(chosen.effort, [], [], chosen.force, chosen.sure * chosen.pivots)
     pulled = [eq.basis.generalized_force(part) for part in parts]
     right = ca.horzcat(*pulled) if apart else total(pulled)
     if "gravity" in wanted:
-        # Forces of bodies at rest: what gravity alone asks for, and the load.
+        # Forces of bodies at rest: gravity alone, and the load.
         bodies = ca.horzcat(*pulled[: len(eq.parts)])
         right = ca.horzcat(right, b.at_zero(bodies, platform.q1, platform.q2))
     found, pivots = solve(b.total, eq.A, right)
@@ -168,19 +168,22 @@ def _least_norm(
     gravity = [f[:, len(parts) :] for f in found]
     if chosen is not None:
         share = [ca.horzcat(f, t - ca.sum2(f)) for f, t in zip(share, chosen.effort, strict=True)]
-        gravity = [ca.horzcat(f, 0, 0) for f in gravity]  # nothing rubs at rest
+        gravity = [ca.horzcat(f, 0, 0) for f in gravity]  # no friction at rest
         quality = chosen.sure * ca.fmin(pivots, chosen.pivots)
         return _Best(chosen.effort, share, gravity, chosen.force, quality)
     effort = [total(ca.horzsplit(f)) for f in share]
     force = ca.SX(0, 1)
     if "contact" in wanted:
-        core = eq if eq.across else _core(b, platform, load)
+        core = eq
+        if eq.G is None:  # route `direct` has no equations across the contacts
+            lump = FORMULATIONS[b.structure.formulation].lumps
+            core = equations(b, platform, load, route="core", lump=lump)
         force = core.contact_forces(platform, effort)
     return _Best(effort, share, gravity, force, pivots)
 
 
 def motion(structure: Structure) -> Program:
-    """The contacts closed from the independent coordinates, and nothing else."""
+    """The whole pose and its rates from the independent coordinates."""
     b = Builder(structure)
     platform = closed(b)
     _add_motion(b, platform)
@@ -189,7 +192,7 @@ def motion(structure: Structure) -> Program:
 
 
 def balance(structure: Structure) -> Program:
-    """What efforts and contacts have to balance, at whole poses that meet the contacts."""
+    """The generalized force to be balanced, at whole poses that meet the contacts."""
     b = Builder(structure)
     platform, load = given(b), Wrench.of(b)
     lump = FORMULATIONS[structure.formulation].lumps
@@ -231,16 +234,10 @@ def _add_balance(b: Builder, platform: Platform, eq: Equations) -> Contacts:
     return touch
 
 
-def _core(b: Builder, platform: Platform, load: Wrench) -> Equations:
-    """Route `direct` has no equations across the contacts: those of the core have."""
-    lump = FORMULATIONS[b.structure.formulation].lumps
-    return equations(b, platform, load, route="core", lump=lump)
+def _observable(b: Builder, eq: Equations) -> ca.SX:
+    """Whether every independent rate moves some joint, beyond rounding: 1, else 0.
 
-
-def _every_rate_is_felt(b: Builder, eq: Equations) -> ca.SX:
-    """Whether no independent rate leaves all joints at rest, but for rounding: 1, else 0.
-
-    Pivots are measured by their own columns, so they do not see a column that is rounding itself.
+    Pivots are compared with their own columns, which does not detect a column of mere rounding.
     """
     length = b.parameter("length")
     angles = [i >= 3 for i in independent_indices(b.structure.dependent)]

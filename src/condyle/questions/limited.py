@@ -1,4 +1,4 @@
-"""Inverse dynamics within limits: efforts and contact forces that make a motion under a load."""
+"""Inverse dynamics within effort limits: efforts and contact forces of a motion under a load."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def limited(structure: Structure, term: str = "square", weighs: bool = False) ->
 
 
 def program(structure: Structure, term: str, weighs: bool) -> Program:
-    """The graph; samples that it cannot vouch for go the robust path."""
+    """The graph; samples that fail its checks take the robust path."""
     b = Builder(structure)
     platform, load = closed(b), Wrench.of(b)
     found, discriminants = within(b, platform, load, Limits.ports(b, weighs), term)
@@ -39,8 +39,7 @@ def program(structure: Structure, term: str, weighs: bool) -> Program:
 def within(
     b: Builder, platform: Platform, load: Wrench, limits: Limits, term: str = "square"
 ) -> tuple[Allocated, Lanes]:
-    """Efforts within limits that make a motion, of all signs of contact forces with friction; and
-    the chains' discriminants."""
+    """Efforts within limits, minimised over all friction signs, and the chains' discriminants."""
     s = b.structure
     lump = FORMULATIONS[s.formulation].lumps
     eq = equations(b, platform, load, route="core", lump=lump)

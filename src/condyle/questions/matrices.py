@@ -1,9 +1,9 @@
-"""The matrices of the equations of motion, apart ([Cheng2023] eqs 57, 61, 63, 64).
+"""The matrices of the equations of motion ([Cheng2023] eqs 57, 61, 63, 64).
 
     M_r q'' + C_r q' + G_r = (J_theta M_J)^T tau + load,
 
 in the independent coordinates q_EE, or, without M_J, dual to X_EE. The generalized force is that of
-inverse dynamics; M_r is its exact derivative in the accelerations, G_r what it is at rest.
+inverse dynamics; M_r is its exact derivative in the accelerations, G_r its value at rest.
 """
 
 from __future__ import annotations
@@ -23,8 +23,7 @@ from .structure import Structure
 def matrices(structure: Structure) -> Program:
     """Inertia matrix, Coriolis and centrifugal force, gravity: in q_EE, and dual to X_EE.
 
-    At whole poses and rates that the contacts allow; port pose_acceleration is what the rates
-    alone, q'' = 0, make of X_EE''.
+    At whole poses and admissible rates; port pose_acceleration is X_EE'' for q'' = 0.
     """
     b = Builder(structure)
     platform = given(b)

@@ -1,4 +1,4 @@
-"""A mechanism's numbers, and where a question finds them: shared parameters, lanes of chains."""
+"""A mechanism's numbers and their layout: shared parameters, lanes of chains."""
 
 from __future__ import annotations
 
@@ -130,13 +130,13 @@ class Layout:
         return [a.reflected_inertia, a.viscous, a.coulomb, a.smoothing_speed**2]
 
     def pads(self, kind: str) -> tuple[str, ...]:
-        """Constants of a family that, at 0, make a lane that stands for no chain do nothing."""
+        """Constants of a family that are 0 in a padding lane, so that it contributes nothing."""
         own = FORMULATIONS[self.structure.formulation].pads
         return FAMILIES[kind].padding if own else ()
 
 
 def specialised(structure: Structure, numbers: Numbers) -> Structure:
-    """The structure that leaves out what is zero in this mechanism."""
+    """The structure with this mechanism's zeros left out."""
     zeros = [(-1, int(i)) for i in np.flatnonzero(numbers.parameters == 0)]
     for group, (values, pad) in enumerate(zip(numbers.lanes, numbers.padding, strict=True)):
         none = (values == 0).all(axis=1) & (pad == 0)
@@ -186,7 +186,7 @@ def require_closed_form(mechanism: Mechanism) -> None:
             "route direct needs parasitic motion in closed form: at most two contacts, on planes, "
             f"with at most one dependent angle. This mechanism has {len(kinds)} "
             f"({', '.join(kinds)}) with dependent {', '.join(dependent)}. Use route core, which "
-            "gives the same torques"
+            "gives the same efforts"
         )
 
 
@@ -222,7 +222,7 @@ def constants_of(mechanism: Mechanism) -> list[ChainNumbers]:
 
 
 def end_masses(mechanism: Mechanism, constants: Sequence[ChainNumbers]) -> dict[Vector, float]:
-    """Masses [kg] of the chains that move with the platform's joints, by the joints' points.
+    """End masses of the chains [kg], by the points of the platform joints.
 
     Args: constants: as of `constants_of`.
     """
@@ -237,7 +237,7 @@ def end_masses(mechanism: Mechanism, constants: Sequence[ChainNumbers]) -> dict[
 def _body(mechanism: Mechanism, points: dict[Vector, float]) -> dict[str, Any]:
     """Mass, first moment and inertia about O_M, in {M}, of the platform and point masses on it.
 
-    Sums are exact before they are rounded: what a symmetric mechanism makes zero is zero.
+    Sums are rounded once, so that symmetric mechanisms have exact zeros.
     """
     platform, xx = mechanism.platform, range(3)
     own = platform.inertia.tensor()

@@ -1,4 +1,4 @@
-"""The platform on its contacts, in symbols: where it is, how it moves, what the contacts allow."""
+"""The platform on its contacts, in symbols: its pose, its motion, and the constraints."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from .builder import Builder, Lanes
 from .numbers import contact_symbols, single_contacts
 
 ANGLE_UNITS = "m, m, m, rad, rad, rad"
-CERTAIN = 0.5  # of a placement's discriminant, which is 0 or 1 where it was iterated
+CERTAIN = 0.5  # minimum discriminant of a placement by iteration, which is 0 or 1
 
 
 @dataclass(frozen=True)
@@ -97,21 +97,21 @@ def given(b: Builder, still: bool = False) -> Platform:
 
 
 def check_contacts(b: Builder, placement: Placement) -> None:
-    """The contacts are met; one that was iterated and is not sure is to be looked at again."""
+    """Check that the contacts are closed; where the iteration did not converge, repeat."""
     if placement.discriminant is not None:
         below = None if placement.iterated else Status.unreachable
         b.check(placement.discriminant, CERTAIN if placement.iterated else 0.0, below)
 
 
 def feasibility(b: Builder, platform: Platform, chains: Lanes) -> ca.SX:
-    """Least of the dimensionless discriminants: not negative where the pose can be reached.
+    """The smallest dimensionless discriminant: >= 0 where the pose can be reached.
 
     Args: chains: their discriminants.
     """
     least, placement = b.least(chains), platform.placement
     if placement.discriminant is None:
         return least
-    # A pose that Newton did not find is not unreachable but unknown: 0, to be looked at again.
+    # Where Newton did not converge the pose is not unreachable but unknown: 0, to be repeated.
     return (
         least * placement.discriminant
         if placement.iterated
@@ -124,7 +124,7 @@ class Contacts:
     """The contacts of one sample, one a column; N and T dual to the twist [V; omega].
 
     point, normal: centre of the ball and unit normal, (3, k).
-    N: (6, k), wrench of unit normal forces;  T: (6, k), what friction takes off it.
+    N: (6, k), wrench of unit normal forces;  T: (6, k), its reduction by friction.
     slip: (3, k), velocity of the material points [m/s];  drag: (3, k), mu u.
     """
 
@@ -136,23 +136,23 @@ class Contacts:
     drag: ca.SX
 
     def add_places(self, b: Builder) -> None:
-        """Where they are, among a question's outputs."""
+        """Points and normals as outputs."""
         for name, vectors, unit in (("point", self.point, "m"), ("normal", self.normal, "1")):
             b.output(f"contact_{name}", vectors.T, unit, vectors.shape[1], 3)
 
     def add_wrenches(self, b: Builder, B: ca.SX) -> None:
-        """N and T among a question's outputs, dual to the rates c' with [V; omega] = B c'."""
+        """N and T as outputs, dual to the rates c' with [V; omega] = B c'."""
         for name, wrenches in (("normal", self.N), ("friction", self.T)):
             b.output(name, (B.T @ wrenches).T, "", wrenches.shape[1], 6)
 
     def add_sliding(self, b: Builder) -> None:
-        """How they slide, among a question's outputs."""
+        """Slip velocities and drag as outputs."""
         for name, vectors, unit in (("slip", self.slip, "m/s"), ("drag", self.drag, "1")):
             b.output(name, vectors.T, unit, vectors.shape[1], 3)
 
 
 def contacts(b: Builder, platform: Platform) -> Contacts:
-    """The contacts, with friction where there is some."""
+    """The contacts, some with friction."""
     position, V, omega = platform.position, platform.motion.twist[:3], platform.motion.twist[3:]
     frame = contact_frame(single_contacts(b.structure, b.parameter), position, platform.R)
     found: list[tuple[ca.SX, ...]] = []
@@ -173,9 +173,9 @@ def contacts(b: Builder, platform: Platform) -> Contacts:
 
 @dataclass(frozen=True)
 class Basis:
-    """Pi, the rates that the contacts allow: identity rows, and `rest` for the other rows.
+    """Pi, a basis of the admissible rates: identity rows, and `rest` for the other rows.
 
-    Efforts do not depend on which basis it is, so it can be a sparse one; inertia matrices do.
+    Efforts do not depend on the choice of basis, so it can be a sparse one; inertia matrices do.
     """
 
     identity: Sequence[int]
@@ -197,7 +197,7 @@ class Basis:
 
 
 def twist_basis(motion: WholeMotion, dependent: Sequence[str]) -> Basis:
-    """Twists with N^T [V; omega] = 0, by the components that stand where `dependent` do at home.
+    """Twists with N^T [V; omega] = 0, the components at the places of `dependent` eliminated.
 
     At home R_omega is the identity, so they are determined as well as the coordinates are.
     """
@@ -212,7 +212,7 @@ def rate_basis(motion: WholeMotion, dependent: Sequence[str]) -> Basis:
 
 
 def whole_basis(size: int) -> Basis:
-    """Every rate is free."""
+    """All rates are admissible."""
     return Basis(range(size), [], ca.SX(0, size))
 
 

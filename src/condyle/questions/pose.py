@@ -1,4 +1,4 @@
-"""The pose that encoder readings belong to, by a fixed number of Gauss-Newton steps.
+"""The pose of encoder readings, by a fixed number of Gauss-Newton steps.
 
     X <- X + M_J dq + dX_phi,    A dq ~ theta - theta(X) - J_theta dX_phi,    A = J_theta M_J,
 
@@ -8,7 +8,7 @@ with joints that turn multiplied by the characteristic length, and their differe
 whole turns. Angles of the pose count as lengths in the same way: A and steps have no dimension.
 
 The start decides the assembly mode. Steps that shrink to a quarter each time lead to the pose
-nearest to it; where they do not, the certificate is 0, and the sample goes to
+nearest to it; otherwise the certificate is 0, and the sample goes to
 `condyle.model.forward_kinematics`, which follows it in pieces.
 """
 
@@ -20,11 +20,12 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ..dynamics.least_norm import definite_solve
+from ..dynamics.least_norm import definite_solve, gram
 from ..graph.program import Program, Variants
 from ..kinematics.chain import FAMILIES
 from ..kinematics.constraints import (
     ContactSymbols,
+    all_of,
     contact_frame,
     indices,
     parasitic_jacobian,
@@ -36,17 +37,17 @@ from .numbers import single_contacts
 from .platform import ANGLE_UNITS, independent_indices
 from .structure import Structure
 
-ITERATIONS = 5  # from one sample of a motion to the next three do
-LONGEST = 1.0  # first step, in characteristic lengths and radians
-SHRINK = 0.25  # a step over the step before, at the most
+ITERATIONS = 5  # between samples of a motion three suffice
+LONGEST = 1.0  # maximum first step, in characteristic lengths and radians
+SHRINK = 0.25  # maximum ratio of consecutive steps
 TINY = 1e-11  # steps that need not shrink
-CLOSED = 1e-10  # the step that is left at the end
-CONDITIONED = 1e-12  # |pivot| over the diagonal's entry of A^T A, at the least
+CLOSED = 1e-10  # maximum last step
+CONDITIONED = 1e-12  # minimum |pivot| over the diagonal's entry of A^T A
 
 
 @dataclass(frozen=True)
 class Step:
-    """A Gauss-Newton step at a pose, and what it was made of.
+    """A Gauss-Newton step at a pose, with its intermediate results.
 
     pose, move: X_EE and the step, (6,).   square: of the move, without dimension.
     M_J: (6, m).   A: (m,) a group, lane values, without dimension; `weight` of each group's.
@@ -108,7 +109,7 @@ def pose_from_encoders(
 
     Args: joint: lane values [rad or m], zero at home; turning joints may count whole turns.
           start: X_EE, (6,), near by: on the contacts, or a little off them.
-          weight: what each chain's difference counts, besides the characteristic length; default 1.
+          weight: of each chain's difference, besides the characteristic length; default 1.
     """
     contacts = single_contacts(b.structure, b.parameter)
     step, sure = step_at(b, joint, start, contacts, weight), ca.SX(1)
@@ -150,11 +151,11 @@ def step_at(
 
 @dataclass(frozen=True)
 class JointsAt:
-    """What joints and contacts say of a pose.
+    """Joints and contacts at a pose.
 
     joint, discriminant: lane values.   J: (6,) a group, theta' = J . X_EE'.
     M_J: (6, m).   back: (6,), moves the dependent coordinates back onto the surfaces.
-    phi: (k,) [m], how far the contacts are off them.
+    phi: (k,) [m], distances of the contacts from their surfaces.
     """
 
     joint: Lanes
@@ -190,22 +191,13 @@ def joints_at(b: Builder, pose: ca.SX, contacts: Sequence[ContactSymbols]) -> Jo
 def least_squares(b: Builder, A: Lanes, right: Lanes) -> tuple[ca.SX, ca.SX]:
     """x with A x ~ right over all chains, (m,), by normal equations; whether A has full rank.
 
-    They square A's condition number. In steps that are repeated this costs no accuracy, only speed
-    of convergence, and that not before the condition number is a million.
+    They square A's condition number. In iterations this costs no accuracy, only speed of
+    convergence, and that not before the condition number is a million.
     """
-    m = b.structure.m
-    pairs = [(j, k) for j in range(m) for k in range(j, m)]
-    sums = b.total(
-        [ca.vertcat(*(a[j] * a[k] for j, k in pairs), a * y) for a, y in zip(A, right, strict=True)]
-    )
-    G = ca.SX(m, m)
-    for (j, k), product in zip(pairs, ca.vertsplit(sums[: len(pairs)]), strict=True):
-        G[j, k] = G[k, j] = product
-    x, excess = definite_solve(G, sums[len(pairs) :], ca.diag(G), CONDITIONED)
-    regular = ca.SX(1)
-    for one in excess:
-        regular = regular * (one > 0)
-    return x, regular
+    G = gram(b.total, A, A)
+    carried = b.total([a * y for a, y in zip(A, right, strict=True)])
+    x, excess = definite_solve(G, carried, ca.diag(G), CONDITIONED)
+    return x, all_of(one > 0 for one in excess)
 
 
 def pose(structure: Structure, iterations: int = ITERATIONS) -> Variants:
@@ -223,7 +215,7 @@ def pose(structure: Structure, iterations: int = ITERATIONS) -> Variants:
 
 
 def encoders(structure: Structure) -> Program:
-    """What following a pose asks of it: at any pose, port pose, the results of `JointsAt`."""
+    """The results of `JointsAt` at any pose, port pose, to follow readings in pieces."""
     b = Builder(structure)
     contacts = single_contacts(structure, b.parameter)
     at = joints_at(b, b.sample("pose", 6, ANGLE_UNITS), contacts)

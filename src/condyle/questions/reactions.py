@@ -1,9 +1,9 @@
-"""Reactions: what every joint, guide and contact carries at given efforts.
+"""Reactions: forces and moments of every joint, guide and contact at given efforts.
 
 The free bodies of each chain (`free_body`) are solved for the efforts, so that Newton and Euler
 hold for every body. All vectors are in {S}; each acts on the body it names, and its opposite on the
-other. A crank's own weight is not in them: a mechanism file states no mass for a crank, which turns
-about its mass centre.
+other. A crank's own weight is not included: a mechanism file states no mass for a crank, which
+rotates about its mass centre.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ POINT = "point of "  # what the name of a quantity's point begins with
 
 @dataclass(frozen=True)
 class Place:
-    """Which reaction it is.
+    """The identity of a reaction.
 
     quantity: "platform_joint", "crank_tip", "shaft_force", "shaft_moment", ..., "contact".
     owner:    name of the chain or contact.
     body, by: the body it acts on, and the one that exerts it.
-    place:    where the force acts, or the point that the moment is about.
-    effort:   whether the actuator's effort is part of it.
+    place:    point of action of the force, or reference point of the moment.
+    effort:   whether it includes the actuator's effort.
     """
 
     quantity: str
@@ -59,7 +59,7 @@ class Place:
 
 
 def reactions(structure: Structure) -> Program:
-    """Vectors, (3,) each, and where they act, by quantity: of all chains that have it."""
+    """Vectors, (3,) each, and their points, by quantity, for all chains that have it."""
     b = Builder(structure)
     platform = given(b)
     effort, force = b.lane_sample("effort"), b.sample("contact_force", len(structure.contacts), "N")
@@ -86,7 +86,7 @@ def reactions(structure: Structure) -> Program:
 
 
 def reaction_places(mechanism: Mechanism) -> list[Place]:
-    """What `reactions` computes, in its order."""
+    """The reactions in the order of `reactions`."""
     return [
         *(place for c in mechanism.chains for place in chain_places(FAMILIES[c.kind], c.name)),
         *(

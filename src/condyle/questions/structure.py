@@ -1,4 +1,4 @@
-"""What shapes a question: the structure of a mechanism, without its numbers."""
+"""The structure of a mechanism: all that shapes a question but the numbers."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Structure:
     losses:    whether an actuator has a rotor or friction of its own.
     friction:  contacts with friction, by number.
     zeros:     parameters that are zero, (-1, i), and constants that are zero in every chain of a
-               group, (group, i): what they multiply is left out.
+               group, (group, i): their products are omitted.
     """
 
     formulation: str
