@@ -50,6 +50,8 @@ _HOMES = {
     "workspace_size": "analysis.map",
     "open_map": "analysis.map",
     "run": "analysis.run_motion",
+    "compare": "analysis.comparison",
+    "tradeoff": "analysis.weight_curve",
     "schema": "analysis.schema",
     "check": "report.mechanism_summary",
     "write_report": "report.page",
@@ -65,10 +67,12 @@ _HOMES = {
 }
 
 if TYPE_CHECKING:
+    from .analysis.comparison import compare
     from .analysis.map import open_map, workspace_map, workspace_size
     from .analysis.run_motion import run
     from .analysis.schema import schema
     from .analysis.sweep import Study, open_sweep, sweep
+    from .analysis.weight_curve import tradeoff
     from .errors import (
         CondyleError,
         InfeasibleError,

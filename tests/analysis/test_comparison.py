@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+from typing import Any
 
 import numpy as np
 import pytest
@@ -153,3 +154,22 @@ def test_collection_goes_on_after_an_error() -> None:
         assert not gc.isenabled()
         raise ValueError("wrong")
     assert gc.isenabled()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"mechanism": 3}, "mechanism: expected a mechanism"),
+        ({"motion": 3}, "motion: expected a Motion"),
+        ({"load": 3}, "load: expected a Load"),
+        ({"formulations": 3}, "formulations: expected a name or several, got 3"),
+        ({"formulations": ["newton"]}, "newton"),
+        ({"load_point": "toe"}, "toe"),
+        ({"distribution": "least"}, "least"),
+    ],
+)
+def test_wrong_arguments_are_named(arguments: dict[str, Any], words: str) -> None:
+    for function in (condyle.compare, condyle.tradeoff):
+        if function is condyle.compare or arguments.keys() <= {"mechanism", "motion", "load"}:
+            with pytest.raises(condyle.CondyleError, match=words):
+                function(**arguments)

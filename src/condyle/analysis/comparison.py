@@ -1,7 +1,7 @@
-"""Every model on one motion: do they agree, and what does each cost?
+"""Every model on one motion: their differences and their cost.
 
-The formulations and routes come from `condyle.dynamics`. Beside the mechanism stands the same one
-without its contacts (the paper's 6RSS), whose platform makes the identical motion.
+The formulations and routes come from `condyle.dynamics`. The same mechanism without its contacts
+(the paper's 6RSS), whose platform makes the identical motion, is computed too.
 """
 
 from __future__ import annotations
@@ -9,16 +9,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..accessors import extend
 from ..dynamics import FORMULATIONS, ROUTES
 from ..dynamics import formulation as formulation_named
-from ..errors import UnsupportedError
+from ..errors import UnsupportedError, texts_of
+from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
 from ..model.model import Model, with_point
+from ..motion.motion_and_load import motion_and_load
 from ..progress import step
 from .runs import Run, Samples, TimedModel, run
 from .torque_indices import Indices, indices
@@ -26,12 +28,10 @@ from .torque_indices import Indices, indices
 if TYPE_CHECKING:
     import xarray as xr
 
-    from ..motion import Load, Motion
-
 
 @dataclass(frozen=True)
 class Unavailable:
-    """A model that this mechanism cannot have, and why."""
+    """A model that this mechanism does not have, and the reason."""
 
     label: str
     reason: str
@@ -53,7 +53,7 @@ class Comparison:
 
     solution:       by the first model; its motion is that of all.
     runs:           with the contacts, in the order of the registries;  free_runs: without them.
-    unavailable:    the models that there are not.
+    unavailable:    models that the mechanism does not have.
     free_condition: largest condition number of the dimensionless J_W without the contacts; nan
                     where there are no free runs.
     """
@@ -102,24 +102,29 @@ class Comparison:
 
 
 def compare(
-    mechanism: Mechanism,
-    motion: Motion,
-    load: Load | None = None,
+    mechanism: Any = "masticatory",
+    motion: Any = None,
+    load: Any = None,
     load_point: str | None = None,
-    formulations: Sequence[str] | None = None,
+    formulations: str | Sequence[str] | None = None,
     distribution: str | None = None,
     preload: float = 0.0,
     contact_weight: float = 0.0,
 ) -> Comparison:
     """Compute one motion by every formulation and route, with and without the contacts.
 
-    Args:   motion, load, load_point: as in `Model.solve`.
-            formulations: names; all by default.
+    Args:   mechanism: a mechanism, a model, the path of a file, or the name of a bundled one.
+            motion, load: files or arrays; default: as in `condyle.run`.
+            load_point: platform point that the load acts at.
+            formulations: names; default: all.
             distribution, preload, contact_weight: how efforts are chosen, as in `derive`.
     Raises: UnreachableError, SingularError: for samples that cannot be computed.
             InputError: for an unknown formulation, or a motion or load that does not fit.
     """
-    names = [formulation_named(name).name for name in formulations or FORMULATIONS]
+    mechanism = as_mechanism(mechanism)
+    motion, load = motion_and_load(mechanism, motion, load)
+    asked = texts_of("formulations", list(FORMULATIONS) if formulations is None else formulations)
+    names = [formulation_named(name).name for name in asked]
     # The first derivation also pays for imports, so it is not one of those that are timed.
     policy = distribution, preload, contact_weight
     model = TimedModel(mechanism, names[0], "core", *policy)
@@ -171,7 +176,7 @@ def samples_of(model: Model, solution: xr.Dataset) -> Samples:
 
 
 def why_not_free(mechanism: Mechanism) -> str | None:
-    """Why there is nothing to compare with the contacts removed, or None."""
+    """Why there are no models without the contacts, or None."""
     if not mechanism.contacts:
         return "the mechanism has no contacts to remove"
     if len(mechanism.chains) < 6:

@@ -1,8 +1,8 @@
-"""From least effort to least load on the contacts: what one costs of the other.
+"""The tradeoff between effort and contact force: the curve of minima of
 
-    sum (effort_i / max_i)^2 + W sum (lambda_k / N_ref)^2   is least,
+    sum (effort_i / max_i)^2 + W sum (lambda_k / N_ref)^2
 
-for weights W from 0 on. As W grows the efforts never fall and the contact forces never grow, in
+for weights W >= 0. As W grows the efforts never decrease and the contact forces never increase, in
 the root mean square over the motion.
 """
 
@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
+from ..mechanism import as_mechanism
 from ..mechanism.chain import limits
-from ..mechanism.mechanism import Mechanism
 from ..model.model import derive
+from ..motion.motion_and_load import motion_and_load
 from ..progress import step
 from ..status import Status
 from .comparison import samples_of
@@ -25,7 +26,6 @@ from .comparison import samples_of
 if TYPE_CHECKING:
     import xarray as xr
 
-    from ..motion import Load, Motion
 
 WEIGHTS = (0.0, *(float(w) for w in np.logspace(-2, 4, 13)))
 
@@ -55,9 +55,9 @@ class Tradeoff:
 
 
 def tradeoff(
-    mechanism: Mechanism,
-    motion: Motion,
-    load: Load | None = None,
+    mechanism: Any = "masticatory",
+    motion: Any = None,
+    load: Any = None,
     load_point: str | None = None,
     weights: Sequence[float] = WEIGHTS,
     preload: float = 0.0,
@@ -65,16 +65,19 @@ def tradeoff(
 ) -> Tradeoff:
     """Solve one motion by `weighted` at several weights.
 
-    Args:   motion, load, load_point: as in `Model.solve`.
-            weights: W, from the least.   preload: least push of one-sided contacts [N].
+    Args:   mechanism: a mechanism, a model, the path of a file, or the name of a bundled one.
+            motion, load: files or arrays; default: as in `condyle.run`.
+            load_point: platform point that the load acts at.
+            weights: W, strictly increasing.
+            preload: minimum compressive force on unilateral contacts [N].
             model: formulation, route and backend of `derive`.
     Raises: InputError: without contacts, or with chains that have no limits.
             InfeasibleError and other errors of samples: as of `Model.solve`.
     """
+    mechanism = as_mechanism(mechanism)
+    motion, load = motion_and_load(mechanism, motion, load)
     if not mechanism.contacts:
-        raise InputError(
-            f'"{mechanism.name}" has no contacts, so no load on them to weigh against efforts'
-        )
+        raise InputError(f'"{mechanism.name}" has no contacts whose forces could be weighed')
     asked = np.asarray(weights, dtype=float)
     if asked.ndim != 1 or not asked.size or (np.diff(asked) <= 0).any():
         raise InputError(f"weights: expected numbers that rise, got {list(weights)}")

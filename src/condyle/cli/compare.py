@@ -36,9 +36,7 @@ def compare(
     require_drawing(figures, report)
     import condyle
 
-    from ..analysis.comparison import compare as compare_models
     from ..analysis.run_motion import weight_of
-    from ..analysis.weight_curve import tradeoff as weigh
     from ..motion import motion_and_load
     from ..report.tables import save_tables, tables, with_tables
     from ..report.tables.tradeoff_table import tradeoff_table
@@ -54,12 +52,12 @@ def compare(
                 "--tradeoff sweeps the weights of --distribution weighted itself: leave "
                 "--distribution and --contact-weight out"
             )
-        curve = weigh(machine, path, acting, load_point, preload=distribution.preload)
+        curve = condyle.tradeoff(machine, path, acting, load_point, preload=distribution.preload)
         shown, solution, text = [tradeoff_table(curve)], curve.solution, ""
         data: dict[str, Any] = {"reference_force": curve.reference_force, "samples": curve.samples}
     else:
         policy["contact_weight"] = weight_of(machine, distribution.contact_weight)
-        comparison = compare_models(machine, path, acting, load_point, **policy)
+        comparison = condyle.compare(machine, path, acting, load_point, **policy)
         shown, solution, text = list(tables(comparison)), comparison.solution, str(comparison)
         unavailable = {one.label: one.reason for one in comparison.unavailable}
         data = {"samples": comparison.samples, "unavailable": unavailable}
