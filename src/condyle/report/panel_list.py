@@ -49,8 +49,8 @@ NORM = "all chains (2-norm)"
 VIEWS = {"above": (0, 1), "side": (0, 2)}  # of a track: the coordinates across and up
 BODIES = {"fixed": "base", "platform": "platform"}
 DISTANCES = {
-    "marker_residual": "from their places in the body",
-    "marker_offset": "from where the computed motion has them",
+    "marker_residual": "residual in the body",
+    "marker_offset": "from the computed motion",
 }
 
 
@@ -134,7 +134,7 @@ def effort(solution: xr.Dataset) -> Iterator[Panel]:
         )
 
 
-NO_LIMITS = "no actuator of this mechanism states a limit of its effort"
+NO_LIMITS = "no actuator of this mechanism has an effort limit"
 
 
 @panels("actuators", "Activation: effort over greatest effort", empty=NO_LIMITS)
@@ -197,7 +197,7 @@ def effort_speed(solution: xr.Dataset, duties: Sequence[Duty] | None = None) -> 
         )
 
 
-@panels("shares", "Efforts by the part of the mechanism that needs them", split=0, same=True)
+@panels("shares", "Efforts by part of the mechanism", split=0, same=True)
 def share(
     solution: xr.Dataset, parts: Sequence[str] | None = None, every: bool = False
 ) -> Iterator[Panel]:
@@ -266,10 +266,8 @@ def load(solution: xr.Dataset, every: bool | None = None) -> Iterator[Panel]:
 
     Args: every: also what is 0 throughout; by default the force, where the moment is 0 too.
     """
-    point, curves = (
-        solution.condyle.options.get("load_point"),
-        of_names(solution, "load", "component"),
-    )
+    point = solution.condyle.options.get("load_point")
+    curves = of_names(solution, "load", "component")
     some = [any(np.nan_to_num(c.values).any() for c in part) for part in (curves[:3], curves[3:])]
     at = f" at {point}" if point else ""
     if every or some[0] or (every is None and not some[1]):
@@ -343,12 +341,12 @@ def marker(solution: xr.Dataset) -> Iterator[Panel]:
         return
     bodies = [str(body) for body in solution["marker_body"].values]
     sets = {}
-    for variable, told in DISTANCES.items():
+    for variable, meaning in DISTANCES.items():
         curves = of_names(solution, variable, "marker")
         for body, word in BODIES.items():
             own = [c for c, of in zip(curves, bodies, strict=True) if of == body]
             if own:
-                sets[f"{word}: {told}"] = own
+                sets[f"{word}: {meaning}"] = own
     if sets:
         yield Panel(
             "marker-residual",
@@ -356,9 +354,8 @@ def marker(solution: xr.Dataset) -> Iterator[Panel]:
             "distance",
             "m",
             sets,
-            note="From their places in the body: how rigid it is, and how well they were seen. "
-            "From where the computed motion has them: what smoothing and the contacts took away "
-            "too.",
+            note="Residual in the body: its rigidity, and the error of measurement. From the "
+            "computed motion: the effect of smoothing and of the contacts too.",
         )
 
 

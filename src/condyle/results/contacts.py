@@ -1,4 +1,4 @@
-"""What contacts are told by: their bounds, and the pull that a one-sided one cannot take."""
+"""Bounds of contacts, and the loss of unilateral ones."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def bound_margins(mechanism: Mechanism, points: np.ndarray) -> np.ndarray:
 
 
 def contact_loss(mechanism: Mechanism, force: np.ndarray) -> np.ndarray:
-    """Whether one-sided contacts would have to pull at contact forces (N, k), (N, k)."""
+    """Whether unilateral contacts would have to pull, (N, k), at contact forces (N, k)."""
     push = np.array([c.push if c.one_sided else 0 for c in mechanism.contacts], dtype=float)
     if not push.any():
         return np.zeros(force.shape, dtype=bool)

@@ -40,7 +40,7 @@ def forward_states(
              their rates dX... (none: at rest), tau_<chain> of every chain, and optionally some of
              Fx, Fy, Fz, Mx, My, Mz. Other columns are named in a warning.
              out: ddX... of the given coordinates, contact_<contact>, the pose, joint_<chain>, and
-             contact_loss_<contact> of one-sided contacts; with `flag` also status and cause.
+             contact_loss_<contact> of unilateral contacts; with `flag` also status and cause.
              flag: keep rows that have no accelerations, empty, with a status.
              strict: a warning is an error.
     Raises:  InputError, SampleError, WarningError: nothing is written then.

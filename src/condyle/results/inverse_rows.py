@@ -10,7 +10,6 @@ import numpy as np
 
 from ..atomic import replacing
 from ..errors import InputError
-from ..mechanism.mechanism import COORDINATES
 from ..model.data import require_ok
 from ..model.joint_reactions import reactions as joint_reactions
 from ..model.model import Model
@@ -20,12 +19,13 @@ from .derived import Derived
 from .failed_samples import status_columns
 from .mat_file import table_variables, write_mat
 from .state_rows import Columns, StateColumns, StatesReport
-from .variables import VARIABLES, WRENCH, variable_columns
+from .summary import peak
+from .variables import VARIABLES, WRENCH, labels_of, variable_columns
 from .warnings import Watch
 
 
 class Activation(NamedTuple):
-    """The largest effort over its limit: how much, of which chain, in which row (from 1)."""
+    """The largest effort over its limit: value, chain and row (from 1)."""
 
     value: float
     chain: str
@@ -60,7 +60,7 @@ def solve_states(
              out: likewise CSV or Parquet.
              reactions: columns reaction_<joint>_<chain>_x, _y, _z ... too.
              strict: a warning is an error.
-             threads: at most so many; the file does not depend on it.
+             threads: maximum number of threads; the file does not depend on it.
              mat: file for MATLAB to write as well; it takes the memory of the whole table.
     Raises:  InputError, SampleError, WarningError: nothing is written then.
     """
@@ -105,12 +105,10 @@ def solve_states(
 
 def _greater(before: Activation | None, derived: Derived, first_row: int) -> Activation | None:
     """The greatest activation so far."""
-    size = np.abs(np.where(derived.ok[:, None], derived.activation, np.nan))
-    if not np.isfinite(size).any():
+    if (found := peak(np.where(derived.ok[:, None], derived.activation, np.nan))) is None:
         return before
-    row, chain = np.unravel_index(np.nanargmax(size), size.shape)
-    name = derived.mechanism.chain_names[chain]
-    here = Activation(float(size[row, chain]), name, first_row + int(row) + 1)
+    row, chain, value = found
+    here = Activation(abs(value), derived.mechanism.chain_names[chain], first_row + row + 1)
     return here if before is None or here.value > before.value else before
 
 
@@ -130,7 +128,7 @@ def solve_table(
     if idle := [name for name in table.columns if name not in used]:
         raise InputError(
             f"{table.source}: {', '.join(idle)} would not be used: the state is given by "
-            f"{', '.join(names)}, their rates and accelerations. Remove what is not of these"
+            f"{', '.join(names)}, their rates and accelerations. Remove the other columns"
         )
     states = given.states(table, names, threads)
     load = given.loads(table, load_point)
@@ -139,22 +137,13 @@ def solve_table(
     if not flag:
         require_ok(mechanism, evaluation, row_offset=first_row)
 
-    def filled(array: np.ndarray) -> np.ndarray:
-        return array if derived.all_ok else np.where(derived.ok[:, None], array, np.nan)
-
-    labels = {
-        "chain": mechanism.chain_names,
-        "contact": mechanism.contact_names,
-        "coordinate": COORDINATES,
-    }
     columns: Columns = {}
     for variable in VARIABLES:
         if variable.column is not None and variable.when(derived):
-            found = variable_columns(variable, variable.values(derived), labels)
-            columns |= {name: filled(a[:, None])[:, 0] for name, a in found.items()}
+            columns |= variable_columns(variable, variable.filled(derived), labels_of(mechanism))
     if reactions:
         for name, reaction in joint_reactions(model, evaluation).items():
-            array = filled(reaction.array)
+            array = np.where(derived.ok[:, None], reaction.array, np.nan)
             columns |= {f"reaction_{name}_{axis}": array[:, i] for i, axis in enumerate(AXES)}
     columns |= contact_loss_columns(mechanism, derived.contact_loss)
     if flag:

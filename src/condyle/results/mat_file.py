@@ -18,9 +18,9 @@ import numpy as np
 import xarray as xr
 
 from ..errors import InputError
-from ..mechanism.mechanism import COORDINATES, Mechanism
+from ..mechanism.mechanism import Mechanism
 from .contacts import AXES
-from .variables import VARIABLES
+from .variables import VARIABLES, labels_of
 
 LONGEST = 63  # letters of a name
 LARGEST = 2**31  # bytes of a variable, which the format counts with 32 bits
@@ -41,11 +41,7 @@ def dataset_variables(dataset: xr.Dataset) -> dict[str, Any]:
 
 def table_variables(mechanism: Mechanism, columns: Mapping[str, Any]) -> dict[str, Any]:
     """What a file has of the columns of `condyle solve`: those of a variable stand side by side."""
-    labels = {
-        "chain": mechanism.chain_names,
-        "contact": mechanism.contact_names,
-        "coordinate": COORDINATES,
-    }
+    labels = labels_of(mechanism)
     info = {"title": f"Inverse dynamics of {mechanism.name}", "mechanism_name": mechanism.name}
     found: dict[str, Any] = {"info": _info(info)} | {n: cells(v) for n, v in labels.items()}
     rest = dict(columns)

@@ -1,4 +1,4 @@
-"""What was measured beside a motion, as part of its solution: markers and EMG at its samples."""
+"""Measured markers and EMG as variables of a solution, at its samples."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ PLACE, RESIDUAL, OFFSET, EMG = "marker_place", "marker_residual", "marker_offset
 _MEANINGS = {
     PLACE: ("m", "measured marker in {S}; nan where it was not seen"),
     RESIDUAL: ("m", "distance of the marker from its place in its body of markers"),
-    OFFSET: ("m", "distance of the marker from where the computed motion has its mean place"),
+    OFFSET: ("m", "distance of the marker from its mean place carried by the computed motion"),
     EMG: ("1", "envelope of the muscle's EMG, 1 at its greatest; nan where none was measured"),
 }
 
@@ -29,7 +29,7 @@ def with_measured(solution: S, measured: MeasuredChannels | str | os.PathLike[st
     """A copy with the variables above, as far as they were measured.
 
     They are linear between the samples of the measurement, NaN in its gaps and outside. An offset
-    tells of smoothing, of projection onto the contacts, and of all that a residual tells of.
+    contains the effect of smoothing, of the projection onto the contacts, and the residual.
 
     Raises: InputError: for chains that are not there, or times that do not meet the solution's.
     """

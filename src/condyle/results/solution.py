@@ -53,7 +53,7 @@ RENAMED = {
 
 
 class Results:
-    """What a dataset of results knows besides its variables: `solution.condyle.mechanism`.
+    """Accessor of datasets of results: `solution.condyle.mechanism`.
 
     A solution is inverse dynamics along a motion, or a simulation. Its dimensions are time, chain,
     contact, coordinate, part and axis; its variables and their units are in the documentation's
@@ -85,12 +85,12 @@ class Results:
 
     @property
     def warnings(self) -> list[str]:
-        """What the run had to say, for people."""
+        """Warnings of the run, as text."""
         return json.loads(self._said("warnings", "[]"))
 
     @property
     def notices(self) -> list[Notice]:
-        """The same as data: kind, whose, when, how much, and the bound."""
+        """The same as data: kind, owner, time, value and bound."""
         if "notices" not in self._dataset.attrs:  # written before warnings were data
             return [Notice("other", text) for text in self.warnings]
         return [Notice(**facts) for facts in json.loads(self._said("notices"))]
@@ -107,7 +107,7 @@ class Results:
 
     @property
     def events(self) -> list[dict[str, Any]]:
-        """What happened in a simulation: time, kind, owner, text, state, ends; else nothing."""
+        """Events of a simulation: time, kind, owner, text, state, ends; else none."""
         return json.loads(self._said("events", "[]"))
 
     @property

@@ -24,7 +24,7 @@ from ..version import __version__
 from . import solution as _accessor  # noqa: F401  # registers `dataset.condyle`
 from .contacts import AXES
 from .derived import Derived
-from .variables import VARIABLES, WRENCH, Variable, chosen
+from .variables import VARIABLES, WRENCH, chosen
 from .warnings import Notice, Watch
 
 
@@ -77,7 +77,18 @@ def assemble(
     derived = Derived(model.mechanism, evaluation, wrench, model.limited)
     watch = Watch(model.mechanism, residual=residual)
     watch.see(derived, motion.t)
-    options = _options(model, motion, load, load_point, residual, seconds)
+    options = {
+        "motion": motion.source,
+        "motion_sha256": motion.sha256,
+        "motion_kind": motion.kind,
+        "landmark": motion.landmark,
+        "load": load.source,
+        "load_sha256": load.sha256,
+        "load_point": load_point,
+        "contact_residual_of_given_pose": residual,
+        "smoothing": None if motion.smoothing is None else str(motion.smoothing),
+        "solve_seconds": seconds,
+    }
     title = f"Inverse dynamics of {model.mechanism.name}"
     solution = labelled(model, derived, motion.t, model.parts, title, options, watch.notices())
     solution["effort"].attrs["long_name"] = chosen(model.policy.objective)
@@ -93,11 +104,18 @@ def labelled(
     options: Mapping[str, Any],
     notices: Sequence[Notice],
 ) -> xr.Dataset:
-    """The dataset of samples at times (N,) [s]; `parts` are those of `share`."""
+    """The dataset of samples at times (N,) [s].
+
+    Args: parts: of `share`;  options: what was solved; what the model is, is added.
+    """
     mechanism = model.mechanism
     loaded = bool(np.any(derived.wrench))
     kept = [i for i, part in enumerate(parts) if loaded or part != LOAD_PART]
-    variables = {v.name: _variable(v, derived) for v in VARIABLES if v.when(derived)}
+    variables: dict[str, Any] = {
+        v.name: (v.dims, v.filled(derived), v.attributes(mechanism))
+        for v in VARIABLES
+        if v.when(derived)
+    }
     if len(kept) < len(parts):
         dims, share, attributes = variables["share"]
         variables["share"] = dims, share[kept], attributes
@@ -108,22 +126,11 @@ def labelled(
         "condyle_version": __version__,
         "mechanism_name": mechanism.name,
         "mechanism": record(mechanism),
-        "options": json.dumps(options),
+        "options": json.dumps(_options(model, options)),
         "warnings": json.dumps([notice.text for notice in notices]),
         "notices": json.dumps([notice.to_dict() for notice in notices]),
     }
     return solution
-
-
-def _variable(
-    variable: Variable, derived: Derived
-) -> tuple[tuple[str, ...], np.ndarray, dict[str, str]]:
-    """What xarray makes a variable of; numbers of failed samples are NaN."""
-    values = variable.values(derived)
-    if values.dtype.kind == "f" and not (derived.all_ok or variable.failed):
-        values = values.copy()
-        values[(slice(None),) * variable.dims.index("time") + (~derived.ok,)] = np.nan
-    return variable.dims, values, variable.attributes(derived.mechanism)
 
 
 def _coordinates(model: Model, times: np.ndarray, parts: Sequence[str]) -> dict[str, Any]:
@@ -144,15 +151,8 @@ def _coordinates(model: Model, times: np.ndarray, parts: Sequence[str]) -> dict[
     }
 
 
-def _options(
-    model: Model,
-    motion: Motion,
-    load: Load,
-    load_point: str | None,
-    residual: float | None,
-    seconds: float,
-) -> dict[str, Any]:
-    """How the solution was made."""
+def _options(model: Model, own: Mapping[str, Any]) -> dict[str, Any]:
+    """How a solution was made: by the model, and of what."""
     return {
         "formulation": model.formulation,
         "route": model.route,
@@ -160,20 +160,13 @@ def _options(
         "preload": model.policy.preload,
         "contact_weight": model.policy.contact_weight * model.reference_force**2,
         "reference_force": model.reference_force,
-        "motion": motion.source,
-        "motion_sha256": motion.sha256,
-        "motion_kind": motion.kind,
-        "landmark": motion.landmark,
-        "load": load.source,
-        "load_sha256": load.sha256,
-        "load_point": load_point,
         "independent": list(model.independent),
         "dependent": list(model.dependent),
         "characteristic_length": model.characteristic_length,
-        "contact_residual_of_given_pose": residual,
-        "smoothing": None if motion.smoothing is None else str(motion.smoothing),
         "derivation_seconds": model.derivation_seconds,
-        "solve_seconds": seconds,
+        **dict.fromkeys(("motion_sha256", "landmark", "load_sha256", "load_point", "smoothing")),
+        "contact_residual_of_given_pose": None,
+        **own,
     }
 
 

@@ -1,6 +1,6 @@
 """States of a mechanism, one a row: a file in, a file out, in flat memory.
 
-Rows never influence each other. What is made of a row is another file's concern: see `inverse_rows`
+Rows never influence each other. What is computed for a row is in `inverse_rows`
 and `forward_rows`.
 """
 
@@ -28,7 +28,7 @@ Columns = dict[str, np.ndarray | list[str]]
 
 @dataclass(frozen=True)
 class StatesReport:
-    """What came of a file of states: `data` for programs, `str` for people."""
+    """Summary of a file of states: `data` for programs, `str` to read."""
 
     data: dict[str, Any]
 
@@ -42,11 +42,10 @@ class StatesReport:
 
 @dataclass(frozen=True)
 class StateColumns:
-    """What columns of a file give of a state.
+    """The columns of a file that make a state.
 
-    rates:  prefixes of its derivatives: d, dd;  missing: what is said where there are none.
-    wanted: what a state has besides its coordinates, in words.
-    others: further columns, with what they are.
+    rates:  prefixes of its derivatives: d, dd;  missing: the warning where there are none.
+    wanted: the other columns of a state, for messages;  others: further columns, by dimension.
     """
 
     model: Model
@@ -56,7 +55,7 @@ class StateColumns:
     others: Mapping[str, Dimension] = field(default_factory=dict)
 
     def known(self) -> dict[str, Dimension]:
-        """What columns there may be."""
+        """The columns that are read."""
         names = [prefix + name for prefix in ("", *self.rates) for name in COORDINATES]
         own = {name: kind for name in (*names, *WRENCH) if (kind := dimension(name)) is not None}
         return own | dict(self.others)

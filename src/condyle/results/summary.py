@@ -19,7 +19,7 @@ FEW = 6  # intervals without a result that a screen shows
 
 @dataclass(frozen=True)
 class Summary:
-    """What a run found; `data` for programs, `str` for people."""
+    """Summary of a run: `data` for programs, `str` to read."""
 
     data: dict[str, Any]
 
@@ -139,17 +139,22 @@ def summarize(solution: xr.Dataset) -> Summary:
 
 def _greatest_activation(solution: xr.Dataset) -> dict[str, Any] | None:
     """The largest |effort| over its limit: how much, whose and when; None without limits."""
-    if "activation" not in solution:
+    if "activation" not in solution or (found := peak(solution["activation"].values)) is None:
         return None
-    size = np.abs(solution["activation"].values)
-    if not np.isfinite(size).any():
-        return None
-    sample, chain = np.unravel_index(np.nanargmax(size), size.shape)
+    sample, chain, value = found
     return {
-        "value": float(size[sample, chain]),
+        "value": abs(value),
         "chain": str(solution["chain"].values[chain]),
         "time": float(solution["time"].values[sample]),
     }
+
+
+def peak(values: np.ndarray) -> tuple[int, int, float] | None:
+    """Row, column and value of the largest magnitude of (N, m) values; None without any."""
+    if not np.isfinite(values).any():
+        return None
+    row, column = np.unravel_index(np.nanargmax(np.abs(values)), values.shape)
+    return int(row), int(column), float(values[row, column])
 
 
 def work(power: np.ndarray, time: np.ndarray) -> np.ndarray:

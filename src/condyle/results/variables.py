@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 
@@ -25,7 +25,7 @@ CHOICES = {
     "bounded": "of least norm within limits",
     "weighted": "of least squares over limits, within them",
     "cubic": "of least cubes over limits, within them",
-    "minimax": "of which the largest over its limit is least",
+    "minimax": "of least maximum of |effort| over limit",
 }
 
 # What the energy of a simulation went to.
@@ -86,12 +86,26 @@ class Variable:
         """Its values; floating-point ones of failed samples may be anything."""
         return derived.simulated[self.name] if self.simulated else attrgetter(self.place)(derived)
 
+    def filled(self, derived: Derived) -> np.ndarray:
+        """Its values; numbers of failed samples are NaN."""
+        values = self.values(derived)
+        if values.dtype.kind == "f" and not (derived.all_ok or self.failed):
+            values = values.copy()
+            values[(slice(None),) * self.dims.index("time") + (~derived.ok,)] = np.nan
+        return values
+
     def attributes(self, mechanism: Mechanism) -> dict[str, str]:
         """`units`, `long_name` and, where there are flags, `flag_meanings`."""
         units = self.units if isinstance(self.units, str) else self.units(mechanism)
         flags = self.flags if isinstance(self.flags, str) else self.flags(mechanism)
         named = {"flag_meanings": flags} if flags else {}
         return {"units": units, "long_name": self.meaning, **named}
+
+
+def labels_of(mechanism: Mechanism) -> dict[str, Sequence[str]]:
+    """Labels along the dimensions that columns have."""
+    chains, contacts = mechanism.chain_names, mechanism.contact_names
+    return {"chain": chains, "contact": contacts, "coordinate": COORDINATES}
 
 
 def variable_columns(
@@ -226,8 +240,8 @@ VARIABLES = (
     ),
     Variable(
         "shortfall", ("time",), "1",
-        "by how much all limits would have to be multiplied, where efforts were chosen within "
-        "limits: 1 where they suffice, inf where no limits would do",
+        "least factor on all limits with which efforts within limits exist: 1 where the limits "
+        "suffice, inf where no factor does",
         "shortfall", only=attrgetter("limited"), failed=True,
     ),
     Variable("pose_rate", _POSE, of_pose("{}/s"), "rate of X_EE", "evaluation.pose_rate"),
@@ -236,7 +250,7 @@ VARIABLES = (
         "evaluation.pose_acceleration",
     ),
     Variable(
-        "share", ("part", *_CHAIN), of_effort(), "part of the effort each part needs",
+        "share", ("part", *_CHAIN), of_effort(), "effort that each part of the mechanism needs",
         "evaluation.share",
     ),
     Variable(
@@ -289,7 +303,7 @@ VARIABLES = (
         flags=" ".join(KINDS),
     ),
     Variable("status", ("time",), "1", "status", "status", flags=" ".join(STATUS_NAMES)),
-    Variable("cause", ("time",), "1", "what the sample fails by", "cause", flags=cause_flags),
+    Variable("cause", ("time",), "1", "cause of the failure", "cause", flags=cause_flags),
 )
 # fmt: on
 BY_NAME = {variable.name: variable for variable in VARIABLES}

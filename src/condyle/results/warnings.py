@@ -25,7 +25,7 @@ from ..status import STATUS_NAMES, Status
 from .contacts import BOUND_TOLERANCE
 from .derived import Derived
 
-POSE_RESIDUAL = 1e-9  # metres off the surfaces, beyond which given poses are told of
+POSE_RESIDUAL = 1e-9  # largest distance of given poses from the surfaces without a warning [m]
 
 
 class Kind(NamedTuple):
@@ -37,7 +37,7 @@ class Kind(NamedTuple):
 
 KINDS = {
     "implausible": Kind(
-        "numbers of the mechanism that do not go together",
+        "implausible numbers in the mechanism file",
         "`condyle check` shows sizes, masses, gravity and limits: mind the units",
     ),
     "home_residual": Kind(
@@ -57,11 +57,11 @@ KINDS = {
         "the measured poses do not fit the surfaces; the dependent coordinates were recomputed",
     ),
     "failed_samples": Kind(
-        "samples that could not be computed (`--flag`)",
+        "samples without a result (`--flag`)",
         "see their intervals and causes; scale the motion",
     ),
     "failed_variants": Kind(
-        "variants that have samples without a result (`--vary`)",
+        "variants with samples without a result (`--vary`)",
         "the bands leave them out; a study of the same numbers by `condyle sweep` has the reasons",
     ),
     "near_singularity": Kind(
@@ -81,12 +81,12 @@ KINDS = {
     "speed_limit": Kind("speed above a limit", "another actuator, or another motion"),
     "rod_angles": Kind(
         "gamma_i near 90 degrees",
-        "the two rod angles lose their meaning, not the mechanism; `virtual_power` does not use "
+        "a singularity of the two rod angles, not of the mechanism; `virtual_power` does not use "
         "them",
     ),
 }
 
-LOW = "effort_low"  # what is tallied of efforts below a limit of their own; told as effort_limit
+LOW = "effort_low"  # efforts below a lower limit of their own; reported as effort_limit
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class Notice:
     """A warning.
 
     kind:  one of `KINDS`; "other" in files that were written before there were kinds.
-    text:  for people.
+    text:  to read.
     owner: name of the chain or contact it is about;  status: of the samples that failed.
     count: samples or rows;  time: of the first [s], along a motion;  row: of a table, from 1.
     value, bound, unit: the largest or smallest that was met, and what it is held against.
@@ -136,7 +136,7 @@ class _Tally:
 
 
 class Watch:
-    """Sees blocks of samples, in order, and tells in the end what was wrong.
+    """Checks blocks of samples, in order, and collects warnings.
 
     Args: rows: samples are rows of a table and stand alone; otherwise they follow a motion.
           residual: largest distance of given poses from the contact surfaces [m].
@@ -224,7 +224,7 @@ class Watch:
                 # What no limits would do for has no number: JSON knows none that is infinite.
                 about |= {"value": size if np.isfinite(size) else None, "bound": 1.0, "unit": "1"}
             return Notice(kind, text, named, status=STATUS_NAMES[status], **about)
-        # Whose it is, what is said of it, what was met, and what it is held against.
+        # Owner, text, value and bound.
         name: str | None
         if kind in ("bounds", "contact_loss"):
             name, value, bound = self.mechanism.contact_names[i], size, 0.0
@@ -269,10 +269,10 @@ class Watch:
 
 
 def home_notices(mechanism: Mechanism) -> Iterable[Notice]:
-    """What the file alone gives rise to: odd sizes, contacts a little off their surfaces."""
+    """Warnings about the mechanism file alone: unusual sizes, contacts off their surfaces."""
     for odd in mechanism_warnings(mechanism):
         yield Notice("implausible", str(odd))
     off = zip(mechanism.contact_names, home_residuals(mechanism), strict=True)
-    told = [(name, float(value)) for name, value in off if abs(value) > HOME_WARNING]
-    for (name, value), text in zip(told, home_warnings(mechanism), strict=True):
+    far = [(name, float(value)) for name, value in off if abs(value) > HOME_WARNING]
+    for (name, value), text in zip(far, home_warnings(mechanism), strict=True):
         yield Notice("home_residual", text, name, value=value, bound=HOME_WARNING, unit="m")

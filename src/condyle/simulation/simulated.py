@@ -133,28 +133,12 @@ def _controlled(plan: Plan, drive: ClosedLoop, trace: Trace) -> dict[str, np.nda
 
 
 def _options(plan: Plan, scenario: Scenario, source: str, seconds: float) -> dict[str, Any]:
-    model = plan.model
     kind = scenario.controller.kind if scenario.closed_loop else "open loop"
     return {
-        "formulation": model.formulation,
-        "route": model.route,
-        "distribution": model.policy.objective,
-        "preload": model.policy.preload,
-        "contact_weight": 0.0,
-        "reference_force": model.reference_force,
         "motion": f"simulation, {kind}",
-        "motion_sha256": None,
         "motion_kind": "simulation",
-        "landmark": None,
         "load": ", ".join(load.name for load in plan.loads) or "no load",
-        "load_sha256": None,
         "load_point": next((load.place for load in plan.loads if load.place), None),
-        "independent": list(model.independent),
-        "dependent": list(model.dependent),
-        "characteristic_length": model.characteristic_length,
-        "contact_residual_of_given_pose": None,
-        "smoothing": None,
-        "derivation_seconds": model.derivation_seconds,
         "solve_seconds": seconds,
         "scenario_source": source,
         "scenario": json.loads(scenario.model_dump_json(by_alias=True, exclude_none=True)),

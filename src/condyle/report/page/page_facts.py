@@ -1,4 +1,4 @@
-"""What the page says in words and tables; it reads without any script."""
+"""Text and tables of the page, which need no script."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import hashlib
 import re
 from collections.abc import Iterator, Sequence
 from functools import partial
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +15,7 @@ import numpy as np
 from ...errors import InputError
 from ...extras import require
 from ...results.solution import BOUND_TOLERANCE
-from ...results.summary import summarize
+from ...results.summary import peak, summarize
 from ..actuators import drawn_limits
 from ..failed_spans import gaps, longest
 from ..panel_list import reaction
@@ -72,20 +71,18 @@ def _facts(page: Reduced) -> Iterator[tuple[Any, ...]]:
     data = summarize(solution).data
     start, end = page.time[[0, -1]]
     time = solution["time"].values
-    told = f"{failed} without a result" if failed else f"{start:g} to {end:g} s"
-    yield "Samples", f"{page.total:,}".replace(",", "\u202f"), told, bool(failed)
+    where = f"{failed} without a result" if failed else f"{start:g} to {end:g} s"
+    yield "Samples", f"{page.total:,}".replace(",", "\u202f"), where, bool(failed)
     units = [str(unit) for unit in solution["effort_unit"].values]
     for unit in dict.fromkeys(units):
         mine = [i for i, u in enumerate(units) if u == unit]
-        peak = _peak(solution["effort"].values[:, mine])
-        if peak is not None:
-            sample, i, value = peak
+        if (largest := peak(solution["effort"].values[:, mine])) is not None:
+            sample, i, value = largest
             name = solution["chain"].values[mine[i]]
             word = "Largest torque" if unit == "N m" else "Largest force"
             yield word, f"{value:.4g} {unit}", f"{name}, t = {time[sample]:g} s"
-    peak = _peak(solution["contact_force"].values)
-    if peak is not None:
-        sample, i, value = peak
+    if (largest := peak(solution["contact_force"].values)) is not None:
+        sample, i, value = largest
         where = f"{solution['contact'].values[i]}, t = {time[sample]:g} s"
         yield "Largest contact force", f"{value:.4g} N", where
     bounds = data["closest_to_bounds"]
@@ -121,14 +118,6 @@ def failure_table(page: Reduced) -> Markup:
     return table(header, rows, "Without a result", notes)
 
 
-def _peak(values: np.ndarray) -> tuple[int, int, float] | None:
-    """(sample, column, signed value) of the largest magnitude of (N, m) values."""
-    if not np.isfinite(values).any():
-        return None
-    sample, column = np.unravel_index(np.nanargmax(np.abs(values)), values.shape)
-    return int(sample), int(column), float(values[sample, column])
-
-
 def chain_table(solution: xr.Dataset) -> Markup:
     """Peak effort and speed of each chain beside its limits."""
     rows = []
@@ -151,18 +140,17 @@ def chain_table(solution: xr.Dataset) -> Markup:
 def _peak_cells(
     solution: xr.Dataset, variable: str, chain: int, unit: str, limit: Limits
 ) -> list[str]:
-    peak = _peak(solution[variable].values[:, [chain]])
-    if peak is None:
+    if (largest := peak(solution[variable].values[:, [chain]])) is None:
         return ["-", "-", "-"]
-    sample, _, value = peak
+    sample, _, value = largest
     use = limit.use(value)
     if use is None:
-        told = "no limit"
+        used = "no limit"
     elif np.isinf(use):
-        told = f"beyond {limit.effort_text(unit)}"
+        used = f"beyond {limit.effort_text(unit)}"
     else:
-        told = f"{use:.0%} of {abs(value / use) if use else limit.greatest:g} {unit}"
-    return [f"{value:.4g} {unit}", f"{solution['time'].values[sample]:g} s", told]
+        used = f"{use:.0%} of {abs(value / use) if use else limit.greatest:g} {unit}"
+    return [f"{value:.4g} {unit}", f"{solution['time'].values[sample]:g} s", used]
 
 
 def reaction_tables(solution: xr.Dataset) -> Markup:
@@ -227,7 +215,7 @@ def _file_row(path: Path) -> list[str]:
 
 
 def file_name(source: Any) -> str:
-    """A file's name without its folders, which tell of the sender's machine; words stay."""
+    """A file's name without its folders, which are the sender's own; words stay."""
     return re.split(r"[/\\](?=[^/\\]*$)", str(source))[-1]
 
 
@@ -279,9 +267,6 @@ def _warnings(solution: xr.Dataset) -> Iterator[tuple[str, np.ndarray]]:
     yield NEAR_SINGULAR, solution["singularity"].values != 0
 
 
-DPI = 110
-
-
 def sweep_section(found: xr.Dataset | None) -> Markup:
     """Pictures and tables of a sweep; nothing without one."""
     if found is None:
@@ -312,9 +297,9 @@ def bands_section(solution: xr.Dataset) -> Markup:
 
 
 def _image(figure: Figure, meaning: str) -> Markup:
-    """A picture within the page: it needs no file beside it."""
-    content = BytesIO()
-    figure.savefig(content, format="png", dpi=DPI)
-    data = base64.b64encode(content.getvalue()).decode()
+    """A picture within the page: it needs no file of its own."""
+    from ..figures.style import png
+
+    data = base64.b64encode(png(figure)).decode()
     source = Markup(f"data:image/png;base64,{data}")
     return Markup(f'<img src="{source}" alt="{meaning}" style="max-width:100%">')

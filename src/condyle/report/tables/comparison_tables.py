@@ -130,7 +130,7 @@ def _notes_1(comparison: Comparison, beside: bool) -> Iterator[str]:
         return
     yield (
         "The paper used Matlab on an i7-8700K and does not state its number of samples, so the "
-        "ratios to its seconds tell little; compare the columns 'of GM 1' (totals as part of GM "
+        "ratios to its seconds mean little; compare the columns 'of GM 1' (totals as part of GM "
         "1's). Its 6RSS shares the symbolic part with Model 2; here each model is derived alone."
     )
     for formulation, names in (("momentum", "GM 2 / GM 1"), ("lagrange", "L-D 2 / L-D 1")):
@@ -150,7 +150,7 @@ def _notes_1(comparison: Comparison, beside: bool) -> Iterator[str]:
 
 
 def processor() -> str:
-    """The processor's name, as good as the system tells it."""
+    """The processor's name, as far as the system names it."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
