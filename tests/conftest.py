@@ -39,8 +39,8 @@ os.environ["COLUMNS"] = "100"
 TESTS = Path(__file__).parent
 # Tests that need a compiler, a browser or another program, or draw pages, are slow without a mark.
 SLOW_FIXTURES = {"browser", "compiler_command"}
-PAGES = {"docs", "report", "view"}
-SLOW_ROOMS = PAGES | {"backends", "bench", "export"}
+COMPILED_ROOMS = {"backends", "bench"}
+SLOW_ROOMS = COMPILED_ROOMS | {"docs", "export", "report", "view"}
 
 
 def room(item: pytest.Item) -> str:
@@ -56,12 +56,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
-    """Quick tests and pages run kernels by numpy, the others as people do."""
-    timed = any(item.get_closest_marker(speed) for speed in ("slow", "ci"))
+    """Tests that ask for no compiler run kernels by numpy, unless they name a backend."""
+    compiled = "compiler_command" in getattr(item, "fixturenames", ())
     with pytest.MonkeyPatch.context() as patch:
         for name in ("CONDYLE_BACKEND", "CONDYLE_LANES"):
             patch.delenv(name, raising=False)
-        if room(item) in PAGES or not timed:
+        if not compiled and room(item) not in COMPILED_ROOMS:
             patch.setenv("CONDYLE_BACKEND", "numpy")
         return (yield)
 
@@ -92,13 +92,8 @@ def condyle_command(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> Callable[..., Outcome]:
     """Runs `condyle ...` in this process, in an empty folder."""
-    from condyle.backends.compiler import CompilerError, find_compiler
     from condyle.cli import main
 
-    try:
-        find_compiler()
-    except CompilerError:  # else the notice of it would mix with what is said on stderr
-        monkeypatch.setenv("CONDYLE_BACKEND", "numpy")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("TERM", "dumb")
 

@@ -17,6 +17,8 @@ from condyle.mechanism.home import independent_coordinates
 from condyle.mechanism.mechanism import Contact
 from condyle.motion import Motion
 
+pytestmark = pytest.mark.slow
+
 
 def small_motion(mechanism: Mechanism) -> Motion:
     """A little of every independent coordinate."""

@@ -86,6 +86,7 @@ def test_what_has_no_curve(motion: Motion) -> None:
         tradeoff(jaw.replace(chains=(free, *jaw.chains[1:])), condyle.trial_motion(jaw))
 
 
+@pytest.mark.slow
 def test_models_agree_under_every_distribution(motion: Motion) -> None:
     for name in ("bounded", "weighted"):
         found = compare(

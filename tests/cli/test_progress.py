@@ -17,7 +17,6 @@ import pytest
 
 import condyle
 from condyle.analysis.comparison import compare
-from condyle.backends.compiler import CompilerError, find_compiler
 from condyle.cli import bar
 from condyle.motion import Motion, iter_table
 from condyle.progress import Advance, step, watched_by
@@ -224,14 +223,10 @@ def test_steps_of_a_comparison(
     assert watcher.steps["drawing figures"] == [12, 12]
 
 
-@pytest.mark.slow
+@pytest.mark.usefixtures("compiler_command")
 def test_building_a_kernel(
     watcher: Watcher, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    try:
-        find_compiler()
-    except CompilerError as error:
-        pytest.skip(f"kernels need a compiler: {error}")
     monkeypatch.setenv("CONDYLE_CACHE", str(tmp_path))
     model = condyle.derive(condyle.load_mechanism("gough-stewart"), backend="compiled")
     zero = np.zeros((1, 6))

@@ -13,7 +13,6 @@ import pytest
 import condyle
 from condyle.backends.c import compiled_kernel as kernel
 from condyle.backends.c.compiled_kernel import CompiledKernel
-from condyle.backends.compiler import CompilerError, find_compiler
 from condyle.mechanism import COORDINATES
 from condyle.model.model import Model, with_point
 from condyle.motion import read_table
@@ -232,15 +231,11 @@ def test_bounds_warn_and_strict_refuses(solve: Solve) -> None:
     assert (outcome.status, outcome.out, outcome.err) == (0, "", "")
 
 
-@pytest.mark.slow
+@pytest.mark.usefixtures("compiler_command")
 def test_threads(
     condyle_command: Callable[..., Any], solve: Solve, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """--threads reaches the kernel, and the file is the same to the byte, with and without."""
-    try:
-        find_compiler()
-    except CompilerError as error:
-        pytest.skip(str(error))
     asked = []
     real = CompiledKernel.run
 

@@ -51,6 +51,7 @@ def compare_all(mechanism: Mechanism, *samples: np.ndarray) -> int:
     return len(others)
 
 
+@pytest.mark.slow
 @settings(max_examples=6, deadline=None, derandomize=True, phases=[Phase.generate])
 @given(
     seed=st.integers(0, 10**6),
@@ -70,6 +71,7 @@ def test_random_mechanisms(seed: int, chains: int, contacts: int, metres: bool) 
     assert compared == len(FORMULATIONS) * (2 if contacts < 3 else 1) - 1
 
 
+@pytest.mark.slow
 def test_the_reference_motion(reference: Mechanism) -> None:
     motion = condyle.reference_motion()
     wrench = condyle.reference_load().at(motion.t)[::25]
@@ -96,7 +98,7 @@ def test_the_choice_of_dependent_coordinates_is_free(
     assert difference(got, wanted) < 1e-10
 
 
-@pytest.mark.parametrize("backend", few(["numpy", "auto"], "numpy", rest=slow))
+@pytest.mark.parametrize("backend", few(["numpy", "compiled"], "numpy", rest=slow))
 def test_near_crank_singularities(reference: Mechanism, backend: str) -> None:
     """Towards a stretched crank the loss is rounding over the transmission's sine, no more.
 
@@ -125,7 +127,7 @@ def test_near_crank_singularities(reference: Mechanism, backend: str) -> None:
         assert (error < 1e-13 / sine**2).all()
 
 
-@pytest.mark.slow
+@pytest.mark.usefixtures("compiler_command")
 @pytest.mark.parametrize(
     "options", [{"contacts": 3}, {"contacts": 2, "surface": "quadratic"}], ids=str
 )

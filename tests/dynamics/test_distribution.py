@@ -64,7 +64,7 @@ def test_an_ill_conditioned_jacobian_costs_its_condition_number_and_no_more(n: i
     "contacts, chains, backend",
     [
         *((k, n, "numpy") for k, n in ((2, 8), (1, 6), (5, 6))),
-        pytest.param(2, 8, "auto", marks=pytest.mark.slow),
+        pytest.param(2, 8, "compiled", marks=pytest.mark.slow),
     ],
 )
 def test_models_choose_the_least_norm(contacts: int, chains: int, backend: str) -> None:

@@ -32,8 +32,7 @@ def close(got: np.ndarray, key: str) -> None:
 def test_every_model_meets_the_cases(
     reference: condyle.Mechanism, formulation: str, route: str
 ) -> None:
-    backend = "auto" if (formulation, route) == ("virtual_power", "core") else "numpy"
-    model = condyle.derive(reference, formulation, route, backend=backend)
+    model = condyle.derive(reference, formulation, route)
     assert list(model.independent) == NAMES
     force = np.hstack([CASES["F"], np.zeros_like(CASES["F"])])
     load = with_point(force, model.load_point(REFERENCE["load_point"]))
@@ -53,7 +52,7 @@ def test_every_model_meets_the_cases(
 @pytest.mark.parametrize(
     "backend, options",
     [
-        pytest.param("auto", (), marks=slow),
+        pytest.param("compiled", (), marks=slow),
         ("numpy", ("--formulation", "lagrange", "--route", "direct")),
     ],
 )

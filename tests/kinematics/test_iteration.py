@@ -98,6 +98,7 @@ def test_what_is_no_pose_is_not_accepted(kind: str, contacts: int, value: float)
     assert not accepted[lengths if np.isfinite(value) else slice(None)].any()
 
 
+@pytest.mark.slow
 def test_home_is_accepted_as_it_is() -> None:
     for kind, contacts, ball in CASES:
         pose, reach = evaluate(

@@ -53,6 +53,7 @@ def test_equation_6_of_the_paper(reference: Mechanism) -> None:
     assert np.ptp(pose[:, 5]) > 0.2
 
 
+@pytest.mark.slow
 @settings(max_examples=10, deadline=None, derandomize=True, phases=[Phase.generate])
 @given(seed=st.integers(0, 10**6), contacts=st.sampled_from([1, 2]))
 def test_any_planes_and_any_set_agree_with_newton(seed: int, contacts: int) -> None:

@@ -20,7 +20,7 @@ CHANGES = {
 
 
 @pytest.mark.parametrize("name", CHANGES)
-@pytest.mark.parametrize("backend", few(["numpy", "auto"], "numpy", rest=slow))
+@pytest.mark.parametrize("backend", few(["numpy", "compiled"], "numpy", rest=slow))
 def test_a_renumbered_model_is_the_mechanisms_own(name: str, backend: str) -> None:
     base = condyle.load_mechanism(name)
     other = base.set(CHANGES[name])

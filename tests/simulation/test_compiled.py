@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.backends.compiler import CompilerError, find_compiler
 from condyle.questions.builder import Lanes
 from condyle.questions.law.controller import EACH_COORDINATE, Control, ControllerTable
 from condyle.questions.load.acting import LoadTable, Place
@@ -20,11 +19,7 @@ from condyle.simulation.gains import check_gains
 from condyle.simulation.plan import Plan, Trace
 from condyle.simulation.scenario import scenario_from
 
-try:
-    find_compiler()
-except CompilerError:
-    pytest.skip("needs a C compiler", allow_module_level=True)
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.usefixtures("compiler_command")
 
 BASE = {"duration": 0.2, "rate": 700.0, "method": "rk4", "step": 2e-4}
 TORQUE = {"kind": "computed_torque", "stiffness": 400.0, "rate": 500.0}

@@ -30,6 +30,7 @@ def brute(jaw: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     return pose, spare(pose)
 
 
+@pytest.mark.slow
 def test_reach_and_who_forbids(jaw: xr.Dataset, brute: tuple[np.ndarray, np.ndarray]) -> None:
     _, left = brute
     clear = (np.abs(left) > 1e-9).all(axis=1)

@@ -113,6 +113,7 @@ def test_ball_in_a_known_set(d: int) -> None:
     assert none.radius == 0.0
 
 
+@pytest.mark.slow
 def test_room_of_a_mechanism(model_of: Models) -> None:
     """Ball and box against the same conditions at many poses, taken from its own evaluations."""
     from condyle.analysis.map.axes import grid_of

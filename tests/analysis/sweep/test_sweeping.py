@@ -113,6 +113,7 @@ def wait_for_parts(folder: Path, count: int, seconds: float = 60.0) -> None:
         time.sleep(0.01)
 
 
+@pytest.mark.slow
 def test_killed_at_any_instant_it_goes_on(
     tables: dict[str, Any], tmp_path: Path, same: Same
 ) -> None:
@@ -133,6 +134,7 @@ def test_killed_at_any_instant_it_goes_on(
     same(condyle.sweep(study, workers=1), condyle.sweep(file, folder, workers=1, resume=True))
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_killed_is_told_and_loses_nothing(
     tables: dict[str, Any],
     tmp_path: Path,
@@ -217,6 +219,7 @@ def test_a_changed_study_is_refused_with_the_difference(
     assert kept["rows"] == 2
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_in_order(
     tables: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -237,6 +240,7 @@ def test_ctrl_c_ends_in_order(
     assert whole["variant"].values.tolist() == list(range(40))
 
 
+@pytest.mark.slow
 def test_solutions_are_kept_on_request(tables: dict[str, Any], tmp_path: Path) -> None:
     study = {**tables, "solutions": True, "vary": [{**tables["vary"][0], "count": 2}]}
     table = condyle.sweep(study, tmp_path, workers=1)

@@ -49,7 +49,7 @@ def evaluate(model: Model, states: dict[str, Any]) -> Evaluation:
     return model.evaluate(q, q1, q2, load)
 
 
-@pytest.mark.parametrize("name", few(MECHANISMS, "quadratic_k1", "balls_round", rest=slow))
+@pytest.mark.parametrize("name", few(MECHANISMS, "quadratic_k1", rest=slow))
 def test_oracle_and_formulations(name: str) -> None:
     rng = np.random.default_rng(sum(map(ord, name)))
     raw = random_mechanism(rng, **MECHANISMS[name])
@@ -115,6 +115,7 @@ def test_surfaces_that_are_the_plane(reference: Mechanism) -> None:
         same(got, wanted, 1e-12)
 
 
+@pytest.mark.slow
 def test_ball_on_a_wall_is_its_centre_on_a_shifted_one(reference: Mechanism) -> None:
     states = masticatory_states()
     wanted = evaluate(interpreted(reference), states)
@@ -129,6 +130,7 @@ def test_ball_on_a_wall_is_its_centre_on_a_shifted_one(reference: Mechanism) -> 
         same(evaluate(interpreted(machine), states), wanted, 1e-12)
 
 
+@pytest.mark.slow
 def test_a_large_sphere_tends_to_its_tangent_plane(reference: Mechanism) -> None:
     """As 1 / r: ten times the radius, a tenth of the difference."""
     states = masticatory_states()
@@ -147,6 +149,7 @@ def test_a_large_sphere_tends_to_its_tangent_plane(reference: Mechanism) -> None
     assert differences[0] < 0.1
 
 
+@pytest.mark.slow
 def test_a_profile_through_a_quadratic(reference: Mechanism) -> None:
     """Equal between its points to spline order: 4 times finer, the torques far nearer."""
     states = masticatory_states()

@@ -114,7 +114,7 @@ def test_a_file_from_before_there_was_contact_loss(
     assert summarize(again).data == summarize(solution).data
 
 
-@pytest.mark.slow
+@pytest.mark.usefixtures("compiler_command")
 def test_compiled_kernels_flag_the_same_samples(reference: Mechanism, chewing: Motion) -> None:
     machine = one_sided(reference)
     compiled = condyle.derive(machine).solve(chewing, condyle.reference_load())

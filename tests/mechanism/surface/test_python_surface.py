@@ -53,7 +53,7 @@ def saved(solution: xr.Dataset, tmp_path: Path) -> xr.Dataset:
     return condyle.open_solution(tmp_path / "s.nc")
 
 
-@pytest.mark.slow
+@pytest.mark.usefixtures("compiler_command")
 def test_every_backend_and_model(machine: Mechanism, motion: Motion, solution: xr.Dataset) -> None:
     by_default = condyle.derive(machine).solve(motion)
     close(by_default["effort"].values, solution["effort"].values, 1e-11)
