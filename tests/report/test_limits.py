@@ -103,8 +103,8 @@ def test_the_view_tells_of_slack(solution: xr.Dataset) -> None:
     messages = state_messages(machine, np.full(2, np.inf), np.zeros(2), given, None)
     assert messages == [
         "temporalis_right is above its effort limit of 3",
-        f"{FIRST} is below its least effort of -0.0005",
-        f"{SECOND} is below its least effort of 0",
+        f"{FIRST} is below its minimum effort of -0.0005",
+        f"{SECOND} is below its minimum effort of 0",
     ]
 
 

@@ -97,19 +97,19 @@ def test_what_no_muscles_can_hold_is_called_infeasible(jaw: condyle.Mechanism) -
     session.set_load(np.array([0.0, 0.0, -5000.0]), "right_molar")
     snapshot = session.snapshot()
     assert np.isnan(snapshot.effort).all() and snapshot.over == ()
-    assert snapshot.messages == ("Infeasible: no efforts within the limits hold this",)
+    assert snapshot.messages == ("Infeasible: no efforts within the limits balance the load",)
 
 
 def test_no_directions_without_redundancy() -> None:
     session = Session(condyle.load_mechanism("gough-stewart"))
     assert session.directions().count == len(session.internal) == 0
-    assert "As many actuators as freedoms" in internal_text(0, 0)
+    assert "No actuation redundancy" in internal_text(0, 0)
 
 
 def test_words_say_what_has_no_slider(jaw: condyle.Mechanism) -> None:
     session = Session(jaw)
     assert "20 directions" in internal_text(20, MOST_INTERNAL)
-    assert "the 6 that load" in internal_text(20, MOST_INTERNAL)
+    assert "of which 6 have a slider" in internal_text(20, MOST_INTERNAL)
     assert internal_text(2, 2).startswith("2 directions") and "of which" not in internal_text(2, 2)
     session.set_internal(1, 2.0)
     html = effects_html(jaw, session.directions(), session.internal, MOST_INTERNAL)

@@ -50,7 +50,7 @@ def test_it_says_that_it_cannot_keep_pace(
     for _ in range(20):
         player.advance(0.1)
     assert player.now == 0
-    assert "Slower than asked" in player.snapshot().messages[0]
+    assert "Slower than requested" in player.snapshot().messages[0]
 
 
 def test_its_numbers_are_those_of_a_simulation(
@@ -76,8 +76,8 @@ def test_an_end_is_said_and_a_restart_goes_on(reference: condyle.Mechanism) -> N
     while player.playing:
         player.advance(0.1)
     found = player.snapshot()
-    assert found.level == "unreachable" and "It ended" in found.messages[0]
-    assert np.isfinite(found.pose).all() and "It ended" in status_html(found)
+    assert found.level == "unreachable" and "Simulation ended" in found.messages[0]
+    assert np.isfinite(found.pose).all() and "Simulation ended" in status_html(found)
     player.play()
     assert player.now == 0 and player.advance(0.01) and player.live.ended is None
 
@@ -89,9 +89,9 @@ def test_it_begins_again_at_its_end(
     player = LivePlayer(planned(reference, {"duration": 0.05, "controller": TORQUE}))
     player.advance(0.1)
     assert player.now == 0 and player.playing
-    player.again = False
+    player.loop = False
     player.advance(0.1)
-    assert not player.playing and player.snapshot().messages[0] == "It is over."
+    assert not player.playing and player.snapshot().messages[0] == "Simulation finished."
 
 
 def test_a_law_that_fails_is_told_of_once(
@@ -139,11 +139,11 @@ def test_hands_on_the_page(open_tab: Callable[..., Tab], view: View) -> None:
         mouse.move(x, y - 12 * step)
         tab.page.evaluate("() => new Promise((done) => requestAnimationFrame(done))")
     tab.until(lambda: player.live.pulling, "the hand pulls")
-    tab.page.locator('[data-table="loads"] tr').filter(has_text="your hand").wait_for()
-    tab.until(lambda: float(row(tab, "loads", "your hand")[1].split()[0]) > 0, "its force is told")
+    tab.page.locator('[data-table="loads"] tr').filter(has_text="mouse").wait_for()
+    tab.until(lambda: float(row(tab, "loads", "mouse")[1].split()[0]) > 0, "its force is told")
     mouse.up()
     tab.until(lambda: not player.live.pulling, "the hand lets go")
-    tab.page.get_by_role("button", name="As in the scenario").click()
+    tab.page.get_by_role("button", name="Reset to scenario").click()
     tab.until(lambda: player.live.values[thickness] == pytest.approx(0.01), "as it was")
     tab.page.get_by_role("button", name="Restart").click()
     tab.until(lambda: player.playing, "it runs again")

@@ -30,7 +30,7 @@ def session(reference: condyle.Mechanism) -> Session:
 
 def test_home_holds_the_platform_against_gravity(session: Session) -> None:
     home = session.snapshot()
-    assert home.level == "calm" and home.messages == ()
+    assert home.level == "ok" and home.messages == ()
     assert np.allclose(home.pose, 0, atol=1e-12) and np.allclose(home.joint, 0, atol=1e-9)
     motion = Motion.from_arrays(
         np.linspace(0, 1, 6),
@@ -77,12 +77,12 @@ def test_a_chain_out_of_reach_is_named_and_stays_drawn(session: Session) -> None
     assert found.level == "unreachable"
     assert 'chain "temporalis_left" cannot reach M' in found.messages[0]
     assert "temporalis_right" in found.messages[1]
-    assert found.broken == ("temporalis_left", "temporalis_right")
+    assert found.out_of_reach == ("temporalis_left", "temporalis_right")
     assert np.isnan(found.effort).all() and found.pose[0] == 0.016
     drawn = [p for d in found.scene.chains.values() for p in d.points.values()]
     assert all(np.isfinite(p).all() for p in drawn)
     session.go_home()
-    assert session.snapshot().level == "calm"
+    assert session.snapshot().level == "ok"
 
 
 def test_contacts_that_cannot_be_met_leave_the_last_pose_and_a_ghost(raw: dict) -> None:
@@ -93,7 +93,7 @@ def test_contacts_that_cannot_be_met_leave_the_last_pose_and_a_ghost(raw: dict) 
     session.set_coordinate("Y", 0.1)  # the ball's socket is 20 mm wide
     found = session.snapshot()
     assert found.level == "unreachable" and "left_condyle" in found.messages[0]
-    assert np.array_equal(found.pose, good) and found.broken == ()
+    assert np.array_equal(found.pose, good) and found.out_of_reach == ()
     assert found.wanted is not None and found.wanted[1] == 0.1 and found.wanted[4] == 0.05
 
 
@@ -108,7 +108,7 @@ def test_wild_poses_never_raise(session: Session) -> None:
         assert session.snapshot().level == "unreachable"
     assert "unreachable" in levels
     session.go_home()
-    assert session.snapshot().level == "calm"
+    assert session.snapshot().level == "ok"
 
 
 def test_dragging_goes_to_the_nearest_pose_on_the_contacts(session: Session) -> None:
@@ -191,7 +191,7 @@ def test_play_begins_where_it_stands_however_long_it_stood(chewing: xr.Dataset) 
     try:
         time.sleep(1.5)
         begun = time.monotonic()
-        view.wish("play", view.panel.toggle)
+        view.request("play", view.panel.toggle)
         time.sleep(0.4)
         assert view.playback is not None
         assert 0 < view.playback.now <= time.monotonic() - begun + 0.02

@@ -85,7 +85,7 @@ def test_page_opens_without_a_network(
     tab = ready(open_tab(view.url, width, height))
     local = ("http://127.0.0.1", "ws://127.0.0.1", "data:", "blob:")
     assert [url for url in tab.requests if not url.startswith(local)] == []
-    assert tab.page.locator('[data-level="calm"]').is_visible()
+    assert tab.page.locator('[data-level="ok"]').is_visible()
     pixels = tab.picture("canvas").reshape(-1, 3)
     assert pixels.std(axis=0).max() > 8, "the canvas is not blank"
 
@@ -123,7 +123,7 @@ def test_poses_out_of_bounds_and_out_of_reach_say_so_and_the_page_lives(
     assert row(tab, "chains", "temporalis_left")[2] == "–"
     tab.picture_where("canvas", lambda p: is_red(p).sum() > 2000, "the platform in red")
     tab.page.get_by_role("button", name="Go home").click()
-    wait_for_level(tab, "calm")
+    wait_for_level(tab, "ok")
     assert row(tab, "chains", "temporalis_left")[2] == "0.0145 N m"
 
 
@@ -167,7 +167,7 @@ def test_files_open_and_bad_ones_are_refused(tab: Tab, view: View, tmp_path: Pat
     condyle.dump(condyle.load_mechanism("hexaglide"), good)
     tab.page.set_input_files("input[type=file]", str(good))
     tab.page.get_by_text("condyle - hexaglide").wait_for()
-    wait_for_level(tab, "calm")
+    wait_for_level(tab, "ok")
     assert view.session.mechanism.name == "hexaglide"
     assert len(row(tab, "chains", "left_front")) == 5
 
@@ -221,7 +221,7 @@ def test_internal_efforts_move_numbers_and_nothing_else(
 ) -> None:
     before = view.snapshot
     tab.page.get_by_role("tab", name="Preload").click()
-    tab.page.get_by_text("2 directions of efforts that balance each other").wait_for()
+    tab.page.get_by_text("2 directions of internal efforts").wait_for()
     fill(tab, "direction 1 [N m]", 0.5)
     tab.until(lambda: bool(view.session.internal[0]), "the slider is heard")
     tab.until(lambda: view.snapshot is not before, "it is drawn")
@@ -232,6 +232,6 @@ def test_internal_efforts_move_numbers_and_nothing_else(
     added = now.effort - before.effort
     assert np.allclose(added, amount * directions.effort[:, 0], atol=1e-12)
     assert np.array_equal(now.pose, before.pose)
-    tab.page.get_by_role("button", name="No internal efforts").click()
+    tab.page.get_by_role("button", name="Reset internal efforts").click()
     tab.until(lambda: not view.session.internal.any(), "the efforts are taken off")
     tab.until(lambda: np.allclose(view.snapshot.effort, before.effort), "they are gone")

@@ -41,7 +41,7 @@ class Page(Protocol):
     dragging: bool
     dark: bool
 
-    def wish(self, kind: str, action: Callable[[], None]) -> None: ...
+    def request(self, kind: str, action: Callable[[], None]) -> None: ...
     def set_dark(self, dark: bool) -> None: ...
     def look_from(self, name: str) -> None: ...
     def open_mechanism(self, mechanism: Mechanism) -> None: ...
@@ -49,7 +49,7 @@ class Page(Protocol):
 
 
 class Panel:
-    """The controls of one mechanism. They note wishes; the view's worker fulfils them."""
+    """The controls of one mechanism. They note requests; the view's worker runs them."""
 
     def __init__(self, server: viser.ViserServer, view: Page) -> None:
         self._gui = server.gui
@@ -73,22 +73,22 @@ class Panel:
             self._add_files()
         self._tables = self._gui.add_html("")
         views = self._gui.add_button_group("View", tuple(VIEWS))
-        views.on_click(lambda _: view.wish("camera", partial(view.look_from, views.value)))
+        views.on_click(lambda _: view.request("camera", partial(view.look_from, views.value)))
         self._follow_drags()
 
-    def hear(self, kind: str, handle: Any, action: Callable[[Any], None]) -> None:
-        """Wish `action(value)` when a hand changes a handle, not when the panel itself does."""
+    def on_change(self, kind: str, handle: Any, action: Callable[[Any], None]) -> None:
+        """Request `action(value)` when a hand changes a handle, not when the panel itself does."""
 
         # On viser's own thread: a pool's thread might read the value after the worker's next one.
         async def heard(event: Any) -> None:
             if event.client_id is not None:
-                self._view.wish(kind, partial(action, handle.value))
+                self._view.request(kind, partial(action, handle.value))
 
         handle.on_update(heard)
 
-    def press(self, label: str, action: Callable[[], None], **options: Any) -> Any:
+    def add_button(self, label: str, action: Callable[[], None], **options: Any) -> Any:
         button = self._gui.add_button(label, **options)
-        button.on_click(lambda _: self._view.wish(label, action))
+        button.on_click(lambda _: self._view.request(label, action))
         return button
 
     def _add_pose(self) -> None:
@@ -98,14 +98,14 @@ class Panel:
         for c in self._coordinates.values():
             low, high = round_outwards(c.low * c.scale, c.high * c.scale)
             slider = self._gui.add_slider(f"{c.name} [{c.unit}]", low, high, 0.01, 0.0)
-            self.hear(c.name, slider, partial(self.move, c.name))
+            self.on_change(c.name, slider, partial(self.move, c.name))
             self._sliders[c.name] = slider
         self._known = session.q.copy()
-        self.press("Go home", self.go_home)
+        self.add_button("Go home", self.go_home)
         control = self._view.stage.control
         control.visible = self._view.live is None  # the hand of a simulation has a grip of its own
-        show = self._gui.add_checkbox("Handle to drag", control.visible)
-        self.hear("control", show, lambda on: setattr(control, "visible", on))
+        show = self._gui.add_checkbox("Drag handle", control.visible)
+        self.on_change("control", show, lambda on: setattr(control, "visible", on))
 
     def _add_load(self) -> None:
         mechanism = self._view.session.mechanism
@@ -115,10 +115,10 @@ class Panel:
         with self._gui.add_folder("Load on the platform"):
             for axis, name in enumerate(("Fx", "Fy", "Fz")):
                 slider = self._gui.add_slider(f"{name} [N]", -most, most, most / 500, 0.0)
-                self.hear(name, slider, partial(self.push, axis))
+                self.on_change(name, slider, partial(self.push, axis))
             here, points = session.load_point, session.load_points
             at = self._gui.add_dropdown("at", points, initial_value=here)
-            self.hear("at", at, lambda point: session.set_load(session.load, point))
+            self.on_change("at", at, lambda point: session.set_load(session.load, point))
 
     def _add_internal(self) -> None:
         """One slider for each direction of internal efforts, as many as a panel can hold."""
@@ -133,13 +133,13 @@ class Panel:
             slider = self._gui.add_slider(
                 f"direction {i + 1} [{unit}]", -high, high, high / 500, 0.0
             )
-            self.hear(f"internal {i}", slider, partial(session.set_internal, i))
+            self.on_change(f"internal {i}", slider, partial(session.set_internal, i))
             self._internal.append(slider)
         if shown:
-            self.press("No internal efforts", self.release)
+            self.add_button("Reset internal efforts", self.reset_internal)
         self._effects = self._gui.add_html("")
 
-    def release(self) -> None:
+    def reset_internal(self) -> None:
         """Take all internal efforts off."""
         session = self._view.session
         session.internal[:] = 0.0
@@ -149,27 +149,29 @@ class Panel:
     def _add_player(self) -> None:
         self._player_note = self._gui.add_markdown("No solution is open. Open one (.nc) here:")
         upload = self._gui.add_upload_button("Open a solution", mime_type=".nc")
-        upload.on_upload(lambda _: self._view.wish("open", partial(self.open_nc, upload.value)))
+        upload.on_upload(lambda _: self._view.request("open", partial(self.open_nc, upload.value)))
         self._time: Any = self._gui.add_slider("t [s]", 0.0, 1.0, 0.001, 0.0, disabled=True)
-        self._play = self.press("Play", self.toggle, disabled=True)
+        self._play = self.add_button("Play", self.toggle, disabled=True)
         self._speed = self._gui.add_dropdown("Speed", tuple(SPEEDS), initial_value="1×")
-        self.hear("time", self._time, self.seek)
-        self.hear("speed", self._speed, self.set_speed)
+        self.on_change("time", self._time, self.seek)
+        self.on_change("speed", self._speed, self.set_speed)
 
     def _add_files(self) -> None:
         bundled = self._gui.add_dropdown("Bundled", ("-", *bundled_mechanisms()))
-        self.hear("open", bundled, self.open_bundled)
+        self.on_change("open", bundled, self.open_bundled)
         upload = self._gui.add_upload_button("Open a mechanism (.toml)", mime_type=".toml")
-        upload.on_upload(lambda _: self._view.wish("open", partial(self.open_toml, upload.value)))
+        upload.on_upload(
+            lambda _: self._view.request("open", partial(self.open_toml, upload.value))
+        )
         dark = self._gui.add_checkbox("Dark page", self._view.dark)
-        self.hear("dark", dark, self._view.set_dark)
+        self.on_change("dark", dark, self._view.set_dark)
 
     def _follow_drags(self) -> None:
         stage = self._view.stage
 
         async def dragged(event: Any) -> None:
             action = partial(self.drag, stage.held_pose(), event.phase != "end")
-            self._view.wish("drag", action)
+            self._view.request("drag", action)
 
         stage.control.on_update(dragged)
 
@@ -209,7 +211,7 @@ class Panel:
             f"{len(playback.time)} samples, {options['formulation']}/{options['route']}"
         )
 
-    def say_error(self, message: str) -> None:
+    def show_error(self, message: str) -> None:
         """What went wrong, where the reader looks first."""
         colour = COLOURS["unreachable"]
         self._status.content = (
@@ -254,9 +256,9 @@ class Panel:
         self._view.playback = None
         self._view.session.take_pose(self._view.snapshot.pose)
 
-    def wish(self, kind: str, action: Callable[[], None]) -> None:
+    def request(self, kind: str, action: Callable[[], None]) -> None:
         """Let the view's worker do something soon."""
-        self._view.wish(kind, action)
+        self._view.request(kind, action)
 
     def watch_live(self) -> None:
         """Show the simulation again, if a hand or a solution had taken over."""
@@ -321,29 +323,29 @@ class LivePanel:
     def __init__(self, gui: viser.GuiApi, panel: Panel, player: LivePlayer, stage: Stage) -> None:
         self._gui, self._panel, self.player, self._stage = gui, panel, player, stage
         self._held = self._shown = False
-        self._play = panel.press("Pause", self.toggle)
-        panel.press("Restart", self.restart)
+        self._play = panel.add_button("Pause", self.toggle)
+        panel.add_button("Restart", self.restart)
         speed = gui.add_slider("Speed [×]", SLOWEST, FASTEST, 0.1, 1.0)
-        panel.hear("live speed", speed, partial(setattr, player, "speed"))
-        again = gui.add_checkbox("Begin again at the end", player.again)
-        panel.hear("again", again, partial(setattr, player, "again"))
+        panel.on_change("live speed", speed, partial(setattr, player, "speed"))
+        again = gui.add_checkbox("Loop", player.loop)
+        panel.on_change("loop", again, partial(setattr, player, "loop"))
         self._add_hand()
         self._add_parameters()
-        self._told = gui.add_html("")
+        self._text = gui.add_html("")
 
     def _add_hand(self) -> None:
         player = self.player
         with self._gui.add_folder("Pull with the mouse"):
             at = self._gui.add_dropdown("at", player.pull_points, initial_value=player.pull_at)
-            self._panel.hear("pull at", at, self.pull_at)
+            self._panel.on_change("pull at", at, self.pull_at)
             first, most = player.stiffness, STRONGEST * player.stiffness
             spring = self._gui.add_slider("spring [N/m]", 0.0, most, most / STEPS, first)
-            self._panel.hear("pull by", spring, partial(setattr, player, "stiffness"))
+            self._panel.on_change("pull by", spring, partial(setattr, player, "stiffness"))
         self._grip = self._stage.add_grip()
 
         async def dragged(event: Any) -> None:
             position = np.asarray(self._grip.position) / self._stage.scale
-            self._panel.wish("pull", partial(self.pull, position, event.phase != "end"))
+            self._panel.request("pull", partial(self.pull, position, event.phase != "end"))
 
         self._grip.on_update(dragged)
 
@@ -358,7 +360,7 @@ class LivePanel:
             with folder:
                 self._sliders.append(self._slider(i, parameter))
         if self._sliders:
-            self._panel.press("As in the scenario", self.reset)
+            self._panel.add_button("Reset to scenario", self.reset)
 
     def _slider(self, i: int, parameter: Parameter) -> Any:
         unit, scale = MILLI.get(parameter.unit, (parameter.unit, 1.0))
@@ -366,14 +368,12 @@ class LivePanel:
         name = parameter.field.replace("_", " ")
         step = (high - low) / STEPS
         slider = self._gui.add_slider(f"{name} [{unit}]", low, high, step, value)
-        self._panel.hear(
+        self._panel.on_change(
             f"parameter {i}",
             slider,
             lambda value: self.player.live.set_parameter(i, float(value) / scale),
         )
         return slider
-
-    # -- what a hand does -------------------------------------------------------------------------
 
     def toggle(self) -> None:
         """Run or pause."""
@@ -406,8 +406,6 @@ class LivePanel:
         for slider, parameter in zip(self._sliders, self.player.live.parameters, strict=True):
             slider.value = parameter.value * MILLI.get(parameter.unit, ("", 1.0))[1]
 
-    # -- what it says -----------------------------------------------------------------------------
-
     def show(self, shown: bool) -> None:
         """Bring words and grip up to date; `shown`: whether the page shows the simulation."""
         self._shown = shown
@@ -417,4 +415,4 @@ class LivePanel:
             return
         if not self._held:
             self._grip.position = self._stage.scale * self.player.grip()
-        self._told.content = live_html(self.player)
+        self._text.content = live_html(self.player)

@@ -7,13 +7,12 @@ import time
 import numpy as np
 
 from ..mechanism import Mechanism
-from ..motion.points import DEFAULT_LOAD_POINT
 from ..report.scene import place
 from ..results.contacts import bound_margins
 from ..simulation.integrators import NoRateError
 from ..simulation.live import Live, LiveState
 from ..simulation.plan import Plan
-from .session import CENTRE
+from .session import load_points, place_of
 from .snapshot import Level, Snapshot, measured, state_messages
 
 SLICE = 2e-3  # seconds of the simulation between two looks at the clock
@@ -37,13 +36,11 @@ class LivePlayer:
         self.mechanism: Mechanism = plan.model.mechanism
         self._model = plan.model
         self.live = Live(plan)
-        self.playing, self.speed, self.again = True, 1.0, True
+        self.playing, self.speed, self.loop = True, 1.0, True
         self.stiffness = HAND * self.mechanism.platform.mass
         self.independent = tuple(plan.model.independent)
         self.load_names = tuple(load.name for load in plan.loads)
-        points = self.mechanism.platform.points
-        self.pull_points = (CENTRE, *points)
-        self.pull_at = DEFAULT_LOAD_POINT if DEFAULT_LOAD_POINT in points else CENTRE
+        self.pull_points, self.pull_at = load_points(self.mechanism)
         self._pace, self._clock = 1.0, 0.0
         self.state = self.live.state()
 
@@ -51,8 +48,6 @@ class LivePlayer:
     def now(self) -> float:
         """Time of the simulation [s]."""
         return self.live.t
-
-    # -- time -----------------------------------------------------------------------------------
 
     def play(self) -> None:
         """Go on; from the start where it is over."""
@@ -83,13 +78,11 @@ class LivePlayer:
             pace = (self.live.t - begun) / (seconds * self.speed)
             self._pace = SMOOTHING * self._pace + (1 - SMOOTHING) * pace
             self._clock = min(self._clock, self.live.t + SLICE)  # what was lost is not made up for
-        elif self.again and self.live.ended is None:
+        elif self.loop and self.live.ended is None:
             self.restart()
         else:
             self.playing = False
         return True
-
-    # -- hands ----------------------------------------------------------------------------------
 
     def pull(self, held: np.ndarray) -> None:
         """Hold the point `pull_at` by a spring at (3,) [m] in {S}, critically damped."""
@@ -106,9 +99,7 @@ class LivePlayer:
         return np.array(scene.on_platform(tuple(self._pulled()))).ravel()
 
     def _pulled(self) -> np.ndarray:
-        return np.array(self.mechanism.platform.points.get(self.pull_at, (0.0, 0.0, 0.0)))
-
-    # -- what is seen -----------------------------------------------------------------------------
+        return place_of(self.mechanism, self.pull_at)
 
     def snapshot(self) -> Snapshot:
         """The mechanism now, or where it could be seen last."""
@@ -147,10 +138,10 @@ class LivePlayer:
         )
         if (end := self.live.ended) is not None:
             whose = f" ({end.owner})" if end.owner else ""
-            return "unreachable", (f"It ended: {end.text}{whose}", *state)
+            return "unreachable", (f"Simulation ended: {end.text}{whose}", *state)
         told: list[str] = []
         if self.live.over:
-            told.append("It is over.")
+            told.append("Simulation finished.")
         if self.playing and self._pace < BEHIND:
-            told.append(f"Slower than asked: {self._pace * self.speed:.2g} times real time")
-        return ("warning" if state else "calm"), (*told, *state)
+            told.append(f"Slower than requested: {self._pace * self.speed:.2g} times real time")
+        return ("warning" if state else "ok"), (*told, *state)

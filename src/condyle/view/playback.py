@@ -119,4 +119,4 @@ class Playback:
             )
         margin, force = here["bound_margin"], here["contact_force"]
         messages = state_messages(self.mechanism, margin, force, here["effort"], here["joint_rate"])
-        return ("warning" if messages else "calm"), tuple(messages)
+        return ("warning" if messages else "ok"), tuple(messages)

@@ -14,8 +14,8 @@ from .live_player import LivePlayer
 from .session import Directions
 from .snapshot import Snapshot
 
-COLOURS = {"calm": "#2b8a3e", "warning": "#b35c00", "unreachable": "#c92a2a"}
-SIGNS = {"calm": "✓", "warning": "⚠", "unreachable": "✕"}
+COLOURS = {"ok": "#2b8a3e", "warning": "#b35c00", "unreachable": "#c92a2a"}
+SIGNS = {"ok": "✓", "warning": "⚠", "unreachable": "✕"}
 _CELL = "padding:1px 5px;text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums"
 EVENTS = 8  # that the page lists
 DIGITS = 6  # most significant digits
@@ -24,7 +24,7 @@ _NAME = "padding:1px 6px 1px 0;text-align:left;font-weight:500;white-space:nowra
 
 
 def status_html(snapshot: Snapshot) -> str:
-    """Whether the pose can be, and what is wrong with it."""
+    """The status of the pose, with its messages."""
     when = "" if snapshot.time is None else f"t = {snapshot.time:.3f} s. "
     lines = snapshot.messages or ("Within reach and bounds.",)
     items = "<br>".join(map(escape, lines))
@@ -47,25 +47,25 @@ def tables_html(snapshot: Snapshot) -> str:
 
 
 def internal_text(count: int, shown: int) -> str:
-    """What the sliders of internal efforts are, and how many there are besides."""
+    """What the sliders of internal efforts are."""
     if not count:
-        return "As many actuators as freedoms: no effort can be changed without moving something."
+        return "No actuation redundancy: this mechanism has no internal efforts."
     many = "1 direction" if count == 1 else f"{count} directions"
     more = (
-        f", of which the {shown} that load the contacts the most have a slider"
+        f", of which {shown} have a slider, those that load the contacts most"
         if shown < count
         else ""
     )
     return (
-        f"{many} of efforts that balance each other{more}. They move nothing; they add to efforts "
-        "and contact forces. Each is given by its largest effort."
+        f"{many} of internal efforts{more}. They balance each other: nothing moves, but efforts "
+        "and contact forces change. A slider sets the largest effort of its direction."
     )
 
 
 def effects_html(
     mechanism: Mechanism, directions: Directions, amount: np.ndarray, shown: int
 ) -> str:
-    """What each direction does by one unit to the contacts, and by now to the efforts."""
+    """Contact forces per unit of each direction, and the efforts added now."""
     heads = ["Direction", "now", *(f"{name}, N per unit" for name in mechanism.contact_names)]
     rows = [
         [str(i + 1), number(amount[i], 3), *(number(v, 3) for v in directions.contact[:, i])]
@@ -81,7 +81,7 @@ def effects_html(
 
 
 def live_html(player: LivePlayer) -> str:
-    """Errors of a simulation, forces of its loads, and what has happened, the newest first."""
+    """Tracking error, load forces and events of a simulation, the newest first."""
     now, parts = player.state, []
     if now.error is not None:
         heads, cells = ["Tracking error"], [""]
@@ -90,16 +90,16 @@ def live_html(player: LivePlayer) -> str:
             heads.append(f"{name} {'mm' if length else '°'}")
             cells.append(number(error * 1e3 if length else np.degrees(error), 3))
         parts.append(_table(heads, [cells], "errors"))
-    names = [*player.load_names, "your hand"]
+    names = [*player.load_names, "mouse"]
     rows = [
         [name, number(float(np.linalg.norm(force)), 2, "N")]
         for name, force in zip(names, now.forces, strict=True)
     ]
     if now.bite is not None:
-        rows.append(["as the controller feels it", number(now.bite, 2, "N")])
+        rows.append(["measured by the controller", number(now.bite, 2, "N")])
     parts.append(_table(["Load", "force"], rows, "loads"))
     lines = map(str, player.live.events[: -EVENTS - 1 : -1])
-    items = "<br>".join(map(escape, lines)) or "Nothing has happened yet."
+    items = "<br>".join(map(escape, lines)) or "No events yet."
     parts.append(f'<div data-table="events" style="line-height:1.4">{items}</div>')
     return f'<div style="margin:4px 10px;font-size:12px;overflow-x:auto">{"".join(parts)}</div>'
 

@@ -1,7 +1,7 @@
 """The live page: viser's server, its sliders, and the one thread that moves the mechanism.
 
-Callbacks only note what is wanted; one worker fulfils the latest wish of each kind and draws. So a
-fast hand never makes a queue, no pose can stop the page, and state needs no locks.
+Callbacks only note requests; one worker runs the latest request of each kind and draws. So fast
+input never makes a queue, no pose can stop the page, and state needs no locks.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import xarray as xr
 
 from ..analysis.map.map_files import mechanism_of, open_map
 from ..errors import CondyleError, InputError
-from ..mechanism import Mechanism, load_mechanism
+from ..mechanism import Mechanism, as_mechanism
 from ..results.solution import open_solution
 from .controls import Panel
 from .gate import Gate, guarded
@@ -73,7 +73,7 @@ class View:
         self._server.scene.configure_environment_map(None)
         self.host, self._token = host, gate.token
         self.port = self._server.get_port()
-        self._wishes: dict[str, Callable[[], None]] = {}
+        self._requests: dict[str, Callable[[], None]] = {}
         self._noting = threading.Lock()
         self._wake = threading.Event()
         self._closed = False
@@ -96,14 +96,14 @@ class View:
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"http://{host}:{self.port}/{self._token}/"
 
-    def wish(self, kind: str, action: Callable[[], None]) -> None:
-        """Let the worker call `action` soon, in place of an earlier wish of the same kind.
+    def request(self, kind: str, action: Callable[[], None]) -> None:
+        """Let the worker call `action` soon; it replaces an earlier request of the same kind.
 
         A CondyleError that it raises is shown on the page.
         """
         with self._noting:
-            self._wishes.pop(kind, None)  # the latest wish goes last
-            self._wishes[kind] = action
+            self._requests.pop(kind, None)  # the latest request goes last
+            self._requests[kind] = action
         self._wake.set()
 
     def open_mechanism(self, mechanism: Mechanism) -> None:
@@ -136,7 +136,7 @@ class View:
         if mechanism != self.session.mechanism:
             self._enter(Session(mechanism))
         self.map = MapLayer(self._server.scene, self.stage.centre, self.session.model, dataset)
-        self.map.on_click(lambda q: self.wish("map", partial(self.panel.take, q)))
+        self.map.on_click(lambda q: self.request("map", partial(self.panel.take, q)))
 
     def set_dark(self, dark: bool) -> None:
         """Draw the page dark or light."""
@@ -189,18 +189,18 @@ class View:
             before = now
             try:
                 moved = self.playback is not None and self.playback.advance(passed)
-                self._fulfil()
+                self._run_requests()
                 if asked or moved:
                     self._draw()
             except CondyleError as error:
-                self.panel.say_error(str(error))
+                self.panel.show_error(str(error))
             except Exception as error:  # the page must say it and go on
-                self.panel.say_error(f"{type(error).__name__}: {error}")
+                self.panel.show_error(f"{type(error).__name__}: {error}")
 
-    def _fulfil(self) -> None:
+    def _run_requests(self) -> None:
         with self._noting:
-            wishes, self._wishes = self._wishes, {}
-        for action in wishes.values():
+            requests, self._requests = self._requests, {}
+        for action in requests.values():
             action()
 
     def _draw(self) -> None:
@@ -231,13 +231,9 @@ def open_view(
         mechanism = mechanism_of(map)
     if isinstance(solution, str | Path):
         solution = open_solution(solution)
-    if not isinstance(mechanism, Mechanism):
-        solved = solution.condyle.mechanism if solution is not None else None
-        mechanism = (
-            load_mechanism(mechanism)
-            if mechanism is not None
-            else solved or load_mechanism(DEFAULT)
-        )
+    if mechanism is None:
+        mechanism = DEFAULT if solution is None else solution.condyle.mechanism
+    mechanism = as_mechanism(mechanism)
     live = None if scenario is None else LivePlayer(planned(mechanism, scenario))
     return View(mechanism, solution, host, port, map, live)
 

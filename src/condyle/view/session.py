@@ -33,9 +33,9 @@ NUDGE = 1e-6  # [m, rad], for differences
 NO_EFFORTS: dict[int, str] = {
     Status.singular: "Singular: the efforts are not determined here",
     Status.overflow: "The load is too large for numbers",
-    Status.infeasible: "Infeasible: no efforts within the limits hold this",
-    Status.jammed: "Jammed: no pattern of friction is consistent here",
-    Status.uncertified: "Efforts were found here that could not be certified",
+    Status.infeasible: "Infeasible: no efforts within the limits balance the load",
+    Status.jammed: "Jammed: Coulomb friction has no solution here, or several",
+    Status.uncertified: "The efforts found here failed the accuracy check",
 }
 
 
@@ -65,9 +65,7 @@ class Session:
         self.model = Model(mechanism, backend="numpy")
         self.q = np.zeros(len(self.model.independent))
         self.load = np.zeros(3)
-        points = mechanism.platform.points
-        self.load_points = (CENTRE, *points)
-        self.load_point = DEFAULT_LOAD_POINT if DEFAULT_LOAD_POINT in points else CENTRE
+        self.load_points, self.load_point = load_points(mechanism)
         self._internal = Internal(self.model)
         self.internal = np.zeros(self._internal.at(np.zeros(6)).count)
         self._pose = np.zeros(6)
@@ -168,7 +166,7 @@ class Session:
             self._pose = pose
         joint, reach = found.configuration.joint[0], found.configuration.discriminant[0]
         in_reach = reach >= 0
-        broken = [
+        out_of_reach = [
             n for n, fine in zip(self.mechanism.chain_names, in_reach, strict=True) if not fine
         ]
         if met:
@@ -185,7 +183,7 @@ class Session:
         if status == Status.unreachable:
             level, cause = "unreachable", unreachable_cause(self.mechanism, found, 0)
             messages = [f"Out of reach: {cause}"]
-            others = [name for name in broken if f'"{name}"' not in cause]
+            others = [name for name in out_of_reach if f'"{name}"' not in cause]
             if met and others:
                 messages.append(f"Also out of reach: {', '.join(others)}")
             messages += bound_messages(self.mechanism, margin)
@@ -195,13 +193,13 @@ class Session:
             if (near := measures["near"]) != KINDS[0] and status == Status.ok:
                 text = f"Near a singularity of the kind {near} (ratio below {NEAR_SINGULAR:g})"
                 messages.append(text)
-            level = "warning" if messages else "calm"
+            level = "warning" if messages else "ok"
         return Snapshot.at(
             self.mechanism,
             self._pose,
             self._joint,
             wanted=wanted,
-            broken=tuple(broken) if met else (),
+            out_of_reach=tuple(out_of_reach) if met else (),
             joint=np.where(in_reach, joint, np.nan),
             effort=effort,
             reach=reach,
@@ -220,7 +218,18 @@ class Session:
         return self.model.evaluate(q, rest, rest, np.repeat(load[None], len(q), axis=0))
 
     def _load_at(self) -> np.ndarray:
-        return np.array(self.mechanism.platform.points.get(self.load_point, (0.0, 0.0, 0.0)))
+        return place_of(self.mechanism, self.load_point)
+
+
+def load_points(mechanism: Mechanism) -> tuple[tuple[str, ...], str]:
+    """Names of the points at which a force can act, and the one that is meant first."""
+    names = (CENTRE, *mechanism.platform.points)
+    return names, DEFAULT_LOAD_POINT if DEFAULT_LOAD_POINT in names else CENTRE
+
+
+def place_of(mechanism: Mechanism, name: str) -> np.ndarray:
+    """Where one of `load_points` is, (3,) [m] in {M}."""
+    return np.array(mechanism.platform.points.get(name, (0.0, 0.0, 0.0)))
 
 
 def _around_home(value: np.ndarray, reached: np.ndarray) -> tuple[float, float]:

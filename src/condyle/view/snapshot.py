@@ -13,7 +13,7 @@ from ..mechanism.chain import limits
 from ..report.scene import Scene, contact_normals, place
 from ..results.contacts import BOUND_TOLERANCE, contact_loss
 
-Level = Literal["calm", "warning", "unreachable"]
+Level = Literal["ok", "warning", "unreachable"]
 MOST_NAMED = 4  # cables that one message names
 
 
@@ -25,7 +25,7 @@ class Snapshot:
     pose:           X_EE that is drawn, (6,) [m, rad]; the last good one where none can be met.
     wanted:         X_EE that was asked for and cannot be met, (6,), or None.
     scene:          points at `pose`, of one sample.
-    broken:         chains that cannot reach the platform.
+    out_of_reach:         chains that cannot reach the platform.
     joint, rate, effort: (n,) [rad or m; per s; N m or N];  reach: (n,), negative out of reach, or
                     None.
     contact_force:  (k,) [N];  force_vector: (k, 3) [N] in {S};  margin: (k,) [m], inf unbounded.
@@ -56,7 +56,7 @@ class Snapshot:
     level: Level
     messages: tuple[str, ...]
     wanted: np.ndarray | None = None
-    broken: tuple[str, ...] = ()
+    out_of_reach: tuple[str, ...] = ()
     rate: np.ndarray | None = None
     reach: np.ndarray | None = None
     time: float | None = None
@@ -117,12 +117,12 @@ def state_messages(
         elif effort[i] > high or (low == -high and effort[i] < low):
             messages.append(f"{chain.name} is above its effort limit of {high:g}")
         elif effort[i] < low:
-            messages.append(f"{chain.name} is below its least effort of {low:g}")
+            messages.append(f"{chain.name} is below its minimum effort of {low:g}")
         if rate is not None and abs(rate[i]) > speed:
             messages.append(f"{chain.name} is above its speed limit of {speed:g}")
     if slack:
         more = f" and {len(slack) - MOST_NAMED} more" if len(slack) > MOST_NAMED else ""
-        messages.append(f"Slack, would have to push: {', '.join(slack[:MOST_NAMED])}{more}")
+        messages.append(f"Slack, negative tension needed: {', '.join(slack[:MOST_NAMED])}{more}")
     return messages
 
 

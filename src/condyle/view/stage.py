@@ -35,7 +35,7 @@ WARNING: RGB = (224, 160, 74)
 LOAD: RGB = (70, 80, 92)
 HAND: RGB = (16, 93, 202)
 MARKER = 2.4  # radius of a measured marker, over that of a slender rod
-BODY = {"calm": PLATFORM, "warning": WARNING, "unreachable": ALARM}
+BODY = {"ok": PLATFORM, "warning": WARNING, "unreachable": ALARM}
 SCREEN: Any = {"thickness": 2.0, "thickness_units": "screen"}
 
 
@@ -147,7 +147,7 @@ class Stage:
             )
             self._ghost.position = self.scale * wanted.position[0]
             self._ghost.wxyz = quaternion(wanted.rotation[0])
-        wrong = (*snapshot.broken, *snapshot.over)
+        wrong = (*snapshot.out_of_reach, *snapshot.over)
         for bar, colour, node in self._bars:
             ill = bar.colour is not None and bar.chain in wrong
             node.color = NEUTRAL if snapshot.stale else ALARM if ill else colour
