@@ -62,6 +62,7 @@ CALLS: dict[str, tuple[str, ...]] = {
     "cache --clear": ("cache", "--clear"),
     "schema": ("schema",),
 }
+FEW = "new", "check", "run", "solve", "pose", "simulate"
 RESULTS = {
     "simulate --check-gains",
     "check",
@@ -125,7 +126,7 @@ def command(
     return condyle_command
 
 
-@pytest.mark.parametrize("name", few(CALLS, "new", "check", "run", "solve", "plot", rest=slow))
+@pytest.mark.parametrize("name", few(CALLS, *FEW, rest=slow))
 def test_the_next_step_works(
     command: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
@@ -159,7 +160,7 @@ def documented_keys() -> dict[str, set[str]]:
     return found
 
 
-@pytest.mark.parametrize("name", CALLS)
+@pytest.mark.parametrize("name", few(CALLS, *FEW, rest=slow))
 def test_json_is_one_object_with_the_documented_keys(
     command: Callable[..., Any], name: str
 ) -> None:
@@ -176,7 +177,7 @@ def test_the_keys_of_bench_are_documented() -> None:
     assert documented_keys()["bench"] == {*Benchmark([], {}, {}, {}).data(), "files"}
 
 
-@pytest.mark.parametrize("name", CALLS)
+@pytest.mark.parametrize("name", few(CALLS, *FEW, rest=slow))
 def test_quiet_says_only_what_was_asked_for(command: Callable[..., Any], name: str) -> None:
     outcome = command(*CALLS[name], "--quiet")
     assert outcome.status == 0 and outcome.err == ""

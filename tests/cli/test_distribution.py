@@ -36,6 +36,7 @@ def states(name: str, rows: int = 3) -> str:
     return name
 
 
+@pytest.mark.slow
 def test_run_chooses_as_it_is_told(condyle_command: Run) -> None:
     """W draws the contact forces down, and the efforts up."""
     loads, efforts = [], []
@@ -75,6 +76,7 @@ def test_solve_with_limits_and_friction(condyle_command: Run, read_csv: Read) ->
         assert size == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_limits_that_no_effort_can_meet(condyle_command: Run, read_csv: Read) -> None:
     weak = robot("weak.toml", limit="1e-4")
     given = ("--states", states("s.csv"), "--out", "a.csv", "--distribution", "bounded")

@@ -31,6 +31,7 @@ def test_ctrl_c_while_it_loads() -> None:
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arguments", [("check", "nope"), ("--nope",)])
 def test_nobody_reads_stderr(arguments: tuple[str, ...], tmp_path: Path) -> None:
     """Closed from the start, or a pipe whose reader is gone: the status is that of the error."""

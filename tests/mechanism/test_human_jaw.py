@@ -140,6 +140,7 @@ def test_the_curve_is_the_published_one() -> None:
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_it_chews(name: str) -> None:
     """`condyle run` gives it the bundled path of the incisor, which it can follow on its curves."""
@@ -152,6 +153,7 @@ def test_it_chews(name: str) -> None:
     assert (travel > 1e-3).all() and (travel < 12e-3).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_muscles_can_chew_the_bundled_load(name: str) -> None:
     """Within their limits, both condyles pushed, at every 100th sample of the reference case.

@@ -123,6 +123,7 @@ def test_off_the_surface_is_said_in_distance() -> None:
     assert problem is not None and "+0.2 mm off" in problem
 
 
+@pytest.mark.slow
 def test_a_number_is_always_a_distance() -> None:
     """Where Newton has not converged phi is not finite; it is never a wrong distance."""
     radius = 0.006

@@ -67,7 +67,7 @@ def test_nearest(options: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("ball", [0.0, 4.0])
-@pytest.mark.parametrize("kind", few(KINDS, "quadratic", "sphere"))
+@pytest.mark.parametrize("kind", few(KINDS, "quadratic"))
 def test_check_gives_points_for_the_file(
     condyle_command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, kind: str, ball: float
 ) -> None:

@@ -102,6 +102,7 @@ def test_a_solution_keeps_a_note_of_it(machine: Mechanism, saved: xr.Dataset) ->
     assert restored == machine
 
 
+@pytest.mark.slow
 def test_options_of_the_note(machine: Mechanism, motion: Motion) -> None:
     """Whether the surface is closed decides what its sides are called."""
     centre, radius = (-0.02665, 0.072, 0.04253 - 0.026), 0.03
@@ -123,6 +124,7 @@ def test_unit_normals_are_kept(machine: Mechanism, saved: xr.Dataset) -> None:
     close(normal, wanted, 1e-14)
 
 
+@pytest.mark.slow
 def test_figures_and_report_of_a_saved_solution(saved: xr.Dataset, tmp_path: Path) -> None:
     for draw in PLOTS.values():
         draw(saved)

@@ -6,13 +6,14 @@ import pytest
 from oracles.forward_tree import forward_dynamics
 from oracles.mujoco_engine import MujocoEngine
 from oracles.pinocchio_engine import PinocchioEngine
+from support.speeds import first, slow
 
 from .cases import BUNDLED, CASES, by_numpy, case, close, efforts, load_of, state
 
 TOLERANCE = 1e-9
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", first(CASES, 3, rest=slow))
 def test_tree_with_its_loops_closed(name: str) -> None:
     c, model = case(name), by_numpy(name)
     engines = [PinocchioEngine(c.raw)]

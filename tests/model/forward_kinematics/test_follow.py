@@ -11,7 +11,6 @@ from oracles.closure import complete_state, independent_coordinates
 from oracles.description import Description, joint, read
 from oracles.random_mechanism import random_mechanism, random_state
 from oracles.rotations import platform_motion
-from support.speeds import first, slow
 
 import condyle
 from condyle.errors import LostError
@@ -60,7 +59,8 @@ def test_a_path_that_used_to_jump(timed: bool) -> None:
 FAMILIES = [(("RSS",), 6, 2), (("PSS", "SPS"), 6, 1), (("SPS",), 6, 0), (("RSS", "SPS"), 6, 3)]
 
 
-@pytest.mark.parametrize(("families", "chains", "contacts"), first(FAMILIES, 1, rest=slow))
+@pytest.mark.slow
+@pytest.mark.parametrize(("families", "chains", "contacts"), FAMILIES)
 def test_round_trips_of_random_mechanisms(
     families: tuple[str, ...], chains: int, contacts: int
 ) -> None:
