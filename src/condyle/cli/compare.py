@@ -22,7 +22,7 @@ def compare(
     figures: bool = True,
     report: options.Report = False,
 ) -> Answer:
-    """Every way to derive the equations, side by side.
+    """Compare all formulations and routes on one motion.
 
     Differences between their numbers, and their cost, with and without the contacts: Tables 1 and 2
     and Figures 5 to 9 of the paper.

@@ -30,21 +30,21 @@ def c(
 ) -> Answer:
     """C99 source and header for a controller.
 
-    No heap, no globals, no input or output, bounded time. With it come an example, recorded test
+    No heap, no globals, no input or output, bounded time. Included: an example, recorded test
     vectors, a Makefile whose `make check` compares with them, and a page of measured facts.
 
     Options:
-        coordinates: Coordinates that closure starts from, as in X,Y,Z,alpha.
+        coordinates: Coordinates given to closure, such as X,Y,Z,alpha.
         out: Folder for source, header, example and tests.
         question: What to export; repeat for more: inverse, contact (with contact forces), bounded
             (within limits), forward (accelerations), motion, closure, pose and observer (from
             encoders), and controllers: computed_torque, impedance, joint_pd, bite_force. Default:
             inverse, contact, forward, motion, pose, computed_torque, and closure with --from or
             --landmark.
-        landmark: Platform point whose path closure starts from.
-        precision: double, or float for processors that compute in it alone.
-        constants: inside, or struct: in a structure that a program fills at run time.
-        prefix: What all names in C begin with. Default: the mechanism's name.
+        landmark: Platform point whose path is given to closure.
+        precision: double, or float for single-precision processors.
+        constants: inside: compiled in; struct: in a structure that the program fills at run time.
+        prefix: Prefix of all names in C. Default: the mechanism's name.
         lanes: Width of GCC's vector types: 2, 4 or 8 doubles; 0: none.
     """
     import condyle

@@ -21,7 +21,7 @@ def fmu(
     """Functional mock-up units (FMI 2.0 or 3.0), for model exchange and co-simulation.
 
     The plant (efforts in, motion out), the inverse model, within limits as `bounded`, and a
-    computed-torque controller. They hold their sources, and a binary for this machine where there
+    computed-torque controller. They contain their sources, and a binary for this machine if there
     is a C compiler.
 
     Options:

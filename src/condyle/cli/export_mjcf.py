@@ -18,8 +18,8 @@ def mjcf(
 ) -> Answer:
     """A model for MuJoCo (MJCF): loops, contacts, actuators with limits and losses, sensors.
 
-    Controls are efforts in N m or N, joints are zero at home. What of the mechanism is only
-    approximate there is said on stderr and in the file.
+    Controls are efforts in N m or N, joints are zero at home. Approximations are listed on stderr
+    and in the file.
 
     Options:
         out: Folder for the file.

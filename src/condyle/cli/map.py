@@ -51,10 +51,10 @@ def map_(
     ] = None,
     scheduler: str | None = None,
 ) -> Answer:
-    """Workspace, and what the mechanism can do in it at rest.
+    """Workspace map: reach, and efforts, loads, speeds and stiffness at rest.
 
-    Over one, two or three independent coordinates: reach and what limits it, singularities,
-    efforts, loads, speeds, stiffness; volume of the reach, and free room around home.
+    Over one, two or three independent coordinates: what limits the reach, singularities, volume of
+    the reach, free space around home.
 
     Options:
         over: Coordinate to sweep, "X=-5:5:200 mm": from, to, number of points; repeat for two or

@@ -89,9 +89,9 @@ Measured = Annotated[
     ),
 ]
 Flag = Annotated[
-    bool, option("Keep samples that cannot be computed, empty and with a status: no error.")
+    bool, option("Keep samples that cannot be computed, empty, with a status, instead of failing.")
 ]
-Reactions = Annotated[bool, option("Also forces and moments in every joint.")]
+Reactions = Annotated[bool, option("Also compute forces and moments in every joint.")]
 Mat = Annotated[bool, option("Also write the results for MATLAB (.mat).")]
 Figures = Annotated[bool, option("Also draw figures.")]
 Report = Annotated[bool, option("Also write the page of condyle report.")]
@@ -189,9 +189,9 @@ class DistributionOptions(Group):
     contact_weight: Annotated[
         float,
         option(
-            "Weight W of contact forces, with weighted: the sum of squares has W (force/N_ref)^2 "
-            "of every contact besides, from least effort (0) to least contact force. N_ref is the "
-            "largest effort limit of the chains, as a force."
+            "Weight W of contact forces, for weighted: adds W (force/N_ref)^2 of every contact to "
+            "the objective, from least effort (0) to least contact force. N_ref is the largest "
+            "effort limit of the chains, as a force."
         ),
     ] = 0.0
 

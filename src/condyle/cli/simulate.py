@@ -22,10 +22,10 @@ def simulate(
     new: Path | None = None,
     backend: options.Backend = "auto",
 ) -> Answer:
-    """Motion over time, under efforts or a controller (simulation).
+    """Simulation: motion over time under efforts or a controller.
 
-    The contacts are kept exactly; food breaks, efforts saturate, encoders count. Results are those
-    of condyle run, with commands, measurements and losses.
+    Contacts are exact constraints; food breaks, actuators saturate, encoders quantise. Results are
+    those of condyle run, with commands, measurements and friction losses.
 
     Options:
         scenario: Scenario (TOML): start, efforts or controller, sensors, loads, duration. Default:
