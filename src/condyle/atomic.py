@@ -29,7 +29,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     Raises: InputError: if `path` cannot be written, a full disk inside the block included.
     """
     target = _checked(path)
-    direct = target.exists() and not target.is_file()
+    direct = os.path.exists(target) and not os.path.isfile(target)
     temporary = target if direct else _beside(target)
     if not direct:
         _sweep(target.parent)

@@ -83,7 +83,7 @@ def test_other_things_are_named_with_what_is_taken():
         match=r"motion: expected a Motion, the path of a file or a DataFrame, got ndarray",
     ):
         as_motion(T)
-    with pytest.raises(InputError, match=r"load: got a int, .*Load.from_arrays\(t, force, moment"):
+    with pytest.raises(InputError, match=r"load: .*got int.*Load.from_arrays\(t, force, moment"):
         as_load(5)
     with pytest.raises(InputError, match="got a list, expected a pandas DataFrame"):
         Motion.from_frame([1, 2])

@@ -9,13 +9,13 @@ from typing import Any, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from ..errors import InputError, MechanismError, shortened
+from ..errors import InputError, MechanismError, shortened, shown
 from .bodies import Inertia, Platform
 from .chain import Chain
 from .contact import Bounds, Contact
 from .coordinates import COORDINATES, Coordinate
 from .home import home_problems, usable_sets
-from .paths import changed, value_at
+from .paths import changed, parsed, value_at
 from .portrait import in_html, in_words
 from .quantities import Gravity, Name
 from .table import Table
@@ -62,10 +62,11 @@ class Mechanism(Table):
         """
         if isinstance(path, Mapping):
             if value is not _NOTHING:
-                raise InputError("set takes a path and a value, or one table {path: value, ...}")
+                raise InputError("set: expected a path and a value, or one {path: value, ...}")
             return self.checked(changed(self, path), self.name)
         if value is _NOTHING:
-            raise InputError(f'set("{path}") has no value; set takes a path and a value')
+            raise InputError(f"set: expected a path and a value, got {shown(path)} alone")
+        parsed(path)
         return self.checked(changed(self, {path: value}), self.name)
 
     def replace(self, **changes: Any) -> Self:

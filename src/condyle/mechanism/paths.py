@@ -32,7 +32,7 @@ def parsed(path: str) -> Path:
     Raises: InputError: if it is none.
     """
     if not isinstance(path, str):
-        raise InputError(f'a path is text such as "platform.mass", got {shown(path)}')
+        raise InputError(f'path: expected text such as "platform.mass", got {shown(path)}')
     keys: list[str | int] = []
     at = 0
     while match := _STEP.match(path, at):
@@ -43,8 +43,8 @@ def parsed(path: str) -> Path:
         at = match.end()
     if at < len(path) or not keys or path.startswith((".", "[")):
         raise InputError(
-            f'"{shortened(path, 80)}" is no path; write it like platform.mass, '
-            "chain.masseter_left.base[2] or contact.left_condyle.surface.offset"
+            "path: expected one such as platform.mass, chain.masseter_left.base[2] or "
+            f"contact.left_condyle.surface.offset, got {shown(path)}"
         )
     return tuple(keys)
 

@@ -152,6 +152,7 @@ class Motion:
         Raises:
             InputError: for samples or options that cannot be used.
         """
+        as_text(source, "source", "text")
         if not isinstance(values, Mapping):
             values = _by_name(values, names, source)
         unit = parse_units(units)

@@ -83,9 +83,10 @@ class Load:
                 moment: (N, 3) [N m]; none by default.
         Raises: InputError: for arrays that cannot be used.
         """
+        as_text(source, "source", "text")
         t = as_samples(t, "t", source)
         if len(t) == 0:
-            raise InputError(f"{source}: no samples")
+            raise InputError(f"{source}: t: expected at least one sample, got none")
         check_rising(t, f"{source}, sample {{}}".format)
         wrench = np.zeros((len(t), 6))
         force, point = as_doubles(force, f"{source}: force"), as_text(point, "point", POINT)

@@ -1,0 +1,197 @@
+"""The public page as a table: one row a door, with a call that is right.
+
+A door is a function of `condyle`, or a public method of a class on the page. Tests call each with
+what is right, and with what is wrong. A new door needs one row here, and fails without it.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import condyle
+from condyle.mechanism import bundled_text
+
+MACHINE = "masticatory"
+T = np.linspace(0.0, 1.0, 8)
+PATH = np.column_stack([1e-3 * np.sin(T), 0 * T, -2e-3 * T])
+
+
+class Stage:
+    """What doors are tried on; each is made when first needed, files in the current folder."""
+
+    @cached_property
+    def mechanism(self) -> condyle.Mechanism:
+        return condyle.load_mechanism(MACHINE)
+
+    @cached_property
+    def model(self) -> condyle.Model:
+        return condyle.derive(self.mechanism, backend="numpy")
+
+    @cached_property
+    def motion(self) -> condyle.Motion:
+        return condyle.Motion.from_arrays(T, PATH, ["x", "y", "z"])
+
+    @cached_property
+    def load(self) -> condyle.Load:
+        return condyle.Load.from_arrays(T, np.ones((8, 3)), point="incisor")
+
+    @cached_property
+    def frame(self) -> Any:
+        import pandas as pd
+
+        return pd.DataFrame({"t": T, "X": T, "Fx": T})
+
+    def file(self, name: str, text: str) -> str:
+        Path(name).write_text(text, encoding="utf-8")
+        return name
+
+    @property
+    def mechanism_file(self) -> str:
+        return self.file("machine.toml", bundled_text(MACHINE))
+
+
+Value = Any  # or a function of the stage that gives it
+
+
+@dataclass(frozen=True)
+class Door:
+    """How to call it rightly.
+
+    right: its arguments;  calls: how often the fuzzer calls it;  model: the argument that takes
+    a model, a mechanism, a path or a name;  states: those of any leading shape;
+    words: what messages may call an argument besides its name.
+    """
+
+    right: Mapping[str, Value] = field(default_factory=dict)
+    calls: int = 200
+    model: str | None = None
+    states: tuple[str, ...] = ()
+    words: tuple[str, ...] = ()
+
+    def arguments(self, stage: Stage) -> dict[str, Any]:
+        return {k: v(stage) if inspect.isfunction(v) else v for k, v in self.right.items()}
+
+
+Q, EFFORT, WRENCH = np.zeros(4), np.zeros(6), np.ones(6)
+STATE: dict[str, Value] = {"q": Q, "v": Q, "a": Q}
+FORCED: dict[str, Value] = {"wrench": WRENCH, "at": "incisor", "outputs": "pose", "threads": 1}
+OWN_MODEL: dict[str, Value] = {"model": lambda stage: stage.mechanism}
+CSV = "t,Fx\n0,1\n1,2\n"
+ROWS = "t,X\n" + "".join(f"{t},{t / 1000}\n" for t in range(8))
+
+DOORS: dict[str, Door] = {
+    "load_mechanism": Door({"name_or_path": MACHINE}, words=("mechanism",)),
+    "bundled_mechanisms": Door(),
+    "dump": Door(
+        {"mechanism": lambda stage: stage.mechanism, "path": "out.toml"}, model="mechanism"
+    ),
+    "dumps": Door({"mechanism": lambda stage: stage.mechanism}, model="mechanism"),
+    "reference_motion": Door(),
+    "reference_load": Door(),
+    "trial_motion": Door(
+        OWN_MODEL | {"cutoff": None, "rate": 10.0, "trim": 0.1},
+        calls=60,
+        model="model",
+        words=("mechanism",),
+    ),
+    "motion_from_c3d": Door(
+        {
+            "path": lambda stage: stage.file("a.c3d", "no recording"),
+            "markers": lambda stage: stage.file("markers.toml", ""),
+            "model": lambda stage: stage.mechanism,
+            "max_residual": 1e-3,
+            "max_gap": 0.1,
+            "longest": False,
+            "unit": "mm",
+            "force": ("a", "b", "c"),
+            "cutoff": None,
+        },
+        words=("mechanism", "a.c3d", "fixed"),
+    ),
+    "derive": Door(
+        {
+            "mechanism": lambda stage: stage.mechanism,
+            "formulation": "virtual_power",
+            "route": "core",
+            "distribution": None,
+            "backend": "numpy",
+        },
+        calls=0,
+    ),
+    "simulate": Door(
+        {"model": lambda stage: stage.model, "scenario": {"duration": 0.002, "rate": 1000.0}},
+        calls=0,
+        words=("mechanism", "duration", "rate"),
+    ),
+    "load_scenario": Door(
+        {"source": lambda stage: stage.file("run.toml", "duration = 0.1")}, words=("path",)
+    ),
+    "Mechanism.get": Door({"path": "platform.mass"}, words=("mechanism",)),
+    "Mechanism.set": Door(
+        {"path": "platform.mass", "value": 0.2}, words=("mass", MACHINE, "mechanism")
+    ),
+    "Mechanism.replace": Door(),
+    "Motion.from_csv": Door(
+        {"path": lambda stage: stage.file("motion.csv", ROWS), "units": "mm"},
+        words=("motion.csv",),
+    ),
+    "Motion.from_arrays": Door(
+        {
+            "t": T,
+            "values": PATH,
+            "names": ["x", "y", "z"],
+            "units": "mm",
+            "landmark": "incisor",
+            "cutoff": None,
+            "rate": None,
+            "times": None,
+            "trim": 0.0,
+            "source": "motion",
+        }
+    ),
+    "Motion.from_frame": Door({"frame": lambda stage: stage.frame[["t", "X"]]}, words=("motion",)),
+    "Load.from_csv": Door(
+        {"path": lambda stage: stage.file("load.csv", CSV), "point": None},
+        words=("load.csv",),
+    ),
+    "Load.from_arrays": Door(
+        {"t": T, "force": np.ones((8, 3)), "moment": np.ones((8, 3)), "point": None}
+    ),
+    "Load.from_frame": Door({"frame": lambda stage: stage.frame[["t", "Fx"]]}, words=("load",)),
+    "Load.constant": Door({"force": (0, 0, 1), "moment": (0, 0, 0), "point": None}),
+    "Load.zero": Door(),
+    "Load.at": Door({"times": T}),
+}
+
+# Without a row: `checked` makes what is given already; the others change their arguments yet.
+LATER = {
+    *("Mechanism.checked", "open_solution", "simulate_all", "workspace_map", "workspace_size"),
+    *("open_map", "sweep", "export_c", "export_fmu", "export_matlab", "export_mjcf"),
+}
+
+
+def target(name: str, stage: Stage) -> Callable[..., Any]:
+    """What a row calls: a function of the page, or a method of an object of the stage."""
+    owner, _, method = name.rpartition(".")
+    return getattr(getattr(stage, owner.lower()) if owner else condyle, method)
+
+
+def public_doors() -> set[str]:
+    """Every function on the page, and every public method of the classes that have rows."""
+    page = {name: getattr(condyle, name) for name in condyle.__all__}
+    found = {name for name, value in page.items() if inspect.isfunction(value)}
+    for name in {row.partition(".")[0] for row in DOORS if "." in row}:
+        found |= {
+            f"{name}.{method}"
+            for method, value in vars(page[name]).items()
+            if not method.startswith("_")
+            and (inspect.isfunction(value) or isinstance(value, classmethod | staticmethod))
+        }
+    return found - LATER

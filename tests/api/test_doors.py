@@ -1,0 +1,113 @@
+"""Every door of the public page: called with what is right, with every form of a model or an array,
+and with a wrong thing; and every module, imported before all others."""
+
+from __future__ import annotations
+
+import inspect
+import pkgutil
+import random
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.errors import CondyleError
+
+from .doors import DOORS, MACHINE, Stage, public_doors, target
+
+# Its file is none here: the right call is refused too.
+BROKEN = (
+    "motion_from_c3d",
+    "open_solution",
+    "sweep",
+)
+MODULES = sorted(
+    module.name
+    for module in pkgutil.walk_packages(condyle.__path__, "condyle.")
+    if not module.name.endswith("__main__")
+)
+ORDERS = 3
+
+
+@pytest.fixture(scope="module")
+def stage() -> Stage:
+    return Stage()
+
+
+@pytest.fixture(autouse=True)
+def in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.chdir(tmp_path)
+    yield
+
+
+@pytest.mark.parametrize("seed", range(ORDERS))
+def test_modules_in_any_order(seed: int) -> None:
+    """One process an order, each begun by other modules; `test_house` proves there is no circle."""
+    order = random.Random(seed).sample(MODULES, len(MODULES))
+    lines = "import importlib, sys\nfor name in sys.argv[1:]:\n    importlib.import_module(name)\n"
+    done = subprocess.run([sys.executable, "-c", lines, *order], capture_output=True, text=True)
+    assert not done.returncode, f"{order[:5]} ...: {done.stderr[-2000:]}"
+
+
+def test_every_door_has_a_row() -> None:
+    assert public_doors() == set(DOORS)
+
+
+def test_the_page_lists_what_it_has() -> None:
+    assert len(condyle.__all__) == len(set(condyle.__all__))
+    assert all(hasattr(condyle, name) for name in condyle.__all__)
+    assert set(condyle.__all__) == set(dir(condyle))
+
+
+@pytest.mark.parametrize("name", [name for name in DOORS if name not in BROKEN])
+def test_right_calls(stage: Stage, name: str) -> None:
+    target(name, stage)(**DOORS[name].arguments(stage))
+
+
+@pytest.mark.parametrize("name", [name for name, door in DOORS.items() if door.model])
+def test_a_model_a_mechanism_a_path_a_name(stage: Stage, name: str) -> None:
+    door, call = DOORS[name], target(name, stage)
+    file = stage.mechanism_file
+    for given in (stage.model, stage.mechanism, MACHINE, file, Path(file)):
+        call(**door.arguments(stage) | {door.model: given})
+    for wrong, said in ((5, "int"), (None, "NoneType"), (b"masticatory", "bytes"), ([], "list")):
+        with pytest.raises(CondyleError, match=f"(mechanism|model): expected a .*got {said}") as e:
+            call(**door.arguments(stage) | {door.model: wrong})
+        assert "\n" not in str(e.value)
+    with pytest.raises(CondyleError, match="masticatory"):
+        call(**door.arguments(stage) | {door.model: "mastikatory"})
+
+
+@pytest.mark.parametrize("name", [name for name, door in DOORS.items() if door.states])
+def test_a_vector_and_a_batch(stage: Stage, name: str) -> None:
+    """States of shapes (m,), (N, m) and (V, N, m) give the same numbers, of their leading shape."""
+    door, call = DOORS[name], target(name, stage)
+    right = door.arguments(stage)
+    one = numbers(call(**right))
+    for lead in ((3,), (2, 3)):
+        many = {k: np.broadcast_to(right[k], (*lead, len(right[k]))) for k in door.states}
+        for key, values in numbers(call(**right | many)).items():
+            assert values.shape == lead + one[key].shape, key
+            expected = np.broadcast_to(one[key], values.shape)
+            np.testing.assert_allclose(values, expected, rtol=1e-12, atol=1e-12, err_msg=key)
+
+
+def numbers(result: object) -> dict[str, np.ndarray]:
+    """Arrays of a result: itself, or its attributes."""
+    found = {"": result} if isinstance(result, np.ndarray) else dict(vars(result))
+    return {k: v for k, v in found.items() if isinstance(v, np.ndarray) and v.dtype.kind in "fiu"}
+
+
+@pytest.mark.parametrize("name", DOORS)
+def test_arguments_that_a_door_has_not(stage: Stage, name: str) -> None:
+    call = target(name, stage)
+    if any(p.kind is p.VAR_KEYWORD for p in inspect.signature(call).parameters.values()):
+        with pytest.raises((CondyleError, TypeError), match="nonsense"):
+            call(**DOORS[name].arguments(stage), nonsense=1)
+        return
+    with pytest.raises(TypeError, match="nonsense"):
+        call(**DOORS[name].arguments(stage), nonsense=1)
