@@ -57,7 +57,7 @@ def replacing_folder(path: str | os.PathLike[str], mark: str) -> Iterator[Path]:
     target = Path(os.path.realpath(as_path(path)))
     if target.exists() and not (target / mark).is_file():
         raise InputError(f"{path}: exists and is something else; give another name, or remove it")
-    if not target.parent.is_dir():
+    if not os.path.isdir(target.parent):
         raise InputError(f"{path}: the folder {target.parent} does not exist; create it first")
     temporary, old = _beside(target), _beside(target)
     _sweep(target.parent)
@@ -141,7 +141,7 @@ def _checked(path: str | os.PathLike[str]) -> Path:
     if os.path.exists(path) and not os.path.isfile(path):
         return Path(path)
     target = Path(os.path.realpath(path))
-    if not target.parent.is_dir():
+    if not os.path.isdir(target.parent):
         raise InputError(f"{path}: the folder {target.parent} does not exist; create it first")
     return target
 

@@ -223,7 +223,7 @@ class UncertifiedError(SampleError):
 def did_you_mean(name: object, available: Iterable[str]) -> str:
     """' Did you mean "x"? Available: ...' for a name that is not among `available`."""
     choices = sorted(available)
-    near = nearest(str(name), choices)
+    near = nearest(name, choices) if isinstance(name, str) else []
     guess = f' Did you mean "{few(near[:1])}"?' if near else ""
     listed = f" Available: {few(choices)}." if choices else " None is available."
     return guess + listed

@@ -133,6 +133,9 @@ DOORS: dict[str, Door] = {
     "load_scenario": Door(
         {"source": lambda stage: stage.file("run.toml", "duration = 0.1")}, words=("path",)
     ),
+    "check": Door({"mechanism": lambda stage: stage.mechanism}, calls=30),
+    "schema": Door({"of": "mechanism"}),
+    "write_reference": Door({"folder": "."}, calls=60, words=("no such", "folder")),
     "Mechanism.get": Door({"path": "platform.mass"}, words=("mechanism",)),
     "Mechanism.set": Door(
         {"path": "platform.mass", "value": 0.2}, words=("mass", MACHINE, "mechanism")
@@ -174,6 +177,8 @@ DOORS: dict[str, Door] = {
 LATER = {
     *("Mechanism.checked", "open_solution", "simulate_all", "workspace_map", "workspace_size"),
     *("open_map", "sweep", "export_c", "export_fmu", "export_matlab", "export_mjcf"),
+    *("forward_states", "solve_states", "pose_states", "run", "open_sweep", "serve_view"),
+    *("write_report", "new_mechanism"),
 }
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.speeds import first, slow
 
 import condyle
 from condyle.errors import CondyleError
@@ -44,7 +45,7 @@ def in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Non
     yield
 
 
-@pytest.mark.parametrize("seed", range(ORDERS))
+@pytest.mark.parametrize("seed", first(range(ORDERS), rest=slow))
 def test_modules_in_any_order(seed: int) -> None:
     """One process an order, each begun by other modules; `test_house` proves there is no circle."""
     order = random.Random(seed).sample(MODULES, len(MODULES))

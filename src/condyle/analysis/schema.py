@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..errors import InputError, did_you_mean
+from ..errors import InputError, did_you_mean, shown
 
 KINDS = ("mechanism", "scenario", "study")
 
@@ -14,12 +14,12 @@ def schema(of: str = "mechanism") -> dict[str, Any]:
 
     Raises: InputError: for another kind of file.
     """
+    if not isinstance(of, str) or of not in KINDS:
+        raise InputError(f"of: expected a kind of file, got {shown(of)}.{did_you_mean(of, KINDS)}")
     if of == "mechanism":
         from ..mechanism import json_schema as made
     elif of == "scenario":
         from ..simulation import scenario_schema as made
-    elif of == "study":
-        from .sweep import json_schema as made
     else:
-        raise InputError(f'schema: no kind of file "{of}".{did_you_mean(of, KINDS)}')
+        from .sweep import json_schema as made
     return made()

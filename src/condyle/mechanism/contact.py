@@ -13,9 +13,9 @@ from pydantic import BeforeValidator, Field, StrictBool, model_validator
 
 from .actuator import SMOOTHING_SPEED
 from .quantities import Coefficient, Interval, Name, Point, PositiveLength, SmoothingSpeed
-from .schema import SIDE_OPTIONS
 from .surface import Surface, of_form, sides
 from .table import Table
+from .table_schema import SIDE_OPTIONS
 
 Side = Literal["below", "above", "inside", "outside"]
 

@@ -17,7 +17,7 @@ from .home import holding_problems, off_surface
 from .mechanism import Mechanism, structural_problems
 from .messages import describe, unknown_key
 from .quantities import PER_METRE
-from .schema import schema_of
+from .table_schema import schema_of
 from .toml import nests_too_deep, read_tables, read_text, too_deep
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from ..errors import did_you_mean, shortened, shown
-from .schema import keys_at
+from .table_schema import keys_at
 
 
 def describe(error: ValidationError, data: Any, root: type[BaseModel]) -> list[str]:

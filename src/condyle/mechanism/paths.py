@@ -18,8 +18,8 @@ from pydantic import BaseModel
 from ..errors import InputError, did_you_mean, printable, shortened, shown
 from .messages import entry
 from .quantities import listed
-from .schema import SIDE_OPTIONS
 from .table import Table
+from .table_schema import SIDE_OPTIONS
 
 Path = tuple[str | int, ...]
 

@@ -14,7 +14,7 @@ from .coordinates import COORDINATES
 from .home import Parts, dependent_coordinates
 
 
-class MechanismSummary(Parts, Protocol):
+class MechanismParts(Parts, Protocol):
     """A mechanism."""
 
     @property
@@ -23,14 +23,14 @@ class MechanismSummary(Parts, Protocol):
     def platform(self) -> Platform: ...
 
 
-def in_words(mechanism: MechanismSummary) -> str:
+def in_words(mechanism: MechanismParts) -> str:
     """Name, freedoms, chains by family, contacts by surface; four lines at most."""
     head, *rows = _rows(mechanism)
     lines = [f'Mechanism "{mechanism.name}": {head[1]}']
     return "\n".join([*lines, *(f"  {title}: {text}" for title, text in rows)])
 
 
-def in_html(mechanism: MechanismSummary) -> str:
+def in_html(mechanism: MechanismParts) -> str:
     """The same as a small table."""
     rows = "".join(
         f'<tr><th style="text-align:left">{escape(title)}</th>'
@@ -41,7 +41,7 @@ def in_html(mechanism: MechanismSummary) -> str:
     return f"<table><caption>Mechanism <b>{name}</b></caption><tbody>{rows}</tbody></table>"
 
 
-def _rows(mechanism: MechanismSummary) -> list[tuple[str, str]]:
+def _rows(mechanism: MechanismParts) -> list[tuple[str, str]]:
     chains = _grouped((chain.kind, chain.name) for chain in mechanism.chains)
     contacts = _grouped((contact.surface.kind, contact.name) for contact in mechanism.contacts)
     radii = np.sqrt(mechanism.platform.inertia.principal() / mechanism.platform.mass) * 1e3
@@ -54,7 +54,7 @@ def _rows(mechanism: MechanismSummary) -> list[tuple[str, str]]:
     ]
 
 
-def _freedoms(mechanism: MechanismSummary) -> str:
+def _freedoms(mechanism: MechanismParts) -> str:
     count = 6 - len(mechanism.contacts)
     text = f"{count} degree{'s' * (count != 1)} of freedom"
     try:

@@ -15,8 +15,8 @@ from ..errors import ScenarioError, as_path, no_such_file
 from ..mechanism.files import without_unit
 from ..mechanism.messages import describe
 from ..mechanism.quantities import PER_METRE, Length, Number
-from ..mechanism.schema import schema_of
 from ..mechanism.table import Table
+from ..mechanism.table_schema import schema_of
 from ..mechanism.toml import read_tables, read_text
 from ..questions.entries import File, Frequency, Gain, Positive
 from ..questions.law import CONTROLLERS

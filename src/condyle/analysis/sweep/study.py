@@ -14,8 +14,8 @@ from ...errors import InputError
 from ...mechanism.library import bundled_mechanisms
 from ...mechanism.messages import describe
 from ...mechanism.quantities import listed
-from ...mechanism.schema import schema_of
 from ...mechanism.table import FrozenTable, Table
+from ...mechanism.table_schema import schema_of
 from ...mechanism.toml import nests_too_deep, read_tables, read_text, too_deep
 
 REFERENCE, TRIAL, NONE = "reference", "trial", "none"  # instead of a file
