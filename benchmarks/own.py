@@ -73,8 +73,8 @@ def reachable_samples(model: Model, count: int, seed: int = 0) -> np.ndarray:
     while sum(map(len, found)) < count:
         q, q1, q2 = (rng.uniform(-s, s, (count, m)) * scale for s in (0.05, 0.5, 5.0))
         force = rng.normal(0, 5, (count, 3))
-        load = np.hstack([force, np.zeros((count, 6))])
-        ok = model.torques(q, q1, q2, load).status == 0
+        wrench = np.hstack([force, np.zeros((count, 3))])
+        ok = model.inverse_dynamics(q, q1, q2, wrench).status == 0
         found.append(np.hstack([q, q1, q2, force])[ok])
     return np.concatenate(found)[:count]
 
@@ -99,7 +99,7 @@ class Case:
             [samples[:, 3 * m :], np.zeros((SAMPLES, 3)), np.tile(point, (SAMPLES, 1))]
         )
         case = Case(mechanism, samples, load, point, np.empty(0))
-        return replace(case, right=reference.torques(*case.states, load).effort)
+        return replace(case, right=reference.inverse_dynamics(*case.arguments).effort)
 
     @property
     def states(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -108,15 +108,19 @@ class Case:
         return q, q1, q2
 
     @property
+    def arguments(self) -> tuple[np.ndarray, ...]:
+        """q, v, a, wrench and point, as models take them."""
+        return *self.states, self.load[:, :6], self.load[:, 6:]
+
+    @property
     def columns(self) -> np.ndarray:
         """What a kernel of inverse dynamics reads, (SAMPLES, 3 m + 9)."""
         return np.hstack([*self.states, self.load])
 
-    def many(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """q, q', q'' and the load of so many samples, as columns."""
+    def many(self, count: int) -> tuple[np.ndarray, ...]:
+        """The arguments of `count` samples, as columns."""
         rows = np.arange(count) % SAMPLES
-        q, q1, q2, load = (np.asfortranarray(a[rows]) for a in (*self.states, self.load))
-        return q, q1, q2, load
+        return tuple(np.asfortranarray(a[rows]) for a in self.arguments)
 
 
 def own_probes(mechanism: Mechanism, formulations: list[str]) -> Iterator[Probe]:
@@ -130,14 +134,14 @@ def own_probes(mechanism: Mechanism, formulations: list[str]) -> Iterator[Probe]
         elif has_closed_form(mechanism):
             variants.append((", direct", "direct", ()))
         for what, route, outputs in variants:
-            model = Model(mechanism, formulation, route, "compiled")
+            model = Model(mechanism, formulation=formulation, route=route, backend="compiled")
             kernel = model.kernel("inverse", outputs)
-            found = model.torques(*case.states, case.load, outputs).effort
+            found = model.inverse_dynamics(*case.arguments).effort
             yield from _kernel_probes(label + what, kernel, case.columns, case.right, found, timer)
     yield from _forward_probes(f"{name} {FORWARD}", case, timer)
     numpy = Model(mechanism, backend="numpy")
     yield _python_probe(
-        f"{name} numpy: batch", lambda: numpy.torques(*case.states, case.load), SAMPLES
+        f"{name} numpy: batch", lambda: numpy.inverse_dynamics(*case.arguments), SAMPLES
     )
     if all(c.offset_surface.form == "plane" for c in mechanism.contacts):
         yield from _straight_probes(f"{name} CasADi straight-line C, gcc", timer, case)
@@ -150,7 +154,7 @@ def _forward_probes(label: str, case: Case, timer: Timer) -> Iterator[Probe]:
     q, q1, q2 = case.states
     assert isinstance(kernel, CompiledKernel)
     given = np.hstack([q, q1, case.right[:, list(kernel.order)], case.load])
-    found = model.forward(q, q1, case.right, case.load).acceleration
+    found = model.forward_dynamics(q, q1, case.right, *case.arguments[3:]).acceleration
     yield from _kernel_probes(label, kernel, given, q2, found, timer)
 
 
@@ -211,7 +215,7 @@ def thread_probes(mechanism: Mechanism) -> Iterator[Probe]:
         given = case.many(count)
         size = "" if count == 200_000 else f" of {count}"
         for threads, what in ((1, "one thread"), (2, "two threads")):
-            call = partial(model.torques, *given, threads=threads)
+            call = partial(model.inverse_dynamics, *given, threads=threads)
             yield _python_probe(f"{label}{size}, {what}", call, count)
 
 
@@ -219,8 +223,9 @@ def asked_probes(mechanism: Mechanism) -> Iterator[Probe]:
     """What people call, from Python, on as many samples: efforts, everything, and `solve`."""
     model, case = Model(mechanism, backend="compiled"), Case.of(mechanism)
     label, given = mechanism.name, case.many(MANY)
-    yield _python_probe(f"{label}: torques", lambda: model.torques(*given), MANY)
-    yield _python_probe(f"{label}: evaluate", lambda: model.evaluate(*given), MANY)
+    for what, outputs in (("efforts", ()), ("all outputs", "all")):
+        call = partial(model.inverse_dynamics, *given, outputs=outputs)
+        yield _python_probe(f"{label}: {what}", call, MANY)
     t = np.linspace(0, 5, MANY)
     chew, bite = reference_motion(), reference_load()
     path = Motion.from_arrays(chew.t, chew.value, chew.names, landmark="incisor", times=t)
@@ -250,8 +255,8 @@ def policy_probes(mechanism: Mechanism) -> Iterator[Probe]:
         (FRICTION, rough, "minimum_norm"),
     ):
         model = Model(machine, backend="compiled", distribution=policy)
-        outputs = ("contact", "motion")  # which `bounded` needs, so that all have the same
-        call = partial(model.torques, *given, outputs=outputs, threads=1)
+        outputs = ("pose",)  # with the motion, which `bounded` needs, so that all have the same
+        call = partial(model.inverse_dynamics, *given, outputs=outputs, threads=1)
         yield _python_probe(f"{label}: {name}", call, JAW_SAMPLES)
 
 
@@ -260,17 +265,19 @@ def limit_probes(
 ) -> Iterator[Probe]:
     """Limits that bind at one sample in three, and bites of a jaw, beside other solvers."""
     given = Case.of(mechanism).many(JAW_SAMPLES)
-    free = Model(mechanism, backend="compiled").torques(*given).effort
+    free = Model(mechanism, backend="compiled").inverse_dynamics(*given).effort
     greatest = float(np.quantile(np.abs(free).max(axis=1), 2 / 3))
     model = Model(tight(mechanism, greatest), backend="compiled", distribution="bounded")
-    fits = model.torques(*given).status == 0
-    q, q1, q2, acting = (a[fits] for a in given)
-    yield from program_probes(Bites(mechanism.name, model, (q, q1, q2, acting)), unavailable)
+    fits = model.inverse_dynamics(*given).status == 0
+    binding = tuple(a[fits] for a in given)
+    yield from program_probes(Bites(mechanism.name, model, binding), unavailable)
     model = Model(jaw, backend="compiled", distribution="bounded")
     still = np.zeros((JAW_SAMPLES, jaw.degrees_of_freedom))
-    bite = np.zeros((JAW_SAMPLES, 9))
-    bite[:, 2], bite[:, 6:] = np.linspace(0, -600, JAW_SAMPLES), model.load_point("right_molar")
-    yield from program_probes(Bites(jaw.name, model, (still, still, still, bite)), unavailable)
+    bite, at = np.zeros((JAW_SAMPLES, 6)), jaw.platform.points["right_molar"]
+    bite[:, 2], point = np.linspace(0, -600, JAW_SAMPLES), np.tile(at, (JAW_SAMPLES, 1))
+    yield from program_probes(
+        Bites(jaw.name, model, (still, still, still, bite, point)), unavailable
+    )
 
 
 def jaw_probes(mechanism: Mechanism) -> Iterator[Probe]:
@@ -282,10 +289,9 @@ def jaw_probes(mechanism: Mechanism) -> Iterator[Probe]:
         turn = 2 * np.pi
         q = unit * np.sin(turn * t)
         q1, q2 = unit * turn * np.cos(turn * t), -(turn**2) * q
-        load = np.zeros((len(t), 9))
-        load[:, 2] = -100 * np.sin(turn / 2 * t[:, 0]) ** 2  # N, a bite
-        load[:, 6:] = model.load_point("right_molar")
-        call = partial(model.torques, q, q1, q2, load, threads=1)
+        bite = np.zeros((len(t), 6))
+        bite[:, 2] = -100 * np.sin(turn / 2 * t[:, 0]) ** 2  # N
+        call = partial(model.inverse_dynamics, q, q1, q2, bite, "right_molar", threads=1)
         assert (call().status == 0).all()
         yield _python_probe(f"{mechanism.name}: {objective}", call, JAW_SAMPLES)
 

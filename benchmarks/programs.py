@@ -23,7 +23,7 @@ BINDING = "bounded where limits bind"
 PROGRAMS = 16  # that others solve, one after the other
 
 
-Given = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # q, q', q'', load
+Given = tuple[np.ndarray, ...]  # q, v, a, wrench, point
 
 
 @dataclass(frozen=True)
@@ -35,20 +35,20 @@ class Bites:
     given: Given
 
     def ours(self) -> float:
-        """Seconds a sample of `torques`, from q to efforts."""
+        """Seconds a sample of `inverse_dynamics`, from q to efforts."""
         start = time.perf_counter()
-        self.model.torques(*self.given, outputs=("contact",), threads=1)
+        self.model.inverse_dynamics(*self.given, threads=1)
         return (time.perf_counter() - start) / len(self.given[0])
 
     def programs(self) -> tuple[list[Sample], np.ndarray]:
         """Some of the programs, contacts eliminated, and the x that solve them, (R, n)."""
         rows = np.linspace(0, len(self.given[0]) - 1, PROGRAMS).astype(int)
-        q, q1, q2, load = (a[rows] for a in self.given)
-        model = self.model
-        at = model.evaluate(q, q1, q2, load)
+        q, q1, q2, wrench, point = (a[rows] for a in self.given)
+        model, outputs = self.model, ("pose", "pose_rate", "pose_acceleration")
+        at = model.inverse_dynamics(q, q1, q2, wrench, point, outputs=outputs)
         ports = {"pose": at.pose, "pose_rate": at.pose_rate}
         ports |= {"pose_acceleration": at.pose_acceleration}
-        ports |= {"force": load[:, :3], "moment": load[:, 3:6], "point": load[:, 6:]}
+        ports |= {"force": wrench[:, :3], "moment": wrench[:, 3:], "point": point}
         s = {k: np.moveaxis(a, -1, 0) for k, a in model.kernel("balance").run(ports).values.items()}
         both = [limits(chain) for chain in model.mechanism.chains]
         low, high = (np.array([getattr(x, name) for x in both]) for name in ("low", "high"))

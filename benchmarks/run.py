@@ -188,9 +188,8 @@ def _peer_probes(unavailable: dict[str, str]) -> Iterator[Probe]:
     samples = reachable_samples(model, 64)
     q, q1, q2 = (np.ascontiguousarray(samples[:, i * m : (i + 1) * m]) for i in range(3))
     force = np.ascontiguousarray(samples[:, 3 * m :])
-    point = np.tile(mechanism.platform.points["right_molar"], (64, 1))
-    load_ = np.hstack([force, np.zeros((64, 3)), point])
-    right = model.torques(q, q1, q2, load_).effort
+    wrench = np.hstack([force, np.zeros((64, 3))])
+    right = model.inverse_dynamics(q, q1, q2, wrench, "right_molar").effort
     for name, make in peers.PEERS.items():
         peer = make()
         able, why = peer.available()

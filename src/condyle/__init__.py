@@ -31,6 +31,7 @@ _HOMES = {
     "motion_from_c3d": "markers",
     "Model": "model.model",
     "derive": "model.model",
+    "Distribution": "model.distributing",
     "Load": "motion",
     "Motion": "motion",
     "reference_load": "motion",
@@ -91,6 +92,7 @@ if TYPE_CHECKING:
     from .export.new_mechanism import new_mechanism
     from .markers import motion_from_c3d
     from .mechanism import Mechanism, bundled_mechanisms, dump, dumps, load_mechanism
+    from .model.distributing import Distribution
     from .model.model import Model, derive
     from .motion import (
         Load,

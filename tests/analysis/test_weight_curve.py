@@ -8,6 +8,7 @@ import pytest
 import condyle
 from condyle.analysis.comparison import compare
 from condyle.analysis.weight_curve import Tradeoff, tradeoff
+from condyle.model.distributing import Distribution
 from condyle.motion import Motion
 from condyle.report.figures.tradeoff_figure import apart, tradeoff_figure
 from condyle.report.tables.tradeoff_table import tradeoff_table
@@ -36,7 +37,10 @@ def test_every_point_is_the_least_of_all_efforts(curve: Tradeoff, motion: Motion
     """Efforts that balance form a plane here, which three of them span; its least is algebra."""
     model = condyle.derive("masticatory", backend="numpy", distribution="weighted")
     unit = model.reference_force**2
-    found = [model.choosing("weighted", 0, w / unit).solve(motion) for w in (0.0, 1.0, 30.0)]
+    found = [
+        model.with_distribution(Distribution("weighted", 0, w / unit)).solve(motion)
+        for w in (0.0, 1.0, 30.0)
+    ]
     limit, rows = 3.0, found[0].sizes["time"]
     for w, weight in enumerate(curve.weights):
         squares = 0.0

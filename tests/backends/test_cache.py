@@ -23,7 +23,8 @@ from condyle.backends.c import build
 from condyle.backends.c.build import _recipe
 from condyle.backends.compiler import Compiler, find_compiler
 from condyle.errors import CondyleError
-from condyle.questions import Prescribed, Question
+from condyle.questions import Question
+from condyle.questions.closure import Prescribed
 from condyle.questions.structure import structure_of
 
 RECIPE, OTHER = cache.digest("one"), cache.digest("other")

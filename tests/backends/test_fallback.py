@@ -44,12 +44,12 @@ def by_numpy() -> Model:
 
 @functools.cache
 def wanted() -> np.ndarray:
-    return by_numpy().torques(*case(NAME).arguments).effort
+    return by_numpy().inverse_dynamics(*case(NAME).arguments).effort
 
 
 def check_numbers(model: Model) -> None:
     """Those of numpy."""
-    found = model.torques(*case(NAME).arguments)
+    found = model.inverse_dynamics(*case(NAME).arguments)
     tolerance = 1e-12 if model.route == "direct" else 0
     assert error(found.effort, wanted()) <= tolerance
 
@@ -176,7 +176,7 @@ def test_kernels_that_are_demanded(
     """At the latest when the first of them is needed."""
     c = case(NAME)
     with pytest.raises(CompilerError) as failure:
-        Model(c.mechanism, backend="compiled").torques(*c.arguments)
+        Model(c.mechanism, backend="compiled").inverse_dynamics(*c.arguments)
     assert useless[1] in str(failure.value) and REMEDY in str(failure.value)
     assert capsys.readouterr().err == ""
 

@@ -49,7 +49,7 @@ def test_kernels_agree_with_casadi(backend: str) -> None:
     left, right = mechanism.contacts
     left = left.model_copy(update={"surface": Expression(bumpy)})
     mechanism = mechanism.replace(contacts=(left, right))
-    wanted = Interpreter(mechanism).solve(*reference.arguments)
+    wanted = Interpreter(mechanism).solve(*reference.packed)
     kernel = Model(mechanism, backend=backend).kernel("inverse", ())
     answer = kernel.run(reference.inputs)
     good = answer.status == Status.ok

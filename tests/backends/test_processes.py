@@ -108,7 +108,7 @@ def kernel() -> CompiledKernel:
 
 def wanted() -> np.ndarray:
     c = case("gough-stewart")
-    return Interpreter(c.mechanism).solve(*c.arguments).effort
+    return Interpreter(c.mechanism).solve(*c.packed).effort
 
 
 def efforts(kernel: CompiledKernel) -> np.ndarray:

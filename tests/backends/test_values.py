@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.cases import case, error, errors, ones
+from support.cases import NAMES, case, error, errors, ones
 from support.interpreter import Found, Interpreter
+from support.loads import parts
 
 from benchmarks.casadi_function import casadi_function
 from condyle.backends.kernel import Answer, arranged
 from condyle.backends.numpy_kernel import NumpyKernel
 from condyle.dynamics import FORMULATIONS
 from condyle.graph.program import Variants
-from condyle.model.inverse_dynamics import RESULTS
 from condyle.model.model import Model
 from condyle.questions import Question
 from condyle.questions.inverse import OUTPUTS
@@ -55,13 +55,13 @@ ALL = [*REFERENCE, *BUNDLED, *RANDOM]
 def wanted(name: str) -> Found:
     """What the witness says, by the paper's first formulation."""
     c = case(name)
-    found = Interpreter(c.mechanism, "momentum").solve(*c.arguments)
+    found = Interpreter(c.mechanism, "momentum").solve(*c.packed)
     assert found.reached.all()
     return found
 
 
 def model(name: str, formulation: str, route: str, backend: str = "compiled") -> Model:
-    found = Model(case(name).mechanism, formulation, route, backend)
+    found = Model(case(name).mechanism, formulation=formulation, route=route, backend=backend)
     assert found.backend.name == backend
     return found
 
@@ -70,12 +70,9 @@ def right(values: Mapping[str, np.ndarray], good: np.ndarray, name: str) -> dict
     """Errors of a kernel's results against the witness, over the good samples."""
     assert good.sum() > len(good) / 2
     found = {}
-    for key in RESULTS:
-        for result in RESULTS[key]:
-            if result in values and result != "gravity":
-                truth = getattr(wanted(name), result)
-                truth = truth.swapaxes(1, 2) if result == "share" else truth.T
-                found[result] = error(values[result][..., good], truth[..., good])
+    for result in set(values) & {*NAMES}:
+        truth = np.moveaxis(getattr(wanted(name), result), 0, -1)
+        found[result] = error(values[result][..., good], truth[..., good])
     found["effort"] = error(values["effort"][:, good], wanted(name).effort.T[:, good])
     return found
 
@@ -88,7 +85,7 @@ def check(answer: Answer, name: str) -> None:
 @pytest.mark.parametrize(("name", "formulation", "route"), ALL)
 def test_numpy(name: str, formulation: str, route: str) -> None:
     c = case(name)
-    got = model(name, formulation, route, "numpy").evaluate(*c.arguments)
+    got = model(name, formulation, route, "numpy").inverse_dynamics(*c.arguments, outputs="all")
     assert not got.status.any()
     off = errors(got, wanted(name))
     assert max(off.values()) < TOLERANCE, off
@@ -101,7 +98,7 @@ def test_compiled(name: str, formulation: str, route: str, monkeypatch: pytest.M
     number = ALL.index((name, formulation, route))
     monkeypatch.setenv("CONDYLE_LANES", WIDTHS[number % 3])
     c = case(name)
-    got = model(name, formulation, route).evaluate(*c.arguments)
+    got = model(name, formulation, route).inverse_dynamics(*c.arguments, outputs="all")
     assert not got.status.any()
     off = errors(got, wanted(name))
     assert max(off.values()) < TOLERANCE, off
@@ -183,12 +180,11 @@ def test_variants_agree(name: str) -> None:
 def test_asking_for_less_changes_nothing() -> None:
     c = case("masticatory")
     evaluator = model("masticatory", "virtual_power", "core")
-    full = evaluator.torques(*c.arguments, outputs=LEAN)
-    bare = evaluator.torques(*c.arguments)
+    full = evaluator.inverse_dynamics(*c.arguments, outputs=("pose", "joint_rate"))
+    bare = evaluator.inverse_dynamics(*c.arguments)
     assert error(bare.effort, full.effort) < 1e-13
-    assert not bare.others
-    with pytest.raises(KeyError):
-        bare["contact_force"]
+    with pytest.raises(AttributeError, match="pose was not asked for"):
+        _ = bare.pose
 
 
 @pytest.mark.usefixtures("unoptimised")
@@ -211,13 +207,13 @@ def test_a_load_point_for_each_sample(backend: str) -> None:
     load[:, 6:] += np.random.default_rng(0).normal(0, 0.02, (len(load), 3))
     truth = Interpreter(c.mechanism).solve(c.q, c.q1, c.q2, load)
     evaluator = model("masticatory", "virtual_power", "core", backend)
-    got = evaluator.torques(c.q, c.q1, c.q2, load, outputs=LEAN)
+    got = evaluator.inverse_dynamics(c.q, c.q1, c.q2, *parts(load))
     assert error(got.effort, truth.effort) < TOLERANCE
-    assert error(got["contact_force"], truth.contact_force) < TOLERANCE
+    assert error(got.contact_force, truth.contact_force) < TOLERANCE
     assert error(got.effort, wanted("masticatory").effort) > 1e-3  # the points are felt
     for i in range(3):  # each as in a batch of its own point
-        alone = evaluator.torques(*(a[i : i + 1] for a in (c.q, c.q1, c.q2, load)))
-        assert error(alone.effort[0], got.effort[i]) < TOLERANCE
+        alone = evaluator.inverse_dynamics(*(a[i] for a in (c.q, c.q1, c.q2, *parts(load))))
+        assert error(alone.effort, got.effort[i]) < TOLERANCE
     if backend == "compiled":
         samples = np.hstack([c.q, c.q1, c.q2, load])
         values, status = ones(evaluator.kernel("inverse", LEAN), samples)
@@ -229,5 +225,5 @@ def test_a_load_point_for_each_sample(backend: str) -> None:
 def test_the_witness_agrees_with_itself(formulation: str) -> None:
     """By every formulation, in twists and in rates."""
     c = case("mixed_k2_n8")
-    off = errors(Interpreter(c.mechanism, formulation).solve(*c.arguments), wanted("mixed_k2_n8"))
+    off = errors(Interpreter(c.mechanism, formulation).solve(*c.packed), wanted("mixed_k2_n8"))
     assert max(off.values()) < TOLERANCE, off

@@ -95,7 +95,7 @@ def motion(kind: str, count: int = 41) -> tuple[list[str], np.ndarray]:
         return ["beta", "t", "Y", "alpha", "X"], np.column_stack([q[:, 3], t, q[:, [1, 2, 0]]])
     if kind == "pose":
         model = condyle.derive(condyle.load_mechanism("masticatory"))
-        pose = model.evaluate(q, 0 * q, 0 * q, np.zeros((count, 9))).pose
+        pose = model.inverse_dynamics(q, 0 * q, 0 * q, outputs="all").pose
         return ["t", "X", "Y", "Z", "alpha", "beta", "gamma"], np.column_stack([t, pose])
     return ["t", "X", "Y", "alpha", "beta"], np.column_stack([t, q])
 
@@ -198,7 +198,7 @@ def test_samples_near_a_singularity_are_counted(
     low, high = 0.0, 0.05
     while high - low > 1e-10:
         q = np.array([[(low + high) / 2, 0, 0, 0]])
-        reached = model.evaluate(q, 0 * q, 0 * q, np.zeros((1, 9))).status[0] == 0
+        reached = model.inverse_dynamics(q, 0 * q, 0 * q).status[0] == 0
         low, high = (q[0, 0], high) if reached else (low, q[0, 0])
     header, rows = motion("plain")
     rows[:, 1:] = 0

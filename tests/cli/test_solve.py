@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.loads import load_point_of
 
 import condyle
 from condyle.backends.c import compiled_kernel as kernel
 from condyle.backends.c.compiled_kernel import CompiledKernel
 from condyle.mechanism import COORDINATES
-from condyle.model.model import Model, with_point
+from condyle.model.model import Model
 from condyle.motion import read_table
 
 NAMES = ("X", "Y", "alpha", "beta")
@@ -67,7 +68,9 @@ def test_columns_and_digits(solve: Solve, model: Model) -> None:
         *COORDINATES,
         *(f"joint_{name}" for name in chains),
     ]
-    found = model.evaluate(q, q1, q2, with_point(wrench, model.load_point("right_molar")))
+    found = model.inverse_dynamics(
+        q, q1, q2, wrench, load_point_of(model, "right_molar"), outputs="all"
+    )
     parts = [found.effort, found.contact_force, found.pose, found.configuration.joint]
     wanted = np.hstack(parts)
     np.testing.assert_array_equal(np.array(rows, dtype=float), wanted)
@@ -106,7 +109,7 @@ def test_rows_never_influence_each_other(solve: Solve, names: tuple[str, ...]) -
 def test_any_valid_set_of_coordinates(solve: Solve, model: Model, names: tuple[str, ...]) -> None:
     """The same states in other coordinates, columns in any order: the same torques."""
     q, q1, q2 = draw(12)
-    found = model.evaluate(q, q1, q2, np.zeros((12, 9)))
+    found = model.inverse_dynamics(q, q1, q2, outputs="all")
     columns = [COORDINATES.index(name) for name in names]
     poses = (found.pose, found.pose_rate, found.pose_acceleration)
     cells = np.hstack([a[:, columns] for a in poses])

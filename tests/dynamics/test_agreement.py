@@ -10,14 +10,15 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from oracles.random_mechanism import random_mechanism, random_state, toml_text
+from support.loads import load_point_of, parts, with_point
 from support.speeds import few, slow
 
 import condyle
 from condyle import InputError, UnsupportedError
 from condyle.dynamics import FORMULATIONS, ROUTES
 from condyle.mechanism import Mechanism, parse
-from condyle.model.data import Evaluation
-from condyle.model.model import Model, with_point
+from condyle.model.model import Model
+from condyle.model.model_result import ModelResult
 from condyle.status import Status
 
 
@@ -26,12 +27,14 @@ def models(mechanism: Mechanism) -> Iterator[Model]:
     for formulation in sorted(FORMULATIONS, key=lambda name: name != "momentum"):
         for route in ROUTES:
             try:
-                yield condyle.derive(mechanism, formulation, route, backend="numpy")
+                yield condyle.derive(
+                    mechanism, formulation=formulation, route=route, backend="numpy"
+                )
             except UnsupportedError:
                 assert route == "direct" and len(mechanism.contacts) > 2
 
 
-def difference(got: Evaluation, wanted: Evaluation) -> float:
+def difference(got: ModelResult, wanted: ModelResult) -> float:
     """Largest difference of anything, over the largest component of its kind in its sample."""
     assert (got.status == 0).all() and (wanted.status == 0).all()
     worst = 0.0
@@ -45,7 +48,9 @@ def difference(got: Evaluation, wanted: Evaluation) -> float:
 
 
 def compare_all(mechanism: Mechanism, *samples: np.ndarray) -> int:
-    first, *others = (model.evaluate(*samples) for model in models(mechanism))
+    first, *others = (
+        model.inverse_dynamics(*samples, outputs="all") for model in models(mechanism)
+    )
     for other in others:
         assert difference(other, first) < 1e-10
     return len(others)
@@ -76,8 +81,8 @@ def test_the_reference_motion(reference: Mechanism) -> None:
     motion = condyle.reference_motion()
     wrench = condyle.reference_load().at(motion.t)[::25]
     model = condyle.derive(reference)
-    (q, q1, q2), _ = model.independent_motion(motion)
-    load = with_point(wrench, model.load_point("right_molar"))
+    (q, q1, q2), _ = model.poses.of_motion(motion)
+    load = with_point(wrench, load_point_of(model, "right_molar"))
     assert compare_all(reference, q[::25], q1[::25], q2[::25], load) == len(FORMULATIONS) * 2 - 1
 
 
@@ -89,12 +94,12 @@ def test_the_choice_of_dependent_coordinates_is_free(
     model = condyle.derive(reference, backend="numpy")
     rng = np.random.default_rng(0)
     q, q1, q2 = rng.normal(0, 1, (3, 5, 4)) * [0.001, 0.001, 0.05, 0.05]
-    load = with_point(rng.normal(0, 5, (5, 6)), model.load_point(None))
-    wanted = model.evaluate(q, q1, q2, load)
+    load = with_point(rng.normal(0, 5, (5, 6)), load_point_of(model, None))
+    wanted = model.inverse_dynamics(q, q1, q2, *parts(load), outputs="all")
     other = condyle.derive(reference.replace(dependent=dependent), backend="numpy")
     columns = [("X", "Y", "Z", "alpha", "beta", "gamma").index(n) for n in other.independent]
     whole = (wanted.pose, wanted.pose_rate, wanted.pose_acceleration)
-    got = other.evaluate(*(a[:, columns] for a in whole), load)
+    got = other.inverse_dynamics(*(a[:, columns] for a in whole), *parts(load), outputs="all")
     assert difference(got, wanted) < 1e-10
 
 
@@ -105,23 +110,25 @@ def test_near_crank_singularities(reference: Mechanism, backend: str) -> None:
     Of root = h - k^2 about eps is lost, so that its square root s, and all that is divided by it,
     loses eps / s^2.
     """
-    wanted_by = condyle.derive(reference, "momentum", "core", backend="numpy")
+    wanted_by = condyle.derive(reference, formulation="momentum", route="core", backend="numpy")
     low, high = 0.0, 0.05
     for _ in range(60):  # to the end of the reach along X
         middle = (low + high) / 2
         pose = np.array([[middle, 0, 0, 0]])
-        status = wanted_by.evaluate(pose, 0 * pose, 0 * pose, np.zeros((1, 9))).status[0]
+        status = wanted_by.inverse_dynamics(pose, 0 * pose, 0 * pose).status[0]
         reached = status != Status.unreachable
         low, high = (middle, high) if reached else (low, middle)
     q = np.zeros((9, 4))
     q[:, 0] = low * (1 - 10.0 ** -np.arange(1, 10))
     q1, q2 = q * [1, 0, 0, 0] + 0.01, q + 0.1
-    load = with_point(np.full((9, 6), 0.3), wanted_by.load_point(None))
-    wanted = wanted_by.evaluate(q, q1, q2, load)
+    load = with_point(np.full((9, 6), 0.3), load_point_of(wanted_by, None))
+    wanted = wanted_by.inverse_dynamics(q, q1, q2, *parts(load), outputs="all")
     sine = np.abs(wanted.configuration.singularity.transmission).min(axis=1)
     assert sine[0] > 0.1 and sine[-1] < 1e-4
     for formulation in FORMULATIONS if backend == "numpy" else ["virtual_power"]:
-        got = condyle.derive(reference, formulation, backend=backend).evaluate(q, q1, q2, load)
+        got = condyle.derive(reference, formulation=formulation, backend=backend).inverse_dynamics(
+            q, q1, q2, *parts(load), outputs="all"
+        )
         error = np.abs(got.effort - wanted.effort).max(axis=1)
         error /= np.abs(wanted.effort).max(axis=1)
         assert (error < 1e-13 / sine**2).all()
@@ -138,7 +145,7 @@ def test_backends_agree_far_from_home(options: dict[str, Any]) -> None:
     wanted_by, got_by = (condyle.derive(mechanism, backend=b) for b in ("numpy", "auto"))
     unit = np.array([0.006 if name in "XYZ" else 0.2 for name in wanted_by.independent])
     q = np.random.default_rng(0).uniform(-1, 1, (400, len(unit))) * unit
-    wanted, got = (m.evaluate(q, q, q, np.zeros((400, 9))) for m in (wanted_by, got_by))
+    wanted, got = (m.inverse_dynamics(q, q, q, outputs="all") for m in (wanted_by, got_by))
     np.testing.assert_array_equal(got.status, wanted.status)
     ok = wanted.status == 0
     assert 50 < ok.sum() < 400

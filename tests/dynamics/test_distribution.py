@@ -7,11 +7,11 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from oracles.random_mechanism import random_mechanism, random_state, toml_text
+from support.loads import load_point_of, parts, with_point
 
 import condyle
 from condyle.dynamics.minimum_norm import minimum_norm
 from condyle.mechanism import parse
-from condyle.model.model import with_point
 
 
 @pytest.mark.parametrize("n, m", [(6, 6), (6, 4), (8, 4), (5, 1)])
@@ -71,12 +71,12 @@ def test_models_choose_the_least_norm(contacts: int, chains: int, backend: str) 
     raw = random_mechanism(np.random.default_rng(9), contacts=contacts, chains=chains)
     model = condyle.derive(parse(toml_text(raw)), backend=backend)
     states = random_state(np.random.default_rng(2), raw, 3)
-    load = with_point(states["wrench"], model.load_point(None))
+    load = with_point(states["wrench"], load_point_of(model, None))
     m = 6 - contacts
     for i in range(3):
         q, q1, q2 = (states[key][i] for key in ("q", "qd", "qdd"))
         zero = np.zeros((m, m))
-        A = model.evaluate(np.tile(q, (m, 1)), np.eye(m), zero, np.zeros((m, 9))).joint_rate.T
-        tau = model.evaluate(q[None], q1[None], q2[None], load[i : i + 1]).effort[0]
+        A = model.inverse_dynamics(np.tile(q, (m, 1)), np.eye(m), zero, outputs="all").joint_rate.T
+        tau = model.inverse_dynamics(q[None], q1[None], q2[None], *parts(load[i : i + 1])).effort[0]
         least = np.linalg.pinv(A.T) @ (A.T @ tau)
         np.testing.assert_allclose(tau, least, atol=1e-11 * np.abs(tau).max())

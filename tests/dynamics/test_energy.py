@@ -16,7 +16,7 @@ from support.speeds import few
 import condyle
 from condyle.dynamics import FORMULATIONS
 from condyle.mechanism import parse
-from condyle.model.model import Model, with_point
+from condyle.model.model import Model
 
 CASES = {f"k{k}": {"contacts": k} for k in range(4)} | {"n8": {"chains": 8}}
 
@@ -43,13 +43,13 @@ def test_power_balance_along_a_trajectory(case: str) -> None:
         return unit * 60.0**order * np.sin(60 * t + phase + order * np.pi / 2)
 
     def energies(t: np.ndarray) -> np.ndarray:
-        found = model.evaluate(q(t, 0), q(t, 1), q(t, 2), np.zeros((len(t), 9)))
+        found = model.inverse_dynamics(q(t, 0), q(t, 1), q(t, 2), outputs="all")
         motions = map(platform_motion, found.pose, found.pose_rate)
         return np.array([sum(energy(d, motion)) for motion in motions])
 
     wrench = rng.normal(0, 2, (len(t), 6)) * np.repeat([1, 0.05], 3)
     point = d.points["right_molar"]
-    result = model.evaluate(q(t, 0), q(t, 1), q(t, 2), with_point(wrench, point))
+    result = model.inverse_dynamics(q(t, 0), q(t, 1), q(t, 2), wrench, point, outputs="all")
     assert (result.status == 0).all()
     h = 2e-4
     slope = 8 * (energies(t + h) - energies(t - h)) - (energies(t + 2 * h) - energies(t - 2 * h))
@@ -68,8 +68,8 @@ def test_power_balance_along_a_trajectory(case: str) -> None:
 def generalized(model: Model, q: np.ndarray, q1: np.ndarray, q2: np.ndarray) -> np.ndarray:
     """Forces dual to q', (m,): A^T tau, with A the joint rates of unit velocities."""
     m = len(q)
-    units = model.evaluate(np.tile(q, (m, 1)), np.eye(m), np.zeros((m, m)), np.zeros((m, 9)))
-    effort = model.evaluate(q[None], q1[None], q2[None], np.zeros((1, 9))).effort[0]
+    units = model.inverse_dynamics(np.tile(q, (m, 1)), np.eye(m), np.zeros((m, m)), outputs="all")
+    effort = model.inverse_dynamics(q[None], q1[None], q2[None]).effort[0]
     return units.joint_rate @ effort
 
 
@@ -78,7 +78,7 @@ def generalized(model: Model, q: np.ndarray, q1: np.ndarray, q2: np.ndarray) -> 
 def test_mass_matrix_is_that_of_the_kinetic_energy(case: str, formulation: str) -> None:
     """Torques are linear in q''; the matrix is symmetric, positive definite, and 2 T = q' M q'."""
     raw, drawn_model = drawn(case)
-    model = condyle.derive(drawn_model.mechanism, formulation, backend="numpy")
+    model = condyle.derive(drawn_model.mechanism, formulation=formulation, backend="numpy")
     states = random_state(np.random.default_rng(4), raw, 1)
     q, q1, m = states["q"][0], states["qd"][0], model.mechanism.degrees_of_freedom
     zero = np.zeros(m)
@@ -106,7 +106,7 @@ def test_at_rest_torques_carry_the_weight(case: str) -> None:
     h = 1e-4
 
     def potential(q: np.ndarray) -> float:
-        pose = model.evaluate(q[None], 0 * q[None], 0 * q[None], np.zeros((1, 9))).pose[0]
+        pose = model.inverse_dynamics(q[None], 0 * q[None], 0 * q[None], outputs="all").pose[0]
         return energy(d, platform_motion(pose))[1]
 
     unit = np.array([model.characteristic_length if n in "XYZ" else 1 for n in model.independent])
@@ -122,6 +122,6 @@ def test_at_rest_torques_carry_the_weight(case: str) -> None:
     forces = generalized(model, q, zero, zero) * unit
     np.testing.assert_allclose(forces, slope, atol=1e-8 * np.abs(slope).max())
     floating = condyle.derive(model.mechanism.replace(gravity=(0, 0, 0)), backend="numpy")
-    at_rest = floating.evaluate(q[None], zero[None], zero[None], np.zeros((1, 9)))
+    at_rest = floating.inverse_dynamics(q[None], zero[None], zero[None], outputs="all")
     assert np.abs(at_rest.effort).max() == 0
     assert np.abs(at_rest.contact_force).max(initial=0) == 0

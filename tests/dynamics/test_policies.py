@@ -13,6 +13,7 @@ from oracles.rubbing import losses, touching
 from support.rubbing import Rubbing, drawn
 
 from condyle.mechanism.chain import limits
+from condyle.model.distributing import Distribution
 from condyle.model.model import Model
 from condyle.status import Status
 
@@ -55,7 +56,7 @@ def by_pinocchio(case: Rubbing, i: int, low: np.ndarray, high: np.ndarray) -> An
 
 def check(case: Rubbing, model: Model, low: np.ndarray, high: np.ndarray) -> set[int]:
     """Every sample; returns the statuses that there were."""
-    got = model.evaluate(*case.arguments)
+    got = model.inverse_dynamics(*case.arguments, outputs="all")
     n = len(model.mechanism.chains)
     for i, status in enumerate(got.status):
         wanted = by_pinocchio(case, i, low, high)
@@ -86,6 +87,6 @@ def test_limits_with_contacts_that_push(name: str) -> None:
     push = np.array([contact.push for contact in machine.contacts])
     low = np.r_[[x.low for x in both], np.where(push > 0, preload, -np.inf)]
     high = np.r_[[x.high for x in both], np.where(push < 0, -preload, np.inf)]
-    model = Model(machine, backend="numpy", distribution="bounded", preload=preload)
+    model = Model(machine, backend="numpy", distribution=Distribution("bounded", preload=preload))
     seen = check(case, model, low, high)
     assert Status.ok in seen <= {Status.ok, Status.infeasible}

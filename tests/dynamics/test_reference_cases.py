@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.loads import load_point_of, parts, with_point
 from support.speeds import first, slow
 
 import condyle
 from condyle.dynamics import FORMULATIONS, ROUTES
-from condyle.model.model import with_point
 
 REFERENCE = json.loads((Path(__file__).parents[1] / "oracles" / "reference_cases.json").read_text())
 CASES = {key: np.array([case[key] for case in REFERENCE["cases"]]) for key in REFERENCE["cases"][0]}
@@ -32,11 +32,13 @@ def close(got: np.ndarray, key: str) -> None:
 def test_every_model_meets_the_cases(
     reference: condyle.Mechanism, formulation: str, route: str
 ) -> None:
-    model = condyle.derive(reference, formulation, route)
+    model = condyle.derive(reference, formulation=formulation, route=route)
     assert list(model.independent) == NAMES
     force = np.hstack([CASES["F"], np.zeros_like(CASES["F"])])
-    load = with_point(force, model.load_point(REFERENCE["load_point"]))
-    found = model.evaluate(CASES["q"], CASES["qd"], CASES["qdd"], load)
+    load = with_point(force, load_point_of(model, REFERENCE["load_point"]))
+    found = model.inverse_dynamics(
+        CASES["q"], CASES["qd"], CASES["qdd"], *parts(load), outputs="all"
+    )
     close(found.effort, "tau")
     close(found.contact_force, "contact")
     close(found.pose, "pose")

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 from scipy.integrate import solve_ivp
+from support.loads import parts
 from support.tools import need, run
 
 import condyle
@@ -97,7 +98,9 @@ def test_inverse(
     if kind == "bounded":
         model = condyle.derive(model.mechanism, backend="numpy", distribution="bounded")
     load = ROW * np.repeat([scale, 1.0], [6, 3])
-    found = model.evaluate(STATE[0][None], STATE[1][None], AHEAD[None], load)
+    found = model.inverse_dynamics(
+        STATE[0][None], STATE[1][None], AHEAD[None], *parts(load), outputs="all"
+    )
     chains, contacts = model.mechanism.chain_names, model.mechanism.contact_names
     names = [f"effort.{c}" for c in chains] + [f"contact_force.{c}" for c in contacts]
     given = HERE | {name: scale * v for name, v in LOAD.items()} | row("q2", Q, AHEAD)
@@ -112,7 +115,7 @@ def test_controller(fmus: dict[tuple[str, int], Path], model: condyle.Model, ver
     gains, damping = np.array([100.0, 200, 300, 400]), np.array([10.0, 20, 30, 40])
     wanted = STATE[0] + 0.001, STATE[1] + 0.02
     q2 = AHEAD + damping * (wanted[1] - STATE[1]) + gains * (wanted[0] - STATE[0])
-    right = model.torques(STATE[0][None], STATE[1][None], q2[None], ROW).effort[0]
+    right = model.inverse_dynamics(STATE[0][None], STATE[1][None], q2[None], *parts(ROW)).effort[0]
     given = HERE | LOAD | row("q_d", Q, wanted[0]) | row("q1_d", Q, wanted[1])
     given |= row("q2_d", Q, AHEAD) | row("kp", Q, gains) | row("kd", Q, damping)
     names = [f"effort.{c}" for c in model.mechanism.chain_names]
@@ -124,7 +127,7 @@ def falling(model: condyle.Model, efforts: Array) -> Callable[[float, Array], Ar
     """Rates of the state under efforts and the load, held."""
 
     def rate(_: float, x: Array) -> Array:
-        found = model.forward(x[None, :4], x[None, 4:], efforts[None], ROW)
+        found = model.forward_dynamics(x[None, :4], x[None, 4:], efforts[None], *parts(ROW))
         return np.concatenate([x[4:], found.acceleration[0]])
 
     return rate
@@ -137,7 +140,9 @@ def test_plant(
 ) -> None:
     """Where it begins the accelerations are forward's; 20 ms later it is where scipy brings it."""
     chains = model.mechanism.chain_names
-    efforts = model.torques(STATE[0][None], STATE[1][None], AHEAD[None], ROW).effort[0]
+    efforts = model.inverse_dynamics(
+        STATE[0][None], STATE[1][None], AHEAD[None], *parts(ROW)
+    ).effort[0]
     given = HERE | LOAD | row("effort", chains, efforts)
     names = [f"q.{c}" for c in Q] + [f"q1.{c}" for c in Q]
     start = np.concatenate(STATE)
@@ -159,7 +164,7 @@ def test_plant(
 def test_a_simulated_chew(fmus: dict[tuple[str, int], Path], model: condyle.Model) -> None:
     """The plant under the efforts of a chew, each held for 1 ms, as scipy integrates the same."""
     motion = condyle.reference_motion()
-    states = model.independent_motion(motion)[0]
+    states = model.poses.of_motion(motion)[0]
     solution = model.solve(motion)
     first, count = 1400, 30
     t, effort = solution["time"].values[first:], solution["effort"].values[first:]
@@ -182,7 +187,9 @@ def test_a_simulated_chew(fmus: dict[tuple[str, int], Path], model: condyle.Mode
     for i in range(count):
 
         def rate(_: float, x: Array, tau: Array = effort[i]) -> Array:
-            ahead = model.forward(x[None, :4], x[None, 4:], tau[None], free).acceleration[0]
+            ahead = model.forward_dynamics(
+                x[None, :4], x[None, 4:], tau[None], *parts(free)
+            ).acceleration[0]
             return np.concatenate([x[4:], ahead])
 
         x = solve_ivp(rate, (t[i], t[i + 1]), x, method="RK45", rtol=1e-10, atol=1e-12).y[:, -1]
@@ -198,7 +205,9 @@ def test_masses_can_be_tuned(fmus: dict[tuple[str, int], Path], version: int) ->
     heavier |= {f"chain.{c}.crank.inertia": 1e-4 for c in ("masseter_left", "masseter_right")}
     changed = condyle.load_mechanism("masticatory").set(heavier)
     states = (a[None] for a in (*STATE, AHEAD))
-    right = condyle.derive(changed, backend="numpy").torques(*states, ROW).effort[0]
+    right = (
+        condyle.derive(changed, backend="numpy").inverse_dynamics(*states, *parts(ROW)).effort[0]
+    )
     given = HERE | LOAD | row("q2", Q, AHEAD)
     given |= {"platform.mass": 0.3, "platform.inertia.xx": 2e-4, "gravity.z": -3.0}
     given |= {f"crank_inertia.{c}": 1e-4 for c in ("masseter_left", "masseter_right")}

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 import pytest
 from export.conftest import Folder
+from support.loads import parts
 from support.tools import run
 
 import condyle
@@ -81,9 +82,12 @@ def test_a_singular_pose_is_named_and_others_balance(tmp_path: Path) -> None:
         q = np.array([0.01, -0.02, 0.015, 0.02, -0.03, np.pi / 2 - size])
         status, found = hexapod("inverse", q=q, force=[1.0, 2.0, -30.0])
         if status == OK:
-            J = model.jacobians(q[None])["J_theta"][0]
-            right = model.torques(
-                q[None], 0 * q[None], 0 * q[None], np.array([[1.0, 2, -30, 0, 0, 0, 0, 0, 0]])
+            J = model.jacobians(q[None]).J_theta[0]
+            right = model.inverse_dynamics(
+                q[None],
+                0 * q[None],
+                0 * q[None],
+                *parts(np.array([[1.0, 2, -30, 0, 0, 0, 0, 0, 0]])),
             ).effort[0]
             off = np.abs(J.T @ (found["effort"] - right)).max()
             assert off <= 1e-11 * np.abs(J.T @ np.diag(right)).max()
@@ -135,7 +139,7 @@ def test_the_controller_is_the_inverse_at_a_corrected_acceleration(jaw: Library)
     q2 = q2_d + kd * (q1_d - q1) + kp * (q_d - q)
     model = condyle.derive(condyle.load_mechanism("masticatory"))
     acting = np.hstack([load["force"], np.zeros(3), load["point"]])
-    right = model.one(q, q1, q2, acting)
+    right = model.unchecked().inverse_dynamics(q, q1, q2, *parts(acting))
     assert status == OK
     np.testing.assert_allclose(found["effort"], right, rtol=0, atol=1e-13 * np.abs(right).max())
 
@@ -168,7 +172,7 @@ def test_a_law_of_ones_own_is_exported(monkeypatch: pytest.MonkeyPatch, tmp_path
     status, found = law("homing", q=q, q1=q1, memory_before=4.0, **gains)
     assert status == OK and found["memory"] == 5.0
     model = condyle.derive(mechanism, backend="numpy")
-    right = model.one(q, q1, -stiffness * q - 3.0 * q1, np.zeros(9))
+    right = model.unchecked().inverse_dynamics(q, q1, -stiffness * q - 3.0 * q1)
     np.testing.assert_allclose(found["effort"], right, rtol=0, atol=1e-12 * np.abs(right).max())
 
 
@@ -233,6 +237,8 @@ int main(void) {
         told.append(np.array(run(f"./{name}", folder=tmp_path).split(), dtype=float))
     q = np.array([0.01, 0.02, 0.01, 0.1, 0.2, 0.1])
     for found, mechanism in zip(told, (nominal, calibrated), strict=True):
-        right = condyle.derive(mechanism, backend="numpy").one(q, 0 * q, 0 * q, np.zeros(9))
+        right = (
+            condyle.derive(mechanism, backend="numpy").unchecked().inverse_dynamics(q, 0 * q, 0 * q)
+        )
         np.testing.assert_allclose(found, right, rtol=0, atol=1e-12 * np.abs(right).max())
     assert np.abs(told[0] - told[1]).max() > 1e-4 * np.abs(told[0]).max()

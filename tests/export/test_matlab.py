@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.io import loadmat, savemat
+from support.loads import parts
 from support.tools import run
 
 import condyle
@@ -56,7 +57,7 @@ def test_octave_computes_what_condyle_does(tmp_path: Path) -> None:
     run("octave-cli", "--quiet", "--no-init-file", "--eval", code, folder=tmp_path)
     out = loadmat(tmp_path / "out.mat", simplify_cells=True)
     model = condyle.derive(mechanism, backend="numpy")
-    found = model.evaluate(q, q1, q2, load)
+    found = model.inverse_dynamics(q, q1, q2, *parts(load), outputs="all")
     good = found.status == 0
     assert list(out["status"]) == [0, 0, 0, 1, 0] and good.sum() == 4
     assert np.isnan(out["effort"][:, 3]).all()

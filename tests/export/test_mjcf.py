@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from oracles.rotations import turn
 from support.cases import case
+from support.loads import parts
 from support.mujoco_player import Player
 from support.surfaces import contact, table
 
@@ -52,7 +53,7 @@ def test_efforts_are_those_of_mj_inverse(name: str) -> None:
         t, z = 1e-4 * np.arange(-1, 2)[:, None], np.zeros((1, m))
         q, q1, q2 = (np.repeat(a[i : i + 1], 3, axis=0) for a in (c.q, c.q1, c.q2))
         q = q + q1 * t + q2 * t**2 / 2
-        poses = model.evaluate(q, q1 + q2 * t, q2, np.zeros((3, 9))).pose
+        poses = model.inverse_dynamics(q, q1 + q2 * t, q2, outputs="all").pose
         places = []
         for pose in poses:
             places.append(player.place(pose))
@@ -66,7 +67,7 @@ def test_efforts_are_those_of_mj_inverse(name: str) -> None:
         moving = (rate.mean(axis=0), (rate[1] - rate[0]) / 1e-4)
         both = (AT_REST, (z, z), ()), (CASES[name], (q1[1:2], q2[1:2]), moving)
         for bound, states, motion in both:
-            efforts = model.torques(q[1:2], *states, np.zeros((1, 9))).effort[0]
+            efforts = model.inverse_dynamics(q[1:2], *states).effort[0]
             needed = free.T @ player.needed(*motion)
             given = free.T @ player.given(efforts)
             scale = np.abs(free.T @ player.needed()).max() + np.abs(needed).max()
@@ -80,7 +81,7 @@ def test_cables_pull_and_real_contacts_push() -> None:
     player, model = Player(made(name).text), Model(mechanism, backend="numpy")
     load = np.array([[0, 0, -50.0, 0, 0, 0, *mechanism.platform.points["incisor"]]])
     z = np.zeros((1, mechanism.degrees_of_freedom))
-    found = model.evaluate(z, z, z, load)
+    found = model.inverse_dynamics(z, z, z, *parts(load), outputs="all")
     player.equations()
     given = player.given(found.effort[0]) + player.jacobian(load[0, 6:])[:3].T @ load[0, :3]
     for one, force in zip(mechanism.contacts, found.contact_force[0], strict=True):

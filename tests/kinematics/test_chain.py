@@ -49,7 +49,7 @@ def test_joint_coordinates_meet_the_oracle(case: str) -> None:
     raw, mechanism = drawn(case)
     model, d = condyle.derive(mechanism), read(raw)
     poses = np.vstack([random_state(np.random.default_rng(1), raw, 6)["pose"], np.zeros(6)])
-    found = model.configuration(poses)
+    found = model.poses.configuration(poses)
     for i, pose in enumerate(poses):
         motion = platform_motion(pose)
         for k, chain in enumerate(d.chains):
@@ -69,7 +69,9 @@ def test_joint_coordinates_meet_the_reference_cases(reference: Mechanism) -> Non
 
     path = Path(__file__).parents[1] / "oracles" / "reference_cases.json"
     cases = json.loads(path.read_text())["cases"]
-    found = condyle.derive(reference).configuration(np.array([case["pose"] for case in cases]))
+    found = condyle.derive(reference).poses.configuration(
+        np.array([case["pose"] for case in cases])
+    )
     for name, got in (("theta", "joint"), ("beta_i", "beta"), ("gamma_i", "gamma")):
         wanted = np.array([case[name] for case in cases])
         np.testing.assert_allclose(getattr(found, got), wanted, atol=1e-13)
@@ -127,5 +129,5 @@ def test_rods_turn_with_their_two_angles() -> None:
 def test_out_of_reach_is_said_with_numbers(reference: Mechanism) -> None:
     text = FAMILIES["RSS"].explain(reference.chains[2], np.array([0.2, 0, 0, 0, 0, 0]))
     assert 'chain "masseter_left" cannot reach M' in text and "mm" in text
-    found = condyle.derive(reference).configuration(np.array([[0.2, 0, 0, 0, 0, 0]]))
+    found = condyle.derive(reference).poses.configuration(np.array([[0.2, 0, 0, 0, 0, 0]]))
     assert found.discriminant[0, 2] < 0 and np.isnan(found.joint[0, 2])

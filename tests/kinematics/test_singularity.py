@@ -14,7 +14,7 @@ from condyle import SingularError
 from condyle.kinematics.singularities import KINDS, Singularity
 from condyle.mechanism import Mechanism, parse
 from condyle.mechanism.files import from_data
-from condyle.model.data import Evaluation, require_ok
+from condyle.model.model_result import ModelResult, require_ok
 from condyle.status import STATUS_NAMES
 
 HOME = np.zeros((1, 6))
@@ -50,10 +50,12 @@ def spatial(kinks: tuple[float, ...] = (0.3,) * 6, meeting: bool = False) -> dic
     return {"name": "spatial", "length_unit": "mm", "platform": platform, "chain": chains}
 
 
-def at_home(raw: dict[str, Any]) -> Evaluation:
+def at_home(raw: dict[str, Any]) -> ModelResult:
     mechanism = from_data(raw)
     zero = np.zeros((1, mechanism.degrees_of_freedom))
-    return condyle.derive(mechanism, backend="numpy").evaluate(zero, zero, zero, np.zeros((1, 9)))
+    return condyle.derive(mechanism, backend="numpy").inverse_dynamics(
+        zero, zero, zero, outputs="all"
+    )
 
 
 def test_a_regular_home() -> None:
@@ -86,7 +88,7 @@ def test_direct_singularity_of_rods_that_meet_an_axis() -> None:
 def test_a_singular_pose_is_an_error_that_names_it() -> None:
     model = condyle.derive(from_data(spatial(meeting=True)), backend="numpy")
     q = np.random.default_rng(0).normal(0, 1e-4, (3, 6)) * [[1], [0], [1]]
-    evaluation = model.evaluate(q, 0 * q, 0 * q, np.zeros((3, 9)))
+    evaluation = model.inverse_dynamics(q, 0 * q, 0 * q, outputs="all")
     assert evaluation.status.tolist() == [0, 2, 0]
     with pytest.raises(SingularError, match=r"singular at row 12: dimensionless ratio") as caught:
         require_ok(model.mechanism, evaluation, row_offset=10)
@@ -103,7 +105,7 @@ def test_measures_are_those_of_the_actuator_jacobian(contacts: int) -> None:
     mechanism = parse(toml_text(raw))
     model, engine = condyle.derive(mechanism), PinocchioEngine(raw)
     states = random_state(np.random.default_rng(1), raw, 3)
-    s = model.configuration(states["pose"]).singularity
+    s = model.poses.configuration(states["pose"]).singularity
     length = model.characteristic_length
     for i, pose in enumerate(states["pose"]):
         zero = np.zeros(6)
@@ -134,8 +136,8 @@ def test_the_measures_do_not_depend_on_the_unit_of_length(raw: dict[str, Any]) -
     huge = from_data(raw)
     pose = np.array([[0.002, 0.001, 0, 0.05, -0.1, 0.02]])
     scaled = pose * np.repeat([1000.0, 1.0], 3)
-    a = condyle.derive(large).configuration(pose).singularity
-    b = condyle.derive(huge).configuration(scaled).singularity
+    a = condyle.derive(large).poses.configuration(pose).singularity
+    b = condyle.derive(huge).poses.configuration(scaled).singularity
     np.testing.assert_allclose(a.J_W_sigma, b.J_W_sigma, rtol=1e-12)
     np.testing.assert_allclose(a.transmission, b.transmission, rtol=1e-12)
     assert b.length == pytest.approx(1000 * a.length)
@@ -152,5 +154,5 @@ def test_kinds_by_their_thresholds() -> None:
 
 
 def test_home_of_the_reference_is_regular(reference: Mechanism) -> None:
-    s = condyle.derive(reference).configuration(HOME).singularity
+    s = condyle.derive(reference).poses.configuration(HOME).singularity
     assert s.rank[0] == 4 and s.kind()[0] == 0 and s.ratio[0] > 0.05

@@ -112,8 +112,8 @@ def test_the_starter_is_a_mechanism() -> None:
     assert mechanism.name == "my-robot" and not home_warnings(mechanism)
     assert text.count("#") > 15
     state = np.zeros((1, mechanism.degrees_of_freedom))
-    evaluation = condyle.derive(mechanism, backend="interpreted").evaluate(
-        state, state, state, np.zeros((1, 9))
+    evaluation = condyle.derive(mechanism, backend="interpreted").inverse_dynamics(
+        state, state, state, outputs="all"
     )
     assert evaluation.status[0] == 0 and np.isfinite(evaluation.effort).all()
 

@@ -118,7 +118,7 @@ def test_static_bites_of_the_jaw_on_planes() -> None:
 def test_the_model_puts_the_same_wrenches_on_the_platform() -> None:
     """Jacobian and normals of the model are those that the bites were computed with."""
     jaw = condyle.load_mechanism("human-jaw")
-    rows = Model(jaw, backend="numpy").jacobians(np.zeros((1, 4)))["J_theta"][0]
+    rows = Model(jaw, backend="numpy").jacobians(np.zeros((1, 4))).J_theta[0]
     for chain, row in zip(jaw.chains, rows, strict=True):
         line = np.subtract(chain.base, chain.platform)
         line /= np.linalg.norm(line)

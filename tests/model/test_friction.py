@@ -13,6 +13,7 @@ from oracles.random_mechanism import toml_text
 from oracles.rotations import platform_motion
 from oracles.rubbing import Balance
 from scipy.optimize import minimize
+from support.loads import load_point_of, parts
 from support.rubbing import Rubbing, drawn
 from support.speeds import few, first, slow
 
@@ -20,8 +21,8 @@ import condyle
 from condyle.dynamics import FORMULATIONS
 from condyle.mechanism import parse
 from condyle.mechanism.contact import Friction
-from condyle.model.data import Evaluation
 from condyle.model.model import Model
+from condyle.model.model_result import ModelResult
 from condyle.status import Status
 
 CASES: dict[str, dict[str, Any]] = {
@@ -49,9 +50,9 @@ CASES: dict[str, dict[str, Any]] = {
 
 
 @cache
-def found(name: str) -> tuple[Rubbing, Evaluation]:
+def found(name: str) -> tuple[Rubbing, ModelResult]:
     case = drawn(**{"count": 3, **CASES[name]})
-    return case, by_numpy(name).evaluate(*case.arguments)
+    return case, by_numpy(name).inverse_dynamics(*case.arguments, outputs="all")
 
 
 @cache
@@ -183,10 +184,12 @@ def test_sliding_velocity_by_differences_of_the_motion(name: str) -> None:
     """A point fixed to the platform where the ball touches moves at the velocity of sliding."""
     case, got = found(name)
     model = by_numpy(name)
-    q, q1, q2, load = case.arguments
+    q, q1, q2, load = case.packed
     h = 1e-4
     poses = [
-        model.evaluate(q + t * q1 + t * t / 2 * q2, q1 + t * q2, q2, load).pose
+        model.inverse_dynamics(
+            q + t * q1 + t * t / 2 * q2, q1 + t * q2, q2, *parts(load), outputs="all"
+        ).pose
         for t in (-2 * h, -h, h, 2 * h)
     ]
     for i, (pose, b) in enumerate(zip(got.pose, case.balances(), strict=True)):
@@ -218,7 +221,7 @@ def test_a_kernel_is_sure_of_forces_that_are_held_at_zero(name: str) -> None:
     """All candidates in one graph against Newton's method on the dual, pattern by pattern."""
     case = drawn(count=20, **HELD[name])
     model = Model(case.mechanism, backend="numpy")
-    q, q1, q2, load = case.arguments
+    q, q1, q2, load = case.packed
     wrench = {"force": load[:, :3], "moment": load[:, 3:6], "point": load[:, 6:]}
     given = {"q": q, "q1": q1, "q2": q2, **wrench}
     answer = model.kernel("inverse", ("contact",)).run(given)
@@ -236,8 +239,8 @@ def test_a_kernel_is_sure_of_forces_that_are_held_at_zero(name: str) -> None:
 @pytest.mark.parametrize("route", few(["core", "direct"], "core"))
 def test_every_formulation_and_route(formulation: str, route: str) -> None:
     case, wanted = found("k2 plane")
-    model = Model(case.mechanism, formulation, route, "numpy")
-    got = model.evaluate(*case.arguments)
+    model = Model(case.mechanism, formulation=formulation, route=route, backend="numpy")
+    got = model.inverse_dynamics(*case.arguments, outputs="all")
     for name in ("effort", "contact_force", "friction_force", "slip"):
         a, b = getattr(got, name), getattr(wanted, name)
         np.testing.assert_allclose(a, b, atol=1e-10 * np.abs(b).max())
@@ -248,11 +251,13 @@ def test_every_formulation_and_route(formulation: str, route: str) -> None:
 def test_compiled() -> None:
     case, wanted = found("k2 plane")
     model = Model(case.mechanism, backend="compiled")
-    got = model.torques(*case.arguments, outputs=("contact",))
+    got = model.inverse_dynamics(*case.arguments)
     size = np.abs(wanted.effort).max()
     np.testing.assert_allclose(got.effort, wanted.effort, atol=1e-11 * size)
     for sample, effort in zip(zip(*case.arguments, strict=True), wanted.effort, strict=True):
-        np.testing.assert_allclose(model.one(*sample), effort, atol=1e-11 * size)
+        np.testing.assert_allclose(
+            model.unchecked().inverse_dynamics(*sample), effort, atol=1e-11 * size
+        )
 
 
 @pytest.mark.slow
@@ -260,14 +265,16 @@ def test_compiled() -> None:
 def test_torques_agree_with_evaluate_whatever_is_asked_and_on_threads(name: str) -> None:
     case, wanted = found(name)
     model = by_numpy(name)
-    asked = ("contact", "share", "gravity", "motion", "joint", "condition")
-    for outputs in ((), ("gravity",), asked) if name == "k2 plane" else ((), asked):
-        got = model.torques(*case.arguments, outputs=outputs, threads=2)
+    asked = ("share", "gravity_share", "pose", "joint_rate", "condition")
+    for outputs in ((), ("gravity_share",), asked) if name == "k2 plane" else ((), asked):
+        got = model.inverse_dynamics(*case.arguments, outputs=outputs, threads=2)
         assert (got.status == wanted.status).all()
         np.testing.assert_allclose(got.effort, wanted.effort, rtol=1e-9, atol=1e-12)
-        for part in {"share", "gravity"} & set(outputs):
-            assert got[part].shape == wanted.share.shape
-    one = np.array([model.one(*row) for row in zip(*case.arguments, strict=True)])
+        for part in {"share", "gravity_share"} & set(outputs):
+            assert getattr(got, part).shape == wanted.share.shape
+    one = np.array(
+        [model.unchecked().inverse_dynamics(*row) for row in zip(*case.arguments, strict=True)]
+    )
     np.testing.assert_allclose(one, wanted.effort, rtol=1e-9, atol=1e-12)
 
 
@@ -276,10 +283,10 @@ def test_shares_are_of_least_norm_and_add_up(name: str) -> None:
     case, got = found(name)
     model = by_numpy(name)
     assert model.parts[-4:] == ("actuators", "load", "friction", "internal")
-    np.testing.assert_allclose(got.share.sum(axis=0), got.effort, atol=1e-12)
-    share = dict(zip(model.parts, got.share, strict=True))
+    np.testing.assert_allclose(got.share.sum(axis=1), got.effort, atol=1e-12)
+    share = dict(zip(model.parts, np.moveaxis(got.share, 1, 0), strict=True))
     J = model.jacobians(case.arguments[0])
-    A = J["J_theta"] @ J["M_J"]
+    A = J.J_theta @ J.M_J
     for i, b in enumerate(case.balances()):
         # What balances itself does nothing, and the losses are what the actuators' share holds.
         held = A[i].T @ share["actuators"][i]
@@ -295,8 +302,10 @@ def test_at_rest_friction_vanishes(name: str) -> None:
     raw["chain"] = [{k: v for k, v in c.items() if k != "actuator"} for c in raw["chain"]]
     for contact in raw["contact"]:
         del contact["friction"]
-    got = by_numpy(name).evaluate(*case.arguments)
-    bare = Model(parse(toml_text(raw)), backend="numpy").evaluate(*case.arguments)
+    got = by_numpy(name).inverse_dynamics(*case.arguments, outputs="all")
+    bare = Model(parse(toml_text(raw)), backend="numpy").inverse_dynamics(
+        *case.arguments, outputs="all"
+    )
     assert np.abs(got.friction_force).max() == 0 == np.abs(got.slip).max()
     size = np.abs(bare.effort).max()
     np.testing.assert_allclose(got.effort, bare.effort, atol=1e-12 * size)
@@ -312,7 +321,7 @@ def test_without_friction_and_losses_nothing_changes(contacts: int) -> None:
         contact["friction"] = {"coefficient": 0.0}
     raw["chain"] = [c | {"actuator": {"coulomb": 0.0, "gear": 9.0}} for c in raw["chain"]]
     a, b = (
-        Model(parse(toml_text(x)), backend="numpy").evaluate(*bare.arguments)
+        Model(parse(toml_text(x)), backend="numpy").inverse_dynamics(*bare.arguments, outputs="all")
         for x in (bare.raw, raw)
     )
     assert (a.effort == b.effort).all() and (a.contact_force == b.contact_force).all()
@@ -328,7 +337,7 @@ def test_the_order_of_chains_and_contacts_does_not_matter() -> None:
     raw["contact"] = [raw["contact"][i] for i in contacts]
     rows = rng.permutation(len(wanted.effort))
     given = [a[rows] for a in case.arguments]
-    got = Model(parse(toml_text(raw)), backend="numpy").evaluate(*given)
+    got = Model(parse(toml_text(raw)), backend="numpy").inverse_dynamics(*given, outputs="all")
     effort = wanted.effort[rows][:, chains]
     np.testing.assert_allclose(got.effort, effort, atol=1e-10 * np.abs(effort).max())
     force = wanted.contact_force[rows][:, contacts]
@@ -358,11 +367,11 @@ def test_power_balance_along_a_trajectory(name: str) -> None:
         return unit * 60.0**order * np.sin(60 * t + phase + order * np.pi / 2)
 
     def kinetic(t: np.ndarray) -> np.ndarray:
-        M = model.inertia_matrix(q(t, 0))  # with the rotors
+        M = model.mass_matrix(q(t, 0))  # with the rotors
         return np.einsum("ri,rij,rj->r", q(t, 1), M, q(t, 1)) / 2
 
-    load = case.arguments[3][:1] + np.zeros((len(t), 1))
-    got = model.evaluate(q(t, 0), q(t, 1), q(t, 2), load)
+    load = case.packed[3][:1] + np.zeros((len(t), 1))
+    got = model.inverse_dynamics(q(t, 0), q(t, 1), q(t, 2), *parts(load), outputs="all")
     assert (got.status == Status.ok).all()
     slope = 8 * (kinetic(t + h) - kinetic(t - h)) - (kinetic(t + 2 * h) - kinetic(t - 2 * h))
     slope /= 12 * h
@@ -397,15 +406,16 @@ def test_efforts_are_continuous_but_where_the_least_pattern_changes() -> None:
     model = Model(reference_with_friction(0.9), backend="numpy")
     times = np.linspace(0, 5, 5001)
     motion = condyle.Motion.from_csv(condyle.motion.bundled_reference()[0], times=times)
-    states, _ = model.independent_motion(motion)
+    states, _ = model.poses.of_motion(motion)
     load = np.zeros((len(times), 9))
-    load[:, :6], load[:, 6:] = condyle.reference_load().at(times), model.load_point("right_molar")
+    load[:, :6] = condyle.reference_load().at(times)
+    load[:, 6:] = load_point_of(model, "right_molar")
     path = np.hstack([*states, load])
 
     def at(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        got = model.torques(*np.split(rows, [4, 8, 12], axis=1), outputs=("contact",))
+        got = model.inverse_dynamics(*np.split(rows, [4, 8, 12, 18], axis=1))
         assert (got.status == Status.ok).all()
-        return got.effort, sides(got["contact_force"])
+        return got.effort, sides(got.contact_force)
 
     def sides(force: np.ndarray) -> np.ndarray:
         return np.where(np.abs(force) < 1e-10, 0, np.sign(force))
@@ -434,7 +444,7 @@ def test_efforts_are_continuous_but_where_the_least_pattern_changes() -> None:
 def test_jammed() -> None:
     """Strong friction under which, at some samples, no pattern of signs is consistent."""
     case = drawn(4, count=40, mu=3.0, contacts=2, chains=4, lossy=False)
-    got = Model(case.mechanism, backend="numpy").evaluate(*case.arguments)
+    got = Model(case.mechanism, backend="numpy").inverse_dynamics(*case.arguments, outputs="all")
     jams = np.array([least(b) is None for b in case.balances()])
     assert 0 < jams.sum() < len(jams)
     assert (got.status[jams] == Status.jammed).all()
@@ -446,18 +456,18 @@ def test_jammed() -> None:
 def test_a_jam_does_not_disturb_others() -> None:
     case = drawn(4, count=40, mu=3.0, contacts=2, chains=4, lossy=False)
     model = Model(case.mechanism, backend="numpy")
-    got = model.evaluate(*case.arguments)
+    got = model.inverse_dynamics(*case.arguments, outputs="all")
     good = got.status == Status.ok
-    alone = model.evaluate(*(a[good] for a in case.arguments))
+    alone = model.inverse_dynamics(*(a[good] for a in case.arguments), outputs="all")
     np.testing.assert_allclose(alone.effort, got.effort[good], rtol=1e-9)
 
 
 def test_nothing_that_can_be_computed() -> None:
     """All samples out of reach: results have their shapes, and no numbers."""
     case, wanted = found("k2 quadratic")
-    q, q1, q2, load = case.arguments
+    q, q1, q2, load = case.packed
     model = by_numpy("k2 quadratic")
-    got = model.evaluate(q + 10.0, q1, q2, load)
+    got = model.inverse_dynamics(q + 10.0, q1, q2, *parts(load), outputs="all")
     assert (got.status == Status.unreachable).all()
     assert np.isnan(got.shortfall).all() and got.share.shape == wanted.share.shape
 
@@ -467,16 +477,14 @@ def test_the_robust_path_agrees(name: str) -> None:
     """Every sample looked at by singular values and active sets, as near a singularity."""
     case, wanted = found(name)
     model = by_numpy(name)
-    q, q1, q2, load = case.arguments
-    parts = np.hsplit(load, 3)
-    given = dict(
-        zip(("q", "q1", "q2", "force", "moment", "point"), (q, q1, q2, *parts), strict=True)
-    )
+    q, q1, q2, load = case.packed
+    names = ("q", "q1", "q2", "force", "moment", "point")
+    given = dict(zip(names, (q, q1, q2, *np.hsplit(load, 3)), strict=True))
     values, status = model.system.robust.evaluate(given)
     assert (status == wanted.status).all()
     np.testing.assert_allclose(values["effort"].T, wanted.effort, rtol=1e-8, atol=1e-11)
     assert values["share"].shape[0] == values["gravity"].shape[0] == len(model.parts)
-    share = values["share"].swapaxes(1, 2)
+    share = np.moveaxis(values["share"], -1, 0)
     np.testing.assert_allclose(share, wanted.share, rtol=1e-7, atol=1e-9)
 
 
@@ -485,10 +493,10 @@ def test_a_kernel_vouches_only_for_the_least_of_all() -> None:
     """Among many samples are some whose least has a contact force of 0, next to a worse pattern."""
     case = drawn(3, count=150, mu=0.9)
     model = Model(case.mechanism, backend="numpy")
-    q, q1, q2, load = case.arguments
+    q, q1, q2, load = case.packed
     names = ("q", "q1", "q2", "force", "moment", "point")
     given = dict(zip(names, (q, q1, q2, *np.hsplit(load, 3)), strict=True))
     values, status = model.system.robust.evaluate(given)
-    got = model.torques(*case.arguments)
+    got = model.inverse_dynamics(*case.arguments)
     assert (got.status == status).all()
     np.testing.assert_allclose(got.effort, values["effort"].T, rtol=1e-7, atol=1e-9)

@@ -96,7 +96,7 @@ def test_the_reference_path_is_certified_by_the_kernel(monkeypatch: pytest.Monke
     m, motion = condyle.load_mechanism("masticatory"), condyle.reference_motion()
     assert motion.kind == "landmark" and motion.landmark == "incisor"
     model = condyle.derive(m, backend="numpy")
-    (q, _, _), _ = model.independent_motion(motion)
+    (q, _, _), _ = model.poses.of_motion(motion)
     assert np.isfinite(q).all() and np.ptp(q, axis=0).max() > 0.05
 
 

@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 from distribution.oracle import Full, best_active_set, by_slsqp, least_maximum, least_stretch
 from oracles.rubbing import Balance
+from support.loads import parts
 from support.rubbing import Rubbing, balanced, drawn
 from support.speeds import first
 
 import condyle
 from condyle.mechanism.chain import limits
+from condyle.model.distributing import Distribution
 from condyle.model.model import Model
 from condyle.status import Status
 
@@ -30,7 +32,7 @@ CASES: dict[str, dict[str, Any]] = {
     "bounded without friction": {"mu": 0, "limit": 2.0, "one_sided": True, "seed": 7},
     "weighted mixed k2": {"families": MIXED, "chains": 7, "limit": 8.0, "seed": 8},
     "weighted mixed k3": {"families": MIXED, "contacts": 3, "limit": 8.0, "seed": 9},
-    "weighted load": {"limit": 4.0, "contact_weight": 0.02, "seed": 10},
+    "weighted load": {"limit": 4.0, "contact_weight": 30.0, "seed": 10},
     "minimax k2": {"limit": 4.0, "seed": 11},
     "minimax mixed k1": {
         "families": MIXED[:3], "contacts": 1, "chains": 7, "limit": 8.0, "seed": 12
@@ -46,28 +48,30 @@ TIGHTER = 1e-8
 @cache
 def found(name: str) -> tuple[Rubbing, Model, Any]:
     options = dict(CASES[name])
-    policy = {key: options.pop(key) for key in ("preload", "contact_weight") if key in options}
+    numbers = {key: options.pop(key) for key in ("preload", "contact_weight") if key in options}
     case = drawn(**{"count": 3, **options})
     if options.get("families") == ("cable",):
         case = balanced(case, 1, 20.0)
-    model = Model(case.mechanism, backend="numpy", distribution=name.split()[0], **policy)
-    return case, model, model.evaluate(*case.arguments)
+    distribution = Distribution(name.split()[0], **numbers)
+    model = Model(case.mechanism, backend="numpy", distribution=distribution)
+    return case, model, model.inverse_dynamics(*case.arguments, outputs="all")
 
 
 def programs(model: Model, b: Balance, mixes: bool) -> list[Full]:
     """The program of every pattern, with bounds of efforts, of signs, and of one-sided contacts."""
-    robot, policy = model.mechanism, model.policy
+    robot, chosen = model.mechanism, model.distribution
     low, high = (np.array([getattr(limits(c), x) for c in robot.chains]) for x in ("low", "high"))
     scale = np.maximum(np.abs(low), np.abs(high)) if mixes else np.ones(len(low))
+    weight = chosen.contact_weight / model.reference_force**2
     push = np.array([c.push if c.one_sided else 0 for c in robot.contacts])
     made = []
     for sigma in b.patterns():
         signs = np.array(sigma, float)
         least = np.where(signs > 0, 0.0, -np.inf)
         most = np.where(signs < 0, 0.0, np.inf)
-        least = np.where(push > 0, np.maximum(least, policy.preload), least)
-        most = np.where(push < 0, np.minimum(most, -policy.preload), most)
-        cost = np.r_[1 / scale**2, np.full(len(push), policy.contact_weight)]
+        least = np.where(push > 0, np.maximum(least, chosen.preload), least)
+        most = np.where(push < 0, np.minimum(most, -chosen.preload), most)
+        cost = np.r_[1 / scale**2, np.full(len(push), weight)]
         bounds = np.r_[low, least], np.r_[high, most]
         made.append(Full(np.hstack([b.C, b.along(sigma)]), b.b, *bounds, cost, len(low)))
     return made
@@ -111,10 +115,12 @@ def test_equations_and_limits_hold(name: str) -> None:
             assert bound.low - slack <= tau <= bound.high + slack
         for pushed, contact in zip(force, model.mechanism.contacts, strict=True):
             if contact.one_sided:
-                assert contact.push * pushed >= model.policy.preload - 1e-9 * np.abs(force).max()
+                assert (
+                    contact.push * pushed >= model.distribution.preload - 1e-9 * np.abs(force).max()
+                )
     assert (got.status == Status.ok).any()
-    np.testing.assert_allclose(got.share.sum(axis=0), got.effort, atol=1e-9)
-    assert model.parts[-1] == "internal" and len(model.parts) == len(got.share)
+    np.testing.assert_allclose(got.share.sum(axis=1), got.effort, atol=1e-9)
+    assert model.parts[-1] == "internal" and len(model.parts) == got.share.shape[1]
 
 
 @pytest.mark.parametrize("name", [n for n in CASES if n.startswith("minimax")])
@@ -161,7 +167,7 @@ def test_limits_that_no_effort_meets() -> None:
     """Shortfall: with limits so many times as wide it is just feasible, with less it is not."""
     case = drawn(3, limit=0.2)
     model = condyle.derive(case.mechanism, backend="numpy", distribution="bounded")
-    got = model.evaluate(*case.arguments)
+    got = model.inverse_dynamics(*case.arguments, outputs="all")
     assert (got.status == Status.infeasible).any()
     worst = float(np.nanmax(got.shortfall[np.isfinite(got.shortfall)]))
     for more, enough in ((1.001, True), (0.999, False)):
@@ -172,7 +178,7 @@ def test_limits_that_no_effort_meets() -> None:
             chain["actuator"] = a
         wide = Rubbing(raw, case.states)
         model = Model(wide.mechanism, backend="numpy", distribution="bounded")
-        again = model.evaluate(*case.arguments)
+        again = model.inverse_dynamics(*case.arguments, outputs="all")
         at = int(np.nanargmax(np.where(np.isfinite(got.shortfall), got.shortfall, -1)))
         assert bool(again.status[at] == Status.ok) is enough
 
@@ -182,7 +188,9 @@ def test_limits_that_no_effort_meets() -> None:
 def test_wide_limits_leave_the_least_norm(contacts: int) -> None:
     case = drawn(8, count=3, limit=1e6, contacts=contacts)
     bounded, least = (
-        Model(case.mechanism, backend="numpy", distribution=name).evaluate(*case.arguments)
+        Model(case.mechanism, backend="numpy", distribution=name).inverse_dynamics(
+            *case.arguments, outputs="all"
+        )
         for name in ("bounded", "minimum_norm")
     )
     size = np.abs(least.effort).max()
@@ -196,19 +204,21 @@ def test_wide_limits_leave_the_least_norm(contacts: int) -> None:
 def test_torques_one_and_evaluate_agree(name: str) -> None:
     case, model, wanted = found(name)
     for threads in (1, 2):
-        got = model.torques(*case.arguments, outputs=("contact", "share"), threads=threads)
+        got = model.inverse_dynamics(*case.arguments, outputs=("share",), threads=threads)
         assert (got.status == wanted.status).all()
         np.testing.assert_allclose(got.effort, wanted.effort, rtol=1e-9, atol=1e-10)
-        np.testing.assert_allclose(got["share"], wanted.share, rtol=1e-9, atol=1e-9)
-    rows = [model.one(*row) for row in zip(*case.arguments, strict=True)]
+        np.testing.assert_allclose(got.share, wanted.share, rtol=1e-9, atol=1e-9)
+    rows = [model.unchecked().inverse_dynamics(*row) for row in zip(*case.arguments, strict=True)]
     np.testing.assert_allclose(rows, wanted.effort, rtol=1e-8, atol=1e-9)
 
 
 @pytest.mark.usefixtures("unoptimised")
-def test_one_sample_of_a_compiled_model_keeps_the_policy() -> None:
+def test_one_sample_of_a_compiled_model_keeps_its_distribution() -> None:
     case, _, wanted = found("bounded k2 one-sided")
-    model = Model(case.mechanism, backend="compiled", distribution="bounded", preload=0.5)
-    rows = [model.one(*row) for row in zip(*case.arguments, strict=True)]
+    model = Model(
+        case.mechanism, backend="compiled", distribution=Distribution("bounded", preload=0.5)
+    )
+    rows = [model.unchecked().inverse_dynamics(*row) for row in zip(*case.arguments, strict=True)]
     np.testing.assert_allclose(rows, wanted.effort, rtol=1e-8, atol=1e-9)
 
 
@@ -217,21 +227,25 @@ def test_one_sample_of_a_compiled_model_keeps_the_policy() -> None:
 def test_compiled_limits_and_shortfalls_are_those_of_numpy(objective: str) -> None:
     """With and without shares, which take other equations; where limits are met and where not."""
     case, model, _ = found("bounded k2 one-sided")
-    q, q1, q2, load = (np.repeat(a, 4, axis=0) for a in case.arguments)
+    q, q1, q2, load = (np.repeat(a, 4, axis=0) for a in case.packed)
     load[:, :6] *= np.tile([0.5, 1, 4, 16], len(load) // 4)[:, None]
-    wanted = model.choosing(objective, 0.5).evaluate(q, q1, q2, load)
+    wanted = model.with_distribution(Distribution(objective, 0.5)).inverse_dynamics(
+        q, q1, q2, *parts(load), outputs="all"
+    )
     assert set(wanted.status) == {Status.ok, Status.infeasible}
-    compiled = Model(case.mechanism, backend="compiled", distribution=objective, preload=0.5)
-    got = compiled.evaluate(q, q1, q2, load)
+    compiled = Model(
+        case.mechanism, backend="compiled", distribution=Distribution(objective, preload=0.5)
+    )
+    got = compiled.inverse_dynamics(q, q1, q2, *parts(load), outputs="all")
     assert (got.status == wanted.status).all()
     good = wanted.status == Status.ok
     for name in ("effort", "contact_force", "friction_force"):
         a, b = getattr(got, name)[good], getattr(wanted, name)[good]
         np.testing.assert_allclose(a, b, atol=1e-9 * np.abs(b).max())
     size = np.abs(wanted.effort[good]).max()
-    np.testing.assert_allclose(got.share[:, good], wanted.share[:, good], atol=1e-9 * size)
+    np.testing.assert_allclose(got.share[good], wanted.share[good], atol=1e-9 * size)
     np.testing.assert_allclose(got.shortfall, wanted.shortfall, rtol=1e-9)
-    quick = compiled.torques(q, q1, q2, load)
+    quick = compiled.inverse_dynamics(q, q1, q2, *parts(load))
     np.testing.assert_allclose(quick.effort[good], got.effort[good], atol=1e-9 * size)
     assert np.isnan(quick.effort[~good]).all()
 
@@ -239,22 +253,24 @@ def test_compiled_limits_and_shortfalls_are_those_of_numpy(objective: str) -> No
 def test_a_preload_without_one_sided_contacts_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     machine = condyle.load_mechanism("masticatory").replace(name="two-sided")
     for _ in range(2):
-        condyle.derive(machine, backend="numpy", distribution="bounded", preload=3.0)
+        condyle.derive(machine, backend="numpy", distribution=Distribution("bounded", preload=3.0))
     said = capsys.readouterr().err
     assert said.count("condyle: preload 3 N presses on nothing") == 1
     assert '"two-sided"' in said and "one_sided = true" in said
     chosen = condyle.load_mechanism("masticatory")
     one = chosen.contacts[0].model_copy(update={"one_sided": True, "side": "below"})
     pushed = chosen.replace(contacts=(one, *chosen.contacts[1:]))
-    condyle.derive(pushed, backend="numpy", distribution="bounded", preload=3.0)
+    condyle.derive(pushed, backend="numpy", distribution=Distribution("bounded", preload=3.0))
     assert capsys.readouterr().err == ""
 
 
-def test_a_pickled_model_keeps_its_policy() -> None:
+def test_a_pickled_model_keeps_its_distribution() -> None:
     case, model, wanted = found("bounded k2 one-sided")
     back = pickle.loads(pickle.dumps(model))
-    assert back.policy == model.policy and back.policy.preload == 0.5
-    np.testing.assert_allclose(back.evaluate(*case.arguments).effort, wanted.effort, rtol=1e-9)
+    assert back.distribution == model.distribution and back.distribution.preload == 0.5
+    np.testing.assert_allclose(
+        back.inverse_dynamics(*case.arguments).effort, wanted.effort, rtol=1e-9
+    )
 
 
 def test_units_are_not_mixed_by_norms() -> None:
@@ -270,7 +286,7 @@ def test_units_are_not_mixed_by_norms() -> None:
 def test_weights_are_numbers(bad: float) -> None:
     for what in ("preload", "contact_weight"):
         with pytest.raises(condyle.InputError, match="at least 0"):
-            condyle.derive("masticatory", backend="numpy", **{what: bad})
+            condyle.derive("masticatory", distribution=Distribution("bounded", **{what: bad}))
 
 
 def test_one_sample_within_limits_is_one_evaluation_of_a_kernel() -> None:
@@ -284,8 +300,13 @@ def test_one_sample_within_limits_is_one_evaluation_of_a_kernel() -> None:
     q, q1, q2 = 0.004 * rng.normal(size=(3, 40, 4)) * np.array([1, 10, 100])[:, None, None]
     load = np.zeros((40, 9))
     load[:, 2], load[:, 6] = rng.uniform(-80, 0, 40), 0.03
-    many = model.torques(q, q1, q2, load)
-    found = np.array([model.one(*row) for row in zip(q, q1, q2, load, strict=True)])
+    many = model.inverse_dynamics(q, q1, q2, *parts(load))
+    found = np.array(
+        [
+            model.unchecked().inverse_dynamics(*row)
+            for row in zip(q, q1, q2, *parts(load), strict=True)
+        ]
+    )
     assert {Status.ok, Status.infeasible} <= set(many.status.tolist())
     assert (np.abs(many.effort) == 0.35).any()
     np.testing.assert_allclose(found, many.effort, rtol=0, atol=1e-12)

@@ -7,6 +7,7 @@ import pytest
 from oracles.random_mechanism import random_mechanism, toml_text
 from support.cases import ones
 from support.interpreter import Interpreter
+from support.loads import parts
 
 import condyle
 from condyle.mechanism import Mechanism, parse
@@ -32,7 +33,7 @@ def turn_of_stewart(q: np.ndarray) -> float:
     model = Model(condyle.load_mechanism("gough-stewart"), backend="numpy")
 
     def sign(gamma: float) -> float:
-        return np.linalg.slogdet(model.jacobians(np.array([[*q[:5], gamma]]))["J_theta"][0])[0]
+        return np.linalg.slogdet(model.jacobians(np.array([[*q[:5], gamma]])).J_theta[0])[0]
 
     low, high = np.pi / 2 - 0.4, np.pi / 2 + 0.4
     assert sign(low) != sign(high)
@@ -54,7 +55,7 @@ def near_four_chains() -> tuple[Mechanism, np.ndarray]:
 
         def sign(part: float, model: Model = model, way: np.ndarray = way) -> float:
             J = model.jacobians(part * way[None])
-            return np.linalg.slogdet(J["J_theta"][0] @ J["M_J"][0])[0]
+            return np.linalg.slogdet(J.J_theta[0] @ J.M_J[0])[0]
 
         try:
             if {sign(0.05), sign(1.0)} != {-1.0, 1.0}:
@@ -67,7 +68,7 @@ def near_four_chains() -> tuple[Mechanism, np.ndarray]:
             low, high = (middle, high) if sign(middle) == sign(low) else (low, middle)
         q = (low * (1 - 10.0 ** -np.arange(1, COUNT + 1)))[:, None] * way
         J = model.jacobians(q[-1:])
-        if np.linalg.cond(J["J_theta"][0] @ J["M_J"][0]) > 1e10:  # and no stretched crank
+        if np.linalg.cond(J.J_theta[0] @ J.M_J[0]) > 1e10:  # and no stretched crank
             return mechanism, q
     raise AssertionError("no singularity found")
 
@@ -93,8 +94,8 @@ def test_near_singularities(case: str) -> None:
     compiled, numpy = (Model(mechanism, backend=name) for name in ("compiled", "numpy"))
     found = {}
     for name, model in (("numpy", numpy), ("batch", compiled)):
-        answer = model.torques(q, q1, q2, load, outputs=("contact",))
-        found[name] = answer.effort, answer["contact_force"], answer.status
+        answer = model.inverse_dynamics(q, q1, q2, *parts(load))
+        found[name] = answer.effort, answer.contact_force, answer.status
     values, status = ones(compiled.kernel("inverse", ("contact",)), np.hstack([q, q1, q2, load]))
     found["one"] = values["effort"].T, values["contact_force"].T, status
     for name in BACKENDS:
@@ -121,6 +122,6 @@ def test_no_effort_that_overflows_is_ok() -> None:
     load[1, 0] = 1e308
     load[1, 7] = 1e10
     with np.errstate(all="ignore"):
-        found = model.torques(zero, zero, zero, load)
+        found = model.inverse_dynamics(zero, zero, zero, *parts(load))
     assert found.status.tolist() == [Status.ok, Status.overflow, Status.ok]
     assert np.isnan(found.effort[1]).all() and np.isfinite(found.effort[[0, 2]]).all()

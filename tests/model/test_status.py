@@ -10,12 +10,13 @@ import pytest
 from scipy.optimize import minimize
 from support.cases import Case, case, ones
 from support.interpreter import Interpreter
+from support.loads import parts, with_point
 from support.speeds import few
 
 from condyle.backends.kernel import AGAIN
 from condyle.errors import InputError, UnreachableError
-from condyle.model.data import Evaluation, require_ok
-from condyle.model.model import Model, with_point
+from condyle.model.model import Model
+from condyle.model.model_result import ModelResult, require_ok
 from condyle.status import Status
 
 NAMES = ("masticatory", "masticatory-curved", "gough-stewart", "hexaglide")
@@ -41,9 +42,11 @@ def far(name: str) -> Case:
     return Case(c.mechanism, q, q1, q2, with_point(rng.normal(0, 10, (COUNT, 6)), c.point))
 
 
-def both(name: str, c: Case) -> tuple[Evaluation, Evaluation]:
+def both(name: str, c: Case) -> tuple[ModelResult, ModelResult]:
     with np.errstate(all="ignore"):
-        compiled, numpy = (model.evaluate(*c.arguments) for model in models(name))
+        compiled, numpy = (
+            model.inverse_dynamics(*c.arguments, outputs="all") for model in models(name)
+        )
     return compiled, numpy
 
 
@@ -52,7 +55,7 @@ def both(name: str, c: Case) -> tuple[Evaluation, Evaluation]:
 def test_status_and_numbers_are_those_of_numpy_and_of_the_witness(name: str) -> None:
     c = far(name)
     compiled, numpy = both(name, c)
-    witness = Interpreter(c.mechanism, "momentum").solve(*c.arguments)
+    witness = Interpreter(c.mechanism, "momentum").solve(*c.packed)
     np.testing.assert_array_equal(compiled.status, numpy.status)
     np.testing.assert_array_equal(compiled.status != Status.unreachable, witness.reached)
     ok = compiled.status == Status.ok
@@ -63,7 +66,7 @@ def test_status_and_numbers_are_those_of_numpy_and_of_the_witness(name: str) -> 
         off = np.abs(got.effort - wanted.effort)[ok].max(axis=1)
         assert (off < 1e-14 * loss * np.abs(wanted.effort[ok]).max(axis=1)).all()
     for model in models(name):
-        np.testing.assert_array_equal(model.torques(*c.arguments).status, numpy.status)
+        np.testing.assert_array_equal(model.inverse_dynamics(*c.arguments).status, numpy.status)
 
 
 @pytest.mark.usefixtures("unoptimised")
@@ -80,16 +83,16 @@ def test_others_keep_their_digits(name: str) -> None:
     """Bit for bit what they are in a batch of good samples."""
     good, bad = case(name).repeated(64), far(name)
     for model in models(name):
-        alone = model.evaluate(*good.arguments)
+        alone = model.inverse_dynamics(*good.arguments, outputs="all")
         where = np.sort(np.random.default_rng(1).choice(64 + COUNT, 64, replace=False))
         mixed = []
         for ours, theirs in zip(good.arguments, bad.arguments, strict=True):
             mixed.append(np.insert(theirs, where - np.arange(64), ours, axis=0))
-        got = model.evaluate(*mixed)
+        got = model.inverse_dynamics(*mixed, outputs="all")
         assert got.status.any() or name == "gough-stewart"
         for key in ("effort", "contact_force", "joint_rate", "joint_acceleration", "pose"):
             np.testing.assert_array_equal(getattr(got, key)[where], getattr(alone, key))
-        np.testing.assert_array_equal(got.share[:, where], alone.share)
+        np.testing.assert_array_equal(got.share[where], alone.share)
 
 
 @pytest.mark.usefixtures("unoptimised")
@@ -100,13 +103,13 @@ def test_others_keep_their_digits(name: str) -> None:
 def test_what_is_no_number(name: str, value: float) -> None:
     """In q, q', q'' or the load: a status, no number, and no harm to the neighbours."""
     c, model = case(name), models(name)[0]
-    clean = model.evaluate(*c.arguments)
+    clean = model.inverse_dynamics(*c.arguments, outputs="all")
     for which in range(4):
         spoiled = [a.copy() for a in c.arguments]
         spoiled[which][5, 1] = value
         with np.errstate(all="ignore"):
-            got, wanted = (m.evaluate(*spoiled) for m in models(name))
-            found = model.torques(*spoiled)
+            got, wanted = (m.inverse_dynamics(*spoiled, outputs="all") for m in models(name))
+            found = model.inverse_dynamics(*spoiled)
         rest = np.arange(len(c.q)) != 5
         np.testing.assert_array_equal(got.effort[rest], clean.effort[rest])
         np.testing.assert_array_equal(got.status, wanted.status)
@@ -128,7 +131,7 @@ def test_cause_of_failure_is_named_alike(name: str) -> None:
     said = []
     for model in models(name):
         with pytest.raises(UnreachableError) as failure:
-            require_ok(model.mechanism, model.evaluate(q, q * 0, q * 0, np.zeros((5, 9))))
+            require_ok(model.mechanism, model.inverse_dynamics(q, q * 0, q * 0, outputs="all"))
         said.append((str(failure.value), failure.value.samples))
     assert said[0] == said[1]
     assert "cannot reach M" in said[0][0]
@@ -146,7 +149,7 @@ def singular_pose(name: str) -> np.ndarray:
     def ratio(u: np.ndarray) -> float:
         q = (u * size)[None]
         poses, reached = model.poses.whole(q, 0 * q, 0 * q)
-        found = model.configuration(poses["pose"])
+        found = model.poses.configuration(poses["pose"])
         if not reached[0] or (found.discriminant < 0).any():
             return 1.0
         return float(found.singularity.direct_ratio[0])
@@ -181,7 +184,7 @@ def test_near_singularities(name: str) -> None:
     condition = numpy.configuration.singularity.condition
     assert condition.max() > 1e12
     for model in models(name):  # what is singular has efforts of no meaning: they are not told
-        told = model.torques(*near.arguments)
+        told = model.inverse_dynamics(*near.arguments)
         np.testing.assert_array_equal(np.isfinite(told.effort).all(axis=1), told.status == 0)
         assert np.isnan(told.effort[told.status != Status.ok]).all()
     wanted = numpy.effort
@@ -219,10 +222,13 @@ def test_empty_batch() -> None:
     c = case("masticatory")
     compiled, numpy = models("masticatory")
     nothing = [a[:0] for a in c.arguments]
-    got, wanted = compiled.evaluate(*nothing), numpy.evaluate(*nothing)
+    got, wanted = (
+        compiled.inverse_dynamics(*nothing, outputs="all"),
+        numpy.inverse_dynamics(*nothing, outputs="all"),
+    )
     for key in ("effort", "share", "contact_force", "joint_rate", "pose", "status"):
         assert getattr(got, key).shape == getattr(wanted, key).shape
-    assert got.status.shape == (0,) and got.share.shape == (4, 0, 6)
+    assert got.status.shape == (0,) and got.share.shape == (0, 4, 6)
 
 
 def layouts(samples: np.ndarray) -> dict[str, Any]:
@@ -282,5 +288,5 @@ def test_samples_of_the_wrong_size(backend: int) -> None:
     if backend == 0:
         with pytest.raises(InputError, match="has 21 numbers"):
             kernel.one(c.samples[0, :-1])
-    with pytest.raises(InputError, match=r"load: expected an array of shape \(N, 9\)"):
-        models("masticatory")[backend].torques(c.q, c.q1, c.q2, c.load[:, :6])
+    with pytest.raises(InputError, match=r"at: expected numbers in an array of shape \(..., 3\)"):
+        models("masticatory")[backend].inverse_dynamics(c.q, c.q1, c.q2, *parts(c.load[:, :6]))

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.loads import parts
 from support.points import moved
 
 import condyle
@@ -41,7 +42,7 @@ def point(name: str = "right_molar") -> np.ndarray:
 
 
 def pose_of(q: np.ndarray) -> np.ndarray:
-    return jaw().survey(q, ("pose",)).values["pose"].T
+    return jaw().poses.survey(q, ("pose",)).values["pose"].T
 
 
 def place(q: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -101,7 +102,7 @@ def inverse(q: np.ndarray, q1: np.ndarray, q2: np.ndarray, force: Any = 0.0) -> 
     """Efforts that bear a force at the molar, too."""
     load = np.zeros((N, 9))
     load[:, :3], load[:, 6:] = force, point()
-    return jaw().torques(q, q1, q2, load).effort
+    return jaw().inverse_dynamics(q, q1, q2, *parts(load)).effort
 
 
 def close(found: np.ndarray, expected: np.ndarray, bound: float = 1e-10) -> None:
@@ -142,7 +143,7 @@ def test_impedance() -> None:
     force = k * (p_d - p)
     force += 30.0 * (np.einsum("nij,nj->ni", J_d, s["q1_d"]) - np.einsum("nij,nj->ni", J, s["q1"]))
     free = 90.0 * (s["q_d"] - s["q"]) + 2 * np.sqrt(90.0) * (s["q1_d"] - s["q1"])
-    by = np.linalg.solve(jaw().inertia_matrix(s["q"]), J.transpose(0, 2, 1))
+    by = np.linalg.solve(jaw().mass_matrix(s["q"]), J.transpose(0, 2, 1))
     taken = by @ np.linalg.pinv(J @ by, hermitian=True) @ J @ free[..., None]
     close(found["asked"], inverse(s["q"], s["q1"], s["q2_d"] + free - taken[..., 0], -force), 1e-8)
 
@@ -172,7 +173,7 @@ def test_bite_force() -> None:
         total = np.where(biting, 0.2 + error * PERIOD, 0.0)
         np.testing.assert_allclose(found["memory"], np.column_stack([mode, total]), rtol=1e-13)
         q2 = back(900.0, 60.0)
-        by = np.linalg.solve(jaw().inertia_matrix(s["q"]), J[..., None])[..., 0]
+        by = np.linalg.solve(jaw().mass_matrix(s["q"]), J[..., None])[..., 0]
         along = np.einsum("nj,nj->n", J, q2 + 120.0 * s["q1"]) / np.einsum("nj,nj->n", J, by)
         q2 = q2 - np.where(biting, along, 0)[:, None] * by
         push = np.where(biting, s["force_d"][:, 0] + 0.4 * error + 6.0 * 0.2, felt)
@@ -297,7 +298,7 @@ def test_loads_and_the_plant(mode: int) -> None:
     )
     close(found["wrench"], total, 1e-9)
     load9 = np.hstack([total, np.zeros((N, 3))])
-    moved_by = jaw().forward(s["q"], s["q1"], effort, load9, ("motion",))
+    moved_by = jaw().forward_dynamics(s["q"], s["q1"], effort, *parts(load9), outputs="all")
     rate = found["rate"]
     np.testing.assert_array_equal(rate[:, :M], s["q1"])
     close(rate[:, M : 2 * M], moved_by.acceleration)
@@ -309,7 +310,7 @@ def test_loads_and_the_plant(mode: int) -> None:
     on = found["guards"][:, 1:] != -1.0
     assert (on.sum(axis=1) == len(guards[0])).all()
     np.testing.assert_allclose(found["guards"][:, 1:][on].reshape(N, -1), guards, atol=1e-9)
-    at = jaw().configuration(pose_of(s["q"])).contact_point[:, 0]
+    at = jaw().poses.configuration(pose_of(s["q"])).contact_point[:, 0]
     beyond = np.max([-end - at[:, 0], at[:, 0] - end, -end - at[:, 1], at[:, 2] - end], axis=0)
     np.testing.assert_allclose(found["guards"][:, 0], beyond, atol=1e-12)
     jumps = [jump.mode for jump in loads[1].jumps]

@@ -32,7 +32,7 @@ def system(c: Case) -> tuple[np.ndarray, np.ndarray]:
 
 def check_balance(c: Case, m: Model) -> None:
     """M q'' + C q' + G = A^T tau + load."""
-    M, bias, gravity = m.inertia_matrix(c.q), m.bias(c.q, c.q1), m.gravity(c.q)
+    M, bias, gravity = m.mass_matrix(c.q), m.bias(c.q, c.q1), m.gravity(c.q)
     needed, load = system(c)
     parts = [(M @ c.q2[..., None])[..., 0], bias, gravity]
     size = max(np.abs(part).max() for part in parts)
@@ -56,7 +56,7 @@ def test_compiled(name: str) -> None:
 def test_inertia_is_symmetric_and_positive(name: str) -> None:
     c, m = case(name), model(name)
     for space in ("q", "X"):
-        M = m.inertia_matrix(c.q, space)
+        M = m.mass_matrix(c.q, space=space)
         scale = np.sqrt(np.einsum("nii->ni", M))
         scaled = M / scale[:, :, None] / scale[:, None, :]
         np.testing.assert_allclose(scaled, scaled.transpose(0, 2, 1), atol=1e-13)
@@ -67,14 +67,14 @@ def test_inertia_is_symmetric_and_positive(name: str) -> None:
 def test_contacts_project_what_belongs_to_x(name: str) -> None:
     """M_J^T M_X M_J = M_q, and M_J^T (C_X + M_X M_J' q') = C_q."""
     c, m = case(name), model(name)
-    M_J = m.jacobians(c.q)["M_J"]
+    M_J = m.jacobians(c.q).M_J
     turned = M_J.transpose(0, 2, 1)
-    M_X = m.inertia_matrix(c.q, "X")
-    assert error(turned @ M_X @ M_J, m.inertia_matrix(c.q)) < 1e-13
-    G = (turned @ m.gravity(c.q, "X")[..., None])[..., 0]
+    M_X = m.mass_matrix(c.q, space="X")
+    assert error(turned @ M_X @ M_J, m.mass_matrix(c.q)) < 1e-13
+    G = (turned @ m.gravity(c.q, space="X")[..., None])[..., 0]
     assert error(G, m.gravity(c.q)) < 1e-13
     drift = m.poses.whole(c.q, c.q1, 0 * c.q)[0]["pose_acceleration"]
-    inside = m.bias(c.q, c.q1, "X") + (M_X @ drift[..., None])[..., 0]
+    inside = m.bias(c.q, c.q1, space="X") + (M_X @ drift[..., None])[..., 0]
     assert error((turned @ inside[..., None])[..., 0], m.bias(c.q, c.q1)) < 1e-12
 
 
@@ -83,7 +83,7 @@ def test_coriolis_forces_do_no_work_on_energy(name: str) -> None:
     """q'^T (M' - 2 C) q' = 0: bias . q' is half of q'^T M' q', by differences along q'."""
     c, m = case(name), model(name)
     h = 1e-5
-    along = [m.inertia_matrix(c.q + s * h * c.q1) for s in (-2, -1, 1, 2)]
+    along = [m.mass_matrix(c.q + s * h * c.q1) for s in (-2, -1, 1, 2)]
     rate = (along[0] - 8 * along[1] + 8 * along[2] - along[3]) / (12 * h)
     work = np.einsum("ni,nij,nj->n", c.q1, rate, c.q1) / 2
     got = (m.bias(c.q, c.q1) * c.q1).sum(axis=1)
@@ -112,13 +112,13 @@ def test_inertia_of_platform_and_rods_by_pinocchio() -> None:
     raw = random_mechanism(np.random.default_rng(4), contacts=0)
     m, engine = Model(parse(toml_text(raw)), backend="numpy"), PinocchioEngine(raw)
     q = random_state(np.random.default_rng(1), raw, 3)["q"]
-    M, G = m.inertia_matrix(q), m.gravity(q)
+    M, G = m.mass_matrix(q), m.gravity(q)
     zero, no_load = np.zeros(6), np.zeros(6)
     for i, pose in enumerate(q):
         rows = []
         for unit in [zero, *np.eye(6)]:
             found = engine.inverse_dynamics(pose, zero, unit, no_load, "right_molar")
-            J = m.jacobians(pose[None])["J_theta"][0]
+            J = m.jacobians(pose[None]).J_theta[0]
             rows.append(J.T @ found["tau"])
         wanted = np.array(rows[1:]) - rows[0]
         assert error(M[i], wanted.T) < 1e-9
@@ -135,8 +135,8 @@ def test_jacobians_are_slopes_of_the_configuration(name: str) -> None:
         step = h * np.eye(c.q.shape[1])[k]
         moved = [m.poses.whole(c.q + s * step, 0 * c.q, 0 * c.q)[0]["pose"] for s in (1, -1)]
         slope = (moved[0] - moved[1]) / (2 * h)
-        assert error(found["M_J"][:, :, k], slope) < 2e-6
-        joints = [m.configuration(pose) for pose in moved]
+        assert error(found.M_J[:, :, k], slope) < 2e-6
+        joints = [m.poses.configuration(pose) for pose in moved]
         wanted = np.stack(
             [
                 (getattr(joints[0], a) - getattr(joints[1], a)) / (2 * h)
@@ -144,19 +144,19 @@ def test_jacobians_are_slopes_of_the_configuration(name: str) -> None:
             ],
             axis=2,
         )
-        rates = found["M_3"] @ found["M_J"][:, None, :, k, None]
+        rates = found.M_3 @ found.M_J[:, None, :, k, None]
         size = max(np.abs(wanted).max(), 1.0)
         np.testing.assert_allclose(rates[..., 0], wanted, atol=1e-6 * size)
-        own = (found["J_theta"] @ found["M_J"][:, :, k, None])[..., 0]
+        own = (found.J_theta @ found.M_J[:, :, k, None])[..., 0]
         np.testing.assert_allclose(own, wanted[..., 0], atol=1e-6 * size)
-    assert error(found["M_1"] @ found["M_3"], found["M_2"]) < 1e-12
-    assert error(found["M_3"][:, :, 0], found["J_theta"]) < 1e-11
+    assert error(found.M_1 @ found.M_3, found.M_2) < 1e-12
+    assert error(found.M_3[:, :, 0], found.J_theta) < 1e-11
 
 
 def test_what_cannot_be_asked() -> None:
     m = model("masticatory")
     with pytest.raises(InputError, match=r'no space "Q"'):
-        m.inertia_matrix(np.zeros((1, 4)), "Q")
+        m.mass_matrix(np.zeros((1, 4)), space="Q")
     walls = Model(case("mixed_k3_n9_curved").mechanism, backend="numpy")
     q = np.zeros((2, 3))
     q[1, :] = 40.0

@@ -35,7 +35,7 @@ def truth(name: str) -> tuple[np.ndarray, np.ndarray]:
     m = model(name)
     unit = np.where([c in "XYZ" for c in m.independent], m.characteristic_length, 1.0)
     q = np.random.default_rng(5).uniform(-0.05, 0.05, (60, len(unit))) * unit
-    found = m.survey(q, ("pose", "joint"))
+    found = m.poses.survey(q, ("pose", "joint"))
     assert found.reached.sum() >= 20
     pose, joint = (found.values[key].T[found.reached] for key in ("pose", "joint"))
     return pose, joint
@@ -101,7 +101,7 @@ def test_encoders_that_disagree_meet_in_least_squares(name: str) -> None:
     for row in range(3):
 
         def off(x: np.ndarray, row: int = row) -> np.ndarray:
-            at = m.survey((x * unit)[None], ("joint",)).values["joint"][:, 0]
+            at = m.poses.survey((x * unit)[None], ("joint",)).values["joint"][:, 0]
             return (joint[row] - at) * weight / length
 
         best = least_squares(off, pose[row, columns] / unit, xtol=1e-15, ftol=1e-15, gtol=1e-15)
@@ -116,7 +116,7 @@ def test_what_is_certain_is_what_the_followed_path_finds(name: str) -> None:
     m = model(name)
     unit = np.where([c in "XYZ" for c in m.independent], m.characteristic_length, 1.0)
     q = np.random.default_rng(8).uniform(-0.3, 0.3, (400, len(unit))) * unit
-    survey = m.survey(q, ("joint",))
+    survey = m.poses.survey(q, ("joint",))
     joint = survey.values["joint"].T[survey.reached]
     pose, left, status = solved(m.kernel("pose"), joint, np.zeros((len(joint), 6)))
     followed = ForwardKinematics(m.mechanism).solve(joint)
@@ -142,7 +142,7 @@ def test_rates_and_weights_in_a_question_of_ones_own(name: str) -> None:
     pose = truth(name)[0]
     q = pose[:, [["X", "Y", "Z", "alpha", "beta", "gamma"].index(x) for x in m.independent]]
     q1 = np.random.default_rng(4).normal(size=q.shape)
-    at = m.evaluate(q, q1, 0 * q, np.zeros((len(q), 9)))
+    at = m.inverse_dynamics(q, q1, 0 * q, outputs="all")
     given = {"joint": at.configuration.joint, "joint_rate": at.joint_rate, "start": at.pose}
     weights = np.ones_like(at.joint_rate)
     for wrong in (False, True):

@@ -22,7 +22,8 @@ from condyle.errors import (
     UncertifiedError,
 )
 from condyle.mechanism import Mechanism, bundled_text, parse
-from condyle.model.data import require_ok
+from condyle.model.distributing import Distribution
+from condyle.model.model_result import require_ok
 from condyle.results.derived import Derived
 from condyle.results.summary import summarize, work
 from condyle.results.warnings import Watch
@@ -108,13 +109,11 @@ def test_activation_is_of_the_greater_limit() -> None:
 def test_options_say_how_efforts_were_chosen() -> None:
     mechanism = machine(ONE_SIDED)
     model = condyle.derive(mechanism, backend="numpy")
-    weight = 0.5 / model.reference_force**2
-    found = solve(mechanism, distribution="weighted", preload=0.25, contact_weight=weight)
-    assert (
-        found.condyle.options["distribution"] == "weighted"
-        and found.condyle.options["preload"] == 0.25
-    )
-    assert found.condyle.options["contact_weight"] == pytest.approx(0.5)
+    distribution = Distribution("weighted", preload=0.25, contact_weight=0.5)
+    found = solve(mechanism, distribution=distribution)
+    options = found.condyle.options
+    assert options["distribution"] == "weighted" and options["preload"] == 0.25
+    assert options["contact_weight"] == 0.5
     # 3 N m at the characteristic length.
     assert found.condyle.options["reference_force"] == pytest.approx(
         3 / model.characteristic_length
@@ -240,7 +239,7 @@ def test_jammed() -> None:
 def test_each_status_is_an_error_of_its_own(status: Status, kind: type[SampleError]) -> None:
     model = condyle.derive(machine(), backend="numpy")
     q = np.zeros((3, 4))
-    found = model.evaluate(q, q, q, np.zeros((3, 9)))
+    found = model.inverse_dynamics(q, q, q, outputs="all")
     found.status[1] = status
     with pytest.raises(kind, match="row 2") as caught:
         require_ok(model.mechanism, found)
@@ -253,7 +252,7 @@ def test_rounding_at_a_limit_is_no_alarm(limited: bool) -> None:
     mechanism = machine(ONE_SIDED)
     model = condyle.derive(mechanism, backend="numpy")
     q = np.zeros((3, 4))
-    found = model.evaluate(q, q, q, np.zeros((3, 9)))
+    found = model.inverse_dynamics(q, q, q, outputs="all")
     found.effort[:] = 3.0 * (1 + 1e-12)
     found.contact_force[:] = 1e-11
     watch = Watch(mechanism)

@@ -14,7 +14,7 @@ import xarray as xr
 
 import condyle
 from condyle.errors import MechanismError, NumberRangeError, UnreachableError, WarningError
-from condyle.model.data import require_ok
+from condyle.model.model_result import require_ok
 from condyle.motion import Motion
 from condyle.status import STATUS_NAMES, Status, judge
 
@@ -37,7 +37,7 @@ def solution(model: condyle.Model) -> xr.Dataset:
 def out_of_span(model: condyle.Model, x: float) -> set[str]:
     """Chains whose coupler cannot close the triangle with the platform moved along X."""
     q = np.array([[x, 0, 0, 0]])
-    pose = model.evaluate(q, 0 * q, 0 * q, np.zeros((1, 9))).pose[0]
+    pose = model.inverse_dynamics(q, 0 * q, 0 * q, outputs="all").pose[0]
     assert np.abs(pose[3:]).max() < 1e-12
     found = set()
     for chain in model.mechanism.chains:
@@ -127,7 +127,7 @@ def test_errors_carry_what_they_say(model: condyle.Model) -> None:
 def test_overflow_is_no_singularity(model: condyle.Model) -> None:
     q = np.zeros((3, 4))
     rates = np.array([[0.0], [1e300], [0.0]]) * np.ones(4)
-    found = model.evaluate(q, rates, 0 * q, np.zeros((3, 9)))
+    found = model.inverse_dynamics(q, rates, 0 * q, outputs="all")
     assert [STATUS_NAMES[i] for i in found.status] == ["ok", "overflow", "ok"]
     with pytest.raises(NumberRangeError, match="not finite") as caught:
         require_ok(model.mechanism, found)

@@ -59,9 +59,9 @@ def test_ten_percent_heavier(jaw: Model, opening: condyle.Motion) -> None:
     found = condyle.simulate(
         plant, {"duration": 0.12, "rtol": 1e-9}, controller=law, motion=opening
     )
-    q, q1, q2 = jaw.independent_motion(opening)[0]
+    q, q1, q2 = jaw.poses.of_motion(opening)[0]
     right = plant.bias(q, q1) + plant.gravity(q)
-    d = q2 + np.linalg.solve(plant.inertia_matrix(q), right[..., None])[..., 0]
+    d = q2 + np.linalg.solve(plant.mass_matrix(q), right[..., None])[..., 0]
     d *= 1 - 1 / HEAVIER
     for i, name in enumerate(jaw.independent):
         worst = np.abs(found["tracking_error"].sel(independent=name)).max().item()
@@ -78,7 +78,7 @@ class Lighter:
 
     def __call__(self, now: Any, aim: Any) -> np.ndarray:
         q2 = aim.q2 + Kv * (aim.q1 - now.q1) + Kp * (aim.q - now.q)
-        return self.model.one(now.q, now.q1, q2, np.zeros(9))
+        return self.model.unchecked().inverse_dynamics(now.q, now.q1, q2)
 
 
 def scaled(machine: condyle.Mechanism, by: float) -> condyle.Mechanism:
@@ -128,7 +128,7 @@ def jaw_jacobian(jaw: Model) -> np.ndarray:
     for i in range(len(jaw.independent)):
         q = np.zeros((2, len(jaw.independent)))
         q[:, i] = -h, h
-        poses = jaw.evaluate(q, 0 * q, 0 * q, np.zeros((2, 9))).pose
+        poses = jaw.inverse_dynamics(q, 0 * q, 0 * q, outputs="all").pose
         columns.append((moved(poses[1], p) - moved(poses[0], p)) / (2 * h))
     return np.column_stack(columns)
 

@@ -89,8 +89,7 @@ def test_a_table_of_loads_is_the_load_of_the_inverse(jaw: Model, tmp_path: Path)
         found[n].sel(coordinate=list(jaw.independent)).values
         for n in ("pose", "pose_rate", "pose_acceleration")
     )
-    given = np.hstack([found["load"].values, np.zeros((len(q), 3))])
-    again = jaw.torques(q, q1, q2, given, ("share",)).effort
+    again = jaw.inverse_dynamics(q, q1, q2, found["load"].values).effort
     # Least norm leaves out what balances itself.
     internal = found["share"].sel(part="internal").values
     assert np.abs(again + internal - found["effort"].values).max() < 1e-9
@@ -167,7 +166,7 @@ def test_a_jam_ends_the_run() -> None:
     q, q1 = (np.array([[trace.ended.state[p + n] for n in names]]) for p in ("", "d"))
     beyond = q + 1e-5 * q1  # the state before a jam is the last that can be
     still = np.zeros((1, 6))
-    statuses = [model.forward(x, q1, still, np.zeros((1, 9))).status[0] for x in (q, beyond)]
+    statuses = [model.forward_dynamics(x, q1, still).status[0] for x in (q, beyond)]
     assert Status.jammed in statuses
 
 

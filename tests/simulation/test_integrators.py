@@ -64,5 +64,5 @@ def test_a_step_is_a_cubic_between_its_ends() -> None:
 def test_contacts_are_kept(jaw: Model) -> None:
     """Every pose is on the surfaces, however long: the state is the independent coordinates."""
     solution = free(jaw)
-    assert jaw.contact_residual(solution["pose"].values) < 1e-13
+    assert jaw.poses.contact_residual(solution["pose"].values) < 1e-13
     assert (solution["status"].values == 0).all()

@@ -47,7 +47,14 @@ class Case:
     load: Array
 
     @property
-    def arguments(self) -> tuple[Array, Array, Array, Array]:
+    def arguments(self) -> tuple[Array, Array, Array, Array, Array]:
+        """Of inverse dynamics: q, v, a, wrench and point."""
+        q, q1, q2, load = self.packed
+        return q, q1, q2, load[:, :6], load[:, 6:]
+
+    @property
+    def packed(self) -> tuple[Array, Array, Array, Array]:
+        """With wrench and point in one array, (N, 9)."""
         return self.q, self.q1, self.q2, self.load
 
     @property

@@ -11,8 +11,8 @@ from oracles.description import Raw
 from oracles.random_mechanism import random_mechanism, random_state, toml_text
 
 from condyle.mechanism import Mechanism, parse
-from condyle.model.data import Evaluation
 from condyle.model.model import Model
+from condyle.model.model_result import ModelResult
 
 MIXED = ("RSS", "PSS", "SPS")
 MECHANISMS: dict[str, dict[str, Any]] = {
@@ -68,7 +68,7 @@ class Case:
         assert model.independent == tuple(self.states["names"])
         return model
 
-    def evaluate(self, *choices: str, backend: str = "numpy", **options: Any) -> Evaluation:
+    def evaluate(self, *choices: str, backend: str = "numpy", **options: Any) -> ModelResult:
         q = (self.states[key] for key in ("q", "qd", "qdd"))
         return self.model(*choices, backend=backend, **options).evaluate(*q, self.load)
 
@@ -105,7 +105,7 @@ def close(got: Any, wanted: Any, tolerance: float, floor: float = 0.0) -> None:
     np.testing.assert_allclose(got, wanted, rtol=0, atol=tolerance * scale)
 
 
-def same(ours: Evaluation, wanted: Evaluation, tolerance: float) -> None:
+def same(ours: ModelResult, wanted: ModelResult, tolerance: float) -> None:
     assert (ours.status == 0).all() and (wanted.status == 0).all()
     # Shares cancel in the effort; parts are compared with the largest of them.
     for name in ("effort", "share", "joint_rate", "joint_acceleration"):

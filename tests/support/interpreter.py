@@ -44,7 +44,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Found:
-    """N samples, by the names of `condyle.model.data.Evaluation`."""
+    """N samples, by the names of `condyle.model.model_result.ModelResult`."""
 
     pose: Array
     pose_rate: Array
@@ -113,7 +113,7 @@ class Interpreter:
         return Found(
             *poses,
             effort=effort,
-            share=share.transpose(2, 0, 1),
+            share=share.transpose(0, 2, 1),
             contact_force=mu * s["n_length"],
             joint_rate=s["rate"],
             joint_acceleration=s["acceleration"],

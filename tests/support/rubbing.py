@@ -28,7 +28,14 @@ class Rubbing:
         return parse(toml_text(self.raw))
 
     @property
-    def arguments(self) -> tuple[Array, Array, Array, Array]:
+    def arguments(self) -> tuple[Array, Array, Array, Array, Array]:
+        """Of inverse dynamics: q, v, a, wrench and point."""
+        q, q1, q2, load = self.packed
+        return q, q1, q2, load[:, :6], load[:, 6:]
+
+    @property
+    def packed(self) -> tuple[Array, Array, Array, Array]:
+        """With wrench and point in one array, (N, 9)."""
         """As `Model.evaluate` takes them."""
         s = self.states
         point = self.mechanism.platform.points[s["load_point"]]

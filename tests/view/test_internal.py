@@ -45,7 +45,7 @@ def test_directions_do_no_work_at_any_pose(name: str, count: int) -> None:
     session.snapshot()
     model = session.model
     J = model.jacobians(session.q[None])
-    A = (J["J_theta"] @ J["M_J"])[0]
+    A = (J.J_theta @ J.M_J)[0]
     found = session.directions()
     assert found.count == len(session.internal) == count == len(A) - A.shape[1]
     assert abs(A.T @ found.effort).max() < 1e-9 * abs(A).max()

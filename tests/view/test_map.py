@@ -39,7 +39,7 @@ def test_rays_become_poses(view: View, model: condyle.Model) -> None:
     X, Y, alpha, beta = q
     assert (X, Y, alpha) == pytest.approx((-5e-3 + 0.4 * 17e-3, 0, np.radians(1)), abs=1e-12)
     assert np.radians(-15.001) < beta < np.radians(-5)
-    assert model.survey(q[None]).reached.all()
+    assert model.poses.survey(q[None]).reached.all()
     assert layer.state_at(target + 9, np.array([0.0, 1.0, 0.0])) is None
 
 

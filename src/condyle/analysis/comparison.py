@@ -19,7 +19,9 @@ from ..dynamics import formulation as formulation_named
 from ..errors import UnsupportedError, texts_of
 from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
-from ..model.model import Model, with_point
+from ..model.distributing import Distribution
+from ..model.model import Model
+from ..motion import resolve_load_point
 from ..motion.motion_and_load import motion_and_load
 from ..progress import step
 from .runs import Run, Samples, TimedModel, run
@@ -107,9 +109,7 @@ def compare(
     load: Any = None,
     load_point: str | None = None,
     formulations: str | Sequence[str] | None = None,
-    distribution: str | None = None,
-    preload: float = 0.0,
-    contact_weight: float = 0.0,
+    distribution: str | Distribution | None = None,
 ) -> Comparison:
     """Compute one motion by every formulation and route, with and without the contacts.
 
@@ -117,7 +117,7 @@ def compare(
             motion, load: files or arrays; default: as in `condyle.run`.
             load_point: platform point that the load acts at.
             formulations: names; default: all.
-            distribution, preload, contact_weight: how efforts are chosen, as in `derive`.
+            distribution: how redundancy is resolved, as in `derive`.
     Raises: UnreachableError, SingularError: for samples that cannot be computed.
             InputError: for an unknown formulation, or a motion or load that does not fit.
     """
@@ -126,8 +126,7 @@ def compare(
     asked = texts_of("formulations", list(FORMULATIONS) if formulations is None else formulations)
     names = [formulation_named(name).name for name in asked]
     # The first derivation also pays for imports, so it is not one of those that are timed.
-    policy = distribution, preload, contact_weight
-    model = TimedModel(mechanism, names[0], "core", *policy)
+    model = TimedModel(mechanism, names[0], "core", distribution)
     solution = model.solve(motion, load, load_point)
     samples = samples_of(model, solution)
     models, unavailable = [], []
@@ -135,7 +134,7 @@ def compare(
     with step("deriving every model", len(kinds)) as advance:
         for name, route in kinds:
             try:
-                models.append(TimedModel(mechanism, name, route, *policy))
+                models.append(TimedModel(mechanism, name, route, distribution))
             except UnsupportedError as error:
                 unavailable.append(Unavailable(f"{name} {route}", str(error)))
             advance(1)
@@ -145,8 +144,8 @@ def compare(
         unavailable.append(Unavailable("without contacts", reason))
     else:
         free = mechanism.replace(contacts=(), dependent=None)
-        models += [TimedModel(free, name, "core", *policy) for name in names]
-        measures = models[-1].configuration(samples.pose).singularity
+        models += [TimedModel(free, name, "core", distribution) for name in names]
+        measures = models[-1].poses.configuration(samples.pose).singularity
         condition = float(measures.condition.max())
     runs = []
     with step("running every model", len(models)) as advance:
@@ -166,12 +165,14 @@ def compare(
 def samples_of(model: Model, solution: xr.Dataset) -> Samples:
     """The motion and load of a solution."""
     wrench, name = solution["load"].values, solution.condyle.options["load_point"]
-    point = model.load_point(name) if name is not None or wrench.any() else np.zeros(3)
+    if name is None and wrench.any():
+        name = resolve_load_point(None, model.mechanism.platform.points)
     return Samples(
         solution["pose"].values,
         solution["pose_rate"].values,
         solution["pose_acceleration"].values,
-        with_point(wrench, point),
+        wrench,
+        name,
     )
 
 

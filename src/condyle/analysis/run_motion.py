@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from ..mechanism import Mechanism, as_mechanism, load_mechanism
+from ..model.distributing import Distribution
 from ..model.model import derive
 from ..motion import motion_and_load
 
@@ -28,9 +28,7 @@ def run(
     route: str = "core",
     backend: str = "auto",
     threads: int | None = None,
-    distribution: str | None = None,
-    preload: float = 0.0,
-    contact_weight: float = 0.0,
+    distribution: str | Distribution | None = None,
     reactions: bool = False,
     flag: bool = False,
     measured: str | Path | None = None,
@@ -43,7 +41,7 @@ def run(
             motion, load: files or arrays; default: the bundled chewing path and bite force where
                 they fit, else a trial motion without a load.
             load_point: platform point at which the load acts.
-            formulation, route, backend, distribution, preload, contact_weight: as of `derive`.
+            formulation, route, backend, distribution: as of `derive`.
             reactions, flag, threads: as of `Model.solve`.
             measured: markers and EMG to keep with the results.
             vary: a study, or its file, whose numbers vary: quantiles of efforts and contact forces.
@@ -53,8 +51,9 @@ def run(
     machine = as_mechanism(mechanism)
     study = None if vary is None else study_for(vary, machine)
     path, acting = motion_and_load(machine, motion, load, **reading)
-    weight = weight_of(machine, contact_weight)
-    model = derive(machine, formulation, route, backend, distribution, preload, weight)
+    model = derive(
+        machine, formulation=formulation, route=route, distribution=distribution, backend=backend
+    )
     solution = model.solve(path, acting, load_point, flag, reactions, threads)
     if measured is not None:
         solution = solution.condyle.with_measured(measured)
@@ -81,14 +80,3 @@ def study_for(given: Study | str | Path, machine: Mechanism) -> Study:
             "name the same mechanism in both, or leave it out of the study"
         )
     return study
-
-
-def weight_of(machine: Mechanism, contact_weight: float) -> float:
-    """W / N_ref^2 [1/N^2] of W."""
-    from ..model.distributing import reference_force
-
-    if not (math.isfinite(contact_weight) and contact_weight >= 0):
-        raise InputError(
-            f"--contact-weight: expected a number of at least 0, got {contact_weight:g}"
-        )
-    return contact_weight / reference_force(machine) ** 2

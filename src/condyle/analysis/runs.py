@@ -12,6 +12,7 @@ import numpy as np
 
 from ..kinematics.constraints import indices
 from ..mechanism.mechanism import Mechanism
+from ..model.distributing import Distribution
 from ..model.model import Model
 from .paper import Seconds
 
@@ -30,15 +31,18 @@ class TimedModel(Model):
         mechanism: Mechanism,
         formulation: str,
         route: str,
-        distribution: str | None = None,
-        preload: float = 0.0,
-        contact_weight: float = 0.0,
+        distribution: str | Distribution | None = None,
     ) -> None:
-        policy = distribution, preload, contact_weight
         with without_collection():
             start = process_time()
-            super().__init__(mechanism, formulation, route, "numpy", *policy)
-            self.kernel("inverse", ())
+            super().__init__(
+                mechanism,
+                formulation=formulation,
+                route=route,
+                distribution=distribution,
+                backend="numpy",
+            )
+            self.kernel("inverse", ("contact",))
             self.symbolic = process_time() - start
 
 
@@ -59,16 +63,17 @@ class Samples:
     """A motion of the platform and the load on it.
 
     pose, rate, acceleration: X_EE and its derivatives, (N, 6).
-    load: force, moment and the point they act at, (N, 9), as `Model.evaluate` takes it.
+    wrench: force and moment on it, (N, 6);  at: the point where they act, by name.
     """
 
     pose: np.ndarray
     rate: np.ndarray
     acceleration: np.ndarray
-    load: np.ndarray
+    wrench: np.ndarray
+    at: str | None
 
     def states(self, model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """q, q1, q2 of a model, (N, m) each."""
+        """q, v, a of a model, (N, m) each."""
         own = indices(model.independent)
         return self.pose[:, own], self.rate[:, own], self.acceleration[:, own]
 
@@ -98,20 +103,20 @@ class Run:
 def run(model: TimedModel, samples: Samples) -> Run:
     """Compute the samples by a model, and time its torques.
 
-    Contact forces, shares and configurations are not in the seconds.
+    Shares and configurations are not in the seconds.
     """
-    states = samples.states(model)
+    given = (*samples.states(model), samples.wrench, samples.at)
     with without_collection():
         start = process_time()
-        model.torques(*states, samples.load)
+        model.inverse_dynamics(*given)
         numeric = process_time() - start
-    found = model.torques(*states, samples.load, ("contact", "share"))
+    found = model.inverse_dynamics(*given, outputs=("share",))
     return Run(
         model.formulation,
         model.route,
         bool(model.mechanism.contacts),
         Seconds(model.symbolic, numeric),
         found.effort,
-        found["share"],
-        found["contact_force"],
+        np.moveaxis(found.share, 1, 0),
+        found.contact_force,
     )

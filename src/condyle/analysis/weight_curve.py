@@ -17,6 +17,7 @@ import numpy as np
 from ..errors import InputError
 from ..mechanism import as_mechanism
 from ..mechanism.chain import limits
+from ..model.distributing import Distribution
 from ..model.model import derive
 from ..motion.motion_and_load import motion_and_load
 from ..progress import step
@@ -81,19 +82,18 @@ def tradeoff(
     asked = np.asarray(weights, dtype=float)
     if asked.ndim != 1 or not asked.size or (np.diff(asked) <= 0).any():
         raise InputError(f"weights: expected numbers that rise, got {list(weights)}")
-    first = derive(mechanism, distribution="weighted", preload=preload, **model)
-    unit = first.reference_force**2
-    one = first.choosing("weighted", preload, asked[0] / unit)
+    first = derive(mechanism, distribution=Distribution("weighted", preload), **model)
+    one = first.with_distribution(Distribution("weighted", preload, float(asked[0])))
     solution = one.solve(motion, load, load_point)
     samples = samples_of(one, solution)
     states = samples.states(one)
     efforts, forces, good = [], [], np.ones(len(samples.pose), dtype=bool)
     with step("solving at every weight", len(asked)) as advance:
         for weight in asked:
-            one = first.choosing("weighted", preload, weight / unit)
-            found = one.torques(*states, samples.load, ("contact",))
+            one = first.with_distribution(Distribution("weighted", preload, float(weight)))
+            found = one.inverse_dynamics(*states, samples.wrench, samples.at)
             efforts.append(found.effort)
-            forces.append(found["contact_force"])
+            forces.append(found.contact_force)
             good &= found.status == Status.ok
             advance(1)
     if not good.any():

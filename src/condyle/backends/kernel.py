@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from ..errors import InputError
-from ..graph.program import Interface, Numbers, Result
+from ..graph.program import Interface, Numbers, Port, Result
 
 OK, AGAIN = 0, 255  # statuses; others are those of the program's checks
 
@@ -41,7 +41,8 @@ class Kernel(Protocol):
     def run(self, inputs: Mapping[str, np.ndarray], threads: int | None = None) -> Answer:
         """Evaluate samples.
 
-        Args: inputs: port -> (N, size), (N, lanes) in the callers' order, or (N, size, lanes).
+        Args: inputs: port -> (N, size), (N, lanes) in the callers' order, or (N, size, lanes); of
+              one row where it is the same for all samples.
               threads: at most so many; results do not depend on it.
         """
         ...
@@ -54,29 +55,33 @@ def columns_of(
 
     Raises: InputError: for an array that does not fit its port.
     """
-    count = None
     columns: list[np.ndarray] = []
-    for port in interface.ports:
-        a = _numbers(port.name, inputs[port.name])
-        want: tuple[int, ...] = (port.size,)
-        if port.lanes:
-            want = (interface.lanes,) if port.size == 1 else (port.size, interface.lanes)
-        if a.shape[1:] != want:
-            shape = ", ".join(["N", *map(str, want)])
-            one = " (one sample is an array of one)" if a.ndim == 1 and a.shape == want else ""
-            raise InputError(
-                f"{port.name}: expected an array of shape ({shape}), got {a.shape}{one}"
-            )
-        if count is not None and len(a) != count:
-            raise InputError(f"{port.name}: {len(a)} samples, where others have {count}")
-        count = len(a)
+    given = [_fitting(interface, port, inputs[port.name]) for port in interface.ports]
+    count = max((len(a) for a in given if len(a) != 1), default=min(map(len, given), default=0))
+    for port, a in zip(interface.ports, given, strict=True):
+        if len(a) != count:
+            if len(a) != 1:
+                raise InputError(f"{port.name}: {len(a)} samples, where others have {count}")
+            a = np.broadcast_to(a, (count, *a.shape[1:]))
         if not port.lanes:
             columns += [a[:, i] for i in range(port.size)]
             continue
         for i in range(port.size):
             rows = a if port.size == 1 else a[:, i]
             columns += [rows[:, k] for k in order]
-    return count or 0, columns
+    return count, columns
+
+
+def _fitting(interface: Interface, port: Port, given: object) -> np.ndarray:
+    a = _numbers(port.name, given)
+    want: tuple[int, ...] = (port.size,)
+    if port.lanes:
+        want = (interface.lanes,) if port.size == 1 else (port.size, interface.lanes)
+    if a.shape[1:] != want:
+        shape = ", ".join(["N", *map(str, want)])
+        one = " (one sample is an array of one)" if a.ndim == 1 and a.shape == want else ""
+        raise InputError(f"{port.name}: expected an array of shape ({shape}), got {a.shape}{one}")
+    return a
 
 
 def _numbers(name: str, given: object) -> np.ndarray:

@@ -7,6 +7,8 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import count as counter
 
+import numpy as np
+
 from ..errors import InputError
 
 PIECES = 4  # that each thread takes, so that one that is held up does not hold up all
@@ -19,9 +21,12 @@ def workers(threads: int | None) -> int:
     Raises: InputError: for a number below 1.
     """
     if threads is not None:
-        if threads < 1:
-            raise InputError(f"threads is {threads}; expected 1 or more, or None for all there are")
-        return threads
+        if not isinstance(threads, int | np.integer) or threads < 1:
+            raise InputError(
+                f"threads: expected an integer of at least 1, or None for all there are; got "
+                f"{threads!r:.60}"
+            )
+        return int(threads)
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

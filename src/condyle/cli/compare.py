@@ -36,7 +36,6 @@ def compare(
     require_drawing(figures, report)
     import condyle
 
-    from ..analysis.run_motion import weight_of
     from ..motion import motion_and_load
     from ..report.tables import save_tables, tables, with_tables
     from ..report.tables.tradeoff_table import tradeoff_table
@@ -45,9 +44,9 @@ def compare(
     following = motion.arguments()
     load_point = following.pop("load_point")
     path, acting = motion_and_load(machine, **following)
-    policy = distribution.arguments()
     if tradeoff:
-        if policy["distribution"] not in (None, "weighted") or policy["contact_weight"]:
+        named = distribution.distribution not in (None, "weighted")
+        if named or distribution.contact_weight:
             raise InputError(
                 "--tradeoff sweeps the weights of --distribution weighted itself: leave "
                 "--distribution and --contact-weight out"
@@ -56,8 +55,8 @@ def compare(
         shown, solution, text = [tradeoff_table(curve)], curve.solution, ""
         data: dict[str, Any] = {"reference_force": curve.reference_force, "samples": curve.samples}
     else:
-        policy["contact_weight"] = weight_of(machine, distribution.contact_weight)
-        comparison = condyle.compare(machine, path, acting, load_point, **policy)
+        chosen = distribution.chosen()
+        comparison = condyle.compare(machine, path, acting, load_point, distribution=chosen)
         shown, solution, text = list(tables(comparison)), comparison.solution, str(comparison)
         unavailable = {one.label: one.reason for one in comparison.unavailable}
         data = {"samples": comparison.samples, "unavailable": unavailable}

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..errors import InputError, WarningError
 from ..extras import require
@@ -29,15 +29,13 @@ def model_of(
     """The model of a mechanism that the options ask for."""
     import condyle
 
-    from ..analysis.run_motion import weight_of
-
-    machine = condyle.load_mechanism(mechanism)
-    policy: dict[str, Any] = {}
-    if distribution is not None:
-        policy = distribution.arguments()
-        policy["contact_weight"] = weight_of(machine, distribution.contact_weight)
-    equations = model.formulation, model.route, model.backend
-    return condyle.derive(machine, *equations, **policy)
+    return condyle.derive(
+        mechanism,
+        formulation=model.formulation,
+        route=model.route,
+        distribution=None if distribution is None else distribution.chosen(),
+        backend=model.backend,
+    )
 
 
 def written(

@@ -195,6 +195,12 @@ class DistributionOptions(Group):
         ),
     ] = 0.0
 
+    def chosen(self) -> Any:
+        """The `condyle.Distribution` of these."""
+        import condyle
+
+        return condyle.Distribution(self.distribution, self.preload, self.contact_weight)
+
 
 @dataclass(frozen=True)
 class OutputOptions(Group):

@@ -41,7 +41,7 @@ def run(
         mechanism,
         **motion.arguments(),
         **model.arguments(),
-        **distribution.arguments(),
+        distribution=distribution.chosen(),
         reactions=reactions,
         flag=flag,
         measured=measured,

@@ -11,7 +11,6 @@ from ..backends.kernel import AGAIN
 from ..backends.numpy_kernel import NumpyKernel
 from ..mechanism.home import characteristic_length, independent_coordinates
 from ..model.closing import Closure
-from ..model.forward_kinematics import ForwardKinematics
 from ..model.model import Model
 from ..questions import Question
 from ..questions.numbers import Layout, specialised
@@ -78,19 +77,18 @@ def _graph(r: Reference, question: str, given: Given) -> tuple[Arrays, np.ndarra
     return results, np.where(found.status == AGAIN, unsure, found.status)
 
 
-def _load(given: Given) -> np.ndarray:
-    return np.hstack([given[name] for name in ("force", "moment", "point")])
+def _load(given: Given) -> tuple[np.ndarray, np.ndarray]:
+    """Wrench and point."""
+    return np.hstack([given["force"], given["moment"]]), given["point"]
 
 
 def _inverse(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
-    found = r.model.torques(
-        given["q"], given["q1"], given["q2"], _load(given), outputs=("contact",)
-    )
-    return {"effort": found.effort, "contact_force": found["contact_force"]}, found.status
+    found = r.model.inverse_dynamics(given["q"], given["q1"], given["q2"], *_load(given))
+    return {"effort": found.effort, "contact_force": found.contact_force}, found.status
 
 
 def _forward(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
-    found = r.model.forward(given["q"], given["q1"], given["effort"], _load(given))
+    found = r.model.forward_dynamics(given["q"], given["q1"], given["effort"], *_load(given))
     results = {"acceleration": found.acceleration, "contact_force": found.contact_force}
     return results, found.status
 
@@ -106,7 +104,7 @@ def _closure(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
 
 
 def _pose(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
-    found = ForwardKinematics(r.model.mechanism).solve(given["joint"])
+    found = r.model.forward_kinematics(given["joint"])
     # A residual beyond the tolerance is infeasible in C.
     codes = np.array([Status.ok, Status.unreachable, Status.unreachable, Status.infeasible])
     return {"pose": found.pose, "residual": found.residual}, codes[found.status]

@@ -67,7 +67,13 @@ def export(
             MechanismError: if the contacts do not hold the platform at home.
     """
     # What a model checks of a mechanism is checked here as well.
-    model = Model(mechanism, formulation, route, "numpy", least_norm(mechanism))
+    model = Model(
+        mechanism,
+        formulation=formulation,
+        route=route,
+        distribution=least_norm(mechanism),
+        backend="numpy",
+    )
     asked = usual(mechanism) if questions is None else questions
     entries = _entries(mechanism, asked, coordinates, landmark)
     structure = structure_of(mechanism, formulation_named(formulation).name, route)

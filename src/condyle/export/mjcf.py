@@ -90,11 +90,11 @@ def _home(document: Document) -> None:
     """A keyframe with the efforts that hold the mechanism at home, if there are such."""
     try:
         model = Model(document.mechanism, backend="numpy")
-        rest = np.zeros((1, document.mechanism.degrees_of_freedom))
-        efforts = model.torques(rest, rest, rest, np.zeros((1, 9)))
-        if efforts.status[0]:
+        rest = np.zeros(document.mechanism.degrees_of_freedom)
+        efforts = model.inverse_dynamics(rest, rest, rest)
+        if efforts.status:
             raise CondyleError
-        document.add("keyframe", "key", name="home", ctrl=efforts.effort[0])
+        document.add("keyframe", "key", name="home", ctrl=efforts.effort)
     except CondyleError:
         document.note("no efforts hold it at home, so the file has no keyframe")
 

@@ -64,8 +64,8 @@ class Singularity:
     @property
     def rank(self) -> np.ndarray:
         """Rank of J_W, (N,): singular values above `SINGULAR` times the largest."""
-        least = SINGULAR * self.J_W_sigma[:, 0]
-        return np.add.reduce([sigma > least for sigma in self.J_W_sigma.T], dtype=np.int8)
+        sigma = np.moveaxis(self.J_W_sigma, -1, 0)
+        return np.add.reduce([one > SINGULAR * sigma[0] for one in sigma], dtype=np.int8)
 
     def kind(self, threshold: float = NEAR_SINGULAR) -> np.ndarray:
         """Index into `KINDS` of the nearest singularity, (N,)."""

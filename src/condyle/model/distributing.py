@@ -7,7 +7,7 @@ for, the equations of those samples go to `condyle.distribution`, and come back 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -30,58 +30,86 @@ _STATUS = np.array([Status[outcome.name] for outcome in Outcome], dtype=np.uint8
 
 
 @dataclass(frozen=True)
-class Policy:
-    """How efforts are chosen: objective, least push of one-sided contacts [N], and W / N_ref^2."""
+class Distribution:
+    """How redundancy is resolved: the objective that efforts minimise, with its numbers.
 
-    objective: str
+    name:           of `condyle.distribution.OBJECTIVES`; None: `bounded` with cables, else
+                    `minimum_norm`.
+    preload:        minimum compressive force on unilateral contacts [N].
+    contact_weight: W of `weighted`, dimensionless: it minimises the sum of (effort_i / max_i)^2
+                    and of W (lambda_k / N_ref)^2 over the contacts, where N_ref [N] is
+                    `Model.reference_force`, the largest limit of the actuators.
+    """
+
+    name: str | None = None
     preload: float = 0.0
     contact_weight: float = 0.0
 
     @staticmethod
-    def of(
-        mechanism: Mechanism, objective: str | None, preload: float, contact_weight: float
-    ) -> Policy:
-        """Checked against a mechanism; by default `bounded` with cables, else `minimum_norm`.
+    def of(given: Any) -> Distribution:
+        """From a name, None or a distribution.
+
+        Raises: InputError: for anything else, or numbers that are none or negative.
+        """
+        found = given if isinstance(given, Distribution) else Distribution(given)
+        if not isinstance(found.name, str | None):
+            raise InputError(
+                "distribution: expected a name, a condyle.Distribution or None, got "
+                f"{type(given).__name__} {given!r:.60}"
+            )
+        for label in ("preload", "contact_weight"):
+            value = getattr(found, label)
+            number = isinstance(value, int | float | np.number) and np.isfinite(value)
+            if not number or value < 0:
+                raise InputError(f"{label}: expected a number of at least 0, got {value!r:.60}")
+        return found
+
+    def checked(self, mechanism: Mechanism) -> Distribution:
+        """The same, by name, checked against a mechanism.
 
         Raises: InputError: for an unknown objective, or one that does not fit the mechanism.
         """
-        asked = objective is not None
-        if objective is None:
+        name = self.name
+        if name is None:
             cables = any(chain.kind == "cable" for chain in mechanism.chains)
-            objective = "bounded" if cables else LEAST
-        if objective not in OBJECTIVES:
-            raise InputError(f'no distribution "{objective}".{did_you_mean(objective, OBJECTIVES)}')
+            name = "bounded" if cables else LEAST
+        if name not in OBJECTIVES:
+            hint = did_you_mean(name, OBJECTIVES)
+            raise InputError(f'distribution: there is no "{name:.60}".{hint}')
+        objective = OBJECTIVES[name]
         units = {FAMILIES[chain.kind].effort_unit for chain in mechanism.chains}
         # The default without cables is as old as the program, and stays.
-        chosen = asked or objective != LEAST
-        if chosen and len(units) > 1 and not OBJECTIVES[objective].mixes_units:
+        chosen = self.name is not None or name != LEAST
+        if chosen and len(units) > 1 and not objective.mixes_units:
             fit = _those(lambda o: o.mixes_units)
             raise InputError(
-                f"distribution {objective} adds the squares of efforts, and this mechanism has "
+                f"distribution {name} adds the squares of efforts, and this mechanism has "
                 f"{' and '.join(sorted(units))}: take one of {fit}, which measure each by its limit"
             )
-        if OBJECTIVES[objective].mixes_units:
-            _require_limits(mechanism, objective)
-        for name, value in (("preload", preload), ("contact weight", contact_weight)):
-            if not (np.isfinite(value) and value >= 0):
-                raise InputError(f"{name}: expected a number of at least 0, got {value}")
-        if preload and not OBJECTIVES[objective].limits:
+        if objective.mixes_units:
+            _require_limits(mechanism, name)
+        if self.preload and not objective.limits:
             raise InputError(
-                f"preload {preload:g} N is for efforts within limits, and distribution {objective} "
+                f"preload {self.preload:g} N is for efforts within limits, and distribution {name} "
                 f"knows none: take one of {_those(lambda o: o.limits)}"
             )
-        if contact_weight and not OBJECTIVES[objective].weighs:
+        if self.contact_weight and not objective.weighs:
             weighing = _those(lambda o: o.weighs)
             raise InputError(
-                f"distribution {objective} does not weigh contact forces: take {weighing}, or "
+                f"distribution {name} does not weigh contact forces: take {weighing}, or "
                 "leave the contact weight out"
             )
-        if preload and not any(contact.one_sided for contact in mechanism.contacts):
+        if self.preload and not any(contact.one_sided for contact in mechanism.contacts):
             notice(
-                f'preload {preload:g} N presses on nothing: no contact of "{mechanism.name}" is '
-                "one-sided. Set one_sided = true at those that only push"
+                f"preload {self.preload:g} N presses on nothing: no contact of "
+                f'"{mechanism.name}" is unilateral. Set one_sided = true at those that only push'
             )
-        return Policy(objective, preload, contact_weight)
+        return replace(self, name=name)
+
+    @property
+    def objective(self) -> Objective:
+        """What is minimised; of one that was checked."""
+        return OBJECTIVES[str(self.name)]
 
 
 def _those(fit: Callable[[Objective], bool]) -> str:
@@ -120,13 +148,16 @@ def reference_force(mechanism: Mechanism) -> float:
 
 
 class Distributor:
-    """Chooses the efforts of one mechanism by a policy."""
+    """Chooses the efforts of one mechanism."""
 
     def __init__(
-        self, mechanism: Mechanism, policy: Policy, backend: Backend | None = None
+        self, mechanism: Mechanism, distribution: Distribution, backend: Backend | None = None
     ) -> None:
-        """Args: backend: what the question of efforts runs by; None: the robust solver alone."""
-        self.policy = policy
+        """Args: distribution: checked against the mechanism.
+        backend: what the question of efforts runs by; None: the robust solver alone.
+        """
+        self.distribution = distribution
+        self._weight = distribution.contact_weight / reference_force(mechanism) ** 2
         self._backend = backend
         self._rubs = [contact.friction.coefficient > 0 for contact in mechanism.contacts]
         self.friction = any(self._rubs)
@@ -139,20 +170,22 @@ class Distributor:
     @property
     def least_norm(self) -> bool:
         """Whether the kernels' own efforts are those wanted."""
-        return self.policy.objective == LEAST
+        return self.distribution.name == LEAST
 
     @property
     def chooses(self) -> bool:
         """Whether it has a say at all in the efforts."""
         return not self.least_norm or self.unsolved_friction
 
-    @property
-    def question(self) -> tuple[tuple[Any, ...], dict[str, np.ndarray]]:
-        """The question of one sample's efforts with its details, none where a kernel alone cannot
-        say what they are; and its ports that are always given the same."""
-        objective = OBJECTIVES[self.policy.objective]
+    def question(self, contact: bool) -> tuple[tuple[Any, ...], dict[str, np.ndarray]]:
+        """The question of one state's efforts with its details, none where a kernel alone cannot
+        say what they are; and its ports that are always given the same.
+
+        Args: contact: whether contact forces are wanted too.
+        """
+        objective = self.distribution.objective
         if not self.chooses:
-            return ("inverse", ()), {}
+            return ("inverse", ("contact",) if contact else ()), {}
         # Cubes take twice the steps, and compilers a minute.
         if objective.term != "square" or self.unsolved_friction:
             return (), {}
@@ -167,12 +200,12 @@ class Distributor:
             return np.flatnonzero(good)
         if self.least_norm:
             return np.empty(0, dtype=int)
-        if self.policy.objective == "bounded":
+        if self.distribution.name == "bounded":
             effort = values["effort"]
             fits = ((effort >= self._low[:, None]) & (effort <= self._high[:, None])).all(axis=0)
             sided = self._push != 0
             pushes = self._push[sided, None] * values["contact_force"][sided]
-            fits &= (pushes >= self.policy.preload).all(axis=0)
+            fits &= (pushes >= self.distribution.preload).all(axis=0)
             good &= ~fits
         return np.flatnonzero(good)
 
@@ -185,7 +218,7 @@ class Distributor:
         """
         s = {name: np.moveaxis(a, -1, 0) for name, a in system.items()}
         problem = self._problem(s["Q"], s["J"].transpose(0, 2, 1), s["normal"], s["friction"])
-        result = distribute(problem, self.policy.objective, self._backend)
+        result = distribute(problem, str(self.distribution.name), self._backend)
         found = {
             "effort": result.effort.T,
             "contact_force": result.contact_force.T,
@@ -199,7 +232,7 @@ class Distributor:
         return found
 
     def _problem(self, *balance: np.ndarray) -> Problem:
-        """Q, J, normal and friction (if any) of samples, with what the policy asks for."""
+        """Q, J, normal and friction (if any) of samples, with what the distribution asks for."""
         Q, J, normal, *friction = balance
         return Problem(
             Q,
@@ -209,8 +242,8 @@ class Distributor:
             low=self._low,
             high=self._high,
             push=self._push,
-            preload=self.policy.preload,
-            contact_weight=self.policy.contact_weight,
+            preload=self.distribution.preload,
+            contact_weight=self._weight,
         )
 
 

@@ -1,4 +1,4 @@
-"""Reactions at the samples of an evaluation: what every joint, guide and contact carries."""
+"""Reactions at the states of a result: what every joint, guide and contact carries."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 
 from ..questions.reactions import POINT, Place, reaction_places
 from ..status import Status
-from .data import Evaluation
 from .model import Model
+from .model_result import ModelResult
 
 
 @dataclass(frozen=True)
@@ -23,25 +23,25 @@ class Reaction(Place):
 
 
 def reactions(
-    model: Model, evaluation: Evaluation, effort: np.ndarray | None = None
+    model: Model, result: ModelResult, effort: np.ndarray | None = None
 ) -> dict[str, Reaction]:
-    """Reactions at the samples of an evaluation; NaN where a sample failed.
+    """Reactions at N states, (N, ...); NaN where a sample failed.
 
-    Args:    evaluation: of the model.
-             effort: (N, n), the efforts to balance if not those of the evaluation. The contact
-             forces are the evaluation's in any case.
+    Args:    result: of inverse dynamics, with pose and rates.
+             effort: (N, n), the efforts to balance if not those of the result. The contact
+             forces are the result's in any case.
     Returns: by name: <joint>_<chain>, <joint>_force_<chain>, <joint>_moment_<chain>,
              guide_moment_<chain>, contact_<contact>.
     """
     inputs = {
-        "pose": evaluation.pose,
-        "pose_rate": evaluation.pose_rate,
-        "pose_acceleration": evaluation.pose_acceleration,
-        "effort": evaluation.effort if effort is None else effort,
-        "contact_force": evaluation.contact_force,
+        "pose": result.pose,
+        "pose_rate": result.pose_rate,
+        "pose_acceleration": result.pose_acceleration,
+        "effort": result.effort if effort is None else effort,
+        "contact_force": result.contact_force,
     }
     values = model.kernel("reactions").run(inputs).values
-    failed = evaluation.status != Status.ok
+    failed = result.status != Status.ok
     found = {}
     seen: dict[str, int] = {}
     for place in reaction_places(model.mechanism):

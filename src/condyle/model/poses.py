@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -12,8 +13,8 @@ from ..kinematics.constraints import closed_form_available, indices
 from ..kinematics.singularities import Singularity
 from ..motion import Motion, resolve_landmark
 from ..status import Status
-from .checks import POSE_COLUMNS, check_array, check_states
-from .data import Configuration
+from .arguments import POSE, Arguments, Lead, requested, samples
+from .model_result import ModelResult
 from .surveying import SURVEYED, Survey, judged
 from .system import System, mended
 
@@ -24,24 +25,59 @@ States = tuple[Array, Array, Array]
 class Poses:
     """Questions about poses, none of which is about efforts; see `Model`."""
 
-    def __init__(self, system: System) -> None:
-        self._system = system
+    def __init__(self, system: System, arguments: Arguments) -> None:
+        self._system, self._arguments = system, arguments
 
-    def configuration(self, pose: Array, threads: int | None) -> Configuration:
-        """As `Model.configuration`."""
-        check_array("pose", pose, 6, POSE_COLUMNS)
+    def configuration(self, pose: Any, threads: int | None = None) -> ModelResult:
+        """Joints, contact points and singularity at whole poses X_EE, (..., 6), on the contacts."""
+        lead, (pose,) = samples((POSE,), (POSE.array(pose),))
         inputs = {"pose": pose}
         answer = self._system.kernel("configuration").run(inputs, threads)
         mended(answer, inputs, lambda few: (self._system.robust.configuration(few["pose"]), 0))
-        return configured(answer.values, self._system.length)
+        return configured(answer.values, self._system.length).shaped(lead)
 
-    def survey(self, q: Array, wanted: Collection[str], threads: int | None) -> Survey:
-        """As `Model.survey`."""
-        for name in wanted:
-            if name not in SURVEYED:
-                raise InputError(f'no output "{name}".{did_you_mean(name, SURVEYED)}')
+    def inverse_kinematics(self, q: Any, v: Any, a: Any) -> ModelResult:
+        """As `Model.inverse_kinematics`."""
+        lead, (q, v_, a_) = self._states(q, v, a)
+        poses, reached = self.whole(q, v_, a_)
+        at = self.configuration(poses["pose"])
+        reached &= (at.discriminant >= 0).all(axis=1)
+        found = {"pose": poses["pose"], **vars(at), "condition": at.singularity.condition}
+        if v is not None or a is not None:
+            found["pose_rate"] = poses["pose_rate"]
+            if a is not None:
+                found["pose_acceleration"] = poses["pose_acceleration"]
+            still = dict.fromkeys(("force", "moment", "point"), np.zeros((1, 3)))
+            joints = self._system.kernel("system").run(poses | still).values
+            names = ("joint_rate", "joint_acceleration")[: 1 if a is None else 2]
+            found |= {name: joints[name].T for name in names}
+        status = np.where(reached, Status.ok, Status.unreachable).astype(np.uint8)
+        return ModelResult(**found, status=status).shaped(lead)
+
+    def _states(self, *given: Any) -> tuple[Lead, list[Array]]:
+        """q, v and a, (N, m) each; zero for None."""
+        own = self._arguments
+        arguments = (own.q, own.v, own.a)
+        still = np.zeros(own.q.size)
+        arrays = [
+            still if x is None and i else argument.array(x)
+            for i, (argument, x) in enumerate(zip(arguments, given, strict=True))
+        ]
+        lead, flat = samples(arguments, arrays)
+        shape = (max(map(len, flat)), own.q.size) if 0 not in lead else flat[0].shape
+        return lead, [np.broadcast_to(x, shape) for x in flat]
+
+    def survey(self, q: Array, wanted: Collection[str] = (), threads: int | None = None) -> Survey:
+        """What poses are like, each judged, as fast as the machine: for maps.
+
+        Args:    q: (N, m), in the order of `independent`.  wanted: of `SURVEYED`: pose, joint,
+                 transmission, rates (of the joints on v, lanes last but one), rows (of the
+                 dimensionless J_W), ratio, points (of the contacts).
+        Raises:  InputError: for a name that is none of these.
+        """
+        requested(wanted, SURVEYED)
         system = self._system
-        check_states(system.independent, q)
+        q = self._states(q, None, None)[1][0]
         wanted = tuple(name for name in SURVEYED if name in wanted)
         answer = system.kernel("survey", wanted).run({"q": q}, threads)
 
@@ -55,32 +91,34 @@ class Poses:
         iterated = not closed_form_available(forms, system.dependent)
         return judged(answer, iterated, follow, partial(system.robust.survey, wanted))
 
-    def matrices(self, q: Array, q1: Array, name: str, space: str) -> Array:
-        """One of the results of the question `matrices`, samples first."""
+    def matrix(self, name: str, q: Any, v: Any, space: str) -> Array:
+        """One of the results of the question `matrices`."""
         if space not in ("q", "X"):
-            raise InputError(f'no space "{space}".{did_you_mean(space, ("q", "X"))}')
-        check_states(self._system.independent, q, q1)
-        values = self._at("matrices", q, q1)
-        return np.moveaxis(values[name if space == "q" else f"{name}_X"], -1, 0)
+            hint = did_you_mean(str(space), ("q", "X"))
+            raise InputError(f'space: there is no "{space!s:.60}".{hint}')
+        lead, values = self._at("matrices", q, v)
+        found = np.moveaxis(values[name if space == "q" else f"{name}_X"], -1, 0)
+        return found.reshape((*lead, *found.shape[1:]))
 
-    def jacobians(self, q: Array) -> dict[str, Array]:
+    def jacobians(self, q: Any) -> ModelResult:
         """As `Model.jacobians`."""
-        check_states(self._system.independent, q)
-        values = self._at("jacobians", q, np.zeros_like(q))
-        found = {"J_theta": np.moveaxis(values["J_theta"], -1, 0).transpose(0, 2, 1)}
+        lead, values = self._at("jacobians", q, None)
+        found = {"J_theta": values["J_theta"].transpose(2, 1, 0)}
         found["M_J"] = np.moveaxis(values["M_J"], -1, 0)
         for name in ("M_1", "M_2", "M_3"):
             found[name] = values[name].transpose(3, 2, 0, 1)
-        return found
+        return ModelResult(**found).shaped(lead)
 
-    def _at(self, question: str, q: Array, q1: Array) -> dict[str, Array]:
+    def _at(self, question: str, q: Any, v: Any) -> tuple[Lead, dict[str, Array]]:
         """Results of a question on the platform's motion, at whole poses the contacts meet."""
-        poses, reached = self.whole(q, q1, np.zeros_like(q))
+        lead, (q, v, a) = self._states(q, v, None)
+        poses, reached = self.whole(q, v, a)
         if not reached.all():
             sample = int(np.argmin(reached))
             raise InputError(f"the contacts cannot be met at sample {sample}: q = {q[sample]}")
         kernel = self._system.kernel(question)
-        return kernel.run({port.name: poses[port.name] for port in kernel.interface.ports}).values
+        inputs = {port.name: poses[port.name] for port in kernel.interface.ports}
+        return lead, kernel.run(inputs).values
 
     def whole(self, q: Array, q1: Array, q2: Array) -> tuple[dict[str, Array], Array]:
         """X_EE and its rates, (N, 6) each, and where the contacts can be met."""
@@ -90,7 +128,11 @@ class Poses:
         return {name: a.T for name, a in answer.values.items()}, answer.status == Status.ok
 
     def of_motion(self, motion: Motion) -> tuple[States, float | None]:
-        """As `Model.independent_motion`."""
+        """q_EE and its rates, (N, m) each, from a motion of any kind.
+
+        Also returns the largest distance of a given whole pose from the contacts [m], which the
+        projection removes; None for other kinds.
+        """
         given = (motion.value, motion.rate, motion.acceleration)
         if motion.kind == "pose":
             columns = indices(self._system.independent)
@@ -99,19 +141,26 @@ class Poses:
         landmark = None
         if motion.kind == "landmark":
             landmark = resolve_landmark(motion.landmark, self._system.mechanism.platform.points)
-        return self.states(motion.names, given, landmark, None), None
+        return self.states(motion.names, given, landmark), None
 
     def contact_residual(self, pose: Array) -> float:
-        """As `Model.contact_residual`."""
+        """Largest |phi| of the contacts over poses, (N, 6) [m]."""
         if not self._system.mechanism.contacts:
             return 0.0
         phi = self._system.kernel("encoders").run({"pose": pose}).values["phi"]
         return float(np.nanmax(np.abs(phi)))
 
     def states(
-        self, names: Collection[str], given: States, landmark: str | None, threads: int | None
+        self,
+        names: Collection[str],
+        given: States,
+        landmark: str | None = None,
+        threads: int | None = None,
     ) -> States:
-        """As `Model.independent_states`."""
+        """q_EE and its rates from another set of coordinates or a landmark's displacement.
+
+        Samples that the contacts cannot meet come back as NaN.
+        """
         names, independent = list(names), self._system.independent
         if landmark is None and sorted(names) == sorted(independent):
             return given if tuple(names) == independent else _ordered(given, names, independent)
@@ -134,16 +183,15 @@ def _ordered(given: States, names: list[str], wanted: Collection[str]) -> States
     return q, q1, q2
 
 
-def configured(values: Mapping[str, Array], length: float) -> Configuration:
+CONFIGURATION = ("joint", "beta", "gamma", "cos_gamma", "discriminant")
+
+
+def configured(values: Mapping[str, Array], length: float) -> ModelResult:
     """Results of a kernel, samples last, as a configuration; length: the characteristic one [m]."""
-    joint, beta, gamma, cos_gamma, discriminant = (
-        values[name].T for name in ("joint", "beta", "gamma", "cos_gamma", "discriminant")
-    )
-    points, normals = (
-        np.moveaxis(values[name], -1, 0) for name in ("contact_point", "contact_normal")
-    )
-    measures = singularity(values, length)
-    return Configuration(joint, beta, gamma, cos_gamma, discriminant, points, normals, measures)
+    found = {name: values[name].T for name in CONFIGURATION}
+    for name in ("contact_point", "contact_normal"):
+        found[name] = np.moveaxis(values[name], -1, 0)
+    return ModelResult(**found, singularity=singularity(values, length))
 
 
 def singularity(values: Mapping[str, Array], length: float) -> Singularity:

@@ -23,8 +23,9 @@ from ..questions import Question
 from ..questions.friction import MOST
 from ..questions.numbers import Layout, characteristic, require_closed_form, specialised
 from ..questions.structure import structure_of
+from .arguments import sample_rows
 from .closing import Closure
-from .distributing import LEAST, Distributor, Policy
+from .distributing import LEAST, Distribution, Distributor
 from .robust_path import Arrays, Robust
 
 
@@ -109,7 +110,7 @@ class System:
     @cached_property
     def robust(self) -> Robust:
         """Where samples go that a kernel cannot vouch for."""
-        distributor = Distributor(self.mechanism, Policy(LEAST))
+        distributor = Distributor(self.mechanism, Distribution(LEAST))
         return Robust(self.structure, self.numbers, self.independent, distributor)
 
 
@@ -124,7 +125,7 @@ def mended(
     """
     again = np.flatnonzero(answer.status == AGAIN)
     if again.size:
-        few = {name: np.asarray(a, dtype=float)[again] for name, a in inputs.items()}
+        few = sample_rows(inputs, again, len(answer.status))
         better, answer.status[again] = robust(few)
         for name, value in answer.values.items():
             value[..., again] = better[name]

@@ -169,7 +169,7 @@ def check(mechanism: Any) -> MechanismSummary:
     """
     mechanism = as_mechanism(mechanism)
     model = Model(mechanism, backend="numpy")  # one pose: building a kernel takes longer
-    s = model.configuration(np.zeros((1, 6))).singularity
+    s = model.poses.configuration(np.zeros((1, 6))).singularity
     room = ball_around_home(model)
     m = mechanism.degrees_of_freedom
     platform = mechanism.platform

@@ -66,6 +66,11 @@ class Derived:
         return lost if self.all_ok else lost & self.ok[:, None]
 
     @cached_property
+    def share(self) -> np.ndarray:
+        """Of the efforts, needed by each part, (parts, N, n)."""
+        return np.moveaxis(self.evaluation.share, 1, 0)
+
+    @cached_property
     def sliding_speed(self) -> np.ndarray:
         """Of the platform where it touches, (N, k) [m/s]."""
         return np.linalg.norm(self.evaluation.slip, axis=2)

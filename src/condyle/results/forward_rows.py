@@ -11,8 +11,8 @@ from ..kinematics.causes import FLAG, Owner, cause_text, causes, owners, sample_
 from ..kinematics.chain import FAMILIES
 from ..kinematics.constraints import indices
 from ..mechanism.mechanism import COORDINATES
-from ..model.data import Accelerations
 from ..model.model import Model
+from ..model.model_result import ModelResult
 from ..motion import Table
 from ..status import Status
 from .contacts import contact_loss, contact_loss_columns
@@ -60,13 +60,21 @@ def forward_states(
     def solved(table: Table, first_row: int) -> Columns:
         names = given.names(table)
         q, q1, _ = given.states(table, names, threads)
-        effort, load = table.require(efforts), given.loads(table, load_point)
-        found = model.forward(q, q1, effort, load, ("motion", "joint"), threads)
+        effort, (wrench, at) = table.require(efforts), given.loads(table, load_point)
+        found = model.forward_dynamics(
+            q,
+            q1,
+            effort,
+            wrench,
+            at,
+            outputs=("pose", "pose_acceleration", "joint"),
+            threads=threads,
+        )
         cause = _causes(model, found, flag, first_row)
         good = (found.status == Status.ok)[:, None]
-        pose, joint = (np.where(good, found[name], np.nan) for name in ("pose", "joint"))
+        pose, joint = (np.where(good, a, np.nan) for a in (found.pose, found.joint))
         columns: Columns = {}
-        columns |= named_columns("dd", names, found["pose_acceleration"][:, indices(names)])
+        columns |= named_columns("dd", names, found.pose_acceleration[:, indices(names)])
         columns |= named_columns("contact_", mechanism.contact_names, found.contact_force)
         columns |= named_columns("", COORDINATES, pose)
         columns |= named_columns("joint_", mechanism.chain_names, joint)
@@ -87,15 +95,15 @@ def forward_states(
     return StatesReport(data | {"warnings": warnings, "files": [Path(out)]})
 
 
-def _causes(model: Model, found: Accelerations, flag: bool, first_row: int) -> np.ndarray:
+def _causes(model: Model, found: ModelResult, flag: bool, first_row: int) -> np.ndarray:
     """What each row fails by, (N,), as `causes` counts.
 
     Raises: SampleError: for rows that fail, unless they are kept.
     """
     if not found.status.any():
         return np.zeros(len(found.status), dtype=np.int16)
-    c = model.configuration(found["pose"])
-    about = found.status, found["pose"], c.discriminant, c.singularity
+    c = model.poses.configuration(found.pose)
+    about = found.status, found.pose, c.discriminant, c.singularity
     cause = causes(*about)
     if flag:
         return cause

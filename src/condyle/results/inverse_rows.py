@@ -10,9 +10,10 @@ import numpy as np
 
 from ..atomic import replacing
 from ..errors import InputError
-from ..model.data import require_ok
+from ..model.inverse_dynamics import SOLVED
 from ..model.joint_reactions import reactions as joint_reactions
 from ..model.model import Model
+from ..model.model_result import require_ok
 from ..motion import Table
 from .contacts import AXES, contact_loss_columns
 from .derived import Derived
@@ -94,7 +95,7 @@ def solve_states(
             "mechanism": model.mechanism.name,
             "formulation": model.formulation,
             "route": model.route,
-            "distribution": model.policy.objective,
+            "distribution": model.distribution.name,
             "rows": rows,
             "greatest_activation": None if greatest is None else greatest._asdict(),
             "warnings": warnings,
@@ -131,9 +132,9 @@ def solve_table(
             f"{', '.join(names)}, their rates and accelerations. Remove the other columns"
         )
     states = given.states(table, names, threads)
-    load = given.loads(table, load_point)
-    evaluation = model.evaluate(*states, load, threads)
-    derived = Derived(mechanism, evaluation, load[:, :6], model.limited)
+    wrench, at = given.loads(table, load_point)
+    evaluation = model.inverse_dynamics(*states, wrench, at, outputs=SOLVED, threads=threads)
+    derived = Derived(mechanism, evaluation, wrench, model.limited)
     if not flag:
         require_ok(mechanism, evaluation, row_offset=first_row)
 

@@ -130,7 +130,7 @@ def pose_states(
     time = table.columns.get("t")
     with step("finding poses"):
         solution = ForwardKinematics(mechanism).solve(given, time, tolerance)
-    status, found = solution.status, solution.found
+    status, found = solution.status, solution.status == PoseStatus.OK
     units = _units(mechanism)
     missing = np.flatnonzero(~found)
     if missing.size and not flag:

@@ -13,10 +13,11 @@ import xarray as xr
 from ..kinematics.chain import FAMILIES
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..mechanism.writing import record
-from ..model.data import Evaluation, require_ok
+from ..model.inverse_dynamics import SOLVED
 from ..model.joint_reactions import Reaction
 from ..model.joint_reactions import reactions as joint_reactions
-from ..model.model import Model, with_point
+from ..model.model import Model
+from ..model.model_result import ModelResult, require_ok
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
 from ..progress import step
 from ..questions.equations import LOAD as LOAD_PART
@@ -44,10 +45,9 @@ def solve(
     name = load_point or load.point
     if np.any(wrench) or name is not None:
         name = resolve_load_point(name, model.mechanism.platform.points)
-    point = np.zeros(3) if name is None else model.load_point(name)
     with step("solving"):
-        states, residual = model.independent_motion(motion)
-        evaluation = model.evaluate(*states, with_point(wrench, point), threads)
+        states, residual = model.poses.of_motion(motion)
+        evaluation = model.inverse_dynamics(*states, wrench, name, outputs=SOLVED, threads=threads)
     if not flag:
         require_ok(model.mechanism, evaluation, motion.t)
     seconds = time.perf_counter() - start
@@ -65,7 +65,7 @@ def assemble(
     load: Load,
     wrench: np.ndarray,
     load_point: str | None,
-    evaluation: Evaluation,
+    evaluation: ModelResult,
     residual: float | None,
     seconds: float,
 ) -> xr.Dataset:
@@ -91,7 +91,7 @@ def assemble(
     }
     title = f"Inverse dynamics of {model.mechanism.name}"
     solution = labelled(model, derived, motion.t, model.parts, title, options, watch.notices())
-    solution["effort"].attrs["long_name"] = chosen(model.policy.objective)
+    solution["effort"].attrs["long_name"] = chosen(str(model.distribution.name))
     return solution
 
 
@@ -156,9 +156,9 @@ def _options(model: Model, own: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "formulation": model.formulation,
         "route": model.route,
-        "distribution": model.policy.objective,
-        "preload": model.policy.preload,
-        "contact_weight": model.policy.contact_weight * model.reference_force**2,
+        "distribution": model.distribution.name,
+        "preload": model.distribution.preload,
+        "contact_weight": model.distribution.contact_weight,
         "reference_force": model.reference_force,
         "independent": list(model.independent),
         "dependent": list(model.dependent),

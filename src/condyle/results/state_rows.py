@@ -15,9 +15,9 @@ import numpy as np
 
 from ..errors import InputError, WarningError
 from ..mechanism.mechanism import COORDINATES
-from ..model.model import Model, with_point
+from ..model.model import Model
 from ..model.poses import States
-from ..motion import Table, TableWriter, iter_table
+from ..motion import Table, TableWriter, iter_table, resolve_load_point
 from ..motion.column_units import Dimension, dimension
 from .variables import WRENCH
 
@@ -83,17 +83,18 @@ class StateColumns:
             own = np.zeros_like(given[0]) if rest else table.require([prefix + n for n in names])
             given.append(own)
         q, q1, q2 = [*given, np.zeros_like(given[0])][:3]
-        return self.model.independent_states(names, q, q1, q2, threads=threads)
+        return self.model.poses.states(names, (q, q1, q2), threads=threads)
 
-    def loads(self, table: Table, load_point: str | None) -> np.ndarray:
-        """Loads of a table, (N, 9): zero where it has none, at a point where there is a force."""
-        wrench, point = np.zeros((table.rows, 6)), np.zeros(3)
+    def loads(self, table: Table, load_point: str | None) -> tuple[np.ndarray, str | None]:
+        """Wrenches of a table, (N, 6): zero where it has none; and their point, where there is a
+        force."""
+        wrench, point = np.zeros((table.rows, 6)), None
         given = [name for name in WRENCH if name in table.columns]
         for name in given:
             wrench[:, WRENCH.index(name)] = table.columns[name]
         if load_point is not None or set(given) & set(WRENCH[:3]):
-            point = self.model.load_point(load_point)
-        return with_point(wrench, point)
+            point = resolve_load_point(load_point, self.model.mechanism.platform.points)
+        return wrench, point
 
     def stream(
         self,

@@ -251,7 +251,7 @@ VARIABLES = (
     ),
     Variable(
         "share", ("part", *_CHAIN), of_effort(), "effort that each part of the mechanism needs",
-        "evaluation.share",
+        "share",
     ),
     Variable(
         "contact_loss", _CONTACT, "1",

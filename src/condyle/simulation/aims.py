@@ -72,7 +72,7 @@ def path_of(model: Model, motion: Motion, force: float | None, file: str | None)
 
     Args: force: f_d [N] at all times;  file: CSV of t, force instead.
     """
-    q = model.independent_motion(motion)[0][0]
+    q = model.poses.of_motion(motion)[0][0]
     if not np.isfinite(q).all():
         bad = int(np.argmin(np.isfinite(q).all(axis=1)))
         raise InputError(

@@ -12,6 +12,7 @@ from ..kinematics.chain import FAMILIES
 from ..mechanism import load_mechanism
 from ..mechanism.chain import limits
 from ..mechanism.home import characteristic_length
+from ..model.distributing import Distribution
 from ..model.model import Model
 from ..motion import Load as LoadTable
 from ..motion import Motion, read_table, resolve_load_point
@@ -135,7 +136,8 @@ def _loads(
                 "loads: expected functions (t, s, v) -> force, or (function, point), got "
                 f"{type(function).__name__}"
             )
-        at = np.zeros(3) if point is None else model.load_point(point)
+        points = model.mechanism.platform.points
+        at = np.zeros(3) if point is None else np.array(points[resolve_load_point(point, points)])
         by_function[len(found)] = function
         none, name = {WRENCH: np.zeros(6)}, f"function_{i + 1}"
         found.append(Load(Constant, name, at, point, none))
@@ -191,17 +193,16 @@ def _closed(
     motion: Motion | None,
 ) -> ClosedLoop:
     table = scenario.controller
-    own = model.choosing(table.distribution, table.preload) if _chooses(table) else model
+    own = model.with_distribution(_distribution(table)) if _chooses(table) else model
     if table.model is not None:
         other = load_mechanism(table.model)
         _same_machine(model, other, table.model)
         own = type(model)(
             other,
-            model.formulation,
-            model.route,
-            model.backend.asked,
-            table.distribution,
-            table.preload,
+            formulation=model.formulation,
+            route=model.route,
+            distribution=_distribution(table),
+            backend=model.backend.asked,
         )
     law = table.bind(machine_of(own)) if function is None else Law(None)
     path = path_of(
@@ -215,6 +216,10 @@ def _closed(
     period = 1.0 / table.rate
     sensing = _sensing(own, scenario, period)
     return ClosedLoop(own, law, path, period, table.delay, sensing, function)
+
+
+def _distribution(table: Any) -> Distribution:
+    return Distribution(table.distribution, table.preload)
 
 
 def _chooses(table: Any) -> bool:

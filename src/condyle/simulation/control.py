@@ -37,6 +37,7 @@ class Controller:
     def __init__(self, plans: Sequence[Plan]) -> None:
         plan, drive = plans[0], drive_of(plans[0])
         sensing = drive.sensing
+        self._inverse = drive.model.unchecked()
         self._model, velocity = drive.model, None if sensing is None else sensing.velocity
         self.details = (drive.law.table, drive.law.choices, velocity)
         function = drive.law.table is None
@@ -190,8 +191,9 @@ class Controller:
             if not seen.result(REQUEST).size:
                 return np.zeros(n)
             q, q1, q2, force, point = np.split(seen[REQUEST], [m, 2 * m, 3 * m, 3 * m + 3])
-            load = np.concatenate([force, np.zeros(3), point])
-            return self._model.one(q, q1, q2, load)
+            wrench = np.concatenate([force, np.zeros(3)])
+            found: np.ndarray = self._inverse.inverse_dynamics(q, q1, q2, wrench, point)
+            return found
         names = ("q", "q1", "joint", "joint_rate")
         now = Seen(**{name: seen[name] for name in names}, force=seen["measured_force"], t=t)
         *aim, force = (seen.given[seen.rows(name), 0] for name in AIMS)

@@ -187,12 +187,11 @@ class Plant:
             raise NoRateError(Status.unreachable)
         asked = columns.given[columns.rows("effort"), 0]
         effort = np.clip(asked, self.plan.low, self.plan.high)
-        load = np.concatenate([self["wrench"], np.zeros(3)])
-        found = self._model.forward(y[None, :m], y[None, m : 2 * m], effort[None], load[None])
-        if found.status[0]:
-            raise NoRateError(int(found.status[0]))
-        force, rate = found.contact_force[0], columns.result("rate")
-        columns.found[rate[m : 2 * m], 0] = found.acceleration[0]
+        found = self._model.forward_dynamics(y[:m], y[m : 2 * m], effort, self["wrench"])
+        if found.status:
+            raise NoRateError(int(found.status))
+        force, rate = found.contact_force, columns.result("rate")
+        columns.found[rate[m : 2 * m], 0] = found.acceleration
         columns.found[rate[2 * m + 3], 0] = np.abs(force) @ self["rub"]
         columns.found[columns.result("contact_force"), 0] = force
         first = len(self._bounded)

@@ -10,9 +10,9 @@ import numpy as np
 import xarray as xr
 
 from ..errors import InputError
-from ..model.data import Evaluation
 from ..model.distributing import shares
-from ..model.model import Model, with_point
+from ..model.model import Model
+from ..model.model_result import ModelResult
 from ..questions.equations import INTERNAL
 from ..results.derived import Derived
 from ..results.solving import labelled
@@ -33,8 +33,7 @@ def solved(plan: Plan, trace: Trace, scenario: Scenario, source: str, started: f
     q, q1 = trace.state[:, :m], trace.state[:, m : 2 * m]
     acted = Plant([plan]).along(trace.t, trace.state, trace.modes)
     wrench = acted["wrench"]
-    load = with_point(wrench, np.zeros(3))
-    evaluation = _evaluation(model, q, q1, trace.effort, load)
+    evaluation = _evaluation(model, q, q1, trace.effort, wrench)
     simulated = _energy(model, q, q1, trace, plan)
     if any(not chain.actuator.ideal for chain in model.mechanism.chains):
         simulated["actuator_loss"] = acted["loss"]
@@ -70,32 +69,18 @@ def solved(plan: Plan, trace: Trace, scenario: Scenario, source: str, started: f
 
 
 def _evaluation(
-    model: Model, q: np.ndarray, q1: np.ndarray, effort: np.ndarray, load: np.ndarray
-) -> Evaluation:
+    model: Model, q: np.ndarray, q1: np.ndarray, effort: np.ndarray, wrench: np.ndarray
+) -> ModelResult:
     """Everything about the states of a trace, from forward dynamics."""
-    found = model.forward(q, q1, effort, load, ("motion", "joint", "sliding"))
-    ports = {name: found[name] for name in ("pose", "pose_rate", "pose_acceleration")}
-    ports |= {"force": load[:, :3], "moment": load[:, 3:6], "point": load[:, 6:]}
-    s = {
-        name: np.moveaxis(a, -1, 0) for name, a in model.kernel("system").run(ports).values.items()
-    }
+    found = model.forward_dynamics(q, q1, effort, wrench, outputs="all")
+    ports = {name: getattr(found, name) for name in ("pose", "pose_rate", "pose_acceleration")}
+    ports |= {"force": wrench[:, :3], "moment": wrench[:, 3:], "point": np.zeros((1, 3))}
+    values = model.kernel("system").run(ports).values
+    s = {name: np.moveaxis(a, -1, 0) for name, a in values.items()}
     rubbed = any(c.friction.coefficient for c in model.mechanism.contacts)
     share = shares(s, effort, found.contact_force if rubbed else None)
-    return Evaluation(
-        found["pose"],
-        found["pose_rate"],
-        found["pose_acceleration"],
-        effort,
-        share.transpose(2, 0, 1),
-        found.contact_force,
-        found["joint_rate"],
-        found["joint_acceleration"],
-        model.configuration(found["pose"]),
-        found["slip"],
-        found["friction_force"],
-        np.ones(len(q)),
-        found.status,
-    )
+    own = {"effort": effort, "share": share.transpose(0, 2, 1), "shortfall": np.ones(len(q))}
+    return ModelResult(**vars(found), **own)
 
 
 def _energy(

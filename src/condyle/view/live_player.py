@@ -109,7 +109,7 @@ class LivePlayer:
         except NoRateError:
             stale = True
         now = self.state
-        found = self._model.configuration(now.pose[None])
+        found = self._model.poses.configuration(now.pose[None])
         margin = bound_margins(self.mechanism, found.contact_point)[0]
         level, messages = self._messages(now, margin)
         return Snapshot.at(

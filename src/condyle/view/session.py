@@ -14,8 +14,9 @@ from ..kinematics.constraints import indices
 from ..kinematics.singularities import KINDS, NEAR_SINGULAR
 from ..mechanism import COORDINATES, Mechanism
 from ..mechanism.chain import limits
-from ..model.data import Evaluation, unreachable_cause
+from ..model.inverse_dynamics import SOLVED
 from ..model.model import Model
+from ..model.model_result import ModelResult, unreachable_cause
 from ..motion.points import DEFAULT_LOAD_POINT
 from ..results.contacts import bound_margins
 from ..status import Status
@@ -212,10 +213,9 @@ class Session:
             **measures,
         )
 
-    def _evaluate(self, q: np.ndarray) -> Evaluation:
-        load = np.concatenate([self.load, np.zeros(3), self._load_at()])
-        rest = np.zeros_like(q)
-        return self.model.evaluate(q, rest, rest, np.repeat(load[None], len(q), axis=0))
+    def _evaluate(self, q: np.ndarray) -> ModelResult:
+        rest, wrench = np.zeros_like(q), np.concatenate([self.load, np.zeros(3)])
+        return self.model.inverse_dynamics(q, rest, rest, wrench, self._load_at(), outputs=SOLVED)
 
     def _load_at(self) -> np.ndarray:
         return place_of(self.mechanism, self.load_point)

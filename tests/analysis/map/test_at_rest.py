@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.optimize import linprog
+from support.loads import load_point_of, parts
 
 import condyle
 from condyle.analysis.map import load_capacity
@@ -25,7 +26,7 @@ def test_efforts_are_those_of_inverse_dynamics(model_of: Models) -> None:
     q = grid.block(0, grid.size)
     point = model.mechanism.platform.points["incisor"]
     load = np.tile([0, 0, -20, 0, 0.3, 0, *point], (len(q), 1))
-    right = model.torques(q, 0 * q, 0 * q, load, ("contact",))
+    right = model.inverse_dynamics(q, 0 * q, 0 * q, *parts(load))
     assert np.isfinite(right.effort).all(axis=1).sum() == len(q) - 1  # one is out of reach
     np.testing.assert_allclose(found.effort.values.reshape(-1, 6), right.effort, rtol=1e-13)
     force = found.contact_force.values.reshape(-1, 2)
@@ -68,9 +69,9 @@ def test_holding_by_facets_and_by_chosen_efforts(
     model = model_of("masticatory")
     grid = grid_of(model.mechanism, ["X=-3:4:8 mm", "beta=-6:6:8 deg"])
     q = grid.block(0, grid.size)
-    survey = model.survey(q, ("pose",))
+    survey = model.poses.survey(q, ("pose",))
     pose = survey.values["pose"].T[survey.reached]
-    load = np.array([0, 0, -240.0, 0, 0, 0, *model.load_point("incisor")])
+    load = np.array([0, 0, -240.0, 0, 0, 0, *load_point_of(model, "incisor")])
     own = load_capacity.LoadCapacity.of(model)
     held = own.holds(pose, load)
     assert 5 < held.sum() < len(held) - 5
@@ -80,10 +81,10 @@ def test_holding_by_facets_and_by_chosen_efforts(
 
 def by_program(model: condyle.Model, pose: np.ndarray, direction: np.ndarray, side: str) -> float:
     q = pose[None, [0, 1, 3, 4]]
-    J = model.jacobians(q)["J_theta"][0]  # (n, 6)
+    J = model.jacobians(q).J_theta[0]  # (n, 6)
     gravity = model.gravity(q, space="X")[0]
     E = condyle_rotation(pose)
-    point = model.load_point(None)
+    point = load_point_of(model, None)
     force = np.concatenate([direction, E[1].T @ np.cross(E[0] @ point, direction)])
     normals = []
     for contact in model.mechanism.contacts:
@@ -116,7 +117,7 @@ def test_speed_is_the_least_of_all_directions(model_of: Models) -> None:
     rates = ways / [1, 1, length, length, length]
     for value, speed in zip(found.X.values, found.speed.values, strict=True):
         J = model.jacobians(np.array([[value, 0, 0, 0, 0]]))
-        joints = np.abs(rates @ (J["J_theta"][0] @ J["M_J"][0]).T)
+        joints = np.abs(rates @ (J.J_theta[0] @ J.M_J[0]).T)
         most = np.array([limits(chain).speed for chain in model.mechanism.chains])
         allowed = (most / joints).min(axis=1)
         assert allowed.min() >= speed * (1 - 1e-12)
@@ -135,7 +136,7 @@ def test_stiffness_is_the_curvature_of_the_springs_energy(model_of: Models) -> N
     ).isel(X=0)
 
     def energy(states: np.ndarray) -> np.ndarray:
-        joint = model.survey(np.vstack([q, states]), ("joint",)).values["joint"].T
+        joint = model.poses.survey(np.vstack([q, states]), ("joint",)).values["joint"].T
         return 0.5 * ((joint[1:] - joint[0]) ** 2) @ k
 
     h = np.array([1e-5, 1e-5, 2e-4, 2e-4])

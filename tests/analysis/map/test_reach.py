@@ -94,8 +94,8 @@ def test_surveys_agree_with_evaluations(model_of: Models, name: str) -> None:
     spans = [0.3 * model.characteristic_length if c in "XYZ" else 0.4 for c in model.independent]
     q = rng.uniform(-1, 1, (150, len(spans))) * spans
     still = np.zeros_like(q)
-    right = model.evaluate(q, still, still, np.zeros((len(q), 9)))
-    found = model.survey(q, ("pose", "joint", "ratio", "points", "rates"))
+    right = model.inverse_dynamics(q, still, still, outputs="all")
+    found = model.poses.survey(q, ("pose", "joint", "ratio", "points", "rates"))
     np.testing.assert_array_equal(found.status == 1, right.status == 1)
     good = right.status == 0
     assert 20 < good.sum() < 150
@@ -108,5 +108,5 @@ def test_surveys_agree_with_evaluations(model_of: Models, name: str) -> None:
     np.testing.assert_allclose(points, c.contact_point[good], atol=1e-13)
     jacobians = model.jacobians(q[good])
     rates = np.moveaxis(found.values["rates"], -1, 0).transpose(0, 2, 1)[good]
-    expected = jacobians["J_theta"] @ jacobians["M_J"]
+    expected = jacobians.J_theta @ jacobians.M_J
     np.testing.assert_allclose(rates, expected, atol=1e-9 * np.abs(expected).max())

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.loads import parts
 
 from condyle.analysis.map.axes import Axis, Grid
 from condyle.analysis.map.free_space import FreeSpace, best_box, greatest_ball, greatest_box
@@ -131,8 +132,8 @@ def test_room_of_a_mechanism(model_of: Models) -> None:
 
     def fine(q: np.ndarray) -> np.ndarray:
         load = np.tile(setup.load, (len(q), 1))
-        bounded = model.choosing("bounded")
-        e = bounded.evaluate(q, 0 * q, 0 * q, load)
+        bounded = model.with_distribution("bounded")
+        e = bounded.inverse_dynamics(q, 0 * q, 0 * q, *parts(load), outputs="all")
         inside = (bound_margins(model.mechanism, e.configuration.contact_point) >= 0).all(axis=1)
         ok = (e.status == 0) & inside & (e.configuration.singularity.ratio >= 0.1)
         high = np.array([limits(chain).high for chain in model.mechanism.chains])

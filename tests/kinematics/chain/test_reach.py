@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from support.families import case
+from support.loads import parts
 
 import condyle
 from condyle.errors import UnreachableError
 from condyle.mechanism import Mechanism
-from condyle.model.data import require_ok
 from condyle.model.model import Model
+from condyle.model.model_result import require_ok
 from condyle.status import Status
 
 
@@ -22,7 +23,7 @@ def test_a_rail_too_far_from_its_joint() -> None:
     model = Model(hexaglide(), backend="numpy")
     q = np.zeros((2, 5))
     q[1, 1] = 0.3  # sideways, by more than the rods reach
-    evaluation = model.evaluate(q, 0 * q, 0 * q, np.zeros((2, 9)))
+    evaluation = model.inverse_dynamics(q, 0 * q, 0 * q, outputs="all")
     assert evaluation.status.tolist() == [0, Status.unreachable]
     with pytest.raises(UnreachableError) as caught:
         require_ok(model.mechanism, evaluation)
@@ -40,7 +41,7 @@ def test_travel_follows_the_platform_along_the_rails() -> None:
     model = Model(mechanism, backend="numpy")
     q = np.zeros((3, 6))
     q[:, 0] = [-0.03, 0.0, 0.04]
-    evaluation = model.evaluate(q, 0 * q, 0 * q, np.zeros((3, 9)))
+    evaluation = model.inverse_dynamics(q, 0 * q, 0 * q, outputs="all")
     np.testing.assert_allclose(
         evaluation.configuration.joint, q[:, :1].repeat(6, axis=1), atol=1e-15
     )
@@ -64,7 +65,7 @@ def test_leg_coordinate_is_the_change_of_length() -> None:
     model = Model(c.mechanism, backend="numpy")
     q = np.zeros((2, 6))
     q[1, :3] = [0.004, -0.003, 0.006]
-    joint = model.evaluate(q, 0 * q, 0 * q, np.zeros((2, 9))).configuration.joint
+    joint = model.inverse_dynamics(q, 0 * q, 0 * q, outputs="all").configuration.joint
     for i, chain in enumerate(c.mechanism.chains):
         leg = np.subtract(chain.platform, chain.base)
         change = np.linalg.norm(leg + q[1, :3]) - np.linalg.norm(leg)
@@ -79,7 +80,7 @@ def test_extension_pushes() -> None:
     zero = np.zeros((1, 6))
     load = np.zeros((1, 9))
     load[0, 2] = -1e4
-    effort = model.evaluate(zero, zero, zero, load).effort
+    effort = model.inverse_dynamics(zero, zero, zero, *parts(load)).effort
     assert (effort > 1e4 / 6).all()
 
 

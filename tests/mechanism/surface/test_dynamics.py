@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from oracles import newton_euler
 from oracles.random_mechanism import random_mechanism, random_state
+from support.loads import load_point_of, parts
 from support.speeds import few, slow
 from support.surfaces import close
 
@@ -17,8 +18,8 @@ from condyle.dynamics import FORMULATIONS
 from condyle.mechanism import Mechanism
 from condyle.mechanism.files import from_data
 from condyle.mechanism.surface import Expression, Plane, Profile, Quadratic, Sphere
-from condyle.model.data import Evaluation
 from condyle.model.model import Model
+from condyle.model.model_result import ModelResult
 
 COUNT = 4
 MECHANISMS: dict[str, dict[str, Any]] = {
@@ -40,13 +41,13 @@ def interpreted(mechanism: Mechanism, *choices: str) -> Model:
     return Model(mechanism, *choices, backend="numpy")
 
 
-def evaluate(model: Model, states: dict[str, Any]) -> Evaluation:
+def evaluate(model: Model, states: dict[str, Any]) -> ModelResult:
     """At the oracles' states, given in any coordinates."""
     motion = (states[key] for key in ("q", "qd", "qdd"))
-    q, q1, q2 = model.independent_states(states["names"], *motion)
-    point = model.load_point(states["load_point"])
+    q, q1, q2 = model.poses.states(states["names"], tuple(motion))
+    point = load_point_of(model, states["load_point"])
     load = np.hstack([states["wrench"], np.tile(point, (len(q), 1))])
-    return model.evaluate(q, q1, q2, load)
+    return model.inverse_dynamics(q, q1, q2, *parts(load), outputs="all")
 
 
 @pytest.mark.parametrize("name", few(MECHANISMS, "quadratic_k1", rest=slow))
@@ -92,7 +93,7 @@ def with_surfaces(reference: Mechanism, *surfaces: Any, **options: Any) -> Mecha
     return reference.replace(contacts=contacts)
 
 
-def same(got: Evaluation, wanted: Evaluation, tolerance: float) -> None:
+def same(got: ModelResult, wanted: ModelResult, tolerance: float) -> None:
     close(got.pose, wanted.pose, tolerance)
     close(got.pose_acceleration, wanted.pose_acceleration, tolerance)
     close(got.effort, wanted.effort, tolerance)

@@ -51,12 +51,12 @@ def by_numpy(name: str) -> Model:
     return Model(case(name).mechanism, distribution=distribution, backend="numpy")
 
 
-def load_of(c: Rubbing) -> Array:
-    """(N, 9), as models take it."""
+def load_of(c: Rubbing) -> tuple[Array, Array]:
+    """Wrench and point, as models take them."""
     wrench, where = c.states["wrench"], c.states["load_point"]
     points = c.mechanism.platform.points
     point = points[where] if where else (0.0, 0.0, 0.0)
-    return np.hstack([wrench, np.tile(point, (len(wrench), 1))])
+    return wrench, np.tile(point, (len(wrench), 1))
 
 
 def efforts(c: Rubbing) -> Array:

@@ -9,6 +9,7 @@ from oracles.energy import energy
 from oracles.random_mechanism import random_mechanism, toml_text
 from oracles.rotations import platform_motion
 from scipy.integrate import solve_ivp
+from support.loads import parts
 
 from condyle.mechanism import parse
 from condyle.model.model import Model
@@ -49,16 +50,16 @@ def followed(raw: dict, duration: float, q: np.ndarray, q1: np.ndarray) -> tuple
     m, effort, load = len(q), np.zeros(len(d.chains)), np.zeros(9)
 
     def slope(t: float, x: np.ndarray) -> np.ndarray:
-        return np.r_[x[m:], model.forward_one(x[:m], x[m:], effort, load)]
+        return np.r_[x[m:], model.unchecked().forward_dynamics(x[:m], x[m:], effort, *parts(load))]
 
     t = np.linspace(0, duration, 200)
     found = solve_ivp(slope, (0, duration), np.r_[q, q1], "DOP853", t, rtol=1e-11, atol=1e-13).y.T
     assert np.isfinite(found).all()
-    given = found[:, :m], found[:, m:], np.zeros((len(t), len(effort))), np.zeros((len(t), 9))
-    states = model.forward(*given, ("motion",))
-    motions = map(platform_motion, states["pose"], states["pose_rate"])
+    given = found[:, :m], found[:, m:], np.zeros((len(t), len(effort)))
+    states = model.forward_dynamics(*given, outputs="all")
+    motions = map(platform_motion, states.pose, states.pose_rate)
     kinetic, potential = np.array([energy(d, motion) for motion in motions]).T
     both = kinetic + potential
-    gap = max(np.abs(residuals(d, pose)).max() for pose in states["pose"])
+    gap = max(np.abs(residuals(d, pose)).max() for pose in states.pose)
     turns = int((np.diff(np.sign(found[:, m])) != 0).sum())
     return float(np.ptp(both) / kinetic.max()), float(gap), turns

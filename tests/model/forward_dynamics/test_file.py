@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.loads import load_point_of, parts, with_point
 
 import condyle
 from condyle.mechanism import COORDINATES
-from condyle.model.model import Model, with_point
+from condyle.model.model import Model
 
 NAMES = ("X", "Y", "alpha", "beta")
 LOAD = ("Fx", "Fy", "Fz")
@@ -71,26 +72,32 @@ def test_columns_and_digits(condyle_command: Run, model: Model) -> None:
         *COORDINATES,
         *(f"joint_{name}" for name in chains),
     ]
-    load = with_point(np.hstack([force, 0 * force]), model.load_point("incisor"))
-    found = model.forward(q, q1, effort, load, ("motion", "joint"))
-    wanted = [found.acceleration, found.contact_force, found["pose"], found["joint"]]
+    load = with_point(np.hstack([force, 0 * force]), load_point_of(model, "incisor"))
+    found = model.forward_dynamics(
+        q,
+        q1,
+        effort,
+        *parts(load),
+        outputs="all",
+    )
+    wanted = [found.acceleration, found.contact_force, found.pose, found.joint]
     np.testing.assert_array_equal(np.array(rows, dtype=float), np.hstack(wanted))
 
 
 def test_other_coordinates(condyle_command: Run, model: Model) -> None:
     """A state in Z and gamma gets its accelerations in these."""
     q, q1, effort = drawn(model)
-    found = model.forward(q, q1, effort, np.zeros((COUNT, 9)), ("motion",))
+    found = model.forward_dynamics(q, q1, effort, outputs="all")
     names = ("Y", "Z", "beta", "gamma")
     at = [COORDINATES.index(name) for name in names]
     head = [*names, *(f"d{n}" for n in names)]
     head += [f"tau_{n} [N mm]" for n in model.mechanism.chain_names]
-    rows = np.hstack([found["pose"][:, at], found["pose_rate"][:, at], 1e3 * effort])
+    rows = np.hstack([found.pose[:, at], found.pose_rate[:, at], 1e3 * effort])
     write(Path("in.csv"), head, rows)
     assert condyle_command(*WORDS).status == 0
     columns, cells = read("out.csv")
     assert columns[:4] == [f"dd{name}" for name in names]
-    second = found["pose_acceleration"]
+    second = found.pose_acceleration
     size = np.abs(second).max()
     np.testing.assert_allclose(
         np.array(cells, dtype=float)[:, :4], second[:, at], rtol=0, atol=1e-8 * size
@@ -125,7 +132,7 @@ def test_without_rates_it_is_at_rest(condyle_command: Run, model: Model) -> None
     outcome = condyle_command(*WORDS)
     assert outcome.status == 0
     assert "the states are at rest" in outcome.err
-    found = model.forward(q, 0 * q, effort, np.zeros((COUNT, 9)))
+    found = model.forward_dynamics(q, 0 * q, effort)
     rows = np.array(read("out.csv")[1], dtype=float)
     np.testing.assert_array_equal(rows[:, :4], found.acceleration)
 

@@ -38,15 +38,15 @@ def test_inverse_undoes_forward(name: str) -> None:
     q, q1 = state(c, model)
     order = [s["names"].index(coordinate) for coordinate in model.independent]
     q2 = s["qdd"][:, order]
-    efforts = model.torques(q, q1, q2, load, ("contact", "motion", "joint"))
-    found = model.forward(q, q1, efforts.effort, load, ("motion", "joint"))
+    efforts = model.inverse_dynamics(q, q1, q2, *load, outputs="all")
+    found = model.forward_dynamics(q, q1, efforts.effort, *load, outputs="all")
     good = efforts.status == 0
     assert good.any()
     assert not found.status[good].any()
     close(found.acceleration[good], q2[good], 1e-10)
-    close(found.contact_force[good], efforts["contact_force"][good], 1e-10)
+    close(found.contact_force[good], efforts.contact_force[good], 1e-10)
     for result in ("pose", "pose_rate", "pose_acceleration", "joint_rate", "joint_acceleration"):
-        close(found[result][good], efforts[result][good], 1e-10)
+        close(getattr(found, result)[good], getattr(efforts, result)[good], 1e-10)
 
 
 @pytest.mark.parametrize("name", ["human-jaw", "human-jaw-curved"])
@@ -56,13 +56,13 @@ def test_inverse_undoes_forward_of_muscles(name: str) -> None:
     rng = np.random.default_rng(5)
     sizes = np.array([0.002 if c in "XYZ" else 0.03 for c in model.independent])
     q, q1, q2 = (k * rng.normal(0, 1, (3, len(sizes))) * sizes for k in (1, 10, 300))
-    load = np.hstack([rng.normal(0, 30, (3, 3)), np.zeros((3, 3)), np.full((3, 3), 0.02)])
-    efforts = model.torques(q, q1, q2, load, ("contact",))
+    load = np.hstack([rng.normal(0, 30, (3, 3)), np.zeros((3, 3))]), np.full(3, 0.02)
+    efforts = model.inverse_dynamics(q, q1, q2, *load)
     assert not efforts.status.any()
-    found = model.forward(q, q1, efforts.effort, load)
+    found = model.forward_dynamics(q, q1, efforts.effort, *load)
     assert not found.status.any()
     close(found.acceleration, q2, 1e-10)
-    close(found.contact_force, efforts["contact_force"], 1e-10)
+    close(found.contact_force, efforts.contact_force, 1e-10)
 
 
 def unrubbed(name: str) -> Rubbing:
@@ -82,32 +82,32 @@ def test_free_bodies_are_in_balance(name: str) -> None:
     c = case(name) if name in DRAWN else unrubbed(name)
     model = by_numpy(name) if name in DRAWN else Model(c.mechanism, backend="numpy")
     s, effort = c.states, efforts(c)
-    found = model.forward(*state(c, model), effort, load_of(c), ("motion", "sliding"))
+    found = model.forward_dynamics(*state(c, model), effort, *load_of(c), outputs="all")
     assert not found.status.any()
     for i in range(0, len(effort), 2):
-        given = s["pose"][i], s["pose_rate"][i], found["pose_acceleration"][i], s["wrench"][i]
+        given = s["pose"][i], s["pose_rate"][i], found.pose_acceleration[i], s["wrench"][i]
         b = balance(c.raw, *given, s["load_point"])
         force = found.contact_force[i]
         terms = [b.C @ effort[i], b.N @ force, -b.T @ np.abs(force), -b.b]
         close(sum(terms), np.zeros(6), 1e-10, np.abs(terms).max())
         rubs = b.rubbing()
-        close(found["slip"][i, rubs], b.slip[rubs], 1e-11)
-        close(found["friction_force"][i], -np.abs(force)[:, None] * b.drag, 1e-10)
+        close(found.slip[i, rubs], b.slip[rubs], 1e-11)
+        close(found.friction_force[i], -np.abs(force)[:, None] * b.drag, 1e-10)
 
 
 @pytest.mark.parametrize("name", ["RSS k2 plain", "SPS k1"])
 def test_formulations_agree(name: str) -> None:
     c, wanted = case(name), by_numpy(name)
-    given = (*state(c, wanted), efforts(c), load_of(c), ("joint",))
-    best = wanted.forward(*given)
+    given = (*state(c, wanted), efforts(c), *load_of(c))
+    best = wanted.forward_dynamics(*given, outputs="all")
     assert not best.status.any()
     for formulation in FORMULATIONS:
-        model = Model(c.mechanism, formulation, backend="numpy")
-        found = model.forward(*given)
+        model = Model(c.mechanism, formulation=formulation, backend="numpy")
+        found = model.forward_dynamics(*given, outputs="all")
         assert not found.status.any()
         close(found.acceleration, best.acceleration, 1e-10)
         close(found.contact_force, best.contact_force, 1e-10)
-        close(found["joint_acceleration"], best["joint_acceleration"], 1e-10)
+        close(found.joint_acceleration, best.joint_acceleration, 1e-10)
 
 
 @pytest.mark.parametrize("name", ["RSS k2 n8 quadratic", "PSS k4", "gough-stewart"])
@@ -115,9 +115,10 @@ def test_robust_path_says_the_same(name: str) -> None:
     """Samples that a kernel would doubt: by singular values and all patterns."""
     c, model = case(name), by_numpy(name)
     outputs = ("motion", "joint", "sliding")
-    given = (*state(c, model), efforts(c), load_of(c))
+    given = (*state(c, model), efforts(c))
     quick = model.kernel("forward", ("contact", *outputs))
-    inputs = model.accelerations._inputs(*given)
+    own = model._arguments
+    _, inputs = own.samples((own.q, own.v, own.effort), given, *load_of(c))
     answer = quick.run(inputs)
     found, status = model.system.robust.forward(inputs)
     assert not answer.status.any()
@@ -131,10 +132,10 @@ def test_backends_agree(name: str, unoptimised: None) -> None:
     """Compiled batches and single samples give numpy's numbers."""
     c, model = case(name), by_numpy(name)
     compiled = Model(c.mechanism, backend="compiled")
-    given = (*state(c, model), efforts(c), load_of(c))
-    wanted, found = (m.forward(*given) for m in (model, compiled))
+    given = (*state(c, model), efforts(c), *load_of(c))
+    wanted, found = (m.forward_dynamics(*given) for m in (model, compiled))
     close(found.acceleration, wanted.acceleration, 1e-12)
     close(found.contact_force, wanted.contact_force, 1e-12)
-    ones = [compiled.forward_one(*sample) for sample in zip(*given, strict=True)]
+    ones = [compiled.unchecked().forward_dynamics(*sample) for sample in zip(*given, strict=True)]
     close(ones, wanted.acceleration, 1e-12)
-    close(model.forward_one(*(a[0] for a in given)), wanted.acceleration[0], 0)
+    close(model.unchecked().forward_dynamics(*(a[0] for a in given)), wanted.acceleration[0], 0)

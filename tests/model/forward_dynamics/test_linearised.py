@@ -16,7 +16,8 @@ def test_slopes(name: str) -> None:
     c, model = case(name), by_numpy(name)
     q, q1 = state(c, model)
     effort, load = efforts(c), load_of(c)
-    A, B = model.linearised(q, q1, effort, load)
+    about = model.linearise(q, q1, effort, *load)
+    A, B = about.A, about.B
     m, n = q.shape[1], effort.shape[1]
     assert A.shape == (len(q), 2 * m, 2 * m)
     assert B.shape == (len(q), 2 * m, n)
@@ -29,7 +30,7 @@ def test_slopes(name: str) -> None:
     units = STEP * np.r_[sizes, 20 * sizes, np.full(n, np.abs(effort).max())]
 
     def at(moved: np.ndarray) -> np.ndarray:
-        return model.forward(*np.hsplit(moved, [m, 2 * m]), load).acceleration
+        return model.forward_dynamics(*np.hsplit(moved, [m, 2 * m]), *load).acceleration
 
     found = np.concatenate([A, B], axis=2)[:, m:]
     for j, unit in enumerate(np.diag(units)):

@@ -44,7 +44,7 @@ def moved(mechanism: Mechanism, q: Any, q1: Any, effort: Any = 0.0) -> Any:
     """Forward dynamics of one sample under its weight."""
     model = Model(mechanism, backend="numpy")
     tension = np.full((1, len(mechanism.chains)), effort)
-    found = model.forward(np.array([q]), np.array([q1]), tension, np.zeros((1, 9)), ("motion",))
+    found = model.forward_dynamics(np.array([q]), np.array([q1]), tension, outputs="all")
     assert not found.status.any()
     return found
 

@@ -8,6 +8,7 @@ from oracles.bodies import Body, bodies
 from oracles.jets import Jet
 from oracles.random_mechanism import random_mechanism
 from support.families import MECHANISMS, Case, case, of_raw
+from support.loads import parts
 from support.speeds import few
 
 from condyle.model.joint_reactions import Reaction, reactions
@@ -29,9 +30,9 @@ def build(name: str) -> Case:
 
 
 def found_reactions(c: Case, formulation: str = "virtual_power") -> dict[str, Reaction]:
-    model = Model(c.mechanism, formulation, backend="numpy")
+    model = Model(c.mechanism, formulation=formulation, backend="numpy")
     q, q1, q2 = (c.states[key] for key in ("q", "qd", "qdd"))
-    return reactions(model, model.evaluate(q, q1, q2, c.load))
+    return reactions(model, model.inverse_dynamics(q, q1, q2, *parts(c.load), outputs="all"))
 
 
 class Ledger:

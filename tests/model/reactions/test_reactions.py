@@ -12,13 +12,14 @@ from oracles.closure import contact_normals
 from oracles.description import read, rod_angles
 from oracles.rotations import platform_motion
 from support.families import MECHANISMS, Case, case, close
+from support.loads import parts
 from support.speeds import few
 
 import condyle
 from condyle.mechanism import Mechanism
-from condyle.model.data import Evaluation
 from condyle.model.joint_reactions import reactions
 from condyle.model.model import Model
+from condyle.model.model_result import ModelResult
 from condyle.motion import read_table, write_table
 from condyle.questions.reactions import reaction_places
 from condyle.results.inverse_rows import solve_states
@@ -33,10 +34,10 @@ JOINTS = {
 DRIVEN = {"RSS": "shaft_moment", "PSS": "rail_force", "SPS": "sleeve_force"}
 
 
-def evaluated(c: Case) -> tuple[Model, Evaluation]:
+def evaluated(c: Case) -> tuple[Model, ModelResult]:
     model = Model(c.mechanism, backend="numpy")
     q, q1, q2 = (c.states[key] for key in ("q", "qd", "qdd"))
-    return model, model.evaluate(q, q1, q2, c.load)
+    return model, model.inverse_dynamics(q, q1, q2, *parts(c.load), outputs="all")
 
 
 @pytest.mark.parametrize("name", few(MECHANISMS, "rss_k0", "pss_k1", "mixed_k3"))
@@ -140,7 +141,7 @@ def test_failed_samples_are_empty(reference: Mechanism) -> None:
     model = Model(reference, backend="numpy")
     q = np.zeros((2, 4))
     q[1, 0] = 0.5
-    evaluation = model.evaluate(q, 0 * q, 0 * q, np.zeros((2, 9)))
+    evaluation = model.inverse_dynamics(q, 0 * q, 0 * q, outputs="all")
     assert evaluation.status.tolist() == [0, 1]
     for r in reactions(model, evaluation).values():
         assert np.isfinite(r.array[0]).all() and np.isnan(r.array[1]).all()
@@ -203,5 +204,5 @@ def test_nothing_moves_nothing_weighs(name: str) -> None:
     mechanism = c.mechanism.replace(gravity=(0.0, 0.0, 0.0))
     model = Model(mechanism, backend="numpy")
     q = c.states["q"]
-    found = reactions(model, model.evaluate(q, 0 * q, 0 * q, np.zeros((len(q), 9))))
+    found = reactions(model, model.inverse_dynamics(q, 0 * q, 0 * q, outputs="all"))
     assert all(np.abs(r.array).max() == 0 for r in found.values())

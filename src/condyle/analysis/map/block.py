@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from ...kinematics.singularities import SINGULAR
-from ...model.data import Efforts
 from ...model.model import Model
+from ...model.model_result import ModelResult
 from ...model.surveying import Survey
 from ...results.contacts import bound_margins
 from ...status import Status
@@ -66,19 +66,19 @@ class Block:
         return self.survey.values[name]
 
     @cached_property
-    def held(self) -> Efforts:
+    def held(self) -> ModelResult:
         """What holds the platform at rest under the load; where it cannot be reached, nothing."""
         still, good = np.zeros_like(self.q), self.survey.reached
         q = np.where(good[:, None], self.q, 0.0)
-        load = np.broadcast_to(self.setup.load, (len(q), 9))
-        found = self.setup.model.torques(
-            q, still, still, load, ("contact",), self.setup.reach.threads
+        load, threads = self.setup.load, self.setup.reach.threads
+        found = self.setup.model.inverse_dynamics(
+            q, still, still, load[:6], load[6:], threads=threads
         )
         status = np.where(good, found.status, Status.unreachable)
         bad = status != Status.ok
-        force = found["contact_force"]
-        found.effort[bad], force[bad] = np.nan, np.nan
-        return Efforts(found.effort, {"contact_force": force}, status)
+        effort, force = found.effort, found.contact_force
+        effort[bad], force[bad] = np.nan, np.nan
+        return ModelResult(effort=effort, contact_force=force, status=status)
 
     @cached_property
     def bounds(self) -> np.ndarray:

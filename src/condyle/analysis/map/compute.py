@@ -18,6 +18,7 @@ from ...extras import require
 from ...mechanism import dumps
 from ...mechanism.mechanism import COORDINATES, Mechanism
 from ...model.model import Model, derive
+from ...motion import resolve_load_point
 from ...motion.column_units import FORCE, MOMENT
 from ...progress import step
 from ...version import __version__
@@ -247,7 +248,7 @@ def _attributes(setup: Setup, grid: Grid) -> dict[str, Any]:
         "load": setup.load.tolist(),
         "stroke_low": setup.reach.low.tolist(),
         "stroke_high": setup.reach.high.tolist(),
-        "distribution": model.policy.objective,
+        "distribution": model.distribution.name,
         "condyle": __version__,
     }
 
@@ -256,7 +257,8 @@ def _point(model: Model, name: str | None) -> np.ndarray:
     """Where a load acts; O_M in a mechanism without points."""
     if name is None and not model.mechanism.platform.points:
         return np.zeros(3)
-    return model.load_point(name)
+    points = model.mechanism.platform.points
+    return np.array(points[resolve_load_point(name, points)])
 
 
 def _direction(given: str | Sequence[float] | None) -> np.ndarray | None:

@@ -110,7 +110,7 @@ class Margins:
         """(names, N); no number where a function has no value."""
         reach = self._reach
         wanted = ["joint"] * bool(self._stroked) + ["points"] * bool(self._bounded)
-        found = reach.model.survey(q, wanted + ["rows"] * self._square, reach.threads)
+        found = reach.model.poses.survey(q, wanted + ["rows"] * self._square, reach.threads)
         rows = [found.closing, *found.discriminant]
         for i in self._stroked:
             joint = found.values["joint"][i]

@@ -58,7 +58,7 @@ class LoadCapacity:
         Negative infinity where no s >= 0 can, infinity where no limit is met.
 
         Args: pose: (N, 6), on the contacts, no number where there is none.
-              load: (9,), as of `Model.evaluate`.  direction: a force in {S} at its point, (3,).
+              load: (9,), wrench and point.  direction: a force in {S} at its point, (3,).
         """
         columns, needed, more = self._columns(pose, load, direction)
         lower, upper = interval(columns, needed, more, self.low, self.high)
@@ -70,8 +70,8 @@ class LoadCapacity:
         units = {FAMILIES[chain.kind].effort_unit for chain in self.model.mechanism.chains}
         if self.many and len(units) == 1:  # choosing efforts is quicker than linear programs
             q = pose[:, indices(self.model.independent)]
-            loads = np.broadcast_to(load, (len(q), 9))
-            chosen = self.model.choosing("bounded").torques(q, 0 * q, 0 * q, loads)
+            bounded = self.model.with_distribution("bounded")
+            chosen = bounded.inverse_dynamics(q, 0 * q, 0 * q, load[:6], load[6:])
             return ~np.isin(chosen.status, (Status.infeasible, Status.jammed))
         columns, needed, _ = self._columns(pose, load, np.zeros(3))
         lower, upper = interval(columns, needed, 0 * needed, self.low, self.high)

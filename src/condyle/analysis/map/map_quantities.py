@@ -179,7 +179,7 @@ QUANTITIES: dict[str, Quantity] = {
     "contact_force": Quantity(
         "contact forces under gravity and the load", (),
         (Mapped("contact_force", ("contact",), "N", "contact force at rest, along the unit normal",
-                lambda b: b.held["contact_force"]),),
+                lambda b: b.held.contact_force),),
         _unless(lambda setup: setup.model.mechanism.contacts, "contacts"),
     ),
     "load_limit": Quantity(

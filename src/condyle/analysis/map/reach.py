@@ -52,7 +52,7 @@ class Reach:
         Poses beyond a stroke count as unreachable. Margins are dimensionless and continuous,
         no number where the contacts are not met.
         """
-        found = self.model.survey(q, {*wanted, *self.needs}, self.threads)
+        found = self.model.poses.survey(q, {*wanted, *self.needs}, self.threads)
         margin = found.discriminant
         if self.needs:
             joint = found.values["joint"]

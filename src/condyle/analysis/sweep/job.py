@@ -14,7 +14,8 @@ from ...errors import InputError
 from ...mechanism import as_mechanism
 from ...mechanism.home import independent_coordinates
 from ...mechanism.mechanism import Mechanism
-from ...model.distributing import reference_force
+from ...model.distributing import Distribution
+from ...model.inverse_dynamics import SOLVED
 from ...model.model import Model
 from ...motion import (
     Load,
@@ -93,9 +94,13 @@ class Job:
         Raises: as of `condyle.derive`.
         """
         s = self.study
-        weight = s.contact_weight / reference_force(self.mechanism) ** 2 if s.contact_weight else 0
         return Model(
-            mechanism, s.formulation, s.route, s.backend, s.distribution, s.preload, weight, True
+            mechanism,
+            formulation=s.formulation,
+            route=s.route,
+            distribution=Distribution(s.distribution, s.preload, s.contact_weight),
+            backend=s.backend,
+            general=True,
         )
 
 
@@ -129,8 +134,8 @@ def prepared(
         raise InputError(f'study: two columns would be called "{twice[0]}"; rename the measure')
     for path in paths:  # what does not fit the mechanism shows here, and kernels are built
         few: Any = {k: getattr(path, k)[:2] for k in ("t", "value", "rate", "acceleration")}
-        (q, q1, q2), _ = model.independent_motion(replace(path, **few))
-        model.evaluate(q, q1, q2, np.zeros((len(q), 9)), 1)
+        (q, q1, q2), _ = model.poses.of_motion(replace(path, **few))
+        model.inverse_dynamics(q, q1, q2, outputs=SOLVED, threads=1)
     return job
 
 

@@ -13,8 +13,9 @@ import numpy as np
 
 from ...errors import CondyleError, InputError, SampleError, shortened
 from ...mechanism.mechanism import Mechanism
-from ...model.data import Evaluation, require_ok
-from ...model.model import Model, with_point
+from ...model.inverse_dynamics import SOLVED
+from ...model.model import Model
+from ...model.model_result import ModelResult, require_ok
 from ...questions.structure import Structure, structure_of
 from ...results.derived import Derived
 from ...results.solving import assemble
@@ -47,7 +48,7 @@ class Solved:
 
     motion: int
     model: Model | None
-    evaluation: Evaluation | None
+    evaluation: ModelResult | None
     status: str
     reason: str
     residual: float | None = None
@@ -82,15 +83,15 @@ class Solver:
         structure = structure_of(mechanism, study.formulation, study.route)
         if structure not in self._models:
             self._models[structure] = self._job.model(mechanism)
-        return self._models[structure].renumbered(mechanism)
+        return self._models[structure].with_mechanism(mechanism)
 
     def _along(self, model: Model, m: int) -> Solved:
         job, motion = self._job, self._job.motions[m]
-        point = np.zeros(3) if job.point is None else model.load_point(job.point)
         try:
-            states, residual = model.independent_motion(motion)
-            load = with_point(job.wrenches[m], point)
-            found = model.evaluate(states[0], states[1], states[2], load, 1)
+            states, residual = model.poses.of_motion(motion)
+            found = model.inverse_dynamics(
+                *states, job.wrenches[m], job.point, outputs=SOLVED, threads=1
+            )
             require_ok(model.mechanism, found, motion.t)
         except SampleError as error:
             return Solved(m, model, found, error.kind, _reason(error), residual)

@@ -8,13 +8,17 @@ times, from the row before (`track`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ...errors import InputError
+from ...kinematics.constraints import indices
+from ...mechanism.home import independent_coordinates
 from ...mechanism.mechanism import Mechanism
+from ..arguments import POSE, Argument, samples
 from ..continuation import follow
+from ..model_result import ModelResult
 from .assembly_modes import AssemblyModes, search
 from .joint_steps import joint_steps
 from .orientation import principal
@@ -22,27 +26,7 @@ from .pose_status import PoseStatus, judge
 from .track import track
 
 TOLERANCE = 1e-6  # of a joint [rad or m]
-
-
-@dataclass(frozen=True)
-class ForwardSolution:
-    """Poses of N samples.
-
-    pose:      X_EE, (N, 6) [m, rad], angles in (-pi, pi]; NaN unless the status is ok.
-    residual:  (N, n): given less computed joint coordinates [rad or m]; NaN where none was reached.
-    condition: (N,), condition number of the dimensionless actuator Jacobian; NaN as the pose.
-    status:    (N,), of `PoseStatus`.
-    """
-
-    pose: np.ndarray
-    residual: np.ndarray
-    condition: np.ndarray
-    status: np.ndarray
-
-    @property
-    def found(self) -> np.ndarray:
-        """Where the status is ok, (N,)."""
-        return np.asarray(self.status == PoseStatus.OK)
+START = POSE._replace(name="start")
 
 
 class ForwardKinematics:
@@ -51,52 +35,67 @@ class ForwardKinematics:
     def __init__(self, mechanism: Mechanism) -> None:
         self._mechanism = mechanism
         self._steps = joint_steps(mechanism)
+        chains = mechanism.chain_names
+        self._joint = Argument("joint", len(chains), f"{', '.join(chains)} [rad or m]")
+        self._independent = indices(independent_coordinates(mechanism))
 
     def solve(
-        self,
-        joints: np.ndarray,
-        time: np.ndarray | None = None,
-        tolerance: float = TOLERANCE,
-    ) -> ForwardSolution:
-        """Poses from joint coordinates.
+        self, joint: Any, time: Any = None, tolerance: float = TOLERANCE, start: Any = None
+    ) -> ModelResult:
+        """As `Model.forward_kinematics`.
 
-        Args:   joints:    (N, n) [rad or m], zero at home; turning joints may count whole turns.
-                time:      (N,) [s], rising: each sample follows the one before. Without, samples
-                           follow from home and never influence each other.
-                tolerance: largest residual of a joint [rad or m].
-        Raises: InputError: for times that do not rise, or a tolerance that is none.
+        Samples without times never influence each other.
         """
-        joints = np.asarray(joints, dtype=float)
         _check(tolerance)
+        given = np.zeros(6) if start is None else START.array(start)
+        arguments = (self._joint, START)
+        lead, (joints, first) = samples(arguments, (self._joint.array(joint), given))
+        count = max(len(joints), len(first)) if 0 not in lead else 0
+        joints = np.broadcast_to(joints, (count, joints.shape[1]))
+        first = np.broadcast_to(first, (count, 6))
         if time is None:
-            pose, reached = follow(self._steps, np.zeros((len(joints), 6)), joints)
+            pose, reached = follow(self._steps, first, joints)
             status = judge(reached, self._steps.step(pose, joints).residual, tolerance)
         else:
-            time = np.asarray(time, dtype=float)
-            if not (np.diff(time) > 0).all():
-                at = int(np.argmin(np.diff(time) > 0))
-                raise InputError(
-                    f"times must rise: {time[at + 1]:g} s follows {time[at]:g} s (row {at + 2}). "
-                    "Without times, rows stand alone"
-                )
-            pose, status = track(self._steps, joints, time, tolerance)
+            if len(lead) != 1 or start is not None:
+                raise InputError("time: rows that follow each other are (N, n), and have no start")
+            pose, status = track(self._steps, joints, _times(time, count), tolerance)
         at_pose = self._steps.step(pose, joints)
         found = status == PoseStatus.OK
-        condition = np.full(len(joints), np.nan)
+        condition = np.full(count, np.nan)
         condition[found] = np.linalg.cond(at_pose.A[found])
         nowhere = (status != PoseStatus.OK) & (status != PoseStatus.INCONSISTENT)
         residual = np.where(nowhere[:, None], np.nan, at_pose.residual)
         pose = np.where(found[:, None], principal(pose), np.nan)
-        return ForwardSolution(pose, residual, condition, status)
+        return ModelResult(
+            pose=pose,
+            q=pose[:, self._independent],
+            residual=residual,
+            condition=condition,
+            status=status,
+        ).shaped(lead)
 
     def modes(
         self, joints: np.ndarray, seed: int = 0, tolerance: float = TOLERANCE
     ) -> AssemblyModes:
         """Assembly modes of one sample, (n,), that a seeded search finds; it may miss some."""
         _check(tolerance)
-        return search(self._mechanism, self._steps, np.asarray(joints, float), seed, tolerance)
+        return search(self._mechanism, self._steps, self._joint.array(joints), seed, tolerance)
 
 
-def _check(tolerance: float) -> None:
-    if not 0 <= tolerance < np.inf:
-        raise InputError(f"tolerance: expected a finite number from 0 on, got {tolerance:g}")
+def _check(tolerance: Any) -> None:
+    if not isinstance(tolerance, int | float | np.number) or not 0 <= tolerance < np.inf:
+        raise InputError(
+            f"tolerance: expected a finite number of at least 0, got {tolerance!r:.60}"
+        )
+
+
+def _times(given: Any, count: int) -> np.ndarray:
+    time = Argument("time", count, "increasing [s]").array(given)
+    if time.ndim != 1 or not (np.diff(time) > 0).all():
+        at = int(np.argmin(np.diff(time, axis=-1).ravel() > 0))
+        raise InputError(
+            f"times must rise: {time.flat[at + 1]:g} s follows {time.flat[at]:g} s (row {at + 2}). "
+            "Without times, rows stand alone"
+        )
+    return time
