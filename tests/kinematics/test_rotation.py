@@ -6,12 +6,12 @@ import casadi as ca
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from condyle.kinematics.rotation import angular_velocity_matrix, rotation
+from condyle.kinematics.rotation import Bryant, rotation
 
 ANGLES = np.random.default_rng(1).uniform(-1.4, 1.4, (20, 3))
 a = ca.SX.sym("a", 3)
 R = ca.Function("R", [a], [rotation(a)])
-R_omega = ca.Function("R_omega", [a], [angular_velocity_matrix(a)])
+R_omega = ca.Function("R_omega", [a], [Bryant.of(a).angular_velocity()])
 
 
 def test_rotation_is_x_then_y_then_z() -> None:

@@ -23,7 +23,7 @@ from condyle.kinematics.constraints import (
     parasitic_jacobian,
     residuals,
 )
-from condyle.kinematics.rotation import angular_velocity_matrix, rotation
+from condyle.kinematics.rotation import Bryant, rotation
 from condyle.mechanism import COORDINATES, Mechanism, parse
 from condyle.mechanism.home import (
     condition_of,
@@ -103,7 +103,7 @@ def test_parasitic_jacobian(contacts: int) -> None:
     d, dependent = read(raw), dependent_coordinates(mechanism)
     x = ca.SX.sym("x", 6)
     frame = contact_frame(contacts_of(mechanism), x[:3], rotation(x[3:]))
-    C = frame.N.T @ ca.diagcat(ca.SX.eye(3), angular_velocity_matrix(x[3:]))
+    C = frame.N.T @ ca.diagcat(ca.SX.eye(3), Bryant.of(x[3:]).angular_velocity())
     M_J_of = ca.Function("M_J", [x], [ca.densify(parasitic_jacobian(C, dependent))])
     states = random_state(np.random.default_rng(2), raw, 4)
     for pose, rate, q1 in zip(states["pose"], states["pose_rate"], states["qd"], strict=True):

@@ -84,9 +84,9 @@ def seen() -> Arrays:
     return found | {"force": force, "force_d": rng.uniform(0, 40, (N, 1))}
 
 
-def asked(told: dict[str, Any], memory: np.ndarray | None = None) -> Arrays:
+def asked(entries: dict[str, Any], memory: np.ndarray | None = None) -> Arrays:
     """Results of the tick of a controller's table."""
-    law = CONTROLLERS[told["kind"]](**told).bind(machine())  # type: ignore[attr-defined]
+    law = CONTROLLERS[entries["kind"]](**entries).bind(machine())  # type: ignore[attr-defined]
     ports = dict(seen()) | {"period": np.full((N, 1), PERIOD)}
     for name, value in law.numbers.items():
         ports[name] = np.broadcast_to(value, (N, np.size(value)))
@@ -128,12 +128,17 @@ def test_computed_torque() -> None:
 @pytest.mark.parametrize("gravity", [True, False])
 def test_joint_pd(gravity: bool) -> None:
     K = np.arange(1.0, 7.0)
-    told = {"kind": "joint_pd", "stiffness": tuple(K), "damping": tuple(K / 50), "gravity": gravity}
+    entries = {
+        "kind": "joint_pd",
+        "stiffness": tuple(K),
+        "damping": tuple(K / 50),
+        "gravity": gravity,
+    }
     s = seen()
     wanted = K * (s["joint_d"] - s["joint"]) + K / 50 * (s["joint_rate_d"] - s["joint_rate"])
     if gravity:
         wanted += inverse(s["q_d"], 0 * s["q"], 0 * s["q"])
-    close(asked(told)["asked"], wanted)
+    close(asked(entries)["asked"], wanted)
 
 
 def test_impedance() -> None:
@@ -158,8 +163,13 @@ def mode_next(mode: float, felt: float, ahead: float, closing: float) -> float:
 
 def test_bite_force() -> None:
     s, u = seen(), np.array([0.6, 0.0, 0.8])
-    told = {"kind": "bite_force", "stiffness": 900.0, "force": 40.0, "direction": (3.0, 0.0, 4.0)}
-    told |= {"proportional": 0.4, "integral": 6.0, "bite_damping": 120.0}
+    entries = {
+        "kind": "bite_force",
+        "stiffness": 900.0,
+        "force": 40.0,
+        "direction": (3.0, 0.0, 4.0),
+    }
+    entries |= {"proportional": 0.4, "integral": 6.0, "bite_damping": 120.0}
     _, J = place(s["q"], point())
     J = np.einsum("i,nij->nj", u, J)
     felt = -s["force"] @ u
@@ -167,7 +177,7 @@ def test_bite_force() -> None:
     met = set()
     for before in (FREE, BITING, LEAVING):
         memory = np.column_stack([np.full(N, before), np.full(N, 0.2)])
-        found = asked(told, memory)
+        found = asked(entries, memory)
         mode = np.array([mode_next(before, *x) for x in zip(felt, ahead, closing, strict=True)])
         error, biting = s["force_d"][:, 0] - felt, mode == BITING
         total = np.where(biting, 0.2 + error * PERIOD, 0.0)
@@ -254,14 +264,14 @@ def food(mode: int, t: float, s: np.ndarray, v: np.ndarray) -> tuple[np.ndarray,
 @pytest.mark.parametrize("mode", [APART, TOUCHING, BROKEN])
 def test_loads_and_the_plant(mode: int) -> None:
     """Their wrench about O_M, the accelerations that it makes, works, and what is watched."""
-    told: list[dict[str, Any]] = [
+    entries: list[dict[str, Any]] = [
         {"kind": "spring", "point": "incisor", "direction": (3.0, 0.0, 4.0), "stiffness": 150.0,
          "damping": 1.5, "rest": 1e-3},
         {"kind": "food", "point": "right_molar", "direction": (0.0, 3.0, 4.0), "thickness": 2e-3,
          "stiffness": 800.0, "damping": 20.0, "break_force": 3.0},
         {"kind": "constant", "force": (0.3, -0.2, -1.0), "moment": (0.0, 1e-3, 0.0)},
     ]  # fmt: skip
-    loads = [LOADS[one["kind"]](**one).bind(machine(), one["kind"]) for one in told]
+    loads = [LOADS[one["kind"]](**one).bind(machine(), one["kind"]) for one in entries]
     s = seen()
     effort = 0.02 * np.random.default_rng(1).normal(size=(N, 6))
     ports = {"q": s["q"], "q1": s["q1"], "effort": effort, **LIMITS}
@@ -287,7 +297,7 @@ def test_loads_and_the_plant(mode: int) -> None:
             both = [food(mode, 2e-3, *x) for x in zip(d, v, strict=True)]
             forces[:, i], guards = [f for f, _ in both], [g for _, g in both]
         else:
-            forces[:, i], moments = told[i]["force"], np.array([told[i]["moment"]] * N)
+            forces[:, i], moments = entries[i]["force"], np.array([entries[i]["moment"]] * N)
         lever = d + load.point - pose_of(s["q"])[:, :3]
         total[:, :3] += forces[:, i]
         total[:, 3:] += np.cross(lever, forces[:, i]) + moments

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import reduce
 
 import casadi as ca
 
@@ -41,9 +42,7 @@ def normal_equations(total: Total, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
     y, excess = definite_solve(G, b, lengths)
     terms = ca.dot(lengths, ca.sum2(y * y))
     spare = CANCELLATION**2 / m * ca.sum2(ca.sum1(y * b)) - terms
-    least = excess[0]
-    for value in excess[1:]:
-        least = ca.fmin(least, value)
+    least = reduce(ca.fmin, excess)
     # Compared separately, since backends treat NaN differently in a minimum.
     return [a.T @ y for a in A], 2 * (least >= 0) * (spare >= 0) - 1
 

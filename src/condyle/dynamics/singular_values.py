@@ -9,6 +9,9 @@ keeps all digits that B has of it.
 
 from __future__ import annotations
 
+from functools import reduce
+from operator import mul
+
 import casadi as ca
 
 from .least_norm import Lanes, Total
@@ -51,7 +54,7 @@ def singular_values(total: Total, A: Lanes) -> tuple[ca.SX, ca.SX]:
         values = _inserted(values, value)
     if found:
         good = good * (values[-2] >= SPREAD)
-    values[-1] = _product(q) / (_product(values[:-1]) + TINY)
+    values[-1] = reduce(mul, q) / (reduce(mul, values[:-1]) + TINY)
     return ca.sqrt(ca.vertcat(*values) * trace), 2 * good - 1
 
 
@@ -124,13 +127,6 @@ def _pair(a: ca.SX, b: ca.SX, s: ca.SX) -> list[ca.SX]:
     half = (a - b) / 2
     mean, root = (a + b) / 2, ca.sqrt(half * half + s)
     return [mean + root, mean - root]
-
-
-def _product(values: list[ca.SX]) -> ca.SX:
-    product = values[0]
-    for value in values[1:]:
-        product = product * value
-    return product
 
 
 def _inserted(values: list[ca.SX], value: ca.SX) -> list[ca.SX]:

@@ -101,11 +101,7 @@ def _inside(graph: Graph, order: Sequence[Value], uses: dict[Value, int]) -> set
         wanted = ("mul",) if node.op == "mul" else ("add", "sub", "mul")
         for a in node.args:
             inner = graph.nodes[a]
-            same = (inner.group, inner.varies, inner.phase) == (
-                node.group,
-                node.varies,
-                node.phase,
-            )
+            same = all(getattr(inner, x) == getattr(node, x) for x in ("group", "varies", "phase"))
             if uses[a] == 1 and same and inner.op in wanted:
                 inside.add(a)
     return inside

@@ -86,14 +86,11 @@ def causes(
 
 def cause_text(status: int, owner: Owner) -> str:
     """A cause as text, such as 'chain "x" cannot reach its platform joint'."""
-    named = ", ".join(f'"{name}"' for name in owner.names)
+    named, several = ", ".join(f'"{name}"' for name in owner.names), len(owner.names) > 1
     texts: dict[tuple[int, str], str] = {
         (Status.unreachable, "chain"): f"chain {named} cannot reach its platform joint",
-        (Status.unreachable, "contact"): (
-            f"no pose with the given coordinates has the contacts {named} on their surfaces"
-            if len(owner.names) > 1
-            else f"no pose with the given coordinates has the contact {named} on its surface"
-        ),
+        (Status.unreachable, "contact"): "no pose with the given coordinates has the "
+        + (f"contacts {named} on their surfaces" if several else f"contact {named} on its surface"),
         (Status.singular, "chain"): f"chain {named} is in line: its actuator has no lever arm",
         (Status.singular, "platform"): "the platform can move while all actuators are locked",
     }

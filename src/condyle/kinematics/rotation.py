@@ -65,11 +65,6 @@ def rotation(angles: ca.SX) -> ca.SX:
     return Bryant.of(angles).rotation()
 
 
-def angular_velocity_matrix(angles: ca.SX) -> ca.SX:
-    """R_omega of (alpha, beta, gamma) [rad], (3, 3)."""
-    return Bryant.of(angles).angular_velocity()
-
-
 def turn_by(angle: ca.SX) -> ca.SX:
     """Cosine and sine, (2,), of 2 atan(angle / 2): near those of the angle, of length 1."""
     t = angle / 2

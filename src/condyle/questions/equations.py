@@ -12,6 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
+from operator import add
 
 import casadi as ca
 
@@ -263,10 +265,5 @@ def _summed(b: Builder, chains: Sequence[ChainTerms], lumped: bool) -> dict[str,
 
 
 def total(terms: Sequence[ca.SX]) -> ca.SX:
-    """The sum; 0 of nothing, as of a family without bodies."""
-    if not terms:
-        return ca.SX(0)
-    found = terms[0]
-    for term in terms[1:]:
-        found = found + term
-    return found
+    """The sum; 0 if there are no terms, as of a family without bodies."""
+    return reduce(add, terms) if terms else ca.SX(0)

@@ -167,8 +167,7 @@ def _held(
     """Candidates with one force held at 0, and with both; limited by the redundancy."""
     overlap = {
         (i, j): b.total([x * y for x, y in zip(free[i], free[j], strict=True)])
-        for i in free
-        for j in free
+        for i, j in product(free, free)
     }
     found = []
     for i in free:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from functools import reduce
 
 import casadi as ca
 
@@ -243,7 +244,4 @@ def _observable(b: Builder, eq: Equations) -> ca.SX:
     angles = [i >= 3 for i in independent_indices(b.structure.dependent)]
     scale = ca.vertcat(*(1 / length if angle else ca.SX(1) for angle in angles))
     sizes = scale * scale * b.total([a * a for a in eq.A])
-    least = sizes[0]
-    for size in ca.vertsplit(sizes)[1:]:
-        least = ca.fmin(least, size)
-    return least >= WEAK * ca.sum1(sizes)
+    return reduce(ca.fmin, ca.vertsplit(sizes)) >= WEAK * ca.sum1(sizes)

@@ -162,7 +162,7 @@ def test_it_is_drawn_as_a_thin_line() -> None:
 
 
 def test_results_tell_of_slack() -> None:
-    """Efforts of least norm know no limits, and each cable that pushes is told of."""
+    """Minimum-norm efforts ignore limits; every cable that pushes is reported."""
     mechanism = case("k2_n9").mechanism
     model = condyle.derive(mechanism, backend="numpy", distribution="minimum_norm")
     solution = model.solve(trial_motion(mechanism, rate=200))

@@ -1,4 +1,4 @@
-"""Where a chain cannot go, which way it goes on, and the units it is told in."""
+"""Where a chain cannot go, which way it goes on, and its units."""
 
 from __future__ import annotations
 
