@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from export.conftest import Folder
+from support.speeds import few
 from support.tools import need, run
 
 from condyle.export.c_package import write_facts
@@ -33,19 +34,21 @@ def checked(of: Folder, flags: str, **variables: str) -> str:
     return told
 
 
-@pytest.mark.parametrize("name", ["jaw", "single", "curved", "struct", "mixed", "limited"])
+@pytest.mark.parametrize(
+    "name", few(["jaw", "single", "curved", "struct", "mixed", "limited"], "jaw", "limited")
+)
 def test_the_recorded_samples(folder: Folders, name: str) -> None:
     need("gcc", "make")
     checked(folder(name), "-O1", CC="gcc")
 
 
-@pytest.mark.parametrize("name", ["struct", "limited"])
+@pytest.mark.parametrize("name", few(["struct", "limited"], "limited"))
 def test_clang_has_nothing_to_say(folder: Folders, name: str) -> None:
     need("clang", "make")
     checked(folder(name), "-O1", CC="clang")
 
 
-@pytest.mark.parametrize("name", ["jaw", "rubbing"])
+@pytest.mark.parametrize("name", few(["jaw", "rubbing"], "jaw"))
 @pytest.mark.parametrize("compiler, flags", [("clang", "-O1"), ("gcc", f"-O1 {SANITIZED}")])
 def test_vector_types(folder: Folders, name: str, compiler: str, flags: str) -> None:
     """Of any processor."""
@@ -54,12 +57,14 @@ def test_vector_types(folder: Folders, name: str, compiler: str, flags: str) -> 
     checked(folder(name), flags, CC=compiler, VECTOR="1", VECTOR_FLAGS=defined)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", ["struct", "limited"])
 def test_sanitizers(folder: Folders, name: str) -> None:
     need("gcc", "make")
     checked(folder(name), f"-O1 -g {SANITIZED}", CC="gcc")
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", ["jaw", "single", "struct"])
 def test_a_bare_arm_calls_only_what_is_stated(folder: Folders, name: str) -> None:
     of = folder(name)
@@ -75,12 +80,14 @@ def test_a_bare_arm_calls_only_what_is_stated(folder: Folders, name: str) -> Non
     assert kinds <= {"T", "t", "r", "R", "a"}, "no variables"
 
 
+@pytest.mark.ci
 def test_64_bit_arm(folder: Folders) -> None:
     need("aarch64-linux-gnu-gcc", "qemu-aarch64", "make")
     arm = {"CC": "aarch64-linux-gnu-gcc", "RUN": "qemu-aarch64", "LDFLAGS": "-static"}
     checked(folder("jaw"), "-O1", **arm)
 
 
+@pytest.mark.ci
 def test_a_linter_is_content(folder: Folders) -> None:
     of = folder("jaw")
     checks = "-checks=clang-analyzer-*,bugprone-*,-bugprone-easily-swappable-parameters"
@@ -89,7 +96,7 @@ def test_a_linter_is_content(folder: Folders) -> None:
     run(*call, of.source, "main.c", "check.c", "--", "-std=c99", folder=of.path)
 
 
-@pytest.mark.parametrize("name", ["jaw", "struct"])
+@pytest.mark.parametrize("name", few(["jaw", "struct"], "jaw"))
 def test_the_header_is_cpp(folder: Folders, name: str) -> None:
     of = folder(name)
     flags = ("-Wall", "-Wextra", "-pedantic", "-Werror", "-std=c++11", "-fsyntax-only")
@@ -98,6 +105,7 @@ def test_the_header_is_cpp(folder: Folders, name: str) -> None:
     run("clang", "-x", "c++", *flags, source, folder=of.path)
 
 
+@pytest.mark.ci
 def test_two_mechanisms_in_one_program(folder: Folders, tmp_path: Path) -> None:
     jaw, hexapod = folder("jaw"), folder("struct")
     lines = [f'#include "{of.exported.prefix}.h"' for of in (jaw, hexapod)]

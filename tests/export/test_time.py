@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+import pytest
 from support.tools import need, run
 
 import condyle
@@ -35,6 +36,7 @@ def adverse(f: Function, rng: np.random.Generator) -> dict[str, np.ndarray]:
     return found
 
 
+@pytest.mark.ci
 def test_instructions_do_not_depend_on_the_state(tmp_path: Path) -> None:
     need("valgrind", "gcc")
     exported = export(condyle.load_mechanism("masticatory"), QUESTIONS, lanes=0, landmark="incisor")
