@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import viser
 import xarray as xr
 
-from ..analysis.map.map_files import mechanism_of, open_map
+from ..analysis.map.map_files import open_map
 from ..errors import CondyleError, InputError
 from ..mechanism import Mechanism, as_mechanism
 from ..results.solution import open_solution
@@ -132,7 +132,7 @@ class View:
 
     def show_map(self, dataset: xr.Dataset) -> None:
         """Show a map beside its mechanism, which goes where the map is clicked; for the worker."""
-        mechanism = mechanism_of(dataset)
+        mechanism = dataset.condyle.mechanism
         if mechanism != self.session.mechanism:
             self._enter(Session(mechanism))
         self.map = MapLayer(self._server.scene, self.stage.centre, self.session.model, dataset)
@@ -228,7 +228,7 @@ def open_view(
     if map is not None and map["status"].ndim == 1:
         raise InputError("this map goes over one coordinate; the view shows those of two or three")
     if map is not None and solution is None:
-        mechanism = mechanism_of(map)
+        mechanism = map.condyle.mechanism
     if isinstance(solution, str | Path):
         solution = open_solution(solution)
     if mechanism is None:

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.analysis.map import open_map, save_map
 from condyle.analysis.map.isosurface import first_hit, isosurface, sheet
-from condyle.analysis.map.map_files import grid_and_reach, mechanism_of
+from condyle.analysis.map.map_files import grid_and_reach
 
 from .conftest import Models
 
@@ -72,9 +71,9 @@ def test_files_bring_all_that_was_asked(model_of: Models, tmp_path: Path) -> Non
     made = condyle.workspace_map(
         model, "X=-2:5:4 mm", hold="beta=2 deg", stroke="masseter_*=-0.5:0.4"
     )
-    save_map(made, tmp_path / "a.nc")
-    found = open_map(tmp_path / "a.nc")
-    assert found.equals(made) and mechanism_of(found) == model.mechanism
+    made.condyle.save(tmp_path / "a.nc")
+    found = condyle.open_map(tmp_path / "a.nc")
+    assert found.equals(made) and found.condyle.mechanism == model.mechanism
     grid, reach = grid_and_reach(found, model)
     assert (grid.axes[0].name, grid.axes[0].count) == ("X", 4)
     assert grid.held == (0.0, 0.0, 0.0, pytest.approx(np.radians(2)))
@@ -82,4 +81,4 @@ def test_files_bring_all_that_was_asked(model_of: Models, tmp_path: Path) -> Non
     (tmp_path / "b.nc").write_text("no")
     for name, words in (("b.nc", "is not a map"), ("c.nc", "no such file")):
         with pytest.raises(condyle.InputError, match=words):
-            open_map(tmp_path / name)
+            condyle.open_map(tmp_path / name)

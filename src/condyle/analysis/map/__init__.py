@@ -1,7 +1,7 @@
 """Maps of what a mechanism can do at rest, over its independent coordinates."""
 
 from .compute import workspace_map
-from .map_files import open_map, save_map
+from .map_files import open_map
 from .map_quantities import QUANTITIES
 from .map_size import WorkspaceSize, workspace_size
 
@@ -9,7 +9,6 @@ __all__ = [
     "QUANTITIES",
     "WorkspaceSize",
     "open_map",
-    "save_map",
     "workspace_map",
     "workspace_size",
 ]

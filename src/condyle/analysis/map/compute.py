@@ -21,11 +21,12 @@ from ...model.model import Model, derive
 from ...motion import resolve_load_point
 from ...motion.column_units import FORCE, MOMENT
 from ...progress import step
+from ...results.solution import Results
 from ...version import __version__
 from ..workers import check_scheduler, run_parts
 from .axes import Grid, Over, Values, grid_of, number, values_of
 from .block import Block, Setup
-from .map_files import MARK, open_map, save_map, zarr_arrays
+from .map_files import MARK, open_map, zarr_arrays
 from .map_quantities import Quantity, chosen, variables
 from .reach import Reach, Strokes
 
@@ -86,7 +87,7 @@ def workspace_map(
         return _streamed(work, file)
     dataset = _in_memory(work)
     if file is not None:
-        save_map(dataset, file)
+        Results(dataset).save(file)
         dataset.encoding["source"] = str(file)
     return dataset
 
@@ -249,7 +250,7 @@ def _attributes(setup: Setup, grid: Grid) -> dict[str, Any]:
         "stroke_low": setup.reach.low.tolist(),
         "stroke_high": setup.reach.high.tolist(),
         "distribution": model.distribution.name,
-        "condyle": __version__,
+        "condyle_version": __version__,
     }
 
 

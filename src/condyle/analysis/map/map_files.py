@@ -1,4 +1,4 @@
-"""Maps in files: NetCDF, or a Zarr folder that is filled piece by piece; whole or not at all."""
+"""Maps from files, and Zarr folders that are filled block by block."""
 
 from __future__ import annotations
 
@@ -10,11 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...atomic import replacing
 from ...errors import InputError, no_such_file
-from ...mechanism import Mechanism, parse
 from ...model.model import Model
-from ...results.solution import write_netcdf
 from .axes import Axis, Grid
 from .reach import Reach
 
@@ -22,12 +19,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MARK = ".zgroup"  # a file that every Zarr folder has
-
-
-def save_map(dataset: xr.Dataset, file: Path) -> None:
-    """As NetCDF. Raises: InputError: if it cannot be written."""
-    with replacing(file) as temporary:
-        write_netcdf(dataset, temporary)
 
 
 def open_map(path: str | os.PathLike[str]) -> xr.Dataset:
@@ -82,11 +73,6 @@ def zarr_arrays(folder: Path, frame: xr.Dataset, like: Mapping[str, Any], rows: 
         name: made(name, dims, shape, dtype, about, (min(rows, shape[0]), *shape[1:]))
         for name, (dims, shape, dtype, about) in like.items()
     }
-
-
-def mechanism_of(dataset: xr.Dataset) -> Mechanism:
-    """The mechanism that was mapped."""
-    return parse(dataset.attrs["mechanism"], "the mechanism of the map")
 
 
 def grid_and_reach(dataset: xr.Dataset, model: Model) -> tuple[Grid, Reach]:

@@ -12,9 +12,10 @@ from ...errors import InputError
 from ...kinematics.singularities import NEAR_SINGULAR
 from ...mechanism.mechanism import COORDINATES
 from ...model.model import Model, derive
+from ...results.solution import Results
 from .block import Setup
 from .free_space import Ball, Box, FreeSpace, greatest_ball, greatest_box
-from .map_files import grid_and_reach, is_map, mechanism_of, open_map
+from .map_files import grid_and_reach, is_map, open_map
 from .volume import Volume, reachable_volume
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ def workspace_size(
     dataset = open_map(map) if isinstance(map, str | os.PathLike) else map
     if not is_map(dataset):
         raise InputError(f"map: expected a map or its file, got {type(dataset).__name__}")
-    made = model or derive(mechanism_of(dataset), distribution=dataset.attrs["distribution"])
+    made = model or derive(Results(dataset).mechanism, distribution=dataset.attrs["distribution"])
     grid, reach = grid_and_reach(dataset, made)
     free = FreeSpace(Setup(made, reach, np.array(dataset.attrs["load"], dtype=float)), margin)
     inside = all(axis.low < 0 < axis.high for axis in grid.axes)
