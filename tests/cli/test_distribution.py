@@ -103,7 +103,7 @@ def test_nothing_that_is_infinite_breaks_json(condyle_command: Run) -> None:
     outcome = condyle_command("run", "four.toml", "--distribution", "bounded", *SHORT, "--json")
     error = json.loads(outcome.out)["error"]
     assert outcome.status == 2 and error["value"] is None
-    assert "no limits would do" in error["message"]
+    assert "no limits would suffice" in error["message"]
 
 
 @pytest.mark.parametrize("command", ["run", "solve", "compare"])

@@ -147,7 +147,7 @@ def test_what_was_assumed_is_a_warning(call: Callable[..., Any]) -> None:
     [
         (("--max-gap", "0.05"), "no pose for longer than 0.05 s: 2 to 2.09 s (2 of 4 fixed"),
         (("--units", "inch"), "unit: expected m, cm, mm, um, got 'inch'"),
-        (("--force", "F1,F2,F3"), "--load names the file"),
+        (("--force", "F1,F2,F3"), "--force requires --load"),
         (("--load", "l.csv"), "load: no channels were named for it"),
         (("--force", "F1", "--load", "l.csv"), "got 1 channels, expected three"),
         (("--force", "F1,F1,F2", "--load", "l.csv"), "expected the labels of three channels"),
