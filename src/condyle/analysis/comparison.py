@@ -16,7 +16,7 @@ import numpy as np
 from ..accessors import extend
 from ..dynamics import FORMULATIONS, ROUTES
 from ..dynamics import formulation as formulation_named
-from ..errors import UnsupportedError, texts_of
+from ..errors import InputError, UnsupportedError, texts_of
 from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
 from ..model.distributing import Distribution
@@ -125,6 +125,8 @@ def compare(
     motion, load = motion_and_load(mechanism, motion, load)
     asked = texts_of("formulations", list(FORMULATIONS) if formulations is None else formulations)
     names = [formulation_named(name).name for name in asked]
+    if not names:
+        raise InputError("formulations: expected at least one")
     # The first derivation also pays for imports, so it is not one of those that are timed.
     model = TimedModel(mechanism, names[0], "core", distribution)
     solution = model.solve(motion, load, load_point)

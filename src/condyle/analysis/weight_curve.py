@@ -79,9 +79,12 @@ def tradeoff(
     motion, load = motion_and_load(mechanism, motion, load)
     if not mechanism.contacts:
         raise InputError(f'"{mechanism.name}" has no contacts whose forces could be weighed')
-    asked = np.asarray(weights, dtype=float)
-    if asked.ndim != 1 or not asked.size or (np.diff(asked) <= 0).any():
-        raise InputError(f"weights: expected numbers that rise, got {list(weights)}")
+    try:
+        asked = np.asarray(weights, dtype=float)
+    except (TypeError, ValueError):
+        asked = np.zeros(0)
+    if asked.ndim != 1 or not asked.size or not (np.diff(asked) > 0).all():
+        raise InputError(f"weights must be strictly increasing numbers, got {weights!r:.80}")
     first = derive(mechanism, distribution=Distribution("weighted", preload), **model)
     one = first.with_distribution(Distribution("weighted", preload, float(asked[0])))
     solution = one.solve(motion, load, load_point)
@@ -97,7 +100,7 @@ def tradeoff(
             good &= found.status == Status.ok
             advance(1)
     if not good.any():
-        raise InputError("no sample has a result at every weight: leave the largest out")
+        raise InputError("no sample has a result at every weight: leave out the largest weight")
     greatest = np.array([limits(chain).greatest for chain in mechanism.chains])
     use = np.array(efforts)[:, good] / np.where(greatest > 0, greatest, 1.0)
     force = np.abs(np.array(forces)[:, good])

@@ -66,7 +66,7 @@ X = "X=-5:5:10 mm"
         ({"out": 3}, "out: expected a path, got int"),
         ({"threads": "two"}, "threads"),
         ({"scheduler": 3}, "scheduler"),
-        ({"model": 3}, "mechanism"),
+        ({"model": 3}, "model: expected a model"),
     ],
 )
 def test_one_clear_line(

@@ -17,7 +17,8 @@ from ...errors import InputError, did_you_mean, texts_of
 from ...extras import require
 from ...mechanism import dumps
 from ...mechanism.mechanism import COORDINATES, Mechanism
-from ...model.model import Model, derive
+from ...model.given import as_model
+from ...model.model import Model
 from ...motion import resolve_load_point
 from ...motion.column_units import FORCE, MOMENT
 from ...progress import step
@@ -75,7 +76,7 @@ def workspace_map(
             names the file as "source".
     Raises: InputError: for any argument that cannot be used, before the computation starts.
     """
-    made = model if isinstance(model, Model) else derive(model)
+    made = as_model(model)
     grid = grid_of(made.mechanism, over, hold)
     setup = setup_of(made, load, load_point, direction, stiffness, stroke, threads)
     wanted = chosen(texts_of("quantities", quantities), setup)
