@@ -18,7 +18,6 @@ from support.report_pages import Elements, column, payload, unpacked
 import condyle
 from condyle.errors import InputError
 from condyle.motion import Motion, bundled_reference
-from condyle.report.failed_spans import at_sample, gaps
 from condyle.report.page import report_html, write_report
 from condyle.report.page.html import fill, json_for_script, tag
 from condyle.report.page.reduce import BUDGET, reduced
@@ -26,8 +25,7 @@ from condyle.report.page.report_page import opened
 from condyle.report.panel_list import magnitudes
 from condyle.report.scene import DARK, LIGHT, styles
 from condyle.report.tables import Table, kept_tables, with_tables
-from condyle.results.failed_samples import Failure
-from condyle.results.solution import Results
+from condyle.results.failed_samples import at_sample
 
 ATTACK = "</script><img src=x onerror=alert(1)>{{style}}"
 
@@ -354,14 +352,9 @@ def test_spans_without_a_result_are_listed_and_marked(long_run: xr.Dataset) -> N
     assert "17 to 17.039 s" in text and "Without a result" in text
 
 
-def test_causes_come_from_the_solution(
-    long_run: xr.Dataset, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    spans = {"why": (16.9, 17.1), "no": (30.0, 31.0)}
-    known = [Failure(*span, 0, 40, "", why, "chain", "") for why, span in spans.items()]
-    monkeypatch.setattr(Results, "failures", known)
-    [found] = gaps(long_run)
-    assert (found.first, found.last, str(found)) == (20_000, 20_039, "unreachable: why")
+def test_the_interval_of_a_sample(long_run: xr.Dataset) -> None:
+    [found] = long_run.condyle.failures
+    assert (found.first, found.count) == (20_000, 40)
     assert at_sample([found], 20_010) is found and at_sample([found], 20_040) is None
 
 

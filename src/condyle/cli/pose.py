@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -38,5 +37,5 @@ def pose(
     import condyle
 
     report = condyle.pose_states(mechanism, joints, out, flag, tolerance, every, seed)
-    text = f"{report}\n{files_line([out])}"
-    return Answer(text, asdict(report) | {"files": [out]}, command_line("view", mechanism))
+    text = f"{report}\n{files_line(report.data['files'])}"
+    return Answer(text, report.data, command_line("view", mechanism))

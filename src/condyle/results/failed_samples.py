@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,8 @@ from ..status import STATUS_NAMES, Status
 
 if TYPE_CHECKING:
     import xarray as xr
+
+MOST = 500  # intervals that a figure or a page shows
 
 
 @dataclass(frozen=True)
@@ -36,11 +39,27 @@ class Failure:
     owner_name: str
     shortfall: float | None = None
 
+    @property
+    def text(self) -> str:
+        """Status and cause."""
+        return f"{self.status}: {self.cause}" if self.cause else self.status
+
     def __str__(self) -> str:
         when = f"{self.start:g} s" if self.count == 1 else f"{self.start:g} to {self.end:g} s"
         count = "1 sample" if self.count == 1 else f"{self.count} samples"
         needed = "" if self.shortfall is None else f"; {shortfall_text(self.shortfall)}"
         return f"t = {when} ({count}): {self.status}, {self.cause}{needed}"
+
+
+def longest(found: Sequence[Failure], most: int = MOST) -> list[Failure]:
+    """The longest ones, in the order of time: a screen cannot show more apart."""
+    kept = sorted(found, key=lambda one: one.start - one.end)[:most]
+    return sorted(kept, key=lambda one: one.first)
+
+
+def at_sample(found: Sequence[Failure], sample: int) -> Failure | None:
+    """The interval that a sample is in, or None."""
+    return next((one for one in found if one.first <= sample < one.first + one.count), None)
 
 
 def failures(solution: xr.Dataset) -> list[Failure]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,7 @@ from ..model.forward_kinematics import TOLERANCE, ForwardKinematics, PoseStatus
 from ..model.system import check_home
 from ..motion import Table, read_table, write_table
 from ..progress import step
+from .state_rows import StatesReport
 
 ERRORS: dict[PoseStatus, tuple[type[SampleError], str]] = {
     PoseStatus.UNREACHABLE: (
@@ -47,49 +47,6 @@ ERRORS: dict[PoseStatus, tuple[type[SampleError], str]] = {
 }
 
 
-@dataclass(frozen=True)
-class PoseReport:
-    """What forward kinematics found in a file.
-
-    missing:   rows without a pose.
-    failed:    the same by status.
-    residual:  largest difference of a joint from the given one, by unit; empty without a pose.
-    condition: largest condition number of the dimensionless actuator Jacobian.
-    """
-
-    rows: int
-    missing: int
-    failed: dict[str, int]
-    residual: dict[str, float]
-    condition: float
-
-    def __str__(self) -> str:
-        found = f"{self.rows - self.missing} of {self.rows} poses found"
-        if self.failed:
-            found += f" ({', '.join(f'{count} {name}' for name, count in self.failed.items())})"
-        if self.missing == self.rows:
-            return found
-        worst = ", ".join(f"{value:.3g} {unit}" for unit, value in self.residual.items())
-        return (
-            f"{found}; largest joint residual {worst}, "
-            f"largest condition number {self.condition:.4g}"
-        )
-
-
-@dataclass(frozen=True)
-class ModesReport:
-    """How many assembly modes were found: of each row, in their order."""
-
-    rows: int
-    modes: list[int]
-
-    def __str__(self) -> str:
-        few, many = min(self.modes), max(self.modes)
-        each = str(few) if few == many else f"{few} to {many}"
-        rows = "1 row" if self.rows == 1 else f"{self.rows} rows"
-        return f"{each} assembly modes found for {rows}; the search may miss some"
-
-
 def pose_states(
     mechanism: Any,
     joints: str | Path,
@@ -98,7 +55,7 @@ def pose_states(
     tolerance: float = TOLERANCE,
     every: bool = False,
     seed: int | None = None,
-) -> PoseReport | ModesReport:
+) -> StatesReport:
     """Forward kinematics of every row of a file of joint coordinates.
 
     Args:   mechanism: one, a model, the path of a file, or the name of a bundled one.
@@ -114,6 +71,9 @@ def pose_states(
                     home: characteristic lengths and rad), residual and condition. Rows never
                     influence each other.
             seed:   of that search; 0 if not given.
+    Returns: a summary; `data`: rows, missing (rows without a pose), failed (the same by status),
+            residual (largest difference of a joint from the given one, by unit), condition (largest
+            number of the dimensionless actuator Jacobian); with `every` rows and modes (of each).
     Raises: UnreachableError, LostError, InconsistentError: for such a row without `flag`; nothing
             is written then.
     """
@@ -155,23 +115,25 @@ def pose_states(
         columns["status"] = [PoseStatus(value).name.lower() for value in status]
     write_table(out, columns)
     counts = {one.name.lower(): int((status == one).sum()) for one in PoseStatus if one}
-    return PoseReport(
-        table.rows,
-        int(missing.size),
-        {name: count for name, count in counts.items() if count},
-        {
-            str(unit): float(np.nanmax(column))
-            for unit, column in zip(np.unique(units), worst.values(), strict=True)
-        }
-        if found.any()
-        else {},
-        float(np.nanmax(solution.condition)) if found.any() else float("nan"),
-    )
+    failed = {name: count for name, count in counts.items() if count}
+    said = f"{int(found.sum())} of {table.rows} poses found"
+    if failed:
+        said += f" ({', '.join(f'{count} {name}' for name, count in failed.items())})"
+    largest, condition = {}, float("nan")
+    if found.any():
+        each = zip(np.unique(units), worst.values(), strict=True)
+        largest = {str(unit): float(np.nanmax(column)) for unit, column in each}
+        condition = float(np.nanmax(solution.condition))
+        texts = ", ".join(f"{value:.3g} {unit}" for unit, value in largest.items())
+        said += f"; largest joint residual {texts}, largest condition number {condition:.4g}"
+    data = {"rows": table.rows, "missing": int(missing.size), "failed": failed}
+    data |= {"residual": largest, "condition": condition, "files": [Path(out)]}
+    return StatesReport(data, said)
 
 
 def _modes(
     mechanism: Mechanism, joints: str | Path, out: str | Path, seed: int, tolerance: float
-) -> ModesReport:
+) -> StatesReport:
     """The assembly modes that a seeded search finds for every row."""
     table, given = _read(mechanism, joints)
     forward, units = ForwardKinematics(mechanism), _units(mechanism)
@@ -191,7 +153,11 @@ def _modes(
     columns |= _largest(np.concatenate([modes.residual for modes in found]), units)
     columns["condition"] = np.concatenate([modes.condition for modes in found])
     write_table(out, columns)
-    return ModesReport(table.rows, counts)
+    few, many = min(counts), max(counts)
+    each = str(few) if few == many else f"{few} to {many}"
+    rows = "1 row" if table.rows == 1 else f"{table.rows} rows"
+    said = f"{each} assembly modes found for {rows}; the search may miss some"
+    return StatesReport({"rows": table.rows, "modes": counts, "files": [Path(out)]}, said)
 
 
 def _read(mechanism: Mechanism, joints: str | Path) -> tuple[Table, np.ndarray]:

@@ -31,8 +31,11 @@ class StatesReport:
     """Summary of a file of states: `data` for programs, `str` to read."""
 
     data: dict[str, Any]
+    said: str = ""
 
     def __str__(self) -> str:
+        if self.said:
+            return self.said
         text = f"{self.data['rows']} rows solved: {', '.join(map(str, self.data['files']))}"
         if most := self.data.get("greatest_activation"):
             text += f"\nGreatest activation (effort over its limit): {most['value']:.4g}, "

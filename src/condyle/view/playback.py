@@ -6,8 +6,8 @@ import numpy as np
 import xarray as xr
 
 from ..kinematics.singularities import KINDS
-from ..report.failed_spans import Gap, at_sample, gaps
 from ..report.scene import place
+from ..results.failed_samples import Failure, at_sample
 from .snapshot import Level, Snapshot, state_messages
 
 
@@ -26,7 +26,7 @@ class Playback:
         self.speed = 1.0
         self._clock = 0.0
         self._good = np.flatnonzero(solution["status"].values == 0)
-        self._failures = gaps(solution)
+        self._failures = solution.condyle.failures
         names = ("pose", "joint", "joint_rate", "effort", "contact_force", "bound_margin", "load")
         self._values = {name: solution[name].values for name in names}
 
@@ -110,11 +110,11 @@ class Playback:
         return int(self._good[max(int(np.searchsorted(self._good, sample)) - 1, 0)])
 
     def _messages(
-        self, failed: Gap | None, drawn: int, here: dict[str, np.ndarray]
+        self, failed: Failure | None, drawn: int, here: dict[str, np.ndarray]
     ) -> tuple[Level, tuple[str, ...]]:
         if failed is not None:
             return "unreachable", (
-                f"No result from {failed.start:g} to {failed.end:g} s: {failed}",
+                f"No result from {failed.start:g} to {failed.end:g} s: {failed.text}",
                 f"Grey: the mechanism at t = {self.time[drawn]:g} s, without forces",
             )
         margin, force = here["bound_margin"], here["contact_force"]

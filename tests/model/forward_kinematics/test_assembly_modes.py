@@ -79,7 +79,7 @@ def test_modes_of_a_file(tmp_path: Path) -> None:
         "condition",
     )
     counts = [int((table.columns["row"] == row).sum()) for row in (1, 2, 3)]
-    assert report.modes == counts and counts[0] >= 8 and counts[1] >= 2 and counts[2] == 0
+    assert report.data["modes"] == counts and counts[0] >= 8 and counts[1] >= 2 and counts[2] == 0
     assert str(report).startswith(f"0 to {max(counts)} assembly modes found for 3 rows")
     followed = np.genfromtxt(tmp_path / "poses.csv", delimiter=",", skip_header=1, max_rows=2)
     modes = table.require(coordinates)

@@ -188,7 +188,9 @@ def test_a_lost_track_in_a_file(tmp_path: Path) -> None:
         pose_states(mechanism, tmp_path / "in.csv", tmp_path / "out.csv")
     assert error.value.samples[-1] == 100 and not (tmp_path / "out.csv").exists()
     report = pose_states(mechanism, tmp_path / "in.csv", tmp_path / "out.csv", flag=True)
-    assert report.failed == {"lost": report.missing} and report.missing >= 22
+    assert (
+        report.data["failed"] == {"lost": report.data["missing"]} and report.data["missing"] >= 22
+    )
 
 
 def test_candidates_of_another_mode_are_followed_anew(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -92,7 +92,7 @@ def test_file_in_file_out(tmp_path: Path) -> None:
     columns = {f"joint_{name}": joints[:, i] for i, name in enumerate(mechanism.chain_names)}
     write_table(tmp_path / "joints.csv", {"t": np.arange(20.0), **columns})
     report = pose_states(mechanism, tmp_path / "joints.csv", tmp_path / "poses.csv")
-    assert (report.rows, report.missing) == (20, 0)
+    assert (report.data["rows"], report.data["missing"]) == (20, 0)
     table = read_table(tmp_path / "poses.csv")
     names = list(table.columns)
     assert names == ["t", "X", "Y", "Z", "alpha", "beta", "gamma", "residual", "condition"]
@@ -118,7 +118,7 @@ def test_residuals_of_chains_that_turn_and_slide(tmp_path: Path) -> None:
         mine = [chain.kind == kind for chain in mechanism.chains]
         worst = np.abs(found.residual[:, mine]).max(axis=1)
         np.testing.assert_allclose(table.columns[f"residual_{unit}"], worst, rtol=1e-12, atol=1e-15)
-        assert f"{report.residual[unit]:.3g} {unit}" in str(report)
+        assert f"{report.data['residual'][unit]:.3g} {unit}" in str(report)
         assert worst[0] < 1e-15 < 1e-7 < worst[1]
 
 
@@ -130,7 +130,7 @@ def test_joints_that_no_pose_has(tmp_path: Path) -> None:
         pose_states(mechanism, tmp_path / "joints.csv", tmp_path / "poses.csv")
     assert not (tmp_path / "poses.csv").exists()
     report = pose_states(mechanism, tmp_path / "joints.csv", tmp_path / "poses.csv", flag=True)
-    assert (report.missing, report.failed) == (1, {"unreachable": 1})
+    assert (report.data["missing"], report.data["failed"]) == (1, {"unreachable": 1})
     assert "1 of 2 poses found (1 unreachable)" in str(report)
     assert (tmp_path / "poses.csv").read_text().splitlines()[2] == "," * 8 + "unreachable"
 

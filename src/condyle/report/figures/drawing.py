@@ -17,8 +17,8 @@ from matplotlib.figure import Figure, FigureBase
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
+from ...results.failed_samples import longest
 from ..actuators import EMG_ROW, REACH
-from ..failed_spans import gaps, longest
 from ..naming import groups, heading, readable, short, stem
 from ..panel import Curve, Panel, PanelGroup
 from .registry import plot
@@ -323,9 +323,9 @@ def draw_curves(
             axes.fill_between(time, low, high, color=style["color"], alpha=0.18, lw=0)
     if len(time) > 1:
         axes.set_xlim(time[0], time[-1])
-    for i, gap in enumerate(longest(gaps(solution))):
+    for i, failure in enumerate(longest(solution.condyle.failures)):
         named = NO_RESULT if i == 0 else None
-        axes.axvspan(gap.start, gap.end, color=GREY, alpha=0.2, lw=1, label=named)
+        axes.axvspan(failure.start, failure.end, color=GREY, alpha=0.2, lw=1, label=named)
 
 
 def draw_limits(axes: Axes, panel: Panel, names: Sequence[str]) -> None:

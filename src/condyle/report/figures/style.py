@@ -24,7 +24,6 @@ from matplotlib.transforms import ScaledTranslation
 
 from ...analysis.paper import is_stand_in, is_synthetic
 from ...errors import InputError, did_you_mean
-from ..failed_spans import gaps
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -276,6 +275,6 @@ def caption(solution: xr.Dataset) -> str:
     if "bands" in solution.attrs:
         count = json.loads(solution.attrs["bands"])["variants"]
         parts.append(f"bands: 5 to 95 and 25 to 75 % of {count} variants")
-    reasons = dict.fromkeys(str(one) for one in gaps(solution))
+    reasons = dict.fromkeys(one.text for one in solution.condyle.failures)
     grey = [f" Grey: no result ({', '.join(list(reasons)[:MOST_REASONS])})."] if reasons else []
     return "; ".join(parts) + "." + "".join(grey)

@@ -14,10 +14,10 @@ import numpy as np
 
 from ...errors import InputError
 from ...extras import require
+from ...results.failed_samples import longest
 from ...results.solution import BOUND_TOLERANCE
 from ...results.summary import peak, summarize
 from ..actuators import drawn_limits
-from ..failed_spans import gaps, longest
 from ..panel_list import reaction
 from .html import Markup, table, tag
 from .page_columns import Columns
@@ -100,20 +100,15 @@ def _facts(page: Reduced) -> Iterator[tuple[Any, ...]]:
 
 def failure_table(page: Reduced) -> Markup:
     """When there is no result, and why."""
-    found = gaps(page.solution, page.time, page.status)
+    found = page.failures
     if not found:
         return Markup("")
     rows = [
-        [
-            f"{one.start:g} to {one.end:g} s",
-            f"{one.last - one.first + 1}",
-            one.status,
-            one.cause or "not stated",
-        ]
+        [f"{one.start:g} to {one.end:g} s", f"{one.count}", one.status, one.cause or "not stated"]
         for one in longest(found, FAILURES)
     ]
     more = len(found) - len(rows)
-    notes = [f"The longest of {len(found)} spans."] if more else []
+    notes = [f"The longest of {len(found)} intervals."] if more else []
     header = ["Time", "Samples", "Status", "Cause"]
     return table(header, rows, "Without a result", notes)
 

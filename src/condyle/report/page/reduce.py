@@ -20,6 +20,8 @@ from .page_columns import Envelope
 if TYPE_CHECKING:
     import xarray as xr
 
+    from ...results.failed_samples import Failure
+
 BUDGET = 3_400_000  # bytes of samples, so that a page of 5001 samples stays under 10 MB
 BUCKETS = 1200  # of an envelope: two of them a pixel of a wide plot
 DRAWN = (4, 3, 20)  # columns a chain, a marker, and besides, that the picture in space needs
@@ -31,8 +33,8 @@ class Reduced:
     """A solution with the samples that a page keeps.
 
     solution: with `samples` (K,) of the run's `total`;  envelope: of its curves, or None if the
-    page has every sample.   status, time: of every sample, (N,), [s];  near: how many of them are
-    near a singularity.   duties: what each actuator does, of every sample too.
+    page has every sample.   status, time: of every sample, (N,), [s];  failures: of all;  near:
+    number of samples near a singularity.   duties: of each actuator, of every sample too.
     """
 
     solution: xr.Dataset
@@ -40,6 +42,7 @@ class Reduced:
     envelope: Envelope | None
     status: np.ndarray
     time: np.ndarray
+    failures: list[Failure]
     near: int
     duties: list[Duty]
 
@@ -55,6 +58,7 @@ class Reduced:
 def reduced(solution: xr.Dataset) -> Reduced:
     """The solution as a page can carry it; one in a file is read piece by piece."""
     time, status = solution["time"].values, solution["status"].values
+    failed = solution.condyle.failures
     count = len(time)
     lines = curve_values(solution.isel(time=slice(0, 2)).load())
     counts = solution.sizes["chain"], solution.sizes.get("marker", 0), 1
@@ -63,7 +67,7 @@ def reduced(solution: xr.Dataset) -> Reduced:
     if count <= affordable:
         whole = solution.load()
         near = int((whole["singularity"].values != 0).sum())
-        return Reduced(whole, np.arange(count), None, status, time, near, duty(whole))
+        return Reduced(whole, np.arange(count), None, status, time, failed, near, duty(whole))
     # An envelope takes 12 bytes a curve and span, a sample 4 bytes a column.
     # It gets half of the room at most, so that the samples still draw tracks and planes.
     buckets = min(BUCKETS, affordable * columns // (6 * len(lines)))
@@ -88,7 +92,9 @@ def reduced(solution: xr.Dataset) -> Reduced:
     extremes |= set(_edges(status).tolist())
     steps = np.linspace(0, count - 1, max(spare - len(extremes), 2)).astype(int)
     samples = np.unique([*steps, *extremes])
-    return Reduced(_at(solution, samples), samples, envelope, status, time, near, meter.read())
+    return Reduced(
+        _at(solution, samples), samples, envelope, status, time, failed, near, meter.read()
+    )
 
 
 def curve_values(solution: xr.Dataset) -> dict[str, np.ndarray]:
@@ -144,4 +150,4 @@ def _at(solution: xr.Dataset, samples: np.ndarray) -> xr.Dataset:
         [p.drop_vars(fixed) for p in parts], "time", coords="minimal", compat="override"
     )
     joined = joined.assign({name: solution[name] for name in fixed})
-    return type(solution)(joined.data_vars, joined.coords, solution.attrs)
+    return joined.assign_attrs(solution.attrs)

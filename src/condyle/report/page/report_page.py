@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...atomic import write_text
 from ...progress import step
-from ..failed_spans import gaps, longest
+from ...results.failed_samples import longest
 from ..panel import panels_of
 from ..scene import styles
 from .html import Markup, fill, json_for_script, tag, text
@@ -154,13 +154,12 @@ def _payload(page: Reduced) -> dict[str, Any]:
         panel_data(section, panel, columns, looks)
         for section, panel in panels_of(solution, page.duties)
     ]
-    told = alerts(solution, columns)
-    failed = gaps(solution, page.time, page.status)
+    shown = alerts(solution, columns)
     return {
         "machine": drawn,
         "panels": panels,
-        "alerts": told,
-        "failures": [[one.start, one.end, str(one)] for one in longest(failed)],
+        "alerts": shown,
+        "failures": [[one.start, one.end, one.text] for one in longest(page.failures)],
         "columns": columns.packed(page.total, page.envelope),  # last, when all are in
     }
 
