@@ -14,7 +14,7 @@ from support.loads import parts
 from support.speeds import few
 
 from benchmarks.casadi_function import casadi_function
-from condyle.backends.kernel import Answer, arranged
+from condyle.backends.kernel import Answer, results_of
 from condyle.backends.numpy_kernel import NumpyKernel
 from condyle.dynamics import FORMULATIONS
 from condyle.graph.program import Variants
@@ -153,14 +153,10 @@ def test_whole_answers(name: str) -> None:
     variants = questions_of(numpy, OUTPUTS)
     function = casadi_function(variants.main, numpy.system.numbers)
     columns = np.hstack([np.asarray(part).T for part in function.map(len(c.q))(c.samples.T)[:-1]])
-    start = 0
-    for result in variants.main.interface.results:
-        width = variants.main.interface.width(result)
-        block = columns[:, start : start + width].T
-        start += width
-        truth = arranged(variants.main.interface, result, block, numpy.system.numbers.order)
+    truth = results_of(variants.main.interface, columns.T, numpy.system.numbers.order)
+    for name, right in truth.items():
         for values in (got.values, reference.values):
-            assert error(values[result.name], truth) < TOLERANCE, result.name
+            assert error(values[name], right) < TOLERANCE, name
 
 
 def questions_of(evaluator: Model, *details: Any) -> Variants:

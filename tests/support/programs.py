@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from benchmarks.casadi_function import casadi_function
-from condyle.backends.kernel import arranged
+from condyle.backends.kernel import results_of
 from condyle.graph.graph import Graph, Value
 from condyle.graph.program import Check, Numbers, Output, Port, Program
 
@@ -31,5 +31,4 @@ def no_numbers(lanes: int = LANES) -> Numbers:
 def by_casadi(p: Program, numbers: Numbers, samples: np.ndarray) -> dict[str, np.ndarray]:
     """Results by name, samples last, by CasADi's interpreter; samples: (N, columns)."""
     *outputs, _ = casadi_function(p, numbers).map(len(samples))(samples.T)
-    blocks = zip(p.interface.results, outputs, strict=True)
-    return {r.name: arranged(p.interface, r, np.array(o), numbers.order) for r, o in blocks}
+    return results_of(p.interface, np.vstack([np.array(o) for o in outputs]), numbers.order)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from ..errors import InputError
-from ..graph.program import Interface, Numbers, Port, Result
+from ..graph.program import Interface, Numbers, Port
 
 OK, AGAIN = 0, 255  # statuses; others are those of the program's checks
 
@@ -48,27 +47,34 @@ class Kernel(Protocol):
         ...
 
 
-def columns_of(
-    interface: Interface, inputs: Mapping[str, np.ndarray], order: tuple[int, ...]
+def arrays_of(
+    interface: Interface, inputs: Mapping[str, np.ndarray]
 ) -> tuple[int, list[np.ndarray]]:
-    """How many samples there are, and every input column, (N,) each, as views where possible.
+    """How many samples there are, and every port's array: as many rows, or one.
 
     Raises: InputError: for an array that does not fit its port.
     """
-    columns: list[np.ndarray] = []
     given = [_fitting(interface, port, inputs[port.name]) for port in interface.ports]
-    count = max((len(a) for a in given if len(a) != 1), default=min(map(len, given), default=0))
+    lengths = [len(a) for a in given]
+    count = max((n for n in lengths if n != 1), default=1 if lengths else 0)
+    for port, n in zip(interface.ports, lengths, strict=True):
+        if n not in (1, count):
+            raise InputError(f"{port.name}: {n} samples, where others have {count}")
+    return count, given
+
+
+def columns_of(
+    interface: Interface, inputs: Mapping[str, np.ndarray], order: tuple[int, ...]
+) -> tuple[int, list[np.ndarray]]:
+    """How many samples there are, and every input column, (N,) each, as views."""
+    count, given = arrays_of(interface, inputs)
+    columns: list[np.ndarray] = []
     for port, a in zip(interface.ports, given, strict=True):
         if len(a) != count:
-            if len(a) != 1:
-                raise InputError(f"{port.name}: {len(a)} samples, where others have {count}")
             a = np.broadcast_to(a, (count, *a.shape[1:]))
-        if not port.lanes:
-            columns += [a[:, i] for i in range(port.size)]
-            continue
-        for i in range(port.size):
-            rows = a if port.size == 1 else a[:, i]
-            columns += [rows[:, k] for k in order]
+        blocks = [a[:, i] for i in range(port.size)] if port.size > 1 and port.lanes else [a]
+        lanes = order if port.lanes else range(port.size)
+        columns += [block[:, k] for block in blocks for k in lanes]
     return count, columns
 
 
@@ -94,28 +100,41 @@ def _numbers(name: str, given: object) -> np.ndarray:
         ) from None
 
 
-def results_of(
-    interface: Interface, columns: np.ndarray, order: tuple[int, ...]
-) -> dict[str, np.ndarray]:
-    """Every result of columns, (width of all, N), by name; see `arranged`."""
-    values, row = {}, 0
+class Place(NamedTuple):
+    """Where a result stands among the columns; `moved`: the lanes in the callers' order."""
+
+    name: str
+    start: int
+    end: int
+    shape: tuple[int, ...]
+    moved: np.ndarray | None
+
+
+def places_of(interface: Interface, order: tuple[int, ...]) -> list[Place]:
+    """Of every result."""
+    starts, found, row = np.cumsum([0, *interface.counts]), [], 0
     for r in interface.results:
-        end = row + interface.width(r)
-        values[r.name] = arranged(interface, r, columns[row:end], order)
+        end, shape, moved = row + interface.width(r), r.shape, None
+        if r.lanes:
+            mine = [k for g in r.groups for k in order[starts[g] : starts[g + 1]]]
+            shape = (*r.shape, len(mine))
+            moved = None if mine == sorted(mine) else np.argsort(mine)
+        found.append(Place(r.name, row, end, shape, moved))
         row = end
+    return found
+
+
+def results_at(places: list[Place], columns: np.ndarray) -> dict[str, np.ndarray]:
+    """Every result of columns, (width of all, N), by name, as its shape has it."""
+    values, count = {}, columns.shape[1]
+    for name, start, end, shape, moved in places:
+        block = columns[start:end].reshape(*shape, count)
+        values[name] = block if moved is None else block.take(moved, axis=-2)
     return values
 
 
-def arranged(
-    interface: Interface, result: Result, block: np.ndarray, order: tuple[int, ...]
-) -> np.ndarray:
-    """Columns of a result, (width, N), as its shape has it; lanes in the callers' order."""
-    count = block.shape[1]
-    if not result.lanes:
-        return block.reshape(*result.shape, count)
-    starts = np.cumsum([0, *interface.counts])
-    mine = [k for g in result.groups for k in order[starts[g] : starts[g + 1]]]
-    found = block.reshape(math.prod(result.shape), len(mine), count)
-    if mine != sorted(mine):
-        found = found[:, np.argsort(mine)]
-    return found.reshape(*result.shape, len(mine), count)
+def results_of(
+    interface: Interface, columns: np.ndarray, order: tuple[int, ...]
+) -> dict[str, np.ndarray]:
+    """Every result of columns, (width of all, N), by name."""
+    return results_at(places_of(interface, order), columns)

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...graph.program import Interface, Numbers, Variants
-from ..kernel import Answer, columns_of, results_of
+from ..kernel import Answer, arrays_of, places_of, results_at
 from ..threads import shared_out, workers
 from .build import loaded
 from .shared_library import aligned, prepared
@@ -54,36 +54,41 @@ class CompiledKernel:
     def _prepare(self, numbers: Numbers) -> None:
         self.order = numbers.order
         self._table = prepared(self._library, self.facts, numbers)
+        self._address = _address(self._table)
+        self._places = places_of(self.interface, self.order)
+        self._vector = ctypes.c_ssize_t * self.interface.columns
 
     def run(self, inputs: Mapping[str, np.ndarray], threads: int | None = None) -> Answer:
         """Evaluate samples; columns that are contiguous or constant are fastest."""
-        count, columns = columns_of(self.interface, inputs, self.order)
-        columns = [_readable(column) for column in columns]
+        count, given = arrays_of(self.interface, inputs)
+        given = [_readable(a) for a in given]  # has to stay as long as C reads it
+        starts: list[int] = []
+        strides: list[int] = []
+        for port, a in zip(self.interface.ports, given, strict=True):
+            first, (row, *steps) = _address(a), a.strides
+            lanes = self.order if port.lanes else range(port.size)
+            blocks = [first]
+            if port.lanes and port.size > 1:
+                blocks = [first + i * steps[0] for i in range(port.size)]
+            starts += [block + k * steps[-1] for block in blocks for k in lanes]
+            strides += [row // 8 if len(a) == count else 0] * (len(blocks) * len(lanes))
         status = np.empty(count, dtype=np.uint8)
         rows = -(-count // UNIT) * UNIT
         results = aligned(self.columns * rows).reshape(self.columns, rows)
-        strides = [column.strides[0] // 8 for column in columns]
-        starts = [column.ctypes.data for column in columns]
-        steps = (ctypes.c_ssize_t * len(columns))(*strides)
-        table, out, judged = self._table.ctypes.data, results.ctypes.data, status.ctypes.data
+        vector, call = self._vector, self._library.batch
+        steps_at, out, judged = vector(*strides), _address(results), _address(status)
 
         def piece(start: int, end: int) -> None:
-            at = (ctypes.c_void_p * len(columns))(
-                *(a + 8 * s * start for a, s in zip(starts, strides, strict=True))
-            )
-            self._library.batch(
-                table,
-                ctypes.addressof(at),
-                ctypes.addressof(steps),
-                end - start,
-                out + 8 * start,
-                rows,
-                judged + start,
-            )
+            moved = starts
+            if start:
+                moved = [a + 8 * s * start for a, s in zip(starts, strides, strict=True)]
+            args = self._address, vector(*moved), steps_at, end - start
+            call(*args, out + 8 * start, rows, judged + start)
 
-        work = self.facts["operations"] * count // self.facts["lanes"]
-        shared_out(piece, count, min(workers(threads), 1 + work // WORTH_A_THREAD), UNIT)
-        return Answer(results_of(self.interface, results[:, :count], self.order), status)
+        most = 1 + self.facts["operations"] * count // self.facts["lanes"] // WORTH_A_THREAD
+        hands = 1 if threads is None and most == 1 else min(workers(threads), most)
+        shared_out(piece, count, hands, UNIT)
+        return Answer(results_at(self._places, results[:, :count]), status)
 
     def one(self, sample: np.ndarray) -> tuple[np.ndarray, int]:
         """Evaluate one sample, (columns,), at least latency: all results in a row, and a status.
@@ -139,8 +144,14 @@ class Single:
         self.run: Callable[[], int] = partial(ONE(one), *self.addresses[1:])
 
 
-def _readable(column: np.ndarray) -> np.ndarray:
-    """A column that C can read: aligned, whole numbers of doubles apart."""
-    if column.strides[0] % 8 or not column.flags.aligned:  # a view into a record, say
-        return column.copy()
-    return column
+def _readable(a: np.ndarray) -> np.ndarray:
+    """An array that C can read: aligned, whole numbers of doubles apart."""
+    if a.flags.aligned and not any(step % 8 for step in a.strides):
+        return a
+    return a.copy()  # of a view into a record, say
+
+
+def _address(a: np.ndarray) -> int:
+    """Of the first number; quicker than `a.ctypes.data`."""
+    found: int = a.__array_interface__["data"][0]
+    return found
