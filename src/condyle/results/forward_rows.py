@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from ..kinematics.causes import FLAG, Owner, cause_text, causes, owners, sample_
 from ..kinematics.chain import FAMILIES
 from ..kinematics.constraints import indices
 from ..mechanism.mechanism import COORDINATES
+from ..model.given import as_model
 from ..model.model import Model
 from ..model.model_result import ModelResult
 from ..motion import Table
@@ -24,7 +26,7 @@ KINDS = {"N m": "moment", "N": "force"}
 
 
 def forward_states(
-    model: Model,
+    model: Any,
     states: str | Path,
     out: str | Path,
     load_point: str | None = None,
@@ -36,7 +38,8 @@ def forward_states(
 
     Rows never influence each other.
 
-    Args:    states: CSV, or Parquet if its name ends in .parquet, with 6 - k pose coordinates,
+    Args:    model: one, or a mechanism, the path of a file, or the name of a bundled one.
+             states: CSV, or Parquet if its name ends in .parquet, with 6 - k pose coordinates,
              their rates dX... (none: at rest), tau_<chain> of every chain, and optionally some of
              Fx, Fy, Fz, Mx, My, Mz. Other columns are named in a warning.
              out: ddX... of the given coordinates, contact_<contact>, the pose, joint_<chain>, and
@@ -45,6 +48,7 @@ def forward_states(
              strict: a warning is an error.
     Raises:  InputError, SampleError, WarningError: nothing is written then.
     """
+    model = as_model(model)
     mechanism = model.mechanism
     efforts = [f"tau_{name}" for name in mechanism.chain_names]
     units = [FAMILIES[chain.kind].effort_unit for chain in mechanism.chains]

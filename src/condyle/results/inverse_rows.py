@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..atomic import replacing
 from ..errors import InputError
+from ..model.given import as_model
 from ..model.inverse_dynamics import SOLVED
 from ..model.joint_reactions import reactions as joint_reactions
 from ..model.model import Model
@@ -40,7 +41,7 @@ def state_columns(model: Model) -> StateColumns:
 
 
 def solve_states(
-    model: Model,
+    model: Any,
     states: str | Path,
     out: str | Path,
     load_point: str | None = None,
@@ -54,7 +55,8 @@ def solve_states(
 
     Rows never influence each other.
 
-    Args:    states: CSV, or Parquet if its name ends in .parquet, with 6 - k pose coordinates,
+    Args:    model: one, or a mechanism, the path of a file, or the name of a bundled one.
+             states: CSV, or Parquet if its name ends in .parquet, with 6 - k pose coordinates,
              their rates dX... and accelerations ddX... (without any of both the states are at
              rest), and optionally some of Fx, Fy, Fz, Mx, My, Mz. Other columns are named in a
              warning, or refused if they look misspelt.
@@ -65,6 +67,9 @@ def solve_states(
              mat: file for MATLAB to write as well; it takes the memory of the whole table.
     Raises:  InputError, SampleError, WarningError: nothing is written then.
     """
+    model = as_model(model)
+    if mat is not None and Path(mat) == Path(out):
+        raise InputError(f"--out {out}: --mat writes that file; give the table another name")
     watch = Watch(model.mechanism, rows=True)
     greatest: Activation | None = None
     kept: list[Columns] = []
