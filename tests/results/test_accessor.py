@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import weakref
 from pathlib import Path
 
@@ -81,3 +82,22 @@ def test_an_accessor_does_not_outlive_its_use(datasets: dict[str, xr.Dataset]) -
     """A dataset that kept it would hold its own arrays until garbage is collected."""
     seen = weakref.ref(datasets["solution"].condyle)
     assert seen() is None
+
+
+def test_older_files_open_with_the_names_of_today(
+    datasets: dict[str, xr.Dataset], tmp_path: Path
+) -> None:
+    old = datasets["solution"].rename(effort="torque", contact_loss="lift_off")
+    old.attrs["events"] = json.dumps([{"kind": "lift_off"}])
+    old.condyle.save(tmp_path / "old.nc")
+    found = condyle.open_solution(tmp_path / "old.nc")
+    assert "torque" not in found and found.condyle.events == [{"kind": "contact_loss"}]
+    for name in ("effort", "contact_loss"):
+        np.testing.assert_array_equal(found[name], datasets["solution"][name])
+
+
+def test_a_run_is_drawn_on_a_map(datasets: dict[str, xr.Dataset]) -> None:
+    [axes, *_] = datasets["map"].condyle.plot.ratio(datasets["solution"]).axes
+    pose = datasets["solution"]["pose"].sel(coordinate=["X", "beta"]).values
+    drawn = [line.get_xydata() for line in axes.get_lines()]
+    assert any(len(one) == 11 and np.allclose(one[:, 0], 1e3 * pose[:, 0]) for one in drawn)
