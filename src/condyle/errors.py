@@ -1,4 +1,4 @@
-"""What can go wrong, each said in a way that helps: what was got, what was expected, what to do.
+"""Exceptions: each says what was got, what was expected and what to do.
 
 Every error of the library derives from `CondyleError`; the command line prints its message on
 stderr and exits with status 2. The facts behind a message are attributes of the exception, and
@@ -182,22 +182,19 @@ class UnreachableError(SampleError):
 
 
 class LostError(SampleError):
-    """Joint coordinates of which it is no longer certain to which assembly mode they belong."""
+    """Joint coordinates whose assembly mode is ambiguous."""
 
 
 class InconsistentError(SampleError):
-    """Joint coordinates that no pose near the one found has."""
+    """Joint coordinates for which forward kinematics did not converge."""
 
 
 class SingularError(SampleError):
-    """A pose at which the torques are not determined."""
+    """A pose at which the efforts are not determined."""
 
 
 class NumberRangeError(SingularError):
-    """Rates, accelerations or a load so large that the efforts are not finite.
-
-    A `SingularError`, as it was before it had a name of its own.
-    """
+    """Rates, accelerations or a load so large that the efforts are not finite."""
 
     @property
     def kind(self) -> str:
@@ -205,19 +202,19 @@ class NumberRangeError(SingularError):
 
 
 class InfeasibleError(SampleError):
-    """A sample that no efforts within the limits balance.
+    """A sample that efforts within the limits cannot balance.
 
-    Attributes: value: the least number by which all limits would have to be multiplied, inf where
-                no limits would do;  bound: 1.
+    Attributes: value: smallest factor on all limits that would make it feasible, inf where there is
+                none;  bound: 1.
     """
 
 
 class JammedError(SampleError):
-    """A sample at which friction holds whatever the actuators do: no pattern is consistent."""
+    """A sample at which Coulomb friction has no solution: the mechanism jams."""
 
 
 class UncertifiedError(SampleError):
-    """Efforts that were found, but not within the accuracy that is promised."""
+    """Efforts that could not be certified to the stated accuracy."""
 
 
 def did_you_mean(name: object, available: Iterable[str]) -> str:
@@ -263,7 +260,7 @@ def printable(text: object, lines: bool = True) -> str:
 
 
 def shortened(text: str, length: int) -> str:
-    """Text of at most so many characters, ended with dots where it was longer."""
+    """Text of at most `length` characters; a longer one ends in dots."""
     return text if len(text) <= length else f"{text[: length - 3]}..."
 
 

@@ -1,4 +1,4 @@
-"""What became of a sample: the one place of statuses, their words and their causes."""
+"""Status of a sample: the codes, their meaning and the cause that each can name."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class Status(IntEnum):
         "chain or platform",
     )
     overflow = 3, "rates, accelerations or load are too large for numbers", "sample"
-    infeasible = 4, "no efforts within the limits balance the sample", "sample"
-    jammed = 5, "no pattern of friction is consistent: the mechanism jams", "sample"
+    infeasible = 4, "efforts within the limits cannot balance the sample", "sample"
+    jammed = 5, "Coulomb friction has no solution: the mechanism jams", "sample"
     uncertified = 6, "efforts were found that could not be certified", "sample"
 
 

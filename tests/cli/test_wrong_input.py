@@ -151,7 +151,7 @@ CASES: dict[str, Case] = {
         motion().replace("X", "X [mm]", 1),
         'the header of column "X" and the units asked for differ',
     ),
-    "motion falls": (RUN, motion(t=TIMES[::-1]), "times must rise"),
+    "motion falls": (RUN, motion(t=TIMES[::-1]), "times must be strictly increasing"),
     "motion stands": (RUN, spoilt(3, "t", "0.05"), "line 4: t is 0.05 s after 0.05 s"),
     "motion nan": (RUN, spoilt(3, "X", "NaN"), 'line 4, column "X": got "NaN"'),
     "motion text": (RUN, spoilt(5, "beta", "1,5"), "line 6: 6 cells, expected 5"),
@@ -180,7 +180,11 @@ CASES: dict[str, Case] = {
     "load missing": (("run", "--load", "in.csv"), None, "in.csv: no such file"),
     "load of nothing": (("run", "--load", "in.csv"), table(["t", "a"], [[0, 0]]), '"Fz" are miss'),
     "load too short": (("run", "--load", "in.csv"), LOADED, "no load at 1 to 5 s"),
-    "load falls": (("run", "--load", "in.csv"), table(LOAD, [[1, 0, 0, 0], [0, 0, 0, 0]]), "rise"),
+    "load falls": (
+        ("run", "--load", "in.csv"),
+        table(LOAD, [[1, 0, 0, 0], [0, 0, 0, 0]]),
+        "strictly increasing",
+    ),
     "load text": (("run", "--load", "in.csv"), table(LOAD, [[0, "a", 0, 0]]), 'got "a"'),
     "load point of run": (("run", "--load-point", "nose"), None, 'no load point "nose"'),
     "landmark elsewhere": (("run", "gough-stewart", "--landmark", "nose"), None, "--landmark nose"),
@@ -201,7 +205,7 @@ CASES: dict[str, Case] = {
     "joints whose times fall": (
         POSE,
         table(["t", *JOINTS], [[1, *[0] * 6]] * 2),
-        "times must rise",
+        "times must be strictly increasing",
     ),
     "joints that disagree": (POSE, table(JOINTS, [[1e-3] + [0] * 5]), "raise --tolerance"),
     "all poses and flags": (

@@ -381,11 +381,11 @@ right_condyle = [4.5, 5, 6]
     ("old", "new", "said"),
     [
         ('["A", "B", "C"]', '["A", "B"]', "fixed: expected at least 3 entries, got 2"),
-        ('["A", "B", "C"]', '["A", "B", "B"]', "fixed: B stands more than once"),
-        ('["A", "B", "C"]', '["A", "B", "D"]', "D stands in fixed and in platform"),
+        ('["A", "B", "C"]', '["A", "B", "B"]', "fixed: B is listed more than once"),
+        ('["A", "B", "C"]', '["A", "B", "D"]', "D is listed in fixed and in platform"),
         ('["A", "B", "C"]', '["A", "B", 3]', "fixed[2]: expected text in quotes, got 3"),
         ('["A", "B", "C"]', '"ABC"', "fixed: expected a list"),
-        ("fixed = ", "fixd = ", "fixd: is not a key of the file format; remove it or mend its "),
+        ("fixed = ", "fixd = ", "fixd: is not a key of the file format; remove it or correct its "),
         ('platform = ["D", "E", "F"]', "", "platform: is missing"),
         ("[0.0, 0.5]", "[0.5, 0.0]", "home: expected [from, to] or one time, got [0.5, 0]"),
         ("[0.0, 0.5]", "[0.0, nan]", "home[1]: expected a finite number"),
@@ -474,7 +474,7 @@ def test_markers_on_one_line_hold_no_body(tmp_path: Path) -> None:
     middle = (jaw.at("Upper_FL") + jaw.at("Upper_BL")) / 2
     jaw.at("Nasion")[:] = middle
     tables = jaw.tables(fixed=["Upper_FL", "Upper_BL", "Nasion"])
-    refused("are on one line, so a turn about it cannot be told", jaw, tmp_path, tables=tables)
+    refused("are on one line, so rotation about it is not determined", jaw, tmp_path, tables=tables)
 
 
 def test_options_that_are_wrong(tmp_path: Path) -> None:

@@ -45,8 +45,8 @@ def test_columns_that_are_no_motion_are_refused(csv_file, header, message):
     ("t", "message"),
     [
         ([0, 1, 2, 3, 4], "5 rows, expected at least 6"),
-        ([0, 1, 2, 2, 4, 5], "line 5: t is 2.0 s after 2.0 s; times must rise"),
-        ([0, 1, 2, 1, 4, 5], "line 5: t is 1.0 s after 2.0 s; times must rise"),
+        ([0, 1, 2, 2, 4, 5], "line 5: t is 2.0 s after 2.0 s; times must be strictly increasing"),
+        ([0, 1, 2, 1, 4, 5], "line 5: t is 1.0 s after 2.0 s; times must be strictly increasing"),
     ],
 )
 def test_times_must_rise_and_be_six(csv_file, t, message):
@@ -77,7 +77,7 @@ def test_times_must_rise_and_be_six(csv_file, t, message):
         ({"X": T}, {"rate": 1e12}, r"would give 2e\+12 samples, which take about 6e\+06 GB"),
         ({"X": T}, {"times": [0.5, 2.5]}, "must lie within 0 to 2 s"),
         ({"X": T}, {"times": []}, "must lie within"),
-        ({"X": T}, {"times": [0.5, 0.5]}, "times must rise"),
+        ({"X": T}, {"times": [0.5, 0.5]}, "times must be strictly increasing"),
         ({"X": T}, {"units": "inch"}, "not a unit"),
         ({"X": T * 1e305}, {}, "too extreme"),
     ],

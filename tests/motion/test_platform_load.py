@@ -59,7 +59,7 @@ def test_constant_and_zero_loads_hold_at_all_times():
         (([0, 1], np.ones((2, 3)), np.ones(3)), "moment has shape"),
         (([0, 1], np.full((2, 3), np.nan)), "not finite"),
         (([0, 1], [["a", "b", "c"]] * 2), "force: expected an array of numbers"),
-        (([], np.ones((0, 3))), "no samples"),
+        (([], np.ones((0, 3))), "at least one sample"),
         (([1, 0], np.ones((2, 3))), "sample 1: t is 0.0 s after 1.0 s"),
     ],
 )

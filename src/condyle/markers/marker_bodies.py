@@ -121,8 +121,8 @@ def _body(
     shape, points = shape[there], points[:, there]
     if breadth(shape - shape.mean(axis=0)) <= FLATTEST:
         raise InputError(
-            f"{source}: the {what} markers {listed(names)} are on one line, so a turn "
-            "about it cannot be told; use one that stands off it"
+            f"{source}: the {what} markers {listed(names)} are on one line, so rotation "
+            "about it is not determined; add a marker off the line"
         )
     body = Body(what, names, points, shape, fit(shape, steadied(points)))
     if not body.fit.found[home].any():

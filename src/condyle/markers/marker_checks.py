@@ -1,4 +1,4 @@
-"""Checks of a recording: why frames have no pose, labels exchanged, markers or balls off."""
+"""Checks of a recording: frames without a pose, exchanged labels, loose markers, contacts."""
 
 from __future__ import annotations
 

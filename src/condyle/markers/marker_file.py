@@ -40,10 +40,11 @@ class Forces(Table):
     plate: int | None = Field(None, description="number of a force plate, from 1")
     point: _Label | None = Field(None, description="point of the platform where it acts")
     axes: Literal["laboratory", "fixed", "platform"] = Field(
-        "laboratory", description="what the sensor's axes, the laboratory's at home, turn with"
+        "laboratory",
+        description="frame that the sensor's axes follow; at home they are the laboratory's",
     )
     reverse: Annotated[bool, Field(strict=True)] = Field(
-        False, description="the channels hold what the platform does to the sensor"
+        False, description="the channels measure the force of the platform on the sensor"
     )
     zero: tuple[_Time, _Time] | None = Field(None, description="when there is no load [s]")
 
@@ -148,7 +149,7 @@ class MarkerFile(Table):
     @classmethod
     def _once(cls, value: tuple[str, ...]) -> tuple[str, ...]:
         if twice := [name for name, count in Counter(value).items() if count > 1]:
-            raise ValueError(f"{few(twice)} stands more than once")
+            raise ValueError(f"{few(twice)} is listed more than once")
         return value
 
     @field_validator("places", mode="before")
@@ -164,7 +165,7 @@ class MarkerFile(Table):
     def _apart(self) -> Self:
         if both := sorted({*self.fixed} & {*self.platform}):
             raise ValueError(
-                f"{few(both)} stands in fixed and in platform; a marker moves with one"
+                f"{few(both)} is listed in fixed and in platform; a marker belongs to one body"
             )
         return self
 

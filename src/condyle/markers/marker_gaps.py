@@ -22,7 +22,7 @@ _DEGREE = 3
 class Gap:
     """Frames without a pose of their own.
 
-    Attributes: start, end: times of the first and the last of them [s];  frames: how many.
+    Attributes: start, end: times of the first and the last [s];  frames: number of frames.
                 reason: why;  made: "filled" by the spline, or "cut" off the motion's ends.
     """
 
@@ -50,7 +50,7 @@ def close_gaps(
     Args:   t: (F,) [s], evenly spaced;  values: (F, m), NaN where there is none.
             longest_gap: to fill [s]. Frames missing at the ends are cut off, since nothing stands
                 beyond them; a longer gap there is an error like any other.
-            keep_longest: of what longer gaps leave, the longest stretch instead of an error.
+            keep_longest: if a gap is too long to fill, keep the longest gap-free interval.
             why: the reason of a run of missing frames.
     Raises: InputError: for gaps that are longer, or for too few frames.
     """
@@ -102,6 +102,6 @@ def _too_long(
     more = f" and {len(runs) - _NAMED} more" if len(runs) > _NAMED else ""
     return InputError(
         f"{source}: no pose for longer than {longest:g} s: {'; '.join(told)}{more}.",
-        "Mend the recording, allow longer gaps with --max-gap, or take the longest stretch without "
-        "such a gap with --longest",
+        "Repair the recording, allow longer gaps with --max-gap, or keep the longest gap-free "
+        "interval with --longest",
     )

@@ -52,8 +52,8 @@ def motion_from_c3d(
             model: whose points are registered: a model or mechanism, its file or bundled name.
             max_residual: a frame in which a marker is farther from its place in its body [m] is a
                 gap.
-            max_gap: gaps are filled by a cubic spline up to so long [s].
-            longest: where gaps are longer, take the longest stretch without one, not an error.
+            max_gap: longest gap that a cubic spline fills [s].
+            longest: if a gap is too long to fill, keep the longest gap-free interval.
             unit: of lengths, in place of what the file says: m, cm, mm or um.
             force: channels that are a force's components along the laboratory's axes, in place
                 of [forces] of the marker file.

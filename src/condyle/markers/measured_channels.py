@@ -1,4 +1,4 @@
-"""What was measured beside a motion, to be shown with what was computed: markers and EMG.
+"""Channels measured with a motion, shown with the results: markers and EMG.
 
 One table: `t`; of every marker `<marker>_x`, `_y`, `_z` [m] in {S}, and its distance from its place
 in its body, `<marker>_residual_fixed` or `<marker>_residual_platform` [m]; of every chain with EMG
@@ -66,7 +66,7 @@ class MeasuredChannels:
 
 
 def read_channels(source: MeasuredChannels | str | os.PathLike[str]) -> MeasuredChannels:
-    """Read a table (CSV or Parquet) of what was measured beside a motion.
+    """Read a table (CSV or Parquet) of channels measured with a motion.
 
     Raises: InputError: for a file without markers or EMG, or of which a column is none of them.
     """

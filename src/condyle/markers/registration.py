@@ -65,7 +65,7 @@ def register(
         if breadth(some - some.mean(axis=0)) < FLATTEST:
             raise InputError(
                 f"register: {', '.join(file.places)} are on one line {what}; a third point must "
-                "stand off it"
+                "be off it"
             )
     found = fit(there, here[None])
     residual = dict(zip(file.places, found.residual[0].tolist(), strict=True))

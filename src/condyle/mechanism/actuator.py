@@ -1,4 +1,4 @@
-"""What drives a chain: what it can do at most, and what of its effort it keeps for itself.
+"""The actuator of a chain: its limits, inertia and friction.
 
 Effort is what the actuator delivers at its joint,
 
@@ -19,11 +19,11 @@ from pydantic import Field
 from .quantities import EffortLimit, Gear, Limit, Loss, MomentOrNone, PullLimit, SmoothingSpeed
 from .table import Table
 
-SMOOTHING_SPEED = 1e-3  # rad/s or m/s: below it Coulomb friction fades, where nothing is said
+SMOOTHING_SPEED = 1e-3  # rad/s or m/s: default speed below which Coulomb friction fades
 
 
 class Limits(NamedTuple):
-    """What an actuator can do: low <= effort <= high, |rate| <= speed; infinite where none is said.
+    """Limits of an actuator: low <= effort <= high, |rate| <= speed; infinite where none is given.
 
     low, high: [N m or N];  speed: [rad/s or m/s].
     """
@@ -78,7 +78,7 @@ class Limits(NamedTuple):
 
 
 class Actuator(Table):
-    """What every actuator has. A motor stands on the base: it is not carried by its chain."""
+    """An actuator. Its motor is fixed to the base, not carried by the chain."""
 
     implied: ClassVar[tuple[str, ...]] = (
         "rotor_inertia",
@@ -108,12 +108,12 @@ class Actuator(Table):
 
     @property
     def reflected_inertia(self) -> float:
-        """rotor_inertia gear^2 [kg m^2 or kg]: what the joint feels of the rotor."""
+        """rotor_inertia gear^2 [kg m^2 or kg]: inertia of the rotor at the joint."""
         return self.rotor_inertia * self.gear**2
 
     @property
     def ideal(self) -> bool:
-        """Whether nothing of the effort is lost on the actuator itself."""
+        """Whether the actuator has neither inertia nor friction of its own."""
         return not (self.rotor_inertia or self.viscous or self.coulomb)
 
 
@@ -138,7 +138,7 @@ class LinearActuator(Actuator):
 
 
 class CableActuator(Actuator):
-    """It winds a cable up: it can only pull."""
+    """A winch: it can only pull."""
 
     force_limit: PullLimit | None = Field(
         default=None, description="N: the greatest tension, or [least, greatest]"

@@ -54,7 +54,7 @@ class Contact(Table):
     """A platform point (the centre of a condyle ball) that stays on a surface fixed in {S}.
 
     With `ball_radius` the surface is the wall that the ball touches, and the centre keeps that
-    distance from it; with `one_sided` the ball can lift off.
+    distance from it; a `one_sided` contact is unilateral: it can be lost.
     """
 
     implied: ClassVar[tuple[str, ...]] = ("friction",)
@@ -67,7 +67,7 @@ class Contact(Table):
         default=None, description="the surface is the wall, and the centre this far from it"
     )
     one_sided: StrictBool = Field(
-        default=False, description="the surface can push the ball and not pull it"
+        default=False, description="unilateral contact: the surface can push the ball, not pull it"
     )
     bounds: Bounds = Bounds()
     friction: Annotated[Friction, BeforeValidator(_none_is_frictionless)] = FRICTIONLESS
@@ -81,7 +81,9 @@ class Contact(Table):
             return data
         moved = {key: surface[key] for key in SIDE_OPTIONS if key in surface}
         if twice := sorted(moved.keys() & data.keys()):
-            raise ValueError(f"{', '.join(twice)} stands in the contact and in its surface")
+            raise ValueError(
+                f"{', '.join(twice)} is given twice: in [[contact]] and in its surface"
+            )
         kept = {key: value for key, value in surface.items() if key not in moved}
         return {**data, **moved, "surface": kept}
 

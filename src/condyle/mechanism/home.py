@@ -145,7 +145,7 @@ def _ball(contact: Contact) -> str:
 
 
 def holding_problems(mechanism: Parts) -> Iterator[str]:
-    """Why the contacts do not determine the dependent coordinates, if they do not."""
+    """Problems of contacts that do not determine the dependent coordinates."""
     if not mechanism.contacts:
         return
     usable = next(usable_sets(mechanism), None)

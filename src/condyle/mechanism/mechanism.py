@@ -112,7 +112,7 @@ class Mechanism(Table):
     @classmethod
     def _distinct(cls, value: tuple[str, ...] | None) -> tuple[str, ...] | None:
         if value is not None and len(set(value)) != len(value):
-            raise ValueError(f"a coordinate stands twice in {list(value)}")
+            raise ValueError(f"a coordinate is given twice in {list(value)}")
         return value
 
     @model_validator(mode="after")
@@ -131,7 +131,7 @@ class Mechanism(Table):
 
 
 def structural_problems(data: Mapping[str, Any]) -> Iterator[str]:
-    """Names that stand twice, too few chains, a wrong number of dependent coordinates.
+    """Names given twice, too few chains, a wrong number of dependent coordinates.
 
     Args: data: the file's top level, as TOML gives it. What is no list of tables is not counted:
           that is another problem.
@@ -147,8 +147,8 @@ def structural_problems(data: Mapping[str, Any]) -> Iterator[str]:
         for name, count in names.items():
             if count > 1:
                 yield (
-                    f'{kind}: the name "{shortened(name, 40)}" stands {count} times; every {kind} '
-                    "needs its own"
+                    f'{kind}: the name "{shortened(name, 40)}" is given {count} times; every '
+                    f"{kind} needs its own"
                 )
     contacts, chains = counts["contact"], counts["chain"]
     if contacts is None:

@@ -1,6 +1,6 @@
-"""Numbers that are allowed and do not go together: what a person would recognise as wrong at once.
+"""Checks of a mechanism: values that are valid and suggest a wrong unit or sign.
 
-None of these is an error, since somebody may mean it; each has a kind that programs can tell.
+They are warnings, since they may be intended; each has a kind for programs.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ ROUNDING = 1e-12  # metres outside a bound
 
 @dataclass(frozen=True)
 class CheckWarning:
-    """Something to look at; `str` for people.
+    """A warning; `str` for people.
 
     kind: one word for programs, the same for ever;  data: the numbers of the message, SI.
     """
@@ -75,7 +75,7 @@ def length_text(metres: float) -> str:
 def _beyond(
     kind: str, text: str, found: Mapping[str, Any], show: str, key: str, what: str = "chain"
 ) -> Iterator[CheckWarning]:
-    """What several parts of a mechanism have in common, if they do.
+    """One warning for all parts that share a problem.
 
     Args: text: of the message, with {} for the list;  show: a name and its numbers in it.
     """

@@ -97,7 +97,7 @@ def _message(problem: Any, root: type[BaseModel]) -> str:
 def unknown_key(key: str, location: Iterable[Any], root: type[BaseModel]) -> str:
     """What to do about a key that a table at this place does not have."""
     hint = did_you_mean(key, keys_at(root, location))
-    return f"is not a key of the file format; remove it or mend its spelling.{hint}"
+    return f"is not a key of the file format; remove it or correct its spelling.{hint}"
 
 
 def _quoted(text: Any) -> list[str]:

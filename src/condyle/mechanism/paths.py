@@ -120,7 +120,7 @@ def _child(here: Any, key: str | int, above: Path) -> Any:
     if key not in entries:
         hint = did_you_mean(key, entries)
         if key in SIDE_OPTIONS and above[-1:] == ("surface",):
-            hint = f" It stands in the contact: {written((*above[:-1], key))}."
+            hint = f" It is a key of the contact: {written((*above[:-1], key))}."
         elif key == "length_unit":
             hint = " Values in Python are SI, lengths in m."
         _refuse(above, key, f'{_called(above)} has no "{shortened(key, 80)}".{hint}')

@@ -66,13 +66,12 @@ def read_tables(text: str, source: str) -> dict[str, Any]:
 
 def too_deep(source: str) -> InputError:
     return InputError(
-        f"{source}: tables or lists stand more than {DEEPEST} deep in each other; "
-        "a mechanism needs six"
+        f"{source}: tables or lists are nested more than {DEEPEST} deep; a mechanism needs six"
     )
 
 
 def nests_too_deep(data: Any) -> bool:
-    """Whether tables and lists stand deeper in each other than any mechanism needs."""
+    """Whether tables and lists are nested deeper than any mechanism needs."""
     waiting = [(1, data)]
     while waiting:
         depth, node = waiting.pop()

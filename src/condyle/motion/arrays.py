@@ -75,7 +75,7 @@ def check_rising(t: np.ndarray, where: Callable[[int], str]) -> None:
         i = int(falls[0]) + 1
         before, now = float(t[i - 1]), float(t[i])
         raise InputError(
-            f"{where(i)}: t is {now} s after {before} s; times must rise from row to row"
+            f"{where(i)}: t is {now} s after {before} s; times must be strictly increasing"
         )
 
 

@@ -40,7 +40,7 @@ Dimension = tuple[str, int]
 class Units:
     """What one unit of length, of angle and of time is, in metres, radians and seconds.
 
-    Attributes: given: which of the three somebody asked for.
+    Attributes: given: which of the three were given.
     """
 
     length: float = 1.0

@@ -1,4 +1,4 @@
-"""Files of strangers: their names and cells as they may stand in a message, bytes and hash."""
+"""Reading files, and showing their names and cells in messages."""
 
 from __future__ import annotations
 

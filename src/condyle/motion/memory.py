@@ -1,4 +1,4 @@
-"""How much memory is at hand, so that what cannot fit is refused before it is begun."""
+"""Available memory, so that too large a request is refused at once."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ _UNKNOWN = 8 << 30  # bytes, where the system does not say
 
 
 def memory_at_hand() -> int:
-    """Bytes that this process can still take, as far as the system tells."""
+    """Bytes that this process can still allocate, as far as the system says."""
     limits = []
     with suppress(OSError, ValueError, IndexError), open("/proc/meminfo", encoding="ascii") as file:
         limits += [int(line.split()[1]) << 10 for line in file if line.startswith("MemAvailable")]

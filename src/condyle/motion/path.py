@@ -145,10 +145,10 @@ class Motion:
             landmark: platform point whose displacement x, y, z are; by default the mechanism's
                 incisor, or its only point.
             cutoff: smooth measured data at this frequency [Hz], or "auto" (10 Hz); None: do not.
-            rate: output samples a second, from t[0] on; or
+            rate: output samples per second, from t[0] on; or
             times: output times within the input's, rising; default: the input's. Both in seconds.
-            trim: leave out so much of the output at either end [s]; a smoothed motion is least
-                certain there.
+            trim: time removed from either end of the output [s], where a smoothed motion is
+                least accurate.
         Raises:
             InputError: for samples or options that cannot be used.
         """

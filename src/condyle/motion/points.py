@@ -1,4 +1,4 @@
-"""Which point of the platform is meant where none was named."""
+"""The platform point that a motion or load refers to, named or by default."""
 
 from __future__ import annotations
 

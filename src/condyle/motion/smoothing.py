@@ -27,7 +27,7 @@ _MIN_PERIODS = 2  # of the cut-off, that a recording must last
 
 @dataclass(frozen=True, eq=False)
 class Smoothing:
-    """What was smoothed away, at the times of the input.
+    """What smoothing removed, at the times of the input.
 
     Attributes: cutoff: frequency at which the amplitude is 1/sqrt(2) [Hz].
                 automatic: whether the cut-off is the default one.
@@ -60,7 +60,7 @@ def parse_cutoff(cutoff: float | str) -> float:
 
 
 def smoothing_spline(t: np.ndarray, values: np.ndarray, cutoff: float) -> Spline:
-    """Quintic spline of what is slower than `cutoff` in the samples.
+    """Quintic smoothing spline: a low-pass filter with the cut-off frequency `cutoff`.
 
         min over c:  sum_i |y_i - s(t_i)|^2 + mu sum_j |D^4 c_j|^2,   s = sum_j c_j B_j
 

@@ -107,7 +107,7 @@ def write_table(
 ) -> None:
     """Write a table of numbers or strings by column name, whole or not at all.
 
-    Args:   parquet: whether as Parquet, else as CSV; by the end of the name if not told.
+    Args:   parquet: whether as Parquet, else as CSV; default: by the file's ending.
     Raises: InputError: if the file cannot be written.
     """
     with TableWriter(path, parquet=parquet) as out:

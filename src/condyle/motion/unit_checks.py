@@ -1,4 +1,4 @@
-"""Motions and loads that no machine makes: mostly units that nobody named."""
+"""Checks of motions and loads: values that suggest a wrong unit."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MS = 'if t is in milliseconds, name the column "t [ms]" or say --units ms'
 def motion_warnings(
     source: str, names: Sequence[str], t: np.ndarray, value: np.ndarray, rate: np.ndarray
 ) -> tuple[str, ...]:
-    """What in a motion, (N,) [s] and (N, m) in SI, looks like a wrong unit."""
+    """Warnings of a motion, (N,) [s] and (N, m) in SI, that suggest a wrong unit."""
     warnings = []
     slow = True
     for name, x, v in zip(names, value.T, np.abs(rate).max(axis=0), strict=True):
@@ -39,7 +39,7 @@ def motion_warnings(
 
 
 def load_warnings(source: str, t: np.ndarray, wrench: np.ndarray) -> tuple[str, ...]:
-    """What in a load, (N,) [s] and (N, 6) [N, N m], looks like a wrong unit."""
+    """Warnings of a load, (N,) [s] and (N, 6) [N, N m], that suggest a wrong unit."""
     largest = np.abs(wrench).max(initial=0)
     huge = (
         f"{source}: reaches {largest:.4g} N or N m; name other units in the header, as Fz [mN]",

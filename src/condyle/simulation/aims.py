@@ -84,7 +84,7 @@ def path_of(model: Model, motion: Motion, force: float | None, file: str | None)
         table = read_table(file, known={"t": ("time", 0), "force": ("force", 0)})
         times, newtons = table.require(["t", "force"]).T
         if (np.diff(times) <= 0).any():
-            raise InputError(f"{file}: times must rise from row to row")
+            raise InputError(f"{file}: times must be strictly increasing")
     return Path(model, motion.t - motion.t[0], q, times, newtons)
 
 

@@ -182,7 +182,7 @@ def _open(model: Model, file: str) -> OpenLoop:
     table = read_table(file, known=known)
     times, efforts = table.require(["t"])[:, 0], table.require(names)
     if (np.diff(times) <= 0).any():
-        raise InputError(f"{file}: times must rise from row to row")
+        raise InputError(f"{file}: times must be strictly increasing")
     return OpenLoop(times, efforts)
 
 

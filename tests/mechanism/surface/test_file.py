@@ -61,7 +61,7 @@ def test_options_may_stand_with_the_surface(raw: dict[str, Any]) -> None:
     inside = parse(spoiled(raw, surface)).contacts[0]
     assert inside.side == "below" and inside.one_sided
     assert any(
-        "stands in the contact and" in p for p in problems(spoiled(raw, surface, side="below"))
+        "is given twice: in [[contact]]" in p for p in problems(spoiled(raw, surface, side="below"))
     )
 
 
