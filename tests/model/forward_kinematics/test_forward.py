@@ -152,7 +152,7 @@ def test_rows_without_times_never_influence_each_other() -> None:
 
 def test_times_must_rise() -> None:
     forward = ForwardKinematics(condyle.load_mechanism("gough-stewart"))
-    with pytest.raises(InputError, match=r"times must rise: 1 s follows 1 s \(row 3\)"):
+    with pytest.raises(InputError, match=r"strictly increasing: 1 s follows 1 s \(row 3\)"):
         forward.solve(np.zeros((3, 6)), np.array([0.0, 1.0, 1.0]))
 
 

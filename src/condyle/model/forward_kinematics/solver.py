@@ -95,7 +95,8 @@ def _times(given: Any, count: int) -> np.ndarray:
     if time.ndim != 1 or not (np.diff(time) > 0).all():
         at = int(np.argmin(np.diff(time, axis=-1).ravel() > 0))
         raise InputError(
-            f"times must rise: {time.flat[at + 1]:g} s follows {time.flat[at]:g} s (row {at + 2}). "
+            "times must be strictly increasing: "
+            f"{time.flat[at + 1]:g} s follows {time.flat[at]:g} s (row {at + 2}). "
             "Without times, rows stand alone"
         )
     return time
