@@ -19,7 +19,7 @@ def test_least_norm(n: int, m: int) -> None:
     """It solves the equations, is numpy's, and any other solution is longer."""
     rng = np.random.default_rng(n + m)
     A, b = rng.normal(size=(20, n, m)), rng.normal(size=(20, m, 3))
-    tau = minimum_norm(A, rng.uniform(0.1, 10, m)).torques(b)
+    tau = minimum_norm(A, rng.uniform(0.1, 10, m), b)
     np.testing.assert_allclose(A.transpose(0, 2, 1) @ tau, b, atol=1e-12)
     np.testing.assert_allclose(tau, np.linalg.pinv(A.transpose(0, 2, 1)) @ b, atol=1e-11)
     for i in range(20 if n > m else 0):
@@ -54,7 +54,7 @@ def test_an_ill_conditioned_jacobian_costs_its_condition_number_and_no_more(n: i
     wanted = np.array(
         [float(sum((x * w for x, w in zip(r, y, strict=True)), Fraction())) for r in F]
     )
-    tau = minimum_norm(A[None], np.ones(4)).torques(b[None, :, None])[0, :, 0]
+    tau = minimum_norm(A[None], np.ones(4), b[None, :, None])[0, :, 0]
     condition = np.linalg.cond(A)
     assert 1e9 < condition < 1e11
     assert np.abs(tau - wanted).max() < 10 * condition * 2e-16 * np.abs(wanted).max()

@@ -11,8 +11,8 @@ Jacobian M_1 = d end_point / d q_r and, one for each component a, a Hessian H_a,
 
     q_r'  = M_1^-1 M',    q_r'' = M_1^-1 (M'' - [q_r'^T H_a q_r']_a).
 
-By D'Alembert a force f_r dual to q_r' is worth M_1^-T f_r on M. [Cheng2023] names this form as
-future work and does not print it: what stands here follows from its title.
+By D'Alembert a force f_r dual to q_r' acts as M_1^-T f_r on M. [Cheng2023] names this form as
+future work and does not print it; this one follows from its title.
 """
 
 from __future__ import annotations

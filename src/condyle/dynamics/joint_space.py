@@ -2,7 +2,7 @@
 
     M_1 q_r' = M',   q_r'' = M_1^-1 (M'' - M_1' q_r'),
 
-and a force f_r dual to q_r' is worth M_1^-T f_r on M. With M' = M_2 c', that is M_3^T f_r on the
+and a force f_r dual to q_r' acts as M_1^-T f_r on M. With M' = M_2 c', that is M_3^T f_r on the
 coordinates, M_3 = M_1^-1 M_2.
 """
 
@@ -22,7 +22,7 @@ from .formulation import Formulation
 
 @dataclass(frozen=True)
 class JointState:
-    """Symbols q_r, q_r', q_r'' and the time derivative of what is written in them."""
+    """Symbols q_r, q_r', q_r'' and the time derivative of expressions in them."""
 
     q: ca.SX
     rate: ca.SX

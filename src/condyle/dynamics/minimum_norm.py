@@ -7,44 +7,19 @@ its condition number.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 
-@dataclass(frozen=True)
-class Factorisation:
-    """A at N samples: A = U diag(sigma) V^T.
+def minimum_norm(A: np.ndarray, scale: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Minimum-norm solutions of A^T tau = b at N samples; NaN where A is not finite.
 
-    U: (N, n, m)   sigma: (N, m)   V: (N, m, m)
+    Args:    A: actuator Jacobian, (N, n, m).   b: (N, m, r), r right-hand sides.
+             scale: (m,), divisors that give the columns of A one unit; they scale equations and
+             so do not change torques.
+    Returns: tau, (N, n, r).
     """
-
-    U: np.ndarray
-    sigma: np.ndarray
-    V: np.ndarray
-
-    def torques(self, b: np.ndarray) -> np.ndarray:
-        """Minimum-norm solutions of A^T tau = b.
-
-        Args:    b: (N, m, r), r right-hand sides.
-        Returns: tau, (N, n, r).
-        """
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return self.U @ ((self.V.transpose(0, 2, 1) @ b) / self.sigma[..., None])
-
-
-def minimum_norm(A: np.ndarray, scale: np.ndarray) -> Factorisation:
-    """Factor the actuator Jacobian A, (N, n, m), of samples; NaN where A is not finite.
-
-    Args: scale: (m,), divisors that give the columns one unit; they scale equations and so do not
-          change torques.
-    """
-    good = np.isfinite(A).all(axis=(1, 2))
-    count, n, m = A.shape
-    U = np.full((count, n, m), np.nan)
-    sigma = np.full((count, m), np.nan)
-    V = np.full((count, m, m), np.nan)
-    U[good], sigma[good], Vt = np.linalg.svd(A[good] / scale, full_matrices=False)
-    # A = U sigma (Vt scale): the scaling moves into the right-hand side.
-    V[good] = Vt.transpose(0, 2, 1) / scale[:, None]
-    return Factorisation(U, sigma, V)
+    tau, good = np.full((*A.shape[:2], b.shape[2]), np.nan), np.isfinite(A).all(axis=(1, 2))
+    U, sigma, Vt = np.linalg.svd(A[good] / scale, full_matrices=False)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        tau[good] = U @ ((Vt @ (b[good] / scale[:, None])) / sigma[..., None])
+    return tau

@@ -87,7 +87,7 @@ class Interface:
 
     @staticmethod
     def of(data: Mapping[str, Any]) -> Interface:
-        """From what `data` returned."""
+        """The inverse of `data`."""
         ports = tuple(Port(**port) for port in data["ports"])
         results = tuple(
             Result(**{**r, "shape": tuple(r["shape"]), "groups": tuple(r["groups"])})

@@ -1,7 +1,4 @@
-"""A landmark's path as contacts: its point stays on planes across the axes of {S} that move.
-
-Three guides hold a landmark where its path says, and are closed like contacts.
-"""
+"""A landmark's path as contacts: three moving planes normal to the axes of {S}."""
 
 from __future__ import annotations
 

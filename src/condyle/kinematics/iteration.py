@@ -176,7 +176,7 @@ class _Pose:
 
 
 def _homotopy(dep: Sequence[int], q: ca.SX, steps: int) -> list[tuple[float, _Pose]]:
-    """Poses with the independent coordinates of equal parts of the way from home to q."""
+    """Poses with the independent coordinates at equal parts of the path from home to q."""
     given = iter(ca.vertsplit(q))
     values = [ca.SX(0) if i in dep else next(given) for i in range(6)]
     first = [ca.vertcat(ca.cos(v / steps), ca.sin(v / steps)) for v in values[3:]]
@@ -218,7 +218,7 @@ class _Contacts:
         return _Contacts.at(here, self.dep, pose)
 
     def guided(self, part: float) -> _Contacts:
-        """The contacts with their guides at a part of the way."""
+        """The contacts with their guides at a fraction of the path."""
         return replace(self, contacts=[c.along_path(part) for c in self.contacts])
 
     @property

@@ -24,7 +24,7 @@ class Projection:
     residual:     distance of each ball from its surface as given, (k,) [m].
     displacement: X_EE of the nearest pose that meets the contacts, (6,) [m, rad].
     points:       with the platform where it is, the nearest ball centres on the surfaces, (k, 3)
-                  [m] in {M}: what `point` would be in the file.
+                  [m] in {M}: values for `point` in the file.
     """
 
     names: tuple[str, ...]

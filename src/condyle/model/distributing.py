@@ -256,11 +256,11 @@ def shares(
              contact_force: (N, k) [N] where friction is a part of its own, before the last.
     Returns: (N, n, parts).
     """
-    factors = minimum_norm(system["A"].transpose(0, 2, 1), np.ones(system["A"].shape[1]))
+    A = system["A"].transpose(0, 2, 1)
     with np.errstate(invalid="ignore"):
         right = system["b"].transpose(0, 2, 1)
         if contact_force is not None:
             rubbed = (np.abs(contact_force)[..., None] * system["friction"]).sum(axis=1)
             right = np.concatenate([right, (system["Pi"] @ rubbed[..., None])], axis=2)
-        share = factors.torques(right)
+        share = minimum_norm(A, np.ones(A.shape[2]), right)
         return np.concatenate([share, (effort - share.sum(axis=2))[..., None]], axis=2)

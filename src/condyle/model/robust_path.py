@@ -72,10 +72,9 @@ class Robust:
                 s[name].T for name in ("joint_rate", "joint_acceleration")
             )
             # A (N, m, n) by entry and lane; b (N, parts, m).
-            factors = minimum_norm(s["A"].transpose(0, 2, 1), self._scale)
-            share, gravity = (
-                factors.torques(s[name].transpose(0, 2, 1)) for name in ("b", "b_gravity")
-            )
+            A, right = s["A"], np.concatenate([s["b"], s["b_gravity"]], axis=1)
+            tau = minimum_norm(A.transpose(0, 2, 1), self._scale, right.transpose(0, 2, 1))
+            share, gravity = np.split(tau, 2, axis=2)
             effort = share.sum(axis=2)
             values["share"], values["gravity"] = (a.transpose(2, 1, 0) for a in (share, gravity))
             values["effort"] = effort.T

@@ -16,7 +16,7 @@ PREFIX = "d_"  # of a port's direction, and of a result's derivative along it
 
 
 def derivative(found: Program | Variants, by: Collection[str], of: Collection[str]) -> Program:
-    """A question with ports `d_<port>` besides, and results `d_<result>`; nothing is checked.
+    """A question with additional ports `d_<port>` and results `d_<result>`, without checks.
 
     Args: by: ports;  of: results.
     """

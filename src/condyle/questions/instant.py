@@ -80,7 +80,7 @@ def losses(b: Builder, group: int, rate: ca.SX) -> ca.SX:
 
 
 def inertia_matrix(b: Builder, platform: Platform) -> ca.SX:
-    """M_r of `matrices`, (m, m), whatever the rates of the platform are."""
+    """M_r of `matrices`, (m, m), at any rates of the platform."""
     zero = ca.SX.zeros(3)
     no_effort = [ca.SX(0) for _ in b.structure.families]
     eq = affine(b, platform, Wrench(zero, zero, zero), no_effort)

@@ -24,7 +24,7 @@ from .builder import Builder
 from .platform import contacts, given
 from .structure import Structure
 
-POINT = "point of "  # what the name of a quantity's point begins with
+POINT = "point of "  # prefix of the name of a quantity's point
 
 
 @dataclass(frozen=True)

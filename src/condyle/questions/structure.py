@@ -56,7 +56,7 @@ class Structure:
 def structure_of(
     mechanism: Mechanism, formulation: str = "virtual_power", route: str = "core"
 ) -> Structure:
-    """The structure of a mechanism; `numbers` says which of its constants are zero."""
+    """The structure of a mechanism, without its zeros: see `numbers.specialised`."""
     counts: dict[str, int] = {}
     for chain in mechanism.chains:
         counts[chain.kind] = counts.get(chain.kind, 0) + 1

@@ -72,7 +72,7 @@ class SPSFamily(LineFamily):
         both:     axial [(s^2 beta')' / p  Y x e - s beta'^2 ds/de],
 
         s = sin(gamma) = Y.e / r, p = r^2 - (Y.e)^2, beta' = (Y x e).V / p, ds/de = (Y - s u) / r.
-        J = u, so that what acts along u is an effort.
+        J = u, so that forces along u are efforts.
         """
         e = M - c.B
         r2 = ca.dot(e, e)
