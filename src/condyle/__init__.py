@@ -45,7 +45,7 @@ _HOMES = {
     "Scenario": "simulation",
     "load_scenario": "simulation",
     "simulate": "simulation",
-    "simulate_all": "simulation",
+    "check_gains": "simulation",
     "ScenarioError": "errors",
     "workspace_map": "analysis.map",
     "workspace_size": "analysis.map",
@@ -108,7 +108,7 @@ if TYPE_CHECKING:
     from .results.inverse_rows import solve_states
     from .results.pose_rows import pose_states
     from .results.solution import open_solution
-    from .simulation import Scenario, load_scenario, simulate, simulate_all
+    from .simulation import Scenario, check_gains, load_scenario, simulate
     from .view import serve_view
 
 # What later rooms give to models, solutions, comparisons and exports, which do not know them.

@@ -15,7 +15,7 @@ from condyle.questions.law.controller import EACH_COORDINATE, Control, Controlle
 from condyle.questions.load.acting import LoadTable, Place
 from condyle.simulation import CONTROLLERS, LOADS, running
 from condyle.simulation.bind import bind
-from condyle.simulation.gains import check_gains
+from condyle.simulation.gains import report
 from condyle.simulation.plan import Plan, Trace
 from condyle.simulation.scenario import scenario_from
 
@@ -190,13 +190,13 @@ def test_side_by_side(model: condyle.Model) -> None:
     """Many runs are the runs alone, whatever the threads."""
     told = [{**BASE, "duration": 0.02, "start": {"dbeta": 0.02 * i}} for i in range(5)]
     alone = [condyle.simulate(model, one) for one in told]
-    many = [condyle.simulate_all(model, told, threads=threads) for threads in (1, 3)]
+    many = [condyle.simulate(model, told, threads=threads) for threads in (1, 3)]
     for one, other, expected in zip(*many, alone, strict=True):
         np.testing.assert_array_equal(one["pose"], other["pose"])
         assert np.abs(one["pose"] - expected["pose"]).max() < 1e-13
     told[3]["start"] = {"dZ": 1.0}
     with pytest.raises(condyle.CondyleError, match=r"scenario 4: 1 problem\n.*start: dZ"):
-        condyle.simulate_all(model, told)
+        condyle.simulate(model, told)
 
 
 class Damped(ControllerTable):
@@ -241,7 +241,7 @@ def test_laws_from_outside_run_in_compiled_code(
     }
     plan = plan_of(told, model)
     run = running.Run([plan])
-    assert run.steps is not None and not check_gains(plan).stable  # nothing holds the place
+    assert run.steps is not None and not report(plan).stable  # nothing holds the place
     found = run.traces()[0]
     same(found, in_python(plan))
     assert run.control is not None

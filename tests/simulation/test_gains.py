@@ -12,7 +12,7 @@ import condyle
 from condyle.errors import UnsupportedError
 from condyle.model.model import Model
 from condyle.simulation.bind import bind
-from condyle.simulation.gains import Loop, Sampled, check_gains, error_bound
+from condyle.simulation.gains import Loop, Sampled, error_bound
 from condyle.simulation.plan import ClosedLoop
 from condyle.simulation.running import run
 from condyle.simulation.scenario import scenario_from
@@ -24,7 +24,7 @@ def report(model: Model, **controller: Any) -> Any:
     table = {"kind": "computed_torque", "stiffness": KP} | controller
     t = np.linspace(0, 1, 11)
     rest = condyle.Motion.from_arrays(t, {n: 0 * t for n in model.independent})
-    return check_gains(bind(model, scenario_from({"controller": table}), motion=rest))
+    return condyle.check_gains(model, {"controller": table}, motion=rest)
 
 
 def test_a_continuous_loop_has_the_roots_of_its_gains(jaw: Model) -> None:
@@ -81,7 +81,7 @@ def test_unstable_drives_are_foretold(jaw: Model, damping: float, stable: bool) 
     t = np.linspace(0, 1, 11)
     rest = condyle.Motion.from_arrays(t, {n: 0 * t for n in jaw.independent})
     tables = {"duration": 0.03, "controller": pd, "start": {"beta": 1e-5}}
-    said = check_gains(bind(jaw, scenario_from(tables), motion=rest))
+    said = condyle.check_gains(jaw, tables, motion=rest)
     assert said.stable == stable and bool(said.warnings) != stable
     assert all((point.phase > 0) == point.stable for point in said.points)
     error = np.abs(condyle.simulate(jaw, tables, motion=rest)["tracking_error"].values)
@@ -101,12 +101,12 @@ def test_a_bite_that_swings_is_foretold(jaw: Model, delay: int, stable: bool) ->
         t, {"X": 0 * t, "Y": 0 * t, "alpha": 0 * t, "beta": 0.15 * (1 - s) - 0.02 * s}
     )
     tables = {"duration": 0.6, "method": "rk4", "step": 2e-4, "start": {"on_motion": True}}
-    plan = bind(jaw, scenario_from(tables | {"controller": bite, "load": [FIRM]}), motion=shut)
-    said = check_gains(plan)
+    tables |= {"controller": bite, "load": [FIRM]}
+    said = condyle.check_gains(jaw, tables, motion=shut)
     holding = [point for point in said.points if point.holds == "food"]
     assert holding and all(point.stable == stable for point in holding)
     assert all(point.stable for point in said.points if point.holds is None)
-    force = run(plan).force[-100:]
+    force = run(bind(jaw, scenario_from(tables), motion=shut)).force[-100:]
     assert (np.ptp(force) < 5.0) == stable
 
 
@@ -138,7 +138,18 @@ def test_the_loop_s_derivatives_are_its_differences(jaw: Model, sensors: Any) ->
 
 def test_no_loop_no_gains(jaw: Model) -> None:
     with pytest.raises(UnsupportedError, match="no controller"):
-        check_gains(bind(jaw, scenario_from({})))
+        condyle.check_gains(jaw, {})
+
+
+@pytest.mark.parametrize("sensors", [{}, {"sensors": {"velocity_cutoff": 150.0}}])
+def test_a_function_in_python_has_the_loop_of_its_law(jaw: Model, sensors: Any) -> None:
+    law = {"kind": "joint_pd", "stiffness": 2.0, "damping": 0.02, "gravity": False, "delay": 1}
+    told = {"duration": 0.2, "controller": law, **sensors}
+    own = lambda now, aim: 2.0 * (aim.joint - now.joint) + 0.02 * (aim.joint_rate - now.joint_rate)  # noqa: E731
+    exact, found = (condyle.check_gains(jaw, told, controller=x) for x in (None, own))
+    for one, other in zip(found.points, exact.points, strict=True):
+        assert one.radius == pytest.approx(other.radius, rel=1e-6)
+        assert one.phase == pytest.approx(other.phase, abs=1e-3)
 
 
 @pytest.mark.parametrize("damping", [10.0, 30.0, 40.0, 60.0])

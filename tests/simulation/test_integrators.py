@@ -10,7 +10,7 @@ import xarray as xr
 
 import condyle
 from condyle.model.model import Model
-from condyle.simulation.integrators import RK4, Settings, hermite
+from condyle.simulation.integrators import RK4, Adaptive, NoRateError, Settings, hermite
 
 START = {"X": 0.001, "beta": 0.04, "dbeta": -0.3, "dalpha": 0.2}
 
@@ -66,3 +66,22 @@ def test_contacts_are_kept(jaw: Model) -> None:
     solution = free(jaw)
     assert jaw.poses.contact_residual(solution["pose"].values) < 1e-13
     assert (solution["status"].values == 0).all()
+
+
+def test_steps_have_a_floor() -> None:
+    """Towards a rate without bound, beyond which there is none, a run ends soon and says why."""
+    calls = []
+
+    def rate(t: float, y: np.ndarray) -> np.ndarray:
+        calls.append(t)
+        if t >= 1.0:
+            raise NoRateError(3)
+        return np.array([1 / np.sqrt(1 - t)])
+
+    stepper = Adaptive("DOP853", rate, Settings(1e-9, np.full(1, 1e-12)))
+    stepper.restart(0.0, np.zeros(1), 2.0)
+    with pytest.raises(NoRateError) as error:
+        for _ in range(1000):
+            step = stepper.step()
+    assert error.value.status == 3 and len(calls) < 6000
+    assert 1.0 - step.t1 < 1e-5

@@ -100,3 +100,10 @@ def test_starter_and_schema(tmp_path: Path) -> None:
     assert load_scenario(path).controller.kind == "computed_torque"
     assert default_scenario().closed_loop
     assert {"controller", "load", "length_unit"} <= scenario_schema()["properties"].keys()
+
+
+def test_what_it_takes(jaw: Model) -> None:
+    with pytest.raises(InputError, match="model: expected a model, .* got int"):
+        condyle.simulate(3)  # type: ignore[call-overload]
+    with pytest.raises(InputError, match="scenario: expected .* got int"):
+        condyle.simulate(jaw, [3])

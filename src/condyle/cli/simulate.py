@@ -42,23 +42,15 @@ def simulate(
     import condyle
 
     from ..results.summary import summarize
-    from ..simulation import simulate as run
-    from ..simulation.bind import bind
-    from ..simulation.first_scenario import default_scenario
-    from ..simulation.gains import check_gains as check
-    from ..simulation.simulating import as_scenario
 
-    machine = condyle.load_mechanism(mechanism)
-    chosen = default_scenario() if scenario is None else as_scenario(scenario)
-    source = "the default scenario" if scenario is None else str(scenario)
-    model = condyle.derive(machine, backend=backend)
+    model = condyle.derive(mechanism, backend=backend)
     if check_gains:
-        found = check(bind(model, chosen, source=source))
+        found = condyle.check_gains(model, scenario)
         warn(found.warnings)
         then = command_line("simulate", mechanism, scenario=scenario)
-        data = {"mechanism": machine.name} | found.data()
+        data = {"mechanism": model.mechanism.name} | found.data()
         return Answer(str(found), data, then, "result", failed=not data["stable"])
-    solution = run(model, chosen, stop_at_bounds=stop_at_bounds, source=source)
+    solution = condyle.simulate(model, scenario, stop_at_bounds=stop_at_bounds)
     warn(solution.condyle.warnings)
     files = written(solution, output, [scenario, mechanism])
     events, summary = solution.condyle.events, summarize(solution)

@@ -5,7 +5,7 @@ from ..questions.load import FOODS, LOADS
 from .events import Event
 from .integrators import INTEGRATORS
 from .scenario import Scenario, load_scenario, scenario_schema
-from .simulating import simulate, simulate_all
+from .simulating import check_gains, simulate
 
 __all__ = [
     "CONTROLLERS",
@@ -14,8 +14,8 @@ __all__ = [
     "LOADS",
     "Event",
     "Scenario",
+    "check_gains",
     "load_scenario",
     "scenario_schema",
     "simulate",
-    "simulate_all",
 ]

@@ -40,18 +40,20 @@ def bind(
     motion: Motion | None = None,
     stop_at_bounds: bool = False,
     source: str = "scenario",
+    shared: dict[Any, Any] | None = None,
 ) -> Plan:
     """The plan of a scenario.
 
     Args:   controller: a function in the place of the scenario's law;  loads: functions besides.
             motion: to follow, in the place of the controller's.
+            shared: paths and models, which plans of one call have in common.
     Raises: ScenarioError: with everything that does not fit the mechanism.
     """
     problems = _Problems()
     with problems:
         bound, functions = _loads(model, scenario, loads)
     with problems:
-        drive = _drive(model, scenario, controller, motion)
+        drive = _drive(model, scenario, controller, motion, {} if shared is None else shared)
     start = None
     with problems:
         start = _start(model, scenario, drive if not problems.lines else None)
@@ -79,6 +81,8 @@ def bind(
         scenario.method,
         Settings(scenario.rtol, atol, scenario.step),
         stop_at_bounds,
+        scenario,
+        source,
         functions,
     )
 
@@ -161,9 +165,10 @@ def _drive(
     scenario: Scenario,
     function: Callable[..., Any] | None,
     motion: Motion | None,
+    shared: dict[Any, Any],
 ) -> OpenLoop | ClosedLoop:
     if scenario.closed_loop:
-        return _closed(model, scenario, function, motion)
+        return _closed(model, scenario, function, motion, shared)
     if function is not None:
         path = path_of(model, motion or default_motion(model), None, None)
         sensing = _sensing(model, scenario, PERIOD)
@@ -191,26 +196,19 @@ def _closed(
     scenario: Scenario,
     function: Callable[..., Any] | None,
     motion: Motion | None,
+    shared: dict[Any, Any],
 ) -> ClosedLoop:
     table = scenario.controller
-    own = model.with_distribution(_distribution(table)) if _chooses(table) else model
-    if table.model is not None:
-        other = load_mechanism(table.model)
-        _same_machine(model, other, table.model)
-        own = type(model)(
-            other,
-            formulation=model.formulation,
-            route=model.route,
-            distribution=_distribution(table),
-            backend=model.backend.asked,
-        )
+    key = table.model, table.distribution, table.preload
+    if key not in shared:
+        shared[key] = _own_model(model, table)
+    own: Model = shared[key]
     law = table.bind(machine_of(own)) if function is None else Law(None)
-    path = path_of(
-        own,
-        motion or _motion(table, own),
-        getattr(table, "force", None),
-        getattr(table, "force_file", None),
-    )
+    force, file = (getattr(table, name, None) for name in ("force", "force_file"))
+    followed = id(own), id(motion), table.motion, table.units, table.landmark, force, file
+    if followed not in shared:
+        shared[followed] = path_of(own, motion or _motion(table, own), force, file)
+    path = shared[followed]
     if table.ideal:
         return ClosedLoop(own, law, path, None, function=function)
     period = 1.0 / table.rate
@@ -218,12 +216,21 @@ def _closed(
     return ClosedLoop(own, law, path, period, table.delay, sensing, function)
 
 
-def _distribution(table: Any) -> Distribution:
-    return Distribution(table.distribution, table.preload)
-
-
-def _chooses(table: Any) -> bool:
-    return table.distribution is not None or bool(table.preload)
+def _own_model(model: Model, table: Any) -> Model:
+    """What the controller computes with."""
+    chosen = Distribution(table.distribution, table.preload)
+    if table.model is None:
+        asked = table.distribution is not None or table.preload
+        return model.with_distribution(chosen) if asked else model
+    other = load_mechanism(table.model)
+    _same_machine(model, other, table.model)
+    return type(model)(
+        other,
+        formulation=model.formulation,
+        route=model.route,
+        distribution=chosen,
+        backend=model.backend.asked,
+    )
 
 
 def _same_machine(model: Model, other: Any, file: str) -> None:

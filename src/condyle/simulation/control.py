@@ -14,6 +14,8 @@ from .columns import Columns
 from .plan import ClosedLoop, Plan
 from .plant import WIDE, Plant
 
+SEEN = ("q", "q1", "joint", "joint_rate", "measured_force")  # results of a tick: what a law sees
+DIFFERENCE = 1e-6
 REPEATS = 4  # of the steps from encoders to a pose, before it is lost
 
 
@@ -107,6 +109,23 @@ class Controller:
     def aim_for(self, path_force: np.ndarray) -> None:
         """Another force to aim at, (K,) [N]."""
         self.aims[:, self.columns.rows(AIMS[5])[0] - self.first, 0] = path_force
+
+    def slopes(self, t: float) -> np.ndarray:
+        """Of a function in Python by what it sees, where it was evaluated: central differences of
+        its efforts by the results `SEEN`, (n, numbers)."""
+        columns = self.columns
+        rows = np.concatenate([columns.result(name) for name in SEEN])
+        found = np.zeros((len(self.plan.low), len(rows)))
+        for i, row in enumerate(rows):
+            value = columns.found[row, 0]
+            h = DIFFERENCE * max(1.0, abs(value))
+            ends = []
+            for end in (value - h, value + h):
+                columns.found[row, 0] = end
+                ends.append(self._given(t, columns))
+            columns.found[row, 0] = value
+            found[:, i] = (ends[1] - ends[0]) / (2 * h)
+        return found
 
     # -- in Python ------------------------------------------------------------------------------
 

@@ -5,7 +5,8 @@ encoders, filter and integrator,
 
     u = H x + H_m w,    w+ = E x + E_m w,    w: its memory,
 
-both by exact derivatives of the questions `rate` and `tick`. Sampled with a period T, held, and d
+both by exact derivatives of the questions `rate` and `tick`; of a law that is a function in Python,
+which has no memory here, by differences. Sampled with a period T, held, and d
 periods late,
 
     x+ = Phi x + Gamma u_-d,    Phi = exp(A T),    Gamma = int exp(A s) ds B.
@@ -36,7 +37,7 @@ from ..questions.derivative import PREFIX, derivative
 from ..questions.numbers import Layout, specialised
 from ..questions.structure import structure_of
 from .columns import Columns
-from .control import Controller
+from .control import SEEN, Controller
 from .integrators import NoRateError
 from .plan import ClosedLoop, Plan
 from .plant import Plant
@@ -135,16 +136,14 @@ class GainReport:
         return "\n".join(map(str, self.points))
 
 
-def check_gains(plan: Plan) -> GainReport:
+def report(plan: Plan) -> GainReport:
     """The loop of a plan, linearised about home and points of its path.
 
-    Raises: UnsupportedError: in open loop, or for a law that is a function in Python.
+    Raises: UnsupportedError: in open loop.
     """
     drive = plan.drive
     if not isinstance(drive, ClosedLoop):
         raise UnsupportedError("there is no loop to check: the scenario has no controller")
-    if drive.function is not None:
-        raise UnsupportedError("a controller that is a function in Python has no derivatives")
     loop = Loop(plan, drive)
     end = min(plan.duration, float(drive.path.times[-1]))
     times = np.linspace(0.0, end, POINTS)
@@ -179,9 +178,11 @@ class Loop:
         )  # fmt: skip
         self._ports = [p for p in self.control.columns.kernel.interface.ports if p.name in MEASURED]
         self._before = self.control.carry
+        seen = SEEN if drive.function is not None else ()
         self.tick = Derivative(
             drive.model, "tick", self.control.details, self.control.columns,
-            [*(p.name for p in self._ports), *self._before], ("asked", *self._before.values()),
+            [*(p.name for p in self._ports), *self._before],
+            tuple(dict.fromkeys(("asked", *self._before.values(), *seen))),
         )  # fmt: skip
 
     def at(
@@ -206,6 +207,8 @@ class Loop:
         effort = self.control.steadily(aim, memory, y, self.plant)
         self.plant.columns.give("effort", effort)
         rate, tick = self.rate(), self.tick()
+        if drive.function is not None:
+            tick["asked"] = self.control.slopes(time or 0.0) @ np.vstack([tick[n] for n in SEEN])
         A, B = rate["rate"][: 2 * m, : 2 * m], rate["rate"][: 2 * m, 2 * m :]
         # What is measured, by x.
         C = {"q": np.eye(2 * m)[:m], "q1": np.eye(2 * m)[m:]}

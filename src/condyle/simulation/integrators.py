@@ -21,8 +21,11 @@ Rate = Callable[[float, np.ndarray], np.ndarray]
 RUNGE_KUTTA = ((1 / 2,), (0, 1 / 2), (0, 0, 1), (1 / 6, 1 / 3, 1 / 3, 1 / 6))
 ROUNDING = 1e-9  # of a step
 LONGEST = 0.01  # seconds a step, so that events between its ends are not passed over
-SHORTEST = 1e-10  # seconds: where a state has no rate within such a step, it is at its end
+SHORTEST = (
+    1e-7  # seconds: a state that needs shorter steps, or has no rate within one, is at its end
+)
 SHRINK = 0.25
+RECOVERED = 1e-4  # seconds: after such a step the integrator is clear of states without a rate
 
 
 class NoRateError(Exception):
@@ -118,6 +121,7 @@ class Adaptive:
         self._rate, self._settings = rate, settings
         self._size: float | None = None
         self._running: Any = None
+        self._status: int | None = None  # of states without a rate that steps have met
 
     def restart(self, t: float, y: np.ndarray, until: float) -> None:
         """As of `RK4`."""
@@ -146,14 +150,18 @@ class Adaptive:
             try:
                 problem = running.step()
                 break
-            except NoRateError:
+            except NoRateError as error:
+                self._status = error.status
                 size = min(size, self._until - t0) * SHRINK
                 if size < SHORTEST:
                     raise
                 self._begin(t0, y0, size)
                 running = self._running
-        if problem is not None:
-            raise NoRateError
+        length = running.t - t0
+        if problem is not None or (length < SHORTEST and running.t < self._until):
+            raise NoRateError(self._status)
+        if length > RECOVERED:
+            self._status = None
         self._size = running.h_abs
         dense: list[Any] = []
 

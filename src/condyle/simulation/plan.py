@@ -14,6 +14,7 @@ from ..questions.load import Load
 from .aims import Path
 from .events import Event
 from .integrators import Settings
+from .scenario import Scenario
 
 WORKS = ("actuators", "load", "actuator_losses", "contact_friction")
 
@@ -67,6 +68,7 @@ class Plan:
     low, high, speed: limits of the actuators, (n,) each, infinite where there is none.
     method, settings: of the integrator.
     stop_at_bounds: whether a contact at the end of its surface ends the run.
+    scenario, source: that it is of, and what messages call it.
     functions: in Python, by the number of the load whose wrench they give: (t, s, v) -> force (3,)
                or force and moment (6,).
     """
@@ -85,6 +87,8 @@ class Plan:
     method: str
     settings: Settings
     stop_at_bounds: bool = False
+    scenario: Scenario = field(default_factory=Scenario)
+    source: str = "scenario"
     functions: dict[int, Callable[..., Any]] = field(default_factory=dict)
 
     @property

@@ -20,15 +20,14 @@ from ..results.variables import ACCOUNTS
 from ..results.warnings import Notice, Watch
 from .plan import ClosedLoop, Plan, Trace
 from .plant import Plant
-from .scenario import Scenario
 from .slips import odd_things
 
 
-def solved(plan: Plan, trace: Trace, scenario: Scenario, source: str, started: float) -> xr.Dataset:
+def solved(plan: Plan, trace: Trace, started: float) -> xr.Dataset:
     """The solution of a run; `started`: of the clock `perf_counter`."""
     if not len(trace.t):
         end = trace.ended
-        raise InputError(f"{source}: the run ended before it began: {end}")
+        raise InputError(f"{plan.source}: the run ended before it began: {end}")
     model, m = plan.model, len(plan.q)
     q, q1 = trace.state[:, :m], trace.state[:, m : 2 * m]
     acted = Plant([plan]).along(trace.t, trace.state, trace.modes)
@@ -57,7 +56,7 @@ def solved(plan: Plan, trace: Trace, scenario: Scenario, source: str, started: f
         trace.t,
         parts,
         f"Simulation of {model.mechanism.name}",
-        _options(plan, scenario, source, seconds),
+        _options(plan, seconds),
         notices,
     )
     solution["effort"].attrs["long_name"] = "actuator effort as it acted"
@@ -117,7 +116,8 @@ def _controlled(plan: Plan, drive: ClosedLoop, trace: Trace) -> dict[str, np.nda
     return found
 
 
-def _options(plan: Plan, scenario: Scenario, source: str, seconds: float) -> dict[str, Any]:
+def _options(plan: Plan, seconds: float) -> dict[str, Any]:
+    scenario = plan.scenario
     kind = scenario.controller.kind if scenario.closed_loop else "open loop"
     return {
         "motion": f"simulation, {kind}",
@@ -125,7 +125,7 @@ def _options(plan: Plan, scenario: Scenario, source: str, seconds: float) -> dic
         "load": ", ".join(load.name for load in plan.loads) or "no load",
         "load_point": next((load.place for load in plan.loads if load.place), None),
         "solve_seconds": seconds,
-        "scenario_source": source,
+        "scenario_source": plan.source,
         "scenario": json.loads(scenario.model_dump_json(by_alias=True, exclude_none=True)),
         "method": plan.method,
         "rtol": plan.settings.rtol,

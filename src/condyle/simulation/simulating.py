@@ -1,90 +1,123 @@
-"""The public function: a model and a scenario in, a solution out."""
+"""The public functions: a model and a scenario in, datasets or a report on the loop out."""
 
 from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeAlias, overload
 
 import xarray as xr
 
 from ..errors import InputError
 from ..mechanism.mechanism import Mechanism
-from ..model.model import Model, derive
+from ..model.given import as_model
+from ..model.model import Model
 from ..motion import Motion
 from .bind import bind
-from .running import run, run_all
+from .first_scenario import default_scenario
+from .gains import GainReport, report
+from .plan import Plan
+from .running import run_all
 from .scenario import Scenario, load_scenario, scenario_from
 from .simulated import solved
 
+ModelLike: TypeAlias = Model | Mechanism | str | os.PathLike[str]
+ScenarioLike: TypeAlias = Scenario | Mapping[str, Any] | str | os.PathLike[str]
 
+
+@overload
 def simulate(
-    model: Model | Mechanism | str | os.PathLike[str],
-    scenario: Scenario | Mapping[str, Any] | str | os.PathLike[str] | None = None,
+    model: ModelLike,
+    scenario: ScenarioLike | None = None,
     *,
     controller: Callable[..., Any] | None = None,
     loads: Sequence[Any] = (),
     motion: Motion | None = None,
     stop_at_bounds: bool = False,
-    source: str | None = None,
-) -> xr.Dataset:
-    """Forward in time: what a mechanism does under efforts or a controller, and under loads.
+    threads: int | None = None,
+) -> xr.Dataset: ...
+
+
+@overload
+def simulate(
+    model: ModelLike,
+    scenario: list[Any] | tuple[Any, ...],
+    *,
+    controller: Callable[..., Any] | None = None,
+    loads: Sequence[Any] = (),
+    motion: Motion | None = None,
+    stop_at_bounds: bool = False,
+    threads: int | None = None,
+) -> list[xr.Dataset]: ...
+
+
+def simulate(
+    model: ModelLike,
+    scenario: Any = None,
+    *,
+    controller: Callable[..., Any] | None = None,
+    loads: Sequence[Any] = (),
+    motion: Motion | None = None,
+    stop_at_bounds: bool = False,
+    threads: int | None = None,
+) -> xr.Dataset | list[xr.Dataset]:
+    """Simulate a mechanism under efforts or a controller, and under loads.
+
+    Scenarios of method `rk4` that differ in numbers alone (gains, starts, loads, paths, limits,
+    files) run in lockstep as compiled code, which shares the processors; others take turns.
 
     Args:   model: a model, a mechanism, or one by its file or name.
-            scenario: a `Scenario`, its file, or its tables in SI; default: 1 s without efforts.
+            scenario: a `Scenario`, its file, or its tables in SI, or a list of these; default:
+            5 s of computed torque along the path that fits the mechanism.
             controller: (measured, reference) -> efforts (n,), in the place of the scenario's law.
             loads: functions (t, s, v) -> force (3,) or force and moment (6,) in {S} at O_M, or
             pairs (function, name of a point), besides those of the scenario; s is the point's
             displacement from home and v its velocity, (3,) each.
             motion: to follow, in the place of the controller's.
             stop_at_bounds: end where a contact reaches the end of its surface.
-            source: what messages call the scenario; default: its file.
-    Returns: a solution at `rate`, up to what ended the run; `events` says what happened.
-    Raises: ScenarioError: for a scenario with anything wrong, or that does not fit.
+            threads: maximum number; default: the processors at hand. Results do not depend on it.
+    Returns: a dataset at `rate`, up to what ended the run; `.condyle.events` says what happened.
+            For a list of scenarios a list.
+    Raises: ScenarioError: for anything wrong in a scenario, or that does not fit, before any runs.
     """
     start = time.perf_counter()
-    if source is None:
-        source = os.fspath(scenario) if isinstance(scenario, str | os.PathLike) else "scenario"
-    told = as_scenario(scenario)
-    if not isinstance(model, Model):
-        model = derive(model)
-    plan = bind(
-        model,
-        told,
-        controller=controller,
-        loads=loads,
-        motion=motion,
-        stop_at_bounds=stop_at_bounds,
-        source=source,
-    )
-    trace = run(plan)
-    return solved(plan, trace, told, source, start)
+    many = isinstance(scenario, list | tuple)
+    given = scenario if many else [scenario]
+    own = {"controller": controller, "loads": loads, "motion": motion}
+    plans = planned(model, given, stop_at_bounds=stop_at_bounds, **own)
+    found = [solved(*pair, start) for pair in zip(plans, run_all(plans, threads), strict=True)]
+    return found if many else found[0]
 
 
-def simulate_all(
-    model: Model | Mechanism | str | os.PathLike[str],
-    scenarios: Iterable[Scenario | Mapping[str, Any] | str | os.PathLike[str]],
-    threads: int | None = None,
-) -> list[xr.Dataset]:
-    """Simulations of one model, side by side; see `simulate`.
+def check_gains(
+    model: ModelLike,
+    scenario: ScenarioLike | None = None,
+    *,
+    controller: Callable[..., Any] | None = None,
+    loads: Sequence[Any] = (),
+    motion: Motion | None = None,
+) -> GainReport:
+    """Is the control loop stable, and by how much, at home and along its path?
 
-    Runs of method `rk4` that differ in numbers alone (gains, starts, loads, paths, limits, files)
-    are compiled code in lockstep, which share the processors; others take turns.
+    By exact derivatives of plant and law; those of a `controller` in Python are differences.
 
-    Args:   threads: at most so many; default: the processors at hand. Results do not depend on it.
-    Returns: solutions in the scenarios' order.
-    Raises: ScenarioError: for a scenario with anything wrong, before any of them runs.
+    Args:   as of `simulate`.
+    Raises: UnsupportedError: in open loop;  ScenarioError: as of `simulate`.
     """
-    start = time.perf_counter()
-    if not isinstance(model, Model):
-        model = derive(model)
-    told = [as_scenario(scenario) for scenario in scenarios]
-    plans = [bind(model, one, source=f"scenario {i + 1}") for i, one in enumerate(told)]
-    traces = run_all(plans, threads)
+    own = {"controller": controller, "loads": loads, "motion": motion}
+    return report(planned(model, [scenario], **own)[0])
+
+
+def planned(model: ModelLike, scenarios: Sequence[Any], **given: Any) -> list[Plan]:
+    """Plans of scenarios for one model, which share paths and models; `given`: as of `bind`."""
+    derived = as_model(model)
+    shared: dict[Any, Any] = {}
+    single = len(scenarios) == 1
+    sources = [_source(one) if single else f"scenario {i + 1}" for i, one in enumerate(scenarios)]
     return [
-        solved(plan, trace, one, f"scenario {i + 1}", start)
-        for i, (plan, trace, one) in enumerate(zip(plans, traces, told, strict=True))
+        bind(derived, as_scenario(one), source=source, shared=shared, **given)
+        for one, source in zip(scenarios, sources, strict=True)
     ]
 
 
@@ -96,12 +129,19 @@ def as_scenario(given: Any) -> Scenario:
     if isinstance(given, Scenario):
         return given
     if given is None:
-        return Scenario()
+        return default_scenario()
     if isinstance(given, str | os.PathLike):
         return load_scenario(given)
     if isinstance(given, Mapping):
         return scenario_from(given)
     raise InputError(
-        f"scenario: got a {type(given).__name__}, expected a condyle.Scenario, the path of a file, "
-        "or its tables"
+        "scenario: expected a condyle.Scenario, the path of a file, tables, or a list of these, "
+        f"got {type(given).__name__}"
     )
+
+
+def _source(given: Any) -> str:
+    """What messages call a scenario."""
+    if given is None:
+        return "the default scenario"
+    return os.fspath(given) if isinstance(given, str | os.PathLike) else "scenario"

@@ -243,12 +243,9 @@ def planned(mechanism: Mechanism, scenario: Any) -> Plan:
 
     Raises: ScenarioError: for a scenario with anything wrong, or that does not fit.
     """
-    from ..model.model import derive
-    from ..simulation.bind import bind
-    from ..simulation.simulating import as_scenario
+    from ..simulation.simulating import planned as plans
 
-    source = str(scenario) if isinstance(scenario, str | Path) else "scenario"
-    return bind(derive(mechanism), as_scenario(scenario), source=source)
+    return plans(mechanism, [scenario])[0]
 
 
 def serve_view(
