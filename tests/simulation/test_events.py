@@ -13,7 +13,7 @@ import condyle
 from condyle.model.model import Model
 from condyle.questions.load.food import APART, BROKEN, TOUCHING
 from condyle.simulation.bind import bind
-from condyle.simulation.control import Controller, Lost
+from condyle.simulation.control import Controller, PoseLostError
 from condyle.simulation.running import Run, run
 from condyle.simulation.scenario import scenario_from
 from condyle.status import Status
@@ -180,15 +180,15 @@ def test_encoders_that_give_no_pose_end_the_run(
         "sensors": {"encoder_resolution": 1e-5},
     }
     whole = run(bind(jaw, scenario_from(told)))
-    look, looks = Controller.look, []
+    look, looks = Controller.sample, []
 
     def blind(self: Controller, *given: Any) -> Any:
         looks.append(given)
         if len(looks) > 10:
-            raise Lost
+            raise PoseLostError
         return look(self, *given)
 
-    monkeypatch.setattr(Controller, "look", blind)
+    monkeypatch.setattr(Controller, "sample", blind)
     trace = run(bind(jaw, scenario_from(told)))
     assert trace.ended is not None and trace.ended.kind == "lost"
     assert trace.ended.time == pytest.approx(10 / 500) and len(trace.command) == 10

@@ -103,7 +103,7 @@ def test_starter_and_schema(tmp_path: Path) -> None:
 
 
 def test_what_it_takes(jaw: Model) -> None:
-    with pytest.raises(InputError, match="model: expected a model, .* got int"):
+    with pytest.raises(InputError, match=r"model: expected a model, .* got int"):
         condyle.simulate(3)  # type: ignore[call-overload]
-    with pytest.raises(InputError, match="scenario: expected .* got int"):
+    with pytest.raises(InputError, match=r"scenario: expected .* got int"):
         condyle.simulate(jaw, [3])

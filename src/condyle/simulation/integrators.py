@@ -21,9 +21,7 @@ Rate = Callable[[float, np.ndarray], np.ndarray]
 RUNGE_KUTTA = ((1 / 2,), (0, 1 / 2), (0, 0, 1), (1 / 6, 1 / 3, 1 / 3, 1 / 6))
 ROUNDING = 1e-9  # of a step
 LONGEST = 0.01  # seconds a step, so that events between its ends are not passed over
-SHORTEST = (
-    1e-7  # seconds: a state that needs shorter steps, or has no rate within one, is at its end
-)
+SHORTEST = 1e-7  # seconds: a run that needs shorter steps is at its end
 SHRINK = 0.25
 RECOVERED = 1e-4  # seconds: after such a step the integrator is clear of states without a rate
 
@@ -159,7 +157,7 @@ class Adaptive:
                 running = self._running
         length = running.t - t0
         if problem is not None or (length < SHORTEST and running.t < self._until):
-            raise NoRateError(self._status)
+            raise NoRateError(self._status_ahead())
         if length > RECOVERED:
             self._status = None
         self._size = running.h_abs
@@ -171,6 +169,16 @@ class Adaptive:
             return dense[0](t)
 
         return Step(t0, running.t, y0, running.y, at)
+
+    def _status_ahead(self) -> int | None:
+        """Why steps are so short: the status of a state without a rate that is near, if any is."""
+        running = self._running
+        try:
+            for size in np.geomspace(SHORTEST, LONGEST, 6):
+                self._rate(running.t + size, running.y + size * running.f)
+        except NoRateError as error:
+            return error.status
+        return self._status
 
 
 INTEGRATORS = ("DOP853", "Radau", "rk4")
