@@ -175,7 +175,7 @@ DOORS: dict[str, Door] = {
 
 # Without a row: `checked` makes what is given already; the others change their arguments yet.
 LATER = {
-    *("Mechanism.checked", "open_solution", "simulate_all", "workspace_map", "workspace_size"),
+    *("Mechanism.checked", "open_solution", "check_gains", "workspace_map", "workspace_size"),
     *("open_map", "sweep", "export_c", "export_fmu", "export_matlab", "export_mjcf"),
     *("forward_states", "solve_states", "pose_states", "run", "open_sweep", "serve_view"),
     *("write_report", "new_mechanism", "compare", "tradeoff"),

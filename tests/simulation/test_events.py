@@ -36,7 +36,7 @@ def test_a_bound_is_told_of_or_ends_the_run(jaw: Model) -> None:
     assert np.abs(ended["pose"] - told["pose"][:i]).max() < 1e-12
     assert f'"{first["owner"]}"' in ended.condyle.warnings[-1]
     q = np.array([[first["state"][n] for n in jaw.independent]])
-    pose = jaw.evaluate(q, 0 * q, 0 * q, np.zeros((1, 9))).pose
+    pose = jaw.inverse_kinematics(q).pose
     point = jaw.configuration(pose).contact_point[0]
     assert abs(point[:, 0] + 0.02765).min() < 1e-9
 
