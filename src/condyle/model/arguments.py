@@ -123,10 +123,11 @@ def samples(arguments: Sequence[Argument], arrays: Sequence[Array]) -> tuple[Lea
 
     Raises: InputError: for leading shapes that do not go together.
     """
-    lead = arrays[0].shape[:-1]
-    if any(a.shape[:-1] != lead and a.ndim > 1 for a in arrays) or len(lead) != 1:
+    leads = {a.shape[:-1] for a in arrays if a.ndim > 1}
+    lead = next(iter(leads), ())
+    if len(leads) > 1:
         try:
-            lead = np.broadcast_shapes(*(a.shape[:-1] for a in arrays))
+            lead = np.broadcast_shapes(*leads)
         except ValueError:
             shapes = (f"{x.name} {a.shape}" for x, a in zip(arguments, arrays, strict=True))
             raise InputError(

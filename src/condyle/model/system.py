@@ -123,8 +123,7 @@ def mended(
 
     Args: robust: results by name, samples last, and statuses, from some samples' inputs.
     """
-    again = np.flatnonzero(answer.status == AGAIN)
-    if again.size:
+    if answer.status.any() and (again := np.flatnonzero(answer.status == AGAIN)).size:
         few = sample_rows(inputs, again, len(answer.status))
         better, answer.status[again] = robust(few)
         for name, value in answer.values.items():

@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Mapping
 from copy import copy
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -76,7 +76,7 @@ class CompiledKernel:
         rows = -(-count // UNIT) * UNIT
         results = aligned(self.columns * rows).reshape(self.columns, rows)
         vector, call = self._vector, self._library.batch
-        steps_at, out, judged = vector(*strides), _address(results), _address(status)
+        steps_at, out, judged = _vector_of(tuple(strides)), _address(results), _address(status)
 
         def piece(start: int, end: int) -> None:
             moved = starts
@@ -149,6 +149,12 @@ def _readable(a: np.ndarray) -> np.ndarray:
     if a.flags.aligned and not any(step % 8 for step in a.strides):
         return a
     return a.copy()  # of a view into a record, say
+
+
+@lru_cache(maxsize=256)
+def _vector_of(numbers: tuple[int, ...]) -> ctypes.Array[ctypes.c_ssize_t]:
+    """As C takes them; never written to."""
+    return (ctypes.c_ssize_t * len(numbers))(*numbers)
 
 
 def _address(a: np.ndarray) -> int:
