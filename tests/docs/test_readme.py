@@ -29,6 +29,7 @@ def checkout(
     return condyle_command
 
 
+@pytest.mark.ci
 def test_commands_run(checkout: Callable[..., Any]) -> None:
     """In their order, since one shows what another wrote."""
     assert len(COMMANDS) > 10
