@@ -37,7 +37,7 @@ def test_a_bound_is_told_of_or_ends_the_run(jaw: Model) -> None:
     assert f'"{first["owner"]}"' in ended.condyle.warnings[-1]
     q = np.array([[first["state"][n] for n in jaw.independent]])
     pose = jaw.inverse_kinematics(q).pose
-    point = jaw.configuration(pose).contact_point[0]
+    point = jaw.poses.configuration(pose).contact_point[0]
     assert abs(point[:, 0] + 0.02765).min() < 1e-9
 
 
@@ -138,7 +138,7 @@ def test_an_interrupted_run_leaves_nothing(
     def interrupt(self: Run) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(Run, "trace", interrupt)
+    monkeypatch.setattr(Run, "traces", interrupt)
     Path("fall.toml").write_text("duration = 0.02")
     ran = condyle_command("simulate", "--scenario", "fall.toml", "--out", "o")
     assert ran.status == 130 and not Path("o").exists()
@@ -164,10 +164,10 @@ def test_a_jam_ends_the_run() -> None:
     assert 0 < trace.t[-1] <= trace.ended.time < FALL["duration"]
     names = model.independent
     q, q1 = (np.array([[trace.ended.state[p + n] for n in names]]) for p in ("", "d"))
-    beyond = q + 1e-5 * q1  # the state before a jam is the last that can be
     still = np.zeros((1, 6))
-    statuses = [model.forward_dynamics(x, q1, still).status[0] for x in (q, beyond)]
-    assert Status.jammed in statuses
+    q2 = model.forward_dynamics(q, q1, still).acceleration
+    ahead = [(q + h * q1, q1 + h * q2) for h in np.geomspace(1e-7, 1e-2, 6)]
+    assert Status.jammed in [model.forward_dynamics(*x, still).status[0] for x in ahead]
 
 
 def test_encoders_that_give_no_pose_end_the_run(
