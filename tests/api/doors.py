@@ -125,6 +125,15 @@ DOORS: dict[str, Door] = {
         },
         calls=0,
     ),
+    "Model.inverse_dynamics": Door(STATE | FORCED, states=("q", "v", "a"), calls=60),
+    "Model.forward_dynamics": Door(
+        {"q": Q, "v": Q, "effort": EFFORT} | FORCED, states=("q", "v", "effort"), calls=60
+    ),
+    "Model.inverse_kinematics": Door(STATE, states=("q", "v", "a"), calls=60),
+    "Model.mass_matrix": Door({"q": Q}, states=("q",), calls=60),
+    "Model.bias": Door({"q": Q, "v": Q}, states=("q", "v"), calls=60),
+    "Model.gravity": Door({"q": Q}, states=("q",), calls=60),
+    "Model.jacobians": Door({"q": Q}, states=("q",), calls=60),
     "simulate": Door(
         {"model": lambda stage: stage.model, "scenario": {"duration": 0.002, "rate": 1000.0}},
         calls=0,
@@ -175,6 +184,8 @@ DOORS: dict[str, Door] = {
 
 # Without a row: `checked` makes what is given already; the others change their arguments yet.
 LATER = {
+    *("Model.with_distribution", "Model.with_mechanism", "Model.unchecked", "Model.linearise"),
+    *("Model.forward_kinematics", "Model.solve", "Model.kernel"),
     *("Mechanism.checked", "open_solution", "check_gains", "workspace_map", "workspace_size"),
     *("open_map", "sweep", "export_c", "export_fmu", "export_matlab", "export_mjcf"),
     *("forward_states", "solve_states", "pose_states", "run", "open_sweep", "serve_view"),

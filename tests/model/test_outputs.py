@@ -118,7 +118,7 @@ WRONG: dict[str, tuple[Any, str]] = {
         r"leading shapes do not go together: q \(2, 4\), v \(3, 4\)",
     ),
     "no point": (lambda m, x: m.inverse_dynamics(x, x, x, at="incisors"), 'at: .*"incisors"'),
-    "no output": (lambda m, x: m.inverse_dynamics(x, x, x, outputs="contacts"), 'put "contacts"'),
+    "no output": (lambda m, x: m.inverse_dynamics(x, x, x, outputs="contacts"), "put 'contacts'"),
     "outputs": (lambda m, x: m.forward_dynamics(x, x, x, outputs=3), "outputs: expected names"),
     "threads": (lambda m, x: m.inverse_dynamics(x, x, x, threads="2"), "threads: expected an int"),
     "space": (lambda m, x: m.mass_matrix(x, space="Q"), 'space: there is no "Q"'),

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, did_you_mean
+from ..errors import InputError, did_you_mean, shown
 from ..mechanism.mechanism import COORDINATES
 
 Array = np.ndarray
@@ -42,7 +42,7 @@ class Argument(NamedTuple):
             if found.dtype.kind not in "fiubO":
                 raise TypeError
             return found.astype(float)
-        except (TypeError, ValueError):  # ragged lists, words, objects
+        except (TypeError, ValueError, OverflowError):  # ragged lists, words, objects
             raise self._refused(_described(given)) from None
 
     def _refused(self, got: str) -> InputError:
@@ -166,12 +166,12 @@ def requested(outputs: Any, known: Collection[str]) -> tuple[str, ...]:
         return tuple(known)
     for name in names:
         if name not in known:
-            hint = did_you_mean(str(name), (*known, "all"))
-            raise InputError(f'outputs: there is no output "{name!s:.60}".{hint}')
+            hint = did_you_mean(name, (*known, "all"))
+            raise InputError(f"outputs: there is no output {shown(name)}.{hint}")
     return names
 
 
 def _described(given: Any) -> str:
     if isinstance(given, np.ndarray):
         return f"shape {given.shape}, dtype {given.dtype}"
-    return f"{type(given).__name__} {given!r:.60}"
+    return f"{type(given).__name__} {shown(given)}"

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from ..accessors import extend
 from ..backends.kernel import Kernel
 from ..errors import InputError
-from ..mechanism import load_mechanism
+from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
 from ..motion import Load, Motion
 from ..questions.equations import INTERNAL, part_names
@@ -379,15 +379,8 @@ def derive(
             MechanismError:   if the contacts do not hold the platform at home.
             CompilerError:    if compiled is asked for and there is no compiler.
     """
-    if isinstance(mechanism, str | os.PathLike):
-        mechanism = load_mechanism(os.fspath(mechanism))
-    if not isinstance(mechanism, Mechanism):
-        raise InputError(
-            "mechanism: expected a mechanism, the path of its file or the name of a bundled one; "
-            f"got {type(mechanism).__name__}"
-        )
     return Model(
-        mechanism,
+        as_mechanism(mechanism),
         formulation=formulation,
         route=route,
         distribution=distribution,
