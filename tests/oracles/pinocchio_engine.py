@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
+import pytest
 
 from .cut_tree import CutTree
 from .description import Chain, Description, Raw
+
+pin = pytest.importorskip("pinocchio", minversion="3", reason="needs pin, of the `test` extra")
 
 Array = np.ndarray
 WORLD = pin.LOCAL_WORLD_ALIGNED

@@ -9,14 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from . import newton_euler
 from .closure import complete_state, dependent_coordinates, independent_coordinates, residuals
 from .description import COORDINATES, load, read
 from .mujoco_engine import MujocoEngine
-from .pinocchio_engine import PinocchioEngine
+from .pinocchio_engine import PinocchioEngine, pin
 from .random_mechanism import SURFACES, random_mechanism, random_state, random_surface, toml_text
 from .surfaces import Offset, normal, read_surface
 
