@@ -13,6 +13,7 @@ from oracles.random_mechanism import random_mechanism, random_state, toml_text
 from condyle.mechanism import Mechanism, parse
 from condyle.model.model import Model
 from condyle.model.model_result import ModelResult
+from support.loads import parts
 
 MIXED = ("RSS", "PSS", "SPS")
 MECHANISMS: dict[str, dict[str, Any]] = {
@@ -55,7 +56,7 @@ SCALES = (0.0, 0.05, 1.0, 1.0)  # home, near it, and far
 
 @dataclass(frozen=True)
 class Case:
-    """A mechanism and N states of it; load is (N, 9) as `Model.evaluate` takes it."""
+    """A mechanism and N states of it; load is (N, 9) wrench and point."""
 
     raw: Raw
     mechanism: Mechanism
@@ -64,13 +65,15 @@ class Case:
 
     def model(self, *choices: str, backend: str = "numpy", **options: Any) -> Model:
         """Args: choices: formulation and route."""
-        model = Model(self.mechanism, *choices, backend=backend, **options)
+        chosen = dict(zip(("formulation", "route"), choices, strict=False))
+        model = Model(self.mechanism, **chosen, backend=backend, **options)
         assert model.independent == tuple(self.states["names"])
         return model
 
     def evaluate(self, *choices: str, backend: str = "numpy", **options: Any) -> ModelResult:
         q = (self.states[key] for key in ("q", "qd", "qdd"))
-        return self.model(*choices, backend=backend, **options).evaluate(*q, self.load)
+        model = self.model(*choices, backend=backend, **options)
+        return model.inverse_dynamics(*q, *parts(self.load), outputs="all")
 
     def sample(self, i: int) -> tuple[Any, ...]:
         """Pose, its rate and acceleration, wrench and load point, as the oracles take them."""
