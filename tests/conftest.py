@@ -39,7 +39,7 @@ os.environ["COLUMNS"] = "100"
 TESTS = Path(__file__).parent
 # Tests that need a compiler, a browser or another program, or draw pages, are slow without a mark.
 SLOW_FIXTURES = {"browser", "compiler_command"}
-COMPILED_ROOMS = {"backends", "bench"}
+COMPILED_ROOMS = {"backends", "bench", "simulation"}
 SLOW_ROOMS = COMPILED_ROOMS | {"docs", "export", "report", "view"}
 
 
