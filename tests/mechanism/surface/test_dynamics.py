@@ -36,9 +36,9 @@ MECHANISMS: dict[str, dict[str, Any]] = {
 }
 
 
-def interpreted(mechanism: Mechanism, *choices: str) -> Model:
+def interpreted(mechanism: Mechanism, **choices: str) -> Model:
     """A model by the interpreter: what is tested here is the mathematics, not its compilation."""
-    return Model(mechanism, *choices, backend="numpy")
+    return Model(mechanism, **choices, backend="numpy")
 
 
 def evaluate(model: Model, states: dict[str, Any]) -> ModelResult:
@@ -57,7 +57,7 @@ def test_oracle_and_formulations(name: str) -> None:
     states = random_state(rng, raw, COUNT)
     mechanism = from_data(raw)
     for formulation in FORMULATIONS:
-        got = evaluate(interpreted(mechanism, formulation), states)
+        got = evaluate(interpreted(mechanism, formulation=formulation), states)
         assert (got.status == 0).all()
         close(got.pose, states["pose"], 1e-12)
         close(got.pose_acceleration, states["pose_acceleration"], 1e-11)
@@ -185,8 +185,9 @@ def test_direct_route_names_the_core(reference: Mechanism) -> None:
         ball_radius=0.006785 / np.hypot(1.1, 1.0),
     )
     states = masticatory_states()
-    direct = evaluate(interpreted(walls, "momentum", "direct"), states)
-    same(direct, evaluate(interpreted(reference, "momentum", "direct"), states), 1e-12)
+    choices = {"formulation": "momentum", "route": "direct"}
+    direct = evaluate(interpreted(walls, **choices), states)
+    same(direct, evaluate(interpreted(reference, **choices), states), 1e-12)
 
 
 def test_expression_sees_the_point_only() -> None:
