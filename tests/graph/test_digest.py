@@ -93,17 +93,18 @@ def test_variants_are_told_apart() -> None:
     main, other = made(), made("sub")
     found = [
         Variants(main),
-        Variants(main, robust=other),
-        Variants(main, latency=other),
-        Variants(main, robust=other, latency=other),
+        Variants(main, write_robust=lambda: other),
+        Variants(main, write_latency=lambda: other),
+        Variants(main, write_robust=lambda: other, write_latency=lambda: other),
         Variants(other),
     ]
     assert len({v.digest for v in found}) == len(found)
 
 
 def test_variants_have_one_interface() -> None:
+    variants = Variants(made(), write_robust=lambda: renamed(made()))
     with pytest.raises(AssertionError):
-        Variants(made(), robust=renamed(made()))
+        _ = variants.robust
 
 
 def test_an_interface_survives_json() -> None:

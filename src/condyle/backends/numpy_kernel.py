@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from copy import copy
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -29,14 +30,19 @@ class NumpyKernel:
         self.interface = variants.main.interface
         self.order = numbers.order
         self._main = _Runner(variants.main, numbers)
-        self._robust = None if variants.robust is None else _Runner(variants.robust, numbers)
+        self._variants, self._numbers = variants, numbers
+
+    @cached_property
+    def _robust(self) -> _Runner | None:
+        robust = self._variants.robust
+        return None if robust is None else _Runner(robust, self._numbers)
 
     def renumbered(self, numbers: Numbers) -> NumpyKernel:
         """The same program on the numbers of another mechanism of its structure."""
         other = copy(self)
-        other.order = numbers.order
+        other.__dict__.pop("_robust", None)
+        other.order, other._numbers = numbers.order, numbers
         other._main = self._main.renumbered(numbers)
-        other._robust = None if self._robust is None else self._robust.renumbered(numbers)
         return other
 
     def run(self, inputs: Mapping[str, np.ndarray], threads: int | None = None) -> Answer:
@@ -51,7 +57,7 @@ class NumpyKernel:
                 some = [column[part] for column in columns]
                 status[part] = self._main(some, found[:, part])
                 again = np.flatnonzero(status[part] == AGAIN) + start
-                if self._robust is not None and again.size:
+                if again.size and self._robust is not None:
                     better = np.empty((len(found), again.size))
                     status[again] = self._robust([column[again] for column in columns], better)
                     found[:, again] = better

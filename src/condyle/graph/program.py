@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -185,16 +185,27 @@ class Variants:
     main:    fast; samples that fail its checks are repeated by `robust`, if there is one.
     latency: the same as main with a shorter critical path, for single evaluations.
     single:  whether single evaluations are compiled as well as batches.
+
+    The others are written when they are first wanted: numpy seldom needs one, never the other.
     """
 
     main: Program
-    robust: Program | None = None
-    latency: Program | None = None
+    write_robust: Callable[[], Program] | None = None
+    write_latency: Callable[[], Program] | None = None
     single: bool = False
 
-    def __post_init__(self) -> None:
-        for other in (self.robust, self.latency):
-            assert other is None or _shape(other) == _shape(self.main)
+    @cached_property
+    def robust(self) -> Program | None:
+        return self._written(self.write_robust)
+
+    @cached_property
+    def latency(self) -> Program | None:
+        return self._written(self.write_latency)
+
+    def _written(self, write: Callable[[], Program] | None) -> Program | None:
+        other = None if write is None else write()
+        assert other is None or _shape(other) == _shape(self.main)
+        return other
 
     @property
     def digest(self) -> str:

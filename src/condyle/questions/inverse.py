@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
-from functools import reduce
+from functools import partial, reduce
 
 import casadi as ca
 
@@ -95,15 +95,14 @@ def in_variants(
 
     Args: program: (robust, low_latency) -> the program;  lean: whether normal equations suffice.
     """
-    robust = program(True, False)
     if not lean:
-        return Variants(robust)
+        return Variants(program(True, False))
+    square = structure.n == structure.m
+    robust = None if square else partial(program, True, False)
     latency = None
     if FORMULATIONS[structure.formulation].lumps:
-        latency = program(structure.n <= structure.m, True)
-    if structure.n == structure.m:
-        return Variants(robust, None, latency, single=True)
-    return Variants(program(False, False), robust, latency, single=True)
+        latency = partial(program, structure.n <= structure.m, True)
+    return Variants(program(square, False), robust, latency, single=True)
 
 
 @dataclass(frozen=True)
