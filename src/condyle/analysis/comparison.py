@@ -20,11 +20,9 @@ from ..errors import InputError, UnsupportedError, texts_of
 from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
 from ..model.distributing import Distribution
-from ..model.model import Model
-from ..motion import resolve_load_point
 from ..motion.motion_and_load import motion_and_load
 from ..progress import step
-from .runs import Run, Samples, TimedModel, run
+from .runs import Run, TimedModel, run
 from .torque_indices import Indices, indices
 
 if TYPE_CHECKING:
@@ -130,7 +128,6 @@ def compare(
     # The first derivation also pays for imports, so it is not one of those that are timed.
     model = TimedModel(mechanism, names[0], "core", distribution)
     solution = model.solve(motion, load, load_point)
-    samples = samples_of(model, solution)
     models, unavailable = [], []
     kinds = list(product(names, ROUTES))
     with step("deriving every model", len(kinds)) as advance:
@@ -147,12 +144,12 @@ def compare(
     else:
         free = mechanism.replace(contacts=(), dependent=None)
         models += [TimedModel(free, name, "core", distribution) for name in names]
-        measures = models[-1].poses.configuration(samples.pose).singularity
+        measures = models[-1].poses.configuration(solution["pose"].values).singularity
         condition = float(measures.condition.max())
     runs = []
     with step("running every model", len(models)) as advance:
         for one in models:
-            runs.append(run(one, samples))
+            runs.append(run(one, solution))
             advance(1)
     held = bool(mechanism.contacts)
     return Comparison(
@@ -164,30 +161,12 @@ def compare(
     )
 
 
-def samples_of(model: Model, solution: xr.Dataset) -> Samples:
-    """The motion and load of a solution."""
-    wrench, name = solution["load"].values, solution.condyle.options["load_point"]
-    if name is None and wrench.any():
-        name = resolve_load_point(None, model.mechanism.platform.points)
-    return Samples(
-        solution["pose"].values,
-        solution["pose_rate"].values,
-        solution["pose_acceleration"].values,
-        wrench,
-        name,
-    )
-
-
 def why_not_free(mechanism: Mechanism) -> str | None:
     """Why there are no models without the contacts, or None."""
     if not mechanism.contacts:
         return "the mechanism has no contacts to remove"
-    if len(mechanism.chains) < 6:
-        return (
-            f"a platform without contacts has 6 degrees of freedom, and {len(mechanism.chains)} "
-            "chains cannot drive them"
-        )
-    return None
+    few = "a platform without contacts has 6 degrees of freedom, and {} chains cannot drive them"
+    return few.format(len(mechanism.chains)) if len(mechanism.chains) < 6 else None
 
 
 def relative_difference(a: np.ndarray, b: np.ndarray, units: Sequence[str] | None = None) -> float:

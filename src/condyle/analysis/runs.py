@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from time import process_time  # of the processor: what else a machine does does not count
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +15,11 @@ from ..kinematics.constraints import indices
 from ..mechanism.mechanism import Mechanism
 from ..model.distributing import Distribution
 from ..model.model import Model
+from ..motion import resolve_load_point
 from .paper import Seconds
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class TimedModel(Model):
@@ -33,15 +38,10 @@ class TimedModel(Model):
         route: str,
         distribution: str | Distribution | None = None,
     ) -> None:
+        how = {"formulation": formulation, "route": route, "distribution": distribution}
         with without_collection():
             start = process_time()
-            super().__init__(
-                mechanism,
-                formulation=formulation,
-                route=route,
-                distribution=distribution,
-                backend="numpy",
-            )
+            super().__init__(mechanism, **how, backend="numpy")  # type: ignore[arg-type]
             self.kernel("inverse", ("contact",))
             self.symbolic = process_time() - start
 
@@ -58,24 +58,14 @@ def without_collection() -> Iterator[None]:
             gc.enable()
 
 
-@dataclass(frozen=True)
-class Samples:
-    """A motion of the platform and the load on it.
-
-    pose, rate, acceleration: X_EE and its derivatives, (N, 6).
-    wrench: force and moment on it, (N, 6);  at: the point where they act, by name.
-    """
-
-    pose: np.ndarray
-    rate: np.ndarray
-    acceleration: np.ndarray
-    wrench: np.ndarray
-    at: str | None
-
-    def states(self, model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """q, v, a of a model, (N, m) each."""
-        own = indices(model.independent)
-        return self.pose[:, own], self.rate[:, own], self.acceleration[:, own]
+def states_of(model: Model, solution: xr.Dataset) -> tuple[Any, ...]:
+    """q, v, a of a model along a solution, the wrench on its platform, and where that acts."""
+    wrench, name = solution["load"].values, solution.condyle.options["load_point"]
+    if name is None and wrench.any():
+        name = resolve_load_point(None, model.mechanism.platform.points)
+    own = indices(model.independent)
+    rates = ("pose", "pose_rate", "pose_acceleration")
+    return *(solution[one].values[:, own] for one in rates), wrench, name
 
 
 @dataclass(frozen=True)
@@ -100,12 +90,9 @@ class Run:
         return f"{self.formulation} {self.route}" + ("" if self.contacts else ", no contacts")
 
 
-def run(model: TimedModel, samples: Samples) -> Run:
-    """Compute the samples by a model, and time its torques.
-
-    Shares and configurations are not in the seconds.
-    """
-    given = (*samples.states(model), samples.wrench, samples.at)
+def run(model: TimedModel, solution: xr.Dataset) -> Run:
+    """Compute a solution's samples by another model, and time its torques, without the shares."""
+    given = states_of(model, solution)
     with without_collection():
         start = process_time()
         model.inverse_dynamics(*given)

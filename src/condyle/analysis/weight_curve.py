@@ -22,7 +22,7 @@ from ..model.model import derive
 from ..motion.motion_and_load import motion_and_load
 from ..progress import step
 from ..status import Status
-from .comparison import samples_of
+from .runs import states_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -88,13 +88,12 @@ def tradeoff(
     first = derive(mechanism, distribution=Distribution("weighted", preload), **model)
     one = first.with_distribution(Distribution("weighted", preload, float(asked[0])))
     solution = one.solve(motion, load, load_point)
-    samples = samples_of(one, solution)
-    states = samples.states(one)
-    efforts, forces, good = [], [], np.ones(len(samples.pose), dtype=bool)
+    states = states_of(one, solution)
+    efforts, forces, good = [], [], np.ones(solution.sizes["time"], dtype=bool)
     with step("solving at every weight", len(asked)) as advance:
         for weight in asked:
             one = first.with_distribution(Distribution("weighted", preload, float(weight)))
-            found = one.inverse_dynamics(*states, samples.wrench, samples.at)
+            found = one.inverse_dynamics(*states)
             efforts.append(found.effort)
             forces.append(found.contact_force)
             good &= found.status == Status.ok

@@ -63,7 +63,7 @@ X = "X=-5:5:10 mm"
         ({"quantities": "load_limit", "direction": 3}, "direction"),
         ({"load_point": 3}, "3"),
         ({"stroke": 3}, "stroke"),
-        ({"out": 3}, "out: expected a path, got int"),
+        ({"out": 3}, "out: expected the path of a file, got 3"),
         ({"threads": "two"}, "threads"),
         ({"scheduler": 3}, "scheduler"),
         ({"model": 3}, "model: expected a model"),

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...atomic import make_folder, replacing_folder
-from ...errors import InputError, did_you_mean, texts_of
+from ...backends.threads import workers as processors
+from ...errors import InputError, as_path, did_you_mean, texts_of
 from ...extras import require
 from ...mechanism import dumps
 from ...mechanism.mechanism import COORDINATES, Mechanism
@@ -104,12 +105,12 @@ def setup_of(
 ) -> Setup:
     """What holds for every pose, checked; arguments as in `workspace_map`."""
     wrench = values_of(load, (*FORCE, *MOMENT))
-    point = np.zeros(3)
-    if wrench or direction is not None or load_point is not None:
-        point = _point(model, load_point)
     force = [wrench.get(name, 0.0) for name in (*FORCE, *MOMENT)]
-    if threads is not None and not (isinstance(threads, int) and threads >= 1):
-        raise InputError(f"threads: expected a whole number of at least 1, got {threads!r:.40}")
+    points = model.mechanism.platform.points
+    point: Sequence[float] = (0.0, 0.0, 0.0)  # O_M, without a load or in a mechanism without points
+    if load_point is not None or (points and (wrench or direction is not None)):
+        point = points[resolve_load_point(load_point, points)]
+    processors(threads)
     return Setup(
         model,
         Reach.of(model, stroke, threads),
@@ -123,9 +124,7 @@ def _file(
     out: str | os.PathLike[str], setup: Setup, grid: Grid, quantities: tuple[Quantity, ...]
 ) -> Path:
     """The file of a map, its folder made."""
-    if not isinstance(out, str | os.PathLike):
-        raise InputError(f"out: expected a path, got {type(out).__name__}")
-    file = Path(out)
+    file = Path(as_path(out, "out"))
     if file.suffix not in (".nc", ".zarr"):
         like = _like(setup, grid, quantities).values()
         size = sum(np.dtype(dtype).itemsize * math.prod(shape) for _, shape, dtype, _ in like)
@@ -203,7 +202,10 @@ def _frame(blocks: Blocks, like: Mapping[str, Any]) -> xr.Dataset:
 
     entries, used = _entries(blocks.setup), {dim for dims, *_ in like.values() for dim in dims}
     axes = blocks.grid.axes
-    coordinates: dict[str, Any] = {a.name: (a.name, a.values, _unit(a.name)) for a in axes}
+    coordinates: dict[str, Any] = {
+        a.name: (a.name, a.values, {"units": "m" if a.name in COORDINATES[:3] else "rad"})
+        for a in axes
+    }
     coordinates |= {dim: (dim, np.array(entries[dim])) for dim in entries if dim in used}
     return xr.Dataset(coords=coordinates, attrs=_attributes(blocks.setup, blocks.grid))
 
@@ -235,10 +237,6 @@ def _entries(setup: Setup) -> dict[str, list[Any]]:
     }
 
 
-def _unit(name: str) -> dict[str, str]:
-    return {"units": "m" if name in COORDINATES[:3] else "rad"}
-
-
 def _attributes(setup: Setup, grid: Grid) -> dict[str, Any]:
     model, moved = setup.model, [axis.name for axis in grid.axes]
     held = {n: value for n, value in zip(grid.names, grid.held, strict=True) if n not in moved}
@@ -253,14 +251,6 @@ def _attributes(setup: Setup, grid: Grid) -> dict[str, Any]:
         "distribution": model.distribution.name,
         "condyle_version": __version__,
     }
-
-
-def _point(model: Model, name: str | None) -> np.ndarray:
-    """Where a load acts; O_M in a mechanism without points."""
-    if name is None and not model.mechanism.platform.points:
-        return np.zeros(3)
-    points = model.mechanism.platform.points
-    return np.array(points[resolve_load_point(name, points)])
 
 
 def _direction(given: str | Sequence[float] | None) -> np.ndarray | None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import InputError, no_such_file
+from ...errors import InputError, as_path, no_such_file
 from ...model.model import Model
 from .axes import Axis, Grid
 from .reach import Reach
@@ -28,9 +28,7 @@ def open_map(path: str | os.PathLike[str]) -> xr.Dataset:
     """
     import xarray as xr
 
-    if not isinstance(path, str | os.PathLike):
-        raise InputError(f"path: expected the path of a map, got {type(path).__name__}")
-
+    path = as_path(path, expected="the path of a map")
     try:
         if (Path(path) / MARK).is_file():
             dataset = xr.open_zarr(Path(path), chunks=None, consolidated=False)

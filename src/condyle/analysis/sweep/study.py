@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, StrictBool, ValidationError, model_validator
 
-from ...errors import InputError
+from ...errors import InputError, as_path, no_such_file
 from ...mechanism.library import bundled_mechanisms
 from ...mechanism.messages import describe
 from ...mechanism.quantities import listed
@@ -224,14 +224,13 @@ def read_study(source: str | os.PathLike[str] | Mapping[str, Any] | Study) -> St
         return source
     if isinstance(source, Mapping):
         return Study.checked(source, "study")
-    if not isinstance(source, str | os.PathLike):
-        raise InputError(f"study: expected a study, a file or tables, got {type(source).__name__}")
-    text = _text(Path(source))
-    study = Study.checked(read_tables(text, str(source)), str(source))
-    folder = Path(source).parent
+    path = Path(as_path(source, "study", "a study, a file or tables"))
+    if not path.is_file():
+        raise no_such_file(path)
+    study = Study.checked(read_tables(read_text(path), str(path)), str(path))
 
     def beside(name: str, words: Iterable[str]) -> str:
-        return name if name in words else str(folder / name)
+        return name if name in words else str(path.parent / name)
 
     named: dict[str, Any] = {"load": beside(study.load, (REFERENCE, NONE))}
     if study.mechanism is not None:
@@ -241,14 +240,6 @@ def read_study(source: str | os.PathLike[str] | Mapping[str, Any] | Study) -> St
         for one in study.motion
     ]
     return study.model_copy(update=named)
-
-
-def _text(path: Path) -> str:
-    if not path.is_file():
-        near = sorted(p.name for p in path.parent.glob("*.toml")) if path.parent.is_dir() else []
-        there = f" There are {', '.join(near[:5])}." if near else ""
-        raise InputError(f"study {path}: no such file.{there}")
-    return read_text(path)
 
 
 def some_of(problems: list[str], most: int) -> str:

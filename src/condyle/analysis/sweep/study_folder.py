@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 import xarray as xr
 
 from ...atomic import make_folder, replacing, write_text
-from ...errors import InputError
+from ...errors import InputError, as_path
 from ...mechanism.toml import read_tables
 from ...mechanism.writing import record
 from ...version import __version__
@@ -35,9 +35,7 @@ class Store:
 
         Raises: InputError: if it holds another study, or this one and `resume` was not asked for.
         """
-        if not isinstance(folder, str | os.PathLike):
-            raise InputError(f"out: expected a folder, got {type(folder).__name__}")
-        self.folder, self._job = Path(folder), job
+        self.folder, self._job = Path(as_path(folder, "out", "a folder")), job
         asked = described(job)
         kept = _kept(self.folder)
         if kept is not None:
@@ -98,9 +96,7 @@ def open_sweep(folder: str | os.PathLike[str]) -> xr.Dataset:
 
     Raises: InputError: for a folder that holds no study, or no row of it yet.
     """
-    if not isinstance(folder, str | os.PathLike):
-        raise InputError(f"folder: expected the folder of a sweep, got {type(folder).__name__}")
-    kept = _kept(Path(folder))
+    kept = _kept(Path(as_path(folder, "folder", "the folder of a sweep")))
     if kept is None:
         raise InputError(f"{folder} is not the folder of a sweep: {STUDY} is missing")
     parts = sorted(Path(folder).glob("part-*.parquet"))
