@@ -37,10 +37,8 @@ def test_every_point_is_the_least_of_all_efforts(curve: Tradeoff, motion: Motion
     """Efforts that balance form a plane here, which three of them span; its least is algebra."""
     model = condyle.derive("masticatory", backend="numpy", distribution="weighted")
     unit = model.reference_force**2
-    found = [
-        model.with_distribution(Distribution("weighted", 0, w / unit)).solve(motion)
-        for w in (0.0, 1.0, 30.0)
-    ]
+    weighted = (Distribution("weighted", 0, w) for w in (0.0, 1.0, 30.0))
+    found = [model.with_distribution(one).solve(motion) for one in weighted]
     limit, rows = 3.0, found[0].sizes["time"]
     for w, weight in enumerate(curve.weights):
         squares = 0.0

@@ -137,7 +137,7 @@ def test_facts_are_measured_wherever_the_folder_is(
     need("gcc", "nm")
     of = folder("jaw")
     monkeypatch.chdir(of.path.parent)
-    rows = write_facts(of.exported, Path(of.path.name)).data["functions"]
+    rows = write_facts(of.exported, Path(of.path.name))[0]["functions"]
     assert all(row["error"] < 1e-12 and not row["wrong"] for row in rows.values())
     for what in ("code", "stack"):  # the same work but for the contact forces
         assert rows["jaw_inverse"][what] > rows["jaw_contact"][what] / 2 > 0

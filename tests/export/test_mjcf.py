@@ -19,8 +19,9 @@ from support.surfaces import contact, table
 
 import condyle
 from condyle.errors import UnsupportedError
-from condyle.export.mjcf import Mjcf, mjcf
+from condyle.export.mjcf import mjcf
 from condyle.export.mjcf_tracks import track
+from condyle.export.mjcf_xml import Document
 from condyle.mechanism import bundled_mechanisms
 from condyle.model.model import Model
 
@@ -37,7 +38,7 @@ CASES = {
 
 
 @cache
-def made(name: str) -> Mjcf:
+def made(name: str) -> Document:
     return mjcf(
         condyle.load_mechanism(name) if name in bundled_mechanisms() else case(name).mechanism
     )

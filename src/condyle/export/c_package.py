@@ -14,7 +14,6 @@ import tempfile
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -92,16 +91,16 @@ def export_c(
     )
     folder = make_folder(path)
     files = write_package(exported, folder)
-    facts = write_facts(exported, folder)
+    facts, warnings = write_facts(exported, folder)
     data = {
         "mechanism": mechanism.name,
         "prefix": exported.prefix,
         "functions": [f.name for f in exported.functions],
         "names": {name: ours for name, ours in exported.names.items() if name != ours},
         "symbols": list(exported.symbols),
-        "facts": facts.data,
+        "facts": facts,
     }
-    return Written([*files, facts.path], facts.warnings, data)
+    return Written([*files, folder / "FACTS.md"], warnings, data)
 
 
 def write_package(exported: Exported, folder: Path) -> list[Path]:
@@ -226,20 +225,12 @@ def _checked(e: Exported, f: Function) -> list[str]:
     ]
 
 
-@dataclass(frozen=True)
-class Facts:
-    """Where they stand, and the same as data: function -> name -> number, None if not measured.
+def write_facts(exported: Exported, folder: Path) -> tuple[dict[str, Any], list[str]]:
+    """Measure and write FACTS.md.
 
-    warnings: functions that do not answer as recorded where they were compiled.
+    Returns: the same as data, function -> name -> number, None if not measured; and which functions
+             do not answer as recorded where they were compiled.
     """
-
-    path: Path
-    data: dict[str, Any]
-    warnings: list[str]
-
-
-def write_facts(exported: Exported, folder: Path) -> Facts:
-    """Measure and write FACTS.md."""
     rows = {
         f.name: {"operations": f.operations, "iterations": f.iterations, **NOTHING}
         for f in exported.functions
@@ -256,15 +247,14 @@ def write_facts(exported: Exported, folder: Path) -> Facts:
         how = f"{version}, {' '.join(FLAGS)}, {platform.machine()}"
         for name, row in rows.items():
             row |= found.get(name, {}) | errors.get(name, {})
-    path = folder / "FACTS.md"
-    write_text(path, _page(exported, rows, how))
+    write_text(folder / "FACTS.md", _page(exported, rows, how))
     warnings = [
         f"{f.name} differs from its recorded samples: worst error {row['error']:.1e}, "
         f"{row['wrong']} wrong statuses; run make check"
         for f, row in zip(exported.functions, rows.values(), strict=True)
         if row["wrong"] or (row["error"] or 0.0) > tolerance(exported, f)
     ]
-    return Facts(path, {"functions": rows, "measured_by": how}, warnings)
+    return {"functions": rows, "measured_by": how}, warnings
 
 
 def _sizes(

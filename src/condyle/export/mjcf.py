@@ -21,7 +21,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 from xml.etree.ElementTree import Element
 
@@ -47,14 +46,6 @@ UNLIMITED = 1e9  # N: of a cable that has no greatest tension
 X, ZERO = np.array([1.0, 0, 0]), np.zeros(3)
 
 
-@dataclass(frozen=True)
-class Mjcf:
-    """text: the document;  notes: what of the mechanism is approximate in it, or left out."""
-
-    text: str
-    notes: tuple[str, ...]
-
-
 def export_mjcf(
     model: Model | Mechanism | str | os.PathLike[str], path: str | os.PathLike[str]
 ) -> Written:
@@ -70,10 +61,10 @@ def export_mjcf(
     made = mjcf(mechanism)
     file = file_at(path, mechanism.name, ".xml")
     write_text(file, made.text)
-    return Written([file], made.notes, {"mechanism": mechanism.name, "notes": list(made.notes)})
+    return Written([file], made.notes, {"mechanism": mechanism.name, "notes": made.notes})
 
 
-def mjcf(mechanism: Mechanism) -> Mjcf:
+def mjcf(mechanism: Mechanism) -> Document:
     """A mechanism as MJCF.
 
     Raises: UnsupportedError: where a surface cannot be followed, or names would meet.
@@ -83,7 +74,8 @@ def mjcf(mechanism: Mechanism) -> Mjcf:
     for chain in mechanism.chains:
         write_chain(document, chain)
     _home(document)
-    return Mjcf(document.text(), tuple(document.notes))
+    document.finish()
+    return document
 
 
 def _home(document: Document) -> None:

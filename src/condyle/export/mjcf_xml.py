@@ -28,7 +28,7 @@ class Document:
     """An MJCF document; `notes` say what is approximate or left out."""
 
     def __init__(self, mechanism: Mechanism) -> None:
-        self.mechanism, self.notes = mechanism, list[str]()
+        self.mechanism, self.notes, self.text = mechanism, list[str](), ""
         self.size = size = characteristic_length(mechanism)
         self.look = extend("mechanism.look", mechanism)
         self.root = ElementTree.fromstring(packaged("mjcf_settings.xml"))
@@ -57,8 +57,8 @@ class Document:
         if text not in self.notes:
             self.notes.append(text)
 
-    def text(self) -> str:
-        """The document.
+    def finish(self) -> None:
+        """Write `text`.
 
         Raises: UnsupportedError: where two elements of a kind have one name, which MuJoCo refuses.
         """
@@ -81,7 +81,7 @@ class Document:
         ]
         self.root.insert(0, Comment("\n" + "\n".join(lines).replace("--", "- -") + "\n"))
         ElementTree.indent(self.root)
-        return ElementTree.tostring(self.root, encoding="unicode") + "\n"
+        self.text = ElementTree.tostring(self.root, encoding="unicode") + "\n"
 
 
 def element(parent: Element, tag: str, **attributes: Any) -> Element:

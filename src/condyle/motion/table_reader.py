@@ -6,15 +6,19 @@ import os
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
-from ..errors import as_path
+from ..errors import InputError, as_path, no_such_file
 from ..progress import step
-from .number_table import Known, Table
+from .column_names import read_header
+from .csv_file import iter_csv
+from .file_words import short, shown_path
+from .number_table import Known, Table, table_of
 
 CHUNK_ROWS = 16_384
+_BUFFER = 1 << 20  # bytes of a column at once; the library's own choice keeps whole files
 
 T = TypeVar("T")
 
@@ -52,10 +56,7 @@ def iter_table(
     Raises: InputError: for whatever is not a table of finite numbers, with line and column. Chunks
             before the one with the error have been yielded by then.
     """
-    if is_parquet(path := as_path(path)):
-        from .parquet_file import iter_parquet as read  # pyarrow takes a while
-    else:
-        from .csv_file import iter_csv as read
+    read = iter_parquet if is_parquet(path := as_path(path)) else iter_csv
     size_known = os.path.isfile(path)  # of a pipe it is not
     total = os.path.getsize(path) if size_known else None
     with step(f"{doing} {Path(path).name}", total) as advance:
@@ -79,3 +80,53 @@ def _ahead(items: Iterator[T]) -> Iterator[T]:
         while (item := coming.result()) is not end:
             coming = pool.submit(next, items, end)
             yield item  # type: ignore[misc]
+
+
+def iter_parquet(
+    path: str | os.PathLike[str], chunk_rows: int, known: Known | None, gaps: bool = False
+) -> Iterator[tuple[Table, int]]:
+    """Tables of up to `chunk_rows` rows, and how many bytes of the file each of them took.
+
+    Args: gaps: empty cells are NaN, and no error.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    if not os.path.exists(path):
+        raise no_such_file(path)
+    source = shown_path(path)
+    try:
+        with pq.ParquetFile(path, pre_buffer=False, buffer_size=_BUFFER) as file:
+            names = file.schema_arrow.names
+            header = read_header(source, names, known)
+            total = file.metadata.num_rows
+            if not total:
+                raise InputError(f"{source}: has column names but no rows of numbers")
+            wanted = [names[i] for i in header.index.values()]
+            size, first = os.path.getsize(path), 1
+            for batch in file.iter_batches(chunk_rows, columns=wanted, use_threads=False):
+                rows = batch.num_rows
+                columns = [
+                    _numbers(batch.column(text), f'{source}, column "{short(text)}"', first, gaps)
+                    for text in wanted
+                ]
+                lines = np.arange(first, first + rows)
+                table = table_of(source, header, columns, lines, "row", checked=not gaps)
+                yield table, size * rows // total
+                first += rows
+            if first != total + 1:
+                raise InputError(f"{source}: says it has {total} rows, but {first - 1} came")
+    except (pa.ArrowException, OSError, ValueError) as error:
+        raise InputError(f"{source}: cannot be read as Parquet ({short(str(error))})") from error
+
+
+def _numbers(column: Any, where: str, first: int, gaps: bool) -> np.ndarray:
+    import pyarrow as pa
+
+    if column.null_count and not gaps:
+        row = first + int(np.argmax(column.is_null().to_numpy(zero_copy_only=False)))
+        raise InputError(f"{where}, row {row}: the cell is empty; every cell needs a number")
+    kind = column.type
+    if not (pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind)):
+        raise InputError(f"{where}: holds {short(str(kind))}, expected numbers")
+    return column.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False)

@@ -30,7 +30,7 @@ def test_efforts_are_those_of_inverse_dynamics(model_of: Models) -> None:
     assert np.isfinite(right.effort).all(axis=1).sum() == len(q) - 1  # one is out of reach
     np.testing.assert_allclose(found.effort.values.reshape(-1, 6), right.effort, rtol=1e-13)
     force = found.contact_force.values.reshape(-1, 2)
-    np.testing.assert_allclose(force, right["contact_force"], rtol=1e-13)
+    np.testing.assert_allclose(force, right.contact_force, rtol=1e-13)
 
 
 @pytest.mark.parametrize("side", ["", "below", "above"])

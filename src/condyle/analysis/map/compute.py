@@ -83,8 +83,8 @@ def workspace_map(
     wanted = chosen(texts_of("quantities", quantities), setup)
     if scheduler is not None:
         check_scheduler(workers, scheduler)
-    file = None if out is None else _file(out, setup, grid, wanted)
     work = Blocks(setup, grid, wanted, BLOCK, workers, scheduler)
+    file = None if out is None else _file(out, work)
     if file is not None and file.suffix == ".zarr":
         return _streamed(work, file)
     dataset = _in_memory(work)
@@ -120,13 +120,11 @@ def setup_of(
     )
 
 
-def _file(
-    out: str | os.PathLike[str], setup: Setup, grid: Grid, quantities: tuple[Quantity, ...]
-) -> Path:
+def _file(out: str | os.PathLike[str], blocks: Blocks) -> Path:
     """The file of a map, its folder made."""
     file = Path(as_path(out, "out"))
     if file.suffix not in (".nc", ".zarr"):
-        like = _like(setup, grid, quantities).values()
+        like = _like(blocks).values()
         size = sum(np.dtype(dtype).itemsize * math.prod(shape) for _, shape, dtype, _ in like)
         file = file.with_name(f"{file.name}{'.zarr' if size > LARGE else '.nc'}")
     if file.suffix == ".zarr":
@@ -178,7 +176,7 @@ def fill(blocks: Blocks, targets: Mapping[str, Any], row: int) -> None:
 
 
 def _in_memory(blocks: Blocks) -> xr.Dataset:
-    grid, like = blocks.grid, _like(blocks.setup, blocks.grid, blocks.quantities)
+    grid, like = blocks.grid, _like(blocks)
     arrays = {name: np.empty(shape, dtype) for name, (_, shape, dtype, _) in like.items()}
     flat = {n: a.reshape(grid.size, *a.shape[len(grid.axes) :]) for n, a in arrays.items()}
     fill(blocks, flat, 1)
@@ -187,7 +185,7 @@ def _in_memory(blocks: Blocks) -> xr.Dataset:
 
 
 def _streamed(blocks: Blocks, file: Path) -> xr.Dataset:
-    like = _like(blocks.setup, blocks.grid, blocks.quantities)
+    like = _like(blocks)
     row = blocks.grid.size // blocks.grid.shape[0]
     rows = max(blocks.size // row, 1)
     with replacing_folder(file, MARK) as folder:
@@ -210,17 +208,17 @@ def _frame(blocks: Blocks, like: Mapping[str, Any]) -> xr.Dataset:
     return xr.Dataset(coords=coordinates, attrs=_attributes(blocks.setup, blocks.grid))
 
 
-def _like(setup: Setup, grid: Grid, quantities: tuple[Quantity, ...]) -> dict[str, Any]:
+def _like(blocks: Blocks) -> dict[str, Any]:
     """Dimensions, shape, type and attributes of every variable, by name."""
-    entries, names = _entries(setup), [axis.name for axis in grid.axes]
+    entries, names = _entries(blocks.setup), [axis.name for axis in blocks.grid.axes]
     return {
         v.name: (
             (*names, *v.dims),
-            (*grid.shape, *(len(entries[dim]) for dim in v.dims)),
+            (*blocks.grid.shape, *(len(entries[dim]) for dim in v.dims)),
             v.dtype,
-            v.attributes(setup.model.mechanism),
+            v.attributes(blocks.setup.model.mechanism),
         )
-        for v in variables(quantities)
+        for v in variables(blocks.quantities)
     }
 
 

@@ -18,7 +18,7 @@ from ...status import Status
 from ..workers import PROCESSES, check_scheduler, run_parts
 from .job import Job, prepared
 from .study import Study
-from .variants import OK, Solver
+from .variants import OK, variants
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 AS_SOLVED = ["formulation", "route", "load_point", "distribution", "preload", "contact_weight"]
@@ -96,7 +96,7 @@ def curves(job: Job, part: int) -> tuple[np.ndarray, np.ndarray, int]:
     effort = np.full((*shape, len(job.mechanism.chains)), np.nan)
     force = np.full((*shape, len(job.mechanism.contacts)), np.nan)
     failed = 0
-    for i, (_, _, (one,)) in enumerate(Solver(job).variants(part)):
+    for i, (_, _, (one,)) in enumerate(variants(job, part)):
         failed += one.status != OK
         if one.evaluation is not None:
             good = one.evaluation.status == Status.ok

@@ -26,6 +26,7 @@ from ...motion import (
     trial_motion,
 )
 from ...motion.reference_case import bundled_reference, fits_reference
+from ...questions.structure import Structure, structure_of
 from .measure import Reading, reading
 from .sampling import Design
 from .study import NONE, REFERENCE, TRIAL, MotionFile, Study
@@ -88,20 +89,24 @@ class Job:
             values |= {f.what: f.times * value + f.plus for f in one.mirror}
         return values
 
+    @cached_property
+    def _models(self) -> dict[Structure, Model]:
+        return {}
+
     def model(self, mechanism: Mechanism) -> Model:
-        """A model that lends its kernels to every mechanism of the structure.
+        """A model, with the kernels of the first mechanism of its structure.
 
         Raises: as of `condyle.derive`.
         """
         s = self.study
-        return Model(
-            mechanism,
-            formulation=s.formulation,
-            route=s.route,
-            distribution=Distribution(s.distribution, s.preload, s.contact_weight),
-            backend=s.backend,
-            general=True,
-        )
+        structure = structure_of(mechanism, s.formulation, s.route)
+        if structure in self._models:
+            return self._models[structure].with_mechanism(mechanism)
+        chosen = Distribution(s.distribution, s.preload, s.contact_weight)
+        how: Any = {"formulation": s.formulation, "route": s.route, "backend": s.backend}
+        made = Model(mechanism, **how, distribution=chosen, general=True)
+        self._models[structure] = made
+        return made
 
 
 def prepared(
