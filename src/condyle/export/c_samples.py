@@ -8,12 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..backends.kernel import AGAIN
-from ..backends.numpy_kernel import NumpyKernel
-from ..mechanism.home import characteristic_length, independent_coordinates
 from ..model.closing import Closure
 from ..model.model import Model
-from ..questions import Question
-from ..questions.numbers import Layout, specialised
 from ..questions.structure import structure_of
 from ..status import Status
 from .c_context import CODES
@@ -25,6 +21,7 @@ Arrays = dict[str, np.ndarray]
 Given = Mapping[str, np.ndarray]  # argument -> (N, size)
 COUNT = 40
 SIZES = {"force": 20.0, "moment": 0.5, "point": 0.05, "kp": 400.0, "kd": 40.0, "period": 1e-3}
+SIZES |= {"resolution": 1e-5, "smoothing": 0.9, "stiffness": 100.0, "damping": 10.0}
 SIGNED = ("force", "moment", "point", "direction")
 WIDTH = 0.1  # of states about home, in characteristic lengths and radians, halved until most reach
 
@@ -119,9 +116,6 @@ _ANSWERS: dict[str, Callable[[Reference, Given], tuple[Arrays, np.ndarray]]] = {
 }
 
 
-SIZES |= {"resolution": 1e-5, "smoothing": 0.9, "stiffness": 100.0, "damping": 10.0}
-
-
 @dataclass(frozen=True)
 class Vectors:
     """Samples of one function.
@@ -141,7 +135,7 @@ def vectors(exported: Exported) -> list[Vectors]:
     mechanism = exported.mechanism
     model = Model(mechanism, **exported.recipe, backend="numpy", distribution=least_norm(mechanism))
     reference = Reference(model, exported.wish)
-    draw = Samples(reference)
+    draw = Samples(model)
     found = []
     for f in exported.functions:
         given = {a.name: draw(a.name, a.size, f) for a in f.inputs}
@@ -167,16 +161,19 @@ def _spoil(given: dict[str, np.ndarray]) -> None:
 class Samples:
     """Arguments by name, (N, size) each, that belong to states which can be reached."""
 
-    def __init__(self, reference: Reference) -> None:
-        self._reference, self._rng = reference, np.random.default_rng(0)
-        mechanism = reference.model.mechanism
-        length = characteristic_length(mechanism)
-        names = independent_coordinates(mechanism)
-        self._scale = np.array([length if n in "XYZ" else 1.0 for n in names])
-        self.q, self.pose = self._states()
+    def __init__(self, model: Model) -> None:
+        self._model, self._rng = model, np.random.default_rng(0)
+        length = model.characteristic_length
+        self._scale = np.array([length if n in "XYZ" else 1.0 for n in model.independent])
+        self.q = self._states()
+        self.q1, self.q2 = (
+            self._rng.uniform(-1, 1, self.q.shape) * self._scale * k for k in (1, 10)
+        )
+        self._path = model.inverse_kinematics(self.q, self.q1, self.q2)
+        self._near = model.inverse_kinematics(0.3 * self.q)  # Newton's reach from home
 
-    def _states(self) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-        """q about home, (N, m), home first, and poses and rates that belong to them."""
+    def _states(self) -> np.ndarray:
+        """q about home, (N, m), home first."""
         width, m = WIDTH, len(self._scale)
         while True:
             q = self._rng.uniform(-width, width, (4 * COUNT, m)) * self._scale
@@ -184,20 +181,15 @@ class Samples:
             zero = np.zeros((len(q), 3))
             given = {"q": q, "q1": 0 * q, "q2": 0 * q, "force": zero, "moment": zero, "point": zero}
             # Where the kernels' own code can vouch for efforts, as the C is: no path to follow.
-            efforts = self._reference.model.kernel("inverse", ("contact",)).run(given)
+            efforts = self._model.kernel("inverse", ("contact",)).run(given)
             good = np.flatnonzero(efforts.status == Status.ok)[:COUNT]
             if len(good) == COUNT:
-                break
+                return q[good]
             width /= 2
-        q = q[good]
-        q1, q2 = (self._rng.uniform(-1, 1, q.shape) * self._scale * k for k in (1.0, 10.0))
-        self._rates = q1, q2
-        return q, self._reference("motion", {"q": q, "q1": q1, "q2": q2})[0]
 
     def __call__(self, name: str, size: int, f: Function) -> np.ndarray:
         """Numbers for an argument of a function."""
-        q1, q2 = self._rates
-        rng, shape = self._rng, (COUNT, size)
+        q1, q2, rng, shape = self.q1, self.q2, self._rng, (COUNT, size)
         known = {"q": self.q, "q_d": self.q + 0.01 * self._scale * rng.uniform(-1, 1, self.q.shape)}
         known |= {"q1": q1, "q1_d": 0.9 * q1, "q2": q2, "q2_d": q2}
         if name in known:
@@ -205,9 +197,9 @@ class Samples:
         if name in ("s", "s1", "s2"):
             return self._prescribed(name, f)
         if name.startswith("joint") and "rate" not in name:
-            return self._joints() * (0.98 if name == "joint_before" else 1.0)
+            return self._near.joint * (0.98 if name == "joint_before" else 1.0)
         if name == "pose_before":  # where `joint` is, but for the last period's way
-            return 0.98 * self._near()["pose"]
+            return 0.98 * self._near.pose
         if name in ("start", "pose_rate_before", "memory_before"):
             return np.zeros(shape)
         low = -1.0 if name in SIGNED or "rate" in name else 0.0
@@ -220,18 +212,4 @@ class Samples:
             share = {"s": 0.02, "s1": 0.1, "s2": 1.0}[name] * self._scale[:1]
             return self._rng.uniform(-1, 1, (COUNT, 3)) * share
         order = ["X", "Y", "Z", "alpha", "beta", "gamma"]
-        return self.pose[quantity][:, [order.index(label) for label in labels]].copy()
-
-    def _near(self) -> dict[str, np.ndarray]:
-        """Poses on the way to those of `q`."""
-        zero = np.zeros_like(self.q)
-        return self._reference("motion", {"q": 0.3 * self.q, "q1": zero, "q2": zero})[0]
-
-    def _joints(self) -> np.ndarray:
-        """Joint coordinates of poses half-way to home: Newton's reach."""
-        mechanism = self._reference.model.mechanism
-        structure = structure_of(mechanism)
-        numbers = Layout.of(structure).numbers(mechanism)
-        question = Question.about(specialised(structure, numbers), "encoders")
-        kernel = NumpyKernel(question.variants(), numbers)
-        return kernel.run({"pose": self._near()["pose"]}).values["joint"].T.copy()
+        return getattr(self._path, quantity)[:, [order.index(label) for label in labels]].copy()

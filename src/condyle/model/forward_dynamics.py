@@ -75,7 +75,7 @@ class ForwardDynamics:
         """As `Model.unchecked`."""
         own = self._arguments
 
-        def checked(q: Any, v: Any, effort: Any, wrench: Any, at: Any) -> Array:
+        def checked(q: Any, v: Any, effort: Any, wrench: Any = None, at: Any = None) -> Array:
             q, v, effort, wrench, at = own.state(own.effort, q, v, effort, wrench, at)
             return self(q, v, effort, wrench, at, (), None).acceleration
 

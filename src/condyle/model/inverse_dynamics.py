@@ -99,7 +99,7 @@ class InverseDynamics:
         """As `Model.unchecked`."""
         own = self._arguments
 
-        def checked(q: Any, v: Any, a: Any, wrench: Any, at: Any) -> Array:
+        def checked(q: Any, v: Any, a: Any, wrench: Any = None, at: Any = None) -> Array:
             q, v, a, wrench, at = own.state(own.a, q, v, a, wrench, at)
             return self(q, v, a, wrench, at, (), None).effort
 

@@ -137,7 +137,7 @@ def greatest_ball(free: FreeSpace, grid: Grid, points: int = POINTS) -> Ball:
     return Ball(radius, stops, points, radius * (_ball_volume(d) / points) ** (1 / d))
 
 
-def ball_around_home(model: Model, points: int = FEW) -> Ball:
+def ball_around_home(model: Model) -> Ball:
     """In all independent coordinates, no further than the characteristic length and a radian.
 
     Without limits of efforts; quick, for one look at a mechanism.
@@ -147,7 +147,7 @@ def ball_around_home(model: Model, points: int = FEW) -> Ball:
     axes = tuple(Axis(n, -end, end, 2) for n, end in zip(model.independent, ends, strict=True))
     reach = Reach.of(model)
     free = FreeSpace(Setup(model, reach, np.zeros(9)), limits=False)
-    return greatest_ball(free, Grid(model.independent, axes, (0.0,) * len(axes)), points)
+    return greatest_ball(free, Grid(model.independent, axes, (0.0,) * len(axes)), FEW)
 
 
 def free_of(margins: np.ndarray) -> np.ndarray:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -135,15 +134,14 @@ def best(table: xr.Dataset, measure: str, count: int = 5) -> xr.Dataset:
     return rows.isel(row=order[:count])
 
 
-def pareto(table: xr.Dataset, measures: Sequence[str] = ()) -> xr.Dataset:
-    """The Pareto front: rows that no other row dominates.
+def pareto(table: xr.Dataset) -> xr.Dataset:
+    """The Pareto front of the first three measures with `better`: rows that none dominates.
 
-    Args:   measures: two or three; default: the first three with `better` in the study.
-    Raises: InputError: for fewer than two measures, or one without a direction.
+    Raises: InputError: for fewer than two such measures.
     """
     known = directions(table)
-    names = list(measures) or list(known)[:3]
-    if not 2 <= len(names) <= 3 or any(name not in known for name in names):
+    names = list(known)[:3]
+    if len(names) < 2:
         raise InputError(
             'a Pareto front needs two or three measures with better = "less" or "more"; '
             f"the study has {', '.join(known) or 'none'}"
