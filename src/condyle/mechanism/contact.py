@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, Field, StrictBool, model_validator
 
 from .actuator import SMOOTHING_SPEED
 from .quantities import Coefficient, Interval, Name, Point, PositiveLength, SmoothingSpeed
-from .surface import Surface, of_form, sides
+from .surface import Surface, of_form, parallel, sides
 from .table import Table
 from .table_schema import SIDE_OPTIONS
 
@@ -110,7 +110,7 @@ class Contact(Table):
         """The surface on which the centre of the ball stays: parallel to the wall, if it is one."""
         if self.ball_radius is None:
             return self.surface
-        return self.surface.parallel(self.push * self.ball_radius, self.point)
+        return parallel(self.surface, self.push * self.ball_radius, self.point)
 
     def gradient(self) -> tuple[float, np.ndarray]:
         """phi [m] and its gradient, (3,) [1], at home."""

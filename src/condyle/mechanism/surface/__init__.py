@@ -1,23 +1,20 @@
-"""Contact surfaces: the data of each kind and its equation phi(p) = 0 in {S}, one file a kind."""
+"""Contact surfaces: the data of each kind and its equation phi(p) = 0 in {S}."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 import casadi as ca
 from pydantic import Field, ValidationInfo, ValidatorFunctionWrapHandler, WrapValidator
 
 from .base import SurfaceTable, sides
-from .cylinder import Cylinder
-from .ellipsoid import Ellipsoid
 from .expression import Expression, Unknown
-from .parallel import Parallel
-from .parallel_quadric import ParallelQuadric
+from .parallel import Parallel, ParallelQuadric, parallel
 from .plane import Plane
 from .profile import Profile
 from .quadratic import Quadratic
-from .sphere import Sphere
+from .quadric import Cylinder, Ellipsoid, Sphere
 
 
 def _written_in_python(
@@ -31,14 +28,10 @@ def _written_in_python(
     return from_file(value)
 
 
+_Kinds = Plane | Quadratic | Sphere | Cylinder | Ellipsoid | Profile
 Surface = Annotated[
-    Annotated[
-        Plane | Quadratic | Sphere | Cylinder | Ellipsoid | Profile, Field(discriminator="kind")
-    ],
-    WrapValidator(_written_in_python),
+    Annotated[_Kinds, Field(discriminator="kind")], WrapValidator(_written_in_python)
 ]
-
-_KINDS = (Plane, Quadratic, Sphere, Cylinder, Ellipsoid, Profile)
 
 
 def of_form(form: str) -> Any:
@@ -53,7 +46,9 @@ def of_form(form: str) -> Any:
         return Parallel(of_form(rest), 0.0)
     if first == "expression":
         return Expression(ca.Function.deserialize(rest))
-    return {kind.model_fields["kind"].default: kind for kind in _KINDS}[first].model_construct()
+    return {kind.model_fields["kind"].default: kind for kind in get_args(_Kinds)}[
+        first
+    ].model_construct()
 
 
 __all__ = [
@@ -69,5 +64,6 @@ __all__ = [
     "SurfaceTable",
     "Unknown",
     "of_form",
+    "parallel",
     "sides",
 ]

@@ -9,25 +9,24 @@ derivatives come from CasADi.
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from typing import Any, ClassVar
 
+import casadi as ca
+
 from ..table import Table
-from .parallel import Parallel
-from .smooth import Smooth
 
 Scalar = Any  # a float or a CasADi scalar
 Coordinates = Any  # anything with [0], [1], [2]
 
-GRAPH_SIDES = ("below", "above")
-CLOSED_SIDES = ("inside", "outside")
 
+class Smooth(ABC):
+    """What has an equation phi(point, constants), twice differentiable.
 
-class SurfaceTable(Smooth, Table):
-    """A surface of a mechanism file: its `kind`, and whether it is `closed` around an inside."""
+    known: whether that equation is at hand.
+    """
 
-    kind: str
-    closed: ClassVar[bool] = False
+    known: ClassVar[bool] = True
 
     @abstractmethod
     def phi(self, point: Coordinates, constants: Coordinates | None = None) -> Scalar:
@@ -40,24 +39,41 @@ class SurfaceTable(Smooth, Table):
     def constants(self) -> tuple[float, ...]:
         """The numbers of the equation, SI."""
 
+    def at_distance(self, distance: float) -> Any:
+        """The parallel surface at a signed distance [m], if it is one of the same kind."""
+        return None
+
+    def gradient(self, point: ca.SX, constants: Any = None) -> ca.SX:
+        """d phi / d point, (3,): along the unit normal."""
+        p = ca.SX.sym("p", 3)
+        return ca.substitute(ca.gradient(self.phi(p, constants), p), p, point)
+
+    def bending(self, point: ca.SX, velocity: ca.SX, constants: Any = None) -> ca.SX:
+        """v^T (d2 phi / d point2) v: what phi'' owes to a velocity, (3,), alone."""
+        p = ca.SX.sym("p", 3)
+        change = ca.jtimes(ca.gradient(self.phi(p, constants), p), p, velocity)
+        return ca.dot(ca.substitute(change, p, point), velocity)
+
+    def started_at(self, point: ca.SX, constants: Any = None) -> Smooth:
+        """The surface for points near `point`, which need not search as far as any point would.
+
+        It is the less exact the farther they are; it may be this surface itself.
+        """
+        return self
+
+
+class SurfaceTable(Smooth, Table):
+    """A surface of a mechanism file: its `kind`, and whether it is `closed` around an inside."""
+
+    kind: str
+    closed: ClassVar[bool] = False
+
     @property
     def form(self) -> str:
         """Surfaces of one form and one number of constants share one expression phi."""
         return self.kind
 
-    def parallel(self, distance: float, point: Coordinates) -> Any:
-        """The surface at a signed `distance` [m] from this one, positive along the normal.
-
-        Args: point: (3,), near the parallel surface.
-        """
-        return Parallel.near(self, distance, point)
-
 
 def sides(closed: bool) -> tuple[str, str]:
     """Names of the two sides of a surface: against its normal, and along it."""
-    return CLOSED_SIDES if closed else GRAPH_SIDES
-
-
-def numbers_of(constants: Coordinates) -> int:
-    """How many constants there are, whatever holds them."""
-    return constants.numel() if hasattr(constants, "numel") else len(constants)
+    return ("inside", "outside") if closed else ("below", "above")

@@ -10,8 +10,7 @@ from typing import Any, ClassVar, NoReturn
 import casadi as ca
 
 from ...errors import InputError
-from .parallel import Parallel
-from .smooth import Smooth
+from .base import Smooth
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,9 +82,6 @@ class Expression(Smooth):
     def form(self) -> str:
         return f"expression {self._serialized}"
 
-    def parallel(self, distance: float, point: Any) -> Parallel:
-        return Parallel.near(self, distance, point)
-
 
 def _unpickled(serialized: str, closed: bool) -> Expression:
     return Expression(ca.Function.deserialize(serialized), closed)
@@ -118,5 +114,5 @@ class Unknown(Smooth):
     def form(self) -> NoReturn:
         self.phi(None)
 
-    def parallel(self, distance: float, point: Any) -> NoReturn:
+    def at_distance(self, distance: float) -> NoReturn:
         self.phi(None)

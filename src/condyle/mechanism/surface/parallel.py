@@ -14,6 +14,15 @@ phi is stationary in w at the closest point: an error of w enters phi squared, i
 derivatives at first order; the last steps start from a converged closest point and remove it from
 all three, so that automatic derivatives are exact too. Where Newton has not converged phi is
 infinite, never wrong.
+
+The closest point of a wall of second order has one unknown. In the principal axes of
+g = sum(h y^2 / 2 + b y) + e that of y is
+
+    w = (y - mu b) / (1 + mu h),   g(w) = 0:
+
+one equation in mu, monotonic as long as all 1 + mu h are positive, as they are at the nearest
+closest point. Where they come near zero, for a ball that nearly fills a steep socket, the general
+way is the safer one.
 """
 
 from __future__ import annotations
@@ -25,7 +34,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from .smooth import Smooth
+from .base import Smooth
 
 ON_THE_WAY = (1 / 3, 2 / 3)  # parts of the way from home at which Newton makes one step,
 STEPS = 6  # and how many it makes at the point itself,
@@ -33,6 +42,8 @@ AGAIN = 2  # or from the closest point of a point nearby
 CONVERGED = 1e-10  # metres off the closest point's conditions
 STILL = 1e-15  # metres of a step that is rounding
 DIRECTIONS, STARTS, HOME_STEPS = 1000, 20, 50  # with which the closest point of home is looked for
+GUESSES, QUADRIC_STEPS = 2, 5  # from the normal at a guessed closest point, and Newton's, for mu
+EASY = 0.5  # least 1 + mu h at home for one unknown
 _FUNCTIONS: dict[tuple[str, int], tuple[ca.Function, ca.Function]] = {}
 
 
@@ -51,18 +62,6 @@ class Parallel(Smooth):
     closest_point: tuple[float, ...] = (0.0, 0.0, 0.0)
     multiplier: float = 0.0
     start: Any = field(default=None, compare=False)
-
-    @staticmethod
-    @lru_cache(maxsize=256)
-    def near(wall: Any, distance: float, point: tuple[float, ...]) -> Parallel:
-        """The parallel surface as seen from `point`, (3,) [m]."""
-        equation = _functions(wall, len(wall.constants()))[0]
-        closest_point, multiplier = _home_closest_point(
-            equation, wall.constants(), distance, np.array(point)
-        )
-        return Parallel(
-            wall, distance, tuple(point), tuple(map(float, closest_point)), float(multiplier)
-        )
 
     @property
     def kind(self) -> str:
@@ -129,6 +128,24 @@ class Parallel(Smooth):
     def _numbers(self, constants: Any) -> Any:
         c = self.constants() if constants is None else constants
         return c if hasattr(c, "numel") else ca.DM(c)
+
+
+@lru_cache(maxsize=256)
+def parallel(wall: Any, distance: float, point: tuple[float, ...]) -> Any:
+    """The surface at a signed `distance` [m] from a wall, positive along its normal.
+
+    Args: point: (3,), near the parallel surface.
+    """
+    if (simple := wall.at_distance(distance)) is not None:
+        return simple
+    numbers = wall.constants()
+    equation = _functions(wall, len(numbers))[0]
+    closest_point, mu = _home_closest_point(equation, numbers, distance, np.array(point))
+    kind = Parallel
+    if hasattr(wall, "quadric"):
+        h = np.linalg.eigvalsh(2 * wall.quadric()[0])
+        kind = ParallelQuadric if (1 + mu * h > EASY).all() else Parallel
+    return kind(wall, distance, tuple(point), tuple(map(float, closest_point)), float(mu))
 
 
 def _functions(wall: Any, count: int) -> tuple[ca.Function, ca.Function]:
@@ -222,3 +239,86 @@ def spread_directions(count: int) -> np.ndarray:
     z, turn = 1 - 2 * k / count, np.pi * (1 + 5**0.5) * k
     across = np.sqrt(1 - z * z)
     return np.column_stack([across * np.cos(turn), across * np.sin(turn), z])
+
+
+@dataclass(frozen=True)
+class ParallelQuadric(Parallel):
+    """Points at a signed distance [m] from a wall with `quadric`."""
+
+    @property
+    def form(self) -> str:
+        return "parallel-quadric"
+
+    def constants(self) -> tuple[float, ...]:
+        """distance; origin (3), axes (9, by columns), h (3), b (3) and e of g."""
+        A, origin, b, e = self.wall.quadric()
+        h, axes = np.linalg.eigh(2 * A)
+        numbers = (*origin, *axes.T.ravel(), *h, *(axes.T @ b), e)
+        return (self.distance, *map(float, numbers))
+
+    def bending(self, point: ca.SX, velocity: ca.SX, constants: Any = None) -> ca.SX:
+        """v . dn/dt, in principal axes."""
+        c = self._numbers(constants)
+        *_, size, _, shrink, a, _ = self._at(point, c)
+        v, n, h = _axes(c).T @ velocity, a / size, c[13:16]
+        still, along = shrink * v, shrink * n
+        turn = h * (still - along * (ca.dot(n, still) / ca.dot(n, along))) / size
+        return ca.dot(v, turn) - ca.dot(v, n) * ca.dot(n, turn)
+
+    def started_at(self, point: ca.SX, constants: Any = None) -> ParallelQuadric:
+        return replace(self, start=self._at(point, constants)[-1])
+
+    def _at(self, point: Any, constants: Any) -> Any:
+        p, c = ca.vertcat(point[0], point[1], point[2]), self._numbers(constants)
+        if self.start is None:
+            return _touching_quadric()(p, c)
+        y, mu = _axes(c).T @ (p - c[1:4]), self.start
+        for _ in range(AGAIN):
+            mu = _mu_step(y, mu, c)
+        phi, _, *more = _at_closest_mu(y, mu, c)
+        return [phi, *more]
+
+
+def _axes(c: ca.SX) -> ca.SX:
+    return ca.reshape(c[4:13], 3, 3)
+
+
+@lru_cache(maxsize=1)
+def _touching_quadric() -> ca.Function:
+    """(p, constants) -> phi, n, |grad g|, H, and in principal axes 1 / (1 + mu h), grad g; mu."""
+    p, c = ca.SX.sym("p", 3), ca.SX.sym("c", 20)
+    h, b = c[13:16], c[16:19]
+    y = w = _axes(c).T @ (p - c[1:4])
+    for _ in range(GUESSES):
+        a = h * w + b
+        w = y - a * (c[0] / ca.norm_2(a))
+    mu = c[0] / ca.norm_2(h * w + b)
+    for _ in range(QUADRIC_STEPS):
+        mu = _mu_step(y, mu, c)
+    phi, converged, *more = _at_closest_mu(y, mu, c)
+    return ca.Function("touching", [p, c], [phi / converged, *more])
+
+
+def _mu_step(y: ca.SX, mu: ca.SX, c: ca.SX) -> ca.SX:
+    g, a, shrink, _ = _foot(y, mu, c[13:16], c[16:19], c[19])
+    return mu + g / ca.dot(a, a * shrink)
+
+
+def _at_closest_mu(y: ca.SX, mu: ca.SX, c: ca.SX) -> list[ca.SX]:
+    """phi, whether mu has converged, and the rest of what `_touching_quadric` returns."""
+    axes, h = _axes(c), c[13:16]
+    g, a, shrink, w = _foot(y, mu, h, c[16:19], c[19])
+    size = ca.norm_2(a)
+    stretch = 1 + mu * h
+    least = ca.fmin(ca.fmin(stretch[0], stretch[1]), stretch[2])
+    converged = (ca.fabs(g) <= CONVERGED) * (least > 0)
+    phi = (ca.dot(a, y - w) + g) / size - c[0]
+    return [phi, converged, axes @ (a / size), size, axes @ ca.diag(h) @ axes.T, shrink, a, mu]
+
+
+def _foot(y: ca.SX, mu: ca.SX, h: ca.SX, b: ca.SX, e: ca.SX) -> tuple[ca.SX, ...]:
+    """g, grad g and 1 / (1 + mu h) at w(mu), and w."""
+    shrink = 1 / (1 + mu * h)
+    w = (y - mu * b) * shrink
+    half = h * w / 2 + b
+    return ca.dot(w, half) + e, h * w + b, shrink, w

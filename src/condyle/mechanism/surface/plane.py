@@ -23,6 +23,6 @@ class Plane(SurfaceTable):
     def constants(self) -> tuple[float, ...]:
         return (*self.slope, self.offset)
 
-    def parallel(self, distance: float, point: Coordinates) -> Plane:
+    def at_distance(self, distance: float) -> Plane:
         steepness = math.hypot(1.0, *self.slope)
         return self.derived(offset=self.offset + distance * steepness)

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import AfterValidator, Field
 
 from ..quantities import Length, Number
-from .base import Coordinates, Scalar, SurfaceTable, numbers_of
+from .base import Coordinates, Scalar, SurfaceTable
 
 UNIT = 1e-6  # how far the length of `direction` may be from 1
 
@@ -55,7 +55,7 @@ class Profile(SurfaceTable):
         s = c[0] * point[0] + c[1] * point[1]
         knot, z, slope, second, third = c[4], c[2], c[3], 0.0, 0.0  # straight, before the first
         last = knot
-        for k in range(4, numbers_of(c), 5):
+        for k in range(4, c.numel() if hasattr(c, "numel") else len(c), 5):
             beyond = s >= c[k]
             knot = knot + beyond * (c[k] - last)
             z, slope = z + beyond * c[k + 1], slope + beyond * c[k + 2]

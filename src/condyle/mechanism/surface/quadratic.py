@@ -9,8 +9,6 @@ from pydantic import Field
 
 from ..quantities import Curvature, Length, Number
 from .base import Coordinates, Scalar, SurfaceTable
-from .parallel import Parallel
-from .parallel_quadric import cheapest
 
 
 class Quadratic(SurfaceTable):
@@ -32,9 +30,6 @@ class Quadratic(SurfaceTable):
         """A, origin, b, e of phi = d^T A d + b . d + e, d = p - origin."""
         A = -np.array([[self.xx, self.xy / 2, 0], [self.xy / 2, self.yy, 0], [0, 0, 0]])
         return A, np.zeros(3), np.array([-self.slope[0], -self.slope[1], 1.0]), -self.offset
-
-    def parallel(self, distance: float, point: Coordinates) -> Parallel:
-        return cheapest(Parallel.near(self, distance, point))
 
     def constants(self) -> tuple[float, ...]:
         return (self.offset, *self.slope, self.xx, self.xy, self.yy)
