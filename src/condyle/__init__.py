@@ -119,7 +119,7 @@ register("map.plot", "condyle.report.figures.map_figures:map_plots")
 register("map.table", "condyle.report.map_text:map_table")
 register("sweep.plot", "condyle.report.figures.sweep_figures:sweep_plots")
 register("sweep.table", "condyle.report.tables.sweep_tables:sweep_text")
-register("comparison.text", "condyle.report.tables:comparison_text")
+register("tables.text", "condyle.report.tables:tables_text")
 register("mechanism.look", "condyle.report.scene.parts:Look")
 
 __all__ = [*_HOMES, "__version__"]

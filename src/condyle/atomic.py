@@ -93,6 +93,11 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
     return Path(path)
 
 
+def file_stem(name: str) -> str:
+    """The name of a mechanism as the beginning of a file name: no way out of the folder."""
+    return re.sub(r"[^\w.+-]+", "_", name)
+
+
 def _beside(target: Path) -> Path:
     """A name in the same folder that tells whose it is."""
     name = f".{target.name[:100]}.{_host()}-{os.getpid()}-{secrets.token_hex(4)}.part"

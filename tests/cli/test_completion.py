@@ -19,7 +19,8 @@ from condyle.dynamics import FORMULATIONS, ROUTES
 from condyle.export.fmu_model import KINDS
 from condyle.mechanism import bundled_text
 from condyle.motion import parse_units
-from condyle.report.figures import PLOTS, STYLES
+from condyle.report.figures import PLOTS
+from condyle.report.figures.style import STYLES
 
 # Loaded by the mathematics, the files and the pictures.
 HEAVY = {"casadi", "numpy", "scipy", "xarray", "matplotlib", "plotly", "viser"}

@@ -24,15 +24,9 @@ from condyle.analysis.comparison import Comparison
 from condyle.kinematics.rotation import rotation
 from condyle.mechanism.surface import Plane, Quadratic
 from condyle.report import figures, panel
-from condyle.report.figures import (
-    PLOTS,
-    figure_5,
-    figure_8,
-    figure_9,
-    registry,
-)
+from condyle.report.figures import PLOTS, registry
 from condyle.report.figures.drawing import looks
-from condyle.report.figures.paper_figures import track
+from condyle.report.figures.paper_figures import figure_5, figure_8, figure_9, track
 from condyle.report.figures.style import new_figure
 from condyle.report.naming import groups, heading
 from condyle.report.panel import Curve, Panel

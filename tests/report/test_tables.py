@@ -11,14 +11,8 @@ import pytest
 import condyle
 from condyle.analysis.comparison import Comparison, compare
 from condyle.motion import Motion
-from condyle.report.tables import (
-    Table,
-    comparison_text,
-    differences,
-    save_tables,
-    table_1,
-    table_2,
-)
+from condyle.report.tables import Table, save_tables, tables_text
+from condyle.report.tables.comparison_tables import differences, table_1, table_2
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +75,7 @@ def test_no_paper_beside_another_mechanism(without_paper: Comparison) -> None:
     rows = table_2(without_paper).rows
     assert [row[0] for row in rows] == ["with contacts [N m]"]
     assert "(" not in rows[0][1]
-    text = comparison_text(without_paper)
+    text = tables_text(without_paper)
     assert "35.861" not in text and "0.0207" not in text
     assert "stands in" not in text and "synthetic" not in text
     assert "Not available: without contacts. Reason: a platform without contacts" in text
@@ -89,7 +83,7 @@ def test_no_paper_beside_another_mechanism(without_paper: Comparison) -> None:
 
 def test_text_is_aligned_and_short(comparison: Comparison) -> None:
     text = str(comparison)
-    assert text == comparison_text(comparison)
+    assert text == tables_text(comparison)
     assert text.isascii()
     table = table_2(comparison).text().splitlines()
     assert len({len(line) for line in table[1:6]}) == 1

@@ -11,10 +11,10 @@ from support.browser import Tab
 
 import condyle
 from condyle.errors import InputError
+from condyle.simulation.simulating import planned
 from condyle.view import View, live_player, open_view
 from condyle.view.live_player import LivePlayer
 from condyle.view.readout import live_html, status_html
-from condyle.view.serve import planned
 
 from .test_view import HANDLE, fill, near, row
 
@@ -26,7 +26,7 @@ CHEW = {"duration": 3.0, "controller": TORQUE, "load": [FOOD]}
 @pytest.fixture
 def player(reference: condyle.Mechanism, monkeypatch: pytest.MonkeyPatch) -> LivePlayer:
     monkeypatch.setattr(live_player, "BUDGET", np.inf)  # however slow this machine is
-    return LivePlayer(planned(reference, CHEW))
+    return LivePlayer(planned(reference, [CHEW])[0])
 
 
 def test_it_keeps_the_time_of_the_clock(player: LivePlayer) -> None:
@@ -72,7 +72,7 @@ def test_its_numbers_are_those_of_a_simulation(
 
 
 def test_an_end_is_said_and_a_restart_goes_on(reference: condyle.Mechanism) -> None:
-    player = LivePlayer(planned(reference, {"duration": 5.0, "start": {"dbeta": 0.1}}))
+    player = LivePlayer(planned(reference, [{"duration": 5.0, "start": {"dbeta": 0.1}}])[0])
     while player.playing:
         player.advance(0.1)
     found = player.snapshot()
@@ -86,7 +86,7 @@ def test_it_begins_again_at_its_end(
     reference: condyle.Mechanism, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(live_player, "BUDGET", np.inf)
-    player = LivePlayer(planned(reference, {"duration": 0.05, "controller": TORQUE}))
+    player = LivePlayer(planned(reference, [{"duration": 0.05, "controller": TORQUE}])[0])
     player.advance(0.1)
     assert player.now == 0 and player.playing
     player.loop = False

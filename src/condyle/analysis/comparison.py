@@ -97,8 +97,14 @@ class Comparison:
         parts = [str(part) for part in self.solution["part"].values]
         return indices(runs[0].share, parts, self.units) if runs else []
 
+    @property
+    def data(self) -> dict[str, Any]:
+        """What the tables do not say, for programs."""
+        missing = {one.label: one.reason for one in self.unavailable}
+        return {"samples": self.samples, "unavailable": missing}
+
     def __str__(self) -> str:
-        return str(extend("comparison.text", self))
+        return str(extend("tables.text", self))
 
 
 def compare(

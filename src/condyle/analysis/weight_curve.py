@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..accessors import extend
 from ..errors import InputError
 from ..mechanism import as_mechanism
 from ..mechanism.chain import limits
@@ -53,6 +54,14 @@ class Tradeoff:
     mean: np.ndarray
     peak: np.ndarray
     samples: int
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """What the table does not say, for programs."""
+        return {"reference_force": self.reference_force, "samples": self.samples}
+
+    def __str__(self) -> str:
+        return str(extend("tables.text", self))
 
 
 def tradeoff(

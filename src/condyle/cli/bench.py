@@ -10,10 +10,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Annotated
 
+from ..atomic import make_folder, replacing
 from ..errors import UnsupportedError
 from .answer import Answer, files_line
 from .command import UPKEEP, command
-from .inputs import output_folder
 from .options import option
 
 
@@ -33,14 +33,13 @@ def bench(
             the longest, and missed ones, next to an empty loop.
         seconds: Time for each row of the table (s).
     """
-    from ..atomic import replacing
     from ..mechanism import load_mechanism
 
     benchmarks = _benchmarks()
 
     with ExitStack() as stack:  # a file that cannot be written is found before the minutes pass
         if out is not None:
-            output_folder(out.parent)
+            make_folder(out.parent)
             temporary = stack.enter_context(replacing(out))
         if realtime:
             result = benchmarks.real_time(load_mechanism("masticatory"), seconds)

@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from ..atomic import file_stem, make_folder
 from ..errors import InputError
 from . import options
 from .answer import Answer, command_line, files_line
 from .command import COMPUTE, command
-from .inputs import file_stem, output_folder, require_drawing, warn
+from .inputs import require_drawing, warn
 
 
 @command(COMPUTE, example="condyle compare jaw.toml --motion path.csv --load bite.csv")
@@ -38,12 +39,12 @@ def compare(
 
     from ..motion import motion_and_load
     from ..report.tables import save_tables, tables, with_tables
-    from ..report.tables.tradeoff_table import tradeoff_table
 
     machine = condyle.load_mechanism(mechanism)
     following = motion.arguments()
     load_point = following.pop("load_point")
     path, acting = motion_and_load(machine, **following)
+    found: Any
     if tradeoff:
         named = distribution.distribution not in (None, "weighted")
         if named or distribution.contact_weight:
@@ -51,38 +52,30 @@ def compare(
                 "--tradeoff sweeps the weights of --distribution weighted itself: leave "
                 "--distribution and --contact-weight out"
             )
-        curve = condyle.tradeoff(machine, path, acting, load_point, preload=distribution.preload)
-        shown, solution, text = [tradeoff_table(curve)], curve.solution, ""
-        data: dict[str, Any] = {"reference_force": curve.reference_force, "samples": curve.samples}
+        found = condyle.tradeoff(machine, path, acting, load_point, preload=distribution.preload)
     else:
         chosen = distribution.chosen()
-        comparison = condyle.compare(machine, path, acting, load_point, distribution=chosen)
-        shown, solution, text = list(tables(comparison)), comparison.solution, str(comparison)
-        unavailable = {one.label: one.reason for one in comparison.unavailable}
-        data = {"samples": comparison.samples, "unavailable": unavailable}
+        found = condyle.compare(machine, path, acting, load_point, distribution=chosen)
+    shown, solution = tables(found), found.solution
     warn([*path.warnings, *acting.warnings, *solution.condyle.warnings])
-    output_folder(out)
-    files = save_tables(shown, out)
+    files = save_tables(shown, make_folder(out))
     solution, stem = with_tables(solution, shown), file_stem(machine.name)
     kept = out / f"{stem}-{'tradeoff' if tradeoff else 'compare'}.nc"
     solution.condyle.save(kept)
     files.append(kept)
-    if figures and tradeoff:
-        from ..report.figures import save
+    if figures:
+        from ..report.figures import save, save_figures
         from ..report.figures.tradeoff_figure import tradeoff_figure
 
-        files += save(tradeoff_figure(curve), out, shown[0].name)
-    elif figures:
-        from ..report.figures import save_figures
-
-        files += save_figures(comparison.solution, comparison, out)
+        if tradeoff:
+            files += save(tradeoff_figure(found), out, "tradeoff")
+        else:
+            files += save_figures(solution, found, out)
     if report:
         from ..report.page import write_report
 
-        inputs = (
-            [] if tradeoff else [file for file in (motion.motion, motion.load) if file is not None]
-        )
         page = kept.with_suffix(".html") if tradeoff else out / f"{stem}.html"
+        inputs = [file for file in (motion.motion, motion.load) if file is not None]
         files.append(write_report(solution, page, files=inputs))
     if tradeoff:
         then = command_line("report", kept)
@@ -91,11 +84,7 @@ def compare(
     else:
         folder = options.OutputOptions(out, report=True)
         then = command_line("run", mechanism, motion, distribution, folder)
-    records = {table.name.replace("-", "_"): table.records for table in shown}
-    about = {
-        "mechanism": machine.name,
-        **records,
-        "warnings": solution.condyle.warnings,
-        "files": files,
-    }
-    return Answer(f"{text or shown[0].text()}\n{files_line(files)}", data | about, then)
+    data = found.data | {"mechanism": machine.name}
+    data |= {table.name.replace("-", "_"): table.records for table in shown}
+    data |= {"warnings": solution.condyle.warnings, "files": files}
+    return Answer(f"{found}\n{files_line(files)}", data, then)

@@ -4,14 +4,23 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-from . import options
-from .answer import Answer
+from . import completion, options
+from .answer import Answer, command_line, files_line
 from .command import COMPUTE, command, group
 from .inputs import warn
 
+if TYPE_CHECKING:
+    from ..export.written import Written
+
 export = group("export", COMPUTE, "Code and models for controllers and other programs.")
+
+
+def answer(made: Written, then: str, text: str = "") -> Answer:
+    """What an export says: its notes, its files, and what it knows of them."""
+    warn(made.notes)
+    return Answer(text or files_line(made), made.data | {"files": list(made)}, then)
 
 
 @command(COMPUTE, example="condyle export c masticatory --out masticatory-c", of=export, name="c")
@@ -62,10 +71,71 @@ def c(
         formulation=formulation,
         route=route,
     )
-    warn(made.notes)
     known = made.data
     lines = [f'"{known["mechanism"]}" in C: {", ".join(known["functions"])}']
     lines += [f"  {name} is {ours}" for name, ours in known["names"].items()]
     lines += [f"Wrote {', '.join(path.name for path in made)} to {out}"]
     then = f"make -C {shlex.quote(str(out))} check"
-    return Answer("\n".join(lines), known | {"files": list(made)}, then)
+    return answer(made, then, "\n".join(lines))
+
+
+@command(COMPUTE, example="condyle export fmu masticatory --out fmu", of=export, name="fmu")
+def fmu(
+    mechanism: options.Mechanism,
+    out: Path,
+    kind: list[str] | None = None,
+    fmi: int = 3,
+) -> Answer:
+    """Functional mock-up units (FMI 2.0 or 3.0), for model exchange and co-simulation.
+
+    The plant (efforts in, motion out), the inverse model, within limits as `bounded`, and a
+    computed-torque controller. They contain their sources, and a binary for this machine if there
+    is a C compiler.
+
+    Options:
+        kind: Unit to export; repeat for more: plant, inverse, controller, bounded. Default: the
+            first three.
+        out: Folder for the files.
+        fmi: Version of the standard: 2 or 3.
+    """
+    import condyle
+
+    made = condyle.export_fmu(mechanism, out, kind=kind or completion.FMUS[:3], fmi=fmi)
+    return answer(made, command_line("check", mechanism))
+
+
+@command(
+    COMPUTE, example="condyle export matlab masticatory --out matlab", of=export, name="matlab"
+)
+def matlab(
+    mechanism: options.Mechanism,
+    out: Path,
+) -> Answer:
+    """Functions for MATLAB and Octave (MEX): C, help texts, build.m and an example.
+
+    Options:
+        out: Folder for the files.
+    """
+    import condyle
+
+    made = condyle.export_matlab(mechanism, out)
+    return answer(made, command_line("check", mechanism))
+
+
+@command(COMPUTE, example="condyle export mjcf masticatory --out mujoco", of=export, name="mjcf")
+def mjcf(
+    mechanism: options.Mechanism,
+    out: Path,
+) -> Answer:
+    """A model for MuJoCo (MJCF): loops, contacts, actuators with limits and losses, sensors.
+
+    Controls are efforts in N m or N, joints are zero at home. Approximations are listed on stderr
+    and in the file.
+
+    Options:
+        out: Folder for the file.
+    """
+    import condyle
+
+    made = condyle.export_mjcf(mechanism, out)
+    return answer(made, command_line("check", mechanism), f"Wrote {made[0]}")

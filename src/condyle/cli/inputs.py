@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -10,7 +9,8 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import InputError, WarningError
+from ..atomic import file_stem, make_folder
+from ..errors import WarningError
 from ..extras import require
 from .answer import command_line
 from .options import DistributionOptions, ModelOptions, OutputOptions
@@ -45,7 +45,7 @@ def written(
 
     Args: inputs: files of the run, to be named in the report.
     """
-    folder, stem = output_folder(output.out), file_stem(solution.attrs["mechanism_name"])
+    folder, stem = make_folder(output.out), file_stem(solution.attrs["mechanism_name"])
     files = [folder / f"{stem}{ending}" for ending in (".nc", ".csv", *[".mat"] * output.mat)]
     solution.condyle.save(*files)
     if output.figures:
@@ -65,25 +65,6 @@ def look_at(files: list[Path], output: OutputOptions) -> str:
     if output.report:
         return command_line("view", solution=files[0])
     return command_line("report", files[0])
-
-
-def output_folder(path: Path) -> Path:
-    """Make the folder for results.
-
-    Raises: InputError: if it cannot be one.
-    """
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"--out {path}: cannot be made a folder for results ({error.strerror})"
-        ) from error
-    return path
-
-
-def file_stem(name: str) -> str:
-    """The name of a mechanism as the beginning of a file name: no way out of the folder."""
-    return re.sub(r"[^\w.+-]+", "_", name)
 
 
 def require_drawing(figures: bool, report: bool) -> None:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from ..atomic import file_stem
 from ..errors import InputError
 from ..extras import require
 from . import completion, options
 from .answer import Answer, command_line, files_line
 from .command import COMPUTE, command
-from .inputs import file_stem, model_of
+from .inputs import model_of
 
 if TYPE_CHECKING:
     import xarray as xr

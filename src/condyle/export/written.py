@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from ..atomic import make_folder, write_text
+from ..atomic import file_stem, make_folder, write_text
 
 
 class Written(list[Path]):
@@ -34,11 +33,6 @@ def file_at(path: str | os.PathLike[str], name: str, suffix: str) -> Path:
         make_folder(Path(path).parent)
         return Path(path)
     return make_folder(path) / f"{file_stem(name)}{suffix}"
-
-
-def file_stem(name: str) -> str:
-    """The name of a mechanism as the beginning of a file name: no way out of the folder."""
-    return re.sub(r"[^\w.+-]+", "_", name)
 
 
 def write_texts(folder: Path, texts: Mapping[str, str]) -> list[Path]:

@@ -126,7 +126,7 @@ def _contact(contact: Mapping[str, Any]) -> str:
     ball, off = contact["ball_radius"], contact["residual"]
     options = [f", {contact['side']}"] if contact["side"] else []
     options += [f", ball of radius {length_text(ball)}"] if ball is not None else []
-    options += [", one-sided"] if contact["one_sided"] else []
+    options += [", unilateral"] if contact["one_sided"] else []
     if (friction := contact["friction"])["coefficient"]:
         options.append(
             f", friction {friction['coefficient']:g} fading below "

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from ..kinematics.causes import causes
-from ..kinematics.singularities import NEAR_SINGULAR
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
 from ..status import Status
@@ -103,27 +102,7 @@ class Derived:
         return np.where(known, self.evaluation.shortfall, np.nan)
 
     @cached_property
-    def inverse_ratio(self) -> np.ndarray:
-        return self.evaluation.configuration.singularity.inverse_ratio
-
-    @cached_property
-    def direct_ratio(self) -> np.ndarray:
-        return self.evaluation.configuration.singularity.direct_ratio
-
-    @cached_property
-    def ratio(self) -> np.ndarray:
-        """Smallest over largest singular value of J_A or J_W, (N,)."""
-        return np.minimum(self.inverse_ratio, self.direct_ratio)
-
-    @cached_property
-    def condition(self) -> np.ndarray:
-        """Condition number of the dimensionless J_W, (N,)."""
-        with np.errstate(divide="ignore"):
-            return 1.0 / self.direct_ratio
-
-    @cached_property
     def near(self) -> np.ndarray:
         """Index into `KINDS` of the singularity that is near, (N,) int8; 0 at failed samples."""
-        kind = (self.inverse_ratio < NEAR_SINGULAR).astype(np.int8)
-        kind += 2 * (self.direct_ratio < NEAR_SINGULAR).astype(np.int8)
+        kind = self.evaluation.configuration.singularity.kind().astype(np.int8)
         return kind if self.all_ok else np.where(self.ok, kind, 0).astype(np.int8)

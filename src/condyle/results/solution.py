@@ -26,23 +26,11 @@ from ..mechanism.files import recall
 from ..mechanism.mechanism import Mechanism
 from ..motion import write_table
 from ..progress import step
-from .contacts import AXES, BOUND_TOLERANCE, bound_margins, contact_loss, contact_loss_columns
+from .contacts import AXES, contact_loss, contact_loss_columns
 from .failed_samples import Failure, failures, status_columns
 from .mat_file import dataset_variables, write_mat
-from .variables import BY_NAME, VARIABLES, WRENCH, named_columns, variable_columns
+from .variables import BY_NAME, VARIABLES, named_columns, variable_columns
 from .warnings import Notice
-
-__all__ = [
-    "AXES",
-    "BOUND_TOLERANCE",
-    "WRENCH",
-    "Results",
-    "bound_margins",
-    "contact_loss",
-    "contact_loss_columns",
-    "named_columns",
-    "open_solution",
-]
 
 # An attribute that only maps or only sweeps have; the others are solutions.
 KINDS = {"held": "map", "study": "sweep"}

@@ -289,14 +289,17 @@ VARIABLES = (
         "J_W_sigma", ("time", "independent"), "1", "singular values of the dimensionless J_W",
         "evaluation.configuration.singularity.J_W_sigma",
     ),
-    Variable("condition", ("time",), "1", "condition number of J_W", "condition"),
+    Variable(
+        "condition", ("time",), "1", "condition number of J_W",
+        "evaluation.configuration.singularity.condition",
+    ),
     Variable(
         "rank", ("time",), "1", "rank of J_W; 0 where the pose cannot be reached",
         "evaluation.configuration.singularity.rank",
     ),
     Variable(
         "singularity_ratio", ("time",), "1", "smallest over largest singular value of J_A or J_W",
-        "ratio",
+        "evaluation.configuration.singularity.ratio",
     ),
     Variable(
         "singularity", ("time",), "1", "kind of singularity that is near", "near",

@@ -167,7 +167,7 @@ class Watch:
                 margin = derived.margin[:, i]
                 tally("bounds", i, margin < -BOUND_TOLERANCE, -margin)
                 tally("contact_loss", i, derived.contact_loss[:, i], np.abs(e.contact_force[:, i]))
-            tally("near_singularity", 0, derived.near != 0, -derived.ratio)
+            tally("near_singularity", 0, derived.near != 0, -configuration.singularity.ratio)
             for i, chain in enumerate(self.mechanism.chains):
                 limit, effort, speed = limits(chain), e.effort[:, i], np.abs(e.joint_rate[:, i])
                 tally("speed_limit", i, speed > limit.speed, speed)
@@ -250,7 +250,7 @@ class Watch:
                 )
             elif kind == LOW:
                 kind, value, bound, unit = "effort_limit", -size, limit.low, family.effort_unit
-                text = f"effort falls to {-size:.4g} {unit} {worst}, below its least of {bound:g}"
+                text = f"effort falls to {-size:.4g} {unit} {worst}, below its minimum of {bound:g}"
             else:
                 what, unit, bound, value = "effort", family.effort_unit, limit.high, size
                 if kind == "speed_limit":

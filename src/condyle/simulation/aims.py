@@ -9,7 +9,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..model.model import Model
-from ..motion import Motion, read_table
+from ..motion import Motion, read_table, reference_motion, trial_motion
+from ..motion.reference_case import fits_reference
 from ..motion.spline import Spline
 
 
@@ -90,9 +91,5 @@ def path_of(model: Model, motion: Motion, force: float | None, file: str | None)
 
 def default_motion(model: Model) -> Motion:
     """The bundled chewing path where it fits; else a trial motion about home."""
-    from ..motion import reference_motion, trial_motion
-
     machine = model.mechanism
-    if len(machine.contacts) == 2 and "incisor" in machine.platform.points:
-        return reference_motion()
-    return trial_motion(machine)
+    return reference_motion() if fits_reference(machine) else trial_motion(machine)

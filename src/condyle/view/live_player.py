@@ -70,7 +70,7 @@ class LivePlayer:
         seconds = min(seconds, LONGEST)
         begun, late = self.live.t, time.perf_counter() + BUDGET
         self._clock += seconds * self.speed
-        self.playing = False  # a law that fails is told of once
+        self.playing = False  # a law that fails is reported once
         while not self.live.over and self.live.t < self._clock and time.perf_counter() < late:
             self.live.go_to(min(self.live.t + SLICE, self._clock))
         self.playing = True
@@ -139,9 +139,9 @@ class LivePlayer:
         if (end := self.live.ended) is not None:
             whose = f" ({end.owner})" if end.owner else ""
             return "unreachable", (f"Simulation ended: {end.text}{whose}", *state)
-        told: list[str] = []
+        notes: list[str] = []
         if self.live.over:
-            told.append("Simulation finished.")
+            notes.append("Simulation finished.")
         if self.playing and self._pace < BEHIND:
-            told.append(f"Slower than requested: {self._pace * self.speed:.2g} times real time")
-        return ("warning" if state else "ok"), (*told, *state)
+            notes.append(f"Slower than requested: {self._pace * self.speed:.2g} times real time")
+        return ("warning" if state else "ok"), (*notes, *state)

@@ -33,7 +33,6 @@ from .stage import Stage
 
 if TYPE_CHECKING:
     from ..simulation import Scenario
-    from ..simulation.plan import Plan
 
 DEFAULT = "masticatory"
 BRAND = (16, 93, 202)
@@ -234,18 +233,12 @@ def open_view(
     if mechanism is None:
         mechanism = DEFAULT if solution is None else solution.condyle.mechanism
     mechanism = as_mechanism(mechanism)
-    live = None if scenario is None else LivePlayer(planned(mechanism, scenario))
+    live = None
+    if scenario is not None:
+        from ..simulation.simulating import planned
+
+        live = LivePlayer(planned(mechanism, [scenario])[0])
     return View(mechanism, solution, host, port, map, live)
-
-
-def planned(mechanism: Mechanism, scenario: Any) -> Plan:
-    """What a scenario does to a mechanism.
-
-    Raises: ScenarioError: for a scenario with anything wrong, or that does not fit.
-    """
-    from ..simulation.simulating import planned as plans
-
-    return plans(mechanism, [scenario])[0]
 
 
 def serve_view(

@@ -101,7 +101,7 @@ def state_messages(
     effort: np.ndarray,
     rate: np.ndarray | None,
 ) -> list[str]:
-    """Contacts out of bounds or lifting off, and actuators above a limit."""
+    """Contacts out of bounds or lost, and actuators above a limit."""
     messages = bound_messages(mechanism, margin)
     lost = contact_loss(mechanism, force[None])[0] if len(force) else []
     messages += [

@@ -170,7 +170,7 @@ def test_results_tell_of_slack() -> None:
     pushing = solution["effort"].values.min(axis=0) < 0
     assert slack == {name for name, p in zip(mechanism.chain_names, pushing, strict=True) if p}
     assert slack and all(
-        "below its least of 0" in n.text for n in solution.condyle.notices if n.owner in slack
+        "below its minimum of 0" in n.text for n in solution.condyle.notices if n.owner in slack
     )
 
 

@@ -129,7 +129,7 @@ def test_check_says_what_a_contact_is(raw: dict[str, Any]) -> None:
     wall = table("sphere") | {"centre": [-26.65, 72, 12.53], "radius": 26.0}
     options = ball_options("sphere", first=False)
     description = check(parse(spoiled(raw, wall, **options, one_sided=True)))
-    assert "sphere, outside, ball of radius 4 mm, one-sided," in str(description)
+    assert "sphere, outside, ball of radius 4 mm, unilateral," in str(description)
     found = description.data["contacts"]["left_condyle"]
     assert (found["kind"], found["side"], found["ball_radius"]) == ("sphere", "outside", 0.004)
 

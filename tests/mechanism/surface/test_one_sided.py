@@ -13,7 +13,7 @@ from condyle.mechanism import Mechanism
 from condyle.mechanism.surface import Plane, Sphere
 from condyle.model.model import Model
 from condyle.motion import Motion
-from condyle.results.solution import contact_loss
+from condyle.results.contacts import contact_loss
 from condyle.results.summary import summarize
 
 

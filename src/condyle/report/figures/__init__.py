@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING
 
 from ..panel import PANEL_GROUPS
 from .drawing import figure_of
-from .paper_figures import figure_5, figure_6, figure_7, figure_8, figure_9
+from .paper_figures import figure_5, figure_8, figure_9
 from .registry import PLOTS, find_figures, plot, solution_plots
 from .saving import save, save_each
-from .style import STYLES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,12 +25,6 @@ find_figures(figure_of)
 
 __all__ = [
     "PLOTS",
-    "STYLES",
-    "figure_5",
-    "figure_6",
-    "figure_7",
-    "figure_8",
-    "figure_9",
     "plot",
     "save",
     "save_figures",
@@ -49,8 +42,8 @@ def save_figures(
     """
     figures = {
         "figure-5-motion": figure_5,
-        "figure-6-jacobian": figure_6,
-        "figure-7-load": figure_7,
+        "figure-6-jacobian": PLOTS["jacobian"],
+        "figure-7-load": PLOTS["load"],
         "figure-8-torque": lambda _: figure_8(comparison),
         "figure-9-share": figure_9,
     }

@@ -206,10 +206,10 @@ def draw_pairs(title: str, solution: xr.Dataset, columns: Columns, same: bool) -
     sides = [short(row) for row in rows]
     paired = all(own == sides[0] for own in sides)
     one_unit = len({*units}) == 1
-    for row, (line, own, told) in enumerate(zip(cells, rows, sides, strict=True)):
+    for row, (line, own, sided) in enumerate(zip(cells, rows, sides, strict=True)):
         labels = list(map(readable, own))
         if dense or many:
-            labels = told if many or paired else list(ORDER[: len(own)])
+            labels = sided if many or paired else list(ORDER[: len(own)])
         panel = first[own[0]][1]
         for axes, (word, column) in zip(line, columns.items(), strict=True):
             panel = column[own[0]][1]

@@ -36,16 +36,6 @@ def figure_5(solution: xr.Dataset) -> Figure:
     return figure
 
 
-def figure_6(solution: xr.Dataset) -> Figure:
-    """The paper's Fig. 6: the diagonal of J_A."""
-    return PLOTS["jacobian"](solution)
-
-
-def figure_7(solution: xr.Dataset) -> Figure:
-    """The paper's Fig. 7: the bite force."""
-    return PLOTS["load"](solution)
-
-
 @house
 def figure_8(comparison: Comparison) -> Figure:
     """The paper's Fig. 8: torques of Model 1, and how far other models are from them."""

@@ -28,7 +28,7 @@ from ...errors import InputError, did_you_mean
 if TYPE_CHECKING:
     import xarray as xr
 
-# Okabe and Ito's colours, told apart by colour-blind readers; without yellow, which pales on white.
+# Okabe and Ito's colours, distinct to colour-blind readers; without yellow, which pales on white.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 DASHES = (
     "-",

@@ -14,8 +14,8 @@ import numpy as np
 
 from ...errors import InputError
 from ...extras import require
+from ...results.contacts import BOUND_TOLERANCE
 from ...results.failed_samples import longest
-from ...results.solution import BOUND_TOLERANCE
 from ...results.summary import peak, summarize
 from ..actuators import drawn_limits
 from ..panel_list import reaction

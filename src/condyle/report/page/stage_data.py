@@ -68,7 +68,7 @@ def machine(solution: xr.Dataset, columns: Columns) -> dict[str, Any]:
         "views": {n: {"from": a, "up": up, "flat": flat} for n, (a, up, flat) in VIEWS.items()},
         "palette": {"light": LIGHT, "dark": DARK},
         "roles": ROLES,
-        "markerLooks": {
+        "markerStyles": {
             body: dict(zip(("colour", "symbol", "sign", "text"), look, strict=True))
             for body, look in MARKERS.items()
         },
@@ -116,8 +116,8 @@ def _chains(
     rods = []
     for bar in parts.bars:
         ends = {"from": at[bar.chain, bar.start], "to": at[bar.chain, bar.end]}
-        told = {"chain": bar.chain, "body": bar.body, "radius": bar.radius, "colour": bar.colour}
-        rods.append(told | ends)
+        facts = {"chain": bar.chain, "body": bar.body, "radius": bar.radius, "colour": bar.colour}
+        rods.append(facts | ends)
     return rods, [at[key] | {"radius": JOINT * parts.size} for key in parts.joints]
 
 
@@ -156,8 +156,8 @@ class Arrow:
 
     @property
     def description(self) -> dict[str, Any]:
-        told = {"kind": self.kind, "at": {"platform": list(self.at)}, "gap": self.gap}
-        return told | {"into": self.into, "columns": self.columns}
+        facts = {"kind": self.kind, "at": {"platform": list(self.at)}, "gap": self.gap}
+        return facts | {"into": self.into, "columns": self.columns}
 
 
 def _scales(arrows: Sequence[Arrow], size: float) -> dict[str, dict[str, float]]:

@@ -7,37 +7,40 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from ...analysis.comparison import Comparison
+from ...analysis.weight_curve import Tradeoff
 from ...atomic import write_text
 from .comparison_tables import differences, table_1, table_2
 from .report_table import Table, kept_tables, with_tables
+from .tradeoff_table import tradeoff_table
 
 __all__ = [
     "Table",
-    "comparison_text",
-    "differences",
     "kept_tables",
     "save_tables",
-    "table_1",
-    "table_2",
     "tables",
+    "tables_text",
     "with_tables",
 ]
 
 
-def tables(comparison: Comparison) -> list[Table]:
-    """The differences, Table 1 and Table 2."""
-    return [differences(comparison), table_1(comparison), table_2(comparison)]
+def tables(found: Comparison | Tradeoff) -> list[Table]:
+    """The differences, Table 1 and Table 2; of a tradeoff its curve."""
+    if isinstance(found, Tradeoff):
+        return [tradeoff_table(found)]
+    return [differences(found), table_1(found), table_2(found)]
 
 
-def comparison_text(comparison: Comparison) -> str:
+def tables_text(found: Comparison | Tradeoff) -> str:
     """All tables as plain text."""
-    return "\n".join(table.text() for table in tables(comparison))
+    return "\n".join(table.text() for table in tables(found))
 
 
-def save_tables(found: Comparison | Iterable[Table], folder: str | os.PathLike[str]) -> list[Path]:
+def save_tables(
+    found: Comparison | Tradeoff | Iterable[Table], folder: str | os.PathLike[str]
+) -> list[Path]:
     """Write tables, or those of a comparison, as Markdown and CSV; returns the paths."""
     paths = []
-    for table in tables(found) if isinstance(found, Comparison) else found:
+    for table in tables(found) if isinstance(found, Comparison | Tradeoff) else found:
         stem = Path(folder) / table.name
         paths += [stem.with_suffix(".md"), stem.with_suffix(".csv")]
         write_text(paths[-2], table.markdown())

@@ -50,7 +50,7 @@ class Table:
                 of a heading only tell equal ones apart.   shown: rows that people see.
         """
         chosen = records if shown is None else [records[i] for i in shown]
-        rows = [[_cell(record, told) for told in cells.values()] for record in chosen]
+        rows = [[_cell(record, cell) for cell in cells.values()] for record in chosen]
         return cls(name, title, tuple(map(str.strip, cells)), rows, list(records), list(notes))
 
     def text(self) -> str:
@@ -80,10 +80,10 @@ class Table:
         write_table(path, columns)
 
 
-def _cell(record: dict[str, Any], told: Cell) -> str:
-    if callable(told):
-        return told(record)
-    key, _, form = told.partition(":")
+def _cell(record: dict[str, Any], cell: Cell) -> str:
+    if callable(cell):
+        return cell(record)
+    key, _, form = cell.partition(":")
     value = record[key]
     return NOTHING if value is None or value == "" else format(value, form)
 

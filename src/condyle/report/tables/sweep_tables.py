@@ -81,8 +81,8 @@ def effect_table(table: xr.Dataset) -> Table:
     rows: dict[str, dict[str, str]] = {}
     for one in main_effects(table):
         share = None if np.isnan(one.share) else one.share
-        told = NOTHING if share is None else f"{share:.0%}"
-        rows.setdefault(one.measure, {})[one.parameter] = f"{one.swing:.3g} ({told})"
+        said = NOTHING if share is None else f"{share:.0%}"
+        rows.setdefault(one.measure, {})[one.parameter] = f"{one.swing:.3g} ({said})"
         known = {"measure": one.measure, "parameter": one.parameter}
         records.append(known | {"swing": one.swing, "share": share})
     parameters = table.attrs["parameters"]

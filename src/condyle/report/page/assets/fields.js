@@ -27,7 +27,7 @@ class Field extends Panel {
     const longest = Math.max(...this.lines.map((line) => line.label.length));
     return {
       ...found, margin: { ...found.margin, l: Math.min(12 + 6.2 * longest, 0.45 * found.width), r: 48 },
-      yaxis: { ...axisLook(), fixedrange: true, autorange: "reversed", dtick: 1, tickfont: { size: 10 }, showgrid: false },
+      yaxis: { ...axisStyle(), fixedrange: true, autorange: "reversed", dtick: 1, tickfont: { size: 10 }, showgrid: false },
       shapes: failureShapes(), annotations: [],
     };
   }

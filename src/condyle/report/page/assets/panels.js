@@ -11,14 +11,14 @@ const PLOT_CONFIG = {
 
 const sizeOf = (node) => ({ width: node.clientWidth, height: node.clientHeight });
 
-function axisLook() {
+function axisStyle() {
   return {
     color: css("--soft"), gridcolor: css("--line"), zerolinecolor: css("--line"), linecolor: css("--line"),
     tickfont: { size: 11 }, automargin: false, exponentformat: "power",
   };
 }
 
-const plotLook = (node) => ({
+const plotStyle = (node) => ({
   ...sizeOf(node), margin: { ...MARGIN, autoexpand: false }, showlegend: false, hovermode: false,
   paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { family: "system-ui, sans-serif", color: css("--ink") },
 });
@@ -107,15 +107,15 @@ class Panel {
   }
 
   layout() {
-    const look = axisLook();
-    const y = { ...look, zeroline: true, fixedrange: true };
+    const style = axisStyle();
+    const y = { ...style, zeroline: true, fixedrange: true };
     const range = this.limits ? this.rangeWithLimits() : null;
     // One label a limit; a level of 0 is the axis.
     const levels = !this.spec.limitsDrawn ? [] : this.spec.limits.flatMap(({ low, high, label }) => [[high, label], [low, high ? "" : label]]).filter(([value]) => value);
     return {
-      ...plotLook(this.plot), dragmode: coarse ? false : "zoom",
+      ...plotStyle(this.plot), dragmode: coarse ? false : "zoom",
       modebar: { bgcolor: "rgba(0,0,0,0)", color: css("--soft"), activecolor: css("--accent") },
-      xaxis: { ...look, range: this.zoom ?? [time[0], time[samples - 1]], ticksuffix: " s", zeroline: false },
+      xaxis: { ...style, range: this.zoom ?? [time[0], time[samples - 1]], ticksuffix: " s", zeroline: false },
       yaxis: range ? { ...y, range } : { ...y, autorange: true },
       shapes: [...failureShapes(), ...levels.map(([value]) => ({
         type: "line", xref: "paper", x0: 0, x1: 1, y0: value, y1: value, line: { color: css("--cursor"), width: 1.5, dash: "longdash" },

@@ -22,10 +22,10 @@ class Plane {
   numbers(line) { return [[line.across, this.track ? line.scale : 1], [line.column, line.scale]]; }
 
   layout() {
-    const look = axisLook(), title = (text) => ({ text, standoff: 4, font: { size: 12 } });
-    const found = { ...plotLook(this.plot), margin: { ...MARGIN, b: 38, autoexpand: false }, dragmode: false };
-    found.xaxis = { ...look, nticks: 5, zeroline: true, title: title(this.axes[0]) };
-    found.yaxis = { ...look, nticks: 6, zeroline: true };
+    const style = axisStyle(), title = (text) => ({ text, standoff: 4, font: { size: 12 } });
+    const found = { ...plotStyle(this.plot), margin: { ...MARGIN, b: 38, autoexpand: false }, dragmode: false };
+    found.xaxis = { ...style, nticks: 5, zeroline: true, title: title(this.axes[0]) };
+    found.yaxis = { ...style, nticks: 6, zeroline: true };
     if (this.track) {
       Object.assign(found.xaxis, this.range(0), { nticks: 0, zeroline: false });
       Object.assign(found.yaxis, this.range(1), { nticks: 0, zeroline: false, scaleanchor: "x", title: title(this.axes[1]) });

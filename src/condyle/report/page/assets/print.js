@@ -10,7 +10,7 @@ function resizePlots() {
   resizeStage();
 }
 
-// The drawing buffer of WebGL is empty when the printer looks; a picture is not.
+// The drawing buffer of WebGL is empty when printing; a picture is not.
 function still() {
   const when = `t = ${time[clock.index].toFixed(timeDecimals)} s`;
   const picture = element("img", { id: "still", alt: `The mechanism at ${when}` });

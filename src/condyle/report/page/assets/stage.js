@@ -6,7 +6,7 @@ const CAMERAS = drawn.views;
 const HALF_FIELD = Math.tan(Math.PI / 8);  // of plotly's perspective
 const FILL = 0.86;  // of the canvas
 const FLAT_DISTANCE = 3;
-// Plotly takes the light's place through the projection, and the flat one looks the other way.
+// Plotly takes the light's place through the projection, and the flat one styles the other way.
 const LIGHT = { false: { x: 2000, y: -3000, z: 6000 }, true: { x: -2000, y: 3000, z: -6000 } };
 
 // Scene units: the middle of the box is the origin, its longest side is 1.
@@ -154,18 +154,18 @@ function labelTrace(index) {
 }
 
 // Measured markers: a sign and a colour for each body, nothing where one was not seen.
-const MARKERS = drawn.markerLooks;
+const MARKERS = drawn.markerStyles;
 
 function markerTrace(index) {
   const places = drawn.markers.map((marker) => marker.columns.map((c) => {
     const value = 1e3 * column(c)[index];
     return Number.isFinite(value) ? value : null;
   }));
-  const looks = drawn.markers.map((marker) => MARKERS[marker.body]);
+  const styles = drawn.markers.map((marker) => MARKERS[marker.body]);
   return {
     type: "scatter3d", mode: "markers", name: "markers", hoverinfo: "text", text: drawn.markers.map((marker) => plain(marker.name)),
     x: places.map((p) => p[0]), y: places.map((p) => p[1]), z: places.map((p) => p[2]),
-    marker: { size: 5, symbol: looks.map((look) => look.symbol), color: looks.map((look) => colour(look.colour)), line: { width: 0 } },
+    marker: { size: 5, symbol: styles.map((one) => one.symbol), color: styles.map((one) => colour(one.colour)), line: { width: 0 } },
   };
 }
 
@@ -179,7 +179,7 @@ function fillMarkerLegend() {
   }));
 }
 
-// Plotly reads a little HTML in labels, and looks texts up in plain objects, where "constructor" is
+// Plotly reads a little HTML in labels, and styles texts up in plain objects, where "constructor" is
 // found before it was put there; a name is only text.
 const plain = (text) => {
   const written = text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
@@ -263,7 +263,7 @@ function shown3d(wanted) {
 const MOVING = drawn.markers.length ? 7 : 6;  // platform, chains, joints, balls, forces, labels, markers
 const LABELS = 5;
 
-// Names after the picture was turned; they may lie on each other now.
+// Names after the picture has turned: some may overlap now.
 function relabel() {
   if (!stageReady) return;
   const wanted = wantedAt(clock.index);
@@ -297,16 +297,16 @@ async function moveStage(index) {
 
 // What is wrong at this sample.
 function showAlerts(index) {
-  const told = payload.alerts.filter((alert) => column(alert.column)[index] === 1);
+  const active = payload.alerts.filter((alert) => column(alert.column)[index] === 1);
   const message = document.getElementById("stage-message");
-  message.hidden = !told.length;
-  if (!told.length) return;
+  message.hidden = !active.length;
+  if (!active.length) return;
   const when = (i) => `t = ${time[i].toFixed(timeDecimals)} s`;
-  if (told.some((alert) => alert.failed)) {
-    const why = failureAt(time[index]) || told.find((alert) => alert.failed).text;
+  if (active.some((alert) => alert.failed)) {
+    const why = failureAt(time[index]) || active.find((alert) => alert.failed).text;
     message.textContent = `${when(index)}: no result, ${why}. Grey: the mechanism at ${when(goodSample[index])}, without forces`;
   } else {
-    message.textContent = `${when(index)}: ${told.map((a) => a.text).join("; ")}`;
+    message.textContent = `${when(index)}: ${active.map((a) => a.text).join("; ")}`;
   }
 }
 

@@ -1,0 +1,116 @@
+"""condyle solve, forward, pose: independent states, one per row of a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from . import options
+from .answer import Answer, command_line, files_line
+from .command import COMPUTE, command
+from .inputs import STRICT, model_of, warn
+
+
+@command(COMPUTE, example="condyle solve jaw.toml --states states.csv --out efforts.csv")
+def solve(
+    mechanism: options.Mechanism,
+    states: Path,
+    out: Path,
+    model: options.ModelOptions,
+    distribution: options.DistributionOptions,
+    load_point: options.LoadPoint = None,
+    reactions: options.Reactions = False,
+    mat: options.Mat = False,
+    flag: options.Flag = False,
+) -> Answer:
+    """Inverse dynamics of independent states, one per row.
+
+    For tables of any length: rows never influence each other.
+
+    Options:
+        states: States (CSV or Parquet), one per row: pose coordinates such as X, Y (m), alpha, beta
+            (rad), their rates dX ... (per s) and accelerations ddX ... (per s^2; at rest without
+            both), and, if any, Fx, Fy, Fz (N), Mx, My, Mz (N m).
+        out: File for the results (.csv or .parquet).
+    """
+    import condyle
+
+    solved = condyle.solve_states(
+        model_of(mechanism, model, distribution),
+        states,
+        out,
+        load_point=load_point,
+        flag=flag,
+        strict=STRICT.get(),
+        reactions=reactions,
+        threads=model.threads,
+        mat=out.with_suffix(".mat") if mat else None,
+    )
+    warn(solved.data["warnings"])
+    return Answer(str(solved), solved.data, command_line("view", mechanism))
+
+
+@command(COMPUTE, example="condyle forward jaw.toml --states states.csv --out accelerations.csv")
+def forward(
+    mechanism: options.Mechanism,
+    states: Path,
+    out: Path,
+    model: options.ModelOptions,
+    load_point: options.LoadPoint = None,
+    flag: options.Flag = False,
+) -> Answer:
+    """Forward dynamics of independent states, one per row.
+
+    Accelerations and contact forces under given efforts and a load. Rows never influence each
+    other.
+
+    Options:
+        states: States and efforts (CSV or Parquet), one per row: pose coordinates such as X, Y (m),
+            alpha, beta (rad), their rates dX ... (per s), tau_CHAIN of every chain (N m, or N where
+            it slides or pulls), and, if any, Fx, Fy, Fz (N), Mx, My, Mz (N m).
+        out: File for the results (.csv or .parquet).
+    """
+    import condyle
+
+    solved = condyle.forward_states(
+        model_of(mechanism, model),
+        states,
+        out,
+        load_point=load_point,
+        flag=flag,
+        strict=STRICT.get(),
+        threads=model.threads,
+    )
+    warn(solved.data["warnings"])
+    return Answer(str(solved), solved.data, command_line("view", mechanism))
+
+
+@command(COMPUTE, example="condyle pose jaw.toml --joints encoders.csv --out poses.csv")
+def pose(
+    mechanism: options.Mechanism,
+    joints: Path,
+    out: Path,
+    flag: options.Flag = False,
+    tolerance: Annotated[float, options.option(min=0.0)] = 1e-6,
+    every: Annotated[bool, options.option("", "--all")] = False,
+    seed: Annotated[int | None, options.option(min=0)] = None,
+) -> Answer:
+    """Pose of the platform from encoder readings (forward kinematics), one per row.
+
+    Joint coordinates in, pose X, Y, Z (m), alpha, beta, gamma (rad) out.
+
+    Options:
+        joints: Joint coordinates (CSV or Parquet): joint_CHAIN for each chain (rad, or m for a
+            slider), zero at home. With a column t (s) each row starts from the row before,
+            otherwise each starts from home.
+        out: File for the poses (.csv or .parquet).
+        tolerance: Largest difference between a joint coordinate of the pose and the given one (rad,
+            or m).
+        every: List all assembly modes that a random search finds; it may miss some.
+        seed: Seed of the search of --all. Default: 0.
+    """
+    import condyle
+
+    report = condyle.pose_states(mechanism, joints, out, flag, tolerance, every, seed)
+    text = f"{report}\n{files_line(report.data['files'])}"
+    return Answer(text, report.data, command_line("view", mechanism))
