@@ -11,7 +11,7 @@ from condyle.analysis.weight_curve import Tradeoff, tradeoff
 from condyle.model.distributing import Distribution
 from condyle.motion import Motion
 from condyle.report.figures.tradeoff_figure import apart, tradeoff_figure
-from condyle.report.tables.tradeoff_table import tradeoff_table
+from condyle.report.tables.comparison_tables import tradeoff_table
 
 WEIGHTS = (0.0, 0.1, 1.0, 10.0, 1e3)
 

@@ -133,6 +133,6 @@ def test_the_command_outside_a_checkout(
     condyle_command: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """An installed package has no engine to run."""
-    monkeypatch.setattr("condyle.cli.bench.__file__", str(tmp_path / "a" / "b" / "c" / "bench.py"))
+    monkeypatch.setattr("condyle.cli.upkeep.__file__", str(tmp_path / "a" / "b" / "c" / "bench.py"))
     outcome = condyle_command("bench")
     assert outcome.status == 2 and "part of the repository" in outcome.err

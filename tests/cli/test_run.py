@@ -52,13 +52,6 @@ def test_the_main_job(
     }
 
 
-def test_the_same_through_python() -> None:
-    mechanism = condyle.load_mechanism("masticatory")
-    model = condyle.derive(mechanism, formulation="momentum", route="core", backend="numpy")
-    solution = model.solve(condyle.reference_motion(), condyle.reference_load())
-    assert solution.sizes["time"] == 5001 and solution.condyle.options["formulation"] == "momentum"
-
-
 def test_summary_as_json_and_in_silence(condyle_command: Callable[..., Any]) -> None:
     data = json.loads(condyle_command("run", "--json", "--rate", 50).out)
     assert data["samples"] == 251 and data["failed_samples"] == 0
@@ -234,16 +227,6 @@ def test_names_never_leave_the_folder(
     assert len(list(Path("results").iterdir())) == 2
 
 
-@pytest.mark.slow
-def test_compare_with_its_page_does_not_propose_to_make_it(
-    condyle_command: Callable[..., Any],
-) -> None:
-    outcome = condyle_command("compare", "--no-figures", "--rate", 10, "--report", "--out", "o")
-    assert outcome.status == 0, outcome.err
-    assert "Next: condyle view --solution o/masticatory-compare.nc" in outcome.out
-    assert Path("o/masticatory.html").is_file()
-
-
 def test_figures_for_a_journal_from_the_command(condyle_command: Callable[..., Any]) -> None:
     assert condyle_command("run", "--rate", 20, "--out", "o", "--quiet").status == 0
     what = ("plot", "o/masticatory.nc", "--figure", "load")
@@ -258,11 +241,14 @@ def test_figures_for_a_journal_from_the_command(condyle_command: Callable[..., A
 
 @pytest.mark.slow
 def test_compare_in_short(condyle_command: Callable[..., Any]) -> None:
-    outcome = condyle_command("compare", "--no-figures", "--rate", 20, "--out", "compared")
+    options = ("--no-figures", "--report", "--rate", 20, "--out", "compared")
+    outcome = condyle_command("compare", *options)
     assert outcome.status == 0 and outcome.err == ""
     for text in ("lagrange direct", "Table 1", "101 samples", "Table 2"):
         assert text in outcome.out
     assert {path.suffix for path in Path("compared").iterdir()} >= {".csv"}
+    assert "Next: condyle view --solution compared/masticatory-compare.nc" in outcome.out
+    assert Path("compared/masticatory.html").is_file()
     assert condyle_command("report", "compared/masticatory-compare.nc").status == 0
     page = Path("compared/masticatory-compare.html").read_text(encoding="utf-8")
     assert "Table 1. Computational time" in page and "Table 2. Mean norm" in page

@@ -1,4 +1,4 @@
-"""The command line: one thin file a command, errors on stderr with exit status 2."""
+"""The command line: thin commands; errors on stderr, with exit status 2."""
 
 from __future__ import annotations
 

@@ -4,4 +4,4 @@
 from . import new, check, reference, motion  # noqa: F401
 from . import run, states, map, simulate, compare, sweep, export  # noqa: F401
 from . import plot, report, view  # noqa: F401
-from . import bench, cache, schema  # noqa: F401
+from . import upkeep  # noqa: F401

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -24,14 +24,6 @@ from .state_rows import Columns, StateColumns, StatesReport
 from .summary import peak
 from .variables import VARIABLES, WRENCH, labels_of, variable_columns
 from .warnings import Watch
-
-
-class Activation(NamedTuple):
-    """The largest effort over its limit: value, chain and row (from 1)."""
-
-    value: float
-    chain: str
-    row: int
 
 
 def state_columns(model: Model) -> StateColumns:
@@ -71,7 +63,7 @@ def solve_states(
     if mat is not None and Path(mat) == Path(out):
         raise InputError(f"--out {out}: --mat writes that file; give the table another name")
     watch = Watch(model.mechanism, rows=True)
-    greatest: Activation | None = None
+    greatest: dict[str, Any] | None = None  # effort over its limit
     kept: list[Columns] = []
 
     def solved(table: Table, first_row: int) -> Columns:
@@ -102,20 +94,24 @@ def solve_states(
             "route": model.route,
             "distribution": model.distribution.name,
             "rows": rows,
-            "greatest_activation": None if greatest is None else greatest._asdict(),
+            "greatest_activation": greatest,
             "warnings": warnings,
             "files": [Path(out), *([] if mat is None else [Path(mat)])],
         }
     )
 
 
-def _greater(before: Activation | None, derived: Derived, first_row: int) -> Activation | None:
-    """The greatest activation so far."""
+def _greater(
+    before: dict[str, Any] | None, derived: Derived, first_row: int
+) -> dict[str, Any] | None:
+    """The greatest activation so far: value, chain and row, from 1."""
     if (found := peak(np.where(derived.ok[:, None], derived.activation, np.nan))) is None:
         return before
     row, chain, value = found
-    here = Activation(abs(value), derived.mechanism.chain_names[chain], first_row + row + 1)
-    return here if before is None or here.value > before.value else before
+    if before is not None and before["value"] >= abs(value):
+        return before
+    name = derived.mechanism.chain_names[chain]
+    return {"value": abs(value), "chain": name, "row": first_row + row + 1}
 
 
 def solve_table(

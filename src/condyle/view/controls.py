@@ -61,7 +61,7 @@ class Panel:
         self._live: LivePanel | None = None
         if view.live is not None:
             with tabs.add_tab("Live"):
-                self._live = LivePanel(self._gui, self, view.live, view.stage)
+                self._live = LivePanel(self._gui, self, view, view.live)
         with tabs.add_tab("Move"):
             self._add_pose()
             self._add_load()
@@ -256,14 +256,6 @@ class Panel:
         self._view.playback = None
         self._view.session.take_pose(self._view.snapshot.pose)
 
-    def request(self, kind: str, action: Callable[[], None]) -> None:
-        """Let the view's worker do something soon."""
-        self._view.request(kind, action)
-
-    def watch_live(self) -> None:
-        """Show the simulation again, if a hand or a solution had taken over."""
-        self._view.playback = self._view.live
-
     def _player(self) -> Playback:
         """The playback, on the page again if a hand had taken over."""
         assert self._playback is not None  # its controls are disabled before
@@ -320,8 +312,8 @@ MILLI = {"m": ("mm", 1e3)}
 class LivePanel:
     """A tab's worth of controls."""
 
-    def __init__(self, gui: viser.GuiApi, panel: Panel, player: LivePlayer, stage: Stage) -> None:
-        self._gui, self._panel, self.player, self._stage = gui, panel, player, stage
+    def __init__(self, gui: viser.GuiApi, panel: Panel, view: Page, player: LivePlayer) -> None:
+        self._gui, self._panel, self._view, self.player = gui, panel, view, player
         self._held = self._shown = False
         self._play = panel.add_button("Pause", self.toggle)
         panel.add_button("Restart", self.restart)
@@ -341,11 +333,11 @@ class LivePanel:
             first, most = player.stiffness, STRONGEST * player.stiffness
             spring = self._gui.add_slider("spring [N/m]", 0.0, most, most / STEPS, first)
             self._panel.on_change("pull by", spring, partial(setattr, player, "stiffness"))
-        self._grip = self._stage.add_grip()
+        self._grip = self._view.stage.add_grip()
 
         async def dragged(event: Any) -> None:
-            position = np.asarray(self._grip.position) / self._stage.scale
-            self._panel.request("pull", partial(self.pull, position, event.phase != "end"))
+            position = np.asarray(self._grip.position) / self._view.stage.scale
+            self._view.request("pull", partial(self.pull, position, event.phase != "end"))
 
         self._grip.on_update(dragged)
 
@@ -378,12 +370,12 @@ class LivePanel:
     def toggle(self) -> None:
         """Run or pause."""
         running = self.player.playing and self._shown
-        self._panel.watch_live()
+        self._view.playback = self._view.live  # again, if a hand or a solution had taken over
         (self.player.pause if running else self.player.play)()
 
     def restart(self) -> None:
         """From the start, running."""
-        self._panel.watch_live()
+        self._view.playback = self._view.live
         self.player.restart()
         self.player.playing = True
 
@@ -414,5 +406,5 @@ class LivePanel:
         if not shown:
             return
         if not self._held:
-            self._grip.position = self._stage.scale * self.player.grip()
+            self._grip.position = self._view.stage.scale * self.player.grip()
         self._text.content = live_html(self.player)

@@ -9,9 +9,8 @@ from pathlib import Path
 from ...analysis.comparison import Comparison
 from ...analysis.weight_curve import Tradeoff
 from ...atomic import write_text
-from .comparison_tables import differences, table_1, table_2
+from .comparison_tables import differences, table_1, table_2, tradeoff_table
 from .report_table import Table, kept_tables, with_tables
-from .tradeoff_table import tradeoff_table
 
 __all__ = [
     "Table",

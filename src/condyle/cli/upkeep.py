@@ -1,4 +1,4 @@
-"""condyle bench: speed of this machine, next to other engines."""
+"""condyle bench, cache, schema: what keeps an installation and its files in order."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ from pathlib import Path
 from types import ModuleType
 from typing import Annotated
 
+import typer
+
 from ..atomic import make_folder, replacing
 from ..errors import UnsupportedError
 from .answer import Answer, files_line
 from .command import UPKEEP, command
+from .completion import one_of
 from .options import option
 
 
@@ -68,3 +71,47 @@ def _benchmarks() -> ModuleType:
         return importlib.import_module("benchmarks")
     finally:
         sys.path.pop(0)
+
+
+@command(UPKEEP, example="condyle cache --clear")
+def cache(
+    clear: bool = False,
+) -> Answer:
+    """Show or clear the compiled kernels on disk.
+
+    A kernel is compiled when it is first needed, in a second or two, and then reused.
+
+    Options:
+        clear: Remove all kernels.
+    """
+    from ..backends import cache as kernels
+
+    had = kernels.clear() if clear else kernels.contents()
+    count = "1 kernel" if had.kernels == 1 else f"{had.kernels} kernels"
+    what = f"{count}, {had.size / 1e6:.1f} MB"
+    return Answer(
+        f"Removed {what} from {had.folder}" if clear else f"{had.folder}: {what}",
+        {"folder": had.folder, "kernels": had.kernels, "bytes": had.size, "cleared": clear},
+        "condyle cache --clear" if had.size and not clear else "condyle run",
+        "result",
+    )
+
+
+@command(UPKEEP, example="condyle schema > condyle.schema.json")
+def schema(
+    of: Annotated[
+        str,
+        typer.Argument(
+            help="Kind of file: mechanism, scenario or study.",
+            autocompletion=one_of("mechanism", "scenario", "study"),
+        ),
+    ] = "mechanism",
+) -> Answer:
+    """JSON schema of mechanism, scenario or study files, for editors.
+
+    An editor that has it completes keys and marks mistakes while you type.
+    """
+    import condyle
+
+    data = condyle.schema(of)
+    return Answer(json.dumps(data, indent=2), data, "condyle check masticatory", "document")
