@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ..atomic import file_stem, make_folder
+from ..atomic import file_stem
 from ..errors import InputError
 from . import options
 from .answer import Answer, command_line, files_line
 from .command import COMPUTE, command
-from .inputs import require_drawing, warn
+from .inputs import output_folder, require_drawing, warn
 
 
 @command(COMPUTE, example="condyle compare jaw.toml --motion path.csv --load bite.csv")
@@ -58,7 +58,7 @@ def compare(
         found = condyle.compare(machine, path, acting, load_point, distribution=chosen)
     shown, solution = tables(found), found.solution
     warn([*path.warnings, *acting.warnings, *solution.condyle.warnings])
-    files = save_tables(shown, make_folder(out))
+    files = save_tables(shown, output_folder(out))
     solution, stem = with_tables(solution, shown), file_stem(machine.name)
     kept = out / f"{stem}-{'tradeoff' if tradeoff else 'compare'}.nc"
     solution.condyle.save(kept)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..atomic import file_stem, make_folder
-from ..errors import WarningError
+from ..errors import InputError, WarningError
 from ..extras import require
 from .answer import command_line
 from .options import DistributionOptions, ModelOptions, OutputOptions
@@ -45,7 +45,7 @@ def written(
 
     Args: inputs: files of the run, to be named in the report.
     """
-    folder, stem = make_folder(output.out), file_stem(solution.attrs["mechanism_name"])
+    folder, stem = output_folder(output.out), file_stem(solution.attrs["mechanism_name"])
     files = [folder / f"{stem}{ending}" for ending in (".nc", ".csv", *[".mat"] * output.mat)]
     solution.condyle.save(*files)
     if output.figures:
@@ -65,6 +65,14 @@ def look_at(files: list[Path], output: OutputOptions) -> str:
     if output.report:
         return command_line("view", solution=files[0])
     return command_line("report", files[0])
+
+
+def output_folder(path: Path) -> Path:
+    """`make_folder`, whose error names the option."""
+    try:
+        return make_folder(path)
+    except InputError as error:
+        raise InputError(f"--out {error}") from None
 
 
 def require_drawing(figures: bool, report: bool) -> None:

@@ -8,11 +8,11 @@ from typing import Annotated
 
 import typer
 
-from ..atomic import make_folder
 from ..errors import InputError, did_you_mean
 from ..extras import require
 from .answer import Answer, command_line
 from .command import LOOK, command
+from .inputs import output_folder
 
 RESULT = Path("results/masticatory.nc")  # of `condyle run` as it stands
 
@@ -53,6 +53,6 @@ def plot(
     data = condyle.open_solution(solution)
     wishes = {"style": style, "title": title, "letters": letters}
     plots = {name: partial(PLOTS[name], **wishes) for name in figure or PLOTS}
-    files = save_each(plots, data, make_folder(out))
+    files = save_each(plots, data, output_folder(out))
     text = "\n".join(f"Wrote {path}" for path in files)
     return Answer(text, {"files": files}, command_line("report", solution))

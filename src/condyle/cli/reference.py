@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..atomic import make_folder
 from .answer import Answer, command_line
 from .command import BEGIN, command
+from .inputs import output_folder
 
 
 @command(BEGIN, example="condyle reference --out case")
@@ -22,7 +22,7 @@ def reference(
     """
     import condyle
 
-    motion, load = condyle.write_reference(make_folder(out))
+    motion, load = condyle.write_reference(output_folder(out))
     return Answer(
         f"Wrote {motion}\nWrote {load}",
         {"files": [motion, load]},

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..atomic import make_folder
 from ..errors import InputError
 from .answer import Answer, command_line, files_line
 from .command import COMPUTE, command
-from .inputs import require_drawing
+from .inputs import output_folder, require_drawing
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -70,7 +69,7 @@ def _shown(table: xr.Dataset, folder: Path, figures: bool) -> Answer:
     tables = sweep_tables(table)
     files = []
     for one in tables:
-        files.append(make_folder(folder) / f"{one.name}.csv")
+        files.append(output_folder(folder) / f"{one.name}.csv")
         one.write_csv(files[-1])
     if figures:
         from ..report.figures import save

@@ -12,11 +12,12 @@ from typing import Annotated
 
 import typer
 
-from ..atomic import make_folder, replacing
+from ..atomic import replacing
 from ..errors import UnsupportedError
 from .answer import Answer, files_line
 from .command import UPKEEP, command
 from .completion import one_of
+from .inputs import output_folder
 from .options import option
 
 
@@ -42,7 +43,7 @@ def bench(
 
     with ExitStack() as stack:  # a file that cannot be written is found before the minutes pass
         if out is not None:
-            make_folder(out.parent)
+            output_folder(out.parent)
             temporary = stack.enter_context(replacing(out))
         if realtime:
             result = benchmarks.real_time(load_mechanism("masticatory"), seconds)
