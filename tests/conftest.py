@@ -11,7 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+import xarray as xr
 
 import condyle
 from condyle.mechanism import bundled_text
@@ -70,6 +72,16 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
 def reference() -> condyle.Mechanism:
     """The bundled mechanism of the paper."""
     return condyle.load_mechanism("masticatory")
+
+
+@pytest.fixture(scope="session")
+def torn(reference: condyle.Mechanism) -> xr.Dataset:
+    """Away and back under a load: samples 15 to 88 of 201 are out of reach."""
+    t = np.linspace(0, 1, 201)
+    names = ("X", "Y", "alpha", "beta")
+    motion = condyle.Motion.from_arrays(t, {n: 0.03 * np.sin(6 * t) * (n == "X") for n in names})
+    push = condyle.Load.constant((0, 0, -30), point="right_molar")
+    return condyle.derive(reference, backend="interpreted").solve(motion, push, flag=True)
 
 
 @pytest.fixture

@@ -311,15 +311,6 @@ def test_paper_gets_light_colours_and_a_still(tab: Tab) -> None:
     assert len(tab.page.pdf(format="A4")) > 50_000
 
 
-def torn_run(reference: condyle.Mechanism) -> xr.Dataset:
-    """Away and back under a load: samples 15 to 88 of 200 are out of reach."""
-    t = np.linspace(0, 1, 201)
-    names = ("X", "Y", "alpha", "beta")
-    motion = Motion.from_arrays(t, {n: 0.03 * np.sin(6 * t) * (n == "X") for n in names})
-    model = condyle.derive(reference, backend="interpreted")
-    return model.solve(motion, condyle.Load.constant((0, 0, -30), point="right_molar"), flag=True)
-
-
 def grey_share(tab: Tab) -> float:
     """Part of the solids' faces that are drawn grey."""
     return float(
@@ -345,9 +336,8 @@ def arrow_size(tab: Tab) -> float:
 
 
 def test_samples_without_a_result_say_so_and_show_no_forces(
-    open_tab: Callable[..., Tab], reference: condyle.Mechanism, tmp_path: Path
+    open_tab: Callable[..., Tab], torn: xr.Dataset, tmp_path: Path
 ) -> None:
-    torn = torn_run(reference)
     failed = np.flatnonzero(torn["status"].values)
     first = int(failed[0])
     tab = ready(open_tab(write_report(torn, tmp_path / "torn.html").as_uri()))

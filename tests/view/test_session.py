@@ -201,16 +201,6 @@ def test_play_begins_where_it_stands_however_long_it_stood(chewing: xr.Dataset) 
         view.close()
 
 
-@pytest.fixture(scope="module")
-def torn(reference: condyle.Mechanism) -> xr.Dataset:
-    """A solution with samples out of reach, under a load."""
-    t = np.linspace(0, 1, 201)
-    names = ("X", "Y", "alpha", "beta")
-    motion = Motion.from_arrays(t, {n: 0.03 * np.sin(6 * t) * (n == "X") for n in names})
-    push = Load.constant((0, 0, -30), point="right_molar")
-    return condyle.derive(reference, backend="interpreted").solve(motion, push, flag=True)
-
-
 def test_playback_of_failed_samples_keeps_the_pose_and_shows_no_force(torn: xr.Dataset) -> None:
     """The pose before in time, wherever one came from; why, since when; and neither load."""
     first = int(np.flatnonzero(torn["status"].values)[0])

@@ -172,8 +172,10 @@ class Session:
         ]
         if met:
             self._joint = np.where(in_reach, joint, self._joint)
-        force = _or_nan(found.contact_force, len(self.mechanism.contacts), status == Status.ok)
-        effort = _or_nan(found.effort, len(in_reach), status == Status.ok)
+        force, effort = (
+            np.where(status == Status.ok, values[0], np.nan)
+            for values in (found.contact_force, found.effort)
+        )
         if met and self.internal.any():
             directions = self.directions()
             effort = effort + directions.effort @ self.internal
@@ -242,10 +244,6 @@ def _around_home(value: np.ndarray, reached: np.ndarray) -> tuple[float, float]:
         high += 1
     step = value[1] - value[0]
     return min(value[low], -step), max(value[high], step)
-
-
-def _or_nan(values: np.ndarray | None, count: int, good: bool) -> np.ndarray:
-    return values[0] if good and values is not None else np.full(count, np.nan)
 
 
 RANK = 1e-10  # of the largest singular value

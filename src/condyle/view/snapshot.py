@@ -1,4 +1,4 @@
-"""One moment of a mechanism: where it is, what its numbers are, and what is wrong with them."""
+"""Snapshot of a mechanism: its pose, its numbers, and what is wrong with them."""
 
 from __future__ import annotations
 
