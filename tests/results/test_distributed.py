@@ -7,6 +7,7 @@ import pickle
 import re
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -300,20 +301,20 @@ def test_nothing_is_said_of_power_at_rest() -> None:
 
 
 @pytest.mark.parametrize(
-    ("policy", "said"),
+    ("distribution", "said"),
     [
-        ({"distribution": "bounde"}, 'Did you mean "bounded"'),
-        ({"distribution": "bounded", "preload": -1.0}, "preload: expected a number of at least 0"),
-        ({"distribution": "bounded", "preload": float("nan")}, "preload: expected"),
-        ({"preload": 1.0}, "minimum_norm knows none: take one of bounded"),
-        ({"distribution": "bounded", "contact_weight": 1.0}, "does not weigh contact forces"),
-        ({"distribution": "weighted", "contact_weight": -1.0}, "contact weight: expected"),
-        ({"distribution": "cubic"}, "cubic is for efforts that only pull"),
+        (("bounde",), 'Did you mean "bounded"'),
+        (("bounded", -1.0), "preload: expected a number of at least 0"),
+        (("bounded", float("nan")), "preload: expected"),
+        ((None, 1.0), "minimum_norm knows none: take one of bounded"),
+        (("bounded", 0.0, 1.0), "does not weigh contact forces"),
+        (("weighted", 0.0, -1.0), "contact_weight: expected"),
+        (("cubic",), "cubic is for efforts that only pull"),
     ],
 )
-def test_policies_that_have_no_meaning(policy: dict[str, object], said: str) -> None:
+def test_distributions_that_have_no_meaning(distribution: tuple[Any, ...], said: str) -> None:
     with pytest.raises(InputError, match=said):
-        condyle.derive(machine(), backend="numpy", **policy)  # type: ignore[arg-type]
+        condyle.derive(machine(), distribution=Distribution(*distribution), backend="numpy")
 
 
 @pytest.mark.parametrize("distribution", ["weighted", "cubic", "minimax"])
