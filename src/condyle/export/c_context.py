@@ -55,9 +55,8 @@ WHY = {
 
 def require_precision(name: str) -> Precision:
     """Raises InputError for an unknown precision."""
-    for precision in PRECISIONS:
-        if precision == name:
-            return precision
+    if found := [one for one in PRECISIONS if one == name]:
+        return found[0]
     raise InputError(f'no precision "{name}".{did_you_mean(name, PRECISIONS)}')
 
 

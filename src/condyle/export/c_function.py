@@ -270,11 +270,7 @@ def _used(program: Program) -> list[str]:
 
 
 def _arguments(
-    c: Context,
-    entry: Entry,
-    program: Program,
-    given: Mapping[str, str],
-    results: Mapping[str, str],
+    c: Context, entry: Entry, program: Program, given: Mapping[str, str], results: Mapping[str, str]
 ) -> list[Argument]:
     ports = {port.name: port for port in program.ports}
     there = {result.name: result for result in program.interface.results}

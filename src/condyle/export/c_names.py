@@ -70,11 +70,8 @@ def packaged(name: str) -> str:
 
 def require_prefix(prefix: str) -> str:
     """Raises InputError for what no name in C can begin with."""
-    if (
-        not re.fullmatch("[A-Za-z][A-Za-z0-9_]{0,39}", str(prefix))
-        or prefix in RESERVED
-        or str(prefix).lower() in OTHERS
-    ):
+    fits = re.fullmatch("[A-Za-z][A-Za-z0-9_]{0,39}", str(prefix))
+    if not fits or prefix in RESERVED or prefix.lower() in OTHERS:
         raise InputError(
             f'prefix "{prefix!s:.60}": expected a name that C takes, of at most 40 letters, digits '
             f"and _, a letter first, other than {', '.join(OTHERS)}"

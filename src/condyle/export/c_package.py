@@ -168,10 +168,7 @@ def _call(e: Exported, f: Function, words: list[str]) -> str:
 
 def recorded(e: Exported, made: list[Vectors]) -> str:
     """Arguments and answers as arrays."""
-    lines = [
-        f"/* Samples for {e.prefix}.c, and the results of condyle. */",
-        "#include <math.h>",
-    ]
+    lines = [f"/* Samples for {e.prefix}.c, and the results of condyle. */", "#include <math.h>"]
     for v in made:
         f, count = v.function, len(v.status)
         lines += ["", f"#define {f.name.upper()}_SAMPLES {count}"]

@@ -125,10 +125,7 @@ CATALOGUE: dict[str, Entry] = {
         quick=True,
     ),
     "motion": Entry(
-        "Pose and its rates from the independent coordinates.",
-        STATE,
-        WHOLE,
-        doubt="UNREACHABLE",
+        "Pose and its rates from the independent coordinates.", STATE, WHOLE, doubt="UNREACHABLE"
     ),
     "closure": Entry(
         "Pose and its rates from other coordinates or a landmark's path.",

@@ -32,21 +32,16 @@ VERSIONS = (2, 3)
 DEFAULT = ("plant", "inverse", "controller")
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")
 LONG_AGO = (1980, 1, 1, 0, 0, 0)  # so that the same model is the same file
-ENDINGS = {"linux": ".so", "darwin": ".dylib", "win32": ".dll"}
-# Platform -> folder in FMI 2.0 and 3.0.
-FOLDERS: dict[str, dict[str, tuple[str | None, str]]] = {
-    "linux": {"x86_64": ("linux64", "x86_64-linux"), "aarch64": (None, "aarch64-linux")},
-    "darwin": {"x86_64": ("darwin64", "x86_64-darwin"), "arm64": (None, "aarch64-darwin")},
-    "win32": {"amd64": ("win64", "x86_64-windows")},
+# Platform -> folder of its binaries in FMI 2.0 and 3.0, and their ending.
+BINARIES: dict[str, tuple[str | None, str, str]] = {
+    "linux x86_64": ("linux64", "x86_64-linux", ".so"),
+    "linux aarch64": (None, "aarch64-linux", ".so"),
+    "darwin x86_64": ("darwin64", "x86_64-darwin", ".dylib"),
+    "darwin arm64": (None, "aarch64-darwin", ".dylib"),
+    "win32 amd64": ("win64", "x86_64-windows", ".dll"),
 }
 # Powers of kg, m, s, rad in units of ours.
-BASE = {
-    "m": {"m": 1},
-    "rad": {"rad": 1},
-    "kg": {"kg": 1},
-    "N": {"kg": 1, "m": 1, "s": -2},
-    "s": {"s": 1},
-}
+BASE = {name: {name: 1} for name in ("m", "rad", "kg", "s")} | {"N": {"kg": 1, "m": 1, "s": -2}}
 STEP = {"canHandleVariableCommunicationStepSize": "true"}
 
 
@@ -93,16 +88,20 @@ def _write(fmu: Fmu, version: int, path: Path) -> bool:
     if version == 3:
         content["sources/buildDescription.xml"] = build_description(fmu).encode()
     content |= {f"sources/{name}": text.encode() for name, text in sources.items()}
-    place, library = binary_place(version), _built(sources)
-    if place is not None and library is not None:
-        content[f"binaries/{place}/{fmu.name}{ENDINGS[sys.platform]}"] = library
+    *folders, ending = BINARIES.get(
+        f"{sys.platform} {platform.machine().lower()}", (None, None, "")
+    )
+    place, library = folders[version - 2], _built(sources)
+    binary = place is not None and library is not None
+    if binary:
+        content[f"binaries/{place}/{fmu.name}{ending}"] = library or b""
     with replacing(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
         for name, data in content.items():
             entry = zipfile.ZipInfo(name, LONG_AGO)
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
             archive.writestr(entry, data)
-    return place is not None and library is not None
+    return binary
 
 
 def fmu_sources(fmu: Fmu, version: int) -> dict[str, str]:
@@ -114,16 +113,9 @@ def fmu_sources(fmu: Fmu, version: int) -> dict[str, str]:
     text += f'{fmu.head}\n#define MODEL_TOKEN "{fmu.token}"\n#define FMI {version}\n\n'
     room = files("condyle")
     step, rest = room / "backends" / "c" / "runge_kutta.h", room / "export" / "fmi.c"
-    text += "\n".join(
-        part.read_text(encoding="utf-8") for part in [step] * bool(fmu.order) + [rest]
-    )
+    parts = [step, rest] if fmu.order else [rest]
+    text += "\n".join(part.read_text(encoding="utf-8") for part in parts)
     return {"fmu.c": text, **fmu.files}
-
-
-def binary_place(version: int) -> str | None:
-    """The folder of this machine's binaries, None where FMI has no name for it."""
-    known = FOLDERS.get(sys.platform, {}).get(platform.machine().lower())
-    return None if known is None else known[version - 2]
 
 
 def _built(sources: dict[str, str]) -> bytes | None:

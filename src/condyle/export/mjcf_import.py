@@ -287,6 +287,10 @@ def contact_of(graph: Graph, steps: tuple[Step, ...], name: str) -> dict[str, An
         surface = {"kind": "sphere", "centre": graph.point(steps[0].point), "radius": radius}
     else:
         return None
+    return _contact(graph, name, at, surface)
+
+
+def _contact(graph: Graph, name: str, at: np.ndarray, surface: dict[str, Any]) -> dict[str, Any]:
     return {"name": name, "point": graph.point(at), "surface": surface}
 
 
@@ -335,7 +339,7 @@ def real_contacts(graph: Graph, platform: int) -> list[dict[str, Any]]:
         if abs(up[2]) < 1e-6:
             graph.note(f"contact {name}: upright planes have no equivalent; left out")
             continue
-        table = {"name": name, "point": graph.point(centre), "surface": _plane(graph, up, centre)}
+        table = _contact(graph, name, centre, _plane(graph, up, centre))
         table |= {"side": "above" if up[2] > 0 else "below", "one_sided": True}
         if m.pair_dim[i] > 1 and m.pair_friction[i, 0] > 0:
             table["friction"] = {"coefficient": float(m.pair_friction[i, 0])}
@@ -353,11 +357,7 @@ def _pair(graph: Graph, platform: int, steps: tuple[Step, ...]) -> list[dict[str
     if np.linalg.norm(np.cross(n, yaw.axis)) > PARALLEL_AXES:
         return []
     found = [
-        {
-            "name": name.removesuffix("_contact"),
-            "point": graph.point(at),
-            "surface": _plane(graph, n, at),
-        }
+        _contact(graph, name.removesuffix("_contact"), at, _plane(graph, n, at))
         for name, at in graph.sites(platform)
         if name.endswith("_contact")
         and np.linalg.norm(np.cross(at - roll.point, roll.axis)) < graph.near

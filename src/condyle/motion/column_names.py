@@ -35,9 +35,7 @@ class Header:
 
 
 def read_header(
-    where: str,
-    names: Sequence[str],
-    known: Collection[str] | Mapping[str, Dimension] | None = None,
+    where: str, names: Sequence[str], known: Collection[str] | Mapping[str, Dimension] | None = None
 ) -> Header:
     """What the names at the head of a table mean. A column without a name ("") has no meaning.
 

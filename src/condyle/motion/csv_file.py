@@ -19,7 +19,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from io import BufferedReader, FileIO, TextIOWrapper
-from typing import Protocol
+from typing import BinaryIO
 
 import numpy as np
 
@@ -38,6 +38,22 @@ _COMMENT = re.compile(r"[ \t\"]*#(?!N/A|REF!|DIV/0!|VALUE!|NAME\?|NUM!|NULL!)")
 _HAS_COMMENT = re.compile(rb"^[ \t\"]*#", re.MULTILINE)
 _GROUPED = re.compile(r"[+-]?\d{1,3}([., '\u2019\u00a0\u202f]\d{3})+([.,]\d+)?")
 _NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)|n/?a|#\S+", re.IGNORECASE)
+
+
+class _Recoded:
+    """UTF-16, or old line ends, as UTF-8 with new ones."""
+
+    def __init__(self, text: TextIOWrapper) -> None:
+        self._text = text
+
+    def read(self, size: int) -> bytes:
+        return self._text.read(size).encode()
+
+    def readline(self, size: int) -> bytes:
+        return self._text.readline(size).encode()
+
+
+Source = BinaryIO | _Recoded  # UTF-8 with line ends that a reader of CSV knows
 
 
 def iter_csv(
@@ -219,13 +235,6 @@ class _Parser:
         raise InputError(f'{where}: got "{short(cell)}", expected a number.{hint}')
 
 
-class Source(Protocol):
-    """UTF-8 with any line ends that a reader of CSV knows."""
-
-    def read(self, size: int, /) -> bytes: ...
-    def readline(self, size: int, /) -> bytes: ...
-
-
 @dataclass(frozen=True)
 class Head:
     """What stands above the rows.
@@ -336,16 +345,3 @@ def opened(path: str | os.PathLike[str]) -> Iterator[Source]:
         raise InputError(f"{shown}: is not UTF-8 text ({error}); save it as CSV UTF-8") from error
     except OSError as error:
         raise InputError(f"{shown}: cannot be read ({error.strerror or error})") from error
-
-
-class _Recoded:
-    """UTF-16, or old line ends, as UTF-8 with new ones."""
-
-    def __init__(self, text: TextIOWrapper) -> None:
-        self._text = text
-
-    def read(self, size: int) -> bytes:
-        return self._text.read(size).encode()
-
-    def readline(self, size: int) -> bytes:
-        return self._text.readline(size).encode()

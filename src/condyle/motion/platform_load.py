@@ -69,12 +69,7 @@ class Load:
 
     @classmethod
     def from_arrays(
-        cls,
-        t: Any,
-        force: Any,
-        moment: Any = None,
-        point: str | None = None,
-        source: str = "load",
+        cls, t: Any, force: Any, moment: Any = None, point: str | None = None, source: str = "load"
     ) -> Load:
         """Load through samples.
 

@@ -29,14 +29,10 @@ def resolve_load_point(name: str | None, points: Iterable[str]) -> str:
 
 def _resolve(name: str | None, points: Iterable[str], default: str, what: str, option: str) -> str:
     points = list(points)
-    if name is not None:
-        if name not in points:
-            raise InputError(f'the mechanism has no {what} "{name}".{did_you_mean(name, points)}')
-        return name
-    if default in points:
-        return default
-    if len(points) == 1:
-        return points[0]
+    if name is not None and name not in points:
+        raise InputError(f'the mechanism has no {what} "{name}".{did_you_mean(name, points)}')
+    if name is not None or default in points or len(points) == 1:
+        return name or (default if default in points else points[0])
     there = f"choose one of {listed(points)}" if points else "give it some in platform.points"
     has = f"{len(points)} points" if points else "no points"
     raise InputError(f"no {what} is named, and the platform has {has}; {there} with {option}")

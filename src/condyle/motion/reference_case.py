@@ -77,11 +77,7 @@ def _columns(file: Path) -> np.ndarray:
 
 
 def trial_motion(
-    model: Any,
-    *,
-    cutoff: float | str | None = None,
-    rate: float | None = None,
-    trim: float = 0.0,
+    model: Any, *, cutoff: float | str | None = None, rate: float | None = None, trim: float = 0.0
 ) -> Motion:
     """Five seconds in which the independent coordinates oscillate about home, each at its own rate.
 

@@ -5,10 +5,4 @@ from .map_files import open_map
 from .map_quantities import QUANTITIES
 from .map_size import WorkspaceSize, workspace_size
 
-__all__ = [
-    "QUANTITIES",
-    "WorkspaceSize",
-    "open_map",
-    "workspace_map",
-    "workspace_size",
-]
+__all__ = ["QUANTITIES", "WorkspaceSize", "open_map", "workspace_map", "workspace_size"]

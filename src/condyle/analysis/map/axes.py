@@ -13,11 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import InputError, did_you_mean, texts_of
-from ...mechanism.home import (
-    characteristic_length,
-    dependent_coordinates,
-    independent_coordinates,
-)
+from ...mechanism.home import characteristic_length, dependent_coordinates, independent_coordinates
 from ...mechanism.mechanism import COORDINATES, Mechanism
 from ...motion.column_units import dimension, unit_factor
 
