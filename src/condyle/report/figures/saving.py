@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,25 +23,18 @@ FORMATS = ("png", "svg")
 def save(figure: Figure, folder: str | os.PathLike[str], name: str) -> list[Path]:
     """Write one figure as PNG and SVG, each whole or not at all; returns the paths."""
     paths = [Path(folder) / f"{name}.{kind}" for kind in FORMATS]
-    with mpl.rc_context(STYLE), laid_out(figure):
-        for path, kind in zip(paths, FORMATS, strict=True):
-            # Without a date the same figure gives the same file.
-            metadata = {"Date": None} if kind == "svg" else None
-            with replacing(path) as temporary:
-                figure.savefig(temporary, format=kind, metadata=metadata)
-    return paths
-
-
-@contextmanager
-def laid_out(figure: Figure) -> Iterator[None]:
-    """Lay the figure out once, not once a file."""
     engine = figure.get_layout_engine()
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")
     try:
-        yield
+        with mpl.rc_context(STYLE):
+            for path, kind in zip(paths, FORMATS, strict=True):
+                # Without a date the same figure gives the same file.
+                metadata = {"Date": None} if kind == "svg" else None
+                with replacing(path) as temporary:
+                    figure.savefig(temporary, format=kind, metadata=metadata)
+                figure.set_layout_engine("none")  # the first file laid it out
     finally:
         figure.set_layout_engine(engine)
+    return paths
 
 
 def save_each(
