@@ -7,6 +7,7 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import replace
 from importlib.resources import files
+from typing import Any
 
 from ..dynamics import formulation as formulation_named
 from ..errors import InputError
@@ -67,13 +68,8 @@ def export(
             MechanismError: if the contacts do not hold the platform at home.
     """
     # What a model checks of a mechanism is checked here as well.
-    model = Model(
-        mechanism,
-        formulation=formulation,
-        route=route,
-        distribution=least_norm(mechanism),
-        backend="numpy",
-    )
+    how: dict[str, Any] = {"formulation": formulation, "route": route, "backend": "numpy"}
+    model = Model(mechanism, **how, distribution=least_norm(mechanism))
     asked = usual(mechanism) if questions is None else questions
     entries = _entries(mechanism, asked, coordinates, landmark)
     structure = structure_of(mechanism, formulation_named(formulation).name, route)

@@ -89,8 +89,11 @@ def grid_of(mechanism: Mechanism, over: Over | None, hold: Values = "") -> Grid:
             hold: text such as "Y=0 mm,alpha=0 deg", or {"Y": value} in SI; 0 for the others.
     Raises: InputError: for what is no independent coordinate, range, count or unit.
     """
+    names = independent_coordinates(mechanism)
     if over is None:
-        axes = [_default_axis(mechanism, name) for name in independent_coordinates(mechanism)[:2]]
+        half = characteristic_length(mechanism) / 2
+        ends = {name: half if name in COORDINATES[:3] else 0.5 for name in names[:2]}
+        axes = [Axis(name, -end, end, 100) for name, end in ends.items()]
     elif isinstance(over, Mapping):
         axes = []
         for name, of in over.items():
@@ -99,7 +102,6 @@ def grid_of(mechanism: Mechanism, over: Over | None, hold: Values = "") -> Grid:
             axes.append(_axis(name, *of))
     else:
         axes = [axis_of(text) for text in texts_of("over", over, separated=False)]
-    names = independent_coordinates(mechanism)
     if not 1 <= len(axes) <= MOST_AXES:
         raise InputError(
             f"over: expected one to three coordinates, got {len(axes)}; available: "
@@ -118,11 +120,6 @@ def grid_of(mechanism: Mechanism, over: Over | None, hold: Values = "") -> Grid:
     if grid.size > MOST_POINTS:
         raise InputError(f"over: {grid.size:.3g} points; the maximum is {MOST_POINTS:.0e}")
     return grid
-
-
-def _default_axis(mechanism: Mechanism, name: str) -> Axis:
-    half = characteristic_length(mechanism) / 2 if name in COORDINATES[:3] else 0.5
-    return Axis(name, -half, half, 100)
 
 
 def require_independent(mechanism: Mechanism, name: str) -> None:

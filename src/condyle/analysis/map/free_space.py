@@ -134,7 +134,8 @@ def greatest_ball(free: FreeSpace, grid: Grid, points: int = POINTS) -> Ball:
             radius, stops = float(np.linalg.norm(nearest)), free.reasons[row]
             if radius == 0.0:
                 return Ball(0.0, stops, points, 0.0)
-    return Ball(radius, stops, points, radius * (_ball_volume(d) / points) ** (1 / d))
+    volume = pi ** (d / 2) / gamma(d / 2 + 1)  # of the unit ball
+    return Ball(radius, stops, points, radius * (volume / points) ** (1 / d))
 
 
 def ball_around_home(model: Model) -> Ball:
@@ -199,10 +200,6 @@ def _on_the_border(margins: Margins, nearest: np.ndarray, row: int) -> np.ndarra
         if size < np.linalg.norm(nearest) and not free_of(margins(out[None]))[0]:
             nearest = x
     return nearest
-
-
-def _ball_volume(d: int) -> float:
-    return pi ** (d / 2) / gamma(d / 2 + 1)
 
 
 def _room_in_range(grid: Grid, scale: np.ndarray) -> float:

@@ -13,7 +13,7 @@ from ...mechanism.mechanism import COORDINATES
 from ...model.model import Model
 from ...results.contacts import AXES
 from ...results.derived import Derived
-from ...results.variables import BY_NAME, VARIABLES, WRENCH, Variable
+from ...results.variables import BY_NAME, VARIABLES, WRENCH
 from .study import Measure
 
 Reduction = Callable[..., np.ndarray]
@@ -56,7 +56,15 @@ def reading(name: str, measure: Measure, model: Model) -> Reading:
 
     Raises: InputError: for a variable, dimension or entry that there is not.
     """
-    variable = _variable(name, measure, model)
+    there = [v for v in VARIABLES if v.when(Derived(model.mechanism, None, limited=model.limited))]
+    if (variable := BY_NAME.get(measure.of)) is None:
+        known = did_you_mean(measure.of, [v.name for v in there])
+        raise InputError(f'measure {name}: no variable "{measure.of}".{known}')
+    if variable not in there:
+        raise InputError(
+            f"measure {name}: solutions of this mechanism have no {variable.name} "
+            f"({variable.meaning})"
+        )
     labels = labels_of(model)
     dims = variable.dims
     for dim, entry in measure.chosen.items():
@@ -89,22 +97,6 @@ def reading(name: str, measure: Measure, model: Model) -> Reading:
     axes = tuple(left.index(d) for d in over)
     units = variable.attributes(model.mechanism)["units"]
     return Reading(variable.name, measure.take, place, axes, names, units)
-
-
-def _variable(name: str, measure: Measure, model: Model) -> Variable:
-    variable = BY_NAME.get(measure.of)
-    there = [v for v in VARIABLES if v.when(Derived(model.mechanism, None, limited=model.limited))]
-    if variable is None:
-        raise InputError(
-            f'measure {name}: no variable "{measure.of}".'
-            f"{did_you_mean(measure.of, [v.name for v in there])}"
-        )
-    if variable not in there:
-        raise InputError(
-            f"measure {name}: solutions of this mechanism have no {variable.name} "
-            f"({variable.meaning})"
-        )
-    return variable
 
 
 def labels_of(model: Model) -> Mapping[str, tuple[str, ...]]:
