@@ -139,6 +139,14 @@ DOORS: dict[str, Door] = {
         calls=0,
         words=("mechanism", "duration", "rate"),
     ),
+    "check_gains": Door(
+        {
+            "model": lambda stage: stage.model,
+            "scenario": {"controller": {"kind": "joint_pd", "stiffness": 5.0, "damping": 0.01}},
+        },
+        calls=0,
+        words=("mechanism", "controller"),
+    ),
     "load_scenario": Door(
         {"source": lambda stage: stage.file("run.toml", "duration = 0.1")}, words=("path",)
     ),
@@ -186,7 +194,7 @@ DOORS: dict[str, Door] = {
 LATER = {
     *("Model.with_distribution", "Model.with_mechanism", "Model.unchecked", "Model.linearise"),
     *("Model.forward_kinematics", "Model.solve", "Model.kernel"),
-    *("Mechanism.checked", "open_solution", "check_gains", "workspace_map", "workspace_size"),
+    *("Mechanism.checked", "open_solution", "workspace_map", "workspace_size"),
     *("open_map", "sweep", "export_c", "export_fmu", "export_matlab", "export_mjcf"),
     *("forward_states", "solve_states", "pose_states", "run", "open_sweep", "serve_view"),
     *("write_report", "new_mechanism", "compare", "tradeoff"),

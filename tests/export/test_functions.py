@@ -156,8 +156,8 @@ class Homing(ControllerTable):
 
     @staticmethod
     def equations(c: Control) -> Any:
-        q2 = -c.gains.stiffness * c.now.q - c.gains.loss * c.now.q1
-        return c.inverse(c.now.q, c.now.q1, q2), c.memory + 1
+        q2 = -c.gains.stiffness * c.measured.q - c.gains.loss * c.measured.q1
+        return c.inverse(c.measured.q, c.measured.q1, q2), c.memory + 1
 
 
 def test_a_law_of_ones_own_is_exported(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -65,8 +65,8 @@ def twist(q: np.ndarray, q1: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 @cache
-def seen() -> Arrays:
-    """States and aims at random, and what encoders read of them."""
+def sampled() -> Arrays:
+    """States and references at random, and what encoders read of them."""
     rng = np.random.default_rng(3)
     found = {}
     for end in ("", "_d"):
@@ -87,7 +87,7 @@ def seen() -> Arrays:
 def asked(entries: dict[str, Any], memory: np.ndarray | None = None) -> Arrays:
     """Results of the tick of a controller's table."""
     law = CONTROLLERS[entries["kind"]](**entries).bind(machine())  # type: ignore[attr-defined]
-    ports = dict(seen()) | {"period": np.full((N, 1), PERIOD)}
+    ports = dict(sampled()) | {"period": np.full((N, 1), PERIOD)}
     for name, value in law.numbers.items():
         ports[name] = np.broadcast_to(value, (N, np.size(value)))
     ports |= {name: np.full((N, 6), s * WIDE) for name, s in (("low", -1), ("high", 1))}
@@ -110,14 +110,14 @@ def close(found: np.ndarray, expected: np.ndarray, bound: float = 1e-10) -> None
 
 
 def back(Kp: Any, Kv: Any) -> np.ndarray:
-    s = seen()
+    s = sampled()
     return s["q2_d"] + Kv * (s["q1_d"] - s["q1"]) + Kp * (s["q_d"] - s["q"])
 
 
 def test_computed_torque() -> None:
     Kp = [100.0, 200.0, 300.0, 400.0]
     found = asked({"kind": "computed_torque", "stiffness": Kp, "damping": 17.0})
-    s = seen()
+    s = sampled()
     close(found["asked"], inverse(s["q"], s["q1"], back(Kp, 17.0)))
     found = asked({"kind": "computed_torque", "stiffness": Kp})
     close(found["asked"], inverse(s["q"], s["q1"], back(Kp, 2 * np.sqrt(Kp))))
@@ -134,7 +134,7 @@ def test_joint_pd(gravity: bool) -> None:
         "damping": tuple(K / 50),
         "gravity": gravity,
     }
-    s = seen()
+    s = sampled()
     wanted = K * (s["joint_d"] - s["joint"]) + K / 50 * (s["joint_rate_d"] - s["joint_rate"])
     if gravity:
         wanted += inverse(s["q_d"], 0 * s["q"], 0 * s["q"])
@@ -142,7 +142,7 @@ def test_joint_pd(gravity: bool) -> None:
 
 
 def test_impedance() -> None:
-    s, k = seen(), np.array([2e3, 3e3, 4e3])
+    s, k = sampled(), np.array([2e3, 3e3, 4e3])
     found = asked({"kind": "impedance", "stiffness": tuple(k), "damping": 30.0, "posture": 90.0})
     (p, J), (p_d, J_d) = (place(s[name], point()) for name in ("q", "q_d"))
     force = k * (p_d - p)
@@ -153,16 +153,16 @@ def test_impedance() -> None:
     close(found["asked"], inverse(s["q"], s["q1"], s["q2_d"] + free - taken[..., 0], -force), 1e-8)
 
 
-def mode_next(mode: float, felt: float, ahead: float, closing: float) -> float:
-    if felt < 1.0:
+def mode_next(mode: float, measured: float, ahead: float, closing: float) -> float:
+    if measured < 1.0:
         return FREE
     if mode == BITING:
         return LEAVING if ahead < -2e-4 and closing < 0 else BITING
-    return BITING if mode == FREE and felt > 2.0 and closing > 0 else mode
+    return BITING if mode == FREE and measured > 2.0 and closing > 0 else mode
 
 
 def test_bite_force() -> None:
-    s, u = seen(), np.array([0.6, 0.0, 0.8])
+    s, u = sampled(), np.array([0.6, 0.0, 0.8])
     entries = {
         "kind": "bite_force",
         "stiffness": 900.0,
@@ -172,21 +172,21 @@ def test_bite_force() -> None:
     entries |= {"proportional": 0.4, "integral": 6.0, "bite_damping": 120.0}
     _, J = place(s["q"], point())
     J = np.einsum("i,nij->nj", u, J)
-    felt = -s["force"] @ u
+    measured = -s["force"] @ u
     ahead, closing = (np.einsum("nj,nj->n", J, x) for x in (s["q_d"] - s["q"], s["q1_d"]))
     met = set()
     for before in (FREE, BITING, LEAVING):
         memory = np.column_stack([np.full(N, before), np.full(N, 0.2)])
         found = asked(entries, memory)
-        mode = np.array([mode_next(before, *x) for x in zip(felt, ahead, closing, strict=True)])
-        error, biting = s["force_d"][:, 0] - felt, mode == BITING
+        mode = np.array([mode_next(before, *x) for x in zip(measured, ahead, closing, strict=True)])
+        error, biting = s["force_d"][:, 0] - measured, mode == BITING
         total = np.where(biting, 0.2 + error * PERIOD, 0.0)
         np.testing.assert_allclose(found["memory"], np.column_stack([mode, total]), rtol=1e-13)
         q2 = back(900.0, 60.0)
         by = np.linalg.solve(jaw().mass_matrix(s["q"]), J[..., None])[..., 0]
         along = np.einsum("nj,nj->n", J, q2 + 120.0 * s["q1"]) / np.einsum("nj,nj->n", J, by)
         q2 = q2 - np.where(biting, along, 0)[:, None] * by
-        push = np.where(biting, s["force_d"][:, 0] + 0.4 * error + 6.0 * 0.2, felt)
+        push = np.where(biting, s["force_d"][:, 0] + 0.4 * error + 6.0 * 0.2, measured)
         close(found["asked"], inverse(s["q"], s["q1"], q2, -push[:, None] * u), 1e-8)
         met |= {(before, m) for m in mode}
     assert {(FREE, BITING), (BITING, BITING), (BITING, LEAVING), (LEAVING, LEAVING)} <= met
@@ -196,7 +196,7 @@ def test_bite_force() -> None:
 def test_limits_cut_what_is_asked_for() -> None:
     law = CONTROLLERS["joint_pd"](kind="joint_pd", stiffness=3.0, damping=0.1, gravity=False)
     bound = law.bind(machine())  # type: ignore[attr-defined]
-    ports = dict(seen()) | {"period": np.full((N, 1), PERIOD)}
+    ports = dict(sampled()) | {"period": np.full((N, 1), PERIOD)}
     ports |= {n: np.broadcast_to(v, (N, 6)) for n, v in bound.numbers.items()}
     ports |= {"low": np.full((N, 6), -0.05), "high": np.full((N, 6), 0.02)}
     found = jaw().kernel("tick", bound.table, bound.choices).run(ports).values
@@ -210,7 +210,7 @@ def test_limits_cut_what_is_asked_for() -> None:
 @pytest.mark.parametrize("velocity", ["difference", "exact"])
 def test_an_observer_counts_and_finds_the_state(velocity: str) -> None:
     """Exact encoders give the state; coarse ones the least squares of their counts."""
-    s, rng = seen(), np.random.default_rng(8)
+    s, rng = sampled(), np.random.default_rng(8)
     true = pose_of(s["q"])
     before = s["joint"] - PERIOD * s["joint_rate"] + 1e-5 * rng.normal(size=(N, 6))
     ports = {
@@ -272,7 +272,7 @@ def test_loads_and_the_plant(mode: int) -> None:
         {"kind": "constant", "force": (0.3, -0.2, -1.0), "moment": (0.0, 1e-3, 0.0)},
     ]  # fmt: skip
     loads = [LOADS[one["kind"]](**one).bind(machine(), one["kind"]) for one in entries]
-    s = seen()
+    s = sampled()
     effort = 0.02 * np.random.default_rng(1).normal(size=(N, 6))
     ports = {"q": s["q"], "q1": s["q1"], "effort": effort, **LIMITS}
     for i, load in enumerate(loads):

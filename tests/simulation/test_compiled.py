@@ -66,8 +66,8 @@ CASES: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 
 
-def plan_of(told: dict[str, Any], model: condyle.Model) -> Plan:
-    return bind(model, scenario_from({**BASE, **told}))
+def plan_of(tables: dict[str, Any], model: condyle.Model) -> Plan:
+    return bind(model, scenario_from({**BASE, **tables}))
 
 
 def in_python(plan: Plan) -> Trace:
@@ -123,8 +123,8 @@ def test_open_loop_between_rows(model: condyle.Model, tmp_path: Any) -> None:
 def test_a_table_of_loads(model: condyle.Model, tmp_path: Any) -> None:
     (tmp_path / "load.csv").write_text("t,Fz,Mx\n0.01,0,0\n0.02,-2,0.001\n0.05,-1,0\n")
     load = {"kind": "csv", "file": "load.csv", "point": "incisor"}
-    told = {**BASE, "duration": 0.08, "controller": TORQUE, "load": [load]}
-    plan = bind(model, scenario_from(told, folder=tmp_path))
+    tables = {**BASE, "duration": 0.08, "controller": TORQUE, "load": [load]}
+    plan = bind(model, scenario_from(tables, folder=tmp_path))
     same(running.run(plan), in_python(plan))
 
 
@@ -153,11 +153,11 @@ def test_states_that_a_kernel_does_not_vouch_for_are_pythons(
 
 
 def test_what_it_is_not_for(model: condyle.Model) -> None:
-    for told in (
+    for tables in (
         {"method": "DOP853", "step": None},
         {"controller": {**TORQUE, "ideal": True, "rate": None}},
     ):
-        merged = {k: v for k, v in {**BASE, **told}.items() if v is not None}
+        merged = {k: v for k, v in {**BASE, **tables}.items() if v is not None}
         assert running.Run([bind(model, scenario_from(merged))]).steps is None
     loads = [lambda t, s, v: (0.0, 0.0, -1.0)]
     plan = bind(model, scenario_from(BASE), loads=loads)
@@ -169,7 +169,7 @@ def test_what_it_is_not_for(model: condyle.Model) -> None:
 def test_in_lockstep(model: condyle.Model) -> None:
     """Runs of a crowd are the runs alone, those with events among them; samples too."""
 
-    def told(i: int) -> dict[str, Any]:
+    def tables(i: int) -> dict[str, Any]:
         return {
             "start": {"beta": 0.05 + 5e-4 * i, "dbeta": -0.5},
             "controller": {**TORQUE, "stiffness": 300.0 + 5 * i, "delay": 1},
@@ -177,7 +177,7 @@ def test_in_lockstep(model: condyle.Model) -> None:
             "load": [{**FOOD, "thickness": 4e-3 + 1e-4 * i}],
         }
 
-    plans = [plan_of(told(i), model) for i in range(11)]
+    plans = [plan_of(tables(i), model) for i in range(11)]
     plans += [plan_of({"start": {"dbeta": 0.02 * i}, "duration": 0.01}, model) for i in range(3)]
     alone = [running.run(plan) for plan in plans]
     for found, expected in zip(running.run_all(plans), alone, strict=True):
@@ -188,15 +188,15 @@ def test_in_lockstep(model: condyle.Model) -> None:
 
 def test_side_by_side(model: condyle.Model) -> None:
     """Many runs are the runs alone, whatever the threads."""
-    told = [{**BASE, "duration": 0.02, "start": {"dbeta": 0.02 * i}} for i in range(5)]
-    alone = [condyle.simulate(model, one) for one in told]
-    many = [condyle.simulate(model, told, threads=threads) for threads in (1, 3)]
+    tables = [{**BASE, "duration": 0.02, "start": {"dbeta": 0.02 * i}} for i in range(5)]
+    alone = [condyle.simulate(model, one) for one in tables]
+    many = [condyle.simulate(model, tables, threads=threads) for threads in (1, 3)]
     for one, other, expected in zip(*many, alone, strict=True):
         np.testing.assert_array_equal(one["pose"], other["pose"])
         assert np.abs(one["pose"] - expected["pose"]).max() < 1e-13
-    told[3]["start"] = {"dZ": 1.0}
+    tables[3]["start"] = {"dZ": 1.0}
     with pytest.raises(condyle.CondyleError, match=r"scenario 4: 1 problem\n.*start: dZ"):
-        condyle.simulate(model, told)
+        condyle.simulate(model, tables)
 
 
 class Damped(ControllerTable):
@@ -210,8 +210,8 @@ class Damped(ControllerTable):
 
     @staticmethod
     def equations(c: Control) -> tuple[Lanes, ca.SX]:
-        q2 = c.aim.q2 + c.gains.damping * (c.aim.q1 - c.now.q1)
-        return c.inverse(c.now.q, c.now.q1, q2), c.memory + 1
+        q2 = c.reference.q2 + c.gains.damping * (c.reference.q1 - c.measured.q1)
+        return c.inverse(c.measured.q, c.measured.q1, q2), c.memory + 1
 
 
 class Wind(LoadTable):
@@ -233,13 +233,13 @@ def test_laws_from_outside_run_in_compiled_code(
     """A controller and a load that are registered here, beside functions in Python."""
     monkeypatch.setitem(CONTROLLERS, "damped", Damped)
     monkeypatch.setitem(LOADS, "wind", Wind)
-    told = {
+    tables = {
         "duration": 0.05,
         "start": {"beta": 0.02, "dX": 0.1},
         "controller": {"kind": "damped", "damping": 40.0, "rate": 1000.0},
         "load": [{"kind": "wind", "drag": 5.0, "point": "incisor"}],
     }
-    plan = plan_of(told, model)
+    plan = plan_of(tables, model)
     run = running.Run([plan])
     assert run.steps is not None and not report(plan).stable  # nothing holds the place
     found = run.traces()[0]
@@ -248,11 +248,11 @@ def test_laws_from_outside_run_in_compiled_code(
     memory = run.control.samples[:, run.control.columns.result("memory"), 0]
     np.testing.assert_array_equal(memory[:, 0], 4.0 + np.arange(50))
 
-    def law(now: Any, aim: Any) -> np.ndarray:
-        q2 = aim.q2 + 40.0 * (aim.q1 - now.q1)
+    def law(now: Any, reference: Any) -> np.ndarray:
+        q2 = reference.q2 + 40.0 * (reference.q1 - now.q1)
         return model.unchecked().inverse_dynamics(now.q, now.q1, q2)
 
-    bare = {name: value for name, value in told.items() if name not in ("controller", "load")}
+    bare = {name: value for name, value in tables.items() if name not in ("controller", "load")}
     function = bind(
         model,
         scenario_from({**BASE, **bare}),
@@ -291,8 +291,8 @@ def test_drives_that_chatter_stay_in_compiled_code() -> None:
     machine = condyle.load_mechanism("masticatory")
     limits = {f"chain.{name}.actuator.torque_limit": 0.02 for name in machine.chain_names}
     hard = {"kind": "joint_pd", "stiffness": 200.0, "damping": 1.0, "rate": 2000.0}
-    told = {"duration": 0.3, "controller": hard, "start": {"beta": 0.02}}
-    run = running.Run([plan_of(told, condyle.derive(machine.set(limits)))])
+    tables = {"duration": 0.3, "controller": hard, "start": {"beta": 0.02}}
+    run = running.Run([plan_of(tables, condyle.derive(machine.set(limits)))])
     assert run.steps is not None
     advance, codes = run.steps.advance, []
     run.steps.advance = lambda budget: codes.append(advance(budget)) or codes[-1]  # type: ignore

@@ -24,16 +24,16 @@ FALL = {"duration": 0.08, "rate": 500}
 def test_a_bound_is_told_of_or_ends_the_run(jaw: Model) -> None:
     """Its time is where the margin is zero, and what was computed before is kept."""
     going = {**FALL, "start": {"dX": -0.2}}
-    told = condyle.simulate(jaw, going)
+    found = condyle.simulate(jaw, going)
     ended = condyle.simulate(jaw, going, stop_at_bounds=True)
     first = ended.condyle.events[-1]
-    assert first["kind"] == "bound" and first["ends"] and not told.condyle.events[0]["ends"]
-    margin = told["bound_margin"].sel(contact=first["owner"])
+    assert first["kind"] == "bound" and first["ends"] and not found.condyle.events[0]["ends"]
+    margin = found["bound_margin"].sel(contact=first["owner"])
     i = int(np.argmax(margin.values < 0))
-    t0, t1 = told["time"].values[i - 1 : i + 1]
+    t0, t1 = found["time"].values[i - 1 : i + 1]
     assert t0 < first["time"] <= t1
     assert ended["time"].values[-1] == t0 and ended.sizes["time"] == i
-    assert np.abs(ended["pose"] - told["pose"][:i]).max() < 1e-12
+    assert np.abs(ended["pose"] - found["pose"][:i]).max() < 1e-12
     assert f'"{first["owner"]}"' in ended.condyle.warnings[-1]
     q = np.array([[first["state"][n] for n in jaw.independent]])
     pose = jaw.inverse_kinematics(q).pose
@@ -174,22 +174,22 @@ def test_encoders_that_give_no_pose_end_the_run(
     jaw: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What they last gave, and all that was computed, is kept."""
-    told = {
+    found = {
         **FALL,
         "controller": {"kind": "computed_torque", "stiffness": 400.0, "rate": 500.0},
         "sensors": {"encoder_resolution": 1e-5},
     }
-    whole = run(bind(jaw, scenario_from(told)))
-    look, looks = Controller.sample, []
+    whole = run(bind(jaw, scenario_from(found)))
+    sample, samples = Controller.sample, []
 
     def blind(self: Controller, *given: Any) -> Any:
-        looks.append(given)
-        if len(looks) > 10:
+        samples.append(given)
+        if len(samples) > 10:
             raise PoseLostError
-        return look(self, *given)
+        return sample(self, *given)
 
     monkeypatch.setattr(Controller, "sample", blind)
-    trace = run(bind(jaw, scenario_from(told)))
+    trace = run(bind(jaw, scenario_from(found)))
     assert trace.ended is not None and trace.ended.kind == "lost"
     assert trace.ended.time == pytest.approx(10 / 500) and len(trace.command) == 10
     kept = len(trace.t)

@@ -1,4 +1,4 @@
-"""What --check-gains foretells is what happens."""
+"""What --check-gains predicts is what happens."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_a_sampled_loop_is_late(jaw: Model, smoothing: float | None) -> None:
 
 
 @pytest.mark.parametrize(("damping", "stable"), [(0.03, True), (0.4, False)])
-def test_unstable_drives_are_foretold(jaw: Model, damping: float, stable: bool) -> None:
+def test_unstable_drives_are_predicted(jaw: Model, damping: float, stable: bool) -> None:
     """A damper against a rotor of 6.6e-5 kg m^2 at 1 kHz: what is said is what happens."""
     pd = {"kind": "joint_pd", "stiffness": 3.0, "damping": damping}
     t = np.linspace(0, 1, 11)
@@ -92,7 +92,7 @@ FIRM = {"kind": "food", "food": "firm_bolus", "point": "right_molar"}
 
 
 @pytest.mark.parametrize(("delay", "stable"), [(1, True), (5, False)])
-def test_a_bite_that_swings_is_foretold(jaw: Model, delay: int, stable: bool) -> None:
+def test_a_bite_that_swings_is_predicted(jaw: Model, delay: int, stable: bool) -> None:
     """50 N on a firm bolus at 1 kHz: while it bites, late efforts pump it up."""
     bite = {"kind": "bite_force", "stiffness": 900.0, "force": 50.0, "delay": delay}
     t = np.linspace(0, 0.5, 51)
@@ -115,11 +115,11 @@ def test_the_loop_s_derivatives_are_its_differences(jaw: Model, sensors: Any) ->
     """Plant with loads and tick, exact, beside central differences of the same kernels."""
     spring = {"kind": "spring", "point": "incisor", "stiffness": 90.0, "damping": 2.0}
     impedance = {"kind": "impedance", "stiffness": 900.0, "damping": 9.0}
-    told = {"controller": impedance, "load": [spring], "sensors": sensors}
-    plan = bind(jaw, scenario_from({k: v for k, v in told.items() if v is not None}))
+    tables = {"controller": impedance, "load": [spring], "sensors": sensors}
+    plan = bind(jaw, scenario_from({k: v for k, v in tables.items() if v is not None}))
     assert isinstance(plan.drive, ClosedLoop)
     loop = Loop(plan, plan.drive)
-    loop.at(0.3, plan.drive.path.aims(np.array([0.3]))[0])
+    loop.at(0.3, plan.drive.path.at(np.array([0.3]))[0])
     for exact, columns in ((loop.rate, loop.plant.columns), (loop.tick, loop.control.columns)):
         found = exact()
         rows = np.concatenate([columns.rows(name) for name in exact.by])
@@ -144,9 +144,9 @@ def test_no_loop_no_gains(jaw: Model) -> None:
 @pytest.mark.parametrize("sensors", [{}, {"sensors": {"velocity_cutoff": 150.0}}])
 def test_a_function_in_python_has_the_loop_of_its_law(jaw: Model, sensors: Any) -> None:
     law = {"kind": "joint_pd", "stiffness": 2.0, "damping": 0.02, "gravity": False, "delay": 1}
-    told = {"duration": 0.2, "controller": law, **sensors}
+    tables = {"duration": 0.2, "controller": law, **sensors}
     own = lambda now, aim: 2.0 * (aim.joint - now.joint) + 0.02 * (aim.joint_rate - now.joint_rate)  # noqa: E731
-    exact, found = (condyle.check_gains(jaw, told, controller=x) for x in (None, own))
+    exact, found = (condyle.check_gains(jaw, tables, controller=x) for x in (None, own))
     for one, other in zip(found.points, exact.points, strict=True):
         assert one.radius == pytest.approx(other.radius, rel=1e-6)
         assert one.phase == pytest.approx(other.phase, abs=1e-3)

@@ -30,13 +30,13 @@ CASES: dict[str, dict[str, Any]] = {
 }
 
 
-def live(told: dict[str, Any], model: condyle.Model) -> Live:
-    return Live(bind(model, scenario_from({**BASE, **told})))
+def live(tables: dict[str, Any], model: condyle.Model) -> Live:
+    return Live(bind(model, scenario_from({**BASE, **tables})))
 
 
-def state(told: dict[str, Any], model: condyle.Model) -> np.ndarray:
+def state(tables: dict[str, Any], model: condyle.Model) -> np.ndarray:
     """q and q' at the end of a whole run."""
-    plan = bind(model, scenario_from({**BASE, **told}))
+    plan = bind(model, scenario_from({**BASE, **tables}))
     trace = running.run(plan)
     assert trace.t[-1] == plan.duration
     return trace.state[-1, : 2 * len(plan.q)]
@@ -75,16 +75,16 @@ def test_bit_by_bit_is_the_whole_run(
 
 @pytest.mark.parametrize("name", CASES)
 def test_every_parameter_is_the_number_of_the_scenario(name: str, jaw: condyle.Model) -> None:
-    told = CASES[name]
-    found = live(told, jaw)
+    tables = CASES[name]
+    found = live(tables, jaw)
     owners = {parameter.owner for parameter in found.parameters}
-    assert owners == {"controller", *(load["kind"] for load in told.get("load", ()))}
-    before = state(told, jaw)
+    assert owners == {"controller", *(load["kind"] for load in tables.get("load", ()))}
+    before = state(tables, jaw)
     for i, parameter in enumerate(found.parameters):
         value = 0.6 * parameter.value
-        other = {**told, "load": [dict(load) for load in told.get("load", ())]}
+        other = {**tables, "load": [dict(load) for load in tables.get("load", ())]}
         tables = {load["kind"]: load for load in other["load"]}
-        tables["controller"] = other["controller"] = dict(told["controller"])
+        tables["controller"] = other["controller"] = dict(tables["controller"])
         assert parameter.value == tables[parameter.owner].get(parameter.field, parameter.value)
         tables[parameter.owner][parameter.field] = value
         found.reset()
@@ -164,8 +164,8 @@ def test_what_ends_it_is_kept_and_it_can_begin_again(jaw: condyle.Model) -> None
 
 
 def test_adaptive_methods_take_steps_that_keep_pace(jaw: condyle.Model) -> None:
-    told = {"duration": 0.02, "controller": TORQUE}
-    plan = bind(jaw, scenario_from(told))
+    tables = {"duration": 0.02, "controller": TORQUE}
+    plan = bind(jaw, scenario_from(tables))
     found = Live(plan)
     found.go_to(1.0)
     exact = running.run(plan).state[-1, :8]

@@ -33,8 +33,8 @@ BEFORE = {  # port -> result
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What a controller sees at a tick: expressions in a law, arrays where it is in Python.
+class Measured:
+    """What a controller measures at a tick: expressions in a law, arrays where it is in Python.
 
     q, q1:  estimated state, (m,) each;  joint, joint_rate: a chain's, as encoders have it.
     force:  of the loads on the platform at the controller's point, (3,) [N] in {S};  t: [s].
@@ -62,7 +62,7 @@ def observer(structure: Structure, velocity: str = DIFFERENCE) -> Variants:
     return Variants(b.finish(), single=True)
 
 
-def observe(b: Builder, joint: Lanes, rate: Lanes, velocity: str, period: ca.SX) -> Seen:
+def observe(b: Builder, joint: Lanes, rate: Lanes, velocity: str, period: ca.SX) -> Measured:
     """The same as a part of another question: its other ports, results of `BEFORE`, and check."""
     resolution = b.lane_sample("resolution", unit="rad or m")
     smoothing = b.sample("smoothing", 1)
@@ -83,4 +83,4 @@ def observe(b: Builder, joint: Lanes, rate: Lanes, velocity: str, period: ca.SX)
     b.output("joint", counts, "rad or m")
     b.output("joint_rate", rate, "rad/s or m/s")
     b.check(2 * found.sure - 1, 0.5)
-    return Seen(found.q, q1, counts, rate)
+    return Measured(found.q, q1, counts, rate)

@@ -1,6 +1,6 @@
 """A tick of a controller: sensors, law and limits, from what is measured to efforts.
 
-    state = observer(joints)  or as it is,     asked, memory = law(state, aim, memory),
+    state = observer(joints)  or as it is,     asked, memory = law(state, reference, memory),
     effort = asked, within limits
 
 What lasts from one tick to the next goes in and comes out: see `carried`.
@@ -19,13 +19,13 @@ from ..graph.program import Program, Variants
 from .builder import Builder, Lanes
 from .equations import Wrench
 from .inverse import HUGE, efforts, in_variants
-from .law.controller import Aim, Control, ControllerTable, gains_of
-from .observer import BEFORE, Seen, observe
+from .law.controller import Control, ControllerTable, Reference, gains_of
+from .observer import BEFORE, Measured, observe
 from .platform import placed
 from .structure import Structure
 
 REQUEST = "request"  # results of ticks whose efforts are: what they have to balance
-AIMS = ("q_d", "q1_d", "q2_d", "joint_d", "joint_rate_d", "force_d")
+REFERENCE = ("q_d", "q1_d", "q2_d", "joint_d", "joint_rate_d", "force_d")
 
 
 def tick(
@@ -39,7 +39,7 @@ def tick(
     """Efforts that a law asks for at what is measured, and what lasts until the next tick.
 
     Ports: q, q1, joint, joint_rate: as they are, or joints alone where there are sensors;
-    aims `AIMS`; force at the law's point, (3,); its gains; low, high: limits, a lane's.
+    reference `REFERENCE`; force at the law's point, (3,); its gains; low, high: limits, a lane's.
     Results: effort; asked, without limits; q, q1, joint, joint_rate, measured_force, as sampled;
     memory.
 
@@ -76,11 +76,11 @@ def _program(
     if velocity is not None:
         now = observe(b, joint, rate, velocity, period)
     else:
-        now = Seen(b.sample("q", m), b.sample("q1", m), joint, rate)
+        now = Measured(b.sample("q", m), b.sample("q1", m), joint, rate)
     now = replace(now, force=b.sample("force", 3, "N"))
-    q, q1, q2 = (b.sample(name, m) for name in AIMS[:3])
-    joint, rate = (b.lane_sample(name) for name in AIMS[3:5])
-    aim = Aim(q, q1, q2, joint, rate, b.sample(AIMS[5], 1, "N"))
+    q, q1, q2 = (b.sample(name, m) for name in REFERENCE[:3])
+    joint, rate = (b.lane_sample(name) for name in REFERENCE[3:5])
+    reference = Reference(q, q1, q2, joint, rate, b.sample(REFERENCE[5], 1, "N"))
 
     known = (
         Wrench(*(b.sample(f"borne_{x}", 3) for x in ("force", "moment", "point")))
@@ -105,7 +105,7 @@ def _program(
         before = b.sample("memory_before", len(law.memory)) if law.memory else ca.SX(0, 1)
         gains = gains_of(b, law.ports)
         asked, memory = law.equations(
-            Control(b, now, aim, gains, dict(choices), before, period, solve)
+            Control(b, now, reference, gains, dict(choices), before, period, solve)
         )
     low, high = (b.lane_sample(name, unit="N m or N") for name in ("low", "high"))
     limited = [ca.fmin(ca.fmax(e, lo), hi) for e, lo, hi in zip(asked, low, high, strict=True)]

@@ -21,9 +21,9 @@ from ..questions.law import Law
 from ..questions.load import Load
 from ..questions.load.acting import WRENCH
 from ..questions.load.given import Constant
-from .aims import default_motion, path_of
 from .integrators import Settings
 from .plan import WORKS, ClosedLoop, OpenLoop, Plan, Sensing
+from .reference_path import default_motion, path_of
 from .scenario import Scenario
 
 ABSOLUTE = 1e-3  # of the mechanism's size, radians or joules: what rtol is of, at the least

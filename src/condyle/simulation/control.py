@@ -7,14 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import InputError
-from ..questions.law.controller import Aim
-from ..questions.observer import Seen
-from ..questions.tick import AIMS, REQUEST, carried
+from ..questions.law.controller import Reference
+from ..questions.observer import Measured
+from ..questions.tick import REFERENCE, REQUEST, carried
 from .columns import Columns
 from .plan import ClosedLoop, Plan
 from .plant import WIDE, Plant
 
-SEEN = ("q", "q1", "joint", "joint_rate", "measured_force")  # results of a tick: what a law sees
+MEASURED = ("q", "q1", "joint", "joint_rate", "measured_force")  # results of a tick
 DIFFERENCE = 1e-6
 REPEATS = 4  # of the steps from encoders to a pose, before it is lost
 
@@ -32,7 +32,7 @@ def drive_of(plan: Plan) -> ClosedLoop:
 class Controller:
     """Kernel, numbers and samples of controllers that are alike; in Python, of the first run.
 
-    aims:    (K, numbers, runs) at the ticks, in the order of the ports.
+    references: (K, numbers, runs) at the ticks, in the order of the ports.
     samples: (K, results, runs), the results of every tick;  states: (K, size, runs), its state.
     """
 
@@ -50,10 +50,10 @@ class Controller:
         self.columns = Columns(drive.model.kernel("tick", *details), len(plans))
         self._apart = self.columns if self.outside else None
         self.ticks = plan.ticks()
-        self._aimed = np.concatenate([self.columns.rows(name) for name in AIMS])
-        self.first = int(self._aimed.min())
-        sizes = len(self._aimed), self.columns.results, plan.size
-        self.aims, self.samples, self.states = (
+        self._rows = np.concatenate([self.columns.rows(name) for name in REFERENCE])
+        self.first = int(self._rows.min())
+        sizes = len(self._rows), self.columns.results, plan.size
+        self.references, self.samples, self.states = (
             np.zeros((len(self.ticks), size, self.columns.stride)) for size in sizes
         )
         self.carry = carried([port.name for port in self.columns.kernel.interface.ports])
@@ -64,7 +64,7 @@ class Controller:
         self.fill(plans)
 
     def fill(self, plans: Sequence[Plan]) -> None:
-        """Take the numbers of plans, but not their aims."""
+        """Take the numbers of plans, but not their references."""
         self.plan, self.drive, fill = plans[0], drive_of(plans[0]), self.columns.fill
         drives = [drive_of(plan) for plan in plans]
         for name in ("low", "high"):
@@ -77,14 +77,14 @@ class Controller:
                 fill(name, [getattr(drive.sensing, name) for drive in drives])
 
     def begin(self, plans: Sequence[Plan]) -> None:
-        """Take aims, and memory to begin with: a machine knows where it starts."""
+        """Take references, and memory to begin with: a machine knows where it starts."""
         drives = [drive_of(plan) for plan in plans]
         starts = [i for i, drive in enumerate(drives)
                   if i == 0 or not drive.path.same_as(drives[i - 1].path)]  # fmt: skip
         for i, end in zip(starts, [*starts[1:], len(drives)], strict=True):
             if len(self.ticks):
-                aims = drives[i].path.aims(self.ticks)
-                self.aims[:, self._aimed - self.first, i:end] = aims[..., None]
+                references = drives[i].path.at(self.ticks)
+                self.references[:, self._rows - self.first, i:end] = references[..., None]
         if self.drive.law.memory.size:
             self.columns.fill("memory_before", [drive.law.memory for drive in drives])
         if self.drive.sensing is None:
@@ -106,15 +106,15 @@ class Controller:
         fill("joint_before", joint - period * rate)
         fill("joint_rate_before", rate)
 
-    def aim_for(self, path_force: np.ndarray) -> None:
-        """Another force to aim at, (K,) [N]."""
-        self.aims[:, self.columns.rows(AIMS[5])[0] - self.first, 0] = path_force
+    def set_force(self, path_force: np.ndarray) -> None:
+        """Set another force to follow, (K,) [N]."""
+        self.references[:, self.columns.rows(REFERENCE[5])[0] - self.first, 0] = path_force
 
     def slopes(self, t: float) -> np.ndarray:
-        """Of a function in Python by what it sees, where it was evaluated: central differences of
-        its efforts by the results `SEEN`, (n, numbers)."""
+        """Efforts of a function in Python by the results `MEASURED`, where it was evaluated, as
+        central differences, (n, numbers)."""
         columns = self.columns
-        rows = np.concatenate([columns.result(name) for name in SEEN])
+        rows = np.concatenate([columns.result(name) for name in MEASURED])
         found = np.zeros((len(self.plan.low), len(rows)))
         for i, row in enumerate(rows):
             value = columns.found[row, 0]
@@ -135,7 +135,7 @@ class Controller:
         Raises: PoseLostError: where the encoders give no pose.
         """
         columns = self.columns
-        columns.given[self.first : self.first + len(self._aimed), 0] = self.aims[k, :, 0]
+        columns.given[self.first : self.first + len(self._rows), 0] = self.references[k, :, 0]
         asked = self._solve(t, y, plant)
         self.samples[k, :, 0], self.states[k, :, 0] = columns.found[: columns.results, 0], y
         if np.isfinite(asked).all():
@@ -150,15 +150,15 @@ class Controller:
 
     def at_once(self, t: float, y: np.ndarray, plant: Plant) -> np.ndarray:
         """Efforts of an ideal controller where the plant was evaluated, (n,)."""
-        self.columns.given[self._aimed, 0] = self.drive.path.aims(np.array([t]))[0]
+        self.columns.given[self._rows, 0] = self.drive.path.at(np.array([t]))[0]
         return self._solve(t, y, plant)
 
     def steadily(
-        self, aim: np.ndarray, memory: np.ndarray, y: np.ndarray, plant: Plant
+        self, reference: np.ndarray, memory: np.ndarray, y: np.ndarray, plant: Plant
     ) -> np.ndarray:
         """Efforts asked for after a while of the same, where the plant was evaluated, (n,)."""
         columns = self.columns
-        columns.given[self._aimed, 0] = aim
+        columns.given[self._rows, 0] = reference
         if memory.size:
             columns.give("memory_before", memory)
         if columns.has("pose_before"):
@@ -204,19 +204,20 @@ class Controller:
             if apart is not columns:
                 columns.found[columns.result(result.name), 0] = apart[result.name]
 
-    def _given(self, t: float, seen: Columns) -> np.ndarray:
+    def _given(self, t: float, by: Columns) -> np.ndarray:
         n, m = len(self.plan.low), len(self.plan.q)
         if self.drive.function is None:
-            if not seen.result(REQUEST).size:
+            if not by.result(REQUEST).size:
                 return np.zeros(n)
-            q, q1, q2, force, point = np.split(seen[REQUEST], [m, 2 * m, 3 * m, 3 * m + 3])
+            q, q1, q2, force, point = np.split(by[REQUEST], [m, 2 * m, 3 * m, 3 * m + 3])
             wrench = np.concatenate([force, np.zeros(3)])
             found: np.ndarray = self._inverse.inverse_dynamics(q, q1, q2, wrench, point)
             return found
         names = ("q", "q1", "joint", "joint_rate")
-        now = Seen(**{name: seen[name] for name in names}, force=seen["measured_force"], t=t)
-        *aim, force = (seen.given[seen.rows(name), 0] for name in AIMS)
-        found = self.drive.function(now, Aim(*aim, force=float(force[0])))  # type: ignore[misc]
+        now = Measured(**{name: by[name] for name in names}, force=by["measured_force"], t=t)
+        *path, force = (by.given[by.rows(name), 0] for name in REFERENCE)
+        reference = Reference(*path, force=float(force[0]))  # type: ignore[misc]
+        found = self.drive.function(now, reference)  # type: ignore[misc]
         effort: np.ndarray = np.asarray(found, dtype=float)
         if effort.shape != (n,) or not np.isfinite(effort).all():
             raise InputError(

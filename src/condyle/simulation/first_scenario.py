@@ -26,7 +26,7 @@ delay = 1                       # periods from a sample to its efforts
 stiffness = 2500.0              # 1/s^2; damping [1/s] is critical by default
 # model = "light.toml"          # the controller's own model, if it is not the plant's
 
-[sensors]                       # without: the controller sees the state itself
+[sensors]                       # without: the controller measures the exact state
 encoder_resolution = 1e-5       # rad or m
 
 # [[load]]                      # any number: constant, csv, spring, food

@@ -37,7 +37,7 @@ from ..questions.derivative import PREFIX, derivative
 from ..questions.numbers import Layout, specialised
 from ..questions.structure import structure_of
 from .columns import Columns
-from .control import SEEN, Controller
+from .control import MEASURED, Controller
 from .integrators import NoRateError
 from .plan import ClosedLoop, Plan
 from .plant import Plant
@@ -147,15 +147,15 @@ def report(plan: Plan) -> GainReport:
     loop = Loop(plan, drive)
     end = min(plan.duration, float(drive.path.times[-1]))
     times = np.linspace(0.0, end, POINTS)
-    home = drive.path.aims(np.zeros(1))
+    home = drive.path.at(np.zeros(1))
     m = len(plan.q)
     home[0, : 3 * m] = 0.0
     at = drive.model.kernel("instant").run({"q": home[:, :m], "q1": home[:, :m]}).values
     home[0, 3 * m : -1] = np.concatenate([at["joint"][:, 0], at["joint_rate"][:, 0]])
-    aims = [*home, *drive.path.aims(times)]
+    references = [*home, *drive.path.at(times)]
     found = []
-    for time, aim in zip([None, *times.tolist()], aims, strict=True):
-        found += [loop.at(time, aim), *loop.holding(time, aim)]
+    for time, reference in zip([None, *times.tolist()], references, strict=True):
+        found += [loop.at(time, reference), *loop.holding(time, reference)]
     return GainReport(tuple(found), drive.period, drive.delay)
 
 
@@ -176,26 +176,26 @@ class Loop:
             plan.model, "rate", self.plant.details, self.plant.columns,
             ("q", "q1", "effort"), ("rate", "joint", "joint_rate", "measured_force", "load_place"),
         )  # fmt: skip
-        self._ports = [p for p in self.control.columns.kernel.interface.ports if p.name in MEASURED]
+        self._ports = [p for p in self.control.columns.kernel.interface.ports if p.name in PORTS]
         self._before = self.control.carry
-        seen = SEEN if drive.function is not None else ()
+        own = MEASURED if drive.function is not None else ()
         self.tick = Derivative(
             drive.model, "tick", self.control.details, self.control.columns,
             [*(p.name for p in self._ports), *self._before],
-            tuple(dict.fromkeys(("asked", *self._before.values(), *seen))),
+            tuple(dict.fromkeys(("asked", *self._before.values(), *own))),
         )  # fmt: skip
 
     def at(
         self,
         time: float | None,
-        aim: np.ndarray,
+        reference: np.ndarray,
         q: np.ndarray | None = None,
         load: int | None = None,
     ) -> Point:
         """Linearised about a reference, or about q while load `load` is held."""
         plan, m, drive = self._plan, self._m, self._drive
         y = np.zeros(plan.size)
-        y[: 2 * m] = aim[: 2 * m]
+        y[: 2 * m] = reference[: 2 * m]
         modes = self._modes(y)
         memory = drive.law.memory
         if q is not None and load is not None:
@@ -204,11 +204,13 @@ class Loop:
             memory = np.array(drive.law.table.holding)  # type: ignore[union-attr]
         self.plant.set_modes(modes)
         self.plant.evaluate(time or 0.0, y)
-        effort = self.control.steadily(aim, memory, y, self.plant)
+        effort = self.control.steadily(reference, memory, y, self.plant)
         self.plant.columns.give("effort", effort)
         rate, tick = self.rate(), self.tick()
         if drive.function is not None:
-            tick["asked"] = self.control.slopes(time or 0.0) @ np.vstack([tick[n] for n in SEEN])
+            tick["asked"] = self.control.slopes(time or 0.0) @ np.vstack(
+                [tick[n] for n in MEASURED]
+            )
         A, B = rate["rate"][: 2 * m, : 2 * m], rate["rate"][: 2 * m, 2 * m :]
         # What is measured, by x.
         C = {"q": np.eye(2 * m)[:m], "q1": np.eye(2 * m)[m:]}
@@ -217,11 +219,9 @@ class Loop:
         C["force"] = force[:, : 2 * m]
         by_x = np.vstack([C[port.name] for port in self._ports])
         results = np.vstack([tick["asked"], *(tick[name] for name in self._before.values())])
-        n, seen = len(plan.low), len(by_x)
-        H, E = results[:n, :seen] @ by_x, results[n:, :seen] @ by_x
-        step = Sampled(
-            A, B, H, results[:n, seen:], E, results[n:, seen:], drive.period, drive.delay
-        )
+        n, k = len(plan.low), len(by_x)
+        H, E = results[:n, :k] @ by_x, results[n:, :k] @ by_x
+        step = Sampled(A, B, H, results[:n, k:], E, results[n:, k:], drive.period, drive.delay)
         holds = None if load is None else plan.loads[load].name
         s = z = np.linalg.eigvals(step.closed())
         if drive.period is None:
@@ -243,19 +243,19 @@ class Loop:
         places = self.plant["load_place"].reshape(-1, 6)
         return [load.begin(at[:3]) for load, at in zip(self._plan.loads, places, strict=True)]
 
-    def holding(self, time: float | None, aim: np.ndarray) -> Iterator[Point]:
+    def holding(self, time: float | None, reference: np.ndarray) -> Iterator[Point]:
         """The same while the law holds its force on each load that bears it, where it can."""
         law, m = self._drive.law, self._m
         holding = None if law.table is None else law.table.holding
-        if holding is None or not aim[-1] > 0:
+        if holding is None or not reference[-1] > 0:
             return
         for i, load in enumerate(self._plan.loads):
             if load.place != law.place or load.law.bears is None:
                 continue
-            q = self._pressed(i, aim[:m], float(aim[-1]), law.numbers["direction"])
+            q = self._pressed(i, reference[:m], float(reference[-1]), law.numbers["direction"])
             if q is None:
                 continue
-            point = self.at(time, aim, q, i)
+            point = self.at(time, reference, q, i)
             if self.control.columns["memory"][0] == holding[0]:  # it goes on holding
                 yield point
 
@@ -291,7 +291,7 @@ class Loop:
             return None
 
 
-MEASURED = ("q", "q1", "joint", "joint_rate", "force")  # ports of a tick
+PORTS = ("q", "q1", "joint", "joint_rate", "force")  # ports of a tick
 
 
 class Derivative:
@@ -354,15 +354,15 @@ class Sampled:
         block = np.zeros((states + n, states + n))
         block[:states, :states], block[:states, states:] = self.A, self.B
         whole = expm(block * T)
-        seen = states + w
-        size = seen + d * n
+        known = states + w
+        size = known + d * n
         F, G, C = np.zeros((size, size)), np.zeros((size, n)), np.zeros((n, size))
         F[:states, :states] = whole[:states, :states]
-        F[states:seen, :states], F[states:seen, states:seen] = self.E, self.E_m
-        C[:, :states], C[:, states:seen] = -self.H, -self.H_m
+        F[states:known, :states], F[states:known, states:known] = self.E, self.E_m
+        C[:, :states], C[:, states:known] = -self.H, -self.H_m
         # Efforts on their way: the first acts, the last was asked for just now.
-        (F[:states, seen : seen + n] if d else G[:states])[:] = whole[:states, states:]
-        F[seen : size - n, seen + n :] = np.eye((d - 1) * n) if d else 0
+        (F[:states, known : known + n] if d else G[:states])[:] = whole[:states, states:]
+        F[known : size - n, known + n :] = np.eye((d - 1) * n) if d else 0
         if d:
             G[size - n :] = np.eye(n)
         return F, G, C

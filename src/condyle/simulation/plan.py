@@ -11,9 +11,9 @@ import numpy as np
 from ..model.model import Model
 from ..questions.law import Law
 from ..questions.load import Load
-from .aims import Path
 from .events import Event
 from .integrators import Settings
+from .reference_path import ReferencePath
 from .scenario import Scenario
 
 WORKS = ("actuators", "load", "actuator_losses", "contact_friction")
@@ -46,13 +46,13 @@ class ClosedLoop:
 
     model:    of the mechanism, as the controller takes it to be.
     period:   [s]; None: at all times.
-    sensing:  None where it sees the state itself.
+    sensing:  None: it measures the exact state.
     function: in Python, in the place of the law: (measured, reference) -> efforts (n,).
     """
 
     model: Model
     law: Law
-    path: Path
+    path: ReferencePath
     period: float | None
     delay: int = 0
     sensing: Sensing | None = None

@@ -168,7 +168,7 @@ class Run:
         """Go on with other numbers in the law and in the loads, which stay what they are."""
         force = self._force(plan)
         if self.control is not None and force is not self._force(self.plans[0]):
-            self.control.aim_for(np.interp(self._ticks, plan.drive.path.force_times, force))  # type: ignore[union-attr]
+            self.control.set_force(np.interp(self._ticks, plan.drive.path.force_times, force))  # type: ignore[union-attr]
         self.plans = [plan]
         self.plant.fill(self.plans)
         self._watch.change(plan)
@@ -196,7 +196,7 @@ class Run:
         """By compiled code up to what it leaves to others: without any, each tick and stretch."""
         clock = self.clock
         if self.steps is not None and self.alive.any():
-            clock.seen, size = 0, self.plans[0].settings.step
+            clock.current, size = 0, self.plans[0].settings.step
             assert size is not None
             left = math.ceil((until - clock.t) / size - CLOSE)
             return self.steps.advance(min(max(left, 1), BUDGET))
@@ -250,8 +250,8 @@ class Run:
         modes, drive = self.kept_modes[:reached, :, i].copy(), plan.drive
         if isinstance(drive, OpenLoop) or control is None or not len(self._ticks):
             tick = np.full(len(t), -1)
-            seen: dict[str, np.ndarray] = dict.fromkeys(("command", "count"), np.empty((0, n)))
-            seen |= {"estimate": np.empty((0, 2 * m)), "force": np.empty(0)}
+            columns: dict[str, np.ndarray] = dict.fromkeys(("command", "count"), np.empty((0, n)))
+            columns |= {"estimate": np.empty((0, 2 * m)), "force": np.empty(0)}
             effort = self._efforts(plan, t, state, modes)
         else:
             tick = np.searchsorted(self._ticks, t + ROUNDING, side="right") - 1
@@ -259,13 +259,13 @@ class Run:
             samples, rows = control.samples[:sampled, :, i], control.columns.result
             due = np.maximum(tick - drive.delay, 0)
             effort = samples[:, rows("effort")][due] if sampled else np.zeros((len(t), n))
-            seen = {
+            columns = {
                 "command": samples[:, rows("asked")],
                 "count": samples[:, rows("joint")],
                 "estimate": samples[:, np.concatenate([rows("q"), rows("q1")])],
                 "force": np.linalg.norm(samples[:, rows("measured_force")], axis=1),
             }
-        return Trace(t, state, modes, effort, tick, **seen, events=tuple(self.logs[i].events))
+        return Trace(t, state, modes, effort, tick, **columns, events=tuple(self.logs[i].events))
 
     def _efforts(
         self, plan: Plan, t: np.ndarray, state: np.ndarray, modes: np.ndarray

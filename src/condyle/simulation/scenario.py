@@ -1,4 +1,4 @@
-"""The scenario: what a simulation is told, as a file or in Python."""
+"""The scenario: duration, start, efforts or a controller, loads; as a file or in Python."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class Sensors(Table):
     """What stands between the mechanism and its controller: encoders in the actuators' joints.
 
     From their counts the pose follows by forward kinematics, from the last pose on. Without this
-    table a controller sees the state itself.
+    table a controller measures the exact state.
     """
 
     encoder_resolution: Gain = Field(default=0.0, description="rad or m a count; 0: exact")
@@ -135,7 +135,7 @@ def _controller_problems(controller: Any, sensors: Sensors | None) -> Iterable[s
     if controller.delay:
         yield "controller.ideal: there is no delay without periods; remove one of them"
     if sensors is not None:
-        yield "controller.ideal: it sees the state itself; remove ideal, or the sensors"
+        yield "controller.ideal: it measures the exact state; remove ideal, or the sensors"
 
 
 def load_scenario(source: str | os.PathLike[str]) -> Scenario:

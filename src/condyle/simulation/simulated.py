@@ -92,7 +92,7 @@ def _energy(
 
 
 def _controlled(plan: Plan, drive: ClosedLoop, trace: Trace) -> dict[str, np.ndarray]:
-    """What was asked for, seen and followed."""
+    """Commands, measurements and the reference."""
     m = len(plan.q)
     wanted, rate, _ = drive.path.states(trace.t)
     found = {

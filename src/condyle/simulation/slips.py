@@ -9,7 +9,7 @@ import numpy as np
 from ..mechanism.home import characteristic_length
 from .plan import ClosedLoop, Plan
 
-COARSE = 0.05  # rad or m: an encoder that hardly sees a motion
+COARSE = 0.05  # rad or m: a coarser encoder hardly resolves a motion
 THICK = 0.5  # food over the mechanism's size
 AWAY = 0.02  # start to path, in the mechanism's size and radians
 

@@ -86,9 +86,9 @@ static int sample(Run *r)
 {
     int64_t stride = r->stride, k = r->clock->tick + 1, due = k > r->delay ? k - r->delay : 0;
     double *kept = r->samples + k * r->results * stride;
-    if (!r->clock->seen && rates(r, r->clock->t, r->y, r->k)) return SAMPLE;
-    r->clock->seen = 1;
-    memcpy(r->aim, r->aims + k * r->aim_rows * stride, (size_t)(r->aim_rows * stride) * sizeof *kept);
+    if (!r->clock->current && rates(r, r->clock->t, r->y, r->k)) return SAMPLE;
+    r->clock->current = 1;
+    memcpy(r->reference, r->references + k * r->reference_rows * stride, (size_t)(r->reference_rows * stride) * sizeof *kept);
     copied(r, r->link, r->links);
     if (evaluate(r, &r->control)) return SAMPLE;
     memcpy(kept, r->control.found, (size_t)(r->results * stride) * sizeof *kept);
@@ -120,11 +120,11 @@ static int between(Run *r, double until)
 {
     int64_t n = r->size * r->stride, steps = (int64_t)fmax(ceil((until - r->clock->t) / r->step - 1e-9), 1);
     double start = r->clock->t, h = (until - start) / (double)steps, *f1 = r->k + r->stages * n;
-    r->until = until, r->clock->seen = 0;
+    r->until = until, r->clock->current = 0;
     if (rates(r, start, r->y, r->k) || guarded(r)) return STEP;
     for (int64_t k = 0; k < steps; k++) {
         double t0 = start + (double)k * h, t1 = k + 1 < steps ? start + (double)(k + 1) * h : until;
-        r->clock->seen = 0;
+        r->clock->current = 0;
         if (r->budget-- <= 0) return PAUSE;
         if (runge_kutta(r->method, (int)r->stages, t0, h, r->y, (int)n, r->y1, r->k, rates, r) ||
             guarded(r))
@@ -133,7 +133,7 @@ static int between(Run *r, double until)
         memcpy(r->y, r->y1, (size_t)n * sizeof *f1);
         memcpy(r->k, f1, (size_t)n * sizeof *f1);
         r->clock->t = t1;
-        r->clock->seen = 1;
+        r->clock->current = 1;
     }
     return 0;
 }

@@ -39,10 +39,10 @@ TABLE = {
     "lanes": "int64_t", "vanishes": "int64_t",
 }  # fmt: skip
 # Where runs are: t, the last tick, the next result, the breakpoint passed, whether it is `fresh`;
-# `seen`: whether the plant's results are those of the state.
+# `current`: whether the plant's results are those of the state.
 CLOCK = {
     "t": "double", "tick": "int64_t", "next": "int64_t", "breakpoint": "int64_t",
-    "fresh": "int64_t", "seen": "int64_t",
+    "fresh": "int64_t", "current": "int64_t",
 }  # fmt: skip
 COPY = {"to": "double *", "from": NUMBERS}
 RUN = {
@@ -58,8 +58,8 @@ RUN = {
     # guards: rows of the plant's results, and whether each is beyond zero already
     "guard": "const int64_t *", "guards": "int64_t", "past": "const uint8_t *",
     "table": "const Table *", "tables": "int64_t",
-    # a sample: aims to where they go, measured rows, results kept, what is carried on, efforts
-    "aims": NUMBERS, "aim": "double *", "aim_rows": "int64_t",
+    # a sample: references, where they go, measured rows, results kept, what is carried on, efforts
+    "references": NUMBERS, "reference": "double *", "reference_rows": "int64_t",
     "link": "const Copy *", "links": "int64_t", "carry": "const Copy *", "carried": "int64_t",
     "samples": "double *", "states": "double *", "results": "int64_t", "delay": "int64_t",
     "effort": "double *", "effort_row": "const int64_t *", "efforts": "int64_t",
@@ -212,8 +212,9 @@ class Steps:
     def _control(self, plan: Plan, plant: Plant, control: Controller, y: np.ndarray) -> None:
         run, columns, m = self.run, control.columns, len(plan.q)
         run.control = self._kernel(columns)
-        run.aims, run.aim = control.aims.ctypes.data, columns.address(control.first)
-        run.aim_rows = control.aims.shape[1]
+        run.references = control.references.ctypes.data
+        run.reference = columns.address(control.first)
+        run.reference_rows = control.references.shape[1]
         measured = [(plant.columns, name, name) for name in ("joint", "joint_rate")]
         measured += [(plant.columns, "measured_force", "force")] * bool(
             plant.columns.result("measured_force").size

@@ -88,18 +88,18 @@ class BiteForce(ComputedTorque):
 
     @staticmethod
     def equations(c: Control) -> tuple[Lanes, ca.SX]:
-        now, aim, g = c.now, c.aim, c.gains
+        now, ref, g = c.measured, c.reference, c.gains
         J = g.direction.T @ c.point(now.q, g.point).J
         measured = -ca.dot(g.direction, now.force)
         mode, total = ca.vertsplit(c.memory)
-        mode = next_mode(c, mode, measured, J @ (aim.q - now.q), J @ aim.q1)
+        mode = next_mode(c, mode, measured, J @ (ref.q - now.q), J @ ref.q1)
         biting = mode == BITING
         M = c.inertia(now.q)
         by = definite_solve(M, J.T, ca.diag(M))[0]
         q2 = corrected(c)
         along = (J @ q2 + g.bite_damping * (J @ now.q1)) / (J @ by)
-        error = aim.force - measured
-        push = aim.force + g.proportional * error + g.integral * total
+        error = ref.force - measured
+        push = ref.force + g.proportional * error + g.integral * total
         push = ca.if_else(biting, push, measured)
         effort = c.inverse(
             now.q, now.q1, q2 - ca.if_else(biting, along, 0) * by, -push * g.direction, g.point

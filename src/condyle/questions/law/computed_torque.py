@@ -48,10 +48,10 @@ class ComputedTorque(ControllerTable):
 
     @staticmethod
     def equations(c: Control) -> tuple[Lanes, ca.SX]:
-        return c.inverse(c.now.q, c.now.q1, corrected(c)), c.memory
+        return c.inverse(c.measured.q, c.measured.q1, corrected(c)), c.memory
 
 
 def corrected(c: Control) -> ca.SX:
     """q_c'', (m,)."""
-    now, aim, g = c.now, c.aim, c.gains
-    return aim.q2 + g.damping * (aim.q1 - now.q1) + g.stiffness * (aim.q - now.q)
+    now, ref, g = c.measured, c.reference, c.gains
+    return ref.q2 + g.damping * (ref.q1 - now.q1) + g.stiffness * (ref.q - now.q)

@@ -1,6 +1,6 @@
 """What a controller is: a table of the scenario file, and equations on the Builder.
 
-    efforts, memory = equations(state, aim, memory, gains)
+    efforts, memory = equations(measured, reference, memory, gains)
 
 Everything that differs from mechanism to mechanism or from file to file is a port; what lasts from
 one period to the next is memory. So the same few lines run by numpy, as compiled code, as a batch
@@ -25,15 +25,15 @@ from ..builder import Builder, Lanes
 from ..entries import Count, File, Frequency, Machine, each, unit
 from ..equations import Wrench
 from ..instant import inertia_matrix
-from ..observer import Seen
+from ..observer import Measured
 from ..platform import Platform, placed
 
 EACH_COORDINATE, EACH_CHAIN = "coordinate", "chain"  # sizes of ports
 
 
 @dataclass(frozen=True)
-class Aim:
-    """What it should be there: q, q1, q2 (m,), joint, joint_rate, a chain's, force [N]."""
+class Reference:
+    """What the controller is to follow: q, q1, q2 (m,), joint, joint_rate, a chain's, force [N]."""
 
     q: Any
     q1: Any
@@ -61,8 +61,8 @@ class Control:
     """
 
     b: Builder
-    now: Seen
-    aim: Aim
+    measured: Measured
+    reference: Reference
     gains: Any
     choices: Mapping[str, Any]
     memory: ca.SX

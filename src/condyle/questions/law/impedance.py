@@ -61,13 +61,13 @@ class Impedance(ControllerTable):
 
     @staticmethod
     def equations(c: Control) -> tuple[Lanes, ca.SX]:
-        now, aim, g = c.now, c.aim, c.gains
-        p, p_d = c.point(now.q, g.point), c.point(aim.q, g.point)
+        now, ref, g = c.measured, c.reference, c.gains
+        p, p_d = c.point(now.q, g.point), c.point(ref.q, g.point)
         force = g.stiffness * (p_d.position - p.position)
-        force += g.damping * (p_d.J @ aim.q1 - p.J @ now.q1)
-        free = g.posture_damping * (aim.q1 - now.q1) + g.posture * (aim.q - now.q)
+        force += g.damping * (p_d.J @ ref.q1 - p.J @ now.q1)
+        free = g.posture_damping * (ref.q1 - now.q1) + g.posture * (ref.q - now.q)
         held = without(free, p.J, c.inertia(now.q))
-        return c.inverse(now.q, now.q1, aim.q2 + held, -force, g.point), c.memory
+        return c.inverse(now.q, now.q1, ref.q2 + held, -force, g.point), c.memory
 
 
 def without(free: ca.SX, J: ca.SX, M: ca.SX) -> ca.SX:

@@ -39,12 +39,12 @@ class JointPD(ControllerTable):
 
     @staticmethod
     def equations(c: Control) -> tuple[Lanes, ca.SX]:
-        now, aim, g = c.now, c.aim, c.gains
-        still = ca.SX.zeros(aim.q.numel())
-        held = c.inverse(aim.q, still, still) if c.choices["gravity"] else [0] * len(now.joint)
+        now, ref, g = c.measured, c.reference, c.gains
+        still = ca.SX.zeros(ref.q.numel())
+        held = c.inverse(ref.q, still, still) if c.choices["gravity"] else [0] * len(now.joint)
         return [
             held[i]
-            + g.stiffness[i] * (aim.joint[i] - now.joint[i])
-            + g.damping[i] * (aim.joint_rate[i] - now.joint_rate[i])
+            + g.stiffness[i] * (ref.joint[i] - now.joint[i])
+            + g.damping[i] * (ref.joint_rate[i] - now.joint_rate[i])
             for i in range(len(now.joint))
         ], c.memory

@@ -15,7 +15,7 @@ from ..motion.spline import Spline
 
 
 @dataclass(frozen=True)
-class Path:
+class ReferencePath:
     """A spline through q at the motion's own times; before and after them it stays where it is.
 
     times: (N,) [s];  q: (N, m).
@@ -28,8 +28,8 @@ class Path:
     force_times: np.ndarray
     force: np.ndarray
 
-    def same_as(self, other: Path) -> bool:
-        """Whether it aims at the same at all times."""
+    def same_as(self, other: ReferencePath) -> bool:
+        """Whether it is the same at all times."""
         arrays = ("times", "q", "force_times", "force")
         return self is other or (
             self.model is other.model
@@ -48,7 +48,7 @@ class Path:
         q1[outside] = q2[outside] = 0.0
         return q, q1, q2
 
-    def aims(self, t: np.ndarray) -> np.ndarray:
+    def at(self, t: np.ndarray) -> np.ndarray:
         """q, q', q'', joint, joint rate and force at times (K,) [s], (K, 3 m + 2 n + 1).
 
         Raises: InputError: where the mechanism cannot be there.
@@ -68,7 +68,7 @@ class Path:
         return np.interp(t, self.force_times, self.force)
 
 
-def path_of(model: Model, motion: Motion, force: float | None, file: str | None) -> Path:
+def path_of(model: Model, motion: Motion, force: float | None, file: str | None) -> ReferencePath:
     """The path of a motion on a model's mechanism.
 
     Args: force: f_d [N] at all times;  file: CSV of t, force instead.
@@ -86,7 +86,7 @@ def path_of(model: Model, motion: Motion, force: float | None, file: str | None)
         times, newtons = table.require(["t", "force"]).T
         if (np.diff(times) <= 0).any():
             raise InputError(f"{file}: times must be strictly increasing")
-    return Path(model, motion.t - motion.t[0], q, times, newtons)
+    return ReferencePath(model, motion.t - motion.t[0], q, times, newtons)
 
 
 def default_motion(model: Model) -> Motion:
