@@ -83,10 +83,10 @@ def test_every_parameter_is_the_number_of_the_scenario(name: str, jaw: condyle.M
     for i, parameter in enumerate(found.parameters):
         value = 0.6 * parameter.value
         other = {**tables, "load": [dict(load) for load in tables.get("load", ())]}
-        tables = {load["kind"]: load for load in other["load"]}
-        tables["controller"] = other["controller"] = dict(tables["controller"])
-        assert parameter.value == tables[parameter.owner].get(parameter.field, parameter.value)
-        tables[parameter.owner][parameter.field] = value
+        owned = {load["kind"]: load for load in other["load"]}
+        owned["controller"] = other["controller"] = dict(tables["controller"])
+        assert parameter.value == owned[parameter.owner].get(parameter.field, parameter.value)
+        owned[parameter.owner][parameter.field] = value
         found.reset()
         found.set_parameter(i, value)
         found.restart()
