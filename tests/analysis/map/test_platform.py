@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from condyle.analysis.map.axes import grid_of
+from condyle.analysis.map.axes import Grid, grid_of
 from condyle.analysis.map.compute import setup_of
 from condyle.analysis.map.lines import Line, lines_of
+from condyle.analysis.map.reach import Reach
 from condyle.analysis.map.volume import reachable_volume
 from condyle.mechanism import bundled_text
+from condyle.model.model import Model
 
 from .conftest import Models
 
@@ -29,13 +31,16 @@ def shells() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return centres, HOME + STROKE[0], HOME + STROKE[1]
 
 
+def at_a_height(model: Model, count: int) -> tuple[Grid, Reach]:
+    """X and Y at Z = 0.1 and that orientation, and the reach within the strokes."""
+    hold = {"Z": 0.1, **dict(zip(("alpha", "beta", "gamma"), ANGLES, strict=True))}
+    grid = grid_of(model.mechanism, dict.fromkeys("XY", (-3.0, 3.0, count)), hold)
+    return grid, setup_of(model, stroke=f"*={STROKE[0]}:{STROKE[1]}").reach
+
+
 def test_area_between_spherical_shells(model_of: Models) -> None:
     """Exact intervals of Y at many X, summed: the slice Z = 0.1 of an intersection of shells."""
-    model = model_of("gough-stewart")
-    alpha, beta, gamma = ANGLES
-    hold = {"Z": 0.1, "alpha": alpha, "beta": beta, "gamma": gamma}
-    grid = grid_of(model.mechanism, {"X": (-3.0, 3.0, 60), "Y": (-3.0, 3.0, 60)}, hold)
-    reach = setup_of(model, stroke=f"*={STROKE[0]}:{STROKE[1]}").reach
+    grid, reach = at_a_height(model_of("gough-stewart"), 60)
     found = reachable_volume(reach.margin, grid, budget=150_000)
     centres, near, far = shells()
     x = (np.arange(40_000) + 0.5) / 40_000 * 6 - 3
@@ -68,11 +73,8 @@ def lengths(x: np.ndarray, centres: np.ndarray, near: np.ndarray, far: np.ndarra
 
 
 def test_borders_lie_on_the_spheres(model_of: Models) -> None:
-    model = model_of("gough-stewart")
-    alpha, beta, gamma = ANGLES
-    hold = {"Z": 0.1, "alpha": alpha, "beta": beta, "gamma": gamma}
-    grid = grid_of(model.mechanism, {"X": (-3.0, 3.0, 41), "Y": (-3.0, 3.0, 41)}, hold)
-    lines = lines_of(setup_of(model, stroke=f"*={STROKE[0]}:{STROKE[1]}").reach, grid)
+    grid, reach = at_a_height(model := model_of("gough-stewart"), 41)
+    lines = lines_of(reach, grid)
     borders = [line for line in lines if line.kind == "stroke"]
     assert len(borders) >= 3
     centres, near, far = shells()
@@ -80,8 +82,7 @@ def test_borders_lie_on_the_spheres(model_of: Models) -> None:
     for line in borders:
         at = np.column_stack([line.points, np.full(len(line.points), 0.1)])
         distance = np.linalg.norm(at[:, None] - centres, axis=2)
-        own = distance[:, names.index(line.name)]
-        i = names.index(line.name)
+        own = distance[:, i := names.index(line.name)]
         assert np.minimum(abs(own - near[i]), abs(own - far[i])).max() < 1e-9
         inside = (distance > near - 1e-8) & (distance < far + 1e-8)
         assert inside.all()  # no other leg forbids what is drawn as the border

@@ -11,10 +11,13 @@ import numpy as np
 import pytest
 from support.loads import parts
 
-from condyle.analysis.map.axes import Axis, Grid
+from condyle.analysis.map.axes import Axis, Grid, grid_of
+from condyle.analysis.map.compute import setup_of
 from condyle.analysis.map.free_space import FreeSpace, best_box, greatest_ball, greatest_box
 from condyle.analysis.map.lines import trace
 from condyle.analysis.map.volume import reachable_volume
+from condyle.mechanism.chain import limits
+from condyle.results.contacts import bound_margins
 
 from .conftest import Models
 
@@ -117,11 +120,6 @@ def test_ball_in_a_known_set(d: int) -> None:
 @pytest.mark.slow
 def test_room_of_a_mechanism(model_of: Models) -> None:
     """Ball and box against the same conditions at many poses, taken from its own evaluations."""
-    from condyle.analysis.map.axes import grid_of
-    from condyle.analysis.map.compute import setup_of
-    from condyle.mechanism.chain import limits
-    from condyle.results.contacts import bound_margins
-
     model = model_of("masticatory")
     over = grid_of(model.mechanism, ["X=-4:9:20 mm", "beta=-6:12:20 deg"])
     setup = setup_of(model, "Fz=-30 N")
@@ -156,9 +154,6 @@ def test_room_of_a_mechanism(model_of: Models) -> None:
 
 
 def test_limits_stop_the_ball(model_of: Models) -> None:
-    from condyle.analysis.map.axes import grid_of
-    from condyle.analysis.map.compute import setup_of
-
     model = model_of("hexaglide")
     over = grid_of(model.mechanism, ["X=-50:50:20 mm"])
     assert greatest_ball(FreeSpace(setup_of(model)), over, points=200).radius == pytest.approx(0.05)
