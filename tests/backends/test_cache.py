@@ -24,7 +24,6 @@ from condyle.backends.c.build import _recipe
 from condyle.backends.compiler import Compiler, find_compiler
 from condyle.errors import CondyleError
 from condyle.questions import Question
-from condyle.questions.closure import Prescribed
 from condyle.questions.structure import structure_of
 
 RECIPE, OTHER = cache.digest("one"), cache.digest("other")
@@ -197,7 +196,7 @@ def test_everything_that_matters_is_in_the_recipe(monkeypatch: pytest.MonkeyPatc
         Question.about(structure, "inverse", ("joint",)),
         Question.about(structure, "matrices"),
         Question.about(structure, "motion"),
-        *(Question.about(structure, "closure", Prescribed(n)) for n in ((), ("X", "Y"))),
+        *(Question.about(structure, "closure", n) for n in ((), ("X", "Y"))),
     ]
     tools = [
         dataclasses.replace(tool, **change)
@@ -227,9 +226,8 @@ def test_everything_that_matters_is_in_the_recipe(monkeypatch: pytest.MonkeyPatc
 def test_formulation_and_route_make_no_difference_to_geometry() -> None:
     mechanism = case("masticatory").mechanism
     for name in questions.GEOMETRY:
-        details = (Prescribed(),) if name in ("closure", "conditions") else ()
         keys = {
-            Question.about(structure_of(mechanism, *choice), name, *details).key
+            Question.about(structure_of(mechanism, *choice), name).key
             for choice in (("virtual_power", "core"), ("momentum", "direct"))
         }
         assert len(keys) == 1

@@ -17,7 +17,6 @@ import condyle
 from condyle.graph.graph import Graph
 from condyle.graph.program import Check, Interface, Output, Port, Program, Variants
 from condyle.questions import QUESTIONS, Question
-from condyle.questions.closure import Prescribed
 from condyle.questions.structure import structure_of
 from condyle.status import Status
 
@@ -117,11 +116,10 @@ def test_an_interface_survives_json() -> None:
 DIGESTS = """
 from support.cases import case
 from condyle.questions import QUESTIONS, Question
-from condyle.questions.closure import Prescribed
 from condyle.questions.law import CONTROLLERS
 from condyle.questions.structure import structure_of
 structure = structure_of(case("mixed_k2_n8").mechanism)
-given = dict.fromkeys(("closure", "conditions"), Prescribed()) | {"tick": CONTROLLERS["impedance"]}
+given = {"tick": CONTROLLERS["impedance"]}
 for name in QUESTIONS:
     details = (given[name],) if name in given else ()
     question = Question.about(structure, name, *details)
@@ -147,7 +145,7 @@ def test_keys_do_not_depend_on_the_order_of_a_set() -> None:
     structure = structure_of(case("mixed_k2_n8").mechanism)
     zeros = [(-1, i) for i in range(40)] + [(0, i) for i in range(40)]
     keys = {
-        Question.about(replace(structure, zeros=frozenset(z)), "closure", Prescribed()).key
+        Question.about(replace(structure, zeros=frozenset(z)), "closure").key
         for z in (zeros, zeros[::-1], zeros[7:] + zeros[:7])
     }
     assert len(keys) == 1

@@ -13,7 +13,6 @@ from ..errors import InputError, did_you_mean
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..model.distributing import LEAST
 from ..questions.allocation import TERMS
-from ..questions.closure import Prescribed
 from ..questions.law import CONTROLLERS, ControllerTable
 from ..questions.law.computed_torque import ComputedTorque
 from ..questions.observer import ITERATIONS as OBSERVER_STEPS
@@ -131,7 +130,7 @@ CATALOGUE: dict[str, Entry] = {
         "Pose and its rates from other coordinates or a landmark's path.",
         "s s1 s2",
         WHOLE,
-        details=lambda wish: (Prescribed(wish.coordinates),),
+        details=lambda wish: (wish.coordinates,),
         doubt="UNREACHABLE",
     ),
     "pose": Entry(

@@ -22,7 +22,42 @@ from .chain import FAMILIES
 from .singularities import SINGULAR, Singularity
 
 FLAG = "or keep such samples with --flag (flag=True)."
-UNBALANCED = (Status.infeasible, Status.jammed, Status.uncertified)
+WEAK = "Stronger actuators, a slower motion or a smaller load"
+PULLED = (
+    "Unilateral contacts would have to pull, or cables to push: reduce --preload, change the "
+    "motion or load, or add cables that pull the other way"
+)
+# The error of a status, its message where no cause is named, and what to do.
+ERRORS: dict[Status, tuple[type[SampleError], str, str]] = {
+    Status.overflow: (
+        NumberRangeError,
+        "the efforts at {} are not finite: its rates, accelerations or load are too large",
+        "",
+    ),
+    Status.singular: (SingularError, "", "The efforts are not determined there; avoid the pose"),
+    Status.unreachable: (
+        UnreachableError,
+        "",
+        "The motion goes too far for this mechanism; scale it down",
+    ),
+    Status.jammed: (
+        JammedError,
+        "the mechanism jams at {}: Coulomb friction has no consistent solution, whatever the "
+        "efforts",
+        "Rigid bodies have no solution there; reduce friction, or change the motion or the slopes "
+        "of the contacts",
+    ),
+    Status.uncertified: (
+        UncertifiedError,
+        "the efforts found at {} could not be certified to 1e-9 of the largest",
+        "Widen limits that leave hardly any margin",
+    ),
+    Status.infeasible: (
+        InfeasibleError,
+        "no efforts within the limits balance the mechanism at {}",
+        "Raise the limits",
+    ),
+}
 
 
 @dataclass(frozen=True)
@@ -135,36 +170,30 @@ def sample_error(
         "row": first_row + i + 1 if t is None else None,
         **named,
     }
-    if status[i] == Status.overflow:
-        return NumberRangeError(
-            f"the efforts at {where} are not finite: its rates, accelerations or load are "
-            f"too large.{more}",
-            **about,
-        )
-    if status[i] == Status.singular:
+    kind, hint = list(Status)[status[i]], ""
+    if kind == Status.singular:
         ratio = float(singularity.ratio[i])
-        return SingularError(
+        about |= {"value": ratio, "bound": SINGULAR, "unit": "1"}
+        text = (
             f"the mechanism is singular at {where}: dimensionless ratio {ratio:.2g}, must be "
-            f"above {SINGULAR:g} ({cause_text(Status.singular, owner)}).{more}",
-            hint=f"The efforts are not determined there; avoid the pose, {FLAG}",
-            value=ratio,
-            bound=SINGULAR,
-            unit="1",
-            **about,
+            f"above {SINGULAR:g} ({cause_text(kind, owner)})"
         )
-    if status[i] in UNBALANCED:
-        return _unbalanced(int(status[i]), where, more, shortfall, about)
-    text = unreachable_text(mechanism, owner, pose[i])
-    if owner.kind == "chain":
-        chain = mechanism.chains[mechanism.chain_names.index(owner.name)]
-        with np.errstate(all="ignore"):
-            if (span := FAMILIES[chain.kind].span(chain, pose[i])) is not None:
-                about |= {"value": span[0], "bound": span[1], "unit": "m"}
-    return UnreachableError(
-        f"{text} at {where}.{more}",
-        hint=f"The motion goes too far for this mechanism; scale it down, {FLAG}",
-        **about,
-    )
+    elif kind == Status.unreachable:
+        text = f"{unreachable_text(mechanism, owner, pose[i])} at {where}"
+        if owner.kind == "chain":
+            chain = mechanism.chains[mechanism.chain_names.index(owner.name)]
+            with np.errstate(all="ignore"):
+                if (span := FAMILIES[chain.kind].span(chain, pose[i])) is not None:
+                    about |= {"value": span[0], "bound": span[1], "unit": "m"}
+    else:
+        text = ERRORS[kind][1].format(where)
+    if kind == Status.infeasible and shortfall is not None:
+        least = float(shortfall[i])
+        text, hint = f"{text}: {shortfall_text(least)}", WEAK if np.isfinite(least) else PULLED
+        about |= {"value": least, "bound": 1.0, "unit": "1"}
+    error, _, advice = ERRORS[kind]
+    hint = hint or advice
+    return error(f"{text}.{more}", hint=f"{hint}, {FLAG}" if hint else "", **about)
 
 
 def shortfall_text(shortfall: float) -> str:
@@ -172,42 +201,3 @@ def shortfall_text(shortfall: float) -> str:
     if not np.isfinite(shortfall):
         return "no limits would suffice, however large"
     return f"all limits would have to be {shortfall:.4g} times as large"
-
-
-def _unbalanced(
-    status: int, where: str, more: str, shortfall: np.ndarray | None, about: dict[str, Any]
-) -> SampleError:
-    """The error for samples without certified efforts."""
-    if status == Status.jammed:
-        return JammedError(
-            f"the mechanism jams at {where}: Coulomb friction has no consistent solution, whatever "
-            f"the efforts.{more}",
-            hint="Rigid bodies have no solution there; reduce friction, or change the motion or "
-            f"the slopes of the contacts, {FLAG}",
-            **about,
-        )
-    if status == Status.uncertified:
-        return UncertifiedError(
-            f"the efforts found at {where} could not be certified to 1e-9 of the largest.{more}",
-            hint=f"Widen limits that leave hardly any margin, {FLAG}",
-            **about,
-        )
-    text = f"no efforts within the limits balance the mechanism at {where}"
-    if shortfall is None:
-        return InfeasibleError(f"{text}.{more}", hint=f"Raise the limits, {FLAG}", **about)
-    least = float(shortfall[about["samples"][0]])
-    if np.isfinite(least):
-        advice = "Stronger actuators, a slower motion or a smaller load"
-    else:
-        advice = (
-            "Unilateral contacts would have to pull, or cables to push: reduce --preload, change "
-            "the motion or load, or add cables that pull the other way"
-        )
-    return InfeasibleError(
-        f"{text}: {shortfall_text(least)}.{more}",
-        hint=f"{advice}, {FLAG}",
-        value=least,
-        bound=1.0,
-        unit="1",
-        **about,
-    )

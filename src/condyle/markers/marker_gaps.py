@@ -59,7 +59,13 @@ def close_gaps(
     runs = runs_of(missing)
     too_long = [r for r in runs if (r.stop - r.start) * step > longest_gap + _SLACK * step]
     if too_long and not keep_longest:
-        raise _too_long(source, t, too_long, longest_gap, why)
+        told = [f"{t[r.start]:.4g} to {t[r.stop - 1]:.4g} s ({why(r)})" for r in too_long[:_NAMED]]
+        more = f" and {len(too_long) - _NAMED} more" if len(too_long) > _NAMED else ""
+        raise InputError(
+            f"{source}: no pose for longer than {longest_gap:g} s: {'; '.join(told)}{more}.",
+            "Repair the recording, allow longer gaps with --max-gap, or keep the longest gap-free "
+            "interval with --longest",
+        )
     kept = _longest_between(too_long, len(t))
     held = runs_of(~missing[kept])
     if not held or (~missing[kept]).sum() < MIN_ROWS:
@@ -89,19 +95,3 @@ def _filled(t: np.ndarray, values: np.ndarray) -> np.ndarray:
         return values
     spline = Spline.through(t[known] - t[0], values[known], _DEGREE)
     return np.where(known[:, None], values, spline(t - t[0]))
-
-
-def _too_long(
-    source: str,
-    t: np.ndarray,
-    runs: list[slice],
-    longest: float,
-    why: Callable[[slice], str],
-) -> InputError:
-    told = [f"{t[r.start]:.4g} to {t[r.stop - 1]:.4g} s ({why(r)})" for r in runs[:_NAMED]]
-    more = f" and {len(runs) - _NAMED} more" if len(runs) > _NAMED else ""
-    return InputError(
-        f"{source}: no pose for longer than {longest:g} s: {'; '.join(told)}{more}.",
-        "Repair the recording, allow longer gaps with --max-gap, or keep the longest gap-free "
-        "interval with --longest",
-    )

@@ -22,7 +22,6 @@ from ..mechanism.home import (
 )
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..questions import Question
-from ..questions.closure import Prescribed
 from ..questions.numbers import Layout, characteristic, specialised
 from ..questions.structure import Structure, structure_of
 from ..status import Status
@@ -80,17 +79,14 @@ class FollowedClosure:
         self._branch = self._side(np.zeros((1, 6)))[0]
 
     @staticmethod
-    def of(structure: Structure, numbers: Numbers, prescribed: Prescribed) -> FollowedClosure:
+    def of(structure: Structure, numbers: Numbers, names: tuple[str, ...]) -> FollowedClosure:
         """By numpy, from the question `conditions`."""
-        kernel = NumpyKernel(
-            Question.about(structure, "conditions", prescribed).variants(), numbers
-        )
+        kernel = NumpyKernel(Question.about(structure, "conditions", names).variants(), numbers)
 
         def conditions(pose: Array, rate: Array) -> tuple[Array, Array, Array]:
             found = kernel.run({"pose": pose, "pose_rate": rate}).values
             return found["values"].T, np.moveaxis(found["K"], -1, 0), found["bias"].T
 
-        names = prescribed.names
         angles = np.array([name in COORDINATES[3:] for name in names])
         if not names:  # a landmark's path: lengths
             angles = np.zeros(structure.m, dtype=bool)
@@ -151,7 +147,6 @@ class Closure:
         else:
             require_landmark(mechanism, landmark)
             self.names = ()
-        prescribed = Prescribed(self.names)
         structure = lender._robust[0] if lender else structure_of(mechanism)
         numbers = Layout.of(structure).numbers(mechanism, landmark)
         if not general:
@@ -159,9 +154,9 @@ class Closure:
         if lender:
             self._kernel: Kernel = lender._kernel.renumbered(numbers)
         else:
-            question = Question.about(structure, "closure", prescribed)
+            question = Question.about(structure, "closure", self.names)
             self._kernel = (backend or Backend()).kernel(question.key, question.variants, numbers)
-        self._robust: tuple[Structure, Numbers, Prescribed] = (structure, numbers, prescribed)
+        self._robust: tuple[Structure, Numbers, tuple[str, ...]] = (structure, numbers, self.names)
 
     @cached_property
     def _followed(self) -> FollowedClosure:

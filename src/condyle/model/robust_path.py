@@ -18,7 +18,6 @@ from ..dynamics.minimum_norm import minimum_norm
 from ..graph.program import Numbers
 from ..kinematics.singularities import SINGULAR, ratio
 from ..questions import Question
-from ..questions.closure import Prescribed
 from ..questions.numbers import characteristic
 from ..questions.structure import Structure
 from ..status import Status, judge
@@ -56,8 +55,7 @@ class Robust:
 
     @cached_property
     def _followed(self) -> FollowedClosure:
-        prescribed = Prescribed(self._independent)
-        return FollowedClosure.of(self._structure, self._numbers, prescribed)
+        return FollowedClosure.of(self._structure, self._numbers, tuple(self._independent))
 
     def evaluate(self, inputs: Mapping[str, np.ndarray]) -> tuple[Arrays, np.ndarray]:
         """All results of inverse dynamics by name, samples last, and their statuses."""

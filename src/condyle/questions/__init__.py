@@ -19,31 +19,25 @@ from typing import Any
 from ..graph.program import Program, Variants
 from .structure import Structure
 
-# Name -> its file in this folder, or the function itself if it is a user's.
-QUESTIONS: dict[str, str | Callable[..., Program | Variants]] = {
+_FILES = {
     "allocation": "allocation",
-    "inverse": "inverse",
+    "inverse": "inverse motion balance system",
     "limited": "limited",
-    "forward": "forward",
-    "forward_system": "forward",
-    "motion": "inverse",
-    "balance": "inverse",
-    "system": "inverse",
+    "forward": "forward forward_system",
     "linear": "linear",
-    "closure": "closure",
-    "conditions": "closure",
-    "configuration": "configuration",
-    "survey": "configuration",
-    "encoders": "pose",
-    "pose": "pose",
-    "instant": "instant",
-    "energy": "instant",
-    "matrices": "matrices",
-    "jacobians": "matrices",
+    "closure": "closure conditions",
+    "configuration": "configuration survey",
+    "pose": "encoders pose",
+    "instant": "instant energy",
+    "matrices": "matrices jacobians",
     "reactions": "reactions",
     "rate": "rate",
     "observer": "observer",
     "tick": "tick",
+}
+# Name -> its file in this folder, or the function itself if it is a user's.
+QUESTIONS: dict[str, str | Callable[..., Program | Variants]] = {
+    name: home for home, names in _FILES.items() for name in names.split()
 }
 
 
@@ -57,20 +51,9 @@ def written(name: str) -> Callable[..., Program | Variants]:
 SOURCES = ("mechanism", "kinematics", "dynamics", "graph", "questions")
 # Questions that do not depend on formulation and route.
 GEOMETRY = (
-    "allocation",
-    "motion",
-    "closure",
-    "conditions",
-    "configuration",
-    "survey",
-    "encoders",
-    "pose",
-    "instant",
-    "energy",
-    "jacobians",
-    "reactions",
-    "linear",
-)
+    "allocation", "motion", "closure", "conditions", "configuration", "survey", "encoders", "pose",
+    "instant", "energy", "jacobians", "reactions", "linear",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

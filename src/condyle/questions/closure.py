@@ -11,8 +11,6 @@ leaves open, is that the midpoint of the two contact points keeps its home Y.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import casadi as ca
 
 from ..graph.program import Program
@@ -34,38 +32,34 @@ from .platform import ANGLE_UNITS, check_contacts
 from .structure import Structure
 
 
-@dataclass(frozen=True)
-class Prescribed:
-    """6 - k prescribed coordinates by name; without names, a landmark's displacement."""
-
-    names: tuple[str, ...] = ()
-
-
 def guides(b: Builder, s: ca.SX) -> list[ContactSymbols]:
     """A landmark's path as contacts, for displacements (4,): x, y, z and the middle's y."""
     landmark, middle = b.parameter("landmark"), b.parameter("middle")
     return [*(Guide.along(i, landmark, s[i]) for i in range(3)), Guide.along(1, middle, s[3])]
 
 
-def closure(structure: Structure, prescribed: Prescribed) -> Program:
-    """Poses and rates where g = s, g' = s1, g'' = s2, ports (6 - k,) each."""
+def closure(structure: Structure, names: tuple[str, ...] = ()) -> Program:
+    """Poses and rates where g = s, g' = s1, g'' = s2, ports (6 - k,) each.
+
+    Args: names: of 6 - k prescribed coordinates; without any, a landmark's displacement.
+    """
     b = Builder(structure)
     m = structure.m
     s, s1, s2 = (b.sample(name, m) for name in ("s", "s1", "s2"))
-    if not prescribed.names:
+    if not names:
         contacts = [*single_contacts(structure, b.parameter), *guides(b, s)]
         placement = followed(contacts, list(range(6)), ca.SX(0, 1))
         here = [c.along_path(1.0) for c in contacts]
         rate, acceleration = _rates(here, placement.position, placement.bryant, s1, s2)
         pose = placement.pose()
     else:
-        dependent = [name for name in COORDINATES if name not in prescribed.names]
+        dependent = [name for name in COORDINATES if name not in names]
         contacts = contact_symbols(structure, b.parameter)
         placement = newton(contacts, dependent, s)
         motion = whole_motion(contacts, dependent, placement, s1, s2)
         rate, acceleration = motion.rate, motion.acceleration
         pose = placement.pose()
-        pose[indices(prescribed.names)] = s
+        pose[indices(names)] = s
     b.output("pose", pose, ANGLE_UNITS)
     b.output("pose_rate", rate, "per s")
     b.output("pose_acceleration", acceleration, "per s^2")
@@ -85,16 +79,12 @@ def _rates(
     return rate, solve_small(K, ca.vertcat(still, s2) - bias)
 
 
-def conditions(structure: Structure, prescribed: Prescribed) -> Program:
+def conditions(structure: Structure, names: tuple[str, ...] = ()) -> Program:
     """phi and g, (6,), K, (6, 6), and K' X', (6,), at any pose, for Newton's method."""
     b = Builder(structure)
     pose, rate = b.sample("pose", 6, ANGLE_UNITS), b.sample("pose_rate", 6)
     contacts = single_contacts(structure, b.parameter)
-    given: ca.SX
-    if not prescribed.names:
-        given = residuals(guides(b, ca.SX.zeros(4)), pose)
-    else:
-        given = pose[indices(prescribed.names)]
+    given = pose[indices(names)] if names else residuals(guides(b, ca.SX.zeros(4)), pose)
     values = ca.vertcat(residuals(contacts, pose), given)
     K = ca.jacobian(values, pose)
     b.output("values", values, "m, rad", 6)

@@ -100,10 +100,15 @@ def _add_singularity(b: Builder, loops: list[Loop], rows: Lanes) -> None:
 
 def loops_of(b: Builder, platform: Platform) -> list[Loop]:
     """The closed loops of the chains, one a group."""
+    return loops_at(b, platform.position, platform.R)
+
+
+def loops_at(b: Builder, O_M: ca.SX, R: ca.SX) -> list[Loop]:
+    """Those at any position, (3,), and rotation, (3, 3), of the platform."""
     loops = []
     for group, kind in enumerate(b.structure.families):
         family = FAMILIES[kind]
-        position = platform.position + platform.R @ b.lane(group, "joint")
+        position = O_M + R @ b.lane(group, "joint")
         loops.append(family.loop(family.named(b.lane(group, "constants")), position))
     return loops
 

@@ -44,12 +44,10 @@ CONDITIONED = 1e-5
 
 
 def forward(structure: Structure, wanted: Collection[str] = ()) -> Variants:
-    """Accelerations alone, or with some of `OUTPUTS`."""
-    return Variants(program(structure, wanted), single=True)
+    """Accelerations alone, or with some of `OUTPUTS`.
 
-
-def program(structure: Structure, wanted: Collection[str] = ()) -> Program:
-    """The graph; samples that fail its checks take the robust path."""
+    Samples that fail its checks take the robust path.
+    """
     b = Builder(structure)
     platform = closed(b, rates=1)
     effort = b.lane_sample("effort", unit="N m or N")
@@ -72,7 +70,7 @@ def program(structure: Structure, wanted: Collection[str] = ()) -> Program:
         b.output("joint_acceleration", accelerations, "per s^2")
     if "sliding" in wanted:
         (touch or contacts(b, platform)).add_sliding(b)
-    return b.finish()
+    return Variants(b.finish(), single=True)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import product
 
 from ..dynamics import FORMULATIONS
-from ..graph.program import Program, Variants
+from ..graph.program import Variants
 from ..status import Status
 from .allocation import TERMS, Allocated, Limits, least_pattern
 from .builder import Builder, Lanes
@@ -18,13 +18,10 @@ from .structure import Structure
 def limited(structure: Structure, term: str = "square", weighs: bool = False) -> Variants:
     """Efforts and contact forces, from q, q', q'', the load and the limits.
 
+    Samples that fail its checks take the robust path.
+
     Args: term: of the objective, see `TERMS`;  weighs: whether contact forces have a weight.
     """
-    return Variants(program(structure, term, weighs), single=True)
-
-
-def program(structure: Structure, term: str, weighs: bool) -> Program:
-    """The graph; samples that fail its checks take the robust path."""
     b = Builder(structure)
     platform, load = closed(b), Wrench.of(b)
     found, discriminants = within(b, platform, load, Limits.ports(b, weighs), term)
@@ -33,7 +30,7 @@ def program(structure: Structure, term: str, weighs: bool) -> Program:
     b.check(feasibility(b, platform, discriminants), DOUBTFUL, Status.unreachable)
     b.check(1 - 2 * found.none, 0.5, Status.infeasible)
     b.check(found.sure, 0.5)
-    return b.finish()
+    return Variants(b.finish(), single=True)
 
 
 def within(

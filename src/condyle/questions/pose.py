@@ -33,6 +33,7 @@ from ..kinematics.constraints import (
 )
 from ..kinematics.rotation import Bryant
 from .builder import Builder, Lanes
+from .configuration import loops_at
 from .numbers import single_contacts
 from .platform import ANGLE_UNITS, independent_indices
 from .structure import Structure
@@ -177,11 +178,7 @@ def joints_at(b: Builder, pose: ca.SX, contacts: Sequence[ContactSymbols]) -> Jo
     if dep:
         back[dep] = -solve_small(C[:, dep], phi)
     levers = [R @ b.lane(group, "joint") for group in range(len(s.families))]
-    loops = []
-    for group, kind in enumerate(s.families):
-        family = FAMILIES[kind]
-        constants = family.named(b.lane(group, "constants"))
-        loops.append(family.loop(constants, position + levers[group]))
+    loops = loops_at(b, position, R)
     pairs = zip(loops, levers, strict=True)
     J = [E.T @ ca.vertcat(loop.J, ca.cross(lever, loop.J)) for loop, lever in pairs]
     reach = [loop.discriminant for loop in loops]
