@@ -74,46 +74,44 @@ class MarkerMotion:
         return dict(zip(self.channels.names, self.channels.points.transpose(1, 0, 2), strict=True))
 
     def __str__(self) -> str:
-        return in_words(self)
-
-
-def in_words(found: MarkerMotion) -> str:
-    """Residuals, registration, gaps and distances from the contacts, some lines of text."""
-    recording, motion = found.recording, found.motion
-    lines = [
-        f"{recording.source}: {len(recording.t)} frames at {recording.rate:g} Hz from "
-        f"{recording.t[0]:.6g} to {recording.t[-1]:.6g} s, lengths in {recording.unit}",
-        f"Motion: {len(motion)} poses from {motion.t[0]:.6g} to {motion.t[-1]:.6g} s, "
-        f"{int((~found.measured).sum())} of them filled in",
-    ]
-    width = max(len(r.name) for r in found.residuals)
-    lines.append("Distance of each marker from its place in its body:")
-    lines += [
-        f"  {r.name:{width}}  {r.body:8}  {_mm(r.rms)} RMS, {_mm(r.largest)} at most "
-        f"(at {r.time:.4g} s), seen {100 * r.seen:.4g} % of the time"
-        for r in found.residuals
-    ]
-    if given := found.registration.residual:
-        points = ", ".join(f"{name} {_mm(value)}" for name, value in given.items())
-        lines.append(
-            f"Registration, distance of each point from its place in the mechanism: {points}"
-        )
-    if off := found.off_contacts.items():
-        balls = ", ".join(f"{n} {_mm(rms)} RMS, {_mm(m)} at most" for n, (rms, m) in off)
-        lines.append(f"Contacts will take away: {balls}")
-    if (load := found.load) is not None:
-        force, moment = (np.linalg.norm(part, axis=1).max() for part in np.split(load.wrench, 2, 1))
-        at = f" at {load.point}" if load.point else ""
-        about = f", moment up to {moment:.4g} N m there" if moment else ""
-        lines.append(f"Load: force up to {force:.4g} N{at}{about}")
-    if emg := found.channels.emg.items():
-        peaks = [f"{n} {v.max():.3g} at {motion.t[v.argmax()]:.4g} s" for n, v in emg]
-        lines.append(f"EMG, largest of each: {', '.join(peaks)}")
-    lines.append(f"Gaps: {len(found.gaps) or 'none'}")
-    lines += [f"  {gap}" for gap in found.gaps[:_LISTED]]
-    if len(found.gaps) > _LISTED:
-        lines.append(f"  and {len(found.gaps) - _LISTED} more")
-    return "\n".join(lines)
+        """Residuals, registration, gaps and distances from the contacts, some lines of text."""
+        recording, motion = self.recording, self.motion
+        lines = [
+            f"{recording.source}: {len(recording.t)} frames at {recording.rate:g} Hz from "
+            f"{recording.t[0]:.6g} to {recording.t[-1]:.6g} s, lengths in {recording.unit}",
+            f"Motion: {len(motion)} poses from {motion.t[0]:.6g} to {motion.t[-1]:.6g} s, "
+            f"{int((~self.measured).sum())} of them filled in",
+        ]
+        width = max(len(r.name) for r in self.residuals)
+        lines.append("Distance of each marker from its place in its body:")
+        lines += [
+            f"  {r.name:{width}}  {r.body:8}  {_mm(r.rms)} RMS, {_mm(r.largest)} at most "
+            f"(at {r.time:.4g} s), seen {100 * r.seen:.4g} % of the time"
+            for r in self.residuals
+        ]
+        if given := self.registration.residual:
+            points = ", ".join(f"{name} {_mm(value)}" for name, value in given.items())
+            lines.append(
+                f"Registration, distance of each point from its place in the mechanism: {points}"
+            )
+        if off := self.off_contacts.items():
+            balls = ", ".join(f"{n} {_mm(rms)} RMS, {_mm(m)} at most" for n, (rms, m) in off)
+            lines.append(f"Contacts will take away: {balls}")
+        if (load := self.load) is not None:
+            force, moment = (
+                np.linalg.norm(part, axis=1).max() for part in np.split(load.wrench, 2, 1)
+            )
+            at = f" at {load.point}" if load.point else ""
+            about = f", moment up to {moment:.4g} N m there" if moment else ""
+            lines.append(f"Load: force up to {force:.4g} N{at}{about}")
+        if emg := self.channels.emg.items():
+            peaks = [f"{n} {v.max():.3g} at {motion.t[v.argmax()]:.4g} s" for n, v in emg]
+            lines.append(f"EMG, largest of each: {', '.join(peaks)}")
+        lines.append(f"Gaps: {len(self.gaps) or 'none'}")
+        lines += [f"  {gap}" for gap in self.gaps[:_LISTED]]
+        if len(self.gaps) > _LISTED:
+            lines.append(f"  and {len(self.gaps) - _LISTED} more")
+        return "\n".join(lines)
 
 
 def as_data(found: MarkerMotion) -> dict[str, Any]:

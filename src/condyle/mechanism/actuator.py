@@ -104,7 +104,10 @@ class Actuator(Table):
     @property
     def effort_range(self) -> tuple[float, float]:
         """Least and greatest effort [N m or N], infinite where there is no limit."""
-        return -math.inf, math.inf
+        limit = getattr(self, "torque_limit", None) or getattr(self, "force_limit", None)
+        if limit is None:
+            return -math.inf, math.inf
+        return limit if isinstance(limit, tuple) else (-limit, limit)
 
     @property
     def reflected_inertia(self) -> float:
@@ -122,19 +125,11 @@ class RotaryActuator(Actuator):
         default=None, description="N m: |effort| is at most this, or [least, greatest]"
     )
 
-    @property
-    def effort_range(self) -> tuple[float, float]:
-        return _range(self.torque_limit)
-
 
 class LinearActuator(Actuator):
     force_limit: EffortLimit | None = Field(
         default=None, description="N: |effort| is at most this, or [least, greatest]"
     )
-
-    @property
-    def effort_range(self) -> tuple[float, float]:
-        return _range(self.force_limit)
 
 
 class CableActuator(Actuator):
@@ -146,11 +141,5 @@ class CableActuator(Actuator):
 
     @property
     def effort_range(self) -> tuple[float, float]:
-        low, high = _range(self.force_limit)
+        low, high = super().effort_range
         return max(low, 0.0), high
-
-
-def _range(limit: float | tuple[float, float] | None) -> tuple[float, float]:
-    if limit is None:
-        return -math.inf, math.inf
-    return limit if isinstance(limit, tuple) else (-limit, limit)

@@ -69,7 +69,7 @@ def test_compiled_kernels_agree(name: str, formulation: str) -> None:
     compiled = model.inverse_dynamics(*q, *parts(c.load), outputs="all")
     same(compiled, c.evaluate(formulation, **LEAST), 1e-10)
     for i, wanted in enumerate(compiled.effort):
-        one = (a[i : i + 1] for a in (*q, c.load))
+        one = (a[i : i + 1] for a in (*q, *parts(c.load)))
         close(model.inverse_dynamics(*one).effort[0], wanted, 1e-10)
 
 
