@@ -25,11 +25,11 @@ _SHORT.maxlevel = 3
 
 
 class CondyleError(Exception):
-    """Base of all errors that condyle raises on purpose.
+    """Base of all errors of condyle.
 
     Whatever a file holds, the message can go to a terminal: see `printable`.
 
-    Attributes: message: what is wrong;  hint: what to do about it, where that is a sentence of
+    Attributes: message: the problem;  hint: the remedy, where that is a sentence of
                 its own. `str` of the error is both.
     """
 
@@ -103,11 +103,11 @@ class ScenarioError(ProblemsError):
 
 
 class UnsupportedError(CondyleError):
-    """A combination of options that has no meaning; the message names one that has."""
+    """Options that cannot be combined; the message names some that can."""
 
 
 class WarningError(CondyleError):
-    """Warnings, where they are asked to be errors (`--strict`).
+    """Warnings as errors (`--strict`).
 
     Attributes: warnings: all of them.
     """
@@ -142,7 +142,7 @@ class SampleError(CondyleError):
     Attributes: samples: their indices, in order; what follows is of the first:
                 chain, contact: name of the one that is the cause;  time: [s], along a motion;
                 row: of a table, from 1;
-                value, bound, unit: what was got, and what it may be at most or at least.
+                value, bound, unit: the value got, and its limit.
     """
 
     facts = ("sample", "count", "time", "row", "chain", "contact", "value", "bound", "unit")

@@ -11,7 +11,7 @@ import numpy as np
 class Status(IntEnum):
     """Status of a sample, as kernels, results and files state it.
 
-    Attributes: meaning: in a few words;  owner: what can be named as its cause.
+    Attributes: meaning: in a few words;  owner: the kind of its cause.
     """
 
     meaning: str

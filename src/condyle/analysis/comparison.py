@@ -119,7 +119,7 @@ def compare(
 
     Args:   mechanism: a mechanism, a model, the path of a file, or the name of a bundled one.
             motion, load: files or arrays; default: as in `condyle.run`.
-            load_point: platform point that the load acts at.
+            load_point: platform point at which the load acts.
             formulations: names; default: all.
             distribution: how redundancy is resolved, as in `derive`.
     Raises: UnreachableError, SingularError: for samples that cannot be computed.

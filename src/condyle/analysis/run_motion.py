@@ -44,7 +44,7 @@ def run(
             formulation, route, backend, distribution: as of `derive`.
             reactions, flag, threads: as of `Model.solve`.
             measured: markers and EMG to keep with the results.
-            vary: a study, or its file, whose numbers vary: quantiles of efforts and contact forces.
+            vary: a study, or its file: quantiles of efforts and contact forces over its variants.
             reading: units, landmark, smooth, rate, trim: how the file of a motion is read.
     Raises: CondyleError: for input that cannot be used, or samples that cannot be computed.
     """

@@ -77,7 +77,7 @@ def tradeoff(
 
     Args:   mechanism: a mechanism, a model, the path of a file, or the name of a bundled one.
             motion, load: files or arrays; default: as in `condyle.run`.
-            load_point: platform point that the load acts at.
+            load_point: platform point at which the load acts.
             weights: W, strictly increasing.
             preload: minimum compressive force on unilateral contacts [N].
             model: formulation, route and backend of `derive`.

@@ -28,12 +28,12 @@ def new_mechanism(
     force: bool = False,
     strict: bool = False,
 ) -> NewMechanism:
-    """Write a small mechanism that works, with a comment on every number.
+    """Write a small valid mechanism, with a comment on every number.
 
     Args:   name: of the mechanism; the file is NAME.toml.
             from_mjcf: a MuJoCo model to convert instead.
             force: replace an existing file;  strict: a warning is an error.
-    Raises: InputError: for a name that cannot be one, or a file that exists.
+    Raises: InputError: for an invalid name, or a file that exists.
     """
     path = Path(name if name.endswith(".toml") else f"{name}.toml")
     stem = path.name.removesuffix(".toml")

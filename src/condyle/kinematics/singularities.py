@@ -26,7 +26,7 @@ class Singularity:
 
     J_A:             diagonal of eq. (26), (N, n) [m^2 per joint unit].
     transmission:    J_A made dimensionless, (N, n): 1 is best.
-    J_W_sigma:       singular values of the dimensionless J_W, (N, m), falling.
+    J_W_sigma:       singular values of the dimensionless J_W, (N, m), decreasing.
     inverse_ratio:   smallest over largest |transmission|, (N,).
     direct_ratio:    smallest over largest singular value of J_W, (N,).
     ratio:           the smaller of the two, (N,).

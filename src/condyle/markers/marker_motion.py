@@ -50,12 +50,12 @@ def motion_from_c3d(
 
     Args:   markers: a marker file (TOML), or its tables.
             model: whose points are registered: a model or mechanism, its file or bundled name.
-            max_residual: a frame in which a marker is farther from its place in its body [m] is a
+            max_residual: a frame in which a marker has a larger residual in its body [m] is a
                 gap.
             max_gap: longest gap that a cubic spline fills [s].
             longest: if a gap is too long to fill, keep the longest gap-free interval.
             unit: of lengths, in place of what the file says: m, cm, mm or um.
-            force: channels that are a force's components along the laboratory's axes, in place
+            force: channels with the components of a force along the laboratory's axes, in place
                 of [forces] of the marker file.
             cutoff: smooth the motion, as of `Motion.from_arrays`.
     Raises: InputError: for files that cannot be used, and gaps that are too long.

@@ -25,7 +25,7 @@ _LISTED = 12  # gaps in the text; all are in the data
 
 @dataclass(frozen=True)
 class MarkerResidual:
-    """How well a marker moves with its body: distances from its place in it.
+    """Residual of a marker in its body: distances from its mean position in it.
 
     Attributes: name, body;  seen: part of the frames used, 0 to 1;  rms, largest: [m];
                 time: of the largest [s].
@@ -41,7 +41,7 @@ class MarkerResidual:
 
 @dataclass(frozen=True, eq=False)
 class MarkerMotion:
-    """A motion from markers, and how well they fit.
+    """A motion from markers, and their residuals.
 
     Attributes:
         motion: X_EE in {S}, of kind "pose", without gaps.
@@ -53,8 +53,8 @@ class MarkerMotion:
         channels: what was measured with it, at its times: markers in {S} with the base's motion
             taken out, their residuals, and EMG, where the marker file names channels.
         load: from force channels or a force plate, where some were named.
-        recording: what the file holds.
-        warnings: what looks wrong, or was assumed.
+        recording: content of the file.
+        warnings: implausible values, and assumptions.
     """
 
     motion: Motion

@@ -25,13 +25,13 @@ EMG = "emg_"
 
 @dataclass(frozen=True, eq=False)
 class MeasuredChannels:
-    """Markers and EMG at times of their own.
+    """Markers and EMG with their own times.
 
-    Attributes: t: (N,) [s], rising.
+    Attributes: t: (N,) [s], increasing.
                 names: of the markers, (m,);  bodies: theirs, "fixed", "platform" or "" if unknown.
                 points: (N, m, 3) [m] in {S};  residual: distance of each marker from its place in
                     its body, (N, m) [m]; NaN where not seen.
-                emg: chain -> envelope, (N,), 1 at its greatest.
+                emg: chain -> envelope, (N,), 1 at its maximum.
                 source: where it came from, for messages.
     """
 

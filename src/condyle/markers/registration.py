@@ -25,7 +25,7 @@ class Registration:
     Attributes: rotation: (3, 3);  position: (3,) [m].
                 residual: distance of each point given from its place in the mechanism [m]; empty
                     where directions were given.
-                warnings: what looks wrong about it.
+                warnings: implausible values.
     """
 
     rotation: np.ndarray

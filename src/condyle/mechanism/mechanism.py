@@ -26,9 +26,9 @@ _NOTHING: Any = object()
 
 
 class Mechanism(Table):
-    """A platform, the contacts that hold it and the chains that drive it.
+    """A platform, the contacts that constrain it and the chains that drive it.
 
-    All values are SI. Make another one with `set` or `replace`, write one with `condyle.dump`.
+    All values are SI. `set` and `replace` return changed copies; `condyle.dump` writes a file.
     """
 
     name: Name
@@ -41,24 +41,24 @@ class Mechanism(Table):
     chains: tuple[Chain, ...] = Field(alias="chain", min_length=1)
 
     def get(self, path: str) -> Any:
-        """What stands at a place of the file, SI: `get("chain.masseter_left.base[2]")`.
+        """The value at a path of the file, SI: `get("chain.masseter_left.base[2]")`.
 
-        Raises: InputError: if there is no such place.
+        Raises: InputError: if there is no such path.
         """
         return value_at(self, path)
 
     def set(self, path: str | Mapping[str, Any], value: Any = _NOTHING) -> Self:
-        """A copy with other values at some places of the file, validated as a file is.
+        """A copy with other values at some paths of the file, validated like a file.
 
             mechanism.set("platform.mass", 0.25)
             mechanism.set({"contact.left.point[2]": 0.031, "contact.left.surface.offset": 0.021})
 
-        Chains and contacts go by their names, entries of lists by their number from 0. Several
+        Chains and contacts are addressed by name, entries of lists by index from 0. Several
         changes are made together: what must agree, such as a contact point and its surface, is
-        checked at the end. None takes an optional entry away.
+        checked at the end. None removes an optional entry.
 
-        Args:   path: a place, or places with their values;  value: the new one, SI.
-        Raises: MechanismError: with every problem found;  InputError: for a path that is none.
+        Args:   path: one path, or paths with their values;  value: the new one, SI.
+        Raises: MechanismError: with every problem found;  InputError: for an unknown path.
         """
         if isinstance(path, Mapping):
             if value is not _NOTHING:
@@ -70,7 +70,7 @@ class Mechanism(Table):
         return self.checked(changed(self, {path: value}), self.name)
 
     def replace(self, **changes: Any) -> Self:
-        """A copy with some fields changed, validated as a file is.
+        """A copy with some fields changed, validated like a file.
 
         Raises: MechanismError: with every problem found.
         """

@@ -11,7 +11,7 @@ from .model import Model, derive
 
 
 def as_model(given: Any) -> Model:
-    """A model: as it is, or of a mechanism, of one by the path of its file or its bundled name.
+    """The model given, or that of a mechanism, of its file or of its bundled name.
 
     Raises: InputError: for anything else; errors of `load_mechanism` and `derive`.
     """

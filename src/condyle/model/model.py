@@ -45,15 +45,15 @@ FORMULATION, ROUTE = "virtual_power", "core"  # by default
 class Model:
     """Inverse and forward dynamics and kinematics of a mechanism, by one formulation and route.
 
-    mechanism, formulation, route, backend: as derived;  derivation_seconds: what that took.
+    mechanism, formulation, route, backend: as derived;  derivation_seconds: duration.
     independent, dependent: names of the coordinates q_EE, in order, and of those that the contacts
                             determine.
-    characteristic_length:  what angles are multiplied by where they meet lengths [m].
+    characteristic_length:  factor that converts angles to lengths [m].
 
     Shapes: m independent coordinates, n chains, k contacts; "..." is the leading shape.
         q, v, a: independent coordinates, rates and accelerations, (..., m) [m, rad; per s; per s^2]
         wrench:  force [N] and moment [N m] on the platform in {S}, (..., 6); None is none
-        at:      where it acts: a platform point by name, or (..., 3) [m] in {M}; None is O_M
+        at:      point of action: a platform point by name, or (..., 3) [m] in {M}; None is O_M
         effort:  of the actuators, in the order of the file, (..., n) [N m or N]
     """
 
@@ -118,7 +118,7 @@ class Model:
         return _again, (type(self), self.mechanism, how)
 
     def with_distribution(self, distribution: str | Distribution | None = None) -> Self:
-        """The same model, kernels and all, with another distribution; see `derive`."""
+        """The same model with its kernels and another distribution; see `derive`."""
         return self._with(self.system, Distribution.of(distribution))
 
     def with_mechanism(self, mechanism: Mechanism) -> Self:
@@ -160,11 +160,11 @@ class Model:
         outputs: Outputs = (),
         threads: int | None = None,
     ) -> ModelResult:
-        """Efforts that make a motion under a wrench: J_A^T tau = F of [Cheng2023] eqs (57), (63).
+        """Efforts for a motion under a wrench: J_A^T tau = F of [Cheng2023] eqs (57), (63).
 
         Args:    q, v, a, wrench, at: as of `Model`.
-                 outputs: names of further results, "all" for all; what is not named is not
-                 computed: share, gravity_share, pose, pose_rate, pose_acceleration, joint_rate,
+                 outputs: names of further results, computed only if named; "all" is
+                 all: share, gravity_share, pose, pose_rate, pose_acceleration, joint_rate,
                  joint_acceleration, configuration, condition, slip, friction_force, shortfall.
                  threads: maximum number of threads; default: the processors at hand. Results do
                  not depend on it.
@@ -185,9 +185,9 @@ class Model:
         outputs: Outputs = (),
         threads: int | None = None,
     ) -> ModelResult:
-        """Accelerations that efforts and a wrench make.
+        """Accelerations under efforts and a wrench.
 
-        Limits of efforts, and that cables cannot push, are the caller's concern.
+        Limits of efforts are not applied, and cables may have negative efforts.
 
         Args:    q, v, effort, wrench, at: as of `Model`;  threads: as of `inverse_dynamics`.
                  outputs: of pose, pose_rate, pose_acceleration, joint, joint_rate,
@@ -205,9 +205,9 @@ class Model:
             effort = dynamics.inverse_dynamics(q, v, a, wrench, at)             (n,)
             acceleration = dynamics.forward_dynamics(q, v, effort, wrench, at)  (m,)
 
-        Arrays of doubles go fastest; `at` is an array (3,) or None. Results are new arrays, NaN
+        Arrays of doubles are fastest; `at` is an array (3,) or None. Results are new arrays, NaN
         where there are none. One object serves all threads.
-        Raises: InputError: for what is no state.
+        Raises: InputError: for arrays that are no state.
         """
         return self._unchecked
 
@@ -219,7 +219,7 @@ class Model:
         wrench: ArrayLike | None = None,
         at: Point = None,
     ) -> ModelResult:
-        """x' = A x + B effort about states x = (q, v), exact; the wrench stays as it is in {S}.
+        """x' = A x + B effort about states x = (q, v), exact; the wrench is constant in {S}.
 
         Args:    as of `forward_dynamics`.
         Returns: A (..., 2 m, 2 m), B (..., 2 m, n), status (...); NaN where there are no
@@ -242,7 +242,7 @@ class Model:
         return self.poses.matrix("bias", q, v, space)
 
     def gravity(self, q: ArrayLike, *, space: str = "q") -> Array:
-        """G_r, what holds it against gravity, (..., m) [N, N m]; in `space` "X", (..., 6)."""
+        """G_r, forces that balance gravity, (..., m) [N, N m]; in `space` "X", (..., 6)."""
         return self.poses.matrix("gravity", q, None, space)
 
     # -- kinematics --------------------------------------------------------------------------
@@ -263,7 +263,7 @@ class Model:
         Args:    q, v, a: (..., m); with v and a come rates and accelerations.
         Returns: pose (..., 6), joint (..., n), contact_point and contact_normal (..., k, 3),
                  beta, gamma, cos_gamma, discriminant (..., n), singularity, condition (...), status
-                 (...): 0 where the contacts are met and every chain reaches. With v: pose_rate,
+                 (...): 0 where contacts are closed and chains reach. With v: pose_rate,
                  joint_rate; with a: pose_acceleration, joint_acceleration.
         Raises:  InputError: for arrays that do not fit.
         """
@@ -277,7 +277,7 @@ class Model:
         time: ArrayLike | None = None,
         tolerance: float = TOLERANCE,
     ) -> ModelResult:
-        """Poses from joint coordinates, as encoders give them: nearest in least squares.
+        """Poses from joint coordinates, such as encoder readings, by least squares.
 
         Args:    joint: (..., n) [rad or m], zero at home; turning joints may count whole turns.
                  start: poses X_EE (..., 6) from which each is followed; default: home.
@@ -310,8 +310,8 @@ class Model:
     ) -> Any:
         """Inverse dynamics along a motion under a load: an `xarray.Dataset` with labels and units.
 
-        Args:   motion: what the platform does; load: what acts on it (none by default).
-                load_point: platform point the load acts at; default: the load's own, else
+        Args:   motion: of the platform; load: on it (none by default).
+                load_point: its point of action, by name; default: the load's own, else
                 right_molar.
                 flag: keep samples that cannot be computed, empty and with a status.
                 reactions: forces and moments in every joint too.
@@ -333,12 +333,12 @@ class Model:
 
     @cached_property
     def reference_force(self) -> float:
-        """N_ref, by which `weighted` measures contact forces [N]."""
+        """N_ref, the reference of contact forces in `weighted` [N]."""
         return reference_force(self.mechanism)
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """Names of the parts that share the efforts."""
+        """Names of the parts of the efforts."""
         structure = self.system.structure
         internal = not self._inverse.distributor.least_norm and not structure.friction
         return part_names(structure) + (INTERNAL,) * internal

@@ -65,7 +65,7 @@ class ModelResult:
 
     Which attributes there are depends on the method and on `outputs`; `QUANTITIES` has their
     shapes, units and meanings, and the result shows its own. Numbers that could not be computed
-    are NaN; `status` says why.
+    are NaN; `status` is the reason.
     """
 
     effort: Array

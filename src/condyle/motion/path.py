@@ -58,7 +58,7 @@ class Motion:
         source: where the samples came from, for messages.
         smoothing: what was smoothed away, or None.
         sha256: hash of the file that was read, or None.
-        warnings: what looks wrong about it, for whoever reads the results.
+        warnings: implausible values, for the results.
     """
 
     kind: Kind

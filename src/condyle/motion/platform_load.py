@@ -30,7 +30,7 @@ class Load:
                 point: name of the platform point; None leaves the choice to the mechanism.
                 source: where the load came from, for messages.
                 sha256: hash of the file that was read, or None.
-                warnings: what looks wrong about it, for whoever reads the results.
+                warnings: implausible values, for the results.
     """
 
     t: np.ndarray

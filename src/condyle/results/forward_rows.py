@@ -36,7 +36,7 @@ def forward_states(
 ) -> StatesReport:
     """Forward dynamics of every row of a file; the output appears whole or not at all.
 
-    Rows never influence each other.
+    Rows are independent.
 
     Args:    model: one, or a mechanism, the path of a file, or the name of a bundled one.
              states: CSV, or Parquet if its name ends in .parquet, with 6 - k pose coordinates,

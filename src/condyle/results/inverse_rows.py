@@ -43,9 +43,9 @@ def solve_states(
     threads: int | None = None,
     mat: str | Path | None = None,
 ) -> StatesReport:
-    """Solve every row of a states file; the output appears whole or not at all.
+    """Inverse dynamics of independent states, one per row; the output is complete or absent.
 
-    Rows never influence each other.
+    Rows are independent.
 
     Args:    model: one, or a mechanism, the path of a file, or the name of a bundled one.
              states: CSV, or Parquet if its name ends in .parquet, with 6 - k pose coordinates,

@@ -60,7 +60,7 @@ def pose_states(
 
     Args:   mechanism: one, a model, the path of a file, or the name of a bundled one.
             joints: CSV with the columns joint_<chain> [rad or m, zero at home], optionally t [s]:
-                    then each row follows the one before, else each follows from home, alone.
+                    then each row follows the one before, else each follows from home.
             out:    CSV: t if given, X ... gamma, residual (largest of the row, in the unit of the
                     joints; where chains slide and turn, residual_m and residual_rad) and
                     condition; with `flag` also status.

@@ -45,7 +45,7 @@ def bind(
     """The plan of a scenario.
 
     Args:   controller: a function in the place of the scenario's law;  loads: functions besides.
-            motion: to follow, in the place of the controller's.
+            motion: to follow, instead of the controller's.
             shared: paths and models, which plans of one call have in common.
     Raises: ScenarioError: with everything that does not fit the mechanism.
     """

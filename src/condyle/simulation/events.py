@@ -33,7 +33,7 @@ MANY = 100  # events of a kind and an owner that are listed
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened.
+    """An event of a simulation.
 
     kind:  of `KINDS`;  owner: name of the chain, contact or load;  text: for people.
     state: independent coordinates and rates there, by name;  ends: whether it ended the run.

@@ -81,7 +81,7 @@ class Sensors(Table):
 
 
 class Scenario(Table):
-    """A simulation: how long, from where, driven by what, under which loads. All values are SI."""
+    """A simulation: duration, start, efforts or controller, and loads. All values are SI."""
 
     duration: Positive = Field(default=1.0, le=LONGEST, description="s")
     rate: Frequency = Field(default=1000.0, description="of the results, Hz")
@@ -123,7 +123,7 @@ class Scenario(Table):
 
     @property
     def closed_loop(self) -> bool:
-        """Whether a controller chooses the efforts."""
+        """Whether a controller commands the efforts."""
         return self.controller is not None and self.controller.kind != "none"
 
 
@@ -139,7 +139,7 @@ def _controller_problems(controller: Any, sensors: Sensors | None) -> Iterable[s
 
 
 def load_scenario(source: str | os.PathLike[str]) -> Scenario:
-    """Read a scenario file; files that it names are looked for next to it.
+    """Read a scenario file; paths in it are relative to it.
 
     Raises: ScenarioError: with every problem found;  InputError: if it is no TOML file.
     """

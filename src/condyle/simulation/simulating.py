@@ -70,16 +70,16 @@ def simulate(
     Args:   model: a model, a mechanism, or one by its file or name.
             scenario: a `Scenario`, its file, or its tables in SI, or a list of these; default:
             5 s of computed torque along the path that fits the mechanism.
-            controller: (measured, reference) -> efforts (n,), in the place of the scenario's law.
+            controller: (measured, reference) -> efforts (n,), instead of the scenario's law.
             loads: functions (t, s, v) -> force (3,) or force and moment (6,) in {S} at O_M, or
             pairs (function, name of a point), besides those of the scenario; s is the point's
             displacement from home and v its velocity, (3,) each.
-            motion: to follow, in the place of the controller's.
+            motion: to follow, instead of the controller's.
             stop_at_bounds: end where a contact reaches the end of its surface.
             threads: maximum number; default: the processors at hand. Results do not depend on it.
-    Returns: a dataset at `rate`, up to what ended the run; `.condyle.events` says what happened.
+    Returns: a dataset at `rate`, up to the end of the run; `.condyle.events` lists events.
             For a list of scenarios a list.
-    Raises: ScenarioError: for anything wrong in a scenario, or that does not fit, before any runs.
+    Raises: ScenarioError: for problems of any scenario, before the first run.
     """
     start = time.perf_counter()
     many = isinstance(scenario, list | tuple)
@@ -98,9 +98,9 @@ def check_gains(
     loads: Sequence[Any] = (),
     motion: Motion | None = None,
 ) -> GainReport:
-    """Is the control loop stable, and by how much, at home and along its path?
+    """Stability, damping and phase margin of the control loop at home and along its path.
 
-    By exact derivatives of plant and law; those of a `controller` in Python are differences.
+    Derivatives of plant and law are exact; those of a `controller` in Python are differences.
 
     Args:   as of `simulate`.
     Raises: UnsupportedError: in open loop;  ScenarioError: as of `simulate`.

@@ -40,7 +40,7 @@ FRAME = 1 / 30  # seconds between pictures of a solution that plays
 
 
 class View:
-    """A running page. `url` is where it is; `close` ends it.
+    """A running page: `url` is its address; `close` ends it.
 
     Attributes: session: the pose and the load that people move;  playback: a solution or a
                 simulation that the page shows, or None;  live: the simulation, if there is one;
@@ -255,7 +255,7 @@ def serve_view(
     Args:   mechanism: one, the path of its file, or the name of a bundled one; without, that of
                 the solution, or the chewing robot.
             solution: to play back, or the path of its NetCDF file; its own mechanism is shown.
-            host, port: where to listen; the next free port is taken if `port` is not.
+            host, port: of the server; if `port` is in use, the next free one.
             open_browser: show the page at once.
             map: of `workspace_map`, or the path of its file: shown beside its mechanism, which
                 goes where the map is clicked.

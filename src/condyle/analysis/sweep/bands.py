@@ -37,8 +37,8 @@ def with_bands(
 ) -> xr.Dataset:
     """The solution with quantiles of efforts and contact forces at every time.
 
-    Of the study what varies and the sampling count; its other keys give way to how the solution was
-    made. Samples without a result are left out, time by time.
+    Only variation and sampling of the study are used; all else is as in the solution. Samples
+    without a result are omitted, time by time.
 
     Args:   motion, load: those of the solution.
             mechanism: that of the solution; to be given where surfaces are written in Python.

@@ -157,7 +157,7 @@ DEFAULT_MEASURES = {
 
 
 class Study(Table):
-    """Many variants of one mechanism along one or several motions, and the measures."""
+    """Variants of one mechanism, one or several motions, and the measures."""
 
     mechanism: str | None = Field(
         default=None, description="a file, or a bundled mechanism; default: masticatory"
@@ -195,7 +195,7 @@ class Study(Table):
     def checked(cls, data: Mapping[str, Any], source: str) -> Self:
         """A study of `data`; `source` names it in messages.
 
-        Raises: InputError: with what is wrong, in one line.
+        Raises: InputError: with the problem, in one line.
         """
         if nests_too_deep(data):
             raise too_deep(source)
@@ -218,7 +218,7 @@ def read_study(source: str | os.PathLike[str] | Mapping[str, Any] | Study) -> St
 
     Relative paths in a file start from its folder.
 
-    Raises: InputError: with what is wrong, in one line.
+    Raises: InputError: with the problem, in one line.
     """
     if isinstance(source, Study):
         return source

@@ -43,7 +43,7 @@ def sweep(
             workers: number of processes; default: all processors. Results do not depend on it.
             scheduler: processes, threads, dask (a cluster on this machine), or the address of a
             Dask scheduler.
-            resume: continue what `out` holds of this study.
+            resume: compute the missing rows of this study in `out`.
             mechanism, motion, load: instead of those that the study names.
     Raises: InputError: for a study that cannot be solved, before the computation starts.
             LostWorkerError: if a worker was killed; finished parts are kept.

@@ -8,10 +8,10 @@ import numpy as np
 
 
 class PoseStatus(IntEnum):
-    """OK, or why there is no pose.
+    """OK, or the reason why there is no pose.
 
-    UNREACHABLE:  followed in pieces, the way ends before the joint coordinates do.
-    LOST:         behind a singularity the assembly mode is no longer certain (with times).
+    UNREACHABLE:  the continuation ends before it reaches the joint coordinates.
+    LOST:         beyond a singularity the assembly mode is uncertain (with times).
     INCONSISTENT: the nearest pose leaves a residual beyond the tolerance.
     """
 

@@ -53,7 +53,7 @@ def save_figures(
 def save_solution_figures(solution: xr.Dataset, folder: str | os.PathLike[str]) -> list[Path]:
     """Write the plots of `PLOTS` as PNG and SVG into a folder that exists; returns the paths.
 
-    Those that the solution has nothing for are left out, such as of contacts or of activations.
+    Plots without data in the solution are omitted, such as of contacts or of activations.
     """
     plots = {
         name: draw

@@ -21,7 +21,7 @@ FORMATS = ("png", "svg")
 
 
 def save(figure: Figure, folder: str | os.PathLike[str], name: str) -> list[Path]:
-    """Write one figure as PNG and SVG, each whole or not at all; returns the paths."""
+    """Write one figure as PNG and SVG, each completely or not at all; returns the paths."""
     paths = [Path(folder) / f"{name}.{kind}" for kind in FORMATS]
     engine = figure.get_layout_engine()
     try:

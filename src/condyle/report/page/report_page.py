@@ -72,16 +72,16 @@ def write_report(
     measured: MeasuredChannels | str | os.PathLike[str] | None = None,
     sweep: xr.Dataset | None = None,
 ) -> Path:
-    """Write the report, whole or not at all.
+    """Write the report, completely or not at all.
 
-    Args:   solution: what to show, or its file (.nc), which is read piece by piece, so that a run
-                of any length fits into memory. More samples than a screen can show are thinned;
-                every peak stays.
+    Args:   solution: a dataset, or its file (.nc), which is read in chunks, so that a run
+                of any length fits into memory. More samples than a screen can show are reduced;
+                every peak is kept.
             path: the HTML file.
             tables: of `condyle.report.tables`, to print on it; default: those that the solution
                 keeps, which `condyle compare` puts there.
             files: inputs of the run, to be named with their hashes.
-            measured: markers and EMG, as of `with_measured`, to show beside it.
+            measured: markers and EMG, as of `with_measured`.
             sweep: of `condyle.sweep`, to be shown too.
     Returns: the path.
     Raises: InputError: if a file cannot be read or the report cannot be written.

@@ -89,7 +89,7 @@ def _cell(record: dict[str, Any], cell: Cell) -> str:
 
 
 def with_tables(solution: xr.Dataset, tables: Sequence[Table]) -> xr.Dataset:
-    """A copy of the solution that keeps the tables, as text, through NetCDF and back."""
+    """A copy of the solution with the tables as text, which NetCDF keeps."""
     kept = [{field: getattr(table, field) for field in _FIELDS} for table in tables]
     copy = type(solution)(solution.data_vars, solution.coords, solution.attrs)
     copy.attrs["tables"] = json.dumps(kept)
