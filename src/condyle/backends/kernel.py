@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -11,6 +11,8 @@ import numpy as np
 from ..errors import InputError
 from ..graph.program import Interface, Numbers, Port
 
+Arrays = dict[str, np.ndarray]
+Found = tuple[Arrays, np.ndarray | int]
 OK, AGAIN = 0, 255  # statuses; others are those of the program's checks
 
 
@@ -24,6 +26,25 @@ class Answer:
 
     values: dict[str, np.ndarray]
     status: np.ndarray
+
+    def mend(self, inputs: Mapping[str, np.ndarray], robust: Callable[[Arrays], Found]) -> None:
+        """Replace what the kernel cannot vouch for, in place, by what another finds.
+
+        Args: robust: results by name, samples last, and statuses, from some samples' inputs.
+        """
+        if self.status.any() and (again := np.flatnonzero(self.status == AGAIN)).size:
+            few = sample_rows(inputs, again, len(self.status))
+            better, self.status[again] = robust(few)
+            for name, value in self.values.items():
+                value[..., again] = better[name]
+
+
+def sample_rows(inputs: Mapping[str, np.ndarray], rows: np.ndarray, count: int) -> Arrays:
+    """Some of N samples of every input, by index."""
+    return {
+        name: np.broadcast_to(a, (count, *a.shape[1:]))[rows] if len(a) != count else a[rows]
+        for name, a in inputs.items()
+    }
 
 
 class Kernel(Protocol):

@@ -96,8 +96,8 @@ def _closure(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
     )
     rest = np.zeros((len(given["s"]), int(not closure.names)))
     s, s1, s2 = (np.hstack([given[name], rest]) for name in ("s", "s1", "s2"))
-    found = closure.solve(s, s1, s2)
-    return dict(found.named()), np.where(found.reached, Status.ok, Status.unreachable)
+    found, status = closure.solve(s, s1, s2).answer()
+    return {name: a.T for name, a in found.items()}, status
 
 
 def _pose(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:

@@ -72,7 +72,6 @@ class Arguments:
         self.v = Argument("v", m, f"rates of {entries} [m/s, rad/s]")
         self.a = Argument("a", m, f"accelerations of {entries} [m/s^2, rad/s^2]")
         self.effort = Argument("effort", n, f"{', '.join(chains)} [N m or N]")
-        self.joint = Argument("joint", n, f"{', '.join(chains)} [rad or m]")
         self._points = {name: np.array(point, dtype=float) for name, point in points.items()}
 
     def point(self, at: Any) -> Array:
@@ -143,14 +142,6 @@ def samples(arguments: Sequence[Argument], arrays: Sequence[Array]) -> tuple[Lea
         else:
             flat.append(np.broadcast_to(a, (*lead, a.shape[-1])).reshape(-1, a.shape[-1]))
     return lead, flat
-
-
-def sample_rows(inputs: Mapping[str, Array], rows: Array, count: int) -> dict[str, Array]:
-    """Some of N samples of every input, by index."""
-    return {
-        name: np.broadcast_to(a, (count, *a.shape[1:]))[rows] if len(a) != count else a[rows]
-        for name, a in inputs.items()
-    }
 
 
 def requested(outputs: Any, known: Collection[str]) -> tuple[str, ...]:

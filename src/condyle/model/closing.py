@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ..backends.choose import Backend
-from ..backends.kernel import AGAIN, Kernel
+from ..backends.kernel import Arrays, Kernel
 from ..backends.numpy_kernel import NumpyKernel
 from ..errors import InputError, did_you_mean
 from ..graph.program import Numbers
@@ -28,6 +28,7 @@ from ..status import Status
 from .continuation import Conditions, Steps, follow, least_squares, nearest
 
 Array = np.ndarray
+MOTION = ("pose", "pose_rate", "pose_acceleration")
 
 
 @dataclass(frozen=True)
@@ -39,13 +40,10 @@ class PlatformMotion:
     acceleration: Array
     reached: Array
 
-    def named(self) -> dict[str, Array]:
-        """The arrays, by the names that questions have for them."""
-        return {
-            "pose": self.pose,
-            "pose_rate": self.rate,
-            "pose_acceleration": self.acceleration,
-        }
+    def answer(self) -> tuple[Arrays, Array]:
+        """As questions answer: arrays by name, samples last, and statuses."""
+        found = dict(zip(MOTION, (self.pose.T, self.rate.T, self.acceleration.T), strict=True))
+        return found, np.where(self.reached, Status.ok, Status.unreachable)
 
 
 class FollowedClosure:
@@ -87,9 +85,8 @@ class FollowedClosure:
             found = kernel.run({"pose": pose, "pose_rate": rate}).values
             return found["values"].T, np.moveaxis(found["K"], -1, 0), found["bias"].T
 
-        angles = np.array([name in COORDINATES[3:] for name in names])
-        if not names:  # a landmark's path: lengths
-            angles = np.zeros(structure.m, dtype=bool)
+        turns = [name in COORDINATES[3:] for name in names]
+        angles = np.array(turns or [False] * structure.m)  # a landmark's path: lengths
         dependent = [name for name in COORDINATES if name not in names]
         closed = closed_form_available([form for form, _ in structure.contacts], dependent)
         length = characteristic(structure, numbers)
@@ -166,22 +163,15 @@ class Closure:
         self, s: np.ndarray, s1: np.ndarray, s2: np.ndarray, threads: int | None = None
     ) -> PlatformMotion:
         """X_EE and its rates where g = s, g' = s1, g'' = s2, (N, 6 - k) each."""
-        answer = self._kernel.run({"s": s, "s1": s1, "s2": s2}, threads)
-        pose, rate, acceleration = (
-            answer.values[name].T for name in ("pose", "pose_rate", "pose_acceleration")
-        )
-        found = (pose, rate, acceleration)
+        inputs = {"s": s, "s1": s1, "s2": s2}
+        answer = self._kernel.run(inputs, threads)
+        answer.mend(inputs, lambda few: self._followed.solve(*few.values()).answer())
         reached = answer.status == Status.ok
-        again = np.flatnonzero(answer.status == AGAIN)
-        if again.size:
-            better = self._followed.solve(s[again], s1[again], s2[again])
-            reached[again] = better.reached
-            for target, a in zip(found, better.named().values(), strict=True):
-                target[again] = a
+        found = [answer.values[name].T for name in MOTION]
         if not reached.all():
-            for target in found:
-                target[~reached] = np.nan
-        return PlatformMotion(pose, rate, acceleration, reached)
+            for a in found:
+                a[~reached] = np.nan
+        return PlatformMotion(found[0], found[1], found[2], reached)
 
 
 def require_independent(mechanism: Mechanism, names: Sequence[str]) -> None:

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from ..backends.c.compiled_kernel import CompiledKernel
 from ..questions.forward import OUTPUTS as ASKED
 from ..status import Status
 from .arguments import Arguments, requested
 from .model_result import ModelResult
 from .poses import Poses
-from .system import System, mended
-from .unchecked import Call, bound
+from .system import System
+from .unchecked import Dynamics
 
 Array = np.ndarray
 
@@ -31,28 +29,27 @@ OUTPUTS = {
 DEPENDENT = ("acceleration", "contact_force", "pose_acceleration", "joint_acceleration")
 
 
-class ForwardDynamics:
+class ForwardDynamics(Dynamics):
     """What efforts and wrenches do to one mechanism; see `Model`."""
 
-    def __init__(self, system: System, arguments: Arguments, poses: Poses) -> None:
-        self._system, self._arguments, self._poses = system, arguments, poses
+    results = ("acceleration", "contact_force")
 
-    def __call__(
-        self, q: Any, v: Any, effort: Any, wrench: Any, at: Any, outputs: Any, threads: int | None
+    def __init__(self, system: System, arguments: Arguments, poses: Poses) -> None:
+        super().__init__(system, arguments, arguments.effort)
+        self._poses = poses
+
+    def question(self, contact: bool) -> tuple[tuple[Any, ...], dict[str, Array]]:
+        return ("forward", ("contact",)), {}
+
+    def many(
+        self, state: Any, wrench: Any, at: Any, outputs: Any, threads: int | None
     ) -> ModelResult:
-        """As `Model.forward_dynamics`."""
-        if type(q) is np.ndarray and q.ndim == 1 and not outputs and threads is None:
-            found = self._one(q, v, effort, wrench, self._arguments.point(at))
-            if found is not None:
-                m, status = len(q), np.zeros((), np.uint8)
-                return ModelResult(acceleration=found[:m], contact_force=found[m:], status=status)
-        names = requested(outputs, OUTPUTS)
-        own = self._arguments
-        lead, inputs = own.samples((own.q, own.v, own.effort), (q, v, effort), wrench, at)
+        names, own = requested(outputs, OUTPUTS), self._arguments
+        lead, inputs = own.samples((own.q, own.v, own.effort), state, wrench, at)
         asked = {"contact", *(OUTPUTS[name] for name in names)}
         kernel = self._system.kernel("forward", tuple(name for name in ASKED if name in asked))
         answer = kernel.run(inputs, threads)
-        mended(answer, inputs, lambda few: self._system.robust.forward(few))
+        answer.mend(inputs, lambda few: self._system.robust.forward(few))
         values, status = answer.values, answer.status
         if status.any():
             for name in {*DEPENDENT} & values.keys():
@@ -66,33 +63,13 @@ class ForwardDynamics:
         found = {name: first[name] for name in ("acceleration", "contact_force", *names)}
         return ModelResult(**found, status=status).shaped(lead)
 
-    @cached_property
-    def _one(self) -> Call:
-        """Accelerations and contact forces of one state in a row; None for what is none."""
-        return self._bound(("acceleration", "contact_force"), lambda *given: None)
-
-    def unchecked(self) -> Call:
-        """As `Model.unchecked`."""
-        own = self._arguments
-
-        def checked(q: Any, v: Any, effort: Any, wrench: Any = None, at: Any = None) -> Array:
-            q, v, effort, wrench, at = own.state(own.effort, q, v, effort, wrench, at)
-            return self(q, v, effort, wrench, at, (), None).acceleration
-
-        return self._bound(("acceleration",), checked)
-
-    def _bound(self, results: tuple[str, ...], otherwise: Call) -> Call:
-        kernel = self._system.kernel("forward", ("contact",))
-        if not isinstance(kernel, CompiledKernel):
-            return otherwise
-        return bound(kernel, len(self._system.independent), results, otherwise)
-
     def linearise(self, q: Any, v: Any, effort: Any, wrench: Any, at: Any) -> ModelResult:
         """As `Model.linearise`."""
         own = self._arguments
         lead, inputs = own.samples((own.q, own.v, own.effort), (q, v, effort), wrench, at)
         loads = np.hstack([inputs["force"], inputs["moment"]]), inputs["point"]
-        about = self(inputs["q"], inputs["q1"], inputs["effort"], *loads, ("pose",), None)
+        states = [inputs[name] for name in ("q", "q1", "effort")]
+        about = self.many(states, *loads, ("pose",), None)
         ports = {name: inputs[name] for name in ("q1", "effort", "force", "moment", "point")}
         ports |= {"pose": about.pose, "q2": about.acceleration}
         ports["contact_force"] = about.contact_force

@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from ..backends.c.compiled_kernel import CompiledKernel
-from ..backends.kernel import Answer
+from ..backends.kernel import Answer, sample_rows
 from ..questions.inverse import OUTPUTS as ASKED
 from ..status import Status
-from .arguments import Arguments, requested, sample_rows
+from .arguments import Arguments, requested
+from .closing import MOTION
 from .distributing import Distributor
 from .model_result import ModelResult
 from .poses import configured, singularity
-from .system import System, mended
-from .unchecked import Call, bound
+from .system import System
+from .unchecked import Dynamics
 
 Array = np.ndarray
-MOTION = ("pose", "pose_rate", "pose_acceleration")
 # What the question is asked for each output; the contact forces always come.
 OUTPUTS = {
     "share": "share",
@@ -38,25 +36,23 @@ OUTPUTS = {
 SOLVED = tuple(name for name in OUTPUTS if name not in ("gravity_share", "condition"))
 
 
-class InverseDynamics:
+class InverseDynamics(Dynamics):
     """What efforts a motion takes; see `Model`."""
 
-    def __init__(self, system: System, arguments: Arguments, distributor: Distributor) -> None:
-        self._system, self._arguments, self.distributor = system, arguments, distributor
+    results = ("effort", "contact_force")
 
-    def __call__(
-        self, q: Any, v: Any, a: Any, wrench: Any, at: Any, outputs: Any, threads: int | None
+    def __init__(self, system: System, arguments: Arguments, distributor: Distributor) -> None:
+        super().__init__(system, arguments, arguments.a)
+        self.distributor = distributor
+
+    def question(self, contact: bool) -> tuple[tuple[Any, ...], dict[str, Array]]:
+        return self.distributor.question(contact)
+
+    def many(
+        self, state: Any, wrench: Any, at: Any, outputs: Any, threads: int | None
     ) -> ModelResult:
-        """As `Model.inverse_dynamics`."""
-        if type(q) is np.ndarray and q.ndim == 1 and not outputs and threads is None:
-            found = self._one(q, v, a, wrench, self._arguments.point(at))
-            if found is not None:
-                n = len(self._system.mechanism.chains)
-                status = np.zeros((), np.uint8)
-                return ModelResult(effort=found[:n], contact_force=found[n:], status=status)
-        names = requested(outputs, OUTPUTS)
-        own = self._arguments
-        lead, inputs = own.samples((own.q, own.v, own.a), (q, v, a), wrench, at)
+        names, own = requested(outputs, OUTPUTS), self._arguments
+        lead, inputs = own.samples((own.q, own.v, own.a), state, wrench, at)
         answer = self._solve(inputs, {OUTPUTS[name] for name in names}, threads)
         values, status = answer.values, answer.status
         found = {"effort": values["effort"].T, "contact_force": values["contact_force"].T}
@@ -88,34 +84,6 @@ class InverseDynamics:
             return np.moveaxis(values["slip"], -1, 0)
         return -np.abs(force)[..., None] * np.moveaxis(values["drag"], -1, 0)
 
-    # -- one state ---------------------------------------------------------------------------
-
-    @cached_property
-    def _one(self) -> Call:
-        """Efforts and contact forces of one state in a row; None for what is none."""
-        return self._bound(True, lambda *given: None)
-
-    def unchecked(self) -> Call:
-        """As `Model.unchecked`."""
-        own = self._arguments
-
-        def checked(q: Any, v: Any, a: Any, wrench: Any = None, at: Any = None) -> Array:
-            q, v, a, wrench, at = own.state(own.a, q, v, a, wrench, at)
-            return self(q, v, a, wrench, at, (), None).effort
-
-        return self._bound(False, checked)
-
-    def _bound(self, contact: bool, otherwise: Call) -> Call:
-        question, fixed = self.distributor.question(contact)
-        compiled = self._system.backend.name == "compiled"
-        kernel = self._system.kernel(*question) if question and compiled else None
-        if not isinstance(kernel, CompiledKernel):
-            return otherwise
-        results = ("effort", "contact_force") if contact else ("effort",)
-        return bound(kernel, len(self._system.independent), results, otherwise, fixed)
-
-    # -- many --------------------------------------------------------------------------------
-
     def _solve(
         self, inputs: dict[str, Array], asked: Collection[str], threads: int | None
     ) -> Answer:
@@ -125,7 +93,7 @@ class InverseDynamics:
         answer = kernel.run(inputs, threads)
         if self.distributor.unsolved_friction:
             self._make_room(answer.values)
-        mended(answer, inputs, lambda few: system.robust.evaluate(few))
+        answer.mend(inputs, lambda few: system.robust.evaluate(few))
         if chooses:
             self._choose(answer.values, answer.status, inputs)
         return answer

@@ -12,8 +12,7 @@ by a kernel of the backend; samples that it cannot vouch for are solved again by
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Self
 
 import numpy as np
@@ -108,14 +107,14 @@ class Model:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Models travel as their recipe; kernels are found again in the cache."""
-        how = {
+        how: dict[str, Any] = {
             "formulation": self.formulation,
             "route": self.route,
             "distribution": self._asked,
             "backend": self.backend.asked,
             "general": self.system.general is not None,
         }
-        return _again, (type(self), self.mechanism, how)
+        return partial(type(self), self.mechanism, **how), ()
 
     def with_distribution(self, distribution: str | Distribution | None = None) -> Self:
         """The same model with its kernels and another distribution; see `derive`."""
@@ -144,10 +143,7 @@ class Model:
 
     @cached_property
     def _unchecked(self) -> Unchecked:
-        return Unchecked(
-            inverse_dynamics=lambda: self._inverse.unchecked(),
-            forward_dynamics=lambda: self._forward.unchecked(),
-        )
+        return Unchecked(lambda: self._inverse, lambda: self._forward)
 
     def inverse_dynamics(
         self,
@@ -206,7 +202,7 @@ class Model:
             acceleration = dynamics.forward_dynamics(q, v, effort, wrench, at)  (m,)
 
         Arrays of doubles are fastest; `at` is an array (3,) or None. Results are new arrays, NaN
-        where there are none. One object serves all threads.
+        where there are none. The functions serve all threads.
         Raises: InputError: for arrays that are no state.
         """
         return self._unchecked
@@ -386,7 +382,3 @@ def derive(
         distribution=distribution,
         backend=backend,
     )
-
-
-def _again(kind: Callable[..., Model], mechanism: Mechanism, how: dict[str, Any]) -> Model:
-    return kind(mechanism, **how)

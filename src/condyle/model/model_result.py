@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
-from typing import Any, NamedTuple, Self
+from dataclasses import dataclass, fields, replace
+from typing import Any, Self
 
 import numpy as np
 
@@ -15,108 +15,81 @@ from .arguments import Lead
 Array = np.ndarray
 
 
-class Quantity(NamedTuple):
-    """Shape behind the leading one, unit, and what it is."""
+@dataclass
+class Quantity:
+    """An attribute of results: its shape behind the leading one, unit, and what it is.
+
+    It speaks where a result has no such number of its own.
+    """
 
     shape: str
     unit: str
     meaning: str
 
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
 
-QUANTITIES = {
-    "effort": Quantity("n", "N m or N", "of the actuators, in the order of the file"),
-    "acceleration": Quantity("m", "m/s^2, rad/s^2", "of the independent coordinates"),
-    "contact_force": Quantity("k", "N", "on the platform, along the unit normals"),
-    "status": Quantity("", "", "0 where it was computed, else of Status (PoseStatus)"),
-    "share": Quantity("parts, n", "N m or N", "of the effort, needed by each of Model.parts"),
-    "gravity_share": Quantity("parts, n", "N m or N", "the same at rest"),
-    "q": Quantity("m", "m, rad", "independent coordinates"),
-    "pose": Quantity("6", "m, rad", "X_EE"),
-    "pose_rate": Quantity("6", "m/s, rad/s", "X_EE'"),
-    "pose_acceleration": Quantity("6", "m/s^2, rad/s^2", "X_EE''"),
-    "joint": Quantity("n", "rad or m", "coordinates of the actuated joints, principal values"),
-    "joint_rate": Quantity("n", "rad/s or m/s", "of the actuated joints"),
-    "joint_acceleration": Quantity("n", "rad/s^2 or m/s^2", "of the actuated joints"),
-    "beta": Quantity("n", "rad", "second angle of each chain, principal values"),
-    "gamma": Quantity("n", "rad", "third angle of each chain, principal values"),
-    "cos_gamma": Quantity("n", "1", "near 0 beta and gamma lose their meaning"),
-    "discriminant": Quantity("n", "1", "of a chain's assembly: negative out of reach"),
-    "contact_point": Quantity("k, 3", "m", "ball centres in {S}"),
-    "contact_normal": Quantity("k, 3", "1", "unit normals of the surfaces there, in {S}"),
-    "configuration": Quantity("", "", "joint to contact_normal, and singularity, as attributes"),
-    "singularity": Quantity("", "", "measures of [Cheng2023] Section 3.3"),
-    "condition": Quantity("", "1", "condition number of the dimensionless Jacobian J_W"),
-    "slip": Quantity("k, 3", "m/s", "velocity of the platform at the contacts, in {S}"),
-    "friction_force": Quantity("k, 3", "N", "on the platform at the contacts, in {S}"),
-    "shortfall": Quantity("", "1", "least common factor on all limits that balances; 1 if met"),
-    "residual": Quantity("n", "rad or m", "given less computed joint coordinates"),
-    "A": Quantity("2 m, 2 m", "", "x' = A x + B effort, x = (q, v)"),
-    "B": Quantity("2 m, n", "", "likewise"),
-    "J_theta": Quantity("n, 6", "", "theta' = J_theta X_EE'"),
-    "M_J": Quantity("6, m", "", "X_EE' = M_J v, [Cheng2023] eq. (9)"),
-    "M_1": Quantity("n, 3, 3", "", "M_1 q_r' = M_2 X_EE' of every chain"),
-    "M_2": Quantity("n, 3, 6", "", "likewise"),
-    "M_3": Quantity("n, 3, 6", "", "q_r' = M_3 X_EE' of every chain"),
-}
+    def __get__(self, result: ModelResult | None, owner: type) -> Any:
+        if result is None:
+            return self
+        raise AttributeError(
+            f"{self.name} was not asked for: outputs=({self.name!r},) or outputs='all' of the "
+            f"method that has it asks for it. Here are {', '.join(vars(result))}"
+        )
+
+
+def _item(shape: str, unit: str, meaning: str) -> Any:
+    return Quantity(shape, unit, meaning)
 
 
 class ModelResult:
     """Results of a model by attribute, each with the leading shape of what was given.
 
-    Which attributes there are depends on the method and on `outputs`; `QUANTITIES` has their
-    shapes, units and meanings, and the result shows its own. Numbers that could not be computed
-    are NaN; `status` is the reason.
+    Which attributes there are depends on the method and on `outputs`; the result shows its own,
+    with units and meanings. Numbers that could not be computed are NaN; `status` is the reason.
     """
 
-    effort: Array
-    acceleration: Array
-    contact_force: Array
-    status: Array
-    share: Array
-    gravity_share: Array
-    q: Array
-    pose: Array
-    pose_rate: Array
-    pose_acceleration: Array
-    joint: Array
-    joint_rate: Array
-    joint_acceleration: Array
-    beta: Array
-    gamma: Array
-    cos_gamma: Array
-    discriminant: Array
-    contact_point: Array
-    contact_normal: Array
-    configuration: ModelResult
-    singularity: Singularity
-    condition: Array
-    slip: Array
-    friction_force: Array
-    shortfall: Array
-    residual: Array
-    A: Array
-    B: Array
-    J_theta: Array
-    M_J: Array
-    M_1: Array
-    M_2: Array
-    M_3: Array
+    effort: Array = _item("n", "N m or N", "of the actuators, in the order of the file")
+    acceleration: Array = _item("m", "m/s^2, rad/s^2", "of the independent coordinates")
+    contact_force: Array = _item("k", "N", "on the platform, along the unit normals")
+    status: Array = _item("", "", "0 where it was computed, else of Status (PoseStatus)")
+    share: Array = _item("parts, n", "N m or N", "of the effort, needed by each of Model.parts")
+    gravity_share: Array = _item("parts, n", "N m or N", "the same at rest")
+    q: Array = _item("m", "m, rad", "independent coordinates")
+    pose: Array = _item("6", "m, rad", "X_EE")
+    pose_rate: Array = _item("6", "m/s, rad/s", "X_EE'")
+    pose_acceleration: Array = _item("6", "m/s^2, rad/s^2", "X_EE''")
+    joint: Array = _item("n", "rad or m", "coordinates of the actuated joints, principal values")
+    joint_rate: Array = _item("n", "rad/s or m/s", "of the actuated joints")
+    joint_acceleration: Array = _item("n", "rad/s^2 or m/s^2", "of the actuated joints")
+    beta: Array = _item("n", "rad", "second angle of each chain, principal values")
+    gamma: Array = _item("n", "rad", "third angle of each chain, principal values")
+    cos_gamma: Array = _item("n", "1", "near 0 beta and gamma lose their meaning")
+    discriminant: Array = _item("n", "1", "of a chain's assembly: negative out of reach")
+    contact_point: Array = _item("k, 3", "m", "ball centres in {S}")
+    contact_normal: Array = _item("k, 3", "1", "unit normals of the surfaces there, in {S}")
+    configuration: ModelResult = _item("", "", "joint to contact_normal, and singularity")
+    singularity: Singularity = _item("", "", "measures of [Cheng2023] Section 3.3")
+    condition: Array = _item("", "1", "condition number of the dimensionless Jacobian J_W")
+    slip: Array = _item("k, 3", "m/s", "velocity of the platform at the contacts, in {S}")
+    friction_force: Array = _item("k, 3", "N", "on the platform at the contacts, in {S}")
+    shortfall: Array = _item("", "1", "least common factor on all limits that balances; 1 if met")
+    residual: Array = _item("n", "rad or m", "given less computed joint coordinates")
+    A: Array = _item("2 m, 2 m", "", "x' = A x + B effort, x = (q, v)")
+    B: Array = _item("2 m, n", "", "likewise")
+    J_theta: Array = _item("n, 6", "", "theta' = J_theta X_EE'")
+    M_J: Array = _item("6, m", "", "X_EE' = M_J v, [Cheng2023] eq. (9)")
+    M_1: Array = _item("n, 3, 3", "", "M_1 q_r' = M_2 X_EE' of every chain")
+    M_2: Array = _item("n, 3, 6", "", "likewise")
+    M_3: Array = _item("n, 3, 6", "", "q_r' = M_3 X_EE' of every chain")
 
     def __init__(self, **values: Any) -> None:
         self.__dict__.update(values)
 
-    def __getattr__(self, name: str) -> Any:
-        if name not in QUANTITIES:
-            raise AttributeError(f"{type(self).__name__} has no attribute {name!r}")
-        raise AttributeError(
-            f"{name} was not asked for: outputs=({name!r},) or outputs='all' of the method that "
-            f"has it asks for it. Here are {', '.join(vars(self))}"
-        )
-
     def __repr__(self) -> str:
         lines = []
         for name, value in vars(self).items():
-            q = QUANTITIES[name]
+            q = getattr(type(self), name)
             shape = str(value.shape) if isinstance(value, np.ndarray) else ""
             lines.append(f"  {name:18} {shape:16} {q.unit:16} {q.meaning}")
         return "\n".join([type(self).__name__, *lines])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,11 +11,12 @@ from ..errors import InputError, did_you_mean
 from ..kinematics.constraints import closed_form_available, indices
 from ..kinematics.singularities import Singularity
 from ..motion import Motion, resolve_landmark
+from ..questions.configuration import SURVEYED
 from ..status import Status
 from .arguments import POSE, Arguments, Lead, requested, samples
 from .model_result import ModelResult
-from .surveying import SURVEYED, Survey, judged
-from .system import System, mended
+from .surveying import Survey, judged
+from .system import System
 
 Array = np.ndarray
 States = tuple[Array, Array, Array]
@@ -33,7 +33,7 @@ class Poses:
         lead, (pose,) = samples((POSE,), (POSE.array(pose),))
         inputs = {"pose": pose}
         answer = self._system.kernel("configuration").run(inputs, threads)
-        mended(answer, inputs, lambda few: (self._system.robust.configuration(few["pose"]), 0))
+        answer.mend(inputs, lambda few: (self._system.robust.configuration(few["pose"]), 0))
         return configured(answer.values, self._system.length).shaped(lead)
 
     def inverse_kinematics(self, q: Any, v: Any, a: Any) -> ModelResult:
@@ -81,15 +81,10 @@ class Poses:
         wanted = tuple(name for name in SURVEYED if name in wanted)
         answer = system.kernel("survey", wanted).run({"q": q}, threads)
 
-        def follow(rows: Array) -> tuple[Array, Array]:
-            some = np.asarray(q, dtype=float)[rows]
-            values, status = system.robust.motion({"q": some, "q1": 0 * some, "q2": 0 * some})
-            return values["pose"].T, status == Status.ok
-
         # Contacts that are closed in a fixed number of steps, which may be too few.
         forms = [form for form, _ in system.structure.contacts]
         iterated = not closed_form_available(forms, system.dependent)
-        return judged(answer, iterated, follow, partial(system.robust.survey, wanted))
+        return judged(answer, q, iterated, lambda few: system.robust.survey(wanted, few))
 
     def matrix(self, name: str, q: Any, v: Any, space: str) -> Array:
         """One of the results of the question `matrices`."""
@@ -124,7 +119,7 @@ class Poses:
         """X_EE and its rates, (N, 6) each, and where the contacts can be met."""
         inputs = {"q": q, "q1": q1, "q2": q2}
         answer = self._system.kernel("motion").run(inputs)
-        mended(answer, inputs, lambda few: self._system.robust.motion(few))
+        answer.mend(inputs, lambda few: self._system.robust.motion(few))
         return {name: a.T for name, a in answer.values.items()}, answer.status == Status.ok
 
     def of_motion(self, motion: Motion) -> tuple[States, float | None]:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..backends.kernel import AGAIN
+from ..backends.kernel import Arrays
 from ..backends.numpy_kernel import NumpyKernel
 from ..dynamics.minimum_norm import minimum_norm
 from ..graph.program import Numbers
@@ -24,8 +24,6 @@ from ..status import Status, judge
 from .closing import FollowedClosure
 from .distributing import Distributor
 from .jamming import balanced, solved
-
-Arrays = dict[str, np.ndarray]
 
 
 class Robust:
@@ -133,33 +131,22 @@ class Robust:
     def motion(self, inputs: Mapping[str, np.ndarray]) -> tuple[Arrays, np.ndarray]:
         """X_EE and its rates by name, (6, N) each, and statuses: whether contacts can be met."""
         answer = self._kernel("motion").run(inputs)
-        doubtful = np.flatnonzero(answer.status == AGAIN)
-        if doubtful.size:
-            found = self._followed.solve(*(inputs[name][doubtful] for name in ("q", "q1", "q2")))
-            answer.status[doubtful] = np.where(found.reached, Status.ok, Status.unreachable)
-            for name, a in found.named().items():
-                answer.values[name][:, doubtful] = a.T
+        answer.mend(
+            inputs, lambda few: self._followed.solve(few["q"], few["q1"], few["q2"]).answer()
+        )
         return answer.values, answer.status
 
     def configuration(self, pose: np.ndarray) -> Arrays:
         """The configuration's results by name, samples last; always by LAPACK."""
         values = self._kernel("configuration").run({"pose": pose}).values
-        rows = np.moveaxis(values["J_W"], -1, 0)
-        good = np.isfinite(rows).all(axis=(1, 2))
-        sigma = np.full((len(rows), self._structure.m), np.nan)
-        sigma[good] = np.linalg.svd(rows[good], compute_uv=False)
-        values["J_W_sigma"] = sigma.T
-        return values
+        return values | {"J_W_sigma": _singular_values(values["J_W"])}
 
-    def survey(self, wanted: tuple[str, ...], pose: np.ndarray) -> Arrays:
-        """Results of that question at whole poses, and `rows`, by name, samples last."""
-        wanted = (*wanted, *(() if "rows" in wanted else ("rows",)))
-        values = self._kernel("survey", wanted, True).run({"pose": pose}).values
-        rows = np.moveaxis(values["rows"], -1, 0)
-        good = np.isfinite(rows).all(axis=(1, 2))
-        if "J_W_sigma" in values:
-            values["J_W_sigma"][:, good] = np.linalg.svd(rows[good], compute_uv=False).T
-        return values
+    def survey(self, wanted: tuple[str, ...], q: np.ndarray) -> Arrays:
+        """Results of that question, and `met`, by name, samples last."""
+        moved, status = self.motion({"q": q, "q1": 0 * q, "q2": 0 * q})
+        asked = (*wanted, *(() if "rows" in wanted else ("rows",)))
+        values = self._kernel("survey", asked, True).run({"pose": moved["pose"].T}).values
+        return values | {"J_W_sigma": _singular_values(values["rows"]), "met": status == Status.ok}
 
     def _contact_forces(self, s: Arrays, effort: np.ndarray) -> np.ndarray:
         """lambda along the unit normals, (N, k), from what the efforts leave over."""
@@ -176,3 +163,12 @@ class Robust:
         regular = np.minimum(ratio(least, most), ratio(sigma[-1], sigma[0])) >= SINGULAR
         assembled = reached & (values["discriminant"] >= 0).all(axis=0)
         return judge(assembled, regular, np.isfinite(effort).all(axis=1))
+
+
+def _singular_values(rows: np.ndarray) -> np.ndarray:
+    """Of matrices, samples last, (m, N); NaN where there is no matrix."""
+    A = np.moveaxis(rows, -1, 0)
+    good = np.isfinite(A).all(axis=(1, 2))
+    sigma = np.full((min(A.shape[1:]), len(A)), np.nan)
+    sigma[:, good] = np.linalg.svd(A[good], compute_uv=False).T
+    return sigma

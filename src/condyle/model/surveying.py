@@ -9,7 +9,6 @@ import numpy as np
 
 from ..backends.kernel import AGAIN, Answer
 from ..kinematics.singularities import SINGULAR, ratio
-from ..questions.configuration import SURVEYED
 from ..questions.platform import CERTAIN
 from ..status import Status
 
@@ -55,31 +54,25 @@ class Survey:
 
 
 def judged(
-    answer: Answer,
-    iterated: bool,
-    follow: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
-    at_poses: Callable[[np.ndarray], Arrays],
+    answer: Answer, q: np.ndarray, iterated: bool, robust: Callable[[np.ndarray], Arrays]
 ) -> Survey:
-    """Judge a kernel's answer, and look again at samples that it is not certain of.
+    """Judge a kernel's answer at q, and look again at samples that it is not certain of.
 
     Args: iterated: whether contacts are closed in a fixed number of steps.
-          follow: poses (N, 6) of some samples, and whether their contacts are met.
-          at_poses: all values at whole poses, and `rows`, by numpy.
+          robust: all values of some q, samples last, by numpy; `met` among them.
     """
     values, again = dict(answer.values), answer.status == AGAIN
     met, reach = values.pop("met"), values["discriminant"]
     known = met >= (CERTAIN if iterated else 0.0)
     if iterated and (doubtful := np.flatnonzero(~known)).size:
-        pose, known[doubtful] = follow(doubtful)
-        doubtful = doubtful[known[doubtful]]
-        better = at_poses(pose[np.isfinite(pose).all(axis=1)])
+        better = robust(q[doubtful])
+        known[doubtful] = better["met"]
         for name, value in values.items():
             value[..., doubtful] = better[name]
     reach[:, ~known] = np.nan
     reached = known & (reach >= 0).all(axis=0)
     if "J_W_sigma" in values and (doubtful := np.flatnonzero(again & reached)).size:
-        rows = np.moveaxis(at_poses(follow(doubtful)[0])["rows"], -1, 0)
-        values["J_W_sigma"][:, doubtful] = np.linalg.svd(rows, compute_uv=False).T
+        values["J_W_sigma"][:, doubtful] = robust(q[doubtful])["J_W_sigma"]
     status = np.where(reached, Status.ok, Status.unreachable).astype(np.int8)
     del values["discriminant"]
     if not reached.all():
@@ -91,6 +84,3 @@ def judged(
         near = np.minimum(found.inverse_ratio, found.direct_ratio) < SINGULAR
         status[reached & near] = Status.singular
     return found
-
-
-__all__ = ["SURVEYED", "Survey", "judged"]

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-
 from ..backends.choose import Backend
-from ..backends.kernel import AGAIN, Answer, Kernel
+from ..backends.kernel import Kernel
 from ..dynamics import ROUTES
 from ..dynamics import formulation as formulation_named
 from ..errors import InputError, MechanismError, did_you_mean
@@ -23,10 +20,9 @@ from ..questions import Question
 from ..questions.friction import MOST
 from ..questions.numbers import Layout, characteristic, require_closed_form, specialised
 from ..questions.structure import structure_of
-from .arguments import sample_rows
 from .closing import Closure
 from .distributing import LEAST, Distribution, Distributor
-from .robust_path import Arrays, Robust
+from .robust_path import Robust
 
 
 class System:
@@ -112,23 +108,6 @@ class System:
         """Where samples go that a kernel cannot vouch for."""
         distributor = Distributor(self.mechanism, Distribution(LEAST))
         return Robust(self.structure, self.numbers, self.independent, distributor)
-
-
-def mended(
-    answer: Answer,
-    inputs: Mapping[str, np.ndarray],
-    robust: Callable[[Arrays], tuple[Arrays, np.ndarray | int]],
-) -> Answer:
-    """An answer whose doubtful samples are replaced, in place, by those of the robust path.
-
-    Args: robust: results by name, samples last, and statuses, from some samples' inputs.
-    """
-    if answer.status.any() and (again := np.flatnonzero(answer.status == AGAIN)).size:
-        few = sample_rows(inputs, again, len(answer.status))
-        better, answer.status[again] = robust(few)
-        for name, value in answer.values.items():
-            value[..., again] = better[name]
-    return answer
 
 
 def check_home(mechanism: Mechanism) -> None:

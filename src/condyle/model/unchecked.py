@@ -8,38 +8,95 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from ..backends.c.compiled_kernel import CompiledKernel, Single
+from ..backends.c.compiled_kernel import CompiledKernel
 from ..backends.kernel import OK
-from .arguments import NO_WRENCH, ORIGIN
+from .arguments import NO_WRENCH, ORIGIN, Argument, Arguments
+from .model_result import ModelResult
+from .system import System
 
 ALL = slice(None)
 Call = Callable[..., Any]
 
 
-class Unchecked(threading.local):
-    """Inverse and forward dynamics of one state, at least latency; see `Model.unchecked`.
+class Unchecked:
+    """Inverse and forward dynamics of one state, at least latency; see `Model.unchecked`."""
 
-    Every thread has buffers of its own, so one object serves all threads.
+    def __init__(self, inverse: Callable[[], Dynamics], forward: Callable[[], Dynamics]) -> None:
+        self._inverse, self._forward = inverse, forward
+
+    @cached_property
+    def inverse_dynamics(self) -> Call:
+        return self._inverse().unchecked()
+
+    @cached_property
+    def forward_dynamics(self) -> Call:
+        return self._forward().unchecked()
+
+
+class Dynamics:
+    """Inverse or forward dynamics of one mechanism: of one state here, of many where it is called.
+
+    results: the first result and the contact forces.   third: the argument behind q and v.
     """
 
-    inverse_dynamics: Call
-    forward_dynamics: Call
+    results: tuple[str, str]
 
-    def __init__(self, **prepare: Callable[[], Call]) -> None:
-        """Args: prepare: what makes each of the functions, when a thread first asks for it."""
-        self._prepare = prepare
+    def __init__(self, system: System, arguments: Arguments, third: Argument) -> None:
+        self._system, self._arguments, self.third = system, arguments, third
 
-    def __getattr__(self, name: str) -> Call:
-        if name not in ("inverse_dynamics", "forward_dynamics"):
-            raise AttributeError(f"unchecked() has no {name!r}: inverse_dynamics, forward_dynamics")
-        call = self._prepare[name]()
-        setattr(self, name, call)
-        return call
+    def __call__(
+        self, q: Any, v: Any, x: Any, wrench: Any, at: Any, outputs: Any, threads: int | None
+    ) -> ModelResult:
+        """As `Model.inverse_dynamics` and `Model.forward_dynamics`."""
+        if type(q) is np.ndarray and q.ndim == 1 and not outputs and threads is None:
+            row = self._one(q, v, x, wrench, self._arguments.point(at))
+            if row is not None:
+                first = len(row) - (6 - len(q))  # and the contact forces
+                found = dict(zip(self.results, (row[:first], row[first:]), strict=True))
+                return ModelResult(**found, status=np.zeros((), np.uint8))
+        return self.many((q, v, x), wrench, at, outputs, threads)
+
+    def many(
+        self, state: Any, wrench: Any, at: Any, outputs: Any, threads: int | None
+    ) -> ModelResult:
+        """The same of arrays of any leading shape; state: q, v and the third argument."""
+        raise NotImplementedError
+
+    def question(self, contact: bool) -> tuple[tuple[Any, ...], Mapping[str, np.ndarray]]:
+        """The question of one state with its details, if a kernel alone can answer it, and its
+        ports that are always given the same.
+
+        Args: contact: whether contact forces are wanted too.
+        """
+        raise NotImplementedError
+
+    @cached_property
+    def _one(self) -> Call:
+        """Both results of one state in a row; None for what is none."""
+        return self._bound(self.results, lambda *given: None)
+
+    def unchecked(self) -> Call:
+        """As `Model.unchecked`."""
+
+        def checked(q: Any, v: Any, x: Any, wrench: Any = None, at: Any = None) -> np.ndarray:
+            *state, wrench, at = self._arguments.state(self.third, q, v, x, wrench, at)
+            found: np.ndarray = getattr(self.many(state, wrench, at, (), None), self.results[0])
+            return found
+
+        return self._bound(self.results[:1], checked)
+
+    def _bound(self, results: tuple[str, ...], otherwise: Call) -> Call:
+        question, fixed = self.question(results == self.results)
+        compiled = question and self._system.backend.name == "compiled"
+        kernel = self._system.kernel(*question) if compiled else None
+        if not isinstance(kernel, CompiledKernel):
+            return otherwise
+        return bound(kernel, self._arguments.q.size, results, otherwise, fixed)
 
 
 def bound(
@@ -47,7 +104,7 @@ def bound(
     size: int,
     results: tuple[str, ...],
     otherwise: Call,
-    fixed: Mapping[str, np.ndarray] = MappingProxyType({}),
+    fixed: Mapping[str, np.ndarray],
 ) -> Call:
     """A compiled kernel as a function of q, v, a third array, wrench and point, each of one state.
 
@@ -55,22 +112,51 @@ def bound(
              always given.
              otherwise: is called with the same arguments where they are not doubles of the right
              number, or the kernel has no answer.
-    Returns: the function; its result is a new array.
+    Returns: the function; its result is a new array. Every thread has buffers of its own.
     """
-    single, order = kernel.single(), np.array(kernel.order)
-    for port in kernel.interface.ports:
-        if port.name in fixed:
-            row = fixed[port.name][order if port.lanes else ALL]
-            single.given[port.start : port.start + len(row)] = row
-    third = kernel.interface.ports[2]
-    sizes = np.cumsum([size, size, kernel.interface.lanes if third.lanes else size, 6, 3])
-    places = np.split(single.given[: sizes[-1]], sizes[:-1])
-    lanes, moved = places[2], third.lanes and (np.diff(order) < 0).any()
-    if moved:
-        places[2] = np.empty_like(lanes)
-    return _call(
-        single, places, lanes if moved else None, order, _columns(kernel, results), otherwise
-    )
+    order, face, wanted = np.array(kernel.order), kernel.interface, _columns(kernel, results)
+    third = face.ports[2]
+    sizes = np.cumsum([size, size, face.lanes if third.lanes else size, 6, 3])
+    moved = third.lanes and (np.diff(order) < 0).any()
+    mine = threading.local()
+    nothing: Any = NO_WRENCH
+    origin: Any = ORIGIN
+
+    def prepare() -> tuple[Any, ...]:
+        single = kernel.single()
+        for port in face.ports:
+            if port.name in fixed:
+                row = fixed[port.name][order if port.lanes else ALL]
+                single.given[port.start : port.start + len(row)] = row
+        places = np.split(single.given[: sizes[-1]], sizes[:-1])
+        lanes = places[2]
+        given = places[2] = np.empty_like(lanes) if moved else lanes
+        # Memoryviews take doubles, as many as there are places; arrays would stretch a single one.
+        views = (memoryview(a) for a in places)  # type: ignore[arg-type]
+        mine.single, mine.places = single, (*views, lanes, given, single.run, single.found)
+        return mine.places
+
+    def call(q: Any, v: Any, third: Any, wrench: Any = None, at: Any = None) -> Any:
+        try:
+            places = mine.places
+        except AttributeError:
+            places = prepare()
+        to_q, to_v, to_third, to_wrench, to_point, lanes, given, run, found = places
+        try:
+            to_q[ALL] = q
+            to_v[ALL] = v
+            to_third[ALL] = third
+            to_wrench[ALL] = nothing if wrench is None else wrench
+            to_point[ALL] = origin if at is None else at
+        except (TypeError, ValueError, NotImplementedError):
+            return otherwise(q, v, third, wrench, at)
+        if moved:
+            lanes[:] = given[order]
+        if run() == OK:
+            return found[wanted]
+        return otherwise(q, v, third, wrench, at)
+
+    return call
 
 
 def _columns(kernel: CompiledKernel, results: tuple[str, ...]) -> np.ndarray:
@@ -81,36 +167,3 @@ def _columns(kernel: CompiledKernel, results: tuple[str, ...]) -> np.ndarray:
         found[r.name] = columns[np.argsort(kernel.order)] if r.lanes else columns
         row += len(columns)
     return np.concatenate([found[name] for name in results])
-
-
-def _call(
-    single: Single,
-    places: list[np.ndarray],
-    lanes: np.ndarray | None,
-    order: np.ndarray,
-    wanted: np.ndarray,
-    otherwise: Call,
-) -> Call:
-    # Memoryviews take doubles, as many as there are places; arrays would stretch a single one.
-    to_q, to_v, to_third, to_wrench, to_point = (memoryview(a) for a in places)  # type: ignore[arg-type]
-    run, found = single.run, single.found
-    nothing: Any = NO_WRENCH
-    origin: Any = ORIGIN
-
-    def call(q: Any, v: Any, third: Any, wrench: Any = None, at: Any = None) -> Any:
-        try:
-            to_q[ALL] = q
-            to_v[ALL] = v
-            to_third[ALL] = third
-            to_wrench[ALL] = nothing if wrench is None else wrench
-            to_point[ALL] = origin if at is None else at
-        except (TypeError, ValueError, NotImplementedError):
-            return otherwise(q, v, third, wrench, at)
-        if lanes is not None:
-            lanes[:] = places[2][order]
-        if run() == OK:
-            return found[wanted]
-        return otherwise(q, v, third, wrench, at)
-
-    call.single = single  # type: ignore[attr-defined]  # has to stay as long as it is called
-    return call

@@ -76,7 +76,7 @@ def test_statuses() -> None:
 def test_what_does_not_fit() -> None:
     c, model = case("masticatory"), by_numpy("masticatory")
     given = (*state(c, model), efforts(c), *load_of(c))
-    with pytest.raises(InputError, match=r'no output "joints".* joint'):
+    with pytest.raises(InputError, match=r"no output 'joints'.* joint"):
         model.forward_dynamics(*given, outputs=("joints",))
     with pytest.raises(
         InputError, match=r"effort: expected numbers in an array of shape \(..., 6\): temporalis"
