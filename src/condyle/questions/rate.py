@@ -40,8 +40,8 @@ def rate(
 
     Ports: low, high, speed: limits of efforts and of joint rates; of load i its point, mode and
     numbers, as `load_i_point`; of bounded contacts `bounds`, low then high a contact (6,), of
-    one-sided ones `push`, the sign of their normal force.
-    Results: rate (2 m + 4,); guards: of bounded contacts, of one-sided ones, of the loads' jumps;
+    unilateral ones `push`, the sign of their normal force.
+    Results: rate (2 m + 4,); guards: of bounded contacts, of unilateral ones, of the loads' jumps;
     too_fast, a lane's. wrench (6,) of all loads about O_M, load_force (loads, 3);
     measured_force (3,).
 

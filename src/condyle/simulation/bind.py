@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from ..errors import InputError, ScenarioError
 from ..kinematics.chain import FAMILIES
 from ..mechanism import load_mechanism
 from ..mechanism.chain import limits
-from ..mechanism.home import characteristic_length
+from ..mechanism.home import characteristic_length, independent_coordinates
 from ..model.distributing import Distribution
 from ..model.model import Model
 from ..motion import Load as LoadTable
@@ -240,8 +240,6 @@ def _same_machine(model: Model, other: Any, file: str) -> None:
             f"controller.model: {file} has the chains {', '.join(other.chain_names)}, and the "
             f"plant {', '.join(one.chain_names)}; they must have the same, in the same order"
         )
-    from ..mechanism.home import independent_coordinates
-
     if model.independent != (names := independent_coordinates(other)):
         raise InputError(
             f"controller.model: {file} has the independent coordinates {', '.join(names)}, and "
@@ -284,12 +282,9 @@ def _start(
             return None
         q, q1 = (a[0] for a in drive.path.states(np.zeros(1))[:2])
     if model.kernel("instant").run({"q": q[None], "q1": q1[None]}).status[0]:
-        raise InputError(f"start: the pose cannot be reached: {_said(names, q)}")
+        pose = ", ".join(f"{n} = {x:g}" for n, x in zip(names, q, strict=True))
+        raise InputError(f"start: the pose cannot be reached: {pose}")
     return q, q1
-
-
-def _said(names: Iterable[str], values: Iterable[float]) -> str:
-    return ", ".join(f"{n} = {v:g}" for n, v in zip(names, values, strict=True))
 
 
 def _moved(model: Model, q: np.ndarray, load: Load) -> np.ndarray:

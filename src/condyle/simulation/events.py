@@ -12,12 +12,12 @@ import numpy as np
 # What each kind means; in the order in which a page lists them.
 KINDS = {
     "bound": "a contact reaches the end of its surface",
-    "contact_loss": "a one-sided contact would have to pull",
+    "contact_loss": "a unilateral contact would have to pull",
     "unreachable": "a chain or a contact cannot be closed any more",
     "singular": "the mechanism is singular, and accelerations have no bound",
-    "jammed": "friction jams: none or several of its patterns are consistent",
+    "jammed": "friction jams: Coulomb friction has no solution, or several",
     "stiff": "the integrator's steps became too small",
-    "lost": "the encoders' counts no longer give a pose",
+    "lost": "forward kinematics of the encoders' counts did not converge",
     "no_effort": "the controller found no efforts for its demand",
     "saturated": "a limit of an actuator cuts its effort",
     "speed": "an actuator passes its speed limit",

@@ -187,10 +187,10 @@ def _hand(
     point: np.ndarray, rest: np.ndarray, stiffness: float, damping: float
 ) -> tuple[Load, ...]:
     """Three springs at a point of {M}, each with its displacement of rest, (3,) [m]."""
-    found = []
-    for numbers in zip(
-        np.eye(3), *(np.full(3, x) for x in (stiffness, damping)), rest, strict=True
-    ):
-        own = {name: np.array(v) for name, v in zip(Spring.ports, numbers, strict=True)}
-        found.append(Load(Spring, HAND, np.asarray(point), None, own))
-    return tuple(found)
+    return tuple(
+        Load(Spring, HAND, np.asarray(point), None, {
+            "direction": axis, "stiffness": np.array(stiffness), "damping": np.array(damping),
+            "rest": np.array(x),
+        })
+        for axis, x in zip(np.eye(3), rest, strict=True)
+    )  # fmt: skip

@@ -95,7 +95,7 @@ class Plant:
             self.columns.fill(f"load_{i}_mode", np.atleast_1d(mode))
 
     def guards(self, plan: Plan) -> list[Guard]:
-        """Bounds, pulls of one-sided contacts, speeds; then the loads' own."""
+        """Bounds, pulls of unilateral contacts, speeds; then the loads' own."""
         machine, rows = plan.model.mechanism, iter(self.columns.result("guards").tolist())
         names = machine.contact_names
         found = [

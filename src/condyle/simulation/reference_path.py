@@ -1,4 +1,4 @@
-"""What a controller is to follow, at any time: the path in q_EE, and the force."""
+"""What a controller follows over time: a path in q_EE, and a force."""
 
 from __future__ import annotations
 

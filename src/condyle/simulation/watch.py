@@ -26,7 +26,7 @@ class Crossing:
 
 
 class Watch:
-    """The guards of one run: bounds, pulls of one-sided contacts, speeds, and the loads' own.
+    """The guards of one run: bounds, pulls of unilateral contacts, speeds, and the loads' own.
 
     past: (guards,), whether each is beyond zero already; loads' never are, their modes change.
     """

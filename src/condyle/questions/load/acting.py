@@ -26,7 +26,7 @@ WRENCH = "wrench"  # a port that is fed over time, (6,)
 
 @dataclass(frozen=True)
 class Jump:
-    """What a load does where its guard passes zero: a new mode, and what to tell."""
+    """What a load does where its guard passes zero: a new mode, and the event's kind and text."""
 
     mode: int
     kind: str
