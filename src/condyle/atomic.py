@@ -83,8 +83,7 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
 
     Raises: InputError: if it cannot be one.
     """
-    if not isinstance(path, str | os.PathLike):
-        raise InputError(f"path: expected a path, got {type(path).__name__}")
+    as_path(path, expected="a folder")
     try:
         Path(path).mkdir(parents=True, exist_ok=True)
     except (OSError, ValueError) as error:

@@ -233,7 +233,7 @@ def texts_of(argument: str, given: object, separated: bool = True) -> tuple[str,
     """
     texts = [given] if isinstance(given, str) else given
     if not isinstance(texts, list | tuple) or not all(isinstance(one, str) for one in texts):
-        raise InputError(f"{argument}: expected a name or several, got {given!r:.60}")
+        raise InputError(f"{argument}: expected a name or several, got {shown(given)}")
     parts = (text.split(",") if separated else [text] for text in texts)
     return tuple(part.strip() for group in parts for part in group)
 
@@ -291,6 +291,16 @@ def as_path(given: Any, name: str = "path", expected: str = "the path of a file"
         if isinstance(path, str) and path and "\0" not in path and os.fsencode(path):
             return path
     raise InputError(f"{name}: expected {expected}, got {shown(given)}")
+
+
+def as_flag(given: Any, name: str) -> bool:
+    """True or False.
+
+    Raises: InputError: for what is neither, such as an array.
+    """
+    with suppress(Exception):
+        return bool(given)
+    raise InputError(f"{name}: expected True or False, got {shown(given)}")
 
 
 def no_such_file(path: str | os.PathLike[str]) -> InputError:

@@ -17,6 +17,7 @@ import numpy as np
 
 import condyle
 from condyle.mechanism import bundled_text
+from condyle.results.solution import Results
 
 MACHINE = "masticatory"
 T = np.linspace(0.0, 1.0, 8)
@@ -52,6 +53,22 @@ class Stage:
         Path(name).write_text(text, encoding="utf-8")
         return name
 
+    @cached_property
+    def solution(self) -> Any:
+        return self.model.solve(self.motion)
+
+    @cached_property
+    def map(self) -> Any:
+        return condyle.workspace_map(self.model, over={"X": (-0.1, 0.1, 3)})
+
+    @property
+    def results(self) -> Any:
+        return self.solution.condyle
+
+    def saved(self, kind: str) -> str:
+        getattr(self, kind).condyle.save("saved.nc")
+        return "saved.nc"
+
     @property
     def mechanism_file(self) -> str:
         return self.file("machine.toml", bundled_text(MACHINE))
@@ -84,6 +101,27 @@ STATE: dict[str, Value] = {"q": Q, "v": Q, "a": Q}
 FORCED: dict[str, Value] = {"wrench": WRENCH, "at": "incisor", "outputs": "pose", "threads": 1}
 OWN_MODEL: dict[str, Value] = {"model": lambda stage: stage.mechanism}
 CSV = "t,Fx\n0,1\n1,2\n"
+FILES = ("path", "file", "folder", "no such", "mechanism")  # what messages say of files
+STAGED: dict[str, Value] = {
+    "mechanism": lambda stage: stage.mechanism,
+    "motion": lambda stage: stage.motion,
+    "load": lambda stage: stage.load,
+    "load_point": "incisor",
+}
+TO_FOLDER: dict[str, Value] = {"model": lambda stage: stage.mechanism, "path": "out"}
+CHAINS = [f"{m}_{s}" for m in ("temporalis", "masseter", "pterygoid") for s in ("left", "right")]
+EFFORTS = "X,Y,alpha,beta," + ",".join(f"tau_{c}" for c in CHAINS) + "\n0" + 9 * ",0" + "\n"
+JOINTS = ",".join(f"joint_{c}" for c in CHAINS) + "\n0" + 5 * ",0" + "\n"
+ROWWISE: dict[str, Value] = {
+    "model": lambda stage: stage.model,
+    "states": lambda stage: stage.file("states.csv", "X,Y,alpha,beta\n0,0,0,0\n"),
+    "out": "out.csv",
+    "load_point": "incisor",
+    "flag": False,
+    "threads": 1,
+    "strict": False,
+}
+STUDY = {"vary": [{"what": "platform.mass", "values": [0.1, 0.2]}]}
 ROWS = "t,X\n" + "".join(f"{t},{t / 1000}\n" for t in range(8))
 
 DOORS: dict[str, Door] = {
@@ -134,6 +172,92 @@ DOORS: dict[str, Door] = {
     "Model.bias": Door({"q": Q, "v": Q}, states=("q", "v"), calls=60),
     "Model.gravity": Door({"q": Q}, states=("q",), calls=60),
     "Model.jacobians": Door({"q": Q}, states=("q",), calls=60),
+    "Model.linearise": Door(
+        {"q": Q, "v": Q, "effort": EFFORT, "wrench": WRENCH, "at": "incisor"},
+        states=("q", "v", "effort"),
+        calls=60,
+    ),
+    "Model.forward_kinematics": Door(
+        {"joint": EFFORT, "start": EFFORT, "time": None, "tolerance": 1e-6},
+        states=("joint",),
+        calls=60,
+    ),
+    "Model.solve": Door(
+        {"motion": lambda stage: stage.motion, "load": lambda stage: stage.load}
+        | {"load_point": "incisor", "flag": False, "reactions": False, "threads": 1},
+        calls=20,
+        words=("X", "Fx", "no such"),
+    ),
+    "Model.with_distribution": Door({"distribution": "minimum_norm"}, calls=0),
+    "Model.with_mechanism": Door(
+        {"mechanism": lambda stage: stage.mechanism}, calls=0, words=("general",)
+    ),
+    "Model.unchecked": Door(),
+    "open_solution": Door({"path": lambda stage: stage.saved("solution")}, words=FILES, calls=20),
+    "open_map": Door({"path": lambda stage: stage.saved("map")}, words=FILES, calls=60),
+    "open_sweep": Door({"folder": "a study"}, words=("folder",), calls=60),
+    "workspace_map": Door(
+        {"model": lambda stage: stage.model, "over": {"X": (-1e-3, 1e-3, 3)}, "quantities": "ratio"}
+        | {"hold": "", "load": "", "load_point": "incisor", "direction": None, "stiffness": None}
+        | {"stroke": (), "out": None, "threads": 1, "workers": None, "scheduler": None},
+        model="model",
+        words=("mechanism", "Dask"),
+        calls=0,
+    ),
+    "workspace_size": Door(
+        {"map": lambda stage: stage.map, "margin": 1e-3, "model": lambda stage: stage.model},
+        calls=0,
+        words=FILES,
+    ),
+    "sweep": Door(
+        {"study": STUDY, "out": None, "workers": 1, "scheduler": "threads", "resume": False}
+        | {"mechanism": None, "motion": lambda stage: stage.motion, "load": None},
+        calls=20,
+    ),
+    "run": Door(
+        STAGED
+        | {"formulation": "momentum", "route": "core", "backend": "numpy", "threads": 1}
+        | {"distribution": None, "reactions": False, "flag": False, "measured": None, "vary": None},
+        calls=20,
+        model="mechanism",
+        words=("study", *FILES),
+    ),
+    "compare": Door(
+        STAGED | {"formulations": "momentum", "distribution": None}, calls=20, model="mechanism"
+    ),
+    "tradeoff": Door(STAGED | {"weights": (0.0, 1.0), "preload": 0.0}, calls=20, model="mechanism"),
+    "export_c": Door(
+        TO_FOLDER
+        | {"question": "inverse", "coordinates": (), "landmark": None, "precision": "double"}
+        | {"constants": "inside", "prefix": None, "lanes": 8, "formulation": None, "route": None},
+        calls=0,
+        words=FILES,
+    ),
+    "export_fmu": Door(TO_FOLDER | {"kind": "plant", "fmi": 3}, calls=0, words=FILES),
+    "export_matlab": Door(TO_FOLDER | {"question": "inverse"}, calls=60, words=FILES),
+    "export_mjcf": Door(TO_FOLDER | {"path": "out/machine.xml"}, calls=60, words=FILES),
+    "solve_states": Door(ROWWISE | {"reactions": False, "mat": None}, calls=60, words=FILES),
+    "forward_states": Door(
+        ROWWISE | {"states": lambda stage: stage.file("states.csv", EFFORTS)}, calls=60, words=FILES
+    ),
+    "pose_states": Door(
+        {"mechanism": MACHINE, "joints": lambda stage: stage.file("joints.csv", JOINTS)}
+        | {"out": "out.csv", "flag": False, "tolerance": 1e-6, "every": False, "seed": None},
+        calls=60,
+        words=FILES,
+    ),
+    "write_report": Door(
+        {"solution": lambda stage: stage.solution, "path": "out.html", "tables": None}
+        | {"files": None, "measured": None, "sweep": None},
+        calls=0,
+        words=FILES,
+    ),
+    "new_mechanism": Door(
+        {"name": "mine", "from_mjcf": None, "force": True, "strict": False}, words=FILES, calls=60
+    ),
+    "Results.save": Door({"path": "out.nc"}, calls=60),
+    "Results.columns": Door(),
+    "Results.with_measured": Door({"measured": "measured.csv"}, words=FILES),
     "simulate": Door(
         {"model": lambda stage: stage.model, "scenario": {"duration": 0.002, "rate": 1000.0}},
         calls=0,
@@ -190,26 +314,21 @@ DOORS: dict[str, Door] = {
     "Load.at": Door({"times": T}),
 }
 
-# Without a row: `checked` makes what is given already; the others change their arguments yet.
-LATER = {
-    *("Model.with_distribution", "Model.with_mechanism", "Model.unchecked", "Model.linearise"),
-    *("Model.forward_kinematics", "Model.solve", "Model.kernel"),
-    *("Mechanism.checked", "open_solution", "workspace_map", "workspace_size"),
-    *("open_map", "sweep", "export_c", "export_fmu", "export_matlab", "export_mjcf"),
-    *("forward_states", "solve_states", "pose_states", "run", "open_sweep", "serve_view"),
-    *("write_report", "new_mechanism", "compare", "tradeoff"),
-}
+# Without a row: these make what is given already, or serve until they are stopped.
+LATER = {"Model.kernel", "Mechanism.checked", "serve_view"}
 
 
 def target(name: str, stage: Stage) -> Callable[..., Any]:
     """What a row calls: a function of the page, or a method of an object of the stage."""
     owner, _, method = name.rpartition(".")
+    if name == "Results.save":  # takes any number of paths
+        return lambda path: stage.results.save(path)
     return getattr(getattr(stage, owner.lower()) if owner else condyle, method)
 
 
 def public_doors() -> set[str]:
     """Every function on the page, and every public method of the classes that have rows."""
-    page = {name: getattr(condyle, name) for name in condyle.__all__}
+    page = {name: getattr(condyle, name) for name in condyle.__all__} | {"Results": Results}
     found = {name for name, value in page.items() if inspect.isfunction(value)}
     for name in {row.partition(".")[0] for row in DOORS if "." in row}:
         found |= {

@@ -8,8 +8,9 @@ import pkgutil
 import random
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,8 +24,9 @@ from .doors import DOORS, MACHINE, Stage, public_doors, target
 # Its file is none here: the right call is refused too.
 BROKEN = (
     "motion_from_c3d",
-    "open_solution",
-    "sweep",
+    "open_sweep",
+    "Results.with_measured",
+    "Model.with_mechanism",
 )
 MODULES = sorted(
     module.name
@@ -112,3 +114,45 @@ def test_arguments_that_a_door_has_not(stage: Stage, name: str) -> None:
         return
     with pytest.raises(TypeError, match="nonsense"):
         call(**DOORS[name].arguments(stage), nonsense=1)
+
+
+@pytest.mark.parametrize("backend", ["numpy", "compiled"])
+def test_one_state_unchecked_needs_no_wrench(stage: Stage, backend: str) -> None:
+    model, q = condyle.Model(MACHINE, backend=backend), np.zeros(4)
+    fast = model.unchecked()
+    effort = fast.inverse_dynamics(q, q, q)
+    np.testing.assert_allclose(effort, model.inverse_dynamics(q, q, q).effort, atol=1e-12)
+    np.testing.assert_allclose(fast.forward_dynamics(q, q, effort), q, atol=1e-9)
+
+
+def test_failures_of_a_map(stage: Stage) -> None:
+    """Of three poses the outer ones cannot be reached."""
+    found = stage.map.condyle.failures
+    assert [(one.first, one.count, one.status) for one in found] == [
+        (0, 1, "unreachable"),
+        (2, 1, "unreachable"),
+    ]
+    assert str(found[1]).startswith("row 3 (1 sample): unreachable, ")
+
+
+def test_failures_of_a_sweep(stage: Stage) -> None:
+    sizes = {"what": "platform.mass", "values": [0.1, -1.0]}
+    found = condyle.sweep({"vary": [sizes]}, motion=stage.motion, workers=1).condyle.failures
+    assert [(one.first, one.owner_kind) for one in found] == [(1, "sample")]
+    assert found[0].cause
+
+
+@pytest.mark.parametrize("ask", ["failures", "columns", "__repr__", "plot"])
+def test_datasets_that_are_no_results(ask: str) -> None:
+    import xarray as xr
+
+    with pytest.raises(CondyleError, match="condyle"):
+        found = getattr(xr.Dataset({"x": ("a", [1, 2])}).condyle, ask)
+        (found.effort if ask == "plot" else found)()
+
+
+@pytest.mark.parametrize("opens", [condyle.open_solution, condyle.open_map, condyle.open_sweep])
+@pytest.mark.parametrize("given", [5, None, b"x", "", "a\0", "."])
+def test_files_that_are_no_results(opens: Callable[[Any], Any], given: object) -> None:
+    with pytest.raises(CondyleError, match=r"path|folder"):
+        opens(given)

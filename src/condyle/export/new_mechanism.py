@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..atomic import write_text
-from ..errors import InputError, WarningError, shortened
+from ..errors import InputError, WarningError, as_flag, as_path, shortened
 from ..mechanism import dumps, parse
 from ..mechanism.library import starter_text
 from ..mechanism.quantities import NAME_CHARACTERS
@@ -35,6 +35,7 @@ def new_mechanism(
             force: replace an existing file;  strict: a warning is an error.
     Raises: InputError: for an invalid name, or a file that exists.
     """
+    name = as_path(name, "name", "a name")
     path = Path(name if name.endswith(".toml") else f"{name}.toml")
     stem = path.name.removesuffix(".toml")
     text, warnings = starter_text(stem), tuple[str, ...]()
@@ -47,17 +48,18 @@ def new_mechanism(
             f'"{shortened(stem, 80)}" cannot be the name of a mechanism; use at most '
             f"{NAME_CHARACTERS} letters, digits, - and _"
         ) from None
-    if path.exists() and not force:
+    if path.exists() and not as_flag(force, "force"):
         raise InputError(f"{path} exists already; choose another name or add --force (force=True)")
     if from_mjcf is not None:
         from .mjcf_import import from_mjcf as imported
 
-        found = imported(Path(from_mjcf), stem)
+        model = Path(as_path(from_mjcf, "from_mjcf"))
+        found = imported(model, stem)
         warnings = tuple(found.notes)
-        source = f"From the MuJoCo model {Path(from_mjcf).name}. "
+        source = f"From the MuJoCo model {model.name}. "
         head = [f"{source}{{S}} is at the platform's mass centre at home.", *warnings]
         text = "\n".join([*(f"# {line}" for line in head), "", dumps(found.mechanism)])
-    if strict and warnings:
+    if as_flag(strict, "strict") and warnings:
         raise WarningError(warnings)
     write_text(path, text)
     return NewMechanism(path, warnings)

@@ -58,7 +58,7 @@ class Model:
 
     def __init__(
         self,
-        mechanism: Mechanism,
+        mechanism: Mechanism | str | os.PathLike[str],
         *,
         formulation: str = FORMULATION,
         route: str = ROUTE,
@@ -74,7 +74,7 @@ class Model:
         for name, given in (("formulation", formulation), ("route", route), ("backend", backend)):
             if not isinstance(given, str):
                 raise InputError(f"{name}: expected a name, got {type(given).__name__}")
-        system = System(mechanism, formulation, route, backend, general)
+        system = System(as_mechanism(mechanism), formulation, route, backend, general)
         self._assemble(system, Distribution.of(distribution))
 
     def _assemble(self, system: System, asked: Distribution) -> None:
@@ -376,7 +376,7 @@ def derive(
             CompilerError:    if compiled is asked for and there is no compiler.
     """
     return Model(
-        as_mechanism(mechanism),
+        mechanism,
         formulation=formulation,
         route=route,
         distribution=distribution,

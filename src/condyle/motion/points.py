@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ..errors import InputError, did_you_mean
+from ..errors import InputError, did_you_mean, shown
 from .file_words import listed
 
 DEFAULT_LANDMARK = "incisor"
@@ -29,8 +29,9 @@ def resolve_load_point(name: str | None, points: Iterable[str]) -> str:
 
 def _resolve(name: str | None, points: Iterable[str], default: str, what: str, option: str) -> str:
     points = list(points)
-    if name is not None and name not in points:
-        raise InputError(f'the mechanism has no {what} "{name}".{did_you_mean(name, points)}')
+    if name is not None and (not isinstance(name, str) or name not in points):
+        got = f'"{name}"' if isinstance(name, str) else shown(name)
+        raise InputError(f"the mechanism has no {what} {got}.{did_you_mean(name, points)}")
     if name is not None or default in points or len(points) == 1:
         return name or (default if default in points else points[0])
     there = f"choose one of {listed(points)}" if points else "give it some in platform.points"

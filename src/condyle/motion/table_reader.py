@@ -69,7 +69,7 @@ def iter_table(
 
 def is_parquet(path: str | os.PathLike[str]) -> bool:
     """Whether the name of a file says Parquet."""
-    return os.fspath(path).lower().endswith(".parquet")
+    return as_path(path).lower().endswith(".parquet")
 
 
 def _ahead(items: Iterator[T]) -> Iterator[T]:

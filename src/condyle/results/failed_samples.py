@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from math import isnan, nan
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..errors import InputError
 from ..kinematics.causes import cause_text, owners, shortfall_text
 from ..mechanism.mechanism import Mechanism
 from ..status import STATUS_NAMES, Status
@@ -22,7 +25,8 @@ MOST = 500  # intervals that a figure or a page shows
 class Failure:
     """Samples in a row that failed alike.
 
-    start, end: times of the first and the last [s];  first: index of the first;  count: of them.
+    start, end: times of the first and the last [s], NaN in maps and sweeps;  first: index of the
+                first;  count: of them.
     status:     name of the status;  cause: in words.
     owner_kind: chain, contact, platform or sample;  owner_name: of the chain or contacts.
     shortfall:  of infeasible samples, the largest number by which limits would have to be
@@ -45,10 +49,14 @@ class Failure:
         return f"{self.status}: {self.cause}" if self.cause else self.status
 
     def __str__(self) -> str:
-        when = f"{self.start:g} s" if self.count == 1 else f"{self.start:g} to {self.end:g} s"
+        if isnan(self.start):
+            when = f"row {self.first + 1}"
+        else:
+            ends = (self.start, self.end)[: self.count]
+            when = f"t = {' to '.join(f'{t:g}' for t in ends)} s"
         count = "1 sample" if self.count == 1 else f"{self.count} samples"
         needed = "" if self.shortfall is None else f"; {shortfall_text(self.shortfall)}"
-        return f"t = {when} ({count}): {self.status}, {self.cause}{needed}"
+        return f"{when} ({count}): {self.status}, {self.cause}{needed}"
 
 
 def longest(found: Sequence[Failure], most: int = MOST) -> list[Failure]:
@@ -62,12 +70,30 @@ def at_sample(found: Sequence[Failure], sample: int) -> Failure | None:
     return next((one for one in found if one.first <= sample < one.first + one.count), None)
 
 
+@contextmanager
+def whole() -> Iterator[None]:
+    """Where a dataset is read that may be none of condyle's, or part of one.
+
+    Raises: InputError: if a variable or attribute is missing.
+    """
+    try:
+        yield
+    except KeyError as error:
+        raise InputError(
+            f"this dataset is no whole result of condyle: {error.args[0]} is missing"
+        ) from None
+
+
 def failures(solution: xr.Dataset) -> list[Failure]:
-    """Every interval of failed samples of a solution, in order."""
-    status, time = solution["status"].values, solution["time"].values
+    """Every interval of failed samples of a solution or map, in order; failed rows of a sweep."""
+    if "reason" in solution:
+        rows = enumerate(zip(solution["status"].values, solution["reason"].values, strict=True))
+        return [Failure(nan, nan, i, 1, *why, "sample", "") for i, why in rows if why[0] != "ok"]
+    status = solution["status"].values.ravel()
     if not status.any():
         return []
-    cause = solution["cause"].values if "cause" in solution else np.zeros_like(status)
+    time = solution["time"].values if "time" in solution else np.full(status.size, nan)
+    cause = solution["cause"].values.ravel() if "cause" in solution else np.zeros_like(status)
     possible = owners(solution.condyle.mechanism)
     turns = np.flatnonzero((np.diff(status) != 0) | (np.diff(cause) != 0)) + 1
     starts, ends = np.append(0, turns), np.append(turns, len(status))

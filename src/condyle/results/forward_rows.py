@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import JammedError, NumberRangeError, SampleError, SingularError
+from ..errors import JammedError, NumberRangeError, SampleError, SingularError, as_flag
 from ..kinematics.causes import FLAG, Owner, cause_text, causes, owners, sample_error
 from ..kinematics.chain import FAMILIES
 from ..kinematics.constraints import indices
@@ -48,7 +48,7 @@ def forward_states(
              strict: a warning is an error.
     Raises:  InputError, SampleError, WarningError: nothing is written then.
     """
-    model = as_model(model)
+    flag, model = as_flag(flag, "flag"), as_model(model)
     mechanism = model.mechanism
     efforts = [f"tau_{name}" for name in mechanism.chain_names]
     units = [FAMILIES[chain.kind].effort_unit for chain in mechanism.chains]

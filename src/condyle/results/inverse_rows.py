@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..atomic import replacing
-from ..errors import InputError
+from ..errors import InputError, as_path
 from ..model.given import as_model
 from ..model.inverse_dynamics import SOLVED
 from ..model.joint_reactions import reactions as joint_reactions
@@ -60,7 +60,7 @@ def solve_states(
     Raises:  InputError, SampleError, WarningError: nothing is written then.
     """
     model = as_model(model)
-    if mat is not None and Path(mat) == Path(out):
+    if mat is not None and Path(as_path(mat, "mat")) == Path(as_path(out, "out")):
         raise InputError(f"--out {out}: --mat writes that file; give the table another name")
     watch = Watch(model.mechanism, rows=True)
     greatest: dict[str, Any] | None = None  # effort over its limit

@@ -19,7 +19,7 @@ import xarray as xr
 
 from ..accessors import extend
 from ..atomic import replacing
-from ..errors import InputError, UnsupportedError, no_such_file
+from ..errors import InputError, UnsupportedError, as_path, no_such_file
 from ..extras import require
 from ..markers import MeasuredChannels
 from ..mechanism.files import recall
@@ -27,7 +27,7 @@ from ..mechanism.mechanism import Mechanism
 from ..motion import write_table
 from ..progress import step
 from .contacts import AXES, contact_loss, contact_loss_columns
-from .failed_samples import Failure, failures, status_columns
+from .failed_samples import Failure, failures, status_columns, whole
 from .mat_file import dataset_variables, write_mat
 from .variables import BY_NAME, VARIABLES, named_columns, variable_columns
 from .warnings import Notice
@@ -85,8 +85,10 @@ class Results:
 
     @property
     def failures(self) -> list[Failure]:
-        """Intervals of samples that could not be computed, each with its cause."""
-        return failures(self._dataset)
+        """Samples in a row that could not be computed, with their cause; of maps, poses in the
+        order of the file, and of sweeps, variants."""
+        with whole():
+            return failures(self._dataset)
 
     @property
     def options(self) -> dict[str, Any]:
@@ -118,7 +120,7 @@ class Results:
         """Write as NetCDF (.nc), CSV, Parquet or MATLAB (.mat): every file whole, or none."""
         with step("writing results"), ExitStack() as stack:
             for path in paths:
-                suffix = Path(path).suffix.lower()
+                suffix = Path(as_path(path)).suffix.lower()
                 if suffix not in WRITERS:
                     raise InputError(
                         f"{path}: expected a name that ends in .nc, .csv, .parquet or .mat, got "
@@ -133,10 +135,12 @@ class Results:
         and, if a sample failed, status, cause and, with efforts within limits, shortfall. Maps and
         sweeps have a row for each pose or variant.
         """
-        return (solution_columns if self.kind == "solution" else row_columns)(self._dataset)
+        with whole():
+            return (solution_columns if self.kind == "solution" else row_columns)(self._dataset)
 
     def __repr__(self) -> str:
-        return str(extend(f"{self.kind}.table", self._dataset))
+        with whole():
+            return str(extend(f"{self.kind}.table", self._dataset))
 
     def _repr_html_(self) -> str:
         """A picture, where there is matplotlib, and the table."""
@@ -199,15 +203,27 @@ def open_solution(path: str | Path) -> xr.Dataset:
 
     Raises: InputError: if the file is missing or is not a condyle solution.
     """
-    if Path(path).is_dir():
-        raise InputError(f"{path}: is a folder; give the name of a solution (.nc) in it")
+    return as_solution(read_dataset(path, "solution"), path)
+
+
+def read_dataset(path: str | os.PathLike[str], kind: str, mark: str | None = None) -> xr.Dataset:
+    """A dataset as NetCDF, or from a folder of Zarr with a file `mark`; `kind` is for messages.
+
+    Raises: InputError: if it is missing or something else.
+    """
+    given = Path(as_path(path))
     try:
-        dataset = xr.load_dataset(path, engine="h5netcdf")
+        if mark is not None and (given / mark).is_file():
+            return xr.open_zarr(given, chunks=None, consolidated=False)
+        if given.is_dir():
+            raise InputError(f"{path}: is a folder; give the name of a {kind} (.nc) in it")
+        return xr.load_dataset(given, engine="h5netcdf")
+    except InputError:
+        raise
     except FileNotFoundError:
         raise no_such_file(path) from None
     except Exception as error:
-        raise InputError(f"{path} is not a NetCDF solution: {error}") from None
-    return as_solution(dataset, path)
+        raise InputError(f"{path} is not a NetCDF {kind}: {error}") from None
 
 
 def as_solution(dataset: xr.Dataset, path: str | os.PathLike[str]) -> xr.Dataset:

@@ -42,7 +42,7 @@ def solve(
     start = time.perf_counter()
     motion, load = as_motion(motion), as_load(load)
     wrench = load.at(motion.t)
-    name = load_point or load.point
+    name = load.point if load_point is None else load_point
     if np.any(wrench) or name is not None:
         name = resolve_load_point(name, model.mechanism.platform.points)
     with step("solving"):

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import InputError, as_path, no_such_file
+from ...errors import InputError
 from ...model.model import Model
+from ...results.solution import read_dataset
 from .axes import Axis, Grid
 from .reach import Reach
 
@@ -26,18 +27,7 @@ def open_map(path: str | os.PathLike[str]) -> xr.Dataset:
 
     Raises: InputError: if the file is missing or is no map.
     """
-    import xarray as xr
-
-    path = as_path(path, expected="the path of a map")
-    try:
-        if (Path(path) / MARK).is_file():
-            dataset = xr.open_zarr(Path(path), chunks=None, consolidated=False)
-        else:
-            dataset = xr.load_dataset(path, engine="h5netcdf")
-    except FileNotFoundError:
-        raise no_such_file(path) from None
-    except Exception as error:
-        raise InputError(f"{path} is not a map: {error}") from None
+    dataset = read_dataset(path, "map", MARK)
     if not is_map(dataset):
         raise InputError(f"{path} is not a map; `condyle map` writes them")
     return dataset

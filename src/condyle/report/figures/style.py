@@ -24,6 +24,7 @@ from matplotlib.transforms import ScaledTranslation
 
 from ...analysis.paper import is_stand_in, is_synthetic
 from ...errors import InputError, did_you_mean
+from ...results.failed_samples import whole
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -161,7 +162,7 @@ def house(draw: Callable[..., Figure]) -> Callable[..., Figure]:
         paper = STYLES[style]
         before = _wishes.set(Wishes(figsize, title, paper))
         try:
-            with mpl.rc_context(paper.settings):
+            with mpl.rc_context(paper.settings), whole():
                 figure = draw(*args, **kwargs)
                 if letters:
                     mark_panels(figure)
