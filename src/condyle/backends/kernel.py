@@ -63,7 +63,7 @@ class Kernel(Protocol):
 
         Args: inputs: port -> (N, size), (N, lanes) in the callers' order, or (N, size, lanes); of
               one row where it is the same for all samples.
-              threads: at most so many; results do not depend on it.
+              threads: maximum number; results do not depend on it.
         """
         ...
 

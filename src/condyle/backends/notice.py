@@ -1,4 +1,4 @@
-"""Things the user is told once."""
+"""Notices that the user gets once."""
 
 from __future__ import annotations
 

@@ -32,16 +32,16 @@ def workers(threads: int | None) -> int:
     return os.cpu_count() or 1
 
 
-def shared_out(work: Callable[[int, int], None], count: int, hands: int, multiple: int) -> None:
+def shared_out(work: Callable[[int, int], None], count: int, n_threads: int, multiple: int) -> None:
     """Let threads do `work(start, end)` on pieces of `count` samples.
 
-    Args: hands: threads, the caller's among them;  multiple: of which pieces start, so that
+    Args: n_threads: threads, the caller's among them;  multiple: of which pieces start, so that
           results do not depend on how samples are cut.
     """
-    if hands < 2:
+    if n_threads < 2:
         work(0, count)
         return
-    size = -(-count // (PIECES * hands * multiple)) * multiple
+    size = -(-count // (PIECES * n_threads * multiple)) * multiple
     next_piece = counter(0, size)
 
     def take() -> None:
@@ -50,7 +50,7 @@ def shared_out(work: Callable[[int, int], None], count: int, hands: int, multipl
                 return
             work(start, min(start + size, count))
 
-    helpers = [_helpers().submit(take) for _ in range(hands - 1)]
+    helpers = [_helpers().submit(take) for _ in range(n_threads - 1)]
     try:
         take()
     finally:

@@ -54,6 +54,7 @@ class Model:
         wrench:  force [N] and moment [N m] on the platform in {S}, (..., 6); None is none
         at:      point of action: a platform point by name, or (..., 3) [m] in {M}; None is O_M
         effort:  of the actuators, in the order of the file, (..., n) [N m or N]
+    Arrays, points or outputs that do not fit are an InputError.
     """
 
     def __init__(
@@ -166,7 +167,6 @@ class Model:
                  not depend on it.
         Returns: effort (..., n), contact_force (..., k) [N], status (...), of `Status`, and what
                  `outputs` names; see `ModelResult`. NaN where the status is not 0.
-        Raises:  InputError: for arrays, points or outputs that do not fit.
         """
         return self._inverse(q, v, a, wrench, at, outputs, threads)
 
@@ -190,7 +190,6 @@ class Model:
                  joint_acceleration, configuration, condition, slip, friction_force; "all" is all.
         Returns: acceleration (..., m) [m/s^2, rad/s^2], contact_force (..., k) [N], status (...),
                  and what `outputs` names; see `ModelResult`. NaN where the status is not 0.
-        Raises:  InputError: for arrays, points or outputs that do not fit.
         """
         return self._forward(q, v, effort, wrench, at, outputs, threads)
 
@@ -261,7 +260,6 @@ class Model:
                  beta, gamma, cos_gamma, discriminant (..., n), singularity, condition (...), status
                  (...): 0 where contacts are closed and chains reach. With v: pose_rate,
                  joint_rate; with a: pose_acceleration, joint_acceleration.
-        Raises:  InputError: for arrays that do not fit.
         """
         return self.poses.inverse_kinematics(q, v, a)
 
@@ -281,7 +279,6 @@ class Model:
                  tolerance: largest residual of a joint [rad or m].
         Returns: pose (..., 6), q (..., m), residual (..., n), condition (...), status (...), of
                  `PoseStatus`. NaN where the status is not 0.
-        Raises:  InputError: for arrays that do not fit.
         """
         return self._forward_kinematics.solve(joint, time, tolerance, start)
 

@@ -86,8 +86,8 @@ class CompiledKernel:
             call(*args, out + 8 * start, rows, judged + start)
 
         most = 1 + self.facts["operations"] * count // self.facts["lanes"] // WORTH_A_THREAD
-        hands = 1 if threads is None and most == 1 else min(workers(threads), most)
-        shared_out(piece, count, hands, UNIT)
+        n_threads = 1 if threads is None and most == 1 else min(workers(threads), most)
+        shared_out(piece, count, n_threads, UNIT)
         return Answer(results_at(self._places, results[:, :count]), status)
 
     def one(self, sample: np.ndarray) -> tuple[np.ndarray, int]:
