@@ -94,10 +94,7 @@ def joint_motion(
 class JointSpace(Formulation):
     """Formulations whose forces on links are derived in joint space."""
 
-    @staticmethod
-    def bias(end_point: ca.SX, s: JointState) -> ca.SX:
-        """M_1' q_r', (3,)."""
-        return rate_bias(end_point, s)
+    bias = staticmethod(rate_bias)
 
     @abstractmethod
     def link_force(self, link: Link, s: JointState, g: ca.SX) -> ca.SX:

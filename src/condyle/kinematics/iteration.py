@@ -95,7 +95,7 @@ def followed(contacts: Sequence[ContactSymbols], dep: list[int], q: ca.SX) -> Pl
     its error. Branches meet at folds, where the determinant of C_dep changes sign; steps that
     shrink quickly and determinants away from zero exclude a fold between them.
     """
-    unit = _Unit.of(contacts)
+    unit = _Unit(sum((c.square_lever for c in contacts), ca.SX(0)) / len(contacts))
     pose = _Pose(ca.SX.zeros(3), [ca.SX([1, 0])] * 3)
     there = _Contacts.at([c.started_at(c.point) for c in contacts], dep, pose)
     home = there.determinant
@@ -130,10 +130,6 @@ class _Unit:
     """
 
     lever: ca.SX
-
-    @staticmethod
-    def of(contacts: Sequence[ContactSymbols]) -> _Unit:
-        return _Unit(sum((c.square_lever for c in contacts), ca.SX(0)) / len(contacts))
 
     def dot(self, a: ca.SX, b: ca.SX, dep: Sequence[int]) -> ca.SX:
         weight = ca.vertcat(*(1 / self.lever if i < 3 else ca.SX(1) for i in dep))

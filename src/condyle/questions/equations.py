@@ -29,7 +29,6 @@ from .platform import (
     normal_forces,
     rate_basis,
     twist_basis,
-    whole_basis,
 )
 from .structure import Structure
 
@@ -132,7 +131,7 @@ def equations(
     elif (route or s.route) == "direct":
         pose = platform.placement.pose()
         state = pose_state(pose, platform.q1, platform.q2, platform.q)
-        basis, G = whole_basis(s.m), None
+        basis, G = Basis(range(s.m), [], ca.SX(0, s.m)), None
     elif method.uses_twist:
         position = platform.placement.position
         state = twist_state(position, motion.R, motion.twist, motion.twist_rate)

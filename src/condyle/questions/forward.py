@@ -93,12 +93,12 @@ def accelerated(
     """
     eq = affine(b, platform, load, effort)
     touch = contacts(b, platform) if b.structure.friction else None
-    found = _solved(b, platform, eq, touch, forces)
-    q2 = solve_small(eq.S, found.w)
+    w, force, sure = _solved(b, platform, eq, touch, forces)
+    q2 = solve_small(eq.S, w)
     b.check(feasibility(b, platform, eq.discriminants), DOUBTFUL, Status.unreachable)
     finite = ca.fabs(ca.sum1(q2)) < HUGE
-    b.check(2 * found.sure * finite - 1, 0.5)
-    return Accelerated(q2, found.force, found.w, eq, touch)
+    b.check(2 * sure * finite - 1, 0.5)
+    return Accelerated(q2, force, w, eq, touch)
 
 
 def forward_system(structure: Structure) -> Program:
@@ -126,15 +126,6 @@ def forward_system(structure: Structure) -> Program:
     return b.finish()
 
 
-@dataclass(frozen=True)
-class _Solved:
-    """w, contact forces along the unit normals (on request), and whether they are reliable."""
-
-    w: ca.SX
-    force: ca.SX
-    sure: ca.SX
-
-
 def _columns(eq: Affine) -> ca.SX:
     """H Pi, (s, m)."""
     ind, dep = list(eq.basis.identity), list(eq.basis.others)
@@ -143,7 +134,8 @@ def _columns(eq: Affine) -> ca.SX:
 
 def _solved(
     b: Builder, platform: Platform, eq: Affine, touch: Contacts | None, wanted: bool
-) -> _Solved:
+) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """w, contact forces along the unit normals (on request), and whether they are reliable."""
     H, F = _columns(eq), eq.F + eq.H @ eq.start
     rubbing = list(b.structure.friction)
     right = -F
@@ -165,4 +157,4 @@ def _solved(
             y, count = consistent(K[rubbing, :], force[rubbing])
             w, force = w - x[:, 1:] @ y, force + K @ y
             sure = sure * (count == 1)
-    return _Solved(w, force, sure)
+    return w, force, sure

@@ -211,11 +211,6 @@ def rate_basis(motion: WholeMotion, dependent: Sequence[str]) -> Basis:
     return Basis(independent_indices(dependent), dep, motion.M_J[dep, :])
 
 
-def whole_basis(size: int) -> Basis:
-    """All rates are admissible."""
-    return Basis(range(size), [], ca.SX(0, size))
-
-
 def normal_forces(b: Builder, motion: WholeMotion, mu: ca.SX) -> ca.SX:
     """Forces along the unit normals, (k,), from multipliers of the contacts' gradients."""
     if b.structure.parallel:
