@@ -183,10 +183,10 @@ def test_near_singularities(name: str) -> None:
     assert {Status.ok, Status.singular} <= set(compiled.status)
     condition = numpy.configuration.singularity.condition
     assert condition.max() > 1e12
-    for model in models(name):  # what is singular has efforts of no meaning: they are not told
-        told = model.inverse_dynamics(*near.arguments)
-        np.testing.assert_array_equal(np.isfinite(told.effort).all(axis=1), told.status == 0)
-        assert np.isnan(told.effort[told.status != Status.ok]).all()
+    for model in models(name):  # what is singular has efforts of no meaning: they are not given
+        found = model.inverse_dynamics(*near.arguments)
+        np.testing.assert_array_equal(np.isfinite(found.effort).all(axis=1), found.status == 0)
+        assert np.isnan(found.effort[found.status != Status.ok]).all()
     wanted = numpy.effort
     kernel = models(name)[0].kernel("inverse", ())
     answer = kernel.run(near.inputs)
@@ -195,7 +195,7 @@ def test_near_singularities(name: str) -> None:
     assert {AGAIN} == set(answer.status[doubtful]) == set(judged[doubtful])
     for values in (answer.values, single):
         off = np.abs(values["effort"].T - wanted).max(axis=1) / np.abs(wanted).max(axis=1)
-        assert (off < 2e-15 * condition).all()
+        assert (off < 2e-15 * condition)[numpy.status == Status.ok].all()
 
 
 # -- shapes -----------------------------------------------------------------------------------
