@@ -10,6 +10,8 @@ from condyle.analysis import paper
 from condyle.analysis.comparison import Comparison
 from condyle.analysis.torque_indices import indices
 
+pytestmark = pytest.mark.slow
+
 PARTS = ["platform", "legs", "load"]
 
 

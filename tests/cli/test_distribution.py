@@ -110,7 +110,7 @@ def test_nothing_that_is_infinite_breaks_json(condyle_command: Run) -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (("--distribution", "cubik"), 'no distribution "cubik". Did you mean "cubic"'),
+        (("--distribution", "cubik"), 'there is no "cubik". Did you mean "cubic"'),
         (("--distribution", "cubic"), "efforts that only pull"),
         (("--preload", "1"), "minimum_norm knows none"),
         (("--distribution", "bounded", "--preload", "-1"), "at least 0, got -1"),

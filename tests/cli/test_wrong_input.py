@@ -257,7 +257,7 @@ CASES: dict[str, Case] = {
     # names
     "new hidden": (("new", ".."), None, "cannot be the name"),
     "new with a quote": (("new", 'a"b'), None, "cannot be the name"),
-    "new without a name": (("new", ""), None, "cannot be the name"),
+    "new without a name": (("new", ""), None, "expected a name"),
     "new with a long name": (("new", "n" * 300), None, "at most 80 letters"),
     "new in no folder": (("new", "no/where"), None, "does not exist"),
 }

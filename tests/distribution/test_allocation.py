@@ -12,6 +12,8 @@ from .cases import MOLAR_RIGHT, human_jaw, random_problem
 from .oracle import best_active_set, full, least_stretch, signs
 from .test_oracle import TOLERANCE
 
+pytestmark = pytest.mark.slow
+
 # Efforts, contacts, contacts with friction.
 SHAPES = [(6, 2, 0), (5, 2, 1), (4, 2, 2), (4, 3, 1), (8, 0, 0)]
 

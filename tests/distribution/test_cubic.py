@@ -11,6 +11,8 @@ from condyle.errors import InputError
 from .cases import random_problem
 from .oracle import by_slsqp, full, least_stretch, signs
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("seed", range(20))
 def test_no_better_answer_is_near_or_far(seed):

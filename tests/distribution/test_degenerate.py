@@ -10,6 +10,8 @@ from condyle.errors import InputError
 
 from .cases import random_problem
 
+pytestmark = pytest.mark.slow
+
 NAMES = sorted(OBJECTIVES)
 
 

@@ -7,6 +7,8 @@ from condyle.distribution import OBJECTIVES, Problem, Status, distribute
 
 from .cases import random_problem, wrenches
 
+pytestmark = pytest.mark.slow
+
 
 def wedge(sign):
     """One contact, as many efforts as equations, so that each pattern has one solution.

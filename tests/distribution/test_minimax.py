@@ -10,6 +10,8 @@ from condyle.distribution import Problem, Status, distribute
 from .cases import random_problem
 from .oracle import best_active_set, full, least_maximum, signs
 
+pytestmark = pytest.mark.slow
+
 
 # The last three leave next to nothing that fits: the choice among ties takes a second program.
 @pytest.mark.parametrize("seed", [*range(40), 80, 341, 461])

@@ -10,6 +10,8 @@ from condyle.distribution import CERTIFIED, Status, distribute
 from .cases import random_problem
 from .oracle import best_active_set, full, least_stretch, signs
 
+pytestmark = pytest.mark.slow
+
 # Both sides solve well-conditioned systems of a dozen unknowns; the worst of 2000 was 1e-10.
 TOLERANCE = 1e-8
 

@@ -13,6 +13,8 @@ import condyle
 from condyle.dynamics.minimum_norm import minimum_norm
 from condyle.mechanism import parse
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("n, m", [(6, 6), (6, 4), (8, 4), (5, 1)])
 def test_least_norm(n: int, m: int) -> None:

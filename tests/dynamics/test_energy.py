@@ -18,6 +18,8 @@ from condyle.dynamics import FORMULATIONS
 from condyle.mechanism import parse
 from condyle.model.model import Model
 
+pytestmark = pytest.mark.slow
+
 CASES = {f"k{k}": {"contacts": k} for k in range(4)} | {"n8": {"chains": 8}}
 
 

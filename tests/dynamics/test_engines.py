@@ -12,6 +12,8 @@ from oracles.random_mechanism import random_mechanism
 from support.families import MECHANISMS, MIXED, Case, case, close, of_raw
 from support.speeds import few
 
+pytestmark = pytest.mark.slow
+
 TOLERANCE = 1e-9
 MODULES = {"pinocchio": "pinocchio", "mujoco": "mujoco", "newton_euler": "numpy"}
 PLANES: list[dict[str, Any]] = [

@@ -17,6 +17,8 @@ from condyle.model.distributing import Distribution
 from condyle.model.model import Model
 from condyle.status import Status
 
+pytestmark = pytest.mark.slow
+
 TOLERANCE = 1e-8
 RIGID = ("RSS", "PSS", "SPS")
 LEAST: dict[str, dict[str, Any]] = {

@@ -35,6 +35,8 @@ from condyle.mechanism.home import (
 from condyle.model.closing import Closure
 from condyle.model.continuation import least_squares
 
+pytestmark = pytest.mark.slow
+
 
 def coordinate_closure(mechanism: Mechanism, names: Sequence[str]) -> Closure:
     return Closure(mechanism, names, backend=Backend("numpy"))

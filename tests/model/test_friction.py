@@ -25,6 +25,8 @@ from condyle.model.model import Model
 from condyle.model.model_result import ModelResult
 from condyle.status import Status
 
+pytestmark = pytest.mark.slow
+
 CASES: dict[str, dict[str, Any]] = {
     "k1": {"contacts": 1, "seed": 1},
     "k1 n8": {"contacts": 1, "chains": 7, "seed": 2},

@@ -20,6 +20,8 @@ from condyle.model.distributing import Distribution
 from condyle.model.model import Model
 from condyle.status import Status
 
+pytestmark = pytest.mark.slow
+
 MIXED = ("RSS", "PSS", "SPS", "cable")
 CASES: dict[str, dict[str, Any]] = {
     "bounded k0": {"contacts": 0, "chains": 7, "limit": 3.0, "seed": 1},

@@ -13,6 +13,8 @@ from condyle.dynamics import FORMULATIONS
 from condyle.errors import InputError
 from condyle.model.model import Model
 
+pytestmark = pytest.mark.slow
+
 NAMES = ("masticatory", "masticatory-curved", "gough-stewart", "rss_k1_n6_ball", "mixed_k2_n8")
 NAMES += ("mixed_k3_n9_curved", "mixed_k4_n6", "mixed_k5_n6", "sps_k2_n6_ellipsoid")
 

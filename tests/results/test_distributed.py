@@ -30,6 +30,8 @@ from condyle.results.summary import summarize, work
 from condyle.results.warnings import Watch
 from condyle.status import STATUS_NAMES, Status
 
+pytestmark = pytest.mark.slow
+
 MU, SMOOTHING = 0.12, 2e-3
 FRICTION = f"friction = {{ coefficient = {MU}, smoothing_speed = {SMOOTHING} }}\n"
 ONE_SIDED = 'one_sided = true\nside = "below"\n'

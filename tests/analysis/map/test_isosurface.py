@@ -79,6 +79,6 @@ def test_files_bring_all_that_was_asked(model_of: Models, tmp_path: Path) -> Non
     assert grid.held == (0.0, 0.0, 0.0, pytest.approx(np.radians(2)))
     assert reach.high[2] == 0.4 and np.isinf(reach.low[0])
     (tmp_path / "b.nc").write_text("no")
-    for name, words in (("b.nc", "is not a map"), ("c.nc", "no such file")):
+    for name, words in (("b.nc", "is not a NetCDF map"), ("c.nc", "no such file")):
         with pytest.raises(condyle.InputError, match=words):
             condyle.open_map(tmp_path / name)

@@ -22,6 +22,8 @@ from condyle.model.joint_reactions import reactions
 from condyle.motion import trial_motion
 from condyle.report.scene import place
 
+pytestmark = pytest.mark.slow
+
 LEAST = {"distribution": "minimum_norm"}
 LIMITED = {"cable": {"force_limit": 1000.0}, "RSS": {"torque_limit": 10.0}}
 NOTHING = {"mass": 0.0, "com": 0.0, "transverse": 0.0, "axial": 0.0}

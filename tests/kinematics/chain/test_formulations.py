@@ -14,6 +14,8 @@ from condyle.dynamics import FORMULATIONS
 from condyle.mechanism import load_mechanism
 from condyle.questions.numbers import has_closed_form
 
+pytestmark = pytest.mark.slow
+
 OTHERS = [name for name in FORMULATIONS if name != "virtual_power"]
 BUNDLED = Path(condyle.__file__).parent / "mechanism" / "bundled"
 

@@ -113,7 +113,7 @@ def wanted() -> list[dict[str, Any]]:
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_efforts(wanted: list[dict[str, Any]], formulation: str) -> None:
-    model = Model(condyle.load_mechanism("gough-stewart"), formulation, backend="numpy")
+    model = Model(condyle.load_mechanism("gough-stewart"), formulation=formulation, backend="numpy")
     q, q1, q2, wrench = states()
     load = np.hstack([wrench, np.tile(PAYLOAD, (len(q), 1))])
     close(

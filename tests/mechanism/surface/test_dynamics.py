@@ -21,6 +21,8 @@ from condyle.mechanism.surface import Expression, Plane, Profile, Quadratic, Sph
 from condyle.model.model import Model
 from condyle.model.model_result import ModelResult
 
+pytestmark = pytest.mark.slow
+
 COUNT = 4
 MECHANISMS: dict[str, dict[str, Any]] = {
     "quadratic": {"surface": "quadratic"},

@@ -18,6 +18,8 @@ from condyle.model.model import Model
 
 from .cases import CASES, DRAWN, by_numpy, case, close, efforts, load_of, state
 
+pytestmark = pytest.mark.slow
+
 # Surfaces, by options of `random_mechanism`.
 SURFACES: dict[str, dict[str, Any]] = {
     "every kind": {"surface": "mixed", "contacts": 5, "chains": 8},
