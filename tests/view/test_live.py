@@ -18,6 +18,8 @@ from condyle.view.readout import live_html, status_html
 
 from .test_view import HANDLE, fill, near, row
 
+pytestmark = pytest.mark.usefixtures("compiler_command")  # by numpy a second takes minutes
+
 TORQUE = {"kind": "computed_torque", "stiffness": 2500.0}
 FOOD = {"kind": "food", "food": "bolus", "point": "right_molar"}
 CHEW = {"duration": 3.0, "controller": TORQUE, "load": [FOOD]}
