@@ -47,9 +47,9 @@ def difference(got: ModelResult, wanted: ModelResult) -> float:
     return worst
 
 
-def compare_all(mechanism: Mechanism, *samples: np.ndarray) -> int:
+def compare_all(mechanism: Mechanism, *states: np.ndarray, load: np.ndarray) -> int:
     first, *others = (
-        model.inverse_dynamics(*samples, outputs="all") for model in models(mechanism)
+        model.inverse_dynamics(*states, *parts(load), outputs="all") for model in models(mechanism)
     )
     for other in others:
         assert difference(other, first) < 1e-10
@@ -72,7 +72,7 @@ def test_random_mechanisms(seed: int, chains: int, contacts: int, metres: bool) 
     mechanism = parse(toml_text(raw))
     states = random_state(rng, raw, 4)
     load = with_point(states["wrench"], np.array(mechanism.platform.points["right_molar"]))
-    compared = compare_all(mechanism, *(states[key] for key in ("q", "qd", "qdd")), load)
+    compared = compare_all(mechanism, *(states[key] for key in ("q", "qd", "qdd")), load=load)
     assert compared == len(FORMULATIONS) * (2 if contacts < 3 else 1) - 1
 
 
@@ -83,7 +83,8 @@ def test_the_reference_motion(reference: Mechanism) -> None:
     model = condyle.derive(reference)
     (q, q1, q2), _ = model.poses.of_motion(motion)
     load = with_point(wrench, load_point_of(model, "right_molar"))
-    assert compare_all(reference, q[::25], q1[::25], q2[::25], load) == len(FORMULATIONS) * 2 - 1
+    compared = compare_all(reference, q[::25], q1[::25], q2[::25], load=load)
+    assert compared == len(FORMULATIONS) * 2 - 1
 
 
 @pytest.mark.parametrize("dependent", [("Z", "alpha"), ("gamma", "X"), ("X", "alpha")])

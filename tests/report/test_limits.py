@@ -49,7 +49,7 @@ def test_what_is_beyond_a_limit_is_told_of_on_its_side(solution: xr.Dataset) -> 
     assert {(FIRST, LOW), (SECOND, 0.0)} <= set(wanted) == set(told)
     for key, (where, worst) in wanted.items():
         assert (told[key].count, told[key].value) == (where.sum(), worst)
-        assert ("below its least" in told[key].text) == (key[1] <= 0)
+        assert ("below its minimum" in told[key].text) == (key[1] <= 0)
 
 
 def test_panels_draw_both_levels(solution: xr.Dataset) -> None:
