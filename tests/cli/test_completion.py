@@ -105,7 +105,13 @@ def test_help_and_completion_load_nothing_heavy(environment: dict[str, str]) -> 
     assert not HEAVY & set(loaded.split())
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_the_script_for_a_shell(condyle_command: Callable[..., Any], shell: str) -> None:
-    outcome = condyle_command("--show-completion", shell)
-    assert outcome.status == 0 and "_CONDYLE_COMPLETE" in outcome.out
+@pytest.mark.parametrize(
+    ("shell", "word"), [("bash", "complete -o"), ("zsh", "#compdef condyle"), ("fish", "--command")]
+)
+def test_the_script_for_a_shell(
+    condyle_command: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, shell: str, word: str
+) -> None:
+    # Typer asks which shell started the command: of a test, any program may have.
+    monkeypatch.setattr("typer.completion._get_shell_name", lambda: shell)
+    outcome = condyle_command("--show-completion")
+    assert outcome.status == 0 and "_CONDYLE_COMPLETE" in outcome.out and word in outcome.out
