@@ -7,8 +7,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pandas
 import pytest
 import tomli_w
+
+from condyle.mechanism import bundled_text
 
 STUDY: dict[str, Any] = {
     "motion": {"file": "trial", "rate": 4.0},
@@ -36,10 +39,25 @@ def test_sweep_and_show(condyle_command: Callable[..., Any], study: Path) -> Non
     assert told["outcomes"] == [{"status": "ok", "rows": 4, "first_reason": ""}]
     names = {Path(file).name for file in told["files"]}
     assert {"best.csv", "main-effects.csv", "pareto.csv", "sweep-scatter.png"} <= names
-    shown = condyle_command("sweep", "--show", "rows")
+    shown = condyle_command("sweep", "--show", "rows", "--csv")
+    assert len(Path("rows/rows.csv").read_text().splitlines()) == 1 + 4
+    assert list(pandas.read_parquet("rows/rows")["status"]) == ["ok"] * 4
+    assert [file.name for file in Path("rows/rows").iterdir()] == ["all.parquet"]
     assert shown.status == 0 and "least peak" in shown.out and "Pareto front" in shown.out
     again = condyle_command("sweep", study, "--out", "rows")
     assert again.status == 2 and "--resume" in again.err
+
+
+def test_a_machine_that_is_no_jaw_has_no_load(condyle_command: Callable[..., Any]) -> None:
+    """The bundled bite force is nobody's default but the jaw's."""
+    text = bundled_text("masticatory").replace("right_molar", "tip").replace("incisor", "nose")
+    Path("own.toml").write_text(text)
+    study = {**STUDY, "mechanism": "own.toml"}
+    del study["load"]
+    Path("study.toml").write_text(tomli_w.dumps(study))
+    done = condyle_command("sweep", "study.toml", "--out", "rows", "--workers", 1)
+    assert done.status == 0, done.err
+    assert condyle_command("run", "own.toml", "--rate", 4, "--out", "results").status == 0
 
 
 @pytest.mark.parametrize(

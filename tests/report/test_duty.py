@@ -158,7 +158,7 @@ def test_without_limits_there_is_no_activation(robot: xr.Dataset, tmp_path: Path
     text = " ".join(t.get_text() for t in PLOTS["activation"](free).axes[0].texts)
     assert "no actuator" in text and activations(free) == {}
     names = {path.stem for path in save_solution_figures(free, tmp_path)}
-    assert "activation" not in names and "effort_speed" in names
+    assert "masticatory-activation" not in names and "masticatory-effort_speed" in names
     ids = {panel["id"] for panel in payload(report_html(free))["panels"]}
     assert "activation" not in ids and "contact-force" in ids
 

@@ -388,8 +388,13 @@ def test_figures_of_a_solution(
 ) -> None:
     few = {name: PLOTS[name] for name in ("load", "contact_force")}
     monkeypatch.setattr(figures, "PLOTS", few)
+    name = fewer_contacts[0].attrs["mechanism_name"]
+    stale, other = tmp_path / f"{name}-contact_force.png", tmp_path / "other-contact_force.png"
+    stale.touch()
+    other.touch()
     paths = figures.save_solution_figures(fewer_contacts[0], tmp_path)
-    assert [p.name for p in paths] == ["load.png", "load.svg"]
+    assert [p.name for p in paths] == [f"{name}-load.png", f"{name}-load.svg"]
+    assert {*tmp_path.iterdir()} == {*paths, other}
 
 
 def test_figure_5_holds_path_and_coordinates(solution: xr.Dataset) -> None:

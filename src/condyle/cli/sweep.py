@@ -26,6 +26,7 @@ def sweep(
     resume: bool = False,
     show: Path | None = None,
     figures: bool = False,
+    csv: bool = False,
 ) -> Answer:
     """Parameter study: a row of measures for each variant of a mechanism.
 
@@ -40,6 +41,7 @@ def sweep(
         resume: Continue from the rows in the folder.
         show: Show the results in the folder of a sweep, instead of running one.
         figures: Also draw figures into the folder.
+        csv: Also write all rows as rows.csv into the folder.
     """
     require_drawing(figures, False)
     import condyle
@@ -47,7 +49,7 @@ def sweep(
     if (study is None) == (show is None):
         raise InputError("expected a study, or --show with the folder of a sweep")
     if show is not None:
-        return _shown(condyle.open_sweep(show), show, figures)
+        return _shown(condyle.open_sweep(show), show, figures, csv)
     assert study is not None
     folder = out or Path(study.stem)
     try:
@@ -59,10 +61,10 @@ def sweep(
             file=sys.stderr,
         )
         raise
-    return _shown(table, folder, figures)
+    return _shown(table, folder, figures, csv)
 
 
-def _shown(table: xr.Dataset, folder: Path, figures: bool) -> Answer:
+def _shown(table: xr.Dataset, folder: Path, figures: bool, csv: bool) -> Answer:
     """The tables of a sweep, as text and as CSV, and its figures."""
     from ..report.tables.sweep_tables import sweep_tables
 
@@ -71,6 +73,9 @@ def _shown(table: xr.Dataset, folder: Path, figures: bool) -> Answer:
     for one in tables:
         files.append(output_folder(folder) / f"{one.name}.csv")
         one.write_csv(files[-1])
+    if csv:
+        files.append(folder / "rows.csv")
+        table.condyle.save(files[-1])
     if figures:
         from ..report.figures import save
         from ..report.figures.sweep_figures import sweep_plots

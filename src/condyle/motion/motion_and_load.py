@@ -12,7 +12,7 @@ from ..mechanism.mechanism import Mechanism
 from .path import Motion, as_motion
 from .platform_load import Load, as_load
 from .points import resolve_landmark
-from .reference_case import bundled_reference, fits_reference, trial_motion
+from .reference_case import bundled_reference, fits_load, fits_reference, trial_motion
 
 
 def motion_and_load(
@@ -45,7 +45,7 @@ def motion_and_load(
             "--motion"
         )
     path, force = bundled_reference()
-    acting = as_load(force if load is None and bundled else load)
+    acting = as_load(force if load is None and bundled and fits_load(mechanism) else load)
     how: dict[str, Any] = {"cutoff": smooth, "rate": rate, "trim": trim}
     if motion is None and not bundled:
         swaying = ", ".join(independent_coordinates(mechanism))

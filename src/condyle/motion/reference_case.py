@@ -28,6 +28,7 @@ from ..mechanism.mechanism import Mechanism
 from .column_units import LANDMARK
 from .path import Motion
 from .platform_load import Load
+from .points import DEFAULT_LOAD_POINT
 
 MOTION_FILE = "chewing-incisor.csv"
 LOAD_FILE = "bite-force.csv"
@@ -40,6 +41,11 @@ def fits_reference(mechanism: Mechanism, landmark: str | None = None) -> bool:
     """Whether the bundled motion is one for a mechanism: two contacts, and a landmark."""
     named = landmark is not None or "incisor" in mechanism.platform.points
     return named and len(mechanism.contacts) == 2
+
+
+def fits_load(mechanism: Mechanism) -> bool:
+    """Whether the bundled load is one for a mechanism: it has the jaw's molar, and can chew."""
+    return DEFAULT_LOAD_POINT in mechanism.platform.points and fits_reference(mechanism)
 
 
 def reference_motion() -> Motion:

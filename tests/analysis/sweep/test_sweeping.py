@@ -109,7 +109,7 @@ def test_dask_gives_the_same_bits_and_outlives_a_worker(
 
 def wait_for_parts(folder: Path, count: int, seconds: float = 60.0) -> None:
     end = time.monotonic() + seconds
-    while len(list(folder.glob("part-*.parquet"))) < count and time.monotonic() < end:
+    while len(list(folder.glob("rows/part-*.parquet"))) < count and time.monotonic() < end:
         time.sleep(0.01)
 
 
@@ -197,7 +197,7 @@ def test_a_full_disk_is_told_and_resumed(
         full.setattr(study_folder.pq, "write_table", write)
         with pytest.raises(condyle.InputError, match="No space left"):
             condyle.sweep(tables, folder, workers=1)
-    assert len(list(folder.iterdir())) == 3  # the study and two parts, nothing half
+    assert len(list((folder / "rows").iterdir())) == 2  # two parts, nothing half
     assert open_sweep(folder).sizes["row"] == 8
     same(alone, condyle.sweep(tables, folder, workers=1, resume=True))
 

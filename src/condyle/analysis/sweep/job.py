@@ -25,7 +25,7 @@ from ...motion import (
     resolve_load_point,
     trial_motion,
 )
-from ...motion.reference_case import bundled_reference, fits_reference
+from ...motion.reference_case import bundled_reference, fits_load, fits_reference
 from ...questions.structure import Structure, structure_of
 from .measure import Reading, reading
 from .sampling import Design
@@ -125,7 +125,7 @@ def prepared(
     design = Design(study.vary, study.sampling, base)
     design.check()
     paths = motions or tuple(_motion(one, machine) for one in study.motion)
-    acting = load or _load(study.load)
+    acting = load or _load(study.load, machine)
     name = study.load_point or acting.point
     if np.any(acting.wrench) or name is not None:
         name = resolve_load_point(name, machine.platform.points)
@@ -182,7 +182,9 @@ def _motion(given: MotionFile, machine: Mechanism) -> Motion:
     return Motion.from_csv(given.file, units=given.units, landmark=given.landmark, **options)
 
 
-def _load(given: str) -> Load:
+def _load(given: str | None, machine: Mechanism) -> Load:
+    if given is None:
+        given = REFERENCE if fits_load(machine) else NONE
     if given == NONE:
         return Load.zero()
     return reference_load() if given == REFERENCE else Load.from_csv(given)

@@ -165,7 +165,11 @@ class Study(Table):
     motion: Annotated[tuple[MotionFile, ...], BeforeValidator(_motions), Field(min_length=1)] = (
         Field(default=(MotionFile(file=REFERENCE),), description="a file or several")
     )
-    load: str = Field(default=REFERENCE, description='a file, "reference" or "none"')
+    load: str | None = Field(
+        default=None,
+        description='a file, "reference" or "none"; default: the bundled bite force where the '
+        "bundled motion and right_molar fit",
+    )
     load_point: str | None = None
     formulation: str = "virtual_power"
     route: str = "core"
@@ -232,7 +236,9 @@ def read_study(source: str | os.PathLike[str] | Mapping[str, Any] | Study) -> St
     def beside(name: str, words: Iterable[str]) -> str:
         return name if name in words else str(path.parent / name)
 
-    named: dict[str, Any] = {"load": beside(study.load, (REFERENCE, NONE))}
+    named: dict[str, Any] = {}
+    if study.load is not None:
+        named["load"] = beside(study.load, (REFERENCE, NONE))
     if study.mechanism is not None:
         named["mechanism"] = beside(study.mechanism, bundled_mechanisms())
     named["motion"] = [

@@ -1,4 +1,7 @@
-"""The folder of a sweep: one Parquet dataset in parts, each whole or absent, and its study."""
+"""The folder of a sweep: its study, and its rows, a Parquet dataset in a folder of their own.
+
+While a sweep runs these are parts, each whole or absent; at its end they are made one file.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +26,8 @@ from .job import MOTION, REASON, SECONDS, STATUS, VARIANT, Job
 from .study import some_of
 from .variants import Row
 
-STUDY, PART, SOLUTIONS = "study.json", "part-{:06d}.parquet", "solutions"
+STUDY, ROWS, SOLUTIONS = "study.json", "rows", "solutions"
+PART, ALL = "part-{:06d}.parquet", "all.parquet"
 _MANY = 5  # differences that a message shows
 
 
@@ -50,16 +54,18 @@ class Store:
                     "resume=True), or choose another folder"
                 )
             return
-        make_folder(folder)
-        if any(self.folder.glob("part-*.parquet")):
+        if any(_files(self.folder)):
             raise InputError(
-                f"{folder} holds parts of a study, but {STUDY} is missing; choose another folder"
+                f"{folder} holds rows of a study, but {STUDY} is missing; choose another folder"
             )
+        make_folder(self.folder / ROWS)
         write_text(self.folder / STUDY, json.dumps(asked, indent=1))
 
     def missing(self) -> list[int]:
         """Parts that are not written yet."""
-        there = {path.name for path in self.folder.glob("part-*.parquet")}
+        there = {path.name for path in _files(self.folder)}
+        if ALL in there:
+            return []
         return [p for p in range(self._job.parts) if PART.format(p) not in there]
 
     def write(self, part: int, rows: Sequence[Row]) -> None:
@@ -73,8 +79,24 @@ class Store:
                 file = self.folder / SOLUTIONS / f"{row.variant:09d}-{row.motion}.nc"
                 with replacing(file) as temporary:
                     temporary.write_bytes(row.solution)
-        with replacing(self.folder / PART.format(part)) as temporary:
+        with replacing(self.folder / ROWS / PART.format(part)) as temporary:
             pq.write_table(_table(self._job, rows), temporary)
+
+    def join(self) -> None:
+        """Make one file of all parts, a part after the other.
+
+        Raises: InputError: if that fails; the parts stay.
+        """
+        parts = [self.folder / ROWS / PART.format(p) for p in range(self._job.parts)]
+        if not (self.folder / ROWS / ALL).is_file():
+            with (
+                replacing(self.folder / ROWS / ALL) as temporary,
+                pq.ParquetWriter(temporary, pq.read_schema(parts[0])) as writer,
+            ):
+                for part in parts:
+                    writer.write_table(pq.read_table(part))
+        for part in parts:
+            part.unlink(missing_ok=True)
 
 
 def _table(job: Job, rows: Sequence[Row]) -> pa.Table:
@@ -99,7 +121,7 @@ def open_sweep(folder: str | os.PathLike[str]) -> xr.Dataset:
     kept = _kept(Path(as_path(folder, "folder", "the folder of a sweep")))
     if kept is None:
         raise InputError(f"{folder} is not the folder of a sweep: {STUDY} is missing")
-    parts = sorted(Path(folder).glob("part-*.parquet"))
+    parts = _files(Path(folder))
     if not parts:
         raise InputError(
             f"{folder} has no rows yet; continue with --resume (in Python resume=True)"
@@ -116,6 +138,12 @@ def open_sweep(folder: str | os.PathLike[str]) -> xr.Dataset:
     lists = {name: list(kept[name]) for name in ("parameters", "measures")}
     attributes = {"rows": kept["rows"], "condyle_version": kept["condyle"], **facts, **lists}
     return xr.Dataset(variables, attrs=attributes)
+
+
+def _files(folder: Path) -> list[Path]:
+    """The files of rows: the one of all, or parts in their order."""
+    joined = folder / ROWS / ALL
+    return [joined] if joined.is_file() else sorted((folder / ROWS).glob("part-*.parquet"))
 
 
 def described(job: Job) -> dict[str, Any]:

@@ -63,4 +63,5 @@ def sweep(
             for part, rows in run_parts(job, solve_part, missing, workers, scheduler):
                 store.write(part, rows)
                 advance(len(rows))
+        store.join()
         return open_sweep(out)

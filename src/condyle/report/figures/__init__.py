@@ -10,11 +10,12 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ...atomic import file_stem
 from ..panel import PANEL_GROUPS
 from .drawing import figure_of
 from .paper_figures import figure_5, figure_8, figure_9
 from .registry import PLOTS, find_figures, plot, solution_plots
-from .saving import save, save_each
+from .saving import FORMATS, save, save_each
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -53,11 +54,17 @@ def save_figures(
 def save_solution_figures(solution: xr.Dataset, folder: str | os.PathLike[str]) -> list[Path]:
     """Write the plots of `PLOTS` as PNG and SVG into a folder that exists; returns the paths.
 
-    Plots without data in the solution are omitted, such as of contacts or of activations.
+    <mechanism>-effort.png, <mechanism>-effort.svg, ... Plots without data in the solution are
+    omitted, such as of contacts or of activations; their files of an earlier solution are removed.
     """
-    plots = {
-        name: draw
-        for name, draw in PLOTS.items()
-        if name not in PANEL_GROUPS or any(PANEL_GROUPS[name].panels(solution))
-    }
-    return save_each(plots, solution, folder)
+    stem = file_stem(solution.attrs["mechanism_name"])
+    plots, none = {}, set()
+    for name, draw in PLOTS.items():
+        if name not in PANEL_GROUPS or any(PANEL_GROUPS[name].panels(solution)):
+            plots[f"{stem}-{name}"] = draw
+        else:
+            none |= {Path(folder) / f"{stem}-{name}.{kind}" for kind in FORMATS}
+    paths = save_each(plots, solution, folder)
+    for stale in none:
+        stale.unlink(missing_ok=True)
+    return paths
