@@ -18,6 +18,7 @@ _HOMES = {
     "CondyleError": "errors",
     "InfeasibleError": "errors",
     "InputError": "errors",
+    "GimbalLockError": "errors",
     "JammedError": "errors",
     "MechanismError": "errors",
     "SingularError": "errors",
@@ -76,6 +77,7 @@ if TYPE_CHECKING:
     from .analysis.weight_curve import tradeoff
     from .errors import (
         CondyleError,
+        GimbalLockError,
         InfeasibleError,
         InputError,
         JammedError,

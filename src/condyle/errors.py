@@ -217,6 +217,10 @@ class UncertifiedError(SampleError):
     """Efforts that could not be certified to the stated accuracy."""
 
 
+class GimbalLockError(SampleError):
+    """A pose at which the rates of the Bryant angles do not determine the angular velocity's."""
+
+
 def did_you_mean(name: object, available: Iterable[str]) -> str:
     """' Did you mean "x"? Available: ...' for a name that is not among `available`."""
     choices = sorted(available)

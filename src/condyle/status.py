@@ -38,6 +38,11 @@ class Status(IntEnum):
     infeasible = 4, "efforts within the limits cannot balance the sample", "sample"
     jammed = 5, "Coulomb friction has no solution: the mechanism jams", "sample"
     uncertified = 6, "efforts were found that could not be certified", "sample"
+    gimbal_lock = (
+        7,
+        "beta at +-90 degrees: rates of the angles do not describe all motions",
+        "sample",
+    )
 
 
 STATUS_NAMES = tuple(status.name for status in Status)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from oracles.closure import complete_state
 from oracles.random_mechanism import random_mechanism, random_state, toml_text
+from oracles.rotations import platform_motion
 
 import condyle
 from condyle import SingularError
@@ -97,7 +98,7 @@ def test_a_singular_pose_is_an_error_that_names_it() -> None:
 
 @pytest.mark.parametrize("contacts", range(6))
 def test_measures_are_those_of_the_actuator_jacobian(contacts: int) -> None:
-    """J_A theta' + J_W q' = 0 with the joints' Jacobian of Pinocchio, by numpy's own SVD."""
+    """J_A theta' + J_W t = 0 on admissible twists [V; L omega], by Pinocchio's Jacobian."""
     pytest.importorskip("pinocchio", reason="pin is not installed (it is in the `test` extra)")
     from oracles.pinocchio_engine import PinocchioEngine
 
@@ -117,9 +118,11 @@ def test_measures_are_those_of_the_actuator_jacobian(contacts: int) -> None:
                 for unit in np.eye(6 - contacts)
             ]
         ).T
-        scale = np.array([1 if name in "XYZ" else length for name in states["names"]])
+        E = np.eye(6)
+        E[3:, 3:] = platform_motion(pose).axes * length
+        admissible = np.linalg.qr(E @ M_J)[0]
         rods = [2 * np.linalg.norm(np.subtract(c.platform, c.crank_tip)) for c in mechanism.chains]
-        J_W = J_A[:, None] * (J_theta @ M_J) / scale / np.array(rods)[:, None]
+        J_W = J_A[:, None] * (J_theta @ np.linalg.solve(E, admissible)) / np.array(rods)[:, None]
         sigma = np.linalg.svd(J_W, compute_uv=False)
         np.testing.assert_allclose(s.J_W_sigma[i], sigma, rtol=1e-10)
         assert s.condition[i] == pytest.approx(sigma[0] / sigma[-1], rel=1e-10)
@@ -156,3 +159,42 @@ def test_kinds_by_their_thresholds() -> None:
 def test_home_of_the_reference_is_regular(reference: Mechanism) -> None:
     s = condyle.derive(reference).poses.configuration(HOME).singularity
     assert s.rank[0] == 4 and s.kind()[0] == 0 and s.ratio[0] > 0.05
+
+
+@pytest.mark.parametrize("d", [1e-2, 1e-6, 1e-8, 1e-12, 0.0])
+def test_a_gimbal_lock_is_none_of_the_machine(d: float) -> None:
+    """Near beta = 90 degrees the condition stays; only q'' is lost, with its own word."""
+    model = condyle.derive("gough-stewart", backend="numpy")
+    q = np.array([[0, 0, 0, 0.1, np.pi / 2 - d, 0.2]])
+    found = model.inverse_dynamics(q, 0 * q, 0 * q, outputs="all")
+    at_lock = model.inverse_kinematics([0, 0, 0, 0.1, np.pi / 2, 0.2]).condition
+    assert found.condition[0] == pytest.approx(at_lock, rel=0.1) and at_lock < 100
+    assert STATUS_NAMES[found.status[0]] == "ok" and found.configuration.singularity.kind()[0] == 0
+    survey = model.poses.survey(q, ("ratio",))
+    assert survey.status[0] == 0 and survey.direct_ratio[0] == pytest.approx(1 / found.condition[0])
+    ahead = model.forward_dynamics(q, 0 * q, found.effort, outputs="twist_rate")
+    assert STATUS_NAMES[ahead.status[0]] == ("ok" if d > 1e-7 else "gimbal_lock")
+    assert np.isfinite(ahead.acceleration).all() == (d > 1e-7)
+    assert np.abs(ahead.twist_rate).max() < 1e-11 and ahead.contact_force.shape == (1, 0)
+
+
+@pytest.mark.parametrize("name", ["masticatory", "gough-stewart", "human-jaw"])
+def test_sensitivity_to_the_characteristic_length(name: str) -> None:
+    """Against differences, with the dimensionless J_W of two lengths."""
+    model = condyle.derive(name, backend="numpy")
+    names = ("X", "Y", "Z", "alpha", "beta", "gamma")
+    q = [0.002 if n in "XYZ" else 0.05 for n in names if n in model.independent]
+    found = model.jacobians(q)
+    at = model.inverse_kinematics(q).singularity
+    if at.direct_ratio > at.inverse_ratio:
+        assert found.length_sensitivity == 0.0
+        return
+    cranks = [chain.lengths.get("crank", 1.0) for chain in model.mechanism.chains]
+    rows = found.J * (at.transmission * cranks)[:, None]
+    step, logs = 1e-4, []
+    for factor in (1 - step, 1 + step):
+        scale = np.repeat([1.0, factor * model.characteristic_length], 3)
+        basis = np.linalg.qr(scale[:, None] * found.twist_basis)[0]
+        sigma = np.linalg.svd(rows / scale @ basis, compute_uv=False)
+        logs.append(np.log(sigma[-1] / sigma[0]))
+    assert found.length_sensitivity == pytest.approx((logs[1] - logs[0]) / (2 * step), rel=1e-5)

@@ -164,3 +164,20 @@ def test_what_cannot_be_asked() -> None:
     q[1, :] = 40.0
     with pytest.raises(InputError, match="the contacts cannot be met at sample 1"):
         walls.gravity(q)
+
+
+@pytest.mark.parametrize("space", ["q", "X"])
+@pytest.mark.parametrize("name", NAMES)
+def test_coriolis(name: str, space: str) -> None:
+    """C v is the bias; M' - 2 C is skew, by differences of the mass matrix along the motion."""
+    c, m = case(name), model(name)
+    C = m.coriolis(c.q, c.q1, space=space)
+    rates = c.q1 if space == "q" else (m.jacobians(c.q).M_J @ c.q1[..., None])[..., 0]
+    assert error((C @ rates[..., None])[..., 0], m.bias(c.q, c.q1, space=space)) < 1e-12
+    h = 1e-6
+    ends = [m.mass_matrix(c.q + s * h * c.q1, space=space) for s in (1, -1)]
+    skew = (ends[0] - ends[1]) / (2 * h) - 2 * C
+    assert np.abs(skew + skew.transpose(0, 2, 1)).max() < 1e-5 * np.abs(C).max()
+    assert m.coriolis(c.q[0], c.q1[0], space=space).shape == C.shape[1:]
+    with pytest.raises(InputError, match='no "Z"'):
+        m.coriolis(c.q, c.q1, space="Z")

@@ -41,6 +41,7 @@ CODES = {
     "INFEASIBLE": Status.infeasible,
     "JAMMED": Status.jammed,
     "UNCERTIFIED": Status.uncertified,
+    "GIMBAL_LOCK": Status.gimbal_lock,
 }
 WHY = {
     "OK": "results are written",
@@ -50,6 +51,7 @@ WHY = {
     "INFEASIBLE": "no efforts within the limits, or no pose, fit the arguments",
     "JAMMED": "Coulomb friction has no solution, or several",
     "UNCERTIFIED": "the result could not be certified",
+    "GIMBAL_LOCK": "beta is +-90 degrees: accelerations of the angles are not determined",
 }
 
 

@@ -59,7 +59,8 @@ static const char *const STATUS_WORDS[] = {
     "ok", "unreachable: no chain or contact reaches this pose",
     "singular: efforts or accelerations are not determined at this pose",
     "out of bounds: a value is no number, or too large for the arithmetic",
-    "infeasible", "jammed: no pattern of friction is consistent", "uncertified"
+    "infeasible", "jammed: no pattern of friction is consistent", "uncertified",
+    "gimbal lock: beta is +-90 degrees"
 };
 
 /* All that a step changes. */

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 from ..errors import InputError, did_you_mean
 from ..kinematics.chain import FAMILIES
 from ..mechanism import Mechanism
+from .c_context import CODES as C_CODES
 from .c_names import identifier
 from .c_source import export
 from .exported import Argument, Exported
@@ -37,7 +38,7 @@ STATES, RATES = ("q", "q1"), ("dq", "acceleration")
 PARAMETERS = ("point", "kp", "kd")
 STARTS = {"kp": 400.0, "kd": 40.0}
 TOLERANCE = 1e-9  # of a step of the plant, relative and absolute
-CODES = "0 ok, 1 unreachable, 2 singular, 3 out of bounds, 4 infeasible, 5 jammed, 6 uncertified"
+CODES = ", ".join(f"{code:d} {name.replace('_', ' ').lower()}" for name, code in C_CODES.items())
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import (
+    GimbalLockError,
     InfeasibleError,
     JammedError,
     NumberRangeError,
@@ -51,6 +52,13 @@ ERRORS: dict[Status, tuple[type[SampleError], str, str]] = {
         UncertifiedError,
         "the efforts found at {} could not be certified to 1e-9 of the largest",
         "Widen limits that leave hardly any margin",
+    ),
+    Status.gimbal_lock: (
+        GimbalLockError,
+        "the angles are in gimbal lock at {}: beta is +-90 degrees, where alpha and gamma turn "
+        "about the same axis",
+        "The mechanism is not singular there: choose axes of the platform that keep beta away from "
+        "+-90 degrees",
     ),
     Status.infeasible: (
         InfeasibleError,

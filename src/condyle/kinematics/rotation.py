@@ -7,6 +7,10 @@ from typing import Any
 
 import casadi as ca
 
+# |cos beta| below which rates of the angles do not describe every motion,
+GIMBAL_LOCK = 1e-7
+NEAR_LOCK = 1e-4  # and below which equations in these rates lose digits that twists keep.
+
 
 def matrix(rows: list[list[Any]]) -> ca.SX:
     return ca.vertcat(*(ca.horzcat(*row) for row in rows))

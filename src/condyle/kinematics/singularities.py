@@ -1,8 +1,9 @@
 """Singularities ([Cheng2023] Section 3.3, eqs 25-28), with dimensionless measures.
 
 L_i = |S_i - M_i|^2 - |S_i M_i|^2 gives J_A theta' + J_W q' = 0. Divided by twice crank times
-coupler, J_A becomes the sine of the transmission angle; divided by twice the coupler, and with
-angles multiplied by the characteristic length, J_W becomes dimensionless as well. Then
+coupler, J_A becomes the sine of the transmission angle. J_W is taken on the twists [V; L omega]
+that the contacts admit, L the characteristic length, in orthonormal coordinates, and divided by
+twice the coupler. Then
 
     inverse:   the smallest |J_A| over the largest is near 0,
     direct:    the smallest singular value of J_W over the largest is near 0,
@@ -70,6 +71,24 @@ class Singularity:
     def kind(self, threshold: float = NEAR_SINGULAR) -> np.ndarray:
         """Index into `KINDS` of the nearest singularity, (N,)."""
         return (self.inverse_ratio < threshold) + 2 * (self.direct_ratio < threshold)
+
+
+def length_sensitivity(J_W: np.ndarray, N: np.ndarray, transmission: np.ndarray) -> np.ndarray:
+    """d log ratio / d log L of the `ratio` with the characteristic length L, (samples,).
+
+    Between -1 and 1: a singular value of J_W falls by the share of turning in its twist,
+    d log sigma / d log L = -|L omega|^2 / (|V|^2 + |L omega|^2). 0 where the ratio is the inverse
+    one.
+
+    Args: J_W: on [V; L omega], dimensionless, (samples, n, 6);  N: wrenches of the contacts, dual
+          to these, (samples, k, 6);  transmission: (samples, n).
+    """
+    free = np.linalg.svd(np.pad(N, ((0, 0), (0, 6 - N.shape[1]), (0, 0))))[2][:, N.shape[1] :]
+    _, sigma, Vt = np.linalg.svd(J_W @ free.transpose(0, 2, 1))
+    turning = ((Vt @ free)[..., 3:] ** 2).sum(axis=2)
+    size = np.abs(transmission)
+    inverse, direct = ratio(size.min(axis=1), size.max(axis=1)), ratio(sigma[:, -1], sigma[:, 0])
+    return np.where(direct <= inverse, turning[:, 0] - turning[:, -1], 0.0)
 
 
 def ratio(small: np.ndarray, large: np.ndarray) -> np.ndarray:

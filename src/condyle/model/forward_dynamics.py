@@ -22,11 +22,13 @@ OUTPUTS = {
     **dict.fromkeys(("joint", "joint_rate", "joint_acceleration"), "joint"),
     "configuration": "motion",
     "condition": "motion",
+    "twist_rate": "twist",
     "slip": "sliding",
     "friction_force": "sliding",
 }
-# What is no number where there are no accelerations.
-DEPENDENT = ("acceleration", "contact_force", "pose_acceleration", "joint_acceleration")
+# What is no number in a gimbal lock, and what is none where there is no solution at all.
+OF_ANGLES = ("acceleration", "pose_acceleration")
+DEPENDENT = (*OF_ANGLES, "contact_force", "joint_acceleration", "twist_rate")
 
 
 class ForwardDynamics(Dynamics):
@@ -53,7 +55,8 @@ class ForwardDynamics(Dynamics):
         values, status = answer.values, answer.status
         if status.any():
             for name in {*DEPENDENT} & values.keys():
-                values[name][..., status != Status.ok] = np.nan
+                known = (Status.ok,) if name in OF_ANGLES else (Status.ok, Status.gimbal_lock)
+                values[name][..., ~np.isin(status, known)] = np.nan
         first: dict[str, Any] = {name: np.moveaxis(a, -1, 0) for name, a in values.items()}
         if "friction_force" in names:
             first["friction_force"] = -np.abs(first["contact_force"])[..., None] * first["drag"]

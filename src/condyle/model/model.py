@@ -186,10 +186,12 @@ class Model:
         Limits of efforts are not applied, and cables may have negative efforts.
 
         Args:    q, v, effort, wrench, at: as of `Model`;  threads: as of `inverse_dynamics`.
-                 outputs: of pose, pose_rate, pose_acceleration, joint, joint_rate,
-                 joint_acceleration, configuration, condition, slip, friction_force; "all" is all.
+                 outputs: of pose, pose_rate, pose_acceleration, twist_rate (6,): [V'; omega'] in
+                 {S}, joint, joint_rate, joint_acceleration, configuration, condition, slip,
+                 friction_force; "all" is all.
         Returns: acceleration (..., m) [m/s^2, rad/s^2], contact_force (..., k) [N], status (...),
-                 and what `outputs` names; see `ModelResult`. NaN where the status is not 0.
+                 and what `outputs` names; see `ModelResult`. NaN where the status is not 0; in a
+                 gimbal lock of the angles accelerations of coordinates alone are.
         """
         return self._forward(q, v, effort, wrench, at, outputs, threads)
 
@@ -233,8 +235,21 @@ class Model:
         return self.poses.matrix("inertia_matrix", q, None, space)
 
     def bias(self, q: ArrayLike, v: ArrayLike, *, space: str = "q") -> Array:
-        """C_r v, Coriolis and centrifugal forces, (..., m) [N, N m]; in `space` "X", (..., 6)."""
+        """C_r v, Coriolis and centrifugal forces, (..., m) [N, N m]; in `space` "X", (..., 6).
+
+        Friction of actuators is added.
+        """
         return self.poses.matrix("bias", q, v, space)
+
+    def coriolis(self, q: ArrayLike, v: ArrayLike, *, space: str = "q") -> Array:
+        """C of Christoffel's symbols, (..., m, m): M' - 2 C is skew, and C v is `bias`.
+
+        As `bias` it is without gravity; friction of actuators is in `bias` and not in C.
+
+        Args:   q, v: (..., m);  space: as of `mass_matrix`; of "X" (..., 6, 6), C X_EE' is `bias`.
+        Raises: InputError: for another space, or a pose that cannot be reached.
+        """
+        return self.poses.coriolis(q, v, space)
 
     def gravity(self, q: ArrayLike, *, space: str = "q") -> Array:
         """G_r, forces that balance gravity, (..., m) [N, N m]; in `space` "X", (..., 6)."""
@@ -285,8 +300,12 @@ class Model:
     def jacobians(self, q: ArrayLike) -> ModelResult:
         """Jacobians of [Cheng2023] eqs (9), (15)-(18) at q, (..., m).
 
-        Returns: J_theta (..., n, 6): theta' = J_theta X_EE'; M_J (..., 6, m); M_1 (..., n, 3, 3),
-                 M_2 and M_3 (..., n, 3, 6): M_1 q_r' = M_2 X_EE', q_r' = M_3 X_EE' of every chain.
+        Returns: J (..., n, 6): theta' = J [V; omega]; twist_basis (..., 6, m): [V; omega] =
+                 twist_basis v, both regular in a gimbal lock of the angles; length_sensitivity
+                 (...): d log ratio / d log L of the singularity ratio, L the characteristic length.
+                 The paper's: J_theta (..., n, 6): theta' = J_theta X_EE'; M_J (..., 6, m);
+                 M_1 (..., n, 3, 3), M_2 and M_3 (..., n, 3, 6): M_1 q_r' = M_2 X_EE',
+                 q_r' = M_3 X_EE' of every chain.
         """
         return self.poses.jacobians(q)
 

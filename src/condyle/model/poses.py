@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError, did_you_mean
 from ..kinematics.constraints import closed_form_available, indices
-from ..kinematics.singularities import Singularity
+from ..kinematics.singularities import Singularity, length_sensitivity
 from ..motion import Motion, resolve_landmark
 from ..questions.configuration import SURVEYED
 from ..status import Status
@@ -88,32 +88,47 @@ class Poses:
 
     def matrix(self, name: str, q: Any, v: Any, space: str) -> Array:
         """One of the results of the question `matrices`."""
-        if space not in ("q", "X"):
-            hint = did_you_mean(str(space), ("q", "X"))
-            raise InputError(f'space: there is no "{space!s:.60}".{hint}')
+        _require_space(space)
         lead, values = self._at("matrices", q, v)
         found = np.moveaxis(values[name if space == "q" else f"{name}_X"], -1, 0)
+        return found.reshape((*lead, *found.shape[1:]))
+
+    def coriolis(self, q: Any, v: Any, space: str) -> Array:
+        """As `Model.coriolis`."""
+        _require_space(space)
+        lead, inputs = self._inputs(q, v)
+        ports = {name: inputs[name] for name in ("pose", "pose_rate")}
+        found = np.moveaxis(self._system.robust.coriolis(space == "X", ports), -1, 0)
         return found.reshape((*lead, *found.shape[1:]))
 
     def jacobians(self, q: Any) -> ModelResult:
         """As `Model.jacobians`."""
         lead, values = self._at("jacobians", q, None)
-        found = {"J_theta": values["J_theta"].transpose(2, 1, 0)}
-        found["M_J"] = np.moveaxis(values["M_J"], -1, 0)
+        found = {name: values[name].transpose(2, 1, 0) for name in ("J", "J_theta")}
+        found |= {name: np.moveaxis(values[name], -1, 0) for name in ("M_J", "twist_basis")}
+        found["length_sensitivity"] = _length_sensitivity(values)
         for name in ("M_1", "M_2", "M_3"):
             found[name] = values[name].transpose(3, 2, 0, 1)
         return ModelResult(**found).shaped(lead)
 
+    def length_sensitivity(self, pose: Array) -> Array:
+        """d log ratio / d log L of the singularity ratio, (N,), at whole poses, (N, 6)."""
+        return _length_sensitivity(self._system.kernel("jacobians").run({"pose": pose}).values)
+
     def _at(self, question: str, q: Any, v: Any) -> tuple[Lead, dict[str, Array]]:
         """Results of a question on the platform's motion, at whole poses the contacts meet."""
+        lead, poses = self._inputs(q, v)
+        kernel = self._system.kernel(question)
+        inputs = {port.name: poses[port.name] for port in kernel.interface.ports}
+        return lead, kernel.run(inputs).values
+
+    def _inputs(self, q: Any, v: Any) -> tuple[Lead, dict[str, Array]]:
         lead, (q, v, a) = self._states(q, v, None)
         poses, reached = self.whole(q, v, a)
         if not reached.all():
             sample = int(np.argmin(reached))
             raise InputError(f"the contacts cannot be met at sample {sample}: q = {q[sample]}")
-        kernel = self._system.kernel(question)
-        inputs = {port.name: poses[port.name] for port in kernel.interface.ports}
-        return lead, kernel.run(inputs).values
+        return lead, poses
 
     def whole(self, q: Array, q1: Array, q2: Array) -> tuple[dict[str, Array], Array]:
         """X_EE and its rates, (N, 6) each, and where the contacts can be met."""
@@ -170,6 +185,17 @@ class Poses:
         columns = indices(independent)
         q, q1, q2 = (a[:, columns] for a in (found.pose, found.rate, found.acceleration))
         return q, q1, q2
+
+
+def _require_space(space: str) -> None:
+    if space not in ("q", "X"):
+        hint = did_you_mean(str(space), ("q", "X"))
+        raise InputError(f'space: there is no "{space!s:.60}".{hint}')
+
+
+def _length_sensitivity(values: Mapping[str, Array]) -> Array:
+    J_W, N = values["J_W"].transpose(2, 1, 0), values["N"].transpose(2, 0, 1)
+    return length_sensitivity(J_W, N, values["transmission"].T)
 
 
 def _ordered(given: States, names: list[str], wanted: Collection[str]) -> States:

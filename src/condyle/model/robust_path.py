@@ -16,6 +16,7 @@ from ..backends.kernel import Arrays
 from ..backends.numpy_kernel import NumpyKernel
 from ..dynamics.minimum_norm import minimum_norm
 from ..graph.program import Numbers
+from ..kinematics.rotation import GIMBAL_LOCK
 from ..kinematics.singularities import SINGULAR, ratio
 from ..questions import Question
 from ..questions.numbers import characteristic
@@ -108,9 +109,12 @@ class Robust:
             assembled = reached & (configuration["discriminant"] >= 0).all(axis=0)
             regular = found.regular & (ratio(least, most) >= SINGULAR)
             finite = np.isfinite(system["F"]).all(axis=0)
-            finite &= np.isfinite(q2).all(axis=1) | ~found.single
+            locked = np.abs(system["cos_beta"]) < GIMBAL_LOCK
+            finite &= np.isfinite(q2).all(axis=1) | ~found.single | locked
             status = judge(assembled, regular, finite)
             status[(status == Status.ok) & ~found.single] = Status.jammed
+            status[(status == Status.ok) & locked] = Status.gimbal_lock
+            twist_rate = s["twist_rate"] + (s["along"] @ found.w[..., None])[..., 0]
         return {
             "acceleration": q2.T,
             "contact_force": found.force.T,
@@ -122,11 +126,16 @@ class Robust:
             "joint_acceleration": turned.T,
             "slip": system["slip"],
             "drag": system["drag"],
+            "twist_rate": twist_rate.T,
         }, status
 
     def linear(self, ports: Mapping[str, np.ndarray]) -> Arrays:
         """Results of the question of that name: asked for too seldom to be worth a compiler."""
         return self._kernel("linear").run(ports).values
+
+    def coriolis(self, whole: bool, ports: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Result of the question of that name, samples last."""
+        return self._kernel("coriolis", whole).run(ports).values["coriolis"]
 
     def motion(self, inputs: Mapping[str, np.ndarray]) -> tuple[Arrays, np.ndarray]:
         """X_EE and its rates by name, (6, N) each, and statuses: whether contacts can be met."""

@@ -29,7 +29,7 @@ _FILES = {
     "configuration": "configuration survey",
     "pose": "encoders pose",
     "instant": "instant energy",
-    "matrices": "matrices jacobians",
+    "matrices": "matrices coriolis jacobians",
     "reactions": "reactions",
     "rate": "rate",
     "observer": "observer",
@@ -49,10 +49,11 @@ def written(name: str) -> Callable[..., Program | Variants]:
 
 # The rooms whose code shapes a graph.
 SOURCES = ("mechanism", "kinematics", "dynamics", "graph", "questions")
-# Questions that do not depend on formulation and route.
+# Questions that do not depend on formulation and route, or that twists serve best.
 GEOMETRY = (
     "allocation", "motion", "closure", "conditions", "configuration", "survey", "encoders", "pose",
-    "instant", "energy", "jacobians", "reactions", "linear",
+    "instant", "energy", "jacobians", "coriolis", "reactions", "linear", "forward_system",
+    "system",
 )  # fmt: skip
 
 

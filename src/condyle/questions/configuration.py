@@ -1,8 +1,10 @@
 """The configuration at a pose: joints, contacts, and how near the mechanism is to a singularity.
 
 L_i = |S_i - M_i|^2 - |S_i M_i|^2 gives J_A theta' + J_W q' = 0 ([Cheng2023] eqs 25, 26). Divided by
-twice crank times coupler, J_A becomes the sine of the transmission angle; divided by twice the
-coupler, and with angles multiplied by the characteristic length, J_W becomes dimensionless too.
+twice crank times coupler, J_A becomes the sine of the transmission angle. J_W is taken on twists
+[V; L omega] that the contacts admit, in orthonormal coordinates of theirs, L the characteristic
+length; divided by twice the coupler it is dimensionless too. So its singular values depend on no
+choice of coordinates, and a gimbal lock of the angles does not appear in them.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from ..dynamics.singular_values import singular_values
 from ..graph.program import Program
 from ..kinematics.chain import FAMILIES, Loop
 from .builder import Builder, Lanes
-from .platform import ANGLE_UNITS, Platform, closed, contacts, given, independent_indices
+from .platform import ANGLE_UNITS, Platform, closed, contacts, given
 from .structure import Structure
 
 CONVERGED = 0.0  # minimum quality of singular values
@@ -85,8 +87,49 @@ def _add_loops(b: Builder, loops: list[Loop], names: Collection[str]) -> None:
 
 
 def _rows_of_J_W(b: Builder, platform: Platform, loops: list[Loop]) -> Lanes:
-    """The dimensionless rows of J_W."""
-    return on_rates(b, platform, [loop.rod / loop.rod_length for loop in loops], scaled=True)
+    """The dimensionless rows of J_W on the admissible twists, (m,) each.
+
+    Householder's reflections take the contacts' k wrenches to the first k axes; the other axes are
+    the coordinates of admissible twists. The last one's sign makes them an oriented basis that
+    moves continuously, so that curves det J_W = 0 can be traced.
+    """
+    scale = wrench_scale(b)
+    columns = ca.horzsplit(ca.diag(scale) @ platform.motion.frame.N) if b.structure.contacts else []
+    reflections: list[tuple[ca.SX, ca.SX]] = []
+    sign = ca.SX(1)
+    for i, column in enumerate(columns):
+        x = _reflected_by(reflections, column)[i:]
+        size = ca.norm_2(x)
+        sign = ca.copysign(sign, sign * x[0])
+        w = ca.vertcat(x[0] + ca.copysign(size, x[0]), x[1:])
+        reflections.append((w, 1 / (size * (size + ca.fabs(x[0])))))
+    rows = []
+    for row in twist_rows(b, platform, [loop.rod / loop.rod_length for loop in loops]):
+        own = _reflected_by(reflections, scale * row)[len(columns) :]
+        own[-1] *= sign
+        rows.append(own)
+    return rows
+
+
+def _reflected_by(reflections: list[tuple[ca.SX, ca.SX]], x: ca.SX) -> ca.SX:
+    for i, (w, factor) in enumerate(reflections):
+        x = ca.vertcat(x[:i], x[i:] - (factor * ca.dot(w, x[i:])) * w)
+    return x
+
+
+def wrench_scale(b: Builder) -> ca.SX:
+    """Factors of a wrench, (6,), that make it dual to the twist [V; L omega]."""
+    inverse = 1 / b.parameter("length")
+    return ca.vertcat(1, 1, 1, inverse, inverse, inverse)
+
+
+def twist_rows(b: Builder, platform: Platform, rows: Lanes) -> Lanes:
+    """Rows (3,) on the velocities of the platform joints as rows (6,) on the twist [V; omega]."""
+    found = []
+    for group, row in enumerate(rows):
+        r = platform.R @ b.lane(group, "joint")
+        found.append(b.lane(group, "mask") * ca.vertcat(row, ca.cross(r, row)))
+    return found
 
 
 def _add_singularity(b: Builder, loops: list[Loop], rows: Lanes) -> None:
@@ -113,20 +156,7 @@ def loops_at(b: Builder, O_M: ca.SX, R: ca.SX) -> list[Loop]:
     return loops
 
 
-def on_rates(b: Builder, platform: Platform, rows: Lanes, scaled: bool = False) -> Lanes:
-    """Rows (3,) on the velocities of the platform joints as rows (m,) on q_EE'.
-
-    Args: scaled: for rates whose angles are multiplied by the characteristic length.
-    """
-    motion = platform.motion
-    B = motion.E @ motion.M_J
-    scale = ca.SX.ones(b.structure.m)
-    if scaled:
-        length = b.parameter("length")
-        ind = independent_indices(b.structure.dependent)
-        scale = ca.vertcat(*(1 / length if i >= 3 else ca.SX(1) for i in ind))
-    found = []
-    for group, row in enumerate(rows):
-        r, mask = platform.R @ b.lane(group, "joint"), b.lane(group, "mask")
-        found.append(mask * scale * (B.T @ ca.vertcat(row, ca.cross(r, row))))
-    return found
+def on_rates(b: Builder, platform: Platform, rows: Lanes) -> Lanes:
+    """Rows (3,) on the velocities of the platform joints as rows (m,) on q_EE'."""
+    B = platform.motion.E @ platform.motion.M_J
+    return [B.T @ row for row in twist_rows(b, platform, rows)]

@@ -15,9 +15,11 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from ..dynamics import FORMULATIONS
 from ..dynamics.least_norm import definite_solve
 from ..graph.program import Program, Variants
 from ..kinematics.constraints import all_of, indices, solve_small
+from ..kinematics.rotation import GIMBAL_LOCK, NEAR_LOCK
 from ..status import Status
 from .builder import Builder, Lanes
 from .configuration import loops_of
@@ -38,7 +40,7 @@ from .platform import (
 from .structure import Structure
 
 # Optional results besides the accelerations.
-OUTPUTS = ("contact", "motion", "joint", "sliding")
+OUTPUTS = ("contact", "motion", "joint", "sliding", "twist")
 # Minimum |pivot| over the diagonal's entry in the elimination.
 CONDITIONED = 1e-5
 
@@ -70,7 +72,14 @@ def forward(structure: Structure, wanted: Collection[str] = ()) -> Variants:
         b.output("joint_acceleration", accelerations, "per s^2")
     if "sliding" in wanted:
         (touch or contacts(b, platform)).add_sliding(b)
+    if "twist" in wanted:
+        b.output("twist_rate", _twist_rate(platform, eq, moved.w), "per s^2")
     return Variants(b.finish(), single=True)
+
+
+def _twist_rate(platform: Platform, eq: Affine, w: ca.SX) -> ca.SX:
+    """[V'; omega'], (6,): determined in a gimbal lock of the angles too."""
+    return platform.motion.twist_rate + eq.B @ eq.basis.rates(w)
 
 
 @dataclass(frozen=True)
@@ -98,6 +107,11 @@ def accelerated(
     b.check(feasibility(b, platform, eq.discriminants), DOUBTFUL, Status.unreachable)
     finite = ca.fabs(ca.sum1(q2)) < HUGE
     b.check(2 * sure * finite - 1, 0.5)
+    # The twist's rate is determined, and rates of the angles in it are not; equations in these have
+    # lost digits before.
+    twists = FORMULATIONS[b.structure.formulation].uses_twist
+    least, status = (GIMBAL_LOCK, Status.gimbal_lock) if twists else (NEAR_LOCK, None)
+    b.check(ca.fabs(platform.placement.bryant.cos[1]) - least, 0.0, status)
     return Accelerated(q2, force, w, eq, touch)
 
 
@@ -115,6 +129,9 @@ def forward_system(structure: Structure) -> Program:
     b.output("F", eq.F + eq.H @ eq.start, "N, N m", 6)
     b.output("S", eq.S, "", m, m)
     b.output("M_J", platform.motion.M_J, "", 6, m)
+    b.output("twist_rate", platform.motion.twist_rate, "per s^2")
+    b.output("along", eq.B @ eq.basis.rates(ca.SX.eye(m)), "", 6, m)
+    b.output("cos_beta", platform.placement.bryant.cos[1], "1")
     touch = contacts(b, platform)
     touch.add_wrenches(b, eq.B)
     touch.add_sliding(b)

@@ -11,7 +11,7 @@ from ..status import Status
 from .builder import Builder
 from .configuration import loops_of, on_rates
 from .equations import Wrench, platform_body
-from .inertia import affine
+from .inertia import Affine, affine
 from .platform import ANGLE_UNITS, Platform, check_contacts, closed
 from .structure import Structure
 
@@ -81,10 +81,22 @@ def losses(b: Builder, group: int, rate: ca.SX) -> ca.SX:
 
 def inertia_matrix(b: Builder, platform: Platform) -> ca.SX:
     """M_r of `matrices`, (m, m), at any rates of the platform."""
+    eq = _unloaded(b, platform)
+    pulled = eq.basis.generalized_force(_symmetric(eq.H))  # Pi^T H
+    return eq.S.T @ eq.basis.generalized_force(pulled.T) @ eq.S
+
+
+def inertia_matrix_X(b: Builder, platform: Platform) -> ca.SX:
+    """The same dual to X_EE, (6, 6), in twists."""
+    E = platform.motion.E
+    return E.T @ _symmetric(_unloaded(b, platform).H) @ E
+
+
+def _unloaded(b: Builder, platform: Platform) -> Affine:
     zero = ca.SX.zeros(3)
     no_effort = [ca.SX(0) for _ in b.structure.families]
-    eq = affine(b, platform, Wrench(zero, zero, zero), no_effort)
-    upper = ca.triu(eq.H)
-    H = upper + ca.triu(eq.H, False).T
-    pulled = eq.basis.generalized_force(H)  # Pi^T H
-    return eq.S.T @ eq.basis.generalized_force(pulled.T) @ eq.S
+    return affine(b, platform, Wrench(zero, zero, zero), no_effort)
+
+
+def _symmetric(H: ca.SX) -> ca.SX:
+    return ca.triu(H) + ca.triu(H, False).T

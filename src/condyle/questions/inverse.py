@@ -14,6 +14,7 @@ import casadi as ca
 from ..dynamics import FORMULATIONS
 from ..dynamics.least_norm import gram_schmidt, normal_equations
 from ..graph.program import Program, Variants
+from ..kinematics.rotation import NEAR_LOCK
 from ..status import Status
 from .builder import Builder, Lanes
 from .configuration import add_configuration
@@ -136,6 +137,8 @@ def _minimum_norm(
     b.check(feasibility(b, platform, discriminants), DOUBTFUL, Status.unreachable)
     finite = ca.fabs(b.total(best.effort)) < HUGE
     b.check(best.quality * finite * _observable(b, eq), WEAK)
+    if not FORMULATIONS[s.formulation].uses_twist:
+        b.check(ca.fabs(platform.placement.bryant.cos[1]) - NEAR_LOCK, 0.0)
     return eq, best
 
 

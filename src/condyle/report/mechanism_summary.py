@@ -148,6 +148,8 @@ def _singularity(d: Mapping[str, Any]) -> Iterator[str]:
         f"condition {s['J_W_condition']:.4g}"
     )
     yield f"  J_A: smallest over largest {s['J_A_ratio']:.4g}"
+    change = s["length_sensitivity"]
+    yield f"  1 % more characteristic length changes the smaller ratio by {change:.2g} %"
     yield f"  near: {s['near']}"
     room = d["room"]
     yield (
@@ -169,7 +171,8 @@ def check(mechanism: Any) -> MechanismSummary:
     """
     mechanism = as_mechanism(mechanism)
     model = Model(mechanism, backend="numpy")  # one pose: building a kernel takes longer
-    s = model.poses.configuration(np.zeros((1, 6))).singularity
+    home = np.zeros((1, 6))
+    s = model.poses.configuration(home).singularity
     room = ball_around_home(model)
     m = mechanism.degrees_of_freedom
     platform = mechanism.platform
@@ -201,6 +204,7 @@ def check(mechanism: Any) -> MechanismSummary:
                 "J_W_rank": int(s.rank[0]),
                 "J_W_condition": float(min(s.condition[0], 1e300)),
                 "J_A_ratio": float(s.inverse_ratio[0]),
+                "length_sensitivity": float(model.poses.length_sensitivity(home)[0]),
                 "near": KINDS[int(s.kind()[0])],
             },
             "room": {

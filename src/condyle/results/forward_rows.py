@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import JammedError, NumberRangeError, SampleError, SingularError, as_flag
-from ..kinematics.causes import FLAG, Owner, cause_text, causes, owners, sample_error
+from ..kinematics.causes import ERRORS, FLAG, Owner, cause_text, causes, owners, sample_error
 from ..kinematics.chain import FAMILIES
 from ..kinematics.constraints import indices
 from ..mechanism.mechanism import COORDINATES
@@ -134,6 +134,9 @@ def _error(status: Status, owner: Owner, bad: np.ndarray, first_row: int) -> Sam
         if owner.kind == "chain":
             text += f" ({cause_text(status, owner)})"
         hint = "Accelerations are not determined there; avoid the pose"
+    elif status == Status.gimbal_lock:
+        kind, text, hint = ERRORS[status]
+        text = text.format(f"row {row}")
     else:
         kind, text = NumberRangeError, f"the accelerations at row {row} are not finite"
         hint = "Its rates, efforts or load are too large for numbers"

@@ -15,6 +15,7 @@ KINDS = {
     "contact_loss": "a unilateral contact would have to pull",
     "unreachable": "a chain or a contact cannot be closed any more",
     "singular": "the mechanism is singular, and accelerations have no bound",
+    "gimbal_lock": "beta is +-90 degrees: accelerations of the angles are not determined",
     "jammed": "friction jams: Coulomb friction has no solution, or several",
     "stiff": "the integrator's steps became too small",
     "lost": "forward kinematics of the encoders' counts did not converge",
