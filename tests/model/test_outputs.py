@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from oracles.rotations import per_twist
 from support.cases import case, error
 from support.loads import parts
 
@@ -25,8 +26,8 @@ def test_condition_is_that_of_the_jacobian(backend: str) -> None:
     c = case("masticatory")
     model = Model(c.mechanism, backend=backend)
     q, q1, q2, load = (a[:5] for a in c.packed)
-    result = model.inverse_dynamics(q, q1, q2, *parts(load), outputs=("condition",))
-    assert set(vars(result)) == {*ALWAYS, "condition"} and not result.status.any()
+    result = model.inverse_dynamics(q, q1, q2, *parts(load), outputs=("pose", "condition"))
+    assert set(vars(result)) == {*ALWAYS, "pose", "condition"} and not result.status.any()
     scale = [model.characteristic_length if n in "XYZ" else 1.0 for n in model.independent]
     for i in range(len(q)):
         steps = np.vstack([q[i] + sign * 1e-6 * row for sign in (1, -1) for row in np.diag(scale)])
@@ -34,7 +35,10 @@ def test_condition_is_that_of_the_jacobian(backend: str) -> None:
         loads = np.tile(load[i], (len(steps), 1))
         evaluation = model.inverse_dynamics(steps, still, still, *parts(loads), outputs="all")
         forth, back = np.split(evaluation.configuration.joint, 2)
-        J = (forth - back) / 2e-6
+        J = (forth - back) / 2e-6 / np.array(scale)[:, None]
+        ahead, behind = np.split(evaluation.pose, 2)
+        M_J = (ahead - behind).T / 2e-6 / scale
+        J = per_twist(result.pose[i], M_J, model.characteristic_length).T @ J
         weights = np.abs(evaluation.configuration.singularity.transmission).mean(axis=0)
         expected = np.linalg.cond(J.T * _arm(model) * weights[:, None])
         assert result.condition[i] == pytest.approx(expected, rel=1e-4)

@@ -53,6 +53,13 @@ class Motion:
         return np.hstack([np.eye(3), np.cross(self.axes, self.R @ t, axisa=0, axisc=0)])
 
 
+def per_twist(pose: Array, M_J: Array, length: float) -> Array:
+    """(m, m): q' of orthonormal twists [V; length omega] in the span of those that q' has."""
+    E = np.eye(6)
+    E[3:, 3:] = length * platform_motion(pose).axes
+    return np.linalg.inv(np.linalg.qr(E @ M_J)[1])
+
+
 def platform_motion(pose: Array, rate: Array | None = None, second: Array | None = None) -> Motion:
     """Motion of {M} from the pose and its derivatives, (6,) each."""
     rate = np.zeros(6) if rate is None else rate

@@ -83,6 +83,12 @@ def length_sensitivity(J_W: np.ndarray, N: np.ndarray, transmission: np.ndarray)
     Args: J_W: on [V; L omega], dimensionless, (samples, n, 6);  N: wrenches of the contacts, dual
           to these, (samples, k, 6);  transmission: (samples, n).
     """
+    known = np.isfinite(J_W).all(axis=(1, 2)) & np.isfinite(N).all(axis=(1, 2))
+    if not known.all():
+        found = np.full(len(J_W), np.nan)
+        if known.any():
+            found[known] = length_sensitivity(J_W[known], N[known], transmission[known])
+        return found
     free = np.linalg.svd(np.pad(N, ((0, 0), (0, 6 - N.shape[1]), (0, 0))))[2][:, N.shape[1] :]
     _, sigma, Vt = np.linalg.svd(J_W @ free.transpose(0, 2, 1))
     turning = ((Vt @ free)[..., 3:] ** 2).sum(axis=2)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import xarray as xr
+from oracles.rotations import per_twist
 
 import condyle
 
@@ -59,16 +60,18 @@ def test_ratio_of_differences_of_the_joints(model_of: Models, jaw: xr.Dataset) -
     """J_W = -J_A dtheta/dq, with dtheta/dq by differences of mapped joint coordinates."""
     model = model_of("masticatory")
     q = np.array([[0.002, 0.001, 0.03, 0.05], [0.004, -0.001, 0.01, -0.02]])
-    h = 1e-6
+    h, S = 1e-6, np.vstack([np.eye(4), -np.eye(4)])
     slope = np.stack(
         [(joints(model, q + h * e) - joints(model, q - h * e)) / (2 * h) for e in np.eye(4)], axis=2
     )
-    scale = np.array([1, 1, 1 / model.characteristic_length, 1 / model.characteristic_length])
     cranks = [chain.lengths["crank"] for chain in model.mechanism.chains]
     for i, state in enumerate(q):
         one = at(model, state, ["transmission", "ratio"])
+        pose, *ends = model.inverse_kinematics([state, *(state + h * S)]).pose
+        M_J = (np.array(ends[:4]) - ends[4:]).T / (2 * h)
+        rates = per_twist(pose, M_J, model.characteristic_length)
         transmission = one.transmission.values.ravel()
-        J_W = transmission[:, None] * np.array(cranks)[:, None] * slope[i] * scale
+        J_W = transmission[:, None] * np.array(cranks)[:, None] * slope[i] @ rates
         sigma = np.linalg.svd(J_W, compute_uv=False)
         size = np.abs(transmission)
         expected = min(sigma[-1] / sigma[0], size.min() / size.max())
