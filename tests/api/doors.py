@@ -170,6 +170,7 @@ DOORS: dict[str, Door] = {
     "Model.inverse_kinematics": Door(STATE, states=("q", "v", "a"), calls=60),
     "Model.mass_matrix": Door({"q": Q}, states=("q",), calls=60),
     "Model.bias": Door({"q": Q, "v": Q}, states=("q", "v"), calls=60),
+    "Model.coriolis": Door({"q": Q, "v": Q}, states=("q", "v"), calls=60),
     "Model.gravity": Door({"q": Q}, states=("q",), calls=60),
     "Model.jacobians": Door({"q": Q}, states=("q",), calls=60),
     "Model.linearise": Door(
