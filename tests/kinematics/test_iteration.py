@@ -17,7 +17,11 @@ from condyle.kinematics.batch import evaluate
 from condyle.kinematics.constraints import contacts_of
 from condyle.kinematics.iteration import newton
 from condyle.mechanism import Mechanism, parse
-from condyle.mechanism.home import dependent_coordinates, independent_coordinates
+from condyle.mechanism.home import (
+    characteristic_length,
+    dependent_coordinates,
+    independent_coordinates,
+)
 
 MODEST, LARGE = (0.3, 0.02), (0.6, 0.04)  # rad and m, by which coordinates differ from home
 FAR = (2.0, 0.1)
@@ -40,7 +44,8 @@ def mechanism(kind: str, contacts: int, ball: float, seed: int = 3) -> Mechanism
 def function(m: Mechanism) -> ca.Function:
     """q -> X_EE and reach."""
     q = ca.SX.sym("q", 6 - len(m.contacts))
-    placement = newton(contacts_of(m), dependent_coordinates(m), q)
+    length = ca.SX(characteristic_length(m))
+    placement = newton(contacts_of(m), dependent_coordinates(m), q, length)
     reach = ca.SX(1) if placement.discriminant is None else placement.discriminant
     return ca.Function("newton", [q], [placement.pose(), reach])
 

@@ -27,6 +27,7 @@ def test_a_bound_is_told_of_or_ends_the_run(jaw: Model) -> None:
     found = condyle.simulate(jaw, going)
     ended = condyle.simulate(jaw, going, stop_at_bounds=True)
     first = ended.condyle.events[-1]
+    assert "least x" in first["text"]
     assert first["kind"] == "bound" and first["ends"] and not found.condyle.events[0]["ends"]
     margin = found["bound_margin"].sel(contact=first["owner"])
     i = int(np.argmax(margin.values < 0))

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import condyle
 from condyle.errors import InputError, ScenarioError
+from condyle.mechanism.files import from_data
 from condyle.model.model import Model
 from condyle.simulation import FOODS, load_scenario, scenario_schema
 from condyle.simulation.bind import bind
@@ -57,6 +60,28 @@ def test_wrong_scenarios(tables: dict[str, Any], said: str) -> None:
 def test_scenarios_that_do_not_fit(jaw: Model, tables: dict[str, Any], said: str) -> None:
     with pytest.raises(ScenarioError, match=said):
         condyle.simulate(jaw, tables)
+
+
+def test_a_start_that_only_the_robust_path_closes() -> None:
+    """It is not said to be out of reach."""
+    model = condyle.derive("masticatory-curved", backend="numpy")
+    q = {"X": 0.0109, "Y": 0.0012, "alpha": -0.1001, "beta": -0.0387}
+    assert model.inverse_kinematics(list(q.values())).status == 0
+    with pytest.raises(ScenarioError, match="begin nearer home"):
+        condyle.simulate(model, {"start": q})
+
+
+def test_a_ball_at_the_origin_of_the_platform() -> None:
+    """O_M slides on a sphere, by kernels that close it."""
+    mechanism = condyle.load_mechanism("gough-stewart")
+    table = {"kind": "sphere", "centre": [0.0, 0.0, -0.8], "radius": 0.8}
+    data = tomllib.loads(condyle.dumps(mechanism))
+    ball = from_data(data | {"contact": [{"name": "ball", "point": [0, 0, 0], "surface": table}]})
+    scenario = {"duration": 0.05, "start": {"X": 0.05, "dX": 0.3, "dalpha": 1.0}}
+    found = condyle.simulate(condyle.derive(ball, backend="numpy"), scenario)
+    away = found["pose"].values[:, :3] - table["centre"]
+    assert len(away) == 51 and abs(np.linalg.norm(away, axis=1) - 0.8).max() < 1e-12
+    assert away[-1, 0] > 0.06
 
 
 def test_what_looks_like_a_slip(jaw: Model) -> None:

@@ -30,6 +30,7 @@ from .rotation import Bryant, turn_by, turned
 
 TINY = 1e-10  # steps that need not shrink
 CLOSED = 1e-13  # maximum last step
+NEAREST = 0.25  # minimum lever over the characteristic length: a contact may be at O_M itself
 NOTHING = 1e-30  # avoids 0 / 0 for steps of zero
 
 
@@ -60,10 +61,14 @@ PLANS = (
 )
 
 
-def newton(contacts: Sequence[ContactSymbols], dependent: Sequence[str], q: ca.SX) -> Placement:
+def newton(
+    contacts: Sequence[ContactSymbols], dependent: Sequence[str], q: ca.SX, length: ca.SX
+) -> Placement:
     """A pose with phi = 0, from q in the order of X_EE.
 
     Its `discriminant` is 1 where the steps converged, else 0.
+
+    Args: length: the characteristic one [m].
     """
     dep = indices(dependent)
     if all(_is_graph(c) for c in contacts) and 2 in dep:
@@ -71,7 +76,7 @@ def newton(contacts: Sequence[ContactSymbols], dependent: Sequence[str], q: ca.S
             return _height(contacts[0], q)
         if len(dep) == 2 and max(dep) >= 3:
             return one_angle(contacts, max(dep), q)
-    return followed(contacts, dep, q)
+    return followed(contacts, dep, q, length)
 
 
 def _is_graph(contact: ContactSymbols) -> bool:
@@ -88,14 +93,17 @@ def _height(contact: ContactSymbols, q: ca.SX) -> Placement:
     return Placement(ca.vertcat(q[:2], Z), bryant, None)
 
 
-def followed(contacts: Sequence[ContactSymbols], dep: list[int], q: ca.SX) -> Placement:
+def followed(
+    contacts: Sequence[ContactSymbols], dep: list[int], q: ca.SX, length: ca.SX
+) -> Placement:
     """All dependent coordinates at once, along the straight path from home; guides move with it.
 
     Each piece is a step that follows the curvature of the contacts, and a Newton step that shows
     its error. Branches meet at folds, where the determinant of C_dep changes sign; steps that
     shrink quickly and determinants away from zero exclude a fold between them.
     """
-    unit = _Unit(sum((c.square_lever for c in contacts), ca.SX(0)) / len(contacts))
+    lever = sum((c.square_lever for c in contacts), ca.SX(0)) / len(contacts)
+    unit = _Unit(ca.fmax(lever, (NEAREST * length) ** 2))
     pose = _Pose(ca.SX.zeros(3), [ca.SX([1, 0])] * 3)
     there = _Contacts.at([c.started_at(c.point) for c in contacts], dep, pose)
     home = there.determinant
@@ -126,7 +134,7 @@ def followed(contacts: Sequence[ContactSymbols], dep: list[int], q: ca.SX) -> Pl
 class _Unit:
     """Norm of steps in lengths and angles: lengths are divided by the levers' mean.
 
-    lever: mean square of the contact points' distances from O_M [m^2].
+    lever: mean square of the contact points' distances from O_M, or a minimum [m^2].
     """
 
     lever: ca.SX

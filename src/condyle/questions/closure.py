@@ -48,14 +48,14 @@ def closure(structure: Structure, names: tuple[str, ...] = ()) -> Program:
     s, s1, s2 = (b.sample(name, m) for name in ("s", "s1", "s2"))
     if not names:
         contacts = [*single_contacts(structure, b.parameter), *guides(b, s)]
-        placement = followed(contacts, list(range(6)), ca.SX(0, 1))
+        placement = followed(contacts, list(range(6)), ca.SX(0, 1), b.parameter("length"))
         here = [c.along_path(1.0) for c in contacts]
         rate, acceleration = _rates(here, placement.position, placement.bryant, s1, s2)
         pose = placement.pose()
     else:
         dependent = [name for name in COORDINATES if name not in names]
         contacts = contact_symbols(structure, b.parameter)
-        placement = newton(contacts, dependent, s)
+        placement = newton(contacts, dependent, s, b.parameter("length"))
         motion = whole_motion(contacts, dependent, placement, s1, s2)
         rate, acceleration = motion.rate, motion.acceleration
         pose = placement.pose()

@@ -71,7 +71,7 @@ def placed(b: Builder, q: ca.SX, q1: ca.SX, q2: ca.SX) -> Platform:
     if closed_form_available([form for form, _ in s.contacts], s.dependent):
         placement = closed_form(contacts, s.dependent, q, b.parameter("branch"))
     else:
-        placement = newton(contacts, s.dependent, q)
+        placement = newton(contacts, s.dependent, q, b.parameter("length"))
     motion = whole_motion(contacts, s.dependent, placement, q1, q2)
     pose = placement.pose()
     pose[independent_indices(s.dependent)] = q

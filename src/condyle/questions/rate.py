@@ -116,7 +116,7 @@ class _Acting:
 
 
 def _bounds(b: Builder, platform: Platform, bounded: Sequence[int]) -> list[ca.SX]:
-    """How far contact points are beyond the ends of their surfaces [m]."""
+    """How far contact points are beyond the faces of their bounds, six a contact [m]."""
     if not bounded:
         return []
     limits = b.sample("bounds", 6 * len(bounded), "m")
@@ -127,5 +127,5 @@ def _bounds(b: Builder, platform: Platform, bounded: Sequence[int]) -> list[ca.S
     for j, i in enumerate(bounded):
         point = platform.placement.position + frame.levers[i]
         low, high = limits[6 * j : 6 * j + 3], limits[6 * j + 3 : 6 * j + 6]
-        found.append(ca.mmax(ca.vertcat(low - point, point - high)))
+        found += ca.vertsplit(ca.vertcat(low - point, point - high))
     return found

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..backends.kernel import AGAIN
 from ..errors import InputError, ScenarioError
 from ..kinematics.chain import FAMILIES
 from ..mechanism import load_mechanism
@@ -21,6 +22,7 @@ from ..questions.law import Law
 from ..questions.load import Load
 from ..questions.load.acting import WRENCH
 from ..questions.load.given import Constant
+from ..status import Status
 from .integrators import Settings
 from .plan import WORKS, ClosedLoop, OpenLoop, Plan, Sensing
 from .reference_path import default_motion, path_of
@@ -281,8 +283,13 @@ def _start(
         if not isinstance(drive, ClosedLoop):
             return None
         q, q1 = (a[0] for a in drive.path.states(np.zeros(1))[:2])
-    if model.kernel("instant").run({"q": q[None], "q1": q1[None]}).status[0]:
+    if status := model.kernel("instant").run({"q": q[None], "q1": q1[None]}).status[0]:
         pose = ", ".join(f"{n} = {x:g}" for n, x in zip(names, q, strict=True))
+        if status == AGAIN and model.inverse_kinematics(q).status == Status.ok:
+            raise InputError(
+                f"start: {pose} is beyond what a simulation can close its contacts for, though "
+                "inverse dynamics can; begin nearer home"
+            )
         raise InputError(f"start: the pose cannot be reached: {pose}")
     return q, q1
 

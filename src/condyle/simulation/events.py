@@ -14,6 +14,7 @@ KINDS = {
     "bound": "a contact reaches the end of its surface",
     "contact_loss": "a unilateral contact would have to pull",
     "unreachable": "a chain or a contact cannot be closed any more",
+    "uncertified": "the contacts' pose is beyond what a simulation can certify",
     "singular": "the mechanism is singular, and accelerations have no bound",
     "gimbal_lock": "beta is +-90 degrees: accelerations of the angles are not determined",
     "jammed": "friction jams: Coulomb friction has no solution, or several",

@@ -22,6 +22,10 @@ WIDE = 1e100  # a limit that is none: products with it stay finite
 CERTAIN = 0.5  # of a placement
 
 
+# Of a contact's bounds, in the order of the question `rate`.
+FACES = tuple(f"its {end} {axis}" for end in ("least", "greatest") for axis in "xyz")
+
+
 @dataclass(frozen=True)
 class Guard:
     """What stays below zero, and what its passing zero means.
@@ -99,8 +103,9 @@ class Plant:
         machine, rows = plan.model.mechanism, iter(self.columns.result("guards").tolist())
         names = machine.contact_names
         found = [
-            Guard(next(rows), "bound", KINDS["bound"], names[i], plan.stop_at_bounds)
+            Guard(next(rows), "bound", f"{KINDS['bound']}, {face}", names[i], plan.stop_at_bounds)
             for i in self._bounded
+            for face in FACES
         ]
         found += [
             Guard(next(rows), "contact_loss", KINDS["contact_loss"], names[i], True)
@@ -184,7 +189,8 @@ class Plant:
         """Accelerations and contact forces where the kernel cannot vouch for its own."""
         columns, m = self.columns, len(self.plan.q)
         if self["certain"][0] < CERTAIN:
-            raise NoRateError(Status.unreachable)
+            closes = self._model.inverse_kinematics(y[:m]).status == Status.ok
+            raise NoRateError(Status.uncertified if closes else Status.unreachable)
         asked = columns.given[columns.rows("effort"), 0]
         effort = np.clip(asked, self.plan.low, self.plan.high)
         found = self._model.forward_dynamics(y[:m], y[m : 2 * m], effort, self["wrench"])
@@ -194,7 +200,7 @@ class Plant:
         columns.found[rate[m : 2 * m], 0] = found.acceleration
         columns.found[rate[2 * m + 3], 0] = np.abs(force) @ self["rub"]
         columns.found[columns.result("contact_force"), 0] = force
-        first = len(self._bounded)
+        first = len(FACES) * len(self._bounded)
         pulled = columns.result("guards")[first : first + len(self._sided)]
         columns.found[pulled, 0] = -self._push * force[self._sided]
 
