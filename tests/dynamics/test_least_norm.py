@@ -9,9 +9,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from condyle.dynamics.least_norm import Lanes, Total, gram_schmidt, normal_equations
+from condyle.dynamics.least_norm import Lanes, Pivots, Total, gram_schmidt, normal_equations
 
-Solver = Callable[[Total, Lanes, ca.SX], tuple[Lanes, ca.SX]]
+Solver = Callable[[Total, Lanes, ca.SX], tuple[Lanes, ca.SX, Pivots]]
 ROUNDING = np.finfo(float).eps
 SIZES = [(4, 1), (5, 2), (6, 3), (4, 4), (8, 4), (7, 5), (6, 6), (9, 6)]
 
@@ -24,7 +24,7 @@ def total(terms: Sequence[ca.SX]) -> ca.SX:
 @cache
 def compiled(solver: Solver, n: int, m: int, r: int = 1) -> ca.Function:
     A, b = ca.SX.sym("A", n, m), ca.SX.sym("b", m, r)
-    tau, quality = solver(total, [A[i, :].T for i in range(n)], b)
+    tau, quality, _ = solver(total, [A[i, :].T for i in range(n)], b)
     assert len(tau) == n
     return ca.Function("solve", [A, b], [ca.vertcat(*tau), quality])
 

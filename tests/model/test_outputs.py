@@ -16,7 +16,7 @@ from condyle.model.distributing import Distribution
 from condyle.model.inverse_dynamics import OUTPUTS
 from condyle.model.model import Model
 
-ALWAYS = ("effort", "contact_force", "status")
+ALWAYS = ("effort", "contact_force", "bound", "status")
 
 
 @pytest.mark.usefixtures("unoptimised")

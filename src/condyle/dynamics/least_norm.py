@@ -4,8 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import reduce
+from operator import mul
+from typing import NamedTuple
 
 import casadi as ca
+
+
+class Pivots(NamedTuple):
+    """Of an elimination, each over what it was before: squares of |q_k| / |a_k|."""
+
+    smallest: ca.SX
+    product: ca.SX
+
+    @staticmethod
+    def of(*ratios: ca.SX) -> Pivots:
+        return Pivots(reduce(ca.fmin, ratios), reduce(mul, ratios))
+
+    def joined(self, other: Pivots) -> Pivots:
+        return Pivots(ca.fmin(self.smallest, other.smallest), self.product * other.product)
+
+    @property
+    def square(self) -> ca.SX:
+        """About the square of the least singular value of A with columns of length one.
+
+        The product of all pivots is det^2, which is too small if several singular values are; the
+        smallest pivot can be too large. So the mean of the two, in logarithms.
+        """
+        return ca.sqrt(self.smallest * self.product)
+
 
 # Limits of the normal equations: minimum |q_k|^2 / |a_k|^2 in the elimination,
 CONDITIONED = 1e-3
@@ -16,7 +42,7 @@ Lanes = list[ca.SX]  # one expression a family group
 Total = Callable[[Sequence[ca.SX]], ca.SX]
 
 
-def normal_equations(total: Total, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
+def normal_equations(total: Total, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX, Pivots]:
     """Minimum-norm solutions tau = A y with A^T A y = b.
 
     Fast, since all its sums run at once. Elimination leaves A^T tau - b of rounding times
@@ -35,16 +61,16 @@ def normal_equations(total: Total, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
              A: (m,) a group, lane values.  b: (m, r).
     Returns: tau, (r,) a group as rows; 1, or -1 where `gram_schmidt` is needed: a pivot is below
              `CONDITIONED` times its column's square, or the bound above, summed over the
-             right-hand sides, does not hold.
+             right-hand sides, does not hold; the pivots.
     """
     m, G = b.shape[0], gram(total, A, A)
     lengths = ca.diag(G)
-    y, excess = definite_solve(G, b, lengths)
+    y, excess, pivots = definite_solve(G, b, lengths)
     terms = ca.dot(lengths, ca.sum2(y * y))
     spare = CANCELLATION**2 / m * ca.sum2(ca.sum1(y * b)) - terms
     least = reduce(ca.fmin, excess)
     # Compared separately, since backends treat NaN differently in a minimum.
-    return [a.T @ y for a in A], 2 * (least >= 0) * (spare >= 0) - 1
+    return [a.T @ y for a in A], 2 * (least >= 0) * (spare >= 0) - 1, pivots
 
 
 def gram(total: Total, A: Lanes, B: Lanes) -> ca.SX:
@@ -60,7 +86,7 @@ def gram(total: Total, A: Lanes, B: Lanes) -> ca.SX:
 
 def definite_solve(
     G: ca.SX, b: ca.SX, lengths: ca.SX, least: float = CONDITIONED
-) -> tuple[ca.SX, list[ca.SX]]:
+) -> tuple[ca.SX, list[ca.SX], Pivots]:
     """G^-1 b for a symmetric, positive definite G, eliminating two rows at a time.
 
     Half as many divisions as row by row, and divisions are the critical path. Only the upper
@@ -69,13 +95,13 @@ def definite_solve(
     Args:    lengths: (m,), the diagonal before elimination.
              least: minimum pivot over `lengths`.
     Returns: the solution, and the excess of the pivots over `least` times `lengths`, each times a
-             positive number.
+             positive number; the pivots over `lengths`.
     """
     m = G.shape[0]
     if m == 0:
-        return ca.SX(0, b.shape[1]), []
+        return ca.SX(0, b.shape[1]), [], Pivots.of(ca.SX(1))
     if m == 1:
-        return b * (1 / G), [G - least * lengths]
+        return b * (1 / G), [G - least * lengths], Pivots.of(G / lengths[0])
     u, v, w = G[0, 0], G[0, 1], G[1, 1]
     determinant = u * w - v * v
     scale = 1 / determinant
@@ -88,11 +114,12 @@ def definite_solve(
     B = G[:2, 2:]
     gain = inverse @ B
     below = G[2:, 2:] - B.T @ gain
-    rest, more = definite_solve(below, b[2:, :] - gain.T @ b[:2, :], lengths[2:], least)
-    return ca.vertcat(inverse @ b[:2, :] - gain @ rest, rest), excess + more
+    rest, more, pivots = definite_solve(below, b[2:, :] - gain.T @ b[:2, :], lengths[2:], least)
+    own = Pivots.of(G[0, 0] / lengths[0], determinant / (G[0, 0] * lengths[1]))
+    return ca.vertcat(inverse @ b[:2, :] - gain @ rest, rest), excess + more, own.joined(pivots)
 
 
-def gram_schmidt(total: Total, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
+def gram_schmidt(total: Total, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX, Pivots]:
     """Minimum-norm solutions of A^T tau = b by modified Gram-Schmidt on the columns of A.
 
     A = Q R with unnormalised columns in Q and ones on the diagonal of R, so no square roots.
@@ -108,21 +135,21 @@ def gram_schmidt(total: Total, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
     Args:    total: sums entries over all chains.
              A: (m,) a group, lane values.  b: (m, r).
     Returns: tau, (r,) a group as rows; the smallest |q_k|^2 / |a_k|^2, which is small where A is
-             ill conditioned.
+             ill conditioned; the pivots.
     """
     m = b.shape[0]
     columns = [[a[k] for a in A] for k in range(m)]
     lengths = total([a * a for a in A])
     w = [b[k, :] for k in range(m)]
     overlaps, inverses = [], []
-    quality = ca.SX(1.0)
+    ratios = []
     for k in range(m):
         q = columns[k]
         # With earlier columns the loss of orthogonality, with later ones R.
         products = total(
             [ca.vertcat(*(x * column[g] for column in columns)) for g, x in enumerate(q)]
         )
-        quality = ca.fmin(quality, products[k] / lengths[k])
+        ratios.append(products[k] / lengths[k])
         overlaps.append(products[:k])
         inverses.append(1 / products[k])
         for j in range(k + 1, m):
@@ -135,4 +162,5 @@ def gram_schmidt(total: Total, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX]:
         for j in range(k):
             w[j] = w[j] - overlaps[k][j] * c
         result = [r + x * c for r, x in zip(result, columns[k], strict=True)]
-    return result, quality
+    pivots = Pivots.of(ca.SX(1), *ratios)
+    return result, pivots.smallest, pivots

@@ -213,12 +213,14 @@ class Placement:
 
     discriminant: dimensionless; the contacts can be closed where it is >= 0 (None: always).
     iterated: by a fixed number of steps; `discriminant` is then 1 if they converged, else 0.
+    left: square of the step that would follow, in lengths of the levers and radians.
     """
 
     position: ca.SX
     bryant: Bryant
     discriminant: ca.SX | None
     iterated: bool = False
+    left: ca.SX | float = 0.0
 
     def pose(self) -> ca.SX:
         """X_EE, (6,)."""

@@ -125,9 +125,10 @@ def followed(
     last = there.at_pose(pose)
     pose = pose.moved(dep, last.step())
     phi = _phi([c.along_path(1.0) for c in contacts], pose)
-    sure.append(unit.square(solve_small(last.C, phi), dep) < CLOSED**2)
+    left = unit.square(solve_small(last.C, phi), dep)
+    sure.append(left < CLOSED**2)
     sure.append(pose.square(unit) < plan.far**2)
-    return Placement(pose.position, pose.bryant, all_of(sure), iterated=True)
+    return Placement(pose.position, pose.bryant, all_of(sure), True, left)
 
 
 @dataclass(frozen=True)

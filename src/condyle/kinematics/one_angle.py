@@ -49,8 +49,9 @@ def one_angle(contacts: Sequence[ContactSymbols], angle: int, q: ca.SX) -> Place
     bryant = Bryant(*(ca.substitute(v, unknown, turn) for v in (bryant.cos, bryant.sin)))
     first, second = (c.phi(c.at(base, bryant.rotation())) for c in contacts)
     # Written so that NaN counts as not closed.
-    closed = ca.fabs((first - second) * (slope * inverse)) < CLOSED
-    return Placement(ca.vertcat(q[:2], -first), bryant, (margin > 0) * closed, iterated=True)
+    left = (first - second) * (slope * inverse)
+    sure = (margin > 0) * (ca.fabs(left) < CLOSED)
+    return Placement(ca.vertcat(q[:2], -first), bryant, sure, True, left * left)
 
 
 def _rotation(angle: int, q: ca.SX) -> tuple[ca.SX, Bryant]:

@@ -177,15 +177,15 @@ class Distributor:
         """Whether it has a say at all in the efforts."""
         return not self.least_norm or self.unsolved_friction
 
-    def question(self, contact: bool) -> tuple[tuple[Any, ...], dict[str, np.ndarray]]:
+    def question(self, whole: bool) -> tuple[tuple[Any, ...], dict[str, np.ndarray]]:
         """The question of one state's efforts with its details, none where a kernel alone cannot
         say what they are; and its ports that are always given the same.
 
-        Args: contact: whether contact forces are wanted too.
+        Args: whole: whether contact forces and the bound are wanted too.
         """
         objective = self.distribution.objective
         if not self.chooses:
-            return ("inverse", ("contact",) if contact else ()), {}
+            return ("inverse", ("contact", "bound") if whole else ()), {}
         # Cubes take twice the steps, and compilers a minute.
         if objective.term != "square" or self.unsolved_friction:
             return (), {}

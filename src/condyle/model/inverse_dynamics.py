@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..backends.kernel import Answer, sample_rows
+from ..questions.bound import CERTIFIED, bound
 from ..questions.inverse import OUTPUTS as ASKED
 from ..status import Status
 from .arguments import Arguments, requested
@@ -19,7 +20,7 @@ from .system import System
 from .unchecked import Dynamics
 
 Array = np.ndarray
-# What the question is asked for each output; the contact forces always come.
+# What the question is asked for each output; the contact forces and the bound always come.
 OUTPUTS = {
     "share": "share",
     "gravity_share": "gravity",
@@ -39,14 +40,14 @@ SOLVED = tuple(name for name in OUTPUTS if name not in ("gravity_share", "condit
 class InverseDynamics(Dynamics):
     """What efforts a motion takes; see `Model`."""
 
-    results = ("effort", "contact_force")
+    results = ("effort", "contact_force", "bound")
 
     def __init__(self, system: System, arguments: Arguments, distributor: Distributor) -> None:
         super().__init__(system, arguments, arguments.a)
         self.distributor = distributor
 
-    def question(self, contact: bool) -> tuple[tuple[Any, ...], dict[str, Array]]:
-        return self.distributor.question(contact)
+    def question(self, whole: bool) -> tuple[tuple[Any, ...], dict[str, Array]]:
+        return self.distributor.question(whole)
 
     def many(
         self, state: Any, wrench: Any, at: Any, outputs: Any, threads: int | None
@@ -55,7 +56,7 @@ class InverseDynamics(Dynamics):
         lead, inputs = own.samples((own.q, own.v, own.a), state, wrench, at)
         answer = self._solve(inputs, {OUTPUTS[name] for name in names}, threads)
         values, status = answer.values, answer.status
-        found = {"effort": values["effort"].T, "contact_force": values["contact_force"].T}
+        found = {name: values[name].T for name in self.results}
         if status.any():
             for value in found.values():
                 value[status != Status.ok] = np.nan
@@ -88,7 +89,7 @@ class InverseDynamics(Dynamics):
         self, inputs: dict[str, Array], asked: Collection[str], threads: int | None
     ) -> Answer:
         system, chooses = self._system, self.distributor.chooses
-        asked = {*asked, "contact"} | ({"motion"} if chooses else set())
+        asked = {*asked, "contact", "bound"} | ({"motion"} if chooses else set())
         kernel = system.kernel("inverse", tuple(name for name in ASKED if name in asked))
         answer = kernel.run(inputs, threads)
         if self.distributor.unsolved_friction:
@@ -117,7 +118,9 @@ class InverseDynamics(Dynamics):
         ports |= sample_rows(load, rows, len(status))
         # Shares cost more than all the rest.
         question = "system" if {"share", "slip"} & values.keys() else "balance"
-        better = self.distributor.solve(self._system.kernel(question).run(ports).values)
+        system = self._system.kernel(question).run(ports).values
+        better = self.distributor.solve(system)
+        better["bound"] = np.fmax(CERTIFIED, bound(system["data_error"], 1.0))
         status[rows] = better.pop("status")
         for name, value in better.items():
             if name in values:

@@ -53,6 +53,7 @@ class ModelResult:
     acceleration: Array = _item("m", "m/s^2, rad/s^2", "of the independent coordinates")
     contact_force: Array = _item("k", "N", "on the platform, along the unit normals")
     status: Array = _item("", "", "0 where it was computed, else of Status (PoseStatus)")
+    bound: Array = _item("", "1", "of the relative error of all this, of the largest entry")
     share: Array = _item("parts, n", "N m or N", "of the effort, needed by each of Model.parts")
     gravity_share: Array = _item("parts, n", "N m or N", "the same at rest")
     q: Array = _item("m", "m, rad", "independent coordinates")

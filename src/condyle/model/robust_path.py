@@ -19,6 +19,7 @@ from ..graph.program import Numbers
 from ..kinematics.rotation import GIMBAL_LOCK
 from ..kinematics.singularities import SINGULAR, ratio
 from ..questions import Question
+from ..questions.bound import CERTIFIED, TINY, bound
 from ..questions.numbers import characteristic
 from ..questions.structure import Structure
 from ..status import Status, judge
@@ -78,6 +79,7 @@ class Robust:
             values["contact_force"] = self._contact_forces(s, effort).T
             values["slip"], values["drag"] = system["slip"], system["drag"]
             status = self._judged(reached, values, effort)
+            values["bound"] = _bound(s, effort)
             if self._structure.friction:
                 parts, n, N = values["share"].shape
                 values["share"] = np.full((parts + 2, n, N), np.nan)
@@ -87,6 +89,7 @@ class Robust:
                     better = self._distributor.solve({n: a[..., good] for n, a in system.items()})
                     status[good] = better.pop("status")
                     better.pop("shortfall")
+                    values["bound"][good] = np.fmax(CERTIFIED, bound(s["data_error"][good], 1.0))
                     for name, a in better.items():
                         values[name][..., good] = a
         return values, status
@@ -172,6 +175,18 @@ class Robust:
         regular = np.minimum(ratio(least, most), ratio(sigma[-1], sigma[0])) >= SINGULAR
         assembled = reached & (values["discriminant"] >= 0).all(axis=0)
         return judge(assembled, regular, np.isfinite(effort).all(axis=1))
+
+
+def _bound(s: Arrays, effort: np.ndarray) -> np.ndarray:
+    """The bound of minimum-norm efforts, (N,), as `questions.bound` has it.
+
+    Args: s: results of `system`, samples first;  effort: (N, n).
+    """
+    lengths = np.linalg.norm(s["A"], axis=2)
+    volume = np.prod(_singular_values((s["A"] / lengths[..., None]).T), axis=0)
+    lost = np.linalg.norm(s["uncancelled"] / lengths, axis=1)
+    lost = np.fmax(1.0, lost / (np.linalg.norm(effort, axis=1) + TINY))
+    return bound(s["data_error"], lost / volume)
 
 
 def _singular_values(rows: np.ndarray) -> np.ndarray:

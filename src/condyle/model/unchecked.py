@@ -41,10 +41,11 @@ class Unchecked:
 class Dynamics:
     """Inverse or forward dynamics of one mechanism: of one state here, of many where it is called.
 
-    results: the first result and the contact forces.   third: the argument behind q and v.
+    results: the first result, the contact forces and the bound.
+    third:   the argument behind q and v.
     """
 
-    results: tuple[str, str]
+    results: tuple[str, str, str]
 
     def __init__(self, system: System, arguments: Arguments, third: Argument) -> None:
         self._system, self._arguments, self.third = system, arguments, third
@@ -56,8 +57,9 @@ class Dynamics:
         if type(q) is np.ndarray and q.ndim == 1 and not outputs and threads is None:
             row = self._one(q, v, x, wrench, self._arguments.point(at))
             if row is not None:
-                first = len(row) - (6 - len(q))  # and the contact forces
-                found = dict(zip(self.results, (row[:first], row[first:]), strict=True))
+                first = len(row) - (7 - len(q))  # then the contact forces, and the bound
+                parts = row[:first], row[first:-1], row[-1]
+                found = dict(zip(self.results, parts, strict=True))
                 return ModelResult(**found, status=np.zeros((), np.uint8))
         return self.many((q, v, x), wrench, at, outputs, threads)
 
@@ -67,17 +69,17 @@ class Dynamics:
         """The same of arrays of any leading shape; state: q, v and the third argument."""
         raise NotImplementedError
 
-    def question(self, contact: bool) -> tuple[tuple[Any, ...], Mapping[str, np.ndarray]]:
+    def question(self, whole: bool) -> tuple[tuple[Any, ...], Mapping[str, np.ndarray]]:
         """The question of one state with its details, if a kernel alone can answer it, and its
         ports that are always given the same.
 
-        Args: contact: whether contact forces are wanted too.
+        Args: whole: whether contact forces and the bound are wanted too.
         """
         raise NotImplementedError
 
     @cached_property
     def _one(self) -> Call:
-        """Both results of one state in a row; None for what is none."""
+        """The results of one state in a row; None for what is none."""
         return self._bound(self.results, lambda *given: None)
 
     def unchecked(self) -> Call:

@@ -160,7 +160,7 @@ def _solved(
         T = eq.B.T @ touch.T[:, rubbing]
         right = ca.horzcat(right, T)
     M, pulled = eq.basis.generalized_force(H), eq.basis.generalized_force(right)
-    x, excess = definite_solve(M, pulled, ca.diag(M), CONDITIONED)
+    x, excess, _ = definite_solve(M, pulled, ca.diag(M), CONDITIONED)
     sure = all_of(one > 0 for one in excess)
     w, force = x[:, 0], ca.SX(0, 1)
     if wanted or touch is not None:

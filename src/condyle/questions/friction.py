@@ -17,7 +17,9 @@ from itertools import product
 
 import casadi as ca
 
+from ..dynamics.least_norm import Pivots
 from ..kinematics.constraints import all_of, independent_indices, indices, solve_small
+from .bound import square_volume
 from .builder import Builder, Lanes
 from .equations import Equations
 from .platform import Basis, Contacts
@@ -26,20 +28,22 @@ MOST = 2  # maximum number of contacts with friction that a kernel of inverse dy
 HUGE = 1e300
 FLAT = 1e-3  # part of a square below which a difference has lost too many digits
 
-LeastNorm = Callable[..., tuple[Lanes, ca.SX]]
+LeastNorm = Callable[..., tuple[Lanes, ca.SX, Pivots]]
 
 
 @dataclass(frozen=True)
 class Chosen:
     """Efforts and contact forces of the best sign pattern.
 
-    sure: 1 where no other pattern can be better, else 0;  pivots: the smallest of all solves.
+    sure: 1 where no other pattern can be better, else 0;  pivots: the smallest of all solves;
+    regular: c^2 V^2 of its equations: see `bound`.
     """
 
     effort: Lanes
     force: ca.SX
     sure: ca.SX
     pivots: ca.SX
+    regular: ca.SX
 
 
 @dataclass(frozen=True)
@@ -73,6 +77,7 @@ class _Pattern:
     flat: dict[int, ca.SX]
     candidates: list[_Candidate]
     pivots: ca.SX
+    regular: ca.SX
 
     def least(self, b: Builder) -> tuple[ca.SX, Lanes, ca.SX]:
         """Norm, efforts and contact forces of the best candidate."""
@@ -103,7 +108,7 @@ def least_norm_pattern(b: Builder, eq: Equations, c: Contacts, solve: LeastNorm)
     """
     s = b.structure
     best = ca.SX(float("inf"))
-    pivots = ca.SX(1.0)
+    pivots, regular = ca.SX(1.0), ca.SX(1.0)
     effort: Lanes = []
     force = ca.SX.zeros(len(s.contacts))
     tried: dict[tuple[int, ...], _Pattern] = {}
@@ -112,12 +117,13 @@ def least_norm_pattern(b: Builder, eq: Equations, c: Contacts, solve: LeastNorm)
         pivots = ca.fmin(pivots, pattern.pivots)
         norm, found, carried = pattern.least(b)
         better = norm < best
+        regular = ca.if_else(better, pattern.regular, regular)
         best = ca.if_else(better, norm, best)
         force = ca.if_else(better, carried, force)
         effort = [
             t if not effort else ca.if_else(better, t, effort[g]) for g, t in enumerate(found)
         ]
-    return Chosen(effort, force, _sure(s.friction, tried, best), pivots)
+    return Chosen(effort, force, _sure(s.friction, tried, best), pivots, regular)
 
 
 def _pattern(
@@ -132,7 +138,7 @@ def _pattern(
         D[:, i] = N[:, i] - sign[i] * T[:, i]
     basis = Basis(ind, dep, -solve_small(D[dep, :].T, D[ind, :].T))
     rows = [basis.generalized_force(chain.row) for chain in eq.chains]
-    found, pivots = solve(b.total, rows, basis.generalized_force(eq.Q))
+    found, pivots, eliminated = solve(b.total, rows, basis.generalized_force(eq.Q))
     carried = b.total([ch.row[dep] * t for ch, t in zip(eq.chains, found, strict=True)])
     force = solve_small(D[dep, :], eq.Q[dep] - carried)
     norm = b.total([t * t for t in found])
@@ -147,12 +153,13 @@ def _pattern(
         for i in s.friction:
             own = [a[i] for a in B]
             taken = b.total([row * a for row, a in zip(rows, own, strict=True)])
-            known, quality = solve(b.total, rows, taken)
+            known, quality, _ = solve(b.total, rows, taken)
             pivots = ca.fmin(pivots, quality)
             free[i] = [a - p for a, p in zip(own, known, strict=True)]
             flat[i] = b.total([x * x for x in free[i]]) < FLAT * b.total([a * a for a in own])
         candidates += _held(b, force, norm, sign, free, flat, s.n - s.m)
-    return _Pattern(found, force, norm, broken, B, free, flat, candidates, pivots)
+    regular = eliminated.square * square_volume(b, D.T, s.dependent)
+    return _Pattern(found, force, norm, broken, B, free, flat, candidates, pivots, regular)
 
 
 def _held(

@@ -16,6 +16,7 @@ from ..dynamics.least_norm import gram_schmidt, normal_equations
 from ..graph.program import Program, Variants
 from ..kinematics.rotation import NEAR_LOCK
 from ..status import Status
+from .bound import bound, cancellation, data_error, uncancelled
 from .builder import Builder, Lanes
 from .configuration import add_configuration
 from .equations import Equations, Wrench, equations, total
@@ -34,7 +35,7 @@ from .platform import (
 from .structure import Structure
 
 # Optional results besides the efforts.
-OUTPUTS = ("contact", "share", "gravity", "motion", "joint", "configuration")
+OUTPUTS = ("contact", "share", "gravity", "motion", "joint", "configuration", "bound")
 DOUBTFUL = 1e-14  # minimum discriminant,
 WEAK = 1e-20  # and squared ratio of a pivot to its column, of samples that are not repeated
 HUGE = 1e300
@@ -76,6 +77,12 @@ def program(
         add_configuration(b, platform)
         if structure.friction:
             contacts(b, platform).add_sliding(b)
+    if "bound" in wanted:
+        data = data_error(b, platform, [c.dynamics.discriminant for c in eq.chains])
+        lengths = b.total([a * a for a in eq.A])
+        square = b.total([t * t for t in best.effort])
+        lost = cancellation(uncancelled(eq.basis, eq.parts.values()), lengths, square)
+        b.output("bound", bound(data, ca.sqrt(lost / best.regular)), "1")
     return b.finish()
 
 
@@ -108,13 +115,14 @@ def in_variants(
 
 @dataclass(frozen=True)
 class _Best:
-    """Minimum-norm efforts, the share of each part, and the contact forces."""
+    """Minimum-norm efforts, the share of each part, the contact forces, and `bound`'s V^2."""
 
     effort: Lanes
     share: Lanes
     gravity: Lanes
     force: ca.SX
     quality: ca.SX
+    regular: ca.SX
 
 
 def _minimum_norm(
@@ -159,21 +167,22 @@ def _solved(
         # Friction as a load.
         parts.append(eq.state.B.T @ (touch.T @ ca.fabs(chosen.force)))
     if chosen is not None and not apart:
-        return _Best(chosen.effort, [], [], chosen.force, chosen.sure * chosen.pivots)
+        sure = chosen.sure * chosen.pivots
+        return _Best(chosen.effort, [], [], chosen.force, sure, chosen.regular)
     pulled = [eq.basis.generalized_force(part) for part in parts]
     right = ca.horzcat(*pulled) if apart else total(pulled)
     if "gravity" in wanted:
         # Forces of bodies at rest: gravity alone, and the load.
         bodies = ca.horzcat(*pulled[: len(eq.parts)])
         right = ca.horzcat(right, b.at_zero(bodies, platform.q1, platform.q2))
-    found, pivots = solve(b.total, eq.A, right)
+    found, pivots, eliminated = solve(b.total, eq.A, right)
     share = [f[:, : len(parts)] if apart else f for f in found]
     gravity = [f[:, len(parts) :] for f in found]
     if chosen is not None:
         share = [ca.horzcat(f, t - ca.sum2(f)) for f, t in zip(share, chosen.effort, strict=True)]
         gravity = [ca.horzcat(f, 0, 0) for f in gravity]  # no friction at rest
         quality = chosen.sure * ca.fmin(pivots, chosen.pivots)
-        return _Best(chosen.effort, share, gravity, chosen.force, quality)
+        return _Best(chosen.effort, share, gravity, chosen.force, quality, chosen.regular)
     effort = [total(ca.horzsplit(f)) for f in share]
     force = ca.SX(0, 1)
     if "contact" in wanted:
@@ -182,7 +191,7 @@ def _solved(
             lump = FORMULATIONS[b.structure.formulation].lumps
             core = equations(b, platform, load, route="core", lump=lump)
         force = core.contact_forces(platform, effort)
-    return _Best(effort, share, gravity, force, pivots)
+    return _Best(effort, share, gravity, force, pivots, eliminated.square)
 
 
 def motion(structure: Structure) -> Program:
@@ -199,7 +208,11 @@ def balance(structure: Structure) -> Program:
     b = Builder(structure)
     platform, load = given(b), Wrench.of(b)
     lump = FORMULATIONS[structure.formulation].lumps
-    _add_balance(b, platform, equations(b, platform, load, route="core", lump=lump))
+    eq = equations(b, platform, load, route="core", lump=lump)
+    _add_balance(b, platform, eq)
+    b.output(
+        "data_error", data_error(b, platform, [c.dynamics.discriminant for c in eq.chains]), "1"
+    )
     return b.finish()
 
 
@@ -219,6 +232,10 @@ def system(structure: Structure) -> Program:
     _add_balance(b, platform, eq).add_sliding(b)
     b.output("joint_rate", [c.dynamics.rate for c in eq.chains], "rad/s or m/s")
     b.output("joint_acceleration", [c.dynamics.acceleration for c in eq.chains], "per s^2")
+    b.output(
+        "data_error", data_error(b, platform, [c.dynamics.discriminant for c in eq.chains]), "1"
+    )
+    b.output("uncancelled", uncancelled(eq.basis, eq.parts.values()), "", structure.m)
     return b.finish()
 
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from itertools import product
 
+import casadi as ca
+
 from ..dynamics import FORMULATIONS
 from ..graph.program import Variants
 from ..status import Status
 from .allocation import TERMS, Allocated, Limits, least_pattern
+from .bound import CERTIFIED, bound, data_error
 from .builder import Builder, Lanes
 from .equations import Wrench, equations
 from .inverse import DOUBTFUL, feasibility
@@ -25,6 +28,8 @@ def limited(structure: Structure, term: str = "square", weighs: bool = False) ->
     b = Builder(structure)
     platform, load = closed(b), Wrench.of(b)
     found, discriminants = within(b, platform, load, Limits.ports(b, weighs), term)
+    accurate = bound(data_error(b, platform, discriminants), 1)
+    b.output("bound", ca.fmax(CERTIFIED, accurate), "1")
     b.output("effort", found.effort, "N m or N")
     b.output("contact_force", found.force, "N", len(structure.contacts))
     b.check(feasibility(b, platform, discriminants), DOUBTFUL, Status.unreachable)

@@ -182,6 +182,10 @@ class Basis:
     others: Sequence[int]
     rest: ca.SX
 
+    def absolute(self) -> Basis:
+        """|Pi|, entry by entry."""
+        return Basis(self.identity, self.others, ca.fabs(self.rest))
+
     def generalized_force(self, f: ca.SX) -> ca.SX:
         """Pi^T f, with a column for each of f."""
         own = f[list(self.identity), :]

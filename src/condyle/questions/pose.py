@@ -193,7 +193,7 @@ def least_squares(b: Builder, A: Lanes, right: Lanes) -> tuple[ca.SX, ca.SX]:
     """
     G = gram(b.total, A, A)
     carried = b.total([a * y for a, y in zip(A, right, strict=True)])
-    x, excess = definite_solve(G, carried, ca.diag(G), CONDITIONED)
+    x, excess, _ = definite_solve(G, carried, ca.diag(G), CONDITIONED)
     return x, all_of(one > 0 for one in excess)
 
 

@@ -305,6 +305,10 @@ VARIABLES = (
         "singularity", ("time",), "1", "kind of singularity that is near", "near",
         flags=" ".join(KINDS),
     ),
+    Variable(
+        "bound", ("time",), "1", "bound of the relative error of what was computed",
+        "evaluation.bound", only=lambda derived: hasattr(derived.evaluation, "bound"),
+    ),
     Variable("status", ("time",), "1", "status", "status", flags=" ".join(STATUS_NAMES)),
     Variable("cause", ("time",), "1", "cause of the failure", "cause", flags=cause_flags),
 )
