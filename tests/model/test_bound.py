@@ -79,3 +79,11 @@ def test_single_states_have_that_of_many(distribution: str) -> None:
 def test_a_solution_has_it() -> None:
     run = condyle.run(backend="numpy")
     assert run["bound"].dims == ("time",) and float(run["bound"].max()) < REGULAR
+
+
+def test_forward_dynamics_has_one_for_each_sample() -> None:
+    model = condyle.derive("masticatory-curved", backend="numpy")
+    q, v, a = states(model)
+    found = model.forward_dynamics(q, v, model.inverse_dynamics(q, v, a).effort)
+    assert (found.bound > 0).all() and (found.bound < 1e-8).all()
+    assert (np.abs(found.acceleration - a).max(axis=1) < found.bound * np.abs(a).max(axis=1)).all()

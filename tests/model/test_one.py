@@ -211,11 +211,12 @@ def restless() -> Iterator[None]:
 @pytest.mark.usefixtures("restless")
 def test_threads_do_not_meet(compiled: Asked) -> None:
     rows = list(zip(*compiled.given, strict=True))
-    wanted = [compiled.one(*row) for row in rows]
+    calls = (compiled.one, compiled.many)
+    wanted = [[f(*row) for f in calls] for row in rows]
 
     def ask(i: int) -> bool:
-        calls = (compiled.one, compiled.many)
-        return all((f(*rows[i]) == wanted[i]).all() for _ in range(1500) for f in calls)
+        pairs = list(zip(calls, wanted[i], strict=True))
+        return all((f(*rows[i]) == found).all() for _ in range(1500) for f, found in pairs)
 
     with ThreadPoolExecutor(4) as pool:
         assert all(pool.map(ask, range(4)))

@@ -16,7 +16,7 @@ from .unchecked import Dynamics
 
 Array = np.ndarray
 
-# What the question is asked for each output; the contact forces always come.
+# What the question is asked for each output; the contact forces and the bound always come.
 OUTPUTS = {
     **dict.fromkeys(("pose", "pose_rate", "pose_acceleration"), "motion"),
     **dict.fromkeys(("joint", "joint_rate", "joint_acceleration"), "joint"),
@@ -27,28 +27,28 @@ OUTPUTS = {
     "friction_force": "sliding",
 }
 # What is no number in a gimbal lock, and what is none where there is no solution at all.
-OF_ANGLES = ("acceleration", "pose_acceleration")
+OF_ANGLES = ("acceleration", "pose_acceleration", "bound")
 DEPENDENT = (*OF_ANGLES, "contact_force", "joint_acceleration", "twist_rate")
 
 
 class ForwardDynamics(Dynamics):
     """What efforts and wrenches do to one mechanism; see `Model`."""
 
-    results = ("acceleration", "contact_force")
+    results = ("acceleration", "contact_force", "bound")
 
     def __init__(self, system: System, arguments: Arguments, poses: Poses) -> None:
         super().__init__(system, arguments, arguments.effort)
         self._poses = poses
 
-    def question(self, contact: bool) -> tuple[tuple[Any, ...], dict[str, Array]]:
-        return ("forward", ("contact",)), {}
+    def question(self, whole: bool) -> tuple[tuple[Any, ...], dict[str, Array]]:
+        return ("forward", ("contact", "bound") if whole else ("contact",)), {}
 
     def many(
         self, state: Any, wrench: Any, at: Any, outputs: Any, threads: int | None
     ) -> ModelResult:
         names, own = requested(outputs, OUTPUTS), self._arguments
         lead, inputs = own.samples((own.q, own.v, own.effort), state, wrench, at)
-        asked = {"contact", *(OUTPUTS[name] for name in names)}
+        asked = {"contact", "bound", *(OUTPUTS[name] for name in names)}
         kernel = self._system.kernel("forward", tuple(name for name in ASKED if name in asked))
         answer = kernel.run(inputs, threads)
         answer.mend(inputs, lambda few: self._system.robust.forward(few))
@@ -63,7 +63,7 @@ class ForwardDynamics(Dynamics):
         if {"configuration", "condition"} & {*names}:
             first["configuration"] = c = self._poses.configuration(first["pose"], threads)
             first["condition"] = c.singularity.condition
-        found = {name: first[name] for name in ("acceleration", "contact_force", *names)}
+        found = {name: first[name] for name in (*self.results, *names)}
         return ModelResult(**found, status=status).shaped(lead)
 
     def linearise(self, q: Any, v: Any, effort: Any, wrench: Any, at: Any) -> ModelResult:

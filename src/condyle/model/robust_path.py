@@ -117,9 +117,11 @@ class Robust:
             status = judge(assembled, regular, finite)
             status[(status == Status.ok) & ~found.single] = Status.jammed
             status[(status == Status.ok) & locked] = Status.gimbal_lock
+            accurate = _forward_bound(s, found.w, found.force)
             twist_rate = s["twist_rate"] + (s["along"] @ found.w[..., None])[..., 0]
         return {
             "acceleration": q2.T,
+            "bound": accurate,
             "contact_force": found.force.T,
             "pose": poses["pose"].T,
             "pose_rate": poses["pose_rate"].T,
@@ -187,6 +189,23 @@ def _bound(s: Arrays, effort: np.ndarray) -> np.ndarray:
     lost = np.linalg.norm(s["uncancelled"] / lengths, axis=1)
     lost = np.fmax(1.0, lost / (np.linalg.norm(effort, axis=1) + TINY))
     return bound(s["data_error"], lost / volume)
+
+
+def _forward_bound(s: Arrays, w: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """The bound of accelerations, (N,).
+
+    Args: s: results of `forward_system`, samples first;  w: (N, m);  force: (N, k).
+    """
+    N, T = (s[name].transpose(0, 2, 1) for name in ("normal", "friction"))
+    A = np.concatenate([s["H"], T * np.copysign(1.0, force)[:, None] - N], axis=2)
+    columns = np.linalg.norm(A, axis=1)
+    A = A / columns[:, None]
+    rows = np.linalg.norm(A, axis=2)
+    sigma = _singular_values(np.moveaxis(A / rows[..., None], 0, -1))
+    size = np.linalg.norm(columns * np.concatenate([w, force], axis=1), axis=1)
+    lost = np.fmax(1.0, np.linalg.norm(s["F"] / rows, axis=1) / (size + TINY))
+    spread = np.abs(np.linalg.det(s["S"] / np.linalg.norm(s["S"], axis=2, keepdims=True)))
+    return bound(s["data_error"], lost * sigma[0] / sigma[-1] / spread)
 
 
 def _singular_values(rows: np.ndarray) -> np.ndarray:

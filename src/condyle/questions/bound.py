@@ -72,6 +72,14 @@ def square_spread(S: ca.SX) -> ca.SX:
     return determinant(S) ** 2 / sizes
 
 
+def distance(K: ca.SX, force: ca.SX) -> ca.SX:
+    """Of the equations (sigma - K) y = lambda_0 of friction from singular ones, in (0, 1]."""
+    sizes = ca.SX(1)
+    for i in range(K.shape[0]):
+        sizes = sizes * (1 + ca.sum2(ca.fabs(K[i, :])))
+    return ca.fabs(determinant(ca.diag(2 * (force >= 0) - 1) - K)) / sizes
+
+
 def data_error(b: Builder, platform: Platform, discriminants: Lanes) -> ca.SX:
     """Of the data of the equations: (u / c^2 + r / c) / d.
 

@@ -21,6 +21,14 @@ from ..graph.program import Program, Variants
 from ..kinematics.constraints import all_of, indices, solve_small
 from ..kinematics.rotation import GIMBAL_LOCK, NEAR_LOCK
 from ..status import Status
+from .bound import (
+    bound,
+    cancellation,
+    data_error,
+    distance,
+    square_spread,
+    uncancelled,
+)
 from .builder import Builder, Lanes
 from .configuration import loops_of
 from .equations import Wrench
@@ -40,7 +48,7 @@ from .platform import (
 from .structure import Structure
 
 # Optional results besides the accelerations.
-OUTPUTS = ("contact", "motion", "joint", "sliding", "twist")
+OUTPUTS = ("contact", "motion", "joint", "sliding", "twist", "bound")
 # Minimum |pivot| over the diagonal's entry in the elimination.
 CONDITIONED = 1e-5
 
@@ -74,6 +82,12 @@ def forward(structure: Structure, wanted: Collection[str] = ()) -> Variants:
         (touch or contacts(b, platform)).add_sliding(b)
     if "twist" in wanted:
         b.output("twist_rate", _twist_rate(platform, eq, moved.w), "per s^2")
+    if "bound" in wanted:
+        data = data_error(b, platform, eq.discriminants)
+        right = uncancelled(eq.basis, [*eq.parts, eq.H @ eq.start])
+        square = ca.dot(moved.lengths, moved.w * moved.w)
+        lost = cancellation(right, moved.lengths, square)
+        b.output("bound", bound(data, ca.sqrt(lost) / (square_spread(eq.S) * moved.regular)), "1")
     return Variants(b.finish(), single=True)
 
 
@@ -84,13 +98,19 @@ def _twist_rate(platform: Platform, eq: Affine, w: ca.SX) -> ca.SX:
 
 @dataclass(frozen=True)
 class Accelerated:
-    """q'' (m,) and the contact forces (k,), with their equations."""
+    """q'' (m,) and the contact forces (k,), with their equations.
+
+    regular: V^2 of the inertia matrix, times V of the friction's equations;  lengths: the inertia
+             matrix's diagonal.
+    """
 
     q2: ca.SX
     force: ca.SX
     w: ca.SX
     equations: Affine
     touch: Contacts | None
+    regular: ca.SX
+    lengths: ca.SX
 
 
 def accelerated(
@@ -102,7 +122,7 @@ def accelerated(
     """
     eq = affine(b, platform, load, effort)
     touch = contacts(b, platform) if b.structure.friction else None
-    w, force, sure = _solved(b, platform, eq, touch, forces)
+    w, force, sure, regular, lengths = _solved(b, platform, eq, touch, forces)
     q2 = solve_small(eq.S, w)
     b.check(feasibility(b, platform, eq.discriminants), DOUBTFUL, Status.unreachable)
     finite = ca.fabs(ca.sum1(q2)) < HUGE
@@ -112,7 +132,7 @@ def accelerated(
     twists = FORMULATIONS[b.structure.formulation].uses_twist
     least, status = (GIMBAL_LOCK, Status.gimbal_lock) if twists else (NEAR_LOCK, None)
     b.check(ca.fabs(platform.placement.bryant.cos[1]) - least, 0.0, status)
-    return Accelerated(q2, force, w, eq, touch)
+    return Accelerated(q2, force, w, eq, touch, regular, lengths)
 
 
 def forward_system(structure: Structure) -> Program:
@@ -131,6 +151,7 @@ def forward_system(structure: Structure) -> Program:
     b.output("M_J", platform.motion.M_J, "", 6, m)
     b.output("twist_rate", platform.motion.twist_rate, "per s^2")
     b.output("along", eq.B @ eq.basis.rates(ca.SX.eye(m)), "", 6, m)
+    b.output("data_error", data_error(b, platform, eq.discriminants), "1")
     b.output("cos_beta", platform.placement.bryant.cos[1], "1")
     touch = contacts(b, platform)
     touch.add_wrenches(b, eq.B)
@@ -151,8 +172,10 @@ def _columns(eq: Affine) -> ca.SX:
 
 def _solved(
     b: Builder, platform: Platform, eq: Affine, touch: Contacts | None, wanted: bool
-) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """w, contact forces along the unit normals (on request), and whether they are reliable."""
+) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, ca.SX]:
+    """w, contact forces along the unit normals (on request), and whether they are reliable; V^2 and
+    the diagonal of the inertia matrix.
+    """
     H, F = _columns(eq), eq.F + eq.H @ eq.start
     rubbing = list(b.structure.friction)
     right = -F
@@ -160,9 +183,10 @@ def _solved(
         T = eq.B.T @ touch.T[:, rubbing]
         right = ca.horzcat(right, T)
     M, pulled = eq.basis.generalized_force(H), eq.basis.generalized_force(right)
-    x, excess, _ = definite_solve(M, pulled, ca.diag(M), CONDITIONED)
+    lengths = ca.diag(M)
+    x, excess, pivots = definite_solve(M, pulled, lengths, CONDITIONED)
     sure = all_of(one > 0 for one in excess)
-    w, force = x[:, 0], ca.SX(0, 1)
+    w, force, regular = x[:, 0], ca.SX(0, 1), pivots.square
     if wanted or touch is not None:
         dep = indices(b.structure.dependent)
         left = F[dep] + H[dep, :] @ w
@@ -174,4 +198,5 @@ def _solved(
             y, count = consistent(K[rubbing, :], force[rubbing])
             w, force = w - x[:, 1:] @ y, force + K @ y
             sure = sure * (count == 1)
-    return w, force, sure
+            regular = regular * distance(K[rubbing, :], force[rubbing])
+    return w, force, sure, regular, lengths

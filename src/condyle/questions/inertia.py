@@ -33,7 +33,7 @@ UPPER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # as `symmetric` takes
 class Affine:
     """The equations of one sample: Q - J^T tau = H c'' + F, and c'' = start + Pi w.
 
-    H: (s, s), symmetric; its upper triangle counts.   F: (s,).   start: (s,).
+    H: (s, s), symmetric; its upper triangle counts.   F: (s,), the sum of parts.   start: (s,).
     basis: Pi.   S: (m, m), w = S q''.
     B: (6, s), [V; omega] = B c'.   G: (s, k), along which the contacts act.
     rows: of J, dual to c', one a group.   rates: of the joints.
@@ -51,6 +51,7 @@ class Affine:
     rates: Lanes
     biases: Lanes
     discriminants: Lanes
+    parts: list[ca.SX]
 
 
 def affine(b: Builder, platform: Platform, load: Wrench, effort: Lanes) -> Affine:
@@ -71,10 +72,11 @@ def _by_chains(b: Builder, platform: Platform, load: Wrench, effort: Lanes) -> A
     coupled = ca.reshape(found[12:21], 3, 3)
     mass, turned = (symmetric(ca.vertsplit(part)) for part in (found[6:12], found[21:27]))
     own = method.inertia(state, body)
+    parts = [found[:6], method.platform(state, body, g), -load.about_centre(motion.R)]
     basis = twist_basis(motion, s.dependent)
     return Affine(
         H=own + ca.vertcat(ca.horzcat(mass, coupled.T), ca.horzcat(coupled, turned)),
-        F=found[:6] + method.platform(state, body, g) - load.about_centre(motion.R),
+        F=total(parts),
         start=motion.twist_rate,
         basis=basis,
         S=(motion.E @ motion.M_J)[list(basis.identity), :],
@@ -84,6 +86,7 @@ def _by_chains(b: Builder, platform: Platform, load: Wrench, effort: Lanes) -> A
         rates=[c.motion.rate for c in chains],
         biases=[c.motion.acceleration for c in chains],
         discriminants=[c.motion.discriminant for c in chains],
+        parts=parts,
     )
 
 
@@ -142,9 +145,10 @@ def _by_derivatives(b: Builder, platform: Platform, load: Wrench, effort: Lanes)
     carried = b.total([c.row * t for c, t in zip(eq.chains, effort, strict=True)])
     Q = b.cut(eq.Q - carried)
     S = (motion.E @ motion.M_J)[list(eq.basis.identity), :] if twists else ca.SX.eye(s.m)
+    F = b.at_zero(Q, unknown)
     return Affine(
         H=b.jacobian(Q, unknown),
-        F=b.at_zero(Q, unknown),
+        F=F,
         start=start,
         basis=eq.basis,
         S=S,
@@ -154,4 +158,5 @@ def _by_derivatives(b: Builder, platform: Platform, load: Wrench, effort: Lanes)
         rates=[c.dynamics.rate for c in eq.chains],
         biases=[b.at_zero(c.dynamics.acceleration, unknown) for c in eq.chains],
         discriminants=[c.dynamics.discriminant for c in eq.chains],
+        parts=[F],
     )
