@@ -297,6 +297,16 @@ def as_path(given: Any, name: str = "path", expected: str = "the path of a file"
     raise InputError(f"{name}: expected {expected}, got {shown(given)}")
 
 
+def as_name(given: Any, argument: str) -> str:
+    """A name, as text; which ones there are is the caller's to check.
+
+    Raises: InputError: for what is no text.
+    """
+    if isinstance(given, str):
+        return given
+    raise InputError(f"{argument}: expected a name, got {shown(given)}")
+
+
 def as_flag(given: Any, name: str) -> bool:
     """True or False.
 

@@ -8,12 +8,17 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
+from contextlib import redirect_stdout
 from dataclasses import dataclass, field
 from functools import cached_property
+from io import StringIO
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock, patch
 
 import numpy as np
+from support.recorded_jaw import record
 
 import condyle
 from condyle.mechanism import bundled_text
@@ -34,6 +39,16 @@ class Stage:
     @cached_property
     def model(self) -> condyle.Model:
         return condyle.derive(self.mechanism, backend="numpy")
+
+    @cached_property
+    def general(self) -> condyle.Model:
+        return condyle.Model(self.mechanism, backend="numpy", general=True)
+
+    @cached_property
+    def recording(self) -> tuple[Path, Path]:
+        """A C3D file and its marker file."""
+        jaw = record(seconds=1.0)
+        return jaw.write(Path("jaw.c3d").resolve()), jaw.write_tables(Path("jaw.toml").resolve())
 
     @cached_property
     def motion(self) -> condyle.Motion:
@@ -84,6 +99,7 @@ class Door:
     right: its arguments;  calls: how often the fuzzer calls it;  model: the argument that takes
     a model, a mechanism, a path or a name;  states: those of any leading shape;
     words: what messages may call an argument besides its name.
+    long: arguments that ask for long work where they are None or empty; the fuzzer leaves that out.
     """
 
     right: Mapping[str, Value] = field(default_factory=dict)
@@ -91,6 +107,7 @@ class Door:
     model: str | None = None
     states: tuple[str, ...] = ()
     words: tuple[str, ...] = ()
+    long: tuple[str, ...] = ()
 
     def arguments(self, stage: Stage) -> dict[str, Any]:
         return {k: v(stage) if inspect.isfunction(v) else v for k, v in self.right.items()}
@@ -141,17 +158,18 @@ DOORS: dict[str, Door] = {
     ),
     "motion_from_c3d": Door(
         {
-            "path": lambda stage: stage.file("a.c3d", "no recording"),
-            "markers": lambda stage: stage.file("markers.toml", ""),
+            "path": lambda stage: stage.recording[0],
+            "markers": lambda stage: stage.recording[1],
             "model": lambda stage: stage.mechanism,
             "max_residual": 1e-3,
             "max_gap": 0.1,
             "longest": False,
             "unit": "mm",
-            "force": ("a", "b", "c"),
+            "force": None,
             "cutoff": None,
         },
-        words=("mechanism", "a.c3d", "fixed"),
+        calls=100,
+        words=("mechanism", "jaw.c3d", "jaw.toml", "cut-off", *FILES),
     ),
     "derive": Door(
         {
@@ -161,7 +179,13 @@ DOORS: dict[str, Door] = {
             "distribution": None,
             "backend": "numpy",
         },
-        calls=0,
+        words=("masticatory",),
+    ),
+    "Model": Door(
+        {"mechanism": MACHINE, "backend": "numpy", "general": False}, words=("masticatory",)
+    ),
+    "Distribution": Door(
+        {"name": "bounded", "preload": 1.0, "contact_weight": 0.0}, words=("distribution",)
     ),
     "Model.inverse_dynamics": Door(STATE | FORCED, states=("q", "v", "a"), calls=60),
     "Model.forward_dynamics": Door(
@@ -189,10 +213,11 @@ DOORS: dict[str, Door] = {
         calls=20,
         words=("X", "Fx", "no such"),
     ),
-    "Model.with_distribution": Door({"distribution": "minimum_norm"}, calls=0),
+    "Model.with_distribution": Door({"distribution": "minimum_norm"}),
     "Model.with_mechanism": Door(
-        {"mechanism": lambda stage: stage.mechanism}, calls=0, words=("general",)
+        {"mechanism": lambda stage: stage.mechanism}, model="mechanism", words=("general",)
     ),
+    "Model.kernel": Door({"question": "inverse"}),
     "Model.unchecked": Door(),
     "open_solution": Door({"path": lambda stage: stage.saved("solution")}, words=FILES, calls=20),
     "open_map": Door({"path": lambda stage: stage.saved("map")}, words=FILES, calls=60),
@@ -203,12 +228,12 @@ DOORS: dict[str, Door] = {
         | {"stroke": (), "out": None, "threads": 1, "workers": None, "scheduler": None},
         model="model",
         words=("mechanism", "Dask"),
-        calls=0,
     ),
     "workspace_size": Door(
         {"map": lambda stage: stage.map, "margin": 1e-3, "model": lambda stage: stage.model},
-        calls=0,
+        calls=60,
         words=FILES,
+        long=("model",),
     ),
     "sweep": Door(
         {"study": STUDY, "out": None, "workers": 1, "scheduler": "threads", "resume": False}
@@ -231,10 +256,10 @@ DOORS: dict[str, Door] = {
         TO_FOLDER
         | {"question": "inverse", "coordinates": (), "landmark": None, "precision": "double"}
         | {"constants": "inside", "prefix": None, "lanes": 8, "formulation": None, "route": None},
-        calls=0,
+        calls=100,
         words=FILES,
     ),
-    "export_fmu": Door(TO_FOLDER | {"kind": "plant", "fmi": 3}, calls=0, words=FILES),
+    "export_fmu": Door(TO_FOLDER | {"kind": "plant", "fmi": 3}, calls=100, words=FILES),
     "export_matlab": Door(TO_FOLDER | {"question": "inverse"}, calls=60, words=FILES),
     "export_mjcf": Door(TO_FOLDER | {"path": "out/machine.xml"}, calls=60, words=FILES),
     "solve_states": Door(ROWWISE | {"reactions": False, "mat": None}, calls=60, words=FILES),
@@ -250,7 +275,7 @@ DOORS: dict[str, Door] = {
     "write_report": Door(
         {"solution": lambda stage: stage.solution, "path": "out.html", "tables": None}
         | {"files": None, "measured": None, "sweep": None},
-        calls=0,
+        calls=60,
         words=FILES,
     ),
     "new_mechanism": Door(
@@ -260,17 +285,20 @@ DOORS: dict[str, Door] = {
     "Results.columns": Door(),
     "Results.with_measured": Door({"measured": "measured.csv"}, words=FILES),
     "simulate": Door(
-        {"model": lambda stage: stage.model, "scenario": {"duration": 0.002, "rate": 1000.0}},
-        calls=0,
+        {
+            "model": lambda stage: stage.model,
+            "scenario": {"duration": 0.002, "rate": 1000.0, "method": "rk4", "step": 1e-3},
+        },
         words=("mechanism", "duration", "rate"),
+        long=("scenario",),
     ),
     "check_gains": Door(
         {
             "model": lambda stage: stage.model,
             "scenario": {"controller": {"kind": "joint_pd", "stiffness": 5.0, "damping": 0.01}},
         },
-        calls=0,
         words=("mechanism", "controller"),
+        long=("scenario", "model"),
     ),
     "load_scenario": Door(
         {"source": lambda stage: stage.file("run.toml", "duration = 0.1")}, words=("path",)
@@ -282,7 +310,32 @@ DOORS: dict[str, Door] = {
     "Mechanism.set": Door(
         {"path": "platform.mass", "value": 0.2}, words=("mass", MACHINE, "mechanism")
     ),
-    "Mechanism.replace": Door(),
+    "Mechanism.replace": Door({"name": "other"}),
+    "Mechanism.checked": Door(
+        {"data": lambda stage: stage.mechanism.entries(), "source": "machine.toml"},
+        words=("machine.toml", "expected a table", "is missing", "problem"),
+    ),
+    "Mechanism": Door(
+        {"name": "mine", "gravity": (0, 0, -9.81)}
+        | {
+            "platform": lambda stage: stage.mechanism.platform,
+            "contact": lambda stage: stage.mechanism.contacts,
+            "chain": lambda stage: stage.mechanism.chains,
+        },
+    ),
+    "Scenario": Door({"duration": 0.1, "rate": 1000.0, "method": "DOP853", "rtol": 1e-6}),
+    "Study": Door(STUDY | {"formulation": "momentum", "preload": 0.0, "solutions": False}),
+    "Study.checked": Door(
+        {"data": STUDY, "source": "study.toml"}, words=("study.toml", "vary", "key")
+    ),
+    "Study.data": Door(),
+    "Study.title": Door(),
+    "serve_view": Door(
+        {"mechanism": lambda stage: stage.mechanism, "solution": None, "host": "127.0.0.1"}
+        | {"port": 8080, "open_browser": False, "map": None, "scenario": None},
+        words=FILES,
+        long=("scenario",),
+    ),
     "Motion.from_csv": Door(
         {"path": lambda stage: stage.file("motion.csv", ROWS), "units": "mm"},
         words=("motion.csv",),
@@ -315,8 +368,8 @@ DOORS: dict[str, Door] = {
     "Load.at": Door({"times": T}),
 }
 
-# Without a row: these make what is given already, or serve until they are stopped.
-LATER = {"Model.kernel", "Mechanism.checked", "serve_view"}
+# Without a row: records of arrays that `from_arrays` and others have checked.
+RECORDS = {"Motion", "Load"}
 
 
 def target(name: str, stage: Stage) -> Callable[..., Any]:
@@ -324,13 +377,40 @@ def target(name: str, stage: Stage) -> Callable[..., Any]:
     owner, _, method = name.rpartition(".")
     if name == "Results.save":  # takes any number of paths
         return lambda path: stage.results.save(path)
+    if name == "serve_view":
+        return unserved
+    if name in ("Study.data", "Study.title"):
+        return getattr(condyle.Study.checked(STUDY, "study"), method)
+    if name == "Model.with_mechanism":
+        return stage.general.with_mechanism
+    if owner == "Study":
+        return getattr(condyle.Study, method)
     return getattr(getattr(stage, owner.lower()) if owner else condyle, method)
+
+
+def unserved(**arguments: Any) -> None:
+    """As `serve_view` without a page, interrupted at once."""
+    from condyle.view import serve
+
+    page = SimpleNamespace(port=8080, url="", close=lambda: None)
+    with (
+        patch.object(serve, "View", lambda *_: page),
+        patch.object(serve, "time", Mock(sleep=Mock(side_effect=KeyboardInterrupt))),
+        patch("webbrowser.open"),
+        redirect_stdout(StringIO()),
+    ):
+        condyle.serve_view(**arguments)
 
 
 def public_doors() -> set[str]:
     """Every function on the page, and every public method of the classes that have rows."""
     page = {name: getattr(condyle, name) for name in condyle.__all__} | {"Results": Results}
-    found = {name for name, value in page.items() if inspect.isfunction(value)}
+    found = {
+        name
+        for name, value in page.items()
+        if inspect.isfunction(value)
+        or (isinstance(value, type) and not issubclass(value, Exception | Results))
+    }
     for name in {row.partition(".")[0] for row in DOORS if "." in row}:
         found |= {
             f"{name}.{method}"
@@ -338,4 +418,4 @@ def public_doors() -> set[str]:
             if not method.startswith("_")
             and (inspect.isfunction(value) or isinstance(value, classmethod | staticmethod))
         }
-    return found - LATER
+    return found - RECORDS

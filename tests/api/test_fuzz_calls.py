@@ -36,6 +36,9 @@ def wrong(rng: random.Random, right: Any, stage: Stage) -> Any:
     if near:
         array = np.array(right)
         return rng.choice([of_array, of_numbers])(rng, array)
+    if isinstance(right, dict) and right and rng.random() < 0.6:
+        key = rng.choice(list(right))
+        return right | {rng.choice([key, key, "x"]): wrong(rng, right[key], stage)}
     if isinstance(right, str) and right and rng.random() < 0.3:
         k = rng.randrange(len(right))
         return rng.choice([right[:k], right + right, right[:k] + "\0" + right[k:], right.upper()])
@@ -96,7 +99,7 @@ def in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Non
     yield
 
 
-@pytest.mark.parametrize("name", [name for name, d in DOORS.items() if d.right and d.calls])
+@pytest.mark.parametrize("name", [name for name, d in DOORS.items() if d.right])
 def test_wrong_calls(stage: Stage, name: str) -> None:
     door, call = DOORS[name], target(name, stage)
     refused, failures = 0, {}
@@ -105,6 +108,8 @@ def test_wrong_calls(stage: Stage, name: str) -> None:
         given = door.arguments(stage)
         spoiled = rng.sample(sorted(given), 1 if rng.random() < 0.7 else min(2, len(given)))
         given |= {key: wrong(rng, given[key], stage) for key in spoiled}
+        if any(repr_of(given[key]) in ("None", "{}") for key in {*door.long} & {*spoiled}):
+            continue
         try:
             with warnings.catch_warnings(), np.errstate(all="ignore"):
                 warnings.simplefilter("ignore")

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..accessors import extend
-from ..errors import InputError
+from ..errors import InputError, shown
 from ..mechanism import as_mechanism
 from ..mechanism.chain import limits
 from ..model.distributing import Distribution
@@ -93,7 +93,7 @@ def tradeoff(
     except (TypeError, ValueError):
         asked = np.zeros(0)
     if asked.ndim != 1 or not asked.size or not (np.diff(asked) > 0).all():
-        raise InputError(f"weights must be strictly increasing numbers, got {weights!r:.80}")
+        raise InputError(f"weights must be strictly increasing numbers, got {shown(weights)}")
     first = derive(mechanism, distribution=Distribution("weighted", preload), **model)
     one = first.with_distribution(Distribution("weighted", preload, float(asked[0])))
     solution = one.solve(motion, load, load_point)

@@ -25,7 +25,7 @@ from contextlib import ExitStack, contextmanager
 from typing import Any, TypeVar
 
 from ..backends.threads import workers as processors
-from ..errors import CondyleError, InputError
+from ..errors import CondyleError, InputError, as_name, shown
 from ..extras import require
 
 Job = TypeVar("Job")
@@ -40,13 +40,13 @@ class LostWorkerError(CondyleError):
     """A worker process ended before it had finished its part of a job."""
 
 
-def check_scheduler(workers: int | None, scheduler: str) -> None:
+def check_scheduler(workers: int | None, scheduler: str | None) -> None:
     """Raises InputError for an unknown scheduler, or one that does not answer."""
     if workers is not None and not (isinstance(workers, int) and workers >= 1):
-        raise InputError(f"workers: expected a whole number of at least 1, got {workers!r:.40}")
-    if scheduler in (PROCESSES, THREADS):
+        raise InputError(f"workers: expected a whole number of at least 1, got {shown(workers)}")
+    if scheduler is None or as_name(scheduler, "scheduler") in (PROCESSES, THREADS):
         return
-    if scheduler != DASK and "://" not in str(scheduler):
+    if scheduler != DASK and "://" not in scheduler:
         raise InputError(
             f'scheduler "{scheduler}": expected {PROCESSES}, {THREADS}, {DASK} (a cluster on this '
             "machine), or the address of a Dask scheduler such as tcp://10.0.0.1:8786"

@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, shown
 from ..graph.program import Interface, Numbers, Port
 
 Arrays = dict[str, np.ndarray]
@@ -117,7 +117,7 @@ def _numbers(name: str, given: object) -> np.ndarray:
     except (TypeError, ValueError):
         kind = type(given).__name__
         raise InputError(
-            f"{name}: expected an array of numbers, got {kind} {given!r:.60}"
+            f"{name}: expected an array of numbers, got {kind} {shown(given)}"
         ) from None
 
 

@@ -21,7 +21,7 @@ from ..atomic import make_folder, write_text
 from ..backends.compiler import CompilerError, find_compiler
 from ..errors import texts_of
 from ..mechanism import Mechanism, as_mechanism
-from ..model.model import Model
+from ..model.model import FORMULATION, ROUTE, Model
 from .c_names import in_format, literal, packaged
 from .c_samples import Vectors, vectors
 from .c_source import export
@@ -74,14 +74,15 @@ def export_c(
     """
     mechanism = as_mechanism(model)
     if isinstance(model, Model):
-        formulation, route = formulation or model.formulation, route or model.route
-    names = in_order(texts_of("coordinates", coordinates or ()))
-    asked = usual(mechanism) + ("closure",) * bool(names or landmark)
+        formulation = model.formulation if formulation is None else formulation
+        route = model.route if route is None else route
+    names = in_order(texts_of("coordinates", coordinates))
+    asked = usual(mechanism) + ("closure",) * bool(names or landmark is not None)
     exported = export(
         mechanism,
         asked if question is None else texts_of("question", question),
-        formulation=formulation or "virtual_power",
-        route=route or "core",
+        formulation=FORMULATION if formulation is None else formulation,
+        route=ROUTE if route is None else route,
         precision=precision,
         prefix=prefix,
         constants=constants,

@@ -10,7 +10,7 @@ from importlib.resources import files
 from typing import Any
 
 from ..dynamics import formulation as formulation_named
-from ..errors import InputError
+from ..errors import InputError, as_name, shown
 from ..mechanism.coordinates import COORDINATES
 from ..mechanism.home import dependent_coordinates, independent_coordinates
 from ..mechanism.mechanism import Mechanism
@@ -67,6 +67,17 @@ def export(
     Raises: InputError, UnsupportedError: for what cannot be exported.
             MechanismError: if the contacts do not hold the platform at home.
     """
+    options = {
+        "precision": precision,
+        "constants": constants,
+        "prefix": prefix,
+        "landmark": landmark,
+    }
+    for argument, given in options.items():
+        if given is not None:
+            as_name(given, argument)
+    if not isinstance(lanes, int) or lanes not in (0, 2, 4, 8):
+        raise InputError(f"lanes: expected 0, 2, 4 or 8, got {shown(lanes)}")
     # What a model checks of a mechanism is checked here as well.
     how: dict[str, Any] = {"formulation": formulation, "route": route, "backend": "numpy"}
     model = Model(mechanism, **how, distribution=least_norm(mechanism))
@@ -80,11 +91,9 @@ def export(
     if not struct:
         structure = specialised(structure, numbers)
     real = require_precision(precision)
-    if lanes not in (0, 2, 4, 8):
-        raise InputError(f"lanes: expected 0, 2, 4 or 8, got {lanes}")
     plain = struct or real != "double"
     own = identifier(mechanism.name).lower()
-    name = require_prefix(prefix or (f"{own}_" if own in OTHERS else own))
+    name = require_prefix((f"{own}_" if own in OTHERS else own) if prefix is None else prefix)
     wish = Wish(in_order(coordinates), landmark)
     arguments = Arguments(mechanism, wish.coordinates, landmark)
     c = Context(mechanism, structure, numbers, name, real, 0 if plain else lanes, arguments, struct)
@@ -118,11 +127,10 @@ def _entries(
     found = {question: require_question(question) for question in questions}
     if not found:
         raise InputError("no question to export")
-    if "closure" in found:
-        if landmark is not None:
-            require_landmark(mechanism, landmark)
-        else:
-            require_independent(mechanism, in_order(coordinates))
+    if landmark is not None:
+        require_landmark(mechanism, landmark)
+    elif "closure" in found:
+        require_independent(mechanism, in_order(coordinates))
     return found
 
 

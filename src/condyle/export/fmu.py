@@ -19,7 +19,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from ..atomic import replacing
 from ..backends.compiler import CompilerError, find_compiler
-from ..errors import InputError, texts_of
+from ..errors import InputError, as_path, shown, texts_of
 from ..mechanism import Mechanism, as_mechanism
 from ..model.model import Model
 from ..version import __version__
@@ -66,9 +66,9 @@ def export_fmu(
     """
     mechanism = as_mechanism(model)
     kinds = list(dict.fromkeys(texts_of("kind", kind)))
-    if fmi not in VERSIONS:
-        raise InputError(f"fmi: expected 2 or 3, got {fmi!r:.40}")
-    if str(path).endswith(".fmu") and len(kinds) != 1:
+    if not isinstance(fmi, int) or fmi not in VERSIONS:
+        raise InputError(f"fmi: expected 2 or 3, got {shown(fmi)}")
+    if as_path(path, expected="the path of a file or folder").endswith(".fmu") and len(kinds) != 1:
         raise InputError(f"{path}: name a folder for the FMUs of {len(kinds)} kinds")
     models = [fmu_model(mechanism, one) for one in kinds]
     files = [file_at(path, f"{mechanism.name}-{one}", ".fmu") for one in kinds]

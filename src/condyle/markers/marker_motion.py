@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from ..errors import InputError
+from ..errors import InputError, shown
 from ..mechanism import as_mechanism
 from ..motion.arrays import as_number
 from ..motion.column_units import POSE
@@ -126,6 +126,8 @@ def motion_from_c3d(
 
 
 def _three(channels: Sequence[str]) -> Forces:
+    if not isinstance(channels, list | tuple):
+        raise InputError(f"force: expected the labels of three channels, got {shown(channels)}")
     if len(channels) != 3:
         raise InputError(f"force: got {len(channels)} channels, expected three: along X, Y, Z")
     try:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import CondyleError, InputError, did_you_mean, shown
+from ..errors import CondyleError, InputError, as_name, did_you_mean, shown
 from ..extras import require
 from ..motion.column_units import LENGTH_UNITS
 from ..motion.file_words import content_of, digest, listed, short
@@ -73,7 +73,7 @@ def read_c3d(path: str | os.PathLike[str], unit: str | None = None) -> Recording
             MissingExtraError: if the reader is not installed.
     """
     require("c3d", "c3d")
-    if unit is not None and unit not in list(LENGTH_UNITS):
+    if unit is not None and as_name(unit, "unit") not in LENGTH_UNITS:
         raise InputError(f"unit: expected {', '.join(LENGTH_UNITS)}, got {shown(unit)}")
     content = _content(path)
     try:

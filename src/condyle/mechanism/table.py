@@ -7,7 +7,7 @@ from typing import Any, ClassVar, NoReturn, Self
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from ..errors import MechanismError
+from ..errors import MechanismError, ProblemsError, as_name
 from .messages import describe
 
 
@@ -24,6 +24,18 @@ class Table(BaseModel):
 
     # Entries that a file does without where they are their defaults.
     implied: ClassVar[tuple[str, ...]] = ()
+    refusal: ClassVar[type[ProblemsError]] = MechanismError
+
+    def __init__(self, **entries: Any) -> None:
+        """Raises: MechanismError, or a `refusal` of its own: with every problem found."""
+        try:
+            super().__init__(**entries)
+        except ValidationError as error:
+            title = type(self).__name__.lower()
+            raise self.refusal(title, describe(error, entries, type(self))) from None
+
+    # Validation of files does not go through it: it knows more than the entries.
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
 
     def entries(self) -> dict[str, Any]:
         """What stands in the table, by the keys of the file."""
@@ -49,6 +61,7 @@ class Table(BaseModel):
 
         Raises: MechanismError: with every problem found.
         """
+        as_name(source, "source")
         try:
             return cls.model_validate(data, context={"at_home": False})
         except ValidationError as error:

@@ -6,6 +6,7 @@ for, the equations of those samples go to `condyle.distribution`, and come back 
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -17,7 +18,7 @@ from ..backends.notice import notice
 from ..distribution import OBJECTIVES, Objective, Problem, distribute
 from ..distribution import Status as Outcome
 from ..dynamics.minimum_norm import minimum_norm
-from ..errors import InputError, did_you_mean, few
+from ..errors import InputError, did_you_mean, few, shown
 from ..kinematics.chain import FAMILIES
 from ..mechanism.chain import limits
 from ..mechanism.home import characteristic_length
@@ -45,24 +46,25 @@ class Distribution:
     preload: float = 0.0
     contact_weight: float = 0.0
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str | None):
+            raise InputError(
+                "distribution: expected a name, a condyle.Distribution or None, got "
+                f"{type(self.name).__name__} {shown(self.name)}"
+            )
+        for label in ("preload", "contact_weight"):
+            value = getattr(self, label)
+            number = isinstance(value, int | float | np.floating | np.integer)
+            if not number or not 0 <= value <= sys.float_info.max:
+                raise InputError(f"{label}: expected a number of at least 0, got {shown(value)}")
+
     @staticmethod
     def of(given: Any) -> Distribution:
         """From a name, None or a distribution.
 
-        Raises: InputError: for anything else, or numbers that are none or negative.
+        Raises: InputError: for anything else.
         """
-        found = given if isinstance(given, Distribution) else Distribution(given)
-        if not isinstance(found.name, str | None):
-            raise InputError(
-                "distribution: expected a name, a condyle.Distribution or None, got "
-                f"{type(given).__name__} {given!r:.60}"
-            )
-        for label in ("preload", "contact_weight"):
-            value = getattr(found, label)
-            number = isinstance(value, int | float | np.number) and np.isfinite(value)
-            if not number or value < 0:
-                raise InputError(f"{label}: expected a number of at least 0, got {value!r:.60}")
-        return found
+        return given if isinstance(given, Distribution) else Distribution(given)
 
     def checked(self, mechanism: Mechanism) -> Distribution:
         """The same, by name, checked against a mechanism.

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from ..accessors import extend
 from ..backends.kernel import Kernel
-from ..errors import InputError
+from ..errors import as_flag, as_name
 from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
 from ..motion import Load, Motion
@@ -73,8 +73,8 @@ class Model:
               leaving out nothing that happens to be zero in this one.
         """
         for name, given in (("formulation", formulation), ("route", route), ("backend", backend)):
-            if not isinstance(given, str):
-                raise InputError(f"{name}: expected a name, got {type(given).__name__}")
+            as_name(given, name)
+        general = as_flag(general, "general")
         system = System(as_mechanism(mechanism), formulation, route, backend, general)
         self._assemble(system, Distribution.of(distribution))
 
@@ -121,15 +121,16 @@ class Model:
         """The same model with its kernels and another distribution; see `derive`."""
         return self._with(self.system, Distribution.of(distribution))
 
-    def with_mechanism(self, mechanism: Mechanism) -> Self:
+    def with_mechanism(self, mechanism: Mechanism | str | os.PathLike[str]) -> Self:
         """The same model, if it is general, of another mechanism of the same structure.
 
         It shares the kernels, so that it costs a thousandth of a new one. The mechanism must have
         been checked, as one from a file or from `Mechanism.set` is.
 
-        Raises: InputError: if the distribution does not fit the mechanism.
+        Raises: InputError: if the distribution does not fit the mechanism, it has other chains,
+                contacts or surfaces, or the model is not general.
         """
-        return self._with(self.system.renumbered(mechanism), self._asked)
+        return self._with(self.system.renumbered(as_mechanism(mechanism)), self._asked)
 
     # -- dynamics ----------------------------------------------------------------------------
 
@@ -366,8 +367,11 @@ class Model:
         return self._inverse.distributor.chooses
 
     def kernel(self, question: str, *details: Any) -> Kernel:
-        """The kernel of a question; see `condyle.questions`."""
-        return self.system.kernel(question, *details)
+        """The kernel of a question, with its details; see `condyle.questions`.
+
+        Raises: InputError: for an unknown question.
+        """
+        return self.system.kernel(as_name(question, "question"), *details)
 
 
 def derive(

@@ -55,8 +55,20 @@ class System:
         self.seconds = time.perf_counter() - start
 
     def renumbered(self, mechanism: Mechanism) -> System:
-        """The same, if it is general, of another mechanism of its structure, sharing kernels."""
-        assert self.general is not None
+        """The same, if it is general, of another mechanism of its structure, sharing kernels.
+
+        Raises: InputError: if it is not general, or for another structure.
+        """
+        if self.general is None:
+            raise InputError(
+                "with_mechanism: this model serves one mechanism; take a general one: "
+                "condyle.Model(mechanism, general=True)"
+            )
+        if structure_of(mechanism, self.formulation, self.route) != self.structure:
+            raise InputError(
+                f'mechanism: "{mechanism.name}" has other chains, contacts or surfaces than '
+                f'"{self.mechanism.name}"; derive a model of its own'
+            )
         other = copy(self.general)
         for name in [n for n, of in vars(System).items() if isinstance(of, cached_property)]:
             other.__dict__.pop(name, None)

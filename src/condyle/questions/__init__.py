@@ -16,6 +16,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from ..errors import InputError, did_you_mean, shown
 from ..graph.program import Program, Variants
 from .structure import Structure
 
@@ -42,7 +43,12 @@ QUESTIONS: dict[str, str | Callable[..., Program | Variants]] = {
 
 
 def written(name: str) -> Callable[..., Program | Variants]:
-    """The function of a question; its file is imported on first use."""
+    """The function of a question; its file is imported on first use.
+
+    Raises: InputError: for an unknown question.
+    """
+    if name not in QUESTIONS:
+        raise InputError(f"question: there is no {shown(name)}.{did_you_mean(name, QUESTIONS)}")
     home = QUESTIONS[name]
     return getattr(import_module(f".{home}", __name__), name) if isinstance(home, str) else home
 

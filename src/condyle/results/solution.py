@@ -19,7 +19,7 @@ import xarray as xr
 
 from ..accessors import extend
 from ..atomic import replacing
-from ..errors import InputError, UnsupportedError, as_path, no_such_file
+from ..errors import InputError, UnsupportedError, as_path, no_such_file, shown
 from ..extras import require
 from ..markers import MeasuredChannels
 from ..mechanism.files import recall
@@ -204,6 +204,17 @@ def open_solution(path: str | Path) -> xr.Dataset:
     Raises: InputError: if the file is missing or is not a condyle solution.
     """
     return as_solution(read_dataset(path, "solution"), path)
+
+
+def as_kind(given: Any, kind: str, argument: str) -> xr.Dataset:
+    """A dataset of one kind: a solution, a map or a sweep.
+
+    Raises: InputError: for anything else.
+    """
+    made = isinstance(given, xr.Dataset) and {"mechanism", "study"} & {*given.attrs}
+    if made and Results(given).kind == kind:
+        return given
+    raise InputError(f"{argument}: expected a {kind} of condyle, got {shown(given)}")
 
 
 def read_dataset(path: str | os.PathLike[str], kind: str, mark: str | None = None) -> xr.Dataset:

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, create_model, model_validator
 
-from ..errors import ScenarioError, as_path, no_such_file
+from ..errors import ScenarioError, as_path, no_such_file, printable
 from ..mechanism.files import without_unit
 from ..mechanism.messages import describe
 from ..mechanism.quantities import PER_METRE, Length, Number
@@ -83,6 +83,8 @@ class Sensors(Table):
 class Scenario(Table):
     """A simulation: duration, start, efforts or controller, and loads. All values are SI."""
 
+    refusal = ScenarioError
+
     duration: Positive = Field(default=1.0, le=LONGEST, description="s")
     rate: Frequency = Field(default=1000.0, description="of the results, Hz")
     method: str = Field(default="DOP853", description=", ".join(INTEGRATORS))
@@ -101,7 +103,7 @@ class Scenario(Table):
         problems = []
         if self.method not in INTEGRATORS:
             known = ", ".join(INTEGRATORS)
-            problems.append(f'method: got "{self.method:.40}"; available: {known}')
+            problems.append(f'method: got "{printable(self.method):.40}"; available: {known}')
         elif (self.method in FIXED) != (self.step is not None):
             problems.append(
                 f"step: {self.method} chooses its own steps, by rtol; remove it"
@@ -157,7 +159,9 @@ def scenario_from(
     Args: folder: where files are that it names; default: the current one.
     """
     data, per_metre, problems = without_unit(data, source, "scenario")
-    if isinstance(data.get("controller"), Mapping) and data["controller"].get("kind") == "none":
+    controller = data.get("controller")
+    kind = controller.get("kind") if isinstance(controller, Mapping) else None
+    if isinstance(kind, str) and kind == "none":
         data.pop("controller")
     if "loads" in data:  # a name that Python has for a key of the file
         problems.append('loads: is not a key of the file format. Did you mean "load"?')

@@ -19,9 +19,9 @@ import viser
 import xarray as xr
 
 from ..analysis.map.map_files import open_map
-from ..errors import CondyleError, InputError
+from ..errors import CondyleError, InputError, shown
 from ..mechanism import Mechanism, as_mechanism
-from ..results.solution import open_solution
+from ..results.solution import as_kind, open_solution
 from .controls import Panel
 from .gate import Gate, guarded
 from .live_player import LivePlayer
@@ -224,15 +224,23 @@ def open_view(
         raise InputError("a page that simulates a scenario shows no solution and no map beside it")
     if isinstance(map, str | Path):
         map = open_map(map)
+    elif map is not None:
+        as_kind(map, "map", "map")
     if map is not None and map["status"].ndim == 1:
         raise InputError("this map goes over one coordinate; the view shows those of two or three")
     if map is not None and solution is None:
         mechanism = map.condyle.mechanism
     if isinstance(solution, str | Path):
         solution = open_solution(solution)
+    elif solution is not None:
+        as_kind(solution, "solution", "solution")
     if mechanism is None:
         mechanism = DEFAULT if solution is None else solution.condyle.mechanism
     mechanism = as_mechanism(mechanism)
+    if not isinstance(host, str) or not host.isprintable() or not host.isascii():
+        raise InputError(f"host: expected the name or address of this machine, got {shown(host)}")
+    if not isinstance(port, int) or isinstance(port, bool) or not 0 <= port < 2**16:
+        raise InputError(f"port: expected a number from 0 to 65535, got {shown(port)}")
     live = None
     if scenario is not None:
         from ..simulation.simulating import planned

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import InputError, did_you_mean, texts_of
+from ...errors import InputError, did_you_mean, shown, texts_of
 from ...mechanism.home import characteristic_length, dependent_coordinates, independent_coordinates
 from ...mechanism.mechanism import COORDINATES, Mechanism
 from ...motion.column_units import dimension, unit_factor
@@ -98,7 +98,9 @@ def grid_of(mechanism: Mechanism, over: Over | None, hold: Values = "") -> Grid:
         axes = []
         for name, of in over.items():
             if not isinstance(of, Sequence) or isinstance(of, str) or len(of) != 3:
-                raise InputError(f"{name}: expected (low, high, count), got {of!r:.60}")
+                raise InputError(
+                    f"over: {shown(name)}: expected (low, high, count), got {shown(of)}"
+                )
             axes.append(_axis(name, *of))
     else:
         axes = [axis_of(text) for text in texts_of("over", over, separated=False)]
@@ -107,7 +109,7 @@ def grid_of(mechanism: Mechanism, over: Over | None, hold: Values = "") -> Grid:
             f"over: expected one to three coordinates, got {len(axes)}; available: "
             f"{', '.join(names)}"
         )
-    held = values_of(hold, COORDINATES)
+    held = values_of(hold, COORDINATES, "hold")
     moved = [axis.name for axis in axes]
     for name in (*moved, *held):
         require_independent(mechanism, name)
@@ -153,7 +155,7 @@ def axis_of(text: str) -> Axis:
     return _axis(name, number(low, text) * scale, number(high, text) * scale, count)
 
 
-def values_of(given: Values, known: Sequence[str]) -> dict[str, float]:
+def values_of(given: Values, known: Sequence[str], argument: str) -> dict[str, float]:
     """`Y=0 mm,alpha=0 deg` by name, in SI.
 
     Raises: InputError: for a name that is not known, one that stands twice, or no number.
@@ -161,7 +163,9 @@ def values_of(given: Values, known: Sequence[str]) -> dict[str, float]:
     if isinstance(given, Mapping):
         pairs = [(name, number(value, f"{name}={value}")) for name, value in given.items()]
     elif not isinstance(given, str):
-        raise InputError(f"expected text such as Y=1 mm, or numbers by name, got {given!r:.60}")
+        raise InputError(
+            f"{argument}: expected text such as Y=1 mm, or numbers by name, got {shown(given)}"
+        )
     else:
         pairs = []
         for part in given.split(",") if given.strip() else []:
@@ -169,9 +173,9 @@ def values_of(given: Values, known: Sequence[str]) -> dict[str, float]:
             pairs.append((name, number(value, part) * _scale(name, unit, part)))
     for name in (names := [name for name, _ in pairs]):
         if name not in known:
-            raise InputError(f'unknown name "{name}".{did_you_mean(name, known)}')
+            raise InputError(f'{argument}: there is no "{name}".{did_you_mean(name, known)}')
         if names.count(name) > 1:
-            raise InputError(f"{name}: is given twice")
+            raise InputError(f"{argument}: {name} is given twice")
     return dict(pairs)
 
 
@@ -179,8 +183,8 @@ def number(given: object, where: str) -> float:
     """A finite number."""
     try:
         value = float(given)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        raise InputError(f'"{where.strip()}": "{given}" is not a number') from None
+    except Exception:  # of objects
+        raise InputError(f'"{where.strip()}": {shown(given)} is not a number') from None
     if not math.isfinite(value):
         raise InputError(f'"{where.strip()}": expected a finite number, got {given}')
     return value

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...atomic import make_folder, replacing_folder
 from ...backends.threads import workers as processors
-from ...errors import InputError, as_path, did_you_mean, texts_of
+from ...errors import InputError, as_path, did_you_mean, shown, texts_of
 from ...extras import require
 from ...mechanism import dumps
 from ...mechanism.mechanism import COORDINATES, Mechanism
@@ -81,8 +81,7 @@ def workspace_map(
     grid = grid_of(made.mechanism, over, hold)
     setup = setup_of(made, load, load_point, direction, stiffness, stroke, threads)
     wanted = chosen(texts_of("quantities", quantities), setup)
-    if scheduler is not None:
-        check_scheduler(workers, scheduler)
+    check_scheduler(workers, scheduler)
     work = Blocks(setup, grid, wanted, BLOCK, workers, scheduler)
     file = None if out is None else _file(out, work)
     if file is not None and file.suffix == ".zarr":
@@ -104,7 +103,7 @@ def setup_of(
     threads: int | None = None,
 ) -> Setup:
     """What holds for every pose, checked; arguments as in `workspace_map`."""
-    wrench = values_of(load, (*FORCE, *MOMENT))
+    wrench = values_of(load, (*FORCE, *MOMENT), "load")
     force = [wrench.get(name, 0.0) for name in (*FORCE, *MOMENT)]
     points = model.mechanism.platform.points
     point: Sequence[float] = (0.0, 0.0, 0.0)  # O_M, without a load or in a mechanism without points
@@ -255,11 +254,11 @@ def _direction(given: str | Sequence[float] | None) -> np.ndarray | None:
     if given is None:
         return None
     parts = given.split(",") if isinstance(given, str) else given
-    if not isinstance(parts, Sequence | np.ndarray) or len(parts) != 3:
-        raise InputError(f'direction "{given}": expected three numbers, as in "0,0,-1"')
-    vector = np.array([number(part, f"direction {given}") for part in parts])
+    if not isinstance(parts, Sequence | np.ndarray) or np.shape(parts) != (3,):
+        raise InputError(f'direction: expected three numbers, as in "0,0,-1", got {shown(given)}')
+    vector = np.array([number(part, f"direction {shown(given)}") for part in parts])
     if not (size := np.linalg.norm(vector)):
-        raise InputError(f'direction "{given}": has no length; expected such as "0,0,-1"')
+        raise InputError(f'direction: expected a length, as in "0,0,-1", got {shown(given)}')
     return vector / size
 
 
@@ -275,7 +274,7 @@ def _per_chain(
             raise InputError(f'stiffness: no chain "{name}".{did_you_mean(name, names)}')
     if missing := [name for name in names if name not in table]:
         raise InputError(f"stiffness: {', '.join(missing)} have none; give one for every chain")
-    values = np.array([number(table[name], f"stiffness {table[name]}") for name in names])
+    values = np.array([number(table[name], f"stiffness {shown(table[name])}") for name in names])
     if not (values > 0).all():
         raise InputError(f"stiffness: expected numbers above 0, got {values.min():g}")
     return values

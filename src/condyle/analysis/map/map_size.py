@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import InputError
+from ...errors import InputError, shown
 from ...kinematics.singularities import NEAR_SINGULAR
+from ...mechanism import Mechanism, dumps
 from ...mechanism.mechanism import COORDINATES
+from ...model.given import as_model
 from ...model.model import Model, derive
 from ...results.solution import Results
 from .block import Setup
@@ -50,21 +52,25 @@ class WorkspaceSize:
 def workspace_size(
     map: xr.Dataset | str | os.PathLike[str],
     margin: float = NEAR_SINGULAR,
-    model: Model | None = None,
+    model: Model | Mechanism | str | os.PathLike[str] | None = None,
 ) -> WorkspaceSize:
     """Volume of the reachable set of a map, and the greatest free ball and box around home.
 
     Args:   map: of `workspace_map`, or its file.
             margin: minimum singularity ratio in ball and box, 0 to 1.
-            model: that of the map, if it is at hand; else it is derived anew.
-    Raises: InputError: for what is no map, or a margin out of range.
+            model: that of the map, if it is at hand; default: derived anew.
+    Raises: InputError: for what is no map, a margin out of range, or a model of another mechanism.
     """
     if isinstance(margin, bool) or not isinstance(margin, int | float) or not 0 <= margin <= 1:
-        raise InputError(f"margin: expected a number from 0 to 1, got {margin!r:.60}")
+        raise InputError(f"margin: expected a number from 0 to 1, got {shown(margin)}")
     dataset = open_map(map) if isinstance(map, str | os.PathLike) else map
     if not is_map(dataset):
         raise InputError(f"map: expected a map or its file, got {type(dataset).__name__}")
-    made = model or derive(Results(dataset).mechanism, distribution=dataset.attrs["distribution"])
+    if model is None:
+        made = derive(Results(dataset).mechanism, distribution=dataset.attrs["distribution"])
+    elif dumps((made := as_model(model)).mechanism) != dataset.attrs["mechanism"]:
+        name = dataset.attrs["mechanism_name"]
+        raise InputError(f'model: is of another mechanism than the map, of "{name}"; leave it out')
     grid, reach = grid_and_reach(dataset, made)
     free = FreeSpace(Setup(made, reach, np.array(dataset.attrs["load"], dtype=float)), margin)
     inside = all(axis.low < 0 < axis.high for axis in grid.axes)

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, StrictBool, ValidationError, model_validator
 
-from ...errors import InputError, as_path, no_such_file
+from ...errors import InputError, ProblemsError, as_name, as_path, no_such_file, printable, shown
 from ...mechanism.library import bundled_mechanisms
 from ...mechanism.messages import describe
 from ...mechanism.quantities import listed
@@ -159,6 +159,8 @@ DEFAULT_MEASURES = {
 class Study(Table):
     """Variants of one mechanism, one or several motions, and the measures."""
 
+    refusal = ProblemsError
+
     mechanism: str | None = Field(
         default=None, description="a file, or a bundled mechanism; default: masticatory"
     )
@@ -187,11 +189,11 @@ class Study(Table):
         object.__setattr__(self, "measure", FrozenTable(self.measure))
         if self.sampling.kind == "grid":
             if bare := [v.what for v in self.vary if v.values is None and v.count is None]:
-                raise ValueError(f"vary {bare[0]}: count is required for a grid")
+                raise ValueError(f"vary {printable(bare[0])}: count is required for a grid")
         elif counted := [one.what for one in self.vary if one.count is not None]:
             raise ValueError(
-                f"vary {counted[0]}: count is for a grid only; kind {self.sampling.kind} has its "
-                "count in [sampling]"
+                f"vary {printable(counted[0])}: count is for a grid only; kind "
+                f"{self.sampling.kind} has its count in [sampling]"
             )
         return self
 
@@ -201,6 +203,9 @@ class Study(Table):
 
         Raises: InputError: with the problem, in one line.
         """
+        as_name(source, "source")
+        if not isinstance(data, Mapping):
+            raise InputError(f"data: expected the tables of a study, got {shown(data)}")
         if nests_too_deep(data):
             raise too_deep(source)
         try:
@@ -229,7 +234,7 @@ def read_study(source: str | os.PathLike[str] | Mapping[str, Any] | Study) -> St
     if isinstance(source, Mapping):
         return Study.checked(source, "study")
     path = Path(as_path(source, "study", "a study, a file or tables"))
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise no_such_file(path)
     study = Study.checked(read_tables(read_text(path), str(path)), str(path))
 

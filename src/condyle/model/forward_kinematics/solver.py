@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError
+from ...errors import InputError, shown
 from ...kinematics.constraints import indices
 from ...mechanism.home import independent_coordinates
 from ...mechanism.mechanism import Mechanism
@@ -86,7 +86,7 @@ class ForwardKinematics:
 def _check(tolerance: Any) -> None:
     if not isinstance(tolerance, int | float | np.number) or not 0 <= tolerance < np.inf:
         raise InputError(
-            f"tolerance: expected a finite number of at least 0, got {tolerance!r:.60}"
+            f"tolerance: expected a finite number of at least 0, got {shown(tolerance)}"
         )
 
 

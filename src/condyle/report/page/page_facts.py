@@ -205,7 +205,7 @@ def _file_row(path: Path) -> list[str]:
             while block := file.read(1 << 20):
                 digest.update(block)
     except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
+        raise InputError(f"files: {path} cannot be read ({error.strerror or error})") from error
     return [path.name, digest.hexdigest()]
 
 

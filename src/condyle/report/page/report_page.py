@@ -12,6 +12,7 @@ from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
 from ...atomic import write_text
+from ...errors import InputError, as_path, shown
 from ...progress import step
 from ...results.failed_samples import longest
 from ..panel import panels_of
@@ -86,15 +87,19 @@ def write_report(
     Returns: the path.
     Raises: InputError: if a file cannot be read or the report cannot be written.
     """
+    from ...results.solution import as_kind
 
+    as_path(path)
     with step("writing the report"):
         with (
             opened(solution)
             if isinstance(solution, str | os.PathLike)
             else nullcontext(solution) as found
         ):
-            shown = found if measured is None else found.condyle.with_measured(measured)
-            page = report_html(shown, tables=tables, files=files, sweep=sweep)
+            as_kind(found, "solution", "solution")
+            if measured is not None:
+                found = found.condyle.with_measured(measured)
+            page = report_html(found, tables=tables, files=files, sweep=sweep)
         write_text(path, page)
     return Path(path)
 
@@ -109,7 +114,18 @@ def report_html(
     """The report as text; see `write_report`."""
     from plotly.offline import get_plotlyjs
 
-    from ..tables import kept_tables
+    from ...results.solution import as_kind
+    from ..tables import Table, kept_tables
+
+    if sweep is not None:
+        as_kind(sweep, "sweep", "sweep")
+    if tables is None:
+        tables = kept_tables(solution)
+    elif not isinstance(tables, list | tuple) or not all(isinstance(t, Table) for t in tables):
+        raise InputError(f"tables: expected tables of condyle.report.tables, got {shown(tables)}")
+    if files is not None and not isinstance(files, list | tuple):
+        raise InputError(f"files: expected paths of files, got {shown(files)}")
+    inputs = [Path(as_path(file, "files")) for file in files or ()]
 
     bands = bands_section(solution)
     page = reduced(solution)
@@ -132,10 +148,10 @@ def report_html(
         "failures": failure_table(page),
         "chains": chain_table(solution),
         "reactions": reaction_tables(solution),
-        "tables": given_tables(kept_tables(solution) if tables is None else tables),
+        "tables": given_tables(tables),
         "bands": bands,
         "sweep": sweep_section(sweep),
-        "run": provenance(solution, [Path(file) for file in files or ()]),
+        "run": provenance(solution, inputs),
         "payload": json_for_script(_payload(page)),
         "plotly": tag("script", Markup(scripts[0])),
         "script": tag("script", Markup(scripts[1])),
