@@ -87,3 +87,19 @@ def test_forward_dynamics_has_one_for_each_sample() -> None:
     found = model.forward_dynamics(q, v, model.inverse_dynamics(q, v, a).effort)
     assert (found.bound > 0).all() and (found.bound < 1e-8).all()
     assert (np.abs(found.acceleration - a).max(axis=1) < found.bound * np.abs(a).max(axis=1)).all()
+
+
+@pytest.mark.parametrize("name", ["gough-stewart", "masticatory-curved"])
+def test_kinematics_have_one_for_each_sample(name: str) -> None:
+    """There and back: the difference is within the sum of both."""
+    model = condyle.derive(name, backend="numpy")
+    q, v, a = states(model)
+    there = model.inverse_kinematics(q, v, a)
+    back = model.forward_kinematics(there.joint, start=there.pose)
+    unit = [model.characteristic_length] * 3 + [1.0] * 3
+    off = (np.abs(back.pose - there.pose) / unit).max(axis=1)
+    for bound in (there.bound, back.bound):
+        assert (bound > 0).all() and (bound < REGULAR).all()
+    assert (off < there.bound + back.bound).all()
+    lost = model.inverse_kinematics(1e3 * q)
+    assert (np.isnan(lost.bound) == (lost.status != 0)).all()

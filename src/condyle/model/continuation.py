@@ -122,6 +122,10 @@ class Steps:
         error = np.sqrt(squares + (at.off**2).sum(axis=1))
         return Step(move, self.size(move), residual, error, A, settled)
 
+    def scaled_basis(self, pose: Array) -> Array:
+        """X' = basis f' at poses (N, 6), (N, 6, m), without dimension."""
+        return self.conditions(pose).basis * self._free / self._unit[:, None]
+
     def _without_turns(self, difference: Array) -> Array:
         turns = np.round(difference / (2 * np.pi)) * (2 * np.pi)
         return np.where(self._turning, difference - turns, difference)

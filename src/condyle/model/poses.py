@@ -11,6 +11,7 @@ from ..errors import InputError, did_you_mean
 from ..kinematics.constraints import closed_form_available, indices
 from ..kinematics.singularities import Singularity, length_sensitivity
 from ..motion import Motion, resolve_landmark
+from ..questions.bound import bound
 from ..questions.configuration import SURVEYED
 from ..status import Status
 from .arguments import POSE, Arguments, Lead, requested, samples
@@ -51,6 +52,7 @@ class Poses:
             joints = self._system.kernel("system").run(poses | still).values
             names = ("joint_rate", "joint_acceleration")[: 1 if a is None else 2]
             found |= {name: joints[name].T for name in names}
+        found["bound"] = np.where(reached, at.bound, np.nan)
         status = np.where(reached, Status.ok, Status.unreachable).astype(np.uint8)
         return ModelResult(**found, status=status).shaped(lead)
 
@@ -212,6 +214,8 @@ def configured(values: Mapping[str, Array], length: float) -> ModelResult:
     found = {name: values[name].T for name in CONFIGURATION}
     for name in ("contact_point", "contact_normal"):
         found[name] = np.moveaxis(values[name], -1, 0)
+    if "data_error" in values:
+        found["bound"] = bound(values["data_error"], 1.0)
     return ModelResult(**found, singularity=singularity(values, length))
 
 

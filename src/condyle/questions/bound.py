@@ -29,8 +29,9 @@ from typing import Any
 
 import casadi as ca
 
-from ..kinematics.constraints import determinant, indices
+from ..kinematics.constraints import determinant, indices, residuals, solve_small
 from .builder import Builder, Lanes
+from .numbers import contact_symbols
 from .platform import Basis, Platform
 
 ROUNDING = 2.0**-53
@@ -80,16 +81,29 @@ def distance(K: ca.SX, force: ca.SX) -> ca.SX:
     return ca.fabs(determinant(ca.diag(2 * (force >= 0) - 1) - K)) / sizes
 
 
-def data_error(b: Builder, platform: Platform, discriminants: Lanes) -> ca.SX:
+def off_contacts(b: Builder, platform: Platform) -> ca.SX:
+    """Square of the step onto the contacts at a given pose, in characteristic lengths and rad."""
+    dep = indices(b.structure.dependent)
+    C = (platform.motion.frame.N.T @ platform.motion.E)[:, dep]
+    phi = residuals(contact_symbols(b.structure, b.parameter), platform.pose)
+    inverse = 1 / b.parameter("length")
+    unit = ca.vertcat(ca.SX(0, 1), *(inverse if i < 3 else ca.SX(1) for i in dep))
+    return ca.sumsqr(unit * solve_small(C, phi)) if dep else ca.SX(0)
+
+
+def data_error(
+    b: Builder, platform: Platform, discriminants: Lanes, left: ca.SX | None = None
+) -> ca.SX:
     """Of the data of the equations: (u / c^2 + r / c) / d.
 
-    Args: discriminants: of the chains.
+    Args: discriminants: of the chains;  left: r^2, if not that of the platform's placement.
     """
-    motion, left = platform.motion, platform.placement.left
+    motion = platform.motion
+    rest = platform.placement.left if left is None else left
     square = square_volume(b, motion.frame.N.T @ motion.E, b.structure.dependent)
     found = ROUNDING / beyond(square, len(b.structure.dependent))
-    if not isinstance(left, float):
-        found = found + ca.sqrt(left / square)
+    if not isinstance(rest, float):
+        found = found + ca.sqrt(rest / square)
     return found / ca.fmin(b.least(discriminants), 1)
 
 

@@ -16,6 +16,7 @@ import casadi as ca
 from ..dynamics.singular_values import singular_values
 from ..graph.program import Program
 from ..kinematics.chain import FAMILIES, Loop
+from .bound import data_error, off_contacts
 from .builder import Builder, Lanes
 from .platform import ANGLE_UNITS, Platform, closed, contacts, given
 from .structure import Structure
@@ -37,8 +38,11 @@ OF_LOOPS: dict[str, tuple[Callable[[Loop], ca.SX], str]] = {
 def configuration(structure: Structure) -> Program:
     """The configuration at whole poses that meet the contacts."""
     b = Builder(structure)
-    rows = add_configuration(b, given(b, still=True))
+    platform = given(b, still=True)
+    rows = add_configuration(b, platform)
     b.output("J_W", rows, "1", structure.m)
+    own = [loop.discriminant for loop in loops_of(b, platform)]
+    b.output("data_error", data_error(b, platform, own, off_contacts(b, platform)), "1")
     return b.finish()
 
 

@@ -16,8 +16,9 @@ from ...errors import InputError, shown
 from ...kinematics.constraints import indices
 from ...mechanism.home import independent_coordinates
 from ...mechanism.mechanism import Mechanism
+from ...questions.bound import ROUNDING, SAFETY
 from ..arguments import POSE, Argument, samples
-from ..continuation import follow
+from ..continuation import Step, follow
 from ..model_result import ModelResult
 from .assembly_modes import AssemblyModes, search
 from .joint_steps import joint_steps
@@ -72,8 +73,24 @@ class ForwardKinematics:
             q=pose[:, self._independent],
             residual=residual,
             condition=condition,
+            bound=np.where(found, self._bound(pose, at_pose), np.nan),
             status=status,
         ).shaped(lead)
+
+    def _bound(self, pose: np.ndarray, step: Step) -> np.ndarray:
+        """Of the pose's error, (N,), in characteristic lengths and radians.
+
+        The step that would follow, and rounding of the joints and of the contacts, through A^+ and
+        the contacts' M_J.
+        """
+        found = np.full(len(pose), np.nan)
+        good = np.flatnonzero(np.isfinite(step.A).all(axis=(1, 2)))
+        A, M_J = step.A[good], self._steps.scaled_basis(pose[good])
+        least = np.linalg.svd(A, compute_uv=False)[:, -1]
+        rounding = ROUNDING * (1 + np.abs(A).sum(axis=2).max(axis=1)) / least
+        grown = np.linalg.norm(M_J, axis=(1, 2))
+        found[good] = SAFETY * grown * rounding + 2 * step.size[good]
+        return found
 
     def modes(
         self, joints: np.ndarray, seed: int = 0, tolerance: float = TOLERANCE
