@@ -213,6 +213,10 @@ class JammedError(SampleError):
     """A sample at which Coulomb friction has no solution: the mechanism jams."""
 
 
+class AmbiguousError(SampleError):
+    """A sample at which several motions follow from the same efforts, under Coulomb friction."""
+
+
 class UncertifiedError(SampleError):
     """Efforts that could not be certified to the stated accuracy."""
 

@@ -43,6 +43,7 @@ class Status(IntEnum):
         "beta at +-90 degrees: rates of the angles do not describe all motions",
         "sample",
     )
+    ambiguous = 8, "under Coulomb friction several motions follow from these efforts", "sample"
 
 
 STATUS_NAMES = tuple(status.name for status in Status)

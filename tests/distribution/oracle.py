@@ -41,8 +41,9 @@ def full(
     q = problem.Q[i] + problem.J[i].T @ problem.offset[i]
     low = problem.low.copy() if limits else np.full(n, -np.inf)
     high = problem.high.copy() if limits else np.full(n, np.inf)
-    contact_low = np.where(sigma > 0, 0.0, -np.inf)
-    contact_high = np.where(sigma < 0, 0.0, np.inf)
+    least = problem.preload if limits else 0.0
+    contact_low = np.where(sigma > 0, least, -np.inf)
+    contact_high = np.where(sigma < 0, -least, np.inf)
     if limits:
         contact_low = np.where(
             problem.push > 0, np.maximum(contact_low, problem.preload), contact_low

@@ -79,7 +79,7 @@ def tradeoff(
             motion, load: files or arrays; default: as in `condyle.run`.
             load_point: platform point at which the load acts.
             weights: W, strictly increasing.
-            preload: minimum compressive force on unilateral contacts [N].
+            preload: as of `Distribution` [N].
             model: formulation, route and backend of `derive`.
     Raises: InputError: without contacts, or with chains that have no limits.
             InfeasibleError and other errors of samples: as of `Model.solve`.

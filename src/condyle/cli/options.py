@@ -67,7 +67,10 @@ Distribution = Annotated[
 ]
 Preload = Annotated[
     float,
-    option("Minimum compressive force on unilateral contacts (N), for objectives with limits."),
+    option(
+        "Minimum compressive force on unilateral contacts, and force of either sign on others with "
+        "friction (N), for objectives with limits."
+    ),
 ]
 Backend = Annotated[
     str,

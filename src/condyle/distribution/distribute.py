@@ -62,7 +62,7 @@ def distribute(
 
 
 def within(problem: Problem, effort: np.ndarray, contact_force: np.ndarray) -> np.ndarray:
-    """Samples that respect effort limits and the preload of unilateral contacts, (N,).
+    """Samples that respect effort limits and the preload of contacts, (N,).
 
     Minimum-norm efforts that do are those of `bounded` too; only the others are distributed.
     Friction signs are ignored.
@@ -71,12 +71,13 @@ def within(problem: Problem, effort: np.ndarray, contact_force: np.ndarray) -> n
     """
     kept = ((effort >= problem.low) & (effort <= problem.high)).all(axis=1)
     pushing = contact_force * problem.push >= problem.preload
-    return kept & (pushing | (problem.push == 0)).all(axis=1)
+    kept &= (pushing | (problem.push == 0)).all(axis=1)
+    return kept & ((np.abs(contact_force) >= problem.preload) | ~problem.rubs).all(axis=1)
 
 
 def patterns(problem: Problem) -> np.ndarray:
     """All sign patterns of the contacts with friction, 0 for others, (P, k)."""
-    rubs = (problem.friction != 0).any(axis=(0, 2))
+    rubs = problem.rubs if problem.preload else (problem.friction != 0).any(axis=(0, 2))
     found = list(product(*[(1, -1) if rubbing else (0,) for rubbing in rubs]))
     return np.array(found, dtype=float).reshape(len(found), problem.k)
 

@@ -68,12 +68,12 @@ class Sample:
         G = np.vstack([Z.T, carried[:, :n]])
         right = np.concatenate([np.linalg.solve(T.T, b), carried[:, n]])
         low, high = (p.low / scale, p.high / scale) if limits else (-np.inf, np.inf)
-        push, least = (p.push if limits else 0 * p.push), p.preload / measure
+        push, least = (p.push, p.preload / measure) if limits else (0 * p.push, 0.0)
         bounds = (
             np.broadcast_to(low, n),
             np.broadcast_to(high, n),
-            np.maximum(np.where(push > 0, least, -np.inf), np.where(sigma > 0, 0.0, -np.inf)),
-            np.minimum(np.where(push < 0, -least, np.inf), np.where(sigma < 0, 0.0, np.inf)),
+            np.maximum(np.where(push > 0, least, -np.inf), np.where(sigma > 0, least, -np.inf)),
+            np.minimum(np.where(push < 0, -least, np.inf), np.where(sigma < 0, -least, np.inf)),
         )
         unit = float(np.abs(right[: 6 - k]).max(initial=0.0))
         if not unit:

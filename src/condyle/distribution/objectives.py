@@ -54,15 +54,17 @@ class Objective:
         return problem.contact_weight if self.weighs else 0.0
 
     def ports(self, problem: Problem) -> dict[str, np.ndarray]:
-        """Limits as ports of the questions `allocation` and `limited`."""
+        """Limits as ports of the questions `allocation` and `limited`; see `Limits`."""
         p, free = problem, np.full(problem.n, np.inf)
         low, high, push = (p.low, p.high, p.push) if self.limits else (-free, free, 0 * p.push)
+        # Both signs of a bilateral contact with friction: all but what is between.
+        both = (push == 0) & p.rubs & bool(self.limits and p.preload)
         ports = {
             "low": low,
             "high": high,
             "scale": self.scale(p),
-            "contact_low": np.where(push > 0, p.preload, -np.inf),
-            "contact_high": np.where(push < 0, -p.preload, np.inf),
+            "contact_low": np.where((push > 0) | both, p.preload, -np.inf),
+            "contact_high": np.where((push < 0) | both, -p.preload, np.inf),
         }
         weight = self.weight(p)
         return ports | ({"weight": np.array([weight])} if weight else {})

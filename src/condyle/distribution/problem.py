@@ -28,9 +28,11 @@ class Problem:
               zero where there is none.
     low, high: limits of the efforts, (n,); infinite where there is none.
     push:     sign of a unilateral contact's force, 0 where the contact is bilateral, (k,).
-    preload:  minimum compressive force of unilateral contacts [N].
+    preload:  minimum force of unilateral contacts, compressive, and of those with friction, of
+              either sign [N]: it keeps them off the border between two patterns.
     offset:   effort less tau, (N, n).
     contact_weight: W / N_ref^2 [1/N^2]: `weighted` adds W (lambda_k / N_ref)^2 of every contact.
+    rubs:     contacts with friction, (k,); by default those where `friction` is not 0.
     """
 
     Q: np.ndarray
@@ -43,6 +45,7 @@ class Problem:
     preload: float = 0.0
     offset: np.ndarray = None  # type: ignore[assignment]
     contact_weight: float = 0.0
+    rubs: np.ndarray = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         """Fill in the defaults and check shapes and values."""
@@ -67,6 +70,8 @@ class Problem:
             if array.shape != shape:
                 raise InputError(f"{name} must be of shape {shape}; got {array.shape}")
             object.__setattr__(self, name, array)
+        if self.rubs is None:
+            object.__setattr__(self, "rubs", (self.friction != 0).any(axis=(0, 2)))
         self._check_numbers()
 
     def _check_numbers(self) -> None:

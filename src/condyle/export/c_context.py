@@ -42,6 +42,7 @@ CODES = {
     "JAMMED": Status.jammed,
     "UNCERTIFIED": Status.uncertified,
     "GIMBAL_LOCK": Status.gimbal_lock,
+    "AMBIGUOUS": Status.ambiguous,
 }
 WHY = {
     "OK": "results are written",
@@ -49,9 +50,10 @@ WHY = {
     "SINGULAR": "the pose is singular to this precision",
     "OUT_OF_BOUNDS": "an argument is not a number, or too large",
     "INFEASIBLE": "no efforts within the limits, or no pose, fit the arguments",
-    "JAMMED": "Coulomb friction has no solution, or several",
+    "JAMMED": "Coulomb friction has no solution",
     "UNCERTIFIED": "the result could not be certified",
     "GIMBAL_LOCK": "beta is +-90 degrees: accelerations of the angles are not determined",
+    "AMBIGUOUS": "Coulomb friction has several solutions",
 }
 
 

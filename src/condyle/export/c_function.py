@@ -206,7 +206,8 @@ def function(c: Context, name: str, entry: Entry, wish: Wish) -> Body:
 
     Raises: UnsupportedError: where efforts with friction have no closed form.
     """
-    if entry.rubbing == "UNCERTIFIED" and len(c.structure.friction) > MOST:
+    results = renamed(entry.results)
+    if entry.rubbing and "effort" in results.values() and len(c.structure.friction) > MOST:
         raise UnsupportedError(
             f"friction at {len(c.structure.friction)} contacts has no efforts in closed form; at "
             f"most {MOST} have"
@@ -215,7 +216,6 @@ def function(c: Context, name: str, entry: Entry, wish: Wish) -> Body:
         raise UnsupportedError("efforts within limits are exported in double alone")
     question = Question.about(c.structure, entry.question or name, *entry.details(wish))
     found = question.variants()
-    results = renamed(entry.results)
     program = _pruned(found.robust or found.main, results)
     given = renamed(entry.given or " ".join(_used(program)))
     arguments = tuple(_arguments(c, entry, program, given, results))

@@ -120,7 +120,7 @@ CATALOGUE: dict[str, Entry] = {
         f"q q1 effort {LOAD}",
         "acceleration contact_force",
         details=lambda wish: (("contact",),),
-        rubbing="JAMMED",
+        rubbing="UNCERTIFIED",
         quick=True,
     ),
     "motion": Entry(

@@ -60,7 +60,8 @@ static const char *const STATUS_WORDS[] = {
     "singular: efforts or accelerations are not determined at this pose",
     "out of bounds: a value is no number, or too large for the arithmetic",
     "infeasible", "jammed: no pattern of friction is consistent", "uncertified",
-    "gimbal lock: beta is +-90 degrees"
+    "gimbal lock: beta is +-90 degrees",
+    "ambiguous: several patterns of friction are consistent"
 };
 
 /* All that a step changes. */

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import (
+    AmbiguousError,
     GimbalLockError,
     InfeasibleError,
     JammedError,
@@ -47,6 +48,11 @@ ERRORS: dict[Status, tuple[type[SampleError], str, str]] = {
         "efforts",
         "Rigid bodies have no solution there; reduce friction, or change the motion or the slopes "
         "of the contacts",
+    ),
+    Status.ambiguous: (
+        AmbiguousError,
+        "several motions follow from the efforts at {}, under Coulomb friction",
+        "Rigid bodies have no single solution there; reduce friction, or change the efforts",
     ),
     Status.uncertified: (
         UncertifiedError,

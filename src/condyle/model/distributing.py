@@ -36,7 +36,8 @@ class Distribution:
 
     name:           of `condyle.distribution.OBJECTIVES`; None: `bounded` with cables, else
                     `minimum_norm`.
-    preload:        minimum compressive force on unilateral contacts [N].
+    preload:        minimum compressive force on unilateral contacts [N]; on contacts with friction
+                    that are bilateral, minimum force of either sign.
     contact_weight: W of `weighted`, dimensionless: it minimises the sum of (effort_i / max_i)^2
                     and of W (lambda_k / N_ref)^2 over the contacts, where N_ref [N] is
                     `Model.reference_force`, the largest limit of the actuators.
@@ -101,10 +102,12 @@ class Distribution:
                 f"distribution {name} does not weigh contact forces: take {weighing}, or "
                 "leave the contact weight out"
             )
-        if self.preload and not any(contact.one_sided for contact in mechanism.contacts):
+        rubs = [contact.friction.coefficient > 0 for contact in mechanism.contacts]
+        if self.preload and not any(rubs) and not any(c.one_sided for c in mechanism.contacts):
             notice(
                 f"preload {self.preload:g} N presses on nothing: no contact of "
-                f'"{mechanism.name}" is unilateral. Set one_sided = true at those that only push'
+                f'"{mechanism.name}" is unilateral or has friction. Set one_sided = true at those '
+                "that only push"
             )
         return replace(self, name=name)
 
@@ -208,6 +211,8 @@ class Distributor:
             sided = self._push != 0
             pushes = self._push[sided, None] * values["contact_force"][sided]
             fits &= (pushes >= self.distribution.preload).all(axis=0)
+            rubbing = np.abs(values["contact_force"][self._rubs])
+            fits &= (rubbing >= self.distribution.preload).all(axis=0)
             good &= ~fits
         return np.flatnonzero(good)
 
@@ -244,6 +249,7 @@ class Distributor:
             low=self._low,
             high=self._high,
             push=self._push,
+            rubs=np.array(self._rubs, dtype=bool),
             preload=self.distribution.preload,
             contact_weight=self._weight,
         )

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
+from ..backends.kernel import sample_rows
 from ..questions.forward import OUTPUTS as ASKED
 from ..status import Status
 from .arguments import Arguments, requested
@@ -23,12 +25,15 @@ OUTPUTS = {
     "configuration": "motion",
     "condition": "motion",
     "twist_rate": "twist",
+    "all_accelerations": "contact",
+    "all_contact_forces": "contact",
     "slip": "sliding",
     "friction_force": "sliding",
 }
 # What is no number in a gimbal lock, and what is none where there is no solution at all.
 OF_ANGLES = ("acceleration", "pose_acceleration", "bound")
 DEPENDENT = (*OF_ANGLES, "contact_force", "joint_acceleration", "twist_rate")
+EVERY = {"all_accelerations": "acceleration", "all_contact_forces": "contact_force"}
 
 
 class ForwardDynamics(Dynamics):
@@ -60,11 +65,30 @@ class ForwardDynamics(Dynamics):
         first: dict[str, Any] = {name: np.moveaxis(a, -1, 0) for name, a in values.items()}
         if "friction_force" in names:
             first["friction_force"] = -np.abs(first["contact_force"])[..., None] * first["drag"]
+        if {*EVERY} & {*names}:
+            first |= self._every(inputs, first, status)
         if {"configuration", "condition"} & {*names}:
             first["configuration"] = c = self._poses.configuration(first["pose"], threads)
             first["condition"] = c.singularity.condition
         found = {name: first[name] for name in (*self.results, *names)}
         return ModelResult(**found, status=status).shaped(lead)
+
+    def _every(
+        self, inputs: Mapping[str, Array], first: Mapping[str, Array], status: Array
+    ) -> dict[str, Array]:
+        """All solutions under friction, the one of `ok` samples first: (N, s, m) and (N, s, k)."""
+        found, better = {}, dict[str, Array]()
+        several = np.flatnonzero(status == Status.ambiguous)
+        if several.size:
+            better = self._system.robust.forward(sample_rows(inputs, several, len(status)))[0]
+        for name, own in EVERY.items():
+            count, size = first[own].shape
+            every = np.full((count, 2 ** len(self._system.structure.friction), size), np.nan)
+            every[:, 0] = first[own]
+            if several.size:
+                every[several] = np.moveaxis(better[name], -1, 0)
+            found[name] = every
+        return found
 
     def linearise(self, q: Any, v: Any, effort: Any, wrench: Any, at: Any) -> ModelResult:
         """As `Model.linearise`."""

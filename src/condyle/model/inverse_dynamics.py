@@ -32,9 +32,10 @@ OUTPUTS = {
     "slip": "configuration",
     "friction_force": "configuration",
     "shortfall": "contact",
+    "ambiguous": "contact",
 }
-# Those that a solution has.
-SOLVED = tuple(name for name in OUTPUTS if name not in ("gravity_share", "condition"))
+# Those that a solution has, and a sweep of them.
+SOLVED = tuple(name for name in OUTPUTS if name not in ("gravity_share", "condition", "ambiguous"))
 
 
 class InverseDynamics(Dynamics):
@@ -61,8 +62,19 @@ class InverseDynamics(Dynamics):
             for value in found.values():
                 value[status != Status.ok] = np.nan
         found["status"] = status
+        if "ambiguous" in names:
+            values["ambiguous"] = self._ambiguous(inputs, found["effort"], status)
         more = {name: self._read(name, values, status) for name in names}
         return ModelResult(**found, **more).shaped(lead)
+
+    def _ambiguous(self, inputs: Mapping[str, Array], effort: Array, status: Array) -> Array:
+        """Whether forward dynamics has other motions under these efforts too, (N,)."""
+        found, good = np.zeros(len(status), dtype=bool), np.flatnonzero(status == Status.ok)
+        if self._system.structure.friction and good.size:
+            given = sample_rows({**inputs, "effort": effort}, good, len(status))
+            del given["q2"]
+            found[good] = self._system.robust.forward_statuses(given) == Status.ambiguous
+        return found
 
     def _read(self, name: str, values: Mapping[str, Array], status: Array) -> Any:
         """One output, samples first."""

@@ -163,7 +163,8 @@ class Model:
         Args:    q, v, a, wrench, at: as of `Model`.
                  outputs: names of further results, computed only if named; "all" is
                  all: share, gravity_share, pose, pose_rate, pose_acceleration, joint_rate,
-                 joint_acceleration, configuration, condition, slip, friction_force, shortfall.
+                 joint_acceleration, configuration, condition, slip, friction_force, shortfall,
+                 ambiguous: whether, under friction, other motions follow from the same efforts.
                  threads: maximum number of threads; default: the processors at hand. Results do
                  not depend on it.
         Returns: effort (..., n), contact_force (..., k) [N], status (...), of `Status`, and what
@@ -189,7 +190,9 @@ class Model:
         Args:    q, v, effort, wrench, at: as of `Model`;  threads: as of `inverse_dynamics`.
                  outputs: of pose, pose_rate, pose_acceleration, twist_rate (6,): [V'; omega'] in
                  {S}, joint, joint_rate, joint_acceleration, configuration, condition, slip,
-                 friction_force; "all" is all.
+                 friction_force, all_accelerations, all_contact_forces; "all" is all. The last two
+                 are of every solution under friction, with one more dimension s, NaN where there
+                 are fewer.
         Returns: acceleration (..., m) [m/s^2, rad/s^2], contact_force (..., k) [N], status (...),
                  and what `outputs` names; see `ModelResult`. NaN where the status is not 0; in a
                  gimbal lock of the angles accelerations of coordinates alone are.

@@ -105,24 +105,28 @@ class Robust:
             system = self._kernel("forward_system").run(poses | others).values
             s = {name: np.moveaxis(a, -1, 0) for name, a in system.items()}
             found = balanced(s, self._structure.friction)
-            q2 = solved(s["S"], found.w)[0]
+            every, w = np.stack([solved(s["S"], one)[0] for one in found.w]), found.w[0]
+            q2 = every[0]
             moved = poses["pose_acceleration"] + (s["M_J"] @ q2[..., None])[..., 0]
-            turned = s["bias"] + (s["J"].transpose(0, 2, 1) @ found.w[..., None])[..., 0]
+            turned = s["bias"] + (s["J"].transpose(0, 2, 1) @ w[..., None])[..., 0]
             least, most = configuration["J_A_extremes"]
             assembled = reached & (configuration["discriminant"] >= 0).all(axis=0)
             regular = found.regular & (ratio(least, most) >= SINGULAR)
             finite = np.isfinite(system["F"]).all(axis=0)
             locked = np.abs(system["cos_beta"]) < GIMBAL_LOCK
-            finite &= np.isfinite(q2).all(axis=1) | ~found.single | locked
+            finite &= np.isfinite(q2).all(axis=1) | (found.count == 0) | locked
             status = judge(assembled, regular, finite)
-            status[(status == Status.ok) & ~found.single] = Status.jammed
+            status[(status == Status.ok) & (found.count == 0)] = Status.jammed
+            status[(status == Status.ok) & (found.count > 1)] = Status.ambiguous
             status[(status == Status.ok) & locked] = Status.gimbal_lock
-            accurate = _forward_bound(s, found.w, found.force)
-            twist_rate = s["twist_rate"] + (s["along"] @ found.w[..., None])[..., 0]
+            accurate = _forward_bound(s, w, found.force[0])
+            twist_rate = s["twist_rate"] + (s["along"] @ w[..., None])[..., 0]
         return {
             "acceleration": q2.T,
             "bound": accurate,
-            "contact_force": found.force.T,
+            "contact_force": found.force[0].T,
+            "all_accelerations": np.moveaxis(every, 1, -1),
+            "all_contact_forces": np.moveaxis(found.force, 1, -1),
             "pose": poses["pose"].T,
             "pose_rate": poses["pose_rate"].T,
             "pose_acceleration": moved.T,
@@ -133,6 +137,12 @@ class Robust:
             "drag": system["drag"],
             "twist_rate": twist_rate.T,
         }, status
+
+    def forward_statuses(self, inputs: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Statuses of forward dynamics, by numpy, (N,)."""
+        answer = self._kernel("forward").run(inputs)
+        answer.mend(inputs, self.forward)
+        return answer.status
 
     def linear(self, ports: Mapping[str, np.ndarray]) -> Arrays:
         """Results of the question of that name: asked for too seldom to be worth a compiler."""

@@ -84,7 +84,10 @@ TERMS = {
 
 @dataclass(frozen=True)
 class Limits:
-    """Bounds of efforts (lanes) and contact forces (k,); scale of efforts, lanes; W or None."""
+    """Bounds of efforts (lanes) and contact forces (k,); scale of efforts, lanes; W or None.
+
+    With a sign, bounds of a contact force that cross exclude what is between them.
+    """
 
     low: Lanes
     high: Lanes
@@ -107,8 +110,12 @@ class Limits:
 
     def signed(self, sigma: ca.SX) -> Limits:
         """With contact forces restricted to these signs, or 0; sigma = 0 for any sign."""
-        low = ca.if_else(sigma > 0, ca.fmax(self.contact_low, 0), self.contact_low)
-        high = ca.if_else(sigma < 0, ca.fmin(self.contact_high, 0), self.contact_high)
+        low, high, none = self.contact_low, self.contact_high, ca.SX(float("inf"))
+        crossed = low > high
+        low, high = (
+            ca.if_else(sigma > 0, ca.fmax(low, 0), ca.if_else(crossed * (sigma < 0), -none, low)),
+            ca.if_else(sigma < 0, ca.fmin(high, 0), ca.if_else(crossed * (sigma > 0), none, high)),
+        )
         return Limits(self.low, self.high, self.scale, low, high, self.weight)
 
 

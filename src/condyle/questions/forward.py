@@ -32,7 +32,7 @@ from .bound import (
 from .builder import Builder, Lanes
 from .configuration import loops_of
 from .equations import Wrench
-from .friction import consistent
+from .friction import Consistent, consistent
 from .inertia import Affine, affine
 from .inverse import DOUBTFUL, HUGE
 from .platform import (
@@ -122,11 +122,16 @@ def accelerated(
     """
     eq = affine(b, platform, load, effort)
     touch = contacts(b, platform) if b.structure.friction else None
-    w, force, sure, regular, lengths = _solved(b, platform, eq, touch, forces)
+    carried = _sizes(b, platform, eq, load, effort) if touch is not None else ca.SX()
+    w, force, sure, regular, lengths, found = _solved(b, platform, eq, touch, forces, carried)
     q2 = solve_small(eq.S, w)
     b.check(feasibility(b, platform, eq.discriminants), DOUBTFUL, Status.unreachable)
-    finite = ca.fabs(ca.sum1(q2)) < HUGE
-    b.check(2 * sure * finite - 1, 0.5)
+    known = ca.fabs(ca.sum1(q2)) < HUGE
+    if found is not None:
+        b.check(1 - 2 * sure * found.none, 0.5, Status.jammed)
+        b.check(1 - 2 * sure * found.several, 0.5, Status.ambiguous)
+        known = known * found.single + found.none + found.several
+    b.check(2 * sure * known - 1, 0.5)
     # The twist's rate is determined, and rates of the angles in it are not; equations in these have
     # lost digits before.
     twists = FORMULATIONS[b.structure.formulation].uses_twist
@@ -143,8 +148,8 @@ def forward_system(structure: Structure) -> Program:
     b = Builder(structure)
     platform = given(b)
     effort = b.lane_sample("effort", unit="N m or N")
-    eq = affine(b, platform, Wrench.of(b), effort)
-    m = structure.m
+    load, m = Wrench.of(b), structure.m
+    eq = affine(b, platform, load, effort)
     b.output("H", _columns(eq), "kg, kg m, kg m^2", 6, m)
     b.output("F", eq.F + eq.H @ eq.start, "N, N m", 6)
     b.output("S", eq.S, "", m, m)
@@ -158,10 +163,20 @@ def forward_system(structure: Structure) -> Program:
     touch.add_sliding(b)
     b.output("joint_rate", eq.rates, "rad/s or m/s")
     pairs = list(zip(eq.biases, eq.rows, strict=True))
+    b.output("size", _sizes(b, platform, eq, load, effort), "N, N m", 6)
     b.output("bias", [bias + ca.dot(row, eq.start) for bias, row in pairs], "per s^2")
     along = eq.basis.rates(ca.SX.eye(m))
     b.output("J", [along.T @ row for row in eq.rows], "", m)
     return b.finish()
+
+
+def _sizes(b: Builder, platform: Platform, eq: Affine, load: Wrench, effort: Lanes) -> ca.SX:
+    """Sizes of the terms of F that may cancel: |J|^T |tau| and those of the load, (s,)."""
+    pairs = zip(eq.rows, effort, strict=True)
+    carried = b.total([ca.fabs(row * tau) for row, tau in pairs])
+    force, lever = load.force, platform.R @ load.point
+    turned = ca.fabs(load.moment) + ca.fabs(ca.cross(lever, force))
+    return carried + ca.fabs(eq.B.T) @ ca.vertcat(ca.fabs(force), turned)
 
 
 def _columns(eq: Affine) -> ca.SX:
@@ -171,10 +186,17 @@ def _columns(eq: Affine) -> ca.SX:
 
 
 def _solved(
-    b: Builder, platform: Platform, eq: Affine, touch: Contacts | None, wanted: bool
-) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, ca.SX]:
+    b: Builder,
+    platform: Platform,
+    eq: Affine,
+    touch: Contacts | None,
+    wanted: bool,
+    carried: ca.SX,
+) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, ca.SX, Consistent | None]:
     """w, contact forces along the unit normals (on request), and whether they are reliable; V^2 and
-    the diagonal of the inertia matrix.
+    the diagonal of the inertia matrix; with friction, which of its patterns are consistent.
+
+    Args: carried: of `_sizes`, with friction.
     """
     H, F = _columns(eq), eq.F + eq.H @ eq.start
     rubbing = list(b.structure.friction)
@@ -186,17 +208,20 @@ def _solved(
     lengths = ca.diag(M)
     x, excess, pivots = definite_solve(M, pulled, lengths, CONDITIONED)
     sure = all_of(one > 0 for one in excess)
-    w, force, regular = x[:, 0], ca.SX(0, 1), pivots.square
+    w, force, regular, found = x[:, 0], ca.SX(0, 1), pivots.square, None
     if wanted or touch is not None:
         dep = indices(b.structure.dependent)
         left = F[dep] + H[dep, :] @ w
         force = normal_forces(b, platform.motion, solve_small(eq.G[dep, :], left))
         if touch is not None:
+            moved = H[dep, :] @ w
+            normal = ca.fabs((eq.B.T @ touch.N)[dep, :])
+            terms = carried[dep] + ca.fabs(F[dep]) + ca.fabs(moved)
+            size = ca.sum1(terms / ca.sum2(normal))
             left = T[dep, :] - H[dep, :] @ x[:, 1:]
             each = ca.horzsplit(solve_small(eq.G[dep, :], left))
             K = ca.horzcat(*(normal_forces(b, platform.motion, mu) for mu in each))
-            y, count = consistent(K[rubbing, :], force[rubbing])
-            w, force = w - x[:, 1:] @ y, force + K @ y
-            sure = sure * (count == 1)
+            found = consistent(K[rubbing, :], force[rubbing], size)
+            w, force = w - x[:, 1:] @ found.y, force + K @ found.y
             regular = regular * distance(K[rubbing, :], force[rubbing])
-    return w, force, sure, regular, lengths
+    return w, force, sure, regular, lengths, found

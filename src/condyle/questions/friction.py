@@ -6,27 +6,32 @@ At the point of contact, with v the velocity of the material point of the platfo
     Q = J^T tau + sum lambda_k D_k,    D_k = N_k - sigma_k T_k,    T_k = mu [u; c_k x u],
 
 and a sign pattern sigma is consistent where sigma_k lambda_k >= 0. Inverse dynamics takes the
-consistent pattern of minimum norm; forward dynamics requires that there is exactly one.
+consistent pattern of minimum norm; forward dynamics requires that there is exactly one solution.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from itertools import product
 
 import casadi as ca
 
 from ..dynamics.least_norm import Pivots
-from ..kinematics.constraints import all_of, independent_indices, indices, solve_small
+from ..kinematics.constraints import all_of, determinant, independent_indices, indices, solve_small
 from .bound import square_volume
 from .builder import Builder, Lanes
-from .equations import Equations
+from .equations import Equations, total
 from .platform import Basis, Contacts
 
 MOST = 2  # maximum number of contacts with friction that a kernel of inverse dynamics takes
 HUGE = 1e300
 FLAT = 1e-3  # part of a square below which a difference has lost too many digits
+HELD = 0.1  # least determinant of the contacts' block over that without friction
+GROWTH = 30.0  # square of a step before it is projected, over that of the efforts
+BORDER = 1e-6  # of the forces that add up to a contact force: below, its sign is left to numpy
+PIVOT = 1e-3  # of a pivot's terms: below, it has lost too many digits
 
 LeastNorm = Callable[..., tuple[Lanes, ca.SX, Pivots]]
 
@@ -66,6 +71,7 @@ class _Pattern:
     B:      lanes of d lambda = -B d effort, (k,).
     free:   by contact, the part of B_i in the null space of the equations, lanes.
     flat:   by contact, 1 where that part is too small to be known, else 0.
+    held:   how well the contacts hold the dependent coordinates: |det| over that of no friction.
     """
 
     effort: Lanes
@@ -78,9 +84,10 @@ class _Pattern:
     candidates: list[_Candidate]
     pivots: ca.SX
     regular: ca.SX
+    held: ca.SX
 
-    def least(self, b: Builder) -> tuple[ca.SX, Lanes, ca.SX]:
-        """Norm, efforts and contact forces of the best candidate."""
+    def least(self, b: Builder) -> tuple[ca.SX, Lanes, ca.SX, ca.SX]:
+        """Norm, efforts and contact forces of the best candidate, and the size of its steps."""
         norm = ca.SX(float("inf"))
         steps = {i: ca.SX(0) for i in self.free}
         held = dict(steps)
@@ -91,13 +98,14 @@ class _Pattern:
                 steps[i] = ca.if_else(better, one.steps.get(i, 0), steps[i])
                 held[i] = ca.if_else(better, int(i in one.steps), held[i])
         if not steps:
-            return norm, self.effort, self.force
+            return norm, self.effort, self.force, ca.SX(0)
         change = [sum(steps[i] * self.free[i][g] for i in steps) for g in range(len(self.effort))]
         effort = [t + d for t, d in zip(self.effort, change, strict=True)]
         force = self.force - b.total([a * d for a, d in zip(self.B, change, strict=True)])
         for i in held:
             force[i] *= 1 - held[i]
-        return norm, effort, force
+        squares = {i: b.total([a[i] * a[i] for a in self.B]) for i in steps}
+        return norm, effort, force, total([steps[i] * steps[i] * squares[i] for i in steps])
 
 
 def least_norm_pattern(b: Builder, eq: Equations, c: Contacts, solve: LeastNorm) -> Chosen:
@@ -107,7 +115,7 @@ def least_norm_pattern(b: Builder, eq: Equations, c: Contacts, solve: LeastNorm)
     So it is found among the consistent candidates: every force with one sign, the other, or 0.
     """
     s = b.structure
-    best = ca.SX(float("inf"))
+    best, stepped, held = ca.SX(float("inf")), ca.SX(0), ca.SX(0)
     pivots, regular = ca.SX(1.0), ca.SX(1.0)
     effort: Lanes = []
     force = ca.SX.zeros(len(s.contacts))
@@ -115,15 +123,18 @@ def least_norm_pattern(b: Builder, eq: Equations, c: Contacts, solve: LeastNorm)
     for signs in product((1, -1), repeat=len(s.friction)):
         pattern = tried[signs] = _pattern(b, eq, c, solve, signs)
         pivots = ca.fmin(pivots, pattern.pivots)
-        norm, found, carried = pattern.least(b)
+        norm, found, carried, steps = pattern.least(b)
         better = norm < best
         regular = ca.if_else(better, pattern.regular, regular)
+        stepped = ca.if_else(better, steps, stepped)
+        held = ca.if_else(better, pattern.held, held)
         best = ca.if_else(better, norm, best)
         force = ca.if_else(better, carried, force)
         effort = [
             t if not effort else ca.if_else(better, t, effort[g]) for g, t in enumerate(found)
         ]
-    return Chosen(effort, force, _sure(s.friction, tried, best), pivots, regular)
+    sure = _sure(s.friction, tried, best) * (stepped <= GROWTH * best) * (held > HELD)
+    return Chosen(effort, force, sure, pivots, regular)
 
 
 def _pattern(
@@ -136,6 +147,7 @@ def _pattern(
     sign = dict(zip(s.friction, signs, strict=True))
     for i in s.friction:
         D[:, i] = N[:, i] - sign[i] * T[:, i]
+    held = ca.fabs(determinant(D[dep, :]) / determinant(N[dep, :]))
     basis = Basis(ind, dep, -solve_small(D[dep, :].T, D[ind, :].T))
     rows = [basis.generalized_force(chain.row) for chain in eq.chains]
     found, pivots, eliminated = solve(b.total, rows, basis.generalized_force(eq.Q))
@@ -159,7 +171,7 @@ def _pattern(
             flat[i] = b.total([x * x for x in free[i]]) < FLAT * b.total([a * a for a in own])
         candidates += _held(b, force, norm, sign, free, flat, s.n - s.m)
     regular = eliminated.square * square_volume(b, D.T, s.dependent)
-    return _Pattern(found, force, norm, broken, B, free, flat, candidates, pivots, regular)
+    return _Pattern(found, force, norm, broken, B, free, flat, candidates, pivots, regular, held)
 
 
 def _held(
@@ -224,37 +236,68 @@ def _sure(friction: Sequence[int], tried: dict[tuple[int, ...], _Pattern], best:
 # -- forward dynamics ----------------------------------------------------------------------
 
 
-def consistent(K: ca.SX, force: ca.SX) -> tuple[ca.SX, ca.SX]:
+@dataclass(frozen=True)
+class Consistent:
+    """Sign patterns of forward dynamics that are consistent.
+
+    y:       magnitudes of the contact forces of one of them, (f,).
+    single, several, none: 1 where that many solutions are certain, else 0; none of the three
+             within `BORDER` of a border.
+    """
+
+    y: ca.SX
+    single: ca.SX
+    several: ca.SX
+    none: ca.SX
+
+
+def consistent(K: ca.SX, force: ca.SX, size: ca.SX) -> Consistent:
     """Magnitudes y of the contact forces in forward dynamics, and the number of solutions.
 
     Friction reduces the contact wrenches by T y, y = |lambda|. All else is linear, so that
 
         lambda = lambda_0 + K y,    that is    (sigma - K) y = lambda_0,    y >= 0,
 
-    with lambda_0 the solution without friction and sigma a diagonal matrix of signs. Weak friction
-    leaves one consistent sigma, since the absolute value equation then has one solution; with none
-    or several the mechanism jams.
+    with lambda_0 the solution without friction and sigma a diagonal matrix of signs. Where
+    det(sigma - K) det(sigma) is positive for every sigma there is exactly one solution [Rump1997],
+    and it is the pattern of the largest smallest y, whatever rounding does to a y that is 0.
+    Elsewhere the patterns are counted, with a margin.
 
-    Args: K: (f, f).  force: lambda_0, (f,).
+    Args: K: (f, f).  force: lambda_0, (f,).  size: of the forces that lambda_0 is a sum of.
     """
-    f = force.numel()
-    chosen, count = ca.SX.zeros(f), ca.SX(0)
-    for y in _solutions(-K, force):
-        kept = all_of((one >= 0) * (one < HUGE) for one in y)
-        count = count + kept
-        chosen = ca.if_else(kept, ca.vertcat(*y), chosen)
-    return chosen, count
+    chosen, best = ca.SX.zeros(force.numel()), ca.SX(-float("inf"))
+    unique, regular, near, clear = ca.SX(1), ca.SX(1), ca.SX(0), ca.SX(0)
+    margin = BORDER * size
+    for y, turned, quality in _solutions(-K, force):
+        least = reduce(ca.fmin, y)
+        better = least > best
+        best = ca.if_else(better, least, best)
+        chosen = ca.if_else(better, ca.vertcat(*y), chosen)
+        unique *= turned > 0
+        regular *= quality > 0
+        near += least >= -margin
+        clear += least > margin
+    bounded = regular * all_of(one < HUGE for one in ca.vertsplit(chosen))
+    single = bounded * (1 - (1 - unique * (near > 0)) * (1 - (near == 1) * (clear == 1)))
+    open_ = regular * (1 - unique)
+    return Consistent(chosen, single, open_ * (clear > 1), open_ * (near == 0))
 
 
-def _solutions(A: ca.SX, right: ca.SX) -> list[list[ca.SX]]:
-    """Solutions of (sigma + A) y = right for every sigma; eliminations are shared."""
-    inverses = [1 / (A[0, 0] + sign) for sign in (1, -1)]
-    if right.numel() == 1:
-        return [[right * inverse] for inverse in inverses]
+def _solutions(A: ca.SX, right: ca.SX) -> list[tuple[list[ca.SX], ca.SX, ca.SX]]:
+    """Solutions of (sigma + A) y = right for every sigma; eliminations are shared.
+
+    Each with det(sigma + A) det(sigma), and a number that is positive where its pivots are known.
+    """
     found = []
-    for inverse in inverses:
+    for sign in (1, -1):
+        pivot = A[0, 0] + sign
+        known, inverse = ca.fabs(pivot) - PIVOT * (1 + ca.fabs(A[0, 0])), 1 / pivot
+        if right.numel() == 1:
+            found.append(([right * inverse], sign * pivot, known))
+            continue
         ratio = A[1:, 0] * inverse
-        for rest in _solutions(A[1:, 1:] - ratio @ A[0, 1:], right[1:] - ratio * right[0]):
-            first = right[0] - A[0, 1:] @ ca.vertcat(*rest)
-            found.append([first * inverse, *rest])
+        rest = _solutions(A[1:, 1:] - ratio @ A[0, 1:], right[1:] - ratio * right[0])
+        for y, turned, quality in rest:
+            first = (right[0] - A[0, 1:] @ ca.vertcat(*y)) * inverse
+            found.append(([first, *y], sign * pivot * turned, ca.fmin(known, quality)))
     return found

@@ -7,7 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import JammedError, NumberRangeError, SampleError, SingularError, as_flag
+from ..errors import (
+    AmbiguousError,
+    JammedError,
+    NumberRangeError,
+    SampleError,
+    SingularError,
+    as_flag,
+)
 from ..kinematics.causes import ERRORS, FLAG, Owner, cause_text, causes, owners, sample_error
 from ..kinematics.chain import FAMILIES
 from ..kinematics.constraints import indices
@@ -127,8 +134,13 @@ def _error(status: Status, owner: Owner, bad: np.ndarray, first_row: int) -> Sam
     if status == Status.jammed:
         kind: type[SampleError] = JammedError
         text = f"the mechanism jams at row {row}: friction at the contacts has no consistent "
-        text += "pattern of signs under these efforts, or several"
-        hint = "There is no one answer with rigid bodies; less friction or other efforts have one"
+        text += "pattern of signs under these efforts"
+        hint = "Rigid bodies have no solution there; less friction or other efforts have one"
+    elif status == Status.ambiguous:
+        kind = AmbiguousError
+        text = f"several motions follow from the efforts at row {row}: friction at the contacts "
+        text += "has more than one consistent pattern of signs"
+        hint = "Rigid bodies have no single solution there; less friction or other efforts have one"
     elif status == Status.singular:
         kind, text = SingularError, f"the mechanism is singular at row {row}"
         if owner.kind == "chain":

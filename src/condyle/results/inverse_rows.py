@@ -134,7 +134,9 @@ def solve_table(
         )
     states = given.states(table, names, threads)
     wrench, at = given.loads(table, load_point)
-    evaluation = model.inverse_dynamics(*states, wrench, at, outputs=SOLVED, threads=threads)
+    evaluation = model.inverse_dynamics(
+        *states, wrench, at, outputs=(*SOLVED, "ambiguous"), threads=threads
+    )
     derived = Derived(mechanism, evaluation, wrench, model.limited)
     if not flag:
         require_ok(mechanism, evaluation, row_offset=first_row)

@@ -47,7 +47,9 @@ def solve(
         name = resolve_load_point(name, model.mechanism.platform.points)
     with step("solving"):
         states, residual = model.poses.of_motion(motion)
-        evaluation = model.inverse_dynamics(*states, wrench, name, outputs=SOLVED, threads=threads)
+        evaluation = model.inverse_dynamics(
+            *states, wrench, name, outputs=(*SOLVED, "ambiguous"), threads=threads
+        )
     if not flag:
         require_ok(model.mechanism, evaluation, motion.t)
     seconds = time.perf_counter() - start

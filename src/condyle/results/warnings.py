@@ -64,6 +64,11 @@ KINDS = {
         "variants with samples without a result (`--vary`)",
         "the bands leave them out; a study of the same numbers by `condyle sweep` has the reasons",
     ),
+    "ambiguous": Kind(
+        "efforts that do not determine the motion",
+        "under friction this strong other motions follow from the same efforts: reduce friction, "
+        "or change the motion; the theory page on what can go wrong has more",
+    ),
     "near_singularity": Kind(
         "samples near a singularity",
         f"ratio below {NEAR_SINGULAR:g}: torques grow, and so does the effect of every error in "
@@ -167,6 +172,8 @@ class Watch:
                 margin = derived.margin[:, i]
                 tally("bounds", i, margin < -BOUND_TOLERANCE, -margin)
                 tally("contact_loss", i, derived.contact_loss[:, i], np.abs(e.contact_force[:, i]))
+            if "ambiguous" in vars(e):
+                tally("ambiguous", 0, e.ambiguous, np.zeros(len(ok)))
             tally("near_singularity", 0, derived.near != 0, -configuration.singularity.ratio)
             for i, chain in enumerate(self.mechanism.chains):
                 limit, effort, speed = limits(chain), e.effort[:, i], np.abs(e.joint_rate[:, i])
@@ -234,6 +241,10 @@ class Watch:
             else:
                 unit, text = "m", f"leaves its bounds {when}, by up to {size * 1e3:.3g} mm {worst}"
             text = f'contact "{name}" {text}'
+        elif kind == "ambiguous":
+            name, value, bound, unit = None, None, None, None
+            text = f"the efforts of {count} do not determine the motion, first "
+            text += f"{self._at(tally.first)}: under friction other motions follow from them too"
         elif kind == "near_singularity":
             name, value, bound, unit = None, -size, NEAR_SINGULAR, "1"
             are = "is" if tally.count == 1 else "are"

@@ -35,7 +35,7 @@ NO_EFFORTS: dict[int, str] = {
     Status.singular: "Singular: the efforts are not determined here",
     Status.overflow: "The load is too large for numbers",
     Status.infeasible: "Infeasible: no efforts within the limits balance the load",
-    Status.jammed: "Jammed: Coulomb friction has no solution here, or several",
+    Status.jammed: "Jammed: Coulomb friction has no solution here",
     Status.uncertified: "The efforts found here failed the accuracy check",
     Status.gimbal_lock: "Gimbal lock: beta is +-90 degrees",
 }
