@@ -15,6 +15,7 @@ from .version import __version__
 
 # Heavy rooms open when they are entered: `import condyle` alone loads nothing.
 _HOMES = {
+    "AmbiguousError": "errors",
     "CondyleError": "errors",
     "InfeasibleError": "errors",
     "InputError": "errors",
@@ -76,6 +77,7 @@ if TYPE_CHECKING:
     from .analysis.sweep import Study, open_sweep, sweep
     from .analysis.weight_curve import tradeoff
     from .errors import (
+        AmbiguousError,
         CondyleError,
         GimbalLockError,
         InfeasibleError,

@@ -42,6 +42,7 @@ def made_up(mechanism: condyle.Mechanism, count: int) -> Any:
         contact_force=rng.normal(0, 1, (count, k)),
         configuration=configuration,
         status=rng.choice([0, 0, 0, 1, 2, 3], count).astype(np.int8),
+        ambiguous=rng.uniform(size=count) > 0.9,
     )
 
 
