@@ -156,6 +156,7 @@ class Context:
     lanes: int
     arguments: Arguments
     struct: bool = False
+    landmark: str | None = None
     tables: dict[str, np.ndarray] = field(default_factory=dict)
     printers: dict[str, Printer] = field(default_factory=dict)
 

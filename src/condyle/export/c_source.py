@@ -88,7 +88,10 @@ def export(
     if constants not in ("inside", "struct"):
         raise InputError(f'constants: expected inside or struct, got "{constants}"')
     struct = constants == "struct"
-    if not struct:
+    if struct:  # two planes need not stay parallel
+        structure = replace(structure, parallel=False)
+        numbers = Layout.of(structure).numbers(mechanism, landmark)
+    else:
         structure = specialised(structure, numbers)
     real = require_precision(precision)
     plain = struct or real != "double"
@@ -96,7 +99,17 @@ def export(
     name = require_prefix((f"{own}_" if own in OTHERS else own) if prefix is None else prefix)
     wish = Wish(in_order(coordinates), landmark)
     arguments = Arguments(mechanism, wish.coordinates, landmark)
-    c = Context(mechanism, structure, numbers, name, real, 0 if plain else lanes, arguments, struct)
+    c = Context(
+        mechanism,
+        structure,
+        numbers,
+        name,
+        real,
+        0 if plain else lanes,
+        arguments,
+        struct,
+        landmark,
+    )
     bodies = [function(c, question, entry, wish) for question, entry in entries.items()]
     named = [*(chain.name for chain in mechanism.chains), *mechanism.contact_names]
     portable = _portable(c, bodies)

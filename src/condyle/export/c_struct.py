@@ -1,63 +1,70 @@
 """Constants in a structure that a program fills: the mechanism's numbers, and what is made of them.
 
-`numbers` are what a calibration changes, always in double; `prepare` computes from them, once, the
-`constants` that every function is given.
+`numbers` are those of the mechanism file, which a calibration changes, always in double; `prepare`
+computes from them, once, the `constants` that every function is given.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
-from ..backends.c.prepare import prepare
+from ..backends.c.prepare import fixed_name, fixed_values, prepare
 from ..backends.c.printer import Printer
+from ..graph.graph import Value
+from ..graph.program import Output
 from ..kinematics.chain import FAMILIES
+from ..questions.file_numbers import file_numbers
 from ..questions.numbers import Layout
 from .c_context import Context
-from .c_names import packaged, picked
+from .c_function import Places, Scalar
+from .c_names import in_comment, packaged, picked
 
-# What the shared numbers are; of contacts and chains `FIELDS` says it once for all.
 FIELDS = {
     "gravity": "m/s^2, in {S}",
     "mass": "kg, of the platform",
-    "first_moment": "kg m, of the platform about O_M, in {M}",
     "inertia": "kg m^2, of the platform about O_M, in {M}: xx, yy, zz, xy, xz, yz",
-    "lumped_mass": "the same with the chains' masses that move with the platform's joints",
-    "lumped_first_moment": "",
-    "lumped_inertia": "",
-    "branch": "-1 or 1: the branch of the dependent angle",
-    "length": "m, the characteristic length",
     "landmark": "m, in {M}: the point whose path is given",
-    "middle": "m, in {M}: between the contact points",
-    "slope": "of both planes, z by x and y",
-    "mean": "m, in {M}: between the contact points",
-    "mean_offset": "m, mean of the planes' heights",
-    "difference": "m, in {M}: first contact point less the second",
-    "gap": "m, difference of the planes' heights",
+    "contact_point": "m, centre of the ball in {M}",
+    "contact_surface": "constants of the surface that the ball's centre stays on",
+    "friction": "coefficient, smoothing speed [m/s], ball radius [m] by the sign of its side",
 }
 LANES = {
+    "base": "m, in {S}: crank pivot, slider's joint at home, or base joint",
+    "axis": "of the shaft or rail, in {S}; its length does not matter",
+    "crank_tip": "m, at home, in {S}",
     "joint": "m, platform joint in {M}",
-    "constants": "the family's constants, in the order of their names",
-    "actuator": "rotor inertia at the joint, viscous and Coulomb friction, smoothing speed squared",
+    "mass": "kg",
+    "com": "mass centre, as in the file",
+    "transverse": "kg m^2, across, about the mass centre",
+    "axial": "kg m^2, along",
+    "inertia": "kg m^2, about its axis",
+    "gear": "turns of the motor a turn of the joint, or rad/m",
+    "viscous": "N m s/rad or N s/m",
+    "coulomb": "N m or N",
+    "smoothing_speed": "rad/s or m/s",
 }
-ONE = "mask"  # of a lane that is a chain
+SURFACES = {
+    "plane": "slopes by x and y; height at the origin [m]",
+    "quadratic": "m, height at the origin; slopes by x and y; xx, xy, yy [1/m]",
+}
 
 
 def declared(c: Context) -> str:
     """Both types, the mechanism's own numbers, and `prepare`, for the header."""
-    p, P = c.prefix, c.prefix.upper()
-    lines = ["/* The mechanism's numbers; chains of a family in the order of the file. */"]
+    p, P, layout = c.prefix, c.prefix.upper(), Layout.of_file(c.structure)
+    lines = ["/* The numbers of the mechanism file; chains of a family in its order. */"]
     lines += ["typedef struct {"]
-    for name, size in _shared(c).items():
-        known = FIELDS.get(name) or FIELDS.get(f"lumped_{name}", "")
-        about = known or ("of its contact" if name[-1].isdigit() else "")
-        lines.append(f"    double {_at(name, size, size)};{f' /* {about} */' if about else ''}")
-    for group, kind in enumerate(c.structure.families):
+    for name, (_, size) in layout.parameters.items():
+        if size:
+            lines.append(f"    double {_at(name, size, size)}; /* {_about(c, name)} */")
+    for (kind, count), lane in zip(c.structure.chains, layout.lanes, strict=True):
         lines.append("    struct {")
-        lines += [
-            f"        double {_at(name, size, size)};"
-            for name, size in _lane_fields(c, group).items()
-        ]
-        lines.append(f"    }} {kind}[{c.structure.counts[group]}];")
+        for path, (_, size) in lane.items():
+            name = _field(path)
+            about = LANES.get(name) or LANES[path.rpartition(".")[2].removeprefix("rotor_")]
+            lines.append(f"        double {_at(name, size, size)}; /* {about} */")
+        lines.append(f"    }} {kind}[{count}];")
     lines += [f"}} {p}_numbers;", "", "/* What functions read: filled by prepare. */"]
     lines += ["typedef struct {"]
     for name, table in c.tables.items():
@@ -70,90 +77,119 @@ def declared(c: Context) -> str:
     return "\n".join(lines)
 
 
+def _about(c: Context, name: str) -> str:
+    """What a shared number is."""
+    kind, _, i = name.rpartition("_")
+    if name in FIELDS:
+        return FIELDS[name]
+    contact = c.mechanism.contact_names[int(i)]
+    about = FIELDS[kind]
+    if kind == "contact_surface":
+        form, _ = c.structure.contacts[int(i)]
+        about += f": {SURFACES[form]}" if form in SURFACES else ""
+    return f"{in_comment(contact)}: {about}"
+
+
 def prepared(c: Context) -> str:
     """`prepare` and what it is made of, for the source."""
-    code = "\n".join(_prepare(c, name, printer) for name, printer in c.printers.items())
+    kernels = "\n".join(_prepare(c, name, printer) for name, printer in c.printers.items())
+    code = f"{kernels}\n{_whole(c)}"
     text = re.sub(r"\breal\b", "double", packaged("c_scalar.h"))
     text = re.sub(r"\bF\((\w+)\)", r"\1", re.sub(r"\bR\(([^()]*)\)", r"\1", text))
     text = picked(re.sub(r"\b(\w+)_s\b", r"\1_d", text), code)
-    p = c.prefix
-    head = f"void {p}_prepare(const {p}_numbers *numbers, {p}_constants *constants)"
-    calls = [f"    prepare_{name}(numbers, constants->{name});" for name in c.printers]
-    return "\n".join([text, code, head, "{", *calls, "}", ""])
+    return f"{text}\n{code}"
+
+
+def _whole(c: Context) -> str:
+    """`prepare`: the file's numbers to the kernel's, and these to constants."""
+    program, layout, p = file_numbers(c.structure), Layout.of(c.structure), c.prefix
+    printer = Scalar(program, Places((), {}, c.numbers.order), "double")
+    own = Layout.of_file(c.structure)
+    shared = {
+        start + i: _at(name, size, i)
+        for name, (start, size) in own.parameters.items()
+        for i in range(size)
+    }
+    lanes = [
+        {start + i: _at(_field(path), size, i) for path, (start, size) in lane.items()
+         for i in range(size)}
+        for lane in own.lanes
+    ]  # fmt: skip
+
+    def lane_place(m: re.Match[str]) -> str:
+        group = int(m[1])
+        return f"numbers->{c.structure.families[group]}[i].{lanes[group][int(m[2])]}"
+
+    text = "\n".join(f"  {line}" for line in _used(printer))
+    text = re.sub(r"\bpar\[(\d+)\]", lambda m: f"numbers->{shared[int(m[1])]}", text)
+    text = _in_double(re.sub(r"\blane\[(\d+)\]\[(\d+) \* \d+ \+ i\]", lane_place, text))
+    counts = [f"{sum(n for _, n in lane.values())} * {count}"
+              for lane, count in zip(layout.lanes, c.structure.counts, strict=True)]  # fmt: skip
+    names = [f"lane_{group}" for group in range(len(counts))]
+    sizes = ", ".join(f"{name}[{size}]" for name, size in zip(names, counts, strict=True))
+    return "\n".join(
+        [
+            f"void {p}_prepare(const {p}_numbers *numbers, {p}_constants *constants)",
+            "{",
+            f"    double par[{sum(n for _, n in layout.parameters.values())}], {sizes};",
+            f"    const double *const lane[] = {{{', '.join(names)}}};",
+            text,
+            *(f"    {line}" for o in program.outputs for line in _stored(c, printer, layout, o)),
+            *(f"    prepare_{name}(par, lane, constants->{name});" for name in c.printers),
+            "}",
+            "",
+        ]
+    )
+
+
+def _stored(c: Context, printer: Printer, layout: Layout, o: Output) -> Iterator[str]:
+    """Statements that put a number of the kernel's where it is read."""
+    if not o.lanes:
+        start, _ = layout.parameters[o.name]
+        for i, (v,) in enumerate(o.entries):
+            assert v is not None
+            yield f"par[{start + i}] = {fixed_name(printer, v)};"
+        return
+    name, _, number = o.name.rpartition("_")
+    group = int(number)
+    start, count = layout.lanes[group][name][0], c.structure.counts[group]
+    for i, entry in enumerate(o.entries):
+        value: Value | None = entry[group]
+        assert value is not None
+        loop = f"for (int i = 0; i < {count}; i++)"
+        yield f"{loop} lane_{group}[{start + i} * {count} + i] = {fixed_name(printer, value)};"
 
 
 def _prepare(c: Context, name: str, printer: Printer) -> str:
-    """As the kernels have it, with numbers from the structure."""
-    text = prepare(printer, f"prepare_{name}")
-    layout = Layout.of(c.structure)
-    for v in printer.fixed:
-        if printer.g.nodes[v].op == "const":  # stands where it is used
-            text = re.sub(rf"^  const double x{v} = .*\n", "", text, flags=re.MULTILINE)
-    shared = {
-        start + i: _at(name, size, i)
-        for name, (start, size) in layout.parameters.items()
-        for i in range(size)
-    }
-    text = re.sub(r"\bpar\[(\d+)\]", lambda m: f"numbers->{shared[int(m[1])]}", text)
-
-    def lane(m: re.Match[str]) -> str:
-        group, k = int(m[1]), int(m[2])
-        field = _lane_places(c, group)[k]
-        return "1.0" if field == ONE else f"numbers->{c.structure.families[group]}[i].{field}"
-
-    text = re.sub(r"\blane\[(\d+)\]\[(\d+) \* \d+ \+ i\]", lane, text)
-    text = re.sub(r"\b(\w+)_s\(", r"\1_d(", text)
+    """As the kernels have it."""
+    text = prepare(printer, f"prepare_{name}").replace("HIDDEN void", "static void", 1)
+    defined = "\n".join(fixed_values(printer))
+    text = _in_double(text.replace(defined, "\n".join(_used(printer))))
     text = re.sub(r"(table\[[^\]]*\]) = ([^;]+);", rf"\1 = ({c.precision})\2;", text)
-    head = f"static void prepare_{name}(const {c.prefix}_numbers *numbers, {c.precision} *table)"
-    _, _, body = text.partition("{")
-    return f"{head}\n{{\n    (void)numbers, (void)table;{body}"
+    text = text.replace("double *table)", f"{c.precision} *table)", 1)
+    return text.replace("{", "{\n  (void)par, (void)lane, (void)table;", 1)
 
 
-def _shared(c: Context) -> dict[str, int]:
-    """Shared numbers that some function reads, and their sizes."""
-    layout, used = Layout.of(c.structure), set()
-    for printer in c.printers.values():
-        nodes = (printer.g.nodes[v] for v in printer.fixed)
-        used |= {node.data[0] for node in nodes if node.op == "parameter"}
-    return {
-        name: size
-        for name, (start, size) in layout.parameters.items()
-        if used & set(range(start, start + size))
-    }
+def _used(printer: Printer) -> list[str]:
+    """Definitions of fixed values but of numbers, which stand where they are used."""
+    nodes = printer.g.nodes
+    known = {f"  const double x{v} = " for v in printer.fixed if nodes[v].op == "const"}
+    return [line for line in fixed_values(printer) if line.partition("= ")[0] + "= " not in known]
 
 
-def _lane_fields(c: Context, group: int) -> dict[str, int]:
-    """Numbers of a chain of a group, and their sizes."""
-    found: dict[str, int] = {}
-    for name, (_, size) in Layout.of(c.structure).lanes[group].items():
-        if name == "constants":
-            found |= FAMILIES[c.structure.families[group]].shapes
-        elif name != ONE:
-            found[name] = size
-    return found
-
-
-def _lane_places(c: Context, group: int) -> list[str]:
-    """C for each number of a lane."""
-    places = [ONE]
-    for name, size in _lane_fields(c, group).items():
-        places += [_at(name, size, i) for i in range(size)]
-    return places
+def _in_double(text: str) -> str:
+    return re.sub(r"\b(\w+)_s\(", r"\1_d(", text)
 
 
 def _initialiser(c: Context) -> list[str]:
-    layout = Layout.of(c.structure)
-    rows = []
-    for name, size in _shared(c).items():
-        start, _ = layout.parameters[name]
-        rows.append(_values(c.numbers.parameters[start : start + size]))
-    for group in range(len(c.structure.families)):
+    layout = Layout.of_file(c.structure)
+    values = layout.file_values(c.mechanism, c.landmark)
+    rows = [_values(values[name]) for name, (_, size) in layout.parameters.items() if size]
+    for kind, lane in zip(c.structure.families, layout.lanes, strict=True):
         chains = []
-        for own in c.numbers.lanes[group].T:
-            fields, at = [], 1
-            for size in _lane_fields(c, group).values():
-                fields.append(_values(own[at : at + size]))
-                at += size
+        for chain in (chain for chain in c.mechanism.chains if chain.kind == kind):
+            own, fields = FAMILIES[kind].file_numbers(chain, lane), []
+            fields = [_values(own[start : start + size]) for start, size in lane.values()]
             chains.append(f"{{{', '.join(fields)}}}")
         rows.append("{" + ", \\\n     ".join(chains) + "}")
     return [*(f"{row}," for row in rows[:-1]), rows[-1]]
@@ -162,6 +198,11 @@ def _initialiser(c: Context) -> list[str]:
 def _values(numbers: object) -> str:
     values = [repr(float(x)) for x in numbers]  # type: ignore[attr-defined]
     return values[0] if len(values) == 1 else f"{{{', '.join(values)}}}"
+
+
+def _field(path: str) -> str:
+    """A field of a chain in C: `joint` is the joint on the platform, that of the crank its tip."""
+    return "joint" if path == "platform" else path.replace(".", "_")
 
 
 def _at(name: str, size: int, i: int) -> str:

@@ -9,7 +9,6 @@ of the exported functions is a row of scalar variables, called as array and labe
 from __future__ import annotations
 
 import hashlib
-import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -154,39 +153,31 @@ def _scalars(e: Exported, a: Argument, role: str, first: int) -> Iterable[Scalar
 
 def _tuned(mechanism: Mechanism, e: Exported) -> Iterator[Tuned]:
     """Gravity, mass and inertia of the platform, and numbers of single chains."""
-    platform, numbers = mechanism.platform, e.header.partition("_numbers;")[0]
-    sized = re.findall(r"double (\w+)", numbers)
-    if "gravity" in sized:
-        for i, (axis, start) in enumerate(zip("xyz", map(float, mechanism.gravity), strict=True)):
-            about = f"gravity.{axis}", "m/s^2", f"gravity along {axis} of {{S}}"
-            yield *about, start, f"n.gravity[{i}] = value"
-    # The numbers hold the chains' masses that move with the platform's joints as well.
-    mass, inertia = (
-        next((name for name in (f"lumped_{own}", own) if name in sized), None)
-        for own in ("mass", "inertia")
-    )
-    if mass is not None:
-        put = f"n.{mass} += value - {platform.mass!r}"
-        yield "platform.mass", "kg", "mass of the platform", platform.mass, put
-    for i, key in enumerate(("xx", "yy", "zz", "xy", "xz", "yz") if inertia else ()):
+    platform = mechanism.platform
+    losses = any(not chain.actuator.ideal for chain in mechanism.chains)
+    for i, (axis, start) in enumerate(zip("xyz", map(float, mechanism.gravity), strict=True)):
+        about = f"gravity.{axis}", "m/s^2", f"gravity along {axis} of {{S}}"
+        yield *about, start, f"n.gravity[{i}] = value"
+    yield "platform.mass", "kg", "mass of the platform", platform.mass, "n.mass = value"
+    for i, key in enumerate(("xx", "yy", "zz", "xy", "xz", "yz")):
         start = float(getattr(platform.inertia, key))
         about = f"platform.inertia.{key}", "kg m^2", f"inertia {key} of the platform"
-        yield *about, start, f"n.{inertia}[{i}] += value - {start!r}"
+        yield *about, start, f"n.inertia[{i}] = value"
     seen = Counter[str]()
     for chain in mechanism.chains:
         name, at = e.names[chain.name], f"n.{chain.kind}[{seen[chain.kind]}]"
         seen[chain.kind] += 1
         if chain.kind == "RSS":
             about = f"crank_inertia.{name}", "kg m^2", f"of the crank of {chain.name}"
-            yield *about, chain.crank.inertia, f"{at}.crank = value"
+            yield *about, chain.crank.inertia, f"{at}.crank_inertia = value"
         if chain.kind == "PSS":
             about = f"slider_mass.{name}", "kg", f"of the slider of {chain.name}"
-            yield *about, chain.slider.mass, f"{at}.slider = value"
-        if "actuator" in sized:
+            yield *about, chain.slider.mass, f"{at}.slider_mass = value"
+        if losses:
             family, text = FAMILIES[chain.kind], f"friction of {chain.name}"
             units = f"{family.effort_unit} s/{family.joint_unit}", family.effort_unit
-            for k, (key, unit) in enumerate(zip(("viscous", "coulomb"), units, strict=True), 1):
-                own = getattr(chain.actuator, key), f"{at}.actuator[{k}] = value"
+            for key, unit in zip(("viscous", "coulomb"), units, strict=True):
+                own = getattr(chain.actuator, key), f"{at}.actuator_{key} = value"
                 yield f"{key}.{name}", unit, text, *own
 
 

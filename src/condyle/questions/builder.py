@@ -23,9 +23,9 @@ Lanes = list[ca.SX]  # one expression a group
 class Builder:
     """Collects the graph of one question about mechanisms of one structure."""
 
-    def __init__(self, structure: Structure) -> None:
+    def __init__(self, structure: Structure, layout: Layout | None = None) -> None:
         self.structure = structure
-        self.layout = Layout.of(structure)
+        self.layout = layout or Layout.of(structure)
         self.graph = Graph()
         self._ports: list[Port] = []
         self._columns = 0

@@ -28,6 +28,9 @@ from ..mechanism.mechanism import Mechanism
 from ..mechanism.surface import of_form
 from .structure import Structure
 
+LOSSES = tuple(
+    f"actuator.{key}" for key in ("rotor_inertia", "gear", "viscous", "coulomb", "smoothing_speed")
+)
 NO_LOSSES = (0.0, 0.0, 0.0, 1.0)
 Parameter = Callable[[str], ca.SX]  # a mechanism's number by name
 Slot = tuple[int, int]  # start, count
@@ -64,6 +67,25 @@ class Layout:
             for kind in structure.families
         ]
         return Layout(structure, _slots(sizes), lanes)
+
+    @staticmethod
+    def of_file(structure: Structure) -> Layout:
+        """Numbers as a mechanism file has them, which `file_numbers` makes the others of."""
+        sizes = {"gravity": 3, "mass": 1, "inertia": 6, "landmark": 3}
+        for i, (_, count) in enumerate(structure.contacts):
+            sizes |= {f"contact_point_{i}": 3, f"contact_surface_{i}": count}
+        sizes |= {f"friction_{i}": 3 for i in structure.friction}
+        losses = dict.fromkeys(LOSSES, 1) if structure.losses else {}
+        lanes = [_slots(FAMILIES[kind].numbers | losses) for kind in structure.families]
+        return Layout(structure, _slots(sizes), lanes)
+
+    def file_values(self, mechanism: Mechanism, landmark: str | None = None) -> dict[str, Any]:
+        """Shared numbers of `of_file`, by name; of friction the smoothing speed, not its square."""
+        values = self._values(mechanism, landmark, constants_of(mechanism))
+        for i in self.structure.friction:
+            f = mechanism.contacts[i].friction
+            values[f"friction_{i}"] = (f.coefficient, f.smoothing_speed, values[f"friction_{i}"][2])
+        return {name: np.ravel(values[name]) for name in self.parameters}
 
     def _values(
         self, mechanism: Mechanism, landmark: str | None, constants: Sequence[ChainNumbers]

@@ -15,19 +15,21 @@ Numbers of a chain enter as named constants, so that one expression serves every
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
+from operator import attrgetter
 from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
 
-from ...mechanism.bodies import cross
 from ...mechanism.coordinates import rotations
 from ..rotation import rotation_y, rotation_z
 
 Cut = Callable[[ca.SX], ca.SX]
 
+CONSTANT_SHAPES = {1: (), 9: (3, 3)}  # others are vectors
 NEAR_X = np.cos(np.radians(5.0))  # a rod this near X_S takes Y_S for its frame
 
 
@@ -173,14 +175,33 @@ class Family(ABC):
     bodies: ClassVar[tuple[str, ...]]
     joint_unit: ClassVar[str]
     effort_unit: ClassVar[str]
-    shapes: ClassVar[dict[str, int]]  # constant -> number of entries (1, 3 or 9)
+    numbers: ClassVar[dict[str, int]]  # path in the chain's table -> number of entries
+    shapes: ClassVar[dict[str, int]]  # constant -> number of entries (1, 2, 3 or 9)
     # Constants that make J and forces of `dynamics` vanish at 0, for lanes without a chain. A
     # family without any is masked by a few multiplications.
     padding: ClassVar[tuple[str, ...]] = ()
 
     @abstractmethod
-    def constants(self, chain: Any) -> dict[str, Any]:
-        """Numbers of one chain, by the names of `shapes`: array-like."""
+    def derived(self, f: Constants) -> dict[str, ca.SX]:
+        """Constants by the names of `shapes`, from the file's numbers.
+
+        Args: f: by the paths of `numbers`, with `_` for a dot.
+        """
+
+    def constants(self, chain: Any) -> dict[str, np.ndarray]:
+        """Constants of one chain, by the names of `shapes`."""
+        found = np.asarray(_derivation(self)(self.file_numbers(chain))).ravel()
+        values, start = {}, 0
+        for name, count in self.shapes.items():
+            part = found[start : start + count]
+            values[name] = part.reshape(CONSTANT_SHAPES.get(count, (count,)))
+            start += count
+        return values
+
+    def file_numbers(self, chain: Any, paths: Iterable[str] | None = None) -> np.ndarray:
+        """The file's numbers of a chain at some paths of its table; default: `numbers`."""
+        parts = [attrgetter(path)(chain) for path in paths or self.numbers]
+        return np.array([x for part in parts for x in np.ravel(part)], dtype=float)
 
     @abstractmethod
     def end_point(self, c: Constants, q_r: ca.SX) -> ca.SX:
@@ -234,14 +255,31 @@ class Family(ABC):
     @classmethod
     def named(cls, vector: Any) -> Constants:
         """Constants by name from a symbolic or numeric vector, (size,)."""
-        values, start = {}, 0
-        for name, count in cls.shapes.items():
-            part = vector[start : start + count]
-            if count == 9:
-                part = ca.reshape(part, 3, 3).T
-            values[name] = part[0] if count == 1 else part
-            start += count
-        return Constants(values)
+        return _named(vector, cls.shapes)
+
+    def derived_vector(self, numbers: Any) -> ca.SX:
+        """Constants in the order of `shapes` from the file's numbers in theirs."""
+        paths = {path.replace(".", "_"): count for path, count in self.numbers.items()}
+        found = self.derived(_named(numbers, paths))
+        return ca.densify(ca.vertcat(*(ca.vec(ca.SX(found[name]).T) for name in self.shapes)))
+
+
+def _named(vector: Any, shapes: Mapping[str, int]) -> Constants:
+    values, start = {}, 0
+    for name, count in shapes.items():
+        part = vector[start : start + count]
+        if count == 9:
+            part = ca.reshape(part, 3, 3).T
+        values[name] = part[0] if count == 1 else part
+        start += count
+    return Constants(values)
+
+
+@cache
+def _derivation(family: Family) -> ca.Function:
+    """A family's constants as a function of the file's numbers."""
+    numbers = ca.SX.sym("numbers", sum(family.numbers.values()))
+    return ca.Function("constants", [numbers], [family.derived_vector(numbers)])
 
 
 def joint_position(chain: Any, pose: np.ndarray) -> np.ndarray:
@@ -249,13 +287,17 @@ def joint_position(chain: Any, pose: np.ndarray) -> np.ndarray:
     return pose[:3] + rotations(np.asarray(pose[3:])) @ np.asarray(chain.platform)
 
 
-def rod_frame(direction: np.ndarray) -> np.ndarray:
+def rod_frame(direction: ca.SX) -> ca.SX:
     """N_i0, (3, 3): X along the rod at home, Y = X x X_S (X x Y_S for a rod near X_S)."""
-    x = direction / np.linalg.norm(direction)
-    reference = np.array([0.0, 1.0, 0.0] if abs(x[0]) > NEAR_X else [1.0, 0.0, 0.0])
-    y = cross(x, reference)
-    y /= np.linalg.norm(y)
-    return np.column_stack([x, y, cross(x, y)])
+    x = unit(direction)
+    near = ca.fabs(x[0]) > NEAR_X
+    y = unit(ca.cross(x, ca.vertcat(ca.logic_not(near), near, 0)))
+    return ca.horzcat(x, y, ca.cross(x, y))
+
+
+def unit(vector: ca.SX) -> ca.SX:
+    """The unit vector along another, (3,)."""
+    return vector / ca.norm_2(vector)
 
 
 def rod_angles(N: ca.SX, rod: ca.SX, length: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:

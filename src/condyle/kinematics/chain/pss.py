@@ -11,8 +11,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from .family import ChainDynamics, Constants, Cut, Joint, Link, Loop, joint_position
-from .rod import ROD, RodFamily
+from .family import ChainDynamics, Constants, Cut, Joint, Link, Loop, joint_position, unit
+from .rod import ROD, ROD_NUMBERS, RodFamily
 
 
 class PSSFamily(RodFamily):
@@ -23,16 +23,20 @@ class PSSFamily(RodFamily):
     effort_unit = "N"
     # S is the slider's joint at home.
     padding = ("branch", "mass", "transverse", "axial", "slider")
+    numbers = {
+        **dict.fromkeys(("base", "axis", "platform"), 3),
+        **dict.fromkeys(("slider.mass", *(f"rod.{name}" for name in ROD_NUMBERS)), 1),
+    }
     shapes = {"S": 3, "axis": 3, **ROD, "slider": 1, "N": 9}
 
-    def constants(self, chain: Any) -> dict[str, Any]:
-        axis = np.asarray(chain.axis) / np.linalg.norm(chain.axis)
+    def derived(self, f: Constants) -> dict[str, ca.SX]:
+        axis, rod = unit(f.axis), f.platform - f.base
         return {
-            "S": chain.base,
+            "S": f.base,
             "axis": axis,
-            "branch": np.sign(np.subtract(chain.platform, chain.base) @ axis),
-            "slider": chain.slider.mass,
-            **self.rod_constants(chain.rod, chain.base, chain.platform),
+            "branch": ca.sign(ca.dot(rod, axis)),
+            "slider": f.slider_mass,
+            **self.rod_constants(f, "rod", rod),
         }
 
     def tip(self, c: Constants, q_r: ca.SX) -> ca.SX:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import casadi as ca
-import numpy as np
 
 from .family import (
     Constants,
@@ -24,6 +23,7 @@ from .family import (
 )
 
 # Constants of every rod: N is N_i0 and Y its second axis; `branch` is that of home.
+ROD_NUMBERS = ("mass", "com", "transverse", "axial")  # of the file
 ROD = {"L": 1, "branch": 1, "Y": 3, "mass": 1, "com": 1, "transverse": 1, "axial": 1}
 
 
@@ -41,12 +41,11 @@ class RodFamily(Family):
         """The link that the actuator drives, and its joint."""
 
     @staticmethod
-    def rod_constants(rod: Any, start: Any, end: Any) -> dict[str, Any]:
-        """Those of `ROD` but the branch, and N."""
-        line = np.subtract(end, start)
+    def rod_constants(f: Constants, rod: str, line: ca.SX) -> dict[str, ca.SX]:
+        """Those of `ROD` but the branch, and N. Args: rod: its table;  line: S to M at home."""
         N = rod_frame(line)
-        bodies = {name: getattr(rod, name) for name in ("mass", "com", "transverse", "axial")}
-        return {"L": np.linalg.norm(line), "Y": N[:, 1], **bodies, "N": N}
+        bodies = {name: getattr(f, f"{rod}_{name}") for name in ROD_NUMBERS}
+        return {"L": ca.norm_2(line), "Y": N[:, 1], **bodies, "N": N}
 
     def end_point(self, c: Constants, q_r: ca.SX) -> ca.SX:
         return self.tip(c, q_r) + c.L * rod_direction(c.N, q_r)
@@ -82,17 +81,12 @@ class LineFamily(Family):
     joint_unit = "m"
     effort_unit = "N"
     sign: ClassVar[int]
+    numbers = {"base": 3, "platform": 3}
 
-    def constants(self, chain: Any) -> dict[str, Any]:
-        line = np.subtract(chain.platform, chain.base)
+    def derived(self, f: Constants) -> dict[str, ca.SX]:
+        line = f.platform - f.base
         N = rod_frame(line)
-        return {
-            "B": chain.base,
-            "home": np.linalg.norm(line),
-            "present": 1.0,
-            "Y": N[:, 1],
-            "N": N,
-        }
+        return {"B": f.base, "home": ca.norm_2(line), "present": ca.SX(1), "Y": N[:, 1], "N": N}
 
     def end_point(self, c: Constants, q_r: ca.SX) -> ca.SX:
         return c.B + (c.home + self.sign * q_r[0]) * rod_direction(c.N, q_r)

@@ -12,10 +12,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ...mechanism.bodies import cross
 from ..rotation import rotation_z
-from .family import ChainDynamics, Constants, Cut, Joint, Link, Loop, joint_position
-from .rod import ROD, RodFamily
+from .family import ChainDynamics, Constants, Cut, Joint, Link, Loop, joint_position, unit
+from .rod import ROD, ROD_NUMBERS, RodFamily
 
 LEVEL = 1e-15  # sine of a shaft's tilt below which its crank plane is plane_1 to rounding
 
@@ -28,28 +27,30 @@ class RSSFamily(RodFamily):
     effort_unit = "N m"
     # `plane_1` and `plane_2` span the crank plane; plane_1[2] = 0 saves a constant. C is C_i0.
     padding = ("branch", "mass", "transverse", "axial", "crank")
+    numbers = {
+        **dict.fromkeys(("base", "axis", "crank_tip", "platform"), 3),
+        **dict.fromkeys(("crank.inertia", *(f"coupler.{name}" for name in ROD_NUMBERS)), 1),
+    }
     shapes = {"G": 3, "plane_1": 2, "plane_2": 3, "l": 1, **ROD, "crank": 1, "C": 9, "N": 9}
 
-    def constants(self, chain: Any) -> dict[str, Any]:
-        crank = np.subtract(chain.crank_tip, chain.base)
-        x = crank / np.linalg.norm(crank)
-        z = np.asarray(chain.axis) - np.dot(chain.axis, x) * x
-        z /= np.linalg.norm(z)
-        y = cross(z, x)
-        plane_1 = np.array([-z[1], z[0]])
-        size = np.linalg.norm(plane_1)
-        plane_1 = plane_1 / size if size > LEVEL else np.array([1.0, 0.0])
-        if size <= LEVEL:
-            z = np.array([0.0, 0.0, np.sign(z[2])])  # the crank plane is plane_1 to rounding
+    def derived(self, f: Constants) -> dict[str, ca.SX]:
+        crank, coupler = f.crank_tip - f.base, f.platform - f.crank_tip
+        x = unit(crank)
+        z = unit(f.axis - ca.dot(f.axis, x) * x)
+        y = ca.cross(z, x)
+        size = ca.norm_2(z[:2])
+        level = size <= LEVEL
+        plane_1 = ca.if_else(level, ca.vertcat(1, 0), ca.vertcat(-z[1], z[0]) / size)
+        z = ca.if_else(level, ca.vertcat(0, 0, ca.sign(z[2])), z)
         return {
-            "G": chain.base,
+            "G": f.base,
             "plane_1": plane_1,
-            "plane_2": cross(z, [*plane_1, 0.0]),
-            "l": np.linalg.norm(crank),
-            "branch": -np.sign(np.subtract(chain.platform, chain.crank_tip) @ y),
-            "crank": chain.crank.inertia,
-            "C": np.column_stack([x, y, z]),
-            **self.rod_constants(chain.coupler, chain.crank_tip, chain.platform),
+            "plane_2": ca.cross(z, ca.vertcat(plane_1, 0)),
+            "l": ca.norm_2(crank),
+            "branch": -ca.sign(ca.dot(coupler, y)),
+            "crank": f.crank_inertia,
+            "C": ca.horzcat(x, y, z),
+            **self.rod_constants(f, "coupler", coupler),
         }
 
     def tip(self, c: Constants, q_r: ca.SX) -> ca.SX:

@@ -34,11 +34,12 @@ class SPSFamily(LineFamily):
     bodies = ("cylinders", "pistons")
     sign = 1
     padding = ("present", "piston_mass")  # `present` is 1; at 0 the leg has no row
+    numbers = LineFamily.numbers | {f"{body}.{name}": 1 for body, name in BODIES}
     shapes = {"B": 3, "home": 1, "present": 1, "Y": 3, **{f"{b}_{n}": 1 for b, n in BODIES}, "N": 9}
 
-    def constants(self, chain: Any) -> dict[str, Any]:
-        own = {f"{body}_{name}": getattr(getattr(chain, body), name) for body, name in BODIES}
-        return super().constants(chain) | own
+    def derived(self, f: Constants) -> dict[str, ca.SX]:
+        own = {f"{body}_{name}": getattr(f, f"{body}_{name}") for body, name in BODIES}
+        return super().derived(f) | own
 
     def links(self, c: Constants, q_r: ca.SX) -> list[Link]:
         n, spin = rod_direction(c.N, q_r), rod_spin(c.N, q_r)
