@@ -146,7 +146,6 @@ WRONG_MODELS = {
     "route": ("masticatory", {"route": None}),
     "backend": ("masticatory", {"backend": b"numpy"}),
     "distribution": ("masticatory", {"distribution": 1.0}),
-    "preload": ("masticatory", {"distribution": Distribution("bounded", preload="1")}),
 }
 
 
@@ -155,6 +154,13 @@ def test_a_wrong_model_is_named(name: str) -> None:
     mechanism, options = WRONG_MODELS[name]
     with pytest.raises(InputError, match=f"^{name}: expected"):
         condyle.derive(mechanism, **options)
+
+
+@pytest.mark.parametrize("name", ["preload", "contact_weight"])
+@pytest.mark.parametrize("value", ["1", -1.0, np.nan, np.inf, None, np.zeros(2)])
+def test_numbers_of_a_distribution(name: str, value: Any) -> None:
+    with pytest.raises(InputError, match=f"^{name}: expected a number of at least 0"):
+        Distribution("bounded", **{name: value})
 
 
 @pytest.mark.parametrize("name", ["masticatory", "mixed_k3_n9_curved"])

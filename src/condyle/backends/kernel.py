@@ -9,10 +9,11 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from ..errors import InputError, shown
-from ..graph.program import Interface, Numbers, Port
+from ..graph.program import Interface, Numbers
 
 Arrays = dict[str, np.ndarray]
 Found = tuple[Arrays, np.ndarray | int]
+DOUBLE = np.dtype(np.float64)
 OK, AGAIN = 0, 255  # statuses; others are those of the program's checks
 
 
@@ -32,7 +33,7 @@ class Answer:
 
         Args: robust: results by name, samples last, and statuses, from some samples' inputs.
         """
-        if self.status.any() and (again := np.flatnonzero(self.status == AGAIN)).size:
+        if np.count_nonzero(self.status) and (again := np.flatnonzero(self.status == AGAIN)).size:
             few = sample_rows(inputs, again, len(self.status))
             better, self.status[again] = robust(few)
             for name, value in self.values.items():
@@ -68,19 +69,37 @@ class Kernel(Protocol):
         ...
 
 
+def shapes_of(interface: Interface) -> dict[str, tuple[int, ...]]:
+    """Every port's shape behind that of the samples."""
+    lanes = interface.lanes
+    return {
+        port.name: (port.size,)
+        if not port.lanes
+        else (lanes,)
+        if port.size == 1
+        else (port.size, lanes)
+        for port in interface.ports
+    }
+
+
 def arrays_of(
-    interface: Interface, inputs: Mapping[str, np.ndarray]
+    shapes: Mapping[str, tuple[int, ...]], inputs: Mapping[str, np.ndarray]
 ) -> tuple[int, list[np.ndarray]]:
     """How many samples there are, and every port's array: as many rows, or one.
 
     Raises: InputError: for an array that does not fit its port.
     """
-    given = [_fitting(interface, port, inputs[port.name]) for port in interface.ports]
-    lengths = [len(a) for a in given]
-    count = max((n for n in lengths if n != 1), default=1 if lengths else 0)
-    for port, n in zip(interface.ports, lengths, strict=True):
-        if n not in (1, count):
-            raise InputError(f"{port.name}: {n} samples, where others have {count}")
+    count, given = 1 if shapes else 0, []
+    for name, shape in shapes.items():
+        a = inputs[name]
+        if type(a) is not np.ndarray or a.dtype is not DOUBLE or a.shape[1:] != shape:
+            a = _fitting(name, shape, a)
+        given.append(a)
+        if len(a) != 1:
+            count = len(a)
+    for name, a in zip(shapes, given, strict=True):
+        if len(a) not in (1, count):
+            raise InputError(f"{name}: {len(a)} samples, where others have {count}")
     return count, given
 
 
@@ -88,7 +107,7 @@ def columns_of(
     interface: Interface, inputs: Mapping[str, np.ndarray], order: tuple[int, ...]
 ) -> tuple[int, list[np.ndarray]]:
     """How many samples there are, and every input column, (N,) each, as views."""
-    count, given = arrays_of(interface, inputs)
+    count, given = arrays_of(shapes_of(interface), inputs)
     columns: list[np.ndarray] = []
     for port, a in zip(interface.ports, given, strict=True):
         if len(a) != count:
@@ -99,15 +118,12 @@ def columns_of(
     return count, columns
 
 
-def _fitting(interface: Interface, port: Port, given: object) -> np.ndarray:
-    a = _numbers(port.name, given)
-    want: tuple[int, ...] = (port.size,)
-    if port.lanes:
-        want = (interface.lanes,) if port.size == 1 else (port.size, interface.lanes)
+def _fitting(name: str, want: tuple[int, ...], given: object) -> np.ndarray:
+    a = _numbers(name, given)
     if a.shape[1:] != want:
         shape = ", ".join(["N", *map(str, want)])
         one = " (one sample is an array of one)" if a.ndim == 1 and a.shape == want else ""
-        raise InputError(f"{port.name}: expected an array of shape ({shape}), got {a.shape}{one}")
+        raise InputError(f"{name}: expected an array of shape ({shape}), got {a.shape}{one}")
     return a
 
 
@@ -145,11 +161,13 @@ def places_of(interface: Interface, order: tuple[int, ...]) -> list[Place]:
     return found
 
 
-def results_at(places: list[Place], columns: np.ndarray) -> dict[str, np.ndarray]:
-    """Every result of columns, (width of all, N), by name, as its shape has it."""
-    values, count = {}, columns.shape[1]
+def results_at(places: list[Place], columns: np.ndarray, count: int) -> dict[str, np.ndarray]:
+    """Every result of columns, (width of all, N or more), by name, as its shape has it."""
+    values = {}
     for name, start, end, shape, moved in places:
-        block = columns[start:end].reshape(*shape, count)
+        block = columns[start:end, :count]
+        if len(shape) != 1:
+            block = block.reshape(*shape, count)
         values[name] = block if moved is None else block.take(moved, axis=-2)
     return values
 
@@ -158,4 +176,4 @@ def results_of(
     interface: Interface, columns: np.ndarray, order: tuple[int, ...]
 ) -> dict[str, np.ndarray]:
     """Every result of columns, (width of all, N), by name."""
-    return results_at(places_of(interface, order), columns)
+    return results_at(places_of(interface, order), columns, columns.shape[1])

@@ -58,7 +58,7 @@ class InverseDynamics(Dynamics):
         answer = self._solve(inputs, {OUTPUTS[name] for name in names}, threads)
         values, status = answer.values, answer.status
         found = {name: values[name].T for name in self.results}
-        if status.any():
+        if np.count_nonzero(status):  # quicker than `any`
             for value in found.values():
                 value[status != Status.ok] = np.nan
         found["status"] = status

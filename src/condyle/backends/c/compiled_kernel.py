@@ -7,21 +7,25 @@ The kernel of a question serves every mechanism of its structure.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Mapping
+import threading
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from functools import lru_cache, partial
+from typing import Any
 
 import numpy as np
 
 from ...errors import InputError
 from ...graph.program import Interface, Numbers, Variants
-from ..kernel import Answer, arrays_of, places_of, results_at
+from ..kernel import Answer, arrays_of, places_of, results_at, shapes_of
 from ..threads import shared_out, workers
 from .build import loaded
 from .shared_library import aligned, prepared
 
 # Vector operations that are worth a thread of their own: some 0.3 ms.
 WORTH_A_THREAD = 1_000_000
+FEW = 512  # samples that are copied
+LINE = 8  # doubles of a cache line
 UNIT = 64  # samples of which pieces are multiples: whole vectors at any width
 
 
@@ -56,11 +60,64 @@ class CompiledKernel:
         self._table = prepared(self._library, self.facts, numbers)
         self._address = _address(self._table)
         self._places = places_of(self.interface, self.order)
+        self._shapes = shapes_of(self.interface)
         self._vector = ctypes.c_ssize_t * self.interface.columns
+        self._steps = self._vector(*[1] * self.interface.columns)
+        self._mine = threading.local()
 
     def run(self, inputs: Mapping[str, np.ndarray], threads: int | None = None) -> Answer:
         """Evaluate samples; columns that are contiguous or constant are fastest."""
-        count, given = arrays_of(self.interface, inputs)
+        count, given = arrays_of(self._shapes, inputs)
+        rows = -(-count // UNIT) * UNIT
+        status, raw = np.empty(count, dtype=np.uint8), np.empty(self.columns * rows + LINE)
+        start = _address(raw)
+        skipped = -start // 8 % LINE  # to a cache line, as vector loads like it
+        results = raw[skipped : skipped + self.columns * rows].reshape(self.columns, rows)
+        goal = start + 8 * skipped, rows, _address(status)
+        if count <= FEW:
+            if threads is not None:
+                workers(threads)
+            self._library.batch(self._address, *self._copied(count, given), count, *goal)
+        else:
+            self._run_many(count, given, goal, threads)
+        return Answer(results_at(self._places, results, count), status)
+
+    def _copied(self, count: int, given: Sequence[np.ndarray]) -> tuple[Any, Any]:
+        """Where columns start, and the steps from sample to sample, of inputs side by side.
+
+        Few numbers are copied sooner than asked where they are. They stay until this thread copies
+        the next.
+        """
+        try:
+            places, starts = self._mine.block
+        except AttributeError:
+            places, starts = self._mine.block = self._block()
+        for (place, order), a in zip(places, given, strict=True):
+            place[..., :count] = a.T if order is None else a.T[order]
+        return starts, self._steps
+
+    def _block(self) -> tuple[list[tuple[np.ndarray, np.ndarray | None]], Any]:
+        """Room for few samples, as every port takes it with the order of its lanes; where columns
+        start."""
+        face, order = self.interface, np.array(self.order)
+        block = np.empty((face.columns, FEW))
+        places = []
+        for port in face.ports:
+            end = port.start + port.size * (face.lanes if port.lanes else 1)
+            place = block[port.start : end]
+            if port.lanes and port.size > 1:
+                place = place.reshape(port.size, face.lanes, FEW).swapaxes(0, 1)
+            moved = port.lanes and (np.diff(order) < 0).any()
+            places.append((place, order if moved else None))
+        return places, self._vector(*(_address(block[k]) for k in range(face.columns)))
+
+    def _run_many(
+        self,
+        count: int,
+        given: Sequence[np.ndarray],
+        goal: tuple[int, int, int],
+        threads: int | None,
+    ) -> None:
         given = [_readable(a) for a in given]  # has to stay as long as C reads it
         starts: list[int] = []
         strides: list[int] = []
@@ -72,11 +129,8 @@ class CompiledKernel:
                 blocks = [first + i * steps[0] for i in range(port.size)]
             starts += [block + k * steps[-1] for block in blocks for k in lanes]
             strides += [row // 8 if len(a) == count else 0] * (len(blocks) * len(lanes))
-        status = np.empty(count, dtype=np.uint8)
-        rows = -(-count // UNIT) * UNIT
-        results = aligned(self.columns * rows).reshape(self.columns, rows)
         vector, call = self._vector, self._library.batch
-        steps_at, out, judged = _vector_of(tuple(strides)), _address(results), _address(status)
+        steps_at, (out, rows, judged) = _vector_of(tuple(strides)), goal
 
         def piece(start: int, end: int) -> None:
             moved = starts
@@ -88,7 +142,6 @@ class CompiledKernel:
         most = 1 + self.facts["operations"] * count // self.facts["lanes"] // WORTH_A_THREAD
         n_threads = 1 if threads is None and most == 1 else min(workers(threads), most)
         shared_out(piece, count, n_threads, UNIT)
-        return Answer(results_at(self._places, results[:, :count]), status)
 
     def one(self, sample: np.ndarray) -> tuple[np.ndarray, int]:
         """Evaluate one sample, (columns,), at least latency: all results in a row, and a status.
