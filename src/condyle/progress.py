@@ -1,4 +1,4 @@
-"""How far long work is: the work says it, and whoever watches shows it.
+"""How far long work is, and how long it may last: the work says it, and whoever watches shows it.
 
     with step("drawing figures", total=5) as advance:
         for figure in figures:
@@ -10,6 +10,7 @@ Nobody watches unless asked to; then a step costs next to nothing.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
@@ -19,6 +20,22 @@ Advance = Callable[[float], None]
 Watcher = Callable[[str, float | None], AbstractContextManager[Advance]]
 
 _watcher: ContextVar[Watcher | None] = ContextVar("watcher", default=None)
+_deadline: ContextVar[float] = ContextVar("deadline", default=float("inf"))
+
+
+@contextmanager
+def budget(seconds: float) -> Iterator[None]:
+    """Let searches inside the block end early, with less found, once `spent`."""
+    token = _deadline.set(min(time.monotonic() + seconds, _deadline.get()))
+    try:
+        yield
+    finally:
+        _deadline.reset(token)
+
+
+def spent() -> bool:
+    """Whether the time of the innermost `budget` is over."""
+    return time.monotonic() > _deadline.get()
 
 
 @contextmanager

@@ -27,6 +27,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from ..progress import spent
+
 Array = np.ndarray
 
 SMALLEST_PIECE = 2.0**-10  # of a step
@@ -35,6 +37,7 @@ ITERATIONS = 40
 SHRINK = 0.25  # a step over the step before
 LONGEST = 1.0  # piece, in characteristic lengths and radians,
 SHORT = 0.25  # and one that need not shrink the step to a quarter
+MOST = 2.0**20  # rad, beyond which an angle has lost the digits that tell where it is
 CONVERGED = 1e-12  # step, likewise
 ALIKE = 0.5  # of |1 - A_end^+ A_start|
 ROUNDING = 4e-15  # of what is prescribed, in the mechanism's own size, with what A makes of it
@@ -108,6 +111,7 @@ class Steps:
         self._unit = np.repeat([length, 1.0], 3)
         self._free = self._unit[free]
 
+    @np.errstate(all="ignore")
     def step(self, pose: Array, prescribed: Array) -> Step:
         """Steps from poses (N, 6) towards values (N, r)."""
         at = self.conditions(pose)
@@ -128,7 +132,8 @@ class Steps:
 
     def _without_turns(self, difference: Array) -> Array:
         turns = np.round(difference / (2 * np.pi)) * (2 * np.pi)
-        return np.where(self._turning, difference - turns, difference)
+        known = np.where(np.abs(difference) < MOST, difference - turns, np.nan)
+        return np.where(self._turning, known, difference)
 
     def between(self, one: Array, other: Array) -> Array:
         """The way from one pose to another, (N, 6), without whole turns."""
@@ -145,14 +150,14 @@ def follow(steps: Steps, start: Array, prescribed: Array) -> tuple[Array, Array]
     """Poses (N, 6) followed from `start`, (N, 6), towards values (N, r), as far as that goes, and
     whether to the end, (N,): there the values are nearest to the prescribed ones.
 
-    Samples never influence each other.
+    Samples never influence each other, unless a `budget` is spent: then all that are left stop.
     """
     pose, piece, reached = start.copy(), np.ones(len(start)), np.zeros(len(start), dtype=bool)
     step = steps.step(pose, prescribed)
     active = np.flatnonzero(np.isfinite(step.size))
     step = step.of(active)
     for _ in range(PIECES):
-        if not active.size:
+        if not active.size or spent():
             break
         part = np.minimum(piece[active], LONGEST / np.maximum(step.size, LONGEST))
         x = pose[active] + step.move * part[:, None]

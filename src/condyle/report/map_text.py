@@ -41,7 +41,10 @@ def _lines(n: WorkspaceSize) -> Iterator[str]:
         return
     pairs = zip(n.axes, n.box.low, n.box.high, strict=True)
     sides = ", ".join(f"{name} {_ends(name, low, high)}" for name, low, high in pairs)
-    yield f"box:        {sides}; certified at points {_sides(n, n.box.spacing)} apart"
+    ends = [("least", n.box.low), ("greatest", n.box.high)]
+    faces = [f"{end} {n.axes[i]}" for end, at in ends for i, x in enumerate(at) if not x]
+    on = f"; home is on its face at the {' and the '.join(faces)}" * bool(faces)
+    yield f"box:        {sides}{on}; certified at points {_sides(n, n.box.spacing)} apart"
 
 
 def map_table(dataset: xr.Dataset) -> str:

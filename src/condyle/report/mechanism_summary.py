@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.map.free_space import ball_around_home
+from ..analysis.map.free_space import QUICK, ball_around_home
 from ..kinematics.chain import FAMILIES
 from ..kinematics.singularities import KINDS
 from ..mechanism import as_mechanism
@@ -152,9 +152,13 @@ def _singularity(d: Mapping[str, Any]) -> Iterator[str]:
     yield f"  1 % more characteristic length changes the smaller ratio by {change:.2g} %"
     yield f"  near: {s['near']}"
     room = d["room"]
+    settled = room["radius"] == room["at_most"]
+    ends = f"ends at {room['ends_at']}"
+    if not settled:
+        ends = f"not settled in {QUICK:g} s: at most {length_text(room['at_most'])}"
     yield (
         f"room around home: a ball of {length_text(room['radius'])} (angles times the "
-        f"characteristic length), off singularities and within bounds, ends at {room['ends_at']}; "
+        f"characteristic length), off singularities and within bounds, {ends}; "
         f"{room['points']} points, {length_text(room['spacing'])} apart"
     )
 
@@ -209,6 +213,7 @@ def check(mechanism: Any) -> MechanismSummary:
             },
             "room": {
                 "radius": room.radius,
+                "at_most": room.at_most,
                 "ends_at": room.stops,
                 "points": room.points,
                 "spacing": room.spacing,

@@ -11,12 +11,15 @@ import numpy as np
 import pytest
 from support.loads import parts
 
+from condyle.analysis.map import free_space
 from condyle.analysis.map.axes import Axis, Grid, grid_of
 from condyle.analysis.map.compute import setup_of
 from condyle.analysis.map.free_space import FreeSpace, best_box, greatest_ball, greatest_box
 from condyle.analysis.map.lines import trace
-from condyle.analysis.map.volume import reachable_volume
+from condyle.analysis.map.map_size import WorkspaceSize
+from condyle.analysis.map.volume import Volume, reachable_volume
 from condyle.mechanism.chain import limits
+from condyle.report.map_text import size_text
 from condyle.results.contacts import bound_margins
 
 from .conftest import Models
@@ -193,3 +196,22 @@ def test_curves_are_followed() -> None:
             return 1 / (p[:, 0] - 0.4567)
 
     assert trace(pole, values_on(pole)) == []
+
+
+def test_what_is_certain_when_time_is_over(
+    model_of: Models, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A smaller ball, and the room it may have yet."""
+    model = model_of("masticatory-curved")
+    whole = free_space.ball_around_home(model)
+    monkeypatch.setattr(free_space, "QUICK", 0.0)
+    hurried = free_space.ball_around_home(model)
+    assert 0 < hurried.radius <= whole.radius == whole.at_most < hurried.at_most
+
+
+def test_a_box_with_home_on_its_face_says_so() -> None:
+    volume = Volume(1e-6, 1e-9, 1e-8, 0.5, (1e-3, 1e-3), 100)
+    ball = free_space.Ball(1e-3, "a singularity", 10, 1e-4, 1e-3)
+    box = free_space.Box((0.0, -1e-3), (2e-3, 1e-3), (1e-5, 1e-5))
+    text = size_text(WorkspaceSize(volume, "m^2", ball, box, ("X", "Y"), 1e-3))
+    assert "home is on its face at the least X;" in text and "Y;" not in text.split("face")[1]

@@ -171,3 +171,14 @@ def test_angles_are_principal_values() -> None:
     np.testing.assert_allclose(bryant_angles(rotations(told[:, 3:])), told[:, 3:], atol=1e-7)
     R = np.array([bryant(angles) for angles in pose[:, 3:]])
     np.testing.assert_allclose(rotations(pose[:, 3:]), R, atol=1e-14)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("name", ["masticatory", "gough-stewart"])
+@pytest.mark.parametrize("joint", [1e308, -1e200, 1e154, 1e10])
+def test_hostile_joints(name: str, joint: float) -> None:
+    """Nothing is printed, and nothing called a pose."""
+    model = condyle.derive(name, backend="numpy")
+    for time in (None, [0.0, 1.0]):
+        found = model.forward_kinematics(np.full((2, 6), joint), time=time)
+        assert (found.status != 0).all() and np.isnan(found.pose).all()

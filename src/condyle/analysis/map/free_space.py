@@ -8,7 +8,7 @@ far as it was looked at: at so many points, so far apart.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import gamma, pi
 
@@ -18,6 +18,7 @@ from ...errors import InputError
 from ...kinematics.singularities import NEAR_SINGULAR
 from ...mechanism.mechanism import COORDINATES
 from ...model.model import Model
+from ...progress import budget, spent, step
 from .axes import Axis, Grid
 from .block import Block, Setup
 from .load_capacity import limited
@@ -26,6 +27,8 @@ from .reach import Reach
 POINTS, FEW = 20_000, 500  # in the ball; where it has to be quick
 CONES = (0.5, 0.15, 0.05)  # half widths around the nearest pose that is not free
 RAYS, HALVINGS = 60, 24
+QUICK = 3.0  # seconds of looking around home
+TINY = 1e-4  # of the first pose found that is not free: a ball that is none
 GROWTH = 2.0  # of the ball until it meets something
 STEPS, NUDGE = 12, 1e-6  # along the border
 ROUNDING = 1e-9  # of the radius, by which rays go further
@@ -40,12 +43,14 @@ class Ball:
     """radius: [m], angles multiplied by the characteristic length;  stops: what ends it.
 
     points: at which all is well inside;  spacing: their mean distance [m].
+    at_most: [m], a pose that is not free is there; the radius itself, unless a `budget` was spent.
     """
 
     radius: float
     stops: str
     points: int
     spacing: float
+    at_most: float
 
 
 @dataclass(frozen=True)
@@ -122,7 +127,7 @@ def greatest_ball(free: FreeSpace, grid: Grid, points: int = POINTS) -> Ball:
 
     stops, whole = RANGE, radius
     radius = whole / GROWTH**6  # far poses cost most
-    few = way[:FEW]
+    few, at_most = way[:FEW], whole
     while radius < whole and free_of(margins(radius * few)).all():
         radius = min(GROWTH * radius, whole)
     for some in (few, way):
@@ -131,24 +136,45 @@ def greatest_ball(free: FreeSpace, grid: Grid, points: int = POINTS) -> Ball:
             row = int(np.argmax(~(found[:, first] >= 0)))
             nearest, row = _along_rays(margins, radius * some[first], row, rng)
             nearest = _on_the_border(margins, nearest, row)
+            if spent():  # poses were given up, so what is not free is not known
+                return _settled(Ball(radius, RANGE, FEW, 0.0, at_most), margins, few)
             radius, stops = float(np.linalg.norm(nearest)), free.reasons[row]
+            at_most = radius
             if radius == 0.0:
-                return Ball(0.0, stops, points, 0.0)
+                return Ball(0.0, stops, points, 0.0, 0.0)
+    if spent():
+        return _settled(Ball(radius, RANGE, FEW, 0.0, at_most), margins, few)
+    return Ball(radius, stops, points, _spacing(radius, points, d), radius)
+
+
+def _settled(ball: Ball, margins: Margins, few: np.ndarray) -> Ball:
+    """The ball that is certain without following poses, once a `budget` is spent."""
+    radius = ball.radius
+    while radius > TINY * ball.at_most and not free_of(margins(radius * few)).all():
+        radius /= GROWTH
+    radius = radius if radius > TINY * ball.at_most else 0.0
+    spacing = _spacing(radius, ball.points, few.shape[1])
+    return replace(ball, radius=radius, spacing=spacing)
+
+
+def _spacing(radius: float, points: int, d: int) -> float:
     volume = pi ** (d / 2) / gamma(d / 2 + 1)  # of the unit ball
-    return Ball(radius, stops, points, radius * (volume / points) ** (1 / d))
+    return radius * (volume / points) ** (1 / d)
 
 
 def ball_around_home(model: Model) -> Ball:
     """In all independent coordinates, no further than the characteristic length and a radian.
 
-    Without limits of efforts; quick, for one look at a mechanism.
+    Without limits of efforts; quick, for one look at a mechanism: in `QUICK` seconds, with what is
+    certain by then.
     """
     length = model.characteristic_length
     ends = [length if name in COORDINATES[:3] else 1.0 for name in model.independent]
     axes = tuple(Axis(n, -end, end, 2) for n, end in zip(model.independent, ends, strict=True))
     reach = Reach.of(model)
     free = FreeSpace(Setup(model, reach, np.zeros(9)), limits=False)
-    return greatest_ball(free, Grid(model.independent, axes, (0.0,) * len(axes)), FEW)
+    with step("looking for the room around home"), budget(QUICK):
+        return greatest_ball(free, Grid(model.independent, axes, (0.0,) * len(axes)), FEW)
 
 
 def free_of(margins: np.ndarray) -> np.ndarray:
@@ -162,7 +188,7 @@ def _along_rays(
     """A pose where the rays near one that is not free end, and what ends the shortest."""
     for cone in CONES:
         size = float(np.linalg.norm(nearest))
-        if size == 0.0:
+        if size == 0.0 or spent():
             break
         rays = nearest / size + cone * rng.normal(size=(RAYS, len(nearest)))
         rays = np.vstack([nearest / size, rays / np.linalg.norm(rays, axis=1, keepdims=True)])
@@ -170,6 +196,8 @@ def _along_rays(
         rays = rays[~free_of(margins(out * rays))]
         low, high = np.zeros(len(rays)), np.full(len(rays), out)
         for _ in range(HALVINGS if len(rays) else 0):
+            if spent():
+                break
             middle = (low + high) / 2
             fine = free_of(margins(middle[:, None] * rays))
             low, high = np.where(fine, middle, low), np.where(fine, high, middle)

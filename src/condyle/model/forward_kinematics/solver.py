@@ -40,6 +40,7 @@ class ForwardKinematics:
         self._joint = Argument("joint", len(chains), f"{', '.join(chains)} [rad or m]")
         self._independent = indices(independent_coordinates(mechanism))
 
+    @np.errstate(all="ignore")
     def solve(
         self, joint: Any, time: Any = None, tolerance: float = TOLERANCE, start: Any = None
     ) -> ModelResult:
