@@ -28,7 +28,7 @@ main()
 
 def test_ctrl_c_while_it_loads() -> None:
     done = subprocess.run([sys.executable, "-c", INTERRUPT], capture_output=True, text=True)
-    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "condyle: stopped\n")
 
 
 @pytest.mark.slow

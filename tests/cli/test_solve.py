@@ -137,6 +137,10 @@ def test_flagged_rows_are_kept_and_empty(solve: Solve) -> None:
     outcome, _, _ = solve(header(), states)
     assert outcome.status == 2 and "at row 3" in outcome.err and not Path("out.csv").exists()
     assert 'chain "temporalis_left" cannot reach M' in outcome.err
+    assert "scale it down" in outcome.err
+    states[2, 0] = 10.0
+    outcome, _, _ = solve(header(), states)
+    assert "Are the lengths of the motion in mm?" in outcome.err
     good = [i for i in range(6) if i not in (2, 4)]
     for options, end in (((), -2), (("--flag",), None)):
         outcome, _, found = solve(header(), states[good], *options)

@@ -151,6 +151,22 @@ def test_a_limit_names_the_chains_that_have_it(solution: xr.Dataset) -> None:
     assert "(" not in titles[1]
 
 
+def test_a_far_limit_flattens_no_curve(solution: xr.Dataset) -> None:
+    """Of two limits, the near one is drawn."""
+    peak = float(abs(solution["effort"].values).max())
+    machine = solution.condyle.mechanism
+    limits = (-2 * peak, 500.0)
+    chains = tuple(
+        c.model_copy(update={"actuator": c.actuator.model_copy(update={"torque_limit": limits})})
+        for c in machine.chains
+    )
+    apart = solution.copy(deep=True)
+    apart.attrs["mechanism"] = condyle.dumps(machine.replace(chains=chains))
+    for axes in PLOTS["effort"](apart).axes:
+        low, high = axes.get_ylim()
+        assert -3 * peak < low < -2 * peak and high < 3 * peak
+
+
 def test_no_load_no_share_of_it(solution: xr.Dataset) -> None:
     titles = [axes.get_title("left") for axes in PLOTS["share"](solution).axes[:4]]
     assert titles == ["platform", "couplers", "cranks", "load"]

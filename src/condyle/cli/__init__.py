@@ -11,5 +11,6 @@ def main() -> None:
         from .app import run  # takes a moment, in which a person may press Ctrl-C
 
         run()
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
+        print(f"condyle: {str(stop) or 'stopped'}", file=sys.stderr)
         sys.exit(130)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -56,11 +55,8 @@ def sweep(
         table = condyle.sweep(study, folder, workers=workers, scheduler=scheduler, resume=resume)
     except KeyboardInterrupt:
         again = command_line("sweep", study, out=folder, resume=True)
-        print(
-            f"condyle: stopped; the rows in {folder} are complete. Continue: {again}",
-            file=sys.stderr,
-        )
-        raise
+        said = f"stopped; the rows in {folder} are complete. Continue: {again}"
+        raise KeyboardInterrupt(said) from None
     return _shown(table, folder, figures, csv)
 
 

@@ -25,6 +25,11 @@ from .singularities import SINGULAR, Singularity
 
 FLAG = "or keep such samples with --flag (flag=True)."
 WEAK = "Stronger actuators, a slower motion or a smaller load"
+FAR_OFF = 20.0  # so many times its length away, a chain suggests another unit
+FAR = (
+    "Are the lengths of the motion in mm? Name their columns so, as X [mm], or say --units mm "
+    '(units="mm"). Else scale the motion down'
+)
 PULLED = (
     "Unilateral contacts would have to pull, or cables to push: reduce --preload, change the "
     "motion or load, or add cables that pull the other way"
@@ -199,6 +204,7 @@ def sample_error(
             with np.errstate(all="ignore"):
                 if (span := FAMILIES[chain.kind].span(chain, pose[i])) is not None:
                     about |= {"value": span[0], "bound": span[1], "unit": "m"}
+                    hint = FAR if span[0] > FAR_OFF * span[1] else ""
     else:
         text = ERRORS[kind][1].format(where)
     if kind == Status.infeasible and shortfall is not None:

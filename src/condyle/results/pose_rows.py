@@ -156,7 +156,8 @@ def _modes(
     few, many = min(counts), max(counts)
     each = str(few) if few == many else f"{few} to {many}"
     rows = "1 row" if table.rows == 1 else f"{table.rows} rows"
-    said = f"{each} assembly modes found for {rows}; the search may miss some"
+    modes = "assembly mode" if many == 1 else "assembly modes"
+    said = f"{each} {modes} found for {rows}; the search may miss some"
     return StatesReport({"rows": table.rows, "modes": counts, "files": [Path(out)]}, said)
 
 

@@ -336,11 +336,12 @@ def draw_limits(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
             continue
         text = readable(limit.label(names))
         levels = [level for level in (limit.high, limit.low) if level and np.isfinite(level)]
-        if levels and min(map(abs, levels)) > REACH * peak:
+        near = [level for level in levels if abs(level) <= REACH * peak]
+        if levels and not near:
             title = axes.get_title(loc="left")
             axes.set_title(f"{title + ', ' if title else ''}{text} is outside the view")
             continue
-        levels = [level * panel.shown.scale for level in levels]
+        levels = [level * panel.shown.scale for level in near]
         for level in levels:
             axes.axhline(level, **LIMIT)
         place, at = axes.get_yaxis_transform(), max(levels, default=0.0)

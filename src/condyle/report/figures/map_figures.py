@@ -280,11 +280,11 @@ def _along(
     x = dataset[axis].values * scale
     values = dataset[variable].values
     unit, factor = _units(dataset, panels[0])
+    steps: dict[str, Any] = {"drawstyle": "steps-mid"} if variable == "cause" else {}
     for i, panel in enumerate(panels):
         own = values if panel.entry is None else values[:, panel.entry]
-        place.plot(
-            x, np.where(np.isfinite(own), own, np.nan) * factor, label=panel.title, **look(i)
-        )
+        shown = np.where(np.isfinite(own), own, np.nan) * factor
+        place.plot(x, shown, label=panel.title, **look(i), **steps)
     out = dataset["cause"].values > 0
     if out.any():
         across: dict[str, Any] = {"transform": place.get_xaxis_transform(), "color": OUT}
