@@ -38,7 +38,7 @@ class MechanismSummary:
         return "\n".join(
             [
                 *_whole(d),
-                "chains (transmission: the actuator's lever arm on the rod, 1 at best, 0 when in line)",
+                "chains (transmission: the lever arm on the rod, 1 at best, 0 in line)",
                 *(f"  {name:<{width}}  {_chain(one)}" for name, one in d["chains"].items()),
                 *["contacts"] * bool(d["contacts"]),
                 *(f"  {name:<{width}}  {_contact(one)}" for name, one in d["contacts"].items()),
