@@ -252,6 +252,42 @@ def test_compiled_limits_and_shortfalls_are_those_of_numpy(objective: str) -> No
     assert np.isnan(quick.effort[~good]).all()
 
 
+def test_a_preload_holds_rubbing_contacts_off_zero() -> None:
+    """Either sign, and no less; where it does not bind, the answer of none."""
+    case = drawn(5, count=12, mu=1.5, contacts=2, limit=50.0)
+    free, held = (
+        Model(case.mechanism, backend="numpy", distribution=Distribution("bounded", preload=p))
+        for p in (0.0, 2.0)
+    )
+    found, kept = (m.inverse_dynamics(*case.arguments) for m in (free, held))
+    assert not found.status.any() and not kept.status.any()
+    least = np.abs(found.contact_force).min(axis=1)
+    assert (least < 1e-9).any() and (least > 2).any()
+    assert np.abs(kept.contact_force).min() > 2 - 1e-9
+    bound = least < 2
+    np.testing.assert_allclose(kept.effort[~bound], found.effort[~bound], atol=1e-9)
+    squares = [(m.effort**2).sum(axis=1)[bound] for m in (found, kept)]
+    assert (squares[1] > squares[0]).all()
+    # Efforts still give the motion, or are known not to.
+    q, v, a, *load = case.arguments
+    back = held.forward_dynamics(q, v, kept.effort, *load)
+    same = back.status == Status.ok
+    assert same.any() and set(back.status) <= {Status.ok, Status.ambiguous}
+    np.testing.assert_allclose(back.acceleration[same], a[same], rtol=1e-7, atol=1e-7)
+
+
+@pytest.mark.usefixtures("unoptimised")
+def test_a_preload_of_rubbing_contacts_in_kernels() -> None:
+    case = drawn(5, count=4, mu=1.5, contacts=1, limit=50.0)
+    chosen = Distribution("bounded", preload=2.0)
+    wanted = Model(case.mechanism, backend="numpy", distribution=chosen)
+    one = Model(case.mechanism, backend="compiled", distribution=chosen).unchecked()
+    rows = [one.inverse_dynamics(*row) for row in zip(*case.arguments, strict=True)]
+    np.testing.assert_allclose(
+        rows, wanted.inverse_dynamics(*case.arguments).effort, rtol=1e-8, atol=1e-8
+    )
+
+
 def test_a_preload_without_one_sided_contacts_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     machine = condyle.load_mechanism("masticatory").replace(name="two-sided")
     for _ in range(2):

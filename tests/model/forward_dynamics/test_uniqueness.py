@@ -124,10 +124,10 @@ def test_every_pattern_by_numpy(contacts: int, mu: float, seed: int) -> None:
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(8))
 def test_patterns_of_many_machines(seed: int) -> None:
-    mu = float(np.linspace(0.1, 2.7, 12)[seed])  # up to 1.5 of it: 4
-    case = drawn(200 + seed, count=25, mu=mu, contacts=1 + seed % 5, lossy=bool(seed % 2))
+    mu = float(np.linspace(0.4, 2.7, 8)[seed])  # up to 1.5 of it: 4
+    case = drawn(200 + seed, count=10, mu=mu, contacts=1 + seed % 5, lossy=bool(seed % 2))
     compare(case, Model(case.mechanism, backend="numpy"), seed)
 
 
