@@ -1,12 +1,12 @@
-"""Runs the parts of a job serially, in threads, in processes, or on a Dask cluster.
+"""Runs the parts of a job serially, in threads, in processes, or on a Dask cluster of yours.
 
 Scheduling, queues and lost workers are handled by `concurrent.futures` and Dask; this module only
-chooses between them. Results do not depend on the choice.
+chooses between them. Results do not depend on the choice. It starts no cluster: each of Dask's
+servers opens a port, for its pages at least, to everybody on the network.
 """
 
 from __future__ import annotations
 
-import logging
 import multiprocessing
 import os
 import signal
@@ -32,7 +32,7 @@ Job = TypeVar("Job")
 Result = TypeVar("Result")
 Work = Callable[[Job, int], Result]
 
-PROCESSES, THREADS, DASK = "processes", "threads", "dask"
+PROCESSES, THREADS = "processes", "threads"
 TIMEOUT = 10.0  # of a scheduler's answer [s]
 
 
@@ -46,17 +46,16 @@ def check_scheduler(workers: int | None, scheduler: str | None) -> None:
         raise InputError(f"workers: expected a whole number of at least 1, got {shown(workers)}")
     if scheduler is None or as_name(scheduler, "scheduler") in (PROCESSES, THREADS):
         return
-    if scheduler != DASK and "://" not in scheduler:
+    if "://" not in scheduler:
         raise InputError(
-            f'scheduler "{scheduler}": expected {PROCESSES}, {THREADS}, {DASK} (a cluster on this '
-            "machine), or the address of a Dask scheduler such as tcp://10.0.0.1:8786"
+            f'scheduler "{scheduler}": expected {PROCESSES}, {THREADS}, or the address of a Dask '
+            "scheduler such as tls://10.0.0.1:8786"
         )
-    if scheduler != DASK and workers is not None:
+    if workers is not None:
         raise InputError("workers cannot be set for an existing scheduler")
     require("distributed", "cluster")
-    if scheduler != DASK:
-        with ExitStack() as stack:
-            _client(stack, None, scheduler)
+    with _client(scheduler):
+        pass
 
 
 def run_parts(
@@ -69,7 +68,7 @@ def run_parts(
     """Parts and the result of `work(job, part)` for each, in the order in which they finish.
 
     Args:   workers: number of them; default: all processors.
-            scheduler: processes, threads, dask, or the address of a Dask scheduler; None: serially.
+            scheduler: processes, threads, or the address of a Dask scheduler; None: serially.
     Raises: InputError:      if the scheduler does not answer.
             LostWorkerError: if a worker ended; Dask retries on other workers first.
     """
@@ -98,7 +97,7 @@ def _pool(job: Any, count: int, scheduler: str) -> Iterator[tuple[Executor, Any]
         else:
             from distributed import KilledWorker
 
-            client = _client(stack, count, scheduler)
+            client = stack.enter_context(_client(scheduler))
             # What was submitted can be made again where it is lost.
             pool, shared = client.get_executor(pure=False), client.submit(_same, job, pure=False)
             lost = (*lost, KilledWorker)
@@ -109,11 +108,21 @@ def _pool(job: Any, count: int, scheduler: str) -> Iterator[tuple[Executor, Any]
             if isinstance(error, BrokenExecutor):
                 what = "a worker process was killed or crashed (is there enough memory?)."
             raise LostWorkerError(what, "Finished parts are kept; --resume continues.") from error
+        except BaseException:
+            if isinstance(pool, ProcessPoolExecutor):
+                _end(pool)  # a part may take long, and nobody would take it
+            raise
         finally:
             if scheduler in (PROCESSES, THREADS):
                 pool.shutdown(cancel_futures=True)
             else:
                 pool.shutdown(wait=False)  # which cancels what is left
+
+
+def _end(pool: ProcessPoolExecutor) -> None:
+    """End the processes of a pool at once."""
+    for process in list((pool._processes or {}).values()):
+        process.terminate()
 
 
 _job: Any = None  # of a worker process
@@ -143,17 +152,13 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
-def _client(stack: ExitStack, count: int | None, scheduler: str) -> Any:
-    """A client of the cluster at an address, or of a temporary one on this machine."""
-    from distributed import Client, LocalCluster
+def _client(scheduler: str) -> Any:
+    """A client of the cluster at an address, to be closed."""
+    from distributed import Client
 
-    if scheduler == DASK:
-        quiet = {"dashboard_address": None, "silence_logs": logging.CRITICAL}
-        cluster = LocalCluster(n_workers=count, threads_per_worker=1, **quiet)
-        return stack.enter_context(Client(stack.enter_context(cluster)))
     try:
-        return stack.enter_context(Client(scheduler, timeout=TIMEOUT))
-    except (OSError, ValueError) as error:
+        return Client(scheduler, timeout=TIMEOUT)
+    except (OSError, ValueError, RuntimeError) as error:
         raise InputError(
             f"no Dask scheduler answers at {scheduler} ({type(error).__name__}). Start one with "
             "`dask scheduler`, and workers with `dask worker ADDRESS`"

@@ -35,8 +35,8 @@ def sweep(
     Options:
         out: Folder for the rows. Default: the name of the study.
         workers: Number of processes. Default: all processors.
-        scheduler: Where rows are computed: processes; threads; dask (a cluster on this machine); or
-            the address of a Dask scheduler, tcp://...
+        scheduler: Where rows are computed: processes, threads, or the address of a Dask
+            scheduler, tls://... or tcp://..., which runs code as you: see the guide on sweeps.
         resume: Continue from the rows in the folder.
         show: Show the results in the folder of a sweep, instead of running one.
         figures: Also draw figures into the folder.

@@ -254,7 +254,8 @@ def test_solutions_are_kept_on_request(tables: dict[str, Any], tmp_path: Path) -
     ("workers", "scheduler", "message"),
     [
         (0, "processes", "at least 1"),
-        (None, "slurm", "expected processes, threads, dask"),
+        (None, "slurm", "expected processes, threads, or the address"),
+        (2, "dask", "expected processes, threads, or the address"),
         (None, "tcp://127.0.0.1:9", "no Dask scheduler answers"),
         (3, "tcp://127.0.0.1:9", "existing scheduler"),
     ],

@@ -41,8 +41,8 @@ def sweep(
     Args:   study: as tables, the path of a TOML file, or a mapping of its keys.
             out: folder for the Parquet dataset; None: none is kept.
             workers: number of processes; default: all processors. Results do not depend on it.
-            scheduler: processes, threads, dask (a cluster on this machine), or the address of a
-            Dask scheduler.
+            scheduler: processes, threads, or the address of a Dask scheduler, which runs code as
+            you.
             resume: compute the missing rows of this study in `out`.
             mechanism, motion, load: instead of those that the study names.
     Raises: InputError: for a study that cannot be solved, before the computation starts.
