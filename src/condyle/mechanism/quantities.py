@@ -10,6 +10,7 @@ Beyond the bounds here no machine was ever built, and products of such numbers o
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from typing import Annotated, Any
 
@@ -72,9 +73,18 @@ def _curvature(value: float, info: ValidationInfo) -> float:
     return value * scale
 
 
+# Printable for Unicode, and drawn by no font: fillers, blank Braille, joiners, selectors.
+_INVISIBLE = re.compile(
+    "[\u034f\u115f\u1160\u17b4\u17b5\u180b-\u180f\u2800\u3164\ufe00-\ufe0f\uffa0"
+    "\U000e0100-\U000e01ef]"
+)
+
+
 def _name(value: str) -> str:
     if value != value.strip() or any(c in ',;"' or not c.isprintable() for c in value):
         raise ValueError("a name has no comma, semicolon, quote, control character or outer space")
+    if found := _INVISIBLE.search(value):
+        raise ValueError(f"a name has no invisible characters; this one has U+{ord(found[0]):04X}")
     if len(value) > NAME_CHARACTERS or len(value.encode()) > NAME_BYTES:
         raise ValueError(
             f"a name has at most {NAME_CHARACTERS} characters ({NAME_BYTES} bytes), since files "
