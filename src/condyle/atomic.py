@@ -1,11 +1,10 @@
-"""Files, and folders of them, that appear whole or not at all."""
+"""Files that appear whole or not at all, and folders for them."""
 
 from __future__ import annotations
 
 import os
 import re
 import secrets
-import shutil
 import socket
 import time
 import zlib
@@ -47,37 +46,6 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
 
 
-@contextmanager
-def replacing_folder(path: str | os.PathLike[str], mark: str) -> Iterator[Path]:
-    """Lend a temporary path for a folder; put it at `path` when the block succeeds, else remove it.
-
-    Args:   mark: a file that folders of this kind have; others are not replaced.
-    Raises: InputError: if `path` cannot be written, or is something else.
-    """
-    target = Path(os.path.realpath(as_path(path)))
-    if target.exists() and not (target / mark).is_file():
-        raise InputError(f"{path}: exists and is something else; give another name, or remove it")
-    if not os.path.isdir(target.parent):
-        raise InputError(f"{path}: the folder {target.parent} does not exist; create it first")
-    temporary, old = _beside(target), _beside(target)
-    _sweep(target.parent)
-    try:
-        yield temporary
-        if target.exists():  # aside until the new one stands
-            os.replace(target, old)
-        try:
-            os.replace(temporary, target)
-        except OSError:
-            if old.exists():
-                os.replace(old, target)
-            raise
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
-    finally:
-        for folder in (temporary, old):
-            shutil.rmtree(folder, ignore_errors=True)
-
-
 def make_folder(path: str | os.PathLike[str]) -> Path:
     """A folder, and those above it, made unless they are there.
 
@@ -116,10 +84,7 @@ def _sweep(folder: Path) -> None:
             with suppress(OSError):
                 gone = left[1] == _host() and not _lives(int(left[2]))
                 if gone or time.time() - entry.stat().st_mtime > _FORGOTTEN:
-                    if entry.is_dir(follow_symlinks=False):
-                        shutil.rmtree(entry.path, ignore_errors=True)
-                    else:
-                        os.unlink(entry.path)
+                    os.unlink(entry.path)
 
 
 def _host() -> str:

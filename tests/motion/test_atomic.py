@@ -6,12 +6,10 @@ import os
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
 
-from condyle.atomic import replacing, replacing_folder, write_text
-from condyle.errors import InputError
+from condyle.atomic import replacing, write_text
 
 KILLED = """
 import os, signal, sys
@@ -50,23 +48,3 @@ def test_what_others_may_still_write_stays_for_a_day(tmp_path):
         names = {path.name for path in tmp_path.iterdir()}
         assert names == {temporary.name, "b.csv", *strange}
     assert (tmp_path / "a.csv").read_text() == "half"
-
-
-def test_the_old_folder_stays_until_the_new_one_stands(tmp_path, monkeypatch):
-    def put(text):
-        with replacing_folder(tmp_path / "map", "mark") as folder:
-            folder.mkdir()
-            (folder / "mark").write_text(text)
-
-    def failing(start, end, rename=os.replace):
-        if str(end).endswith("map") and (Path(start) / "mark").read_text() == "new":
-            raise OSError(28, "no space left")
-        rename(start, end)
-
-    put("old")
-    with monkeypatch.context() as patch, pytest.raises(InputError, match="no space"):
-        patch.setattr(os, "replace", failing)
-        put("new")
-    assert (tmp_path / "map" / "mark").read_text() == "old"
-    put("new")
-    assert (tmp_path / "map" / "mark").read_text() == "new" and len(list(tmp_path.iterdir())) == 1

@@ -24,7 +24,6 @@ DISTRIBUTIONS = {  # name -> objective, and constraints
 }
 BACKENDS = ("auto", "compiled", "numpy")
 FMUS = ("plant", "inverse", "controller", "bounded")
-FORMATS = ("auto", "netcdf", "zarr")
 STYLES = ("screen", "journal", "journal-wide")
 EXPORTS = (
     *("inverse", "contact", "bounded", "forward"),
@@ -88,7 +87,6 @@ OFFERED: dict[str, Callable[..., list[str]]] = {
     "kind": one_of(*FMUS),
     "precision": one_of("double", "float"),
     "constants": one_of("inside", "struct"),
-    "format": one_of(*FORMATS),
 }
 _BUNDLED = files("condyle") / "mechanism" / "bundled"
 

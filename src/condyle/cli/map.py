@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from ..atomic import file_stem
-from ..errors import InputError
 from ..extras import require
-from . import completion, options
+from . import options
 from .answer import Answer, command_line, files_line
 from .command import COMPUTE, command
 from .inputs import model_of
@@ -17,8 +16,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from ..model.model import Model
-
-SUFFIXES = {"auto": "", "netcdf": ".nc", "zarr": ".zarr"}
 
 
 @command(
@@ -41,7 +38,6 @@ def map_(
     distribution: options.Distribution = None,
     preload: options.Preload = 0.0,
     out: Path = Path("maps"),
-    format: str = "auto",
     figures: bool = True,
     run: Path | None = None,
     backend: options.Backend = "auto",
@@ -69,17 +65,14 @@ def map_(
         stiffness: Stiffness of every actuator (N m/rad or N/m), for the quantity stiffness.
         stroke: Range of joint coordinates that counts as reach, "leg_*=-200:300 mm".
         out: Folder for the results.
-        format: netcdf; zarr (a folder, streamed: for more than memory holds); or auto, by size.
         figures: Draw the maps.
         run: Results (.nc) whose motion is drawn on the maps.
-        scheduler: Where blocks are computed, as for sweep: processes, threads, dask, or the address
-            of a Dask scheduler. Default: this process. The same numbers.
+        scheduler: Where blocks are computed, as for sweep: processes, threads, or the address of a
+            Dask scheduler. Default: this process. The same numbers.
         margin: Smallest singularity ratio allowed in ball and box.
     """
     if figures:
         require("matplotlib", "figures")
-    if format not in SUFFIXES:
-        raise InputError(f'no format "{format}"; expected {", ".join(completion.FORMATS)}')
     import condyle
 
     from ..report.map_text import size_text
@@ -98,7 +91,7 @@ def map_(
         direction,
         stiffness,
         stroke or (),
-        out=out / f"{file_stem(machine.name)}-map{SUFFIXES[format]}",
+        out=out / f"{file_stem(machine.name)}-map.nc",
         threads=threads,
         workers=workers,
         scheduler=scheduler,

@@ -24,7 +24,7 @@ def view(
     map: Annotated[
         Path | None,
         option(
-            "Map over two or three coordinates (.nc or .zarr) to rotate and to click; it contains "
+            "Map over two or three coordinates (.nc) to rotate and to click; it contains "
             "its mechanism."
         ),
     ] = None,

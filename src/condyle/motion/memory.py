@@ -1,9 +1,10 @@
-"""Available memory, so that too large a request is refused at once."""
+"""Available memory, so that too large a request is refused at once, and a limit for libraries."""
 
 from __future__ import annotations
 
 import os
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 
 _UNKNOWN = 8 << 30  # bytes, where the system does not say
 
@@ -24,3 +25,29 @@ def memory_at_hand() -> int:
         address_space = resource.getrlimit(resource.RLIMIT_AS)[0]
         limits += [address_space] if address_space != resource.RLIM_INFINITY else []
     return min(limits, default=_UNKNOWN)
+
+
+@contextmanager
+def at_most(extra: int) -> Iterator[None]:
+    """Let this process allocate so many further bytes, where the system can say so.
+
+    For a library that allocates what a damaged file asks for: it gets a MemoryError.
+    """
+    try:
+        import resource
+
+        with open("/proc/self/statm", encoding="ascii") as file:
+            now = int(file.read().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+    except (ImportError, OSError, ValueError):
+        yield
+        return
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    wanted = now + extra
+    if any(limit != resource.RLIM_INFINITY and limit <= wanted for limit in (soft, hard)):
+        yield
+        return
+    resource.setrlimit(resource.RLIMIT_AS, (wanted, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))

@@ -17,6 +17,12 @@ if TYPE_CHECKING:
 S = TypeVar("S", bound="xr.Dataset")
 PLACE, RESIDUAL, OFFSET, EMG = "marker_place", "marker_residual", "marker_offset", "emg"
 
+DIMS = {
+    PLACE: ("time", "marker", "axis"),
+    RESIDUAL: ("time", "marker"),
+    OFFSET: ("time", "marker"),
+    EMG: ("time", "chain"),
+}
 _MEANINGS = {
     PLACE: ("m", "measured marker in {S}; nan where it was not seen"),
     RESIDUAL: ("m", "distance of the marker from its place in its body of markers"),
@@ -52,14 +58,13 @@ def with_measured(solution: S, measured: MeasuredChannels | str | os.PathLike[st
         result = result.assign_coords(
             marker=list(found.names), marker_body=("marker", list(found.bodies))
         )
-        seen = ("time", "marker")
-        result[PLACE] = (*seen, "axis"), here.points, _attributes(PLACE)
-        result[RESIDUAL] = seen, here.residual, _attributes(RESIDUAL)
-        result[OFFSET] = seen, _offset(here, solution["pose"].values), _attributes(OFFSET)
+        offset = _offset(here, solution["pose"].values)
+        for name, values in ((PLACE, here.points), (RESIDUAL, here.residual), (OFFSET, offset)):
+            result[name] = DIMS[name], values, _attributes(name)
     if found.emg:
         nothing = np.full(len(time), np.nan)
         envelope = np.column_stack([here.emg.get(chain, nothing) for chain in chains])
-        result[EMG] = ("time", "chain"), envelope, _attributes(EMG)
+        result[EMG] = DIMS[EMG], envelope, _attributes(EMG)
     return result
 
 

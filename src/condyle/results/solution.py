@@ -16,10 +16,11 @@ from typing import Any
 import h5netcdf
 import numpy as np
 import xarray as xr
+from pydantic import BaseModel, JsonValue, TypeAdapter
 
 from ..accessors import extend
 from ..atomic import replacing
-from ..errors import InputError, UnsupportedError, as_path, no_such_file, shown
+from ..errors import InputError, UnsupportedError, as_path, shown
 from ..extras import require
 from ..markers import MeasuredChannels
 from ..mechanism.files import recall
@@ -28,8 +29,10 @@ from ..motion import write_table
 from ..progress import step
 from .contacts import AXES, contact_loss, contact_loss_columns
 from .failed_samples import Failure, failures, status_columns, whole
+from .foreign import Kind, json_of, open_netcdf
 from .mat_file import dataset_variables, write_mat
-from .variables import BY_NAME, VARIABLES, named_columns, variable_columns
+from .measured import DIMS as MEASURED
+from .variables import BY_NAME, DIMENSIONS, VARIABLES, named_columns, variable_columns
 from .warnings import Notice
 
 # An attribute that only maps or only sweeps have; the others are solutions.
@@ -38,6 +41,7 @@ KINDS = {"held": "map", "study": "sweep"}
 RENAMED = {
     "torque": "effort", "torque_quantile": "effort_quantile", "lift_off": "contact_loss"
 }  # fmt: skip
+QUANTILE = "_quantile"  # end of the names of bands
 
 
 class Results:
@@ -198,12 +202,108 @@ def row_columns(d: xr.Dataset) -> dict[str, np.ndarray | list[str]]:
     return {**columns}
 
 
-def open_solution(path: str | Path) -> xr.Dataset:
-    """Read a solution that was saved as NetCDF.
+class Said(BaseModel):
+    """An event as JSON."""
 
+    time: float = 0.0
+    kind: str = ""
+    text: str = ""
+    owner: str = ""
+    ends: bool = False
+    state: dict[str, float] = {}
+
+
+class Run(BaseModel):
+    """What every solution says of how it was made."""
+
+    formulation: str
+    route: str
+    motion: str
+    load: str
+    landmark: str | None
+    load_point: str | None
+    solve_seconds: float
+    motion_kind: str | None = None
+
+
+class Bands(BaseModel):
+    """Of which variants the quantiles are."""
+
+    study: dict[str, JsonValue]
+    variants: int
+    failed: int
+
+
+class Kept(BaseModel):
+    """A table that a solution keeps."""
+
+    name: str
+    title: str
+    columns: list[str]
+    rows: list[list[str]]
+    notes: list[str]
+
+
+def _dimensions(name: str) -> tuple[str, ...] | None:
+    """Those of a variable of solutions, or None if they have none of that name."""
+    name = RENAMED.get(name, name)
+    if name.endswith(QUANTILE) and (own := BY_NAME.get(name.removesuffix(QUANTILE))):
+        return ("quantile", *own.dims)
+    if name == "contact_force_vector":
+        return ("time", "contact", "axis")
+    if name.startswith("reaction_"):
+        return ("time", "chain*", "axis")
+    return BY_NAME[name].dims if name in BY_NAME else MEASURED.get(name)
+
+
+def _along(name: str) -> str | None:
+    """The dimension that labels of solutions are along."""
+    if name.startswith("chain_"):  # of some families alone
+        return name
+    return LABELS.get(name)
+
+
+LABELS = {name: name for name in (*DIMENSIONS, "marker", "quantile")} | {
+    "effort_unit": "chain", "joint_unit": "chain", "marker_body": "marker"
+}  # fmt: skip
+# Those that every solution has.
+NEEDED = ("effort", "contact_force", "pose", "joint", "joint_rate", "bound_margin", "load")
+SOLUTION = Kind(
+    "solution",
+    _dimensions,
+    _along,
+    {
+        "options": json_of(TypeAdapter(Run)),
+        "warnings": json_of(TypeAdapter(list[str])),
+        "notices": json_of(TypeAdapter(list[Notice])),
+        "events": json_of(TypeAdapter(list[Said])),
+        "bands": json_of(TypeAdapter(Bands)),
+        "tables": json_of(TypeAdapter(list[Kept])),
+    },
+)
+
+
+def open_solution(path: str | os.PathLike[str], lazy: bool = False) -> xr.Dataset:
+    """Read a solution that was saved as NetCDF, by whomever.
+
+    Names that no solution has are not read.
+
+    Args:   lazy: leave arrays in the file until they are read; it is to be closed.
     Raises: InputError: if the file is missing or is not a condyle solution.
     """
-    return as_solution(read_dataset(path, "solution"), path)
+    found = open_netcdf(path, SOLUTION, lazy)
+    old = {old: new for old, new in RENAMED.items() if old in found and new not in found}
+    solution = found.drop_vars({*RENAMED} - {*old}, errors="ignore").rename(old)
+    solution.set_close(found.close)
+    if missing := [name for name in (*NEEDED, "status") if name not in solution]:
+        raise InputError(f'{path} is NetCDF, but not a condyle solution: it has no "{missing[0]}"')
+    for name in {"notices", "events"} & {*solution.attrs}:
+        solution.attrs[name] = solution.attrs[name].replace('"lift_off"', '"contact_loss"')
+    if "contact_loss" not in solution:  # written before there were unilateral contacts
+        variable, machine = BY_NAME["contact_loss"], solution.condyle.mechanism
+        lost = contact_loss(machine, solution["contact_force"].values)
+        solution["contact_loss"] = variable.dims, lost, variable.attributes(machine)
+    return solution
 
 
 def as_kind(given: Any, kind: str, argument: str) -> xr.Dataset:
@@ -215,43 +315,6 @@ def as_kind(given: Any, kind: str, argument: str) -> xr.Dataset:
     if made and Results(given).kind == kind:
         return given
     raise InputError(f"{argument}: expected a {kind} of condyle, got {shown(given)}")
-
-
-def read_dataset(path: str | os.PathLike[str], kind: str, mark: str | None = None) -> xr.Dataset:
-    """A dataset as NetCDF, or from a folder of Zarr with a file `mark`; `kind` is for messages.
-
-    Raises: InputError: if it is missing or something else.
-    """
-    given = Path(as_path(path))
-    try:
-        if mark is not None and (given / mark).is_file():
-            return xr.open_zarr(given, chunks=None, consolidated=False)
-        if given.is_dir():
-            raise InputError(f"{path}: is a folder; give the name of a {kind} (.nc) in it")
-        return xr.load_dataset(given, engine="h5netcdf")
-    except InputError:
-        raise
-    except FileNotFoundError:
-        raise no_such_file(path) from None
-    except Exception as error:
-        raise InputError(f"{path} is not a NetCDF {kind}: {error}") from None
-
-
-def as_solution(dataset: xr.Dataset, path: str | os.PathLike[str]) -> xr.Dataset:
-    """What was read from a file of any version, with the names of this one.
-
-    Raises: InputError: if it is not a condyle solution.
-    """
-    solution = dataset.rename({old: new for old, new in RENAMED.items() if old in dataset})
-    if "mechanism" not in solution.attrs or "effort" not in solution:
-        raise InputError(f"{path} is NetCDF, but not a condyle solution")
-    for name in {"notices", "events"} & {*solution.attrs}:
-        solution.attrs[name] = solution.attrs[name].replace('"lift_off"', '"contact_loss"')
-    if "contact_loss" not in solution:  # written before there were unilateral contacts
-        variable, machine = BY_NAME["contact_loss"], solution.condyle.mechanism
-        lost = contact_loss(machine, solution["contact_force"].values)
-        solution["contact_loss"] = variable.dims, lost, variable.attributes(machine)
-    return solution
 
 
 def write_netcdf(dataset: xr.Dataset, path: Path) -> None:

@@ -1,4 +1,4 @@
-"""A map as a labelled dataset: in memory, or streamed to a folder where it would not fit."""
+"""A map as a labelled dataset, computed block by block."""
 
 from __future__ import annotations
 
@@ -6,29 +6,28 @@ import json
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...atomic import make_folder, replacing_folder
+from ...atomic import make_folder
 from ...backends.threads import workers as processors
 from ...errors import InputError, as_path, did_you_mean, shown, texts_of
-from ...extras import require
 from ...mechanism import dumps
 from ...mechanism.mechanism import COORDINATES, Mechanism
 from ...model.given import as_model
 from ...model.model import Model
 from ...motion import resolve_load_point
 from ...motion.column_units import FORCE, MOMENT
+from ...motion.memory import memory_at_hand
 from ...progress import step
 from ...results.solution import Results
 from ...version import __version__
 from ..workers import check_scheduler, run_parts
 from .axes import Grid, Over, Values, grid_of, number, values_of
 from .block import Block, Setup
-from .map_files import MARK, open_map, zarr_arrays
 from .map_quantities import Quantity, chosen, variables
 from .reach import Reach, Strokes
 
@@ -36,7 +35,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 BLOCK = 1 << 16  # poses at a time
-LARGE = 200_000_000  # bytes above which a map without a suffix is streamed to Zarr
+COPIES = 3  # of a map in memory: its arrays, its file before it is on disk, and one to work on
 
 
 def workspace_map(
@@ -68,14 +67,15 @@ def workspace_map(
             direction: of the additional load of quantity `load_limit`, in {S}: "0,0,-1".
             stiffness: of every actuator, or by chain [N m/rad or N/m].
             stroke: "leg_*=-200:300 mm": range of joint coordinates that counts as reach.
-            out: file: .nc (NetCDF), or .zarr (a folder, streamed, for more than memory holds).
-            Without a suffix: by size. It appears whole or not at all; its folder is made.
+            out: file (NetCDF), to which .nc is added unless it ends so. It appears whole or not
+            at all; its folder is made.
             threads: maximum number of threads.
-            workers, scheduler: as in `condyle.sweep`: processes, threads, dask, or the address of
-            a Dask scheduler. Default: this process. Same numbers.
+            workers, scheduler: as in `condyle.sweep`: processes, threads, or the address of a
+            Dask scheduler. Default: this process. Same numbers.
     Returns: a dataset with a dimension for each axis, `status` and `cause` always; its `encoding`
             names the file as "source".
-    Raises: InputError: for any argument that cannot be used, before the computation starts.
+    Raises: InputError: for any argument that cannot be used, and for more points than memory
+            holds, before the computation starts.
     """
     made = as_model(model)
     grid = grid_of(made.mechanism, over, hold)
@@ -83,10 +83,8 @@ def workspace_map(
     wanted = chosen(texts_of("quantities", quantities), setup)
     check_scheduler(workers, scheduler)
     work = Blocks(setup, grid, wanted, BLOCK, workers, scheduler)
-    file = None if out is None else _file(out, work)
-    if file is not None and file.suffix == ".zarr":
-        return _streamed(work, file)
-    dataset = _in_memory(work)
+    file = None if out is None else _file(out)
+    dataset = _computed(work)
     if file is not None:
         Results(dataset).save(file)
         dataset.encoding["source"] = str(file)
@@ -119,15 +117,11 @@ def setup_of(
     )
 
 
-def _file(out: str | os.PathLike[str], blocks: Blocks) -> Path:
+def _file(out: str | os.PathLike[str]) -> Path:
     """The file of a map, its folder made."""
     file = Path(as_path(out, "out"))
-    if file.suffix not in (".nc", ".zarr"):
-        like = _like(blocks).values()
-        size = sum(np.dtype(dtype).itemsize * math.prod(shape) for _, shape, dtype, _ in like)
-        file = file.with_name(f"{file.name}{'.zarr' if size > LARGE else '.nc'}")
-    if file.suffix == ".zarr":
-        require("zarr", "maps")
+    if file.suffix != ".nc":
+        file = file.with_name(f"{file.name}.nc")
     make_folder(file.parent)
     return file
 
@@ -157,11 +151,8 @@ def evaluated(blocks: Blocks, number: int) -> dict[str, np.ndarray]:
         return {v.name: v.values(here) for v in variables(blocks.quantities)}
 
 
-def fill(blocks: Blocks, targets: Mapping[str, Any], row: int) -> None:
-    """Evaluate all poses, block by block.
-
-    Args: targets: what takes the values, by name;  row: poses in one entry of theirs.
-    """
+def fill(blocks: Blocks, targets: Mapping[str, np.ndarray]) -> None:
+    """Evaluate all poses, block by block, into arrays (N, ..) by name."""
     count = -(-blocks.grid.size // blocks.size)
     with step("mapping", blocks.grid.size) as advance:
         for number, arrays in run_parts(
@@ -169,28 +160,25 @@ def fill(blocks: Blocks, targets: Mapping[str, Any], row: int) -> None:
         ):
             start, stop = blocks.ends(number)
             for name, target in targets.items():
-                shape = (stop - start) // row, *target.shape[1:]
-                target[start // row : stop // row] = arrays[name].reshape(shape)
+                target[start:stop] = arrays[name]
             advance(stop - start)
 
 
-def _in_memory(blocks: Blocks) -> xr.Dataset:
+def _computed(blocks: Blocks) -> xr.Dataset:
+    """Raises InputError for more than memory holds."""
     grid, like = blocks.grid, _like(blocks)
+    size = sum(np.dtype(dtype).itemsize * math.prod(shape) for _, shape, dtype, _ in like.values())
+    if COPIES * size > (free := memory_at_hand()):
+        raise InputError(
+            f"a map of {grid.size} points takes {COPIES * size / 2**30:.3g} GiB, and "
+            f"{free / 2**30:.3g} GiB are free: choose fewer points or quantities, or map parts of "
+            "the range one after the other"
+        )
     arrays = {name: np.empty(shape, dtype) for name, (_, shape, dtype, _) in like.items()}
     flat = {n: a.reshape(grid.size, *a.shape[len(grid.axes) :]) for n, a in arrays.items()}
-    fill(blocks, flat, 1)
+    fill(blocks, flat)
     made = {name: (like[name][0], a, like[name][3]) for name, a in arrays.items()}
     return _frame(blocks, like).assign(made)
-
-
-def _streamed(blocks: Blocks, file: Path) -> xr.Dataset:
-    like = _like(blocks)
-    row = blocks.grid.size // blocks.grid.shape[0]
-    rows = max(blocks.size // row, 1)
-    with replacing_folder(file, MARK) as folder:
-        targets = zarr_arrays(folder, _frame(blocks, like), like, rows)
-        fill(replace(blocks, size=rows * row), targets, row)
-    return open_map(file)
 
 
 def _frame(blocks: Blocks, like: Mapping[str, Any]) -> xr.Dataset:

@@ -1,35 +1,56 @@
-"""Maps from files, and Zarr folders that are filled block by block."""
+"""Maps from files, and what they went over."""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from ...errors import InputError
+from ...mechanism.home import independent_coordinates
+from ...mechanism.mechanism import COORDINATES
 from ...model.model import Model
-from ...results.solution import read_dataset
+from ...results.foreign import AXES_OF_STATUS, Kind, json_of, numbers, open_netcdf
 from .axes import Axis, Grid
+from .map_quantities import ALWAYS, QUANTITIES
 from .reach import Reach
 
 if TYPE_CHECKING:
     import xarray as xr
 
-MARK = ".zgroup"  # a file that every Zarr folder has
+LABELS = (*COORDINATES, "chain", "contact", "coordinate", "mode", "row", "column")
+
+
+def _dimensions(name: str) -> tuple[str, ...] | None:
+    """Those of a variable of maps, or None if they have none of that name."""
+    known = (*ALWAYS, *(v for quantity in QUANTITIES.values() for v in quantity.variables))
+    return next(((AXES_OF_STATUS, *v.dims) for v in known if v.name == name), None)
+
+
+MAP = Kind(
+    "map",
+    _dimensions,
+    lambda name: name if name in LABELS else None,
+    {
+        "held": json_of(TypeAdapter(dict[str, float])),
+        **dict.fromkeys(("load", "stroke_low", "stroke_high"), numbers),
+    },
+)
 
 
 def open_map(path: str | os.PathLike[str]) -> xr.Dataset:
-    """A map that was written as NetCDF or as Zarr.
+    """A map that was written as NetCDF, by whomever.
 
     Raises: InputError: if the file is missing or is no map.
     """
-    dataset = read_dataset(path, "map", MARK)
+    dataset = open_netcdf(path, MAP)
     if not is_map(dataset):
         raise InputError(f"{path} is not a map; `condyle map` writes them")
+    if why := _objection(dataset):
+        raise InputError(f"{path}: {why}")
     return dataset
 
 
@@ -38,29 +59,24 @@ def is_map(data: Any) -> bool:
     return "held" in getattr(data, "attrs", ()) and "cause" in data
 
 
-def zarr_arrays(folder: Path, frame: xr.Dataset, like: Mapping[str, Any], rows: int) -> Any:
-    """Arrays of a new Zarr group by name, to be filled by so many rows of the first axis.
-
-    Args: frame: its coordinates and attributes.
-          like: name -> (dimensions, shape, type, attributes).
-    """
-    import zarr
-
-    group = zarr.open_group(str(folder), mode="w", zarr_format=2, attributes=dict(frame.attrs))
-
-    def made(
-        name: str, dims: Any, shape: Any, dtype: Any, about: Mapping[str, Any], chunks: Any
-    ) -> Any:
-        array = group.create_array(name, shape=shape, dtype=dtype, chunks=chunks, fill_value=None)
-        array.attrs.update({"_ARRAY_DIMENSIONS": list(dims), **about})
-        return array
-
-    for name, c in frame.coords.items():
-        made(str(name), c.dims, c.shape, c.dtype, c.attrs, c.shape)[...] = c.values
-    return {
-        name: made(name, dims, shape, dtype, about, (min(rows, shape[0]), *shape[1:]))
-        for name, (dims, shape, dtype, about) in like.items()
-    }
+def _objection(dataset: xr.Dataset) -> str | None:
+    """Why a dataset is no map over independent coordinates, or None."""
+    machine = dataset.condyle.mechanism
+    free, held = independent_coordinates(machine), json.loads(dataset.attrs["held"])
+    axes = [str(dim) for dim in dataset["status"].dims] if "status" in dataset else []
+    if not 1 <= len(axes) <= 3 or sorted([*axes, *held]) != sorted(free):
+        return f"it goes over {', '.join(axes) or 'nothing'}; expected one to three of {free}"
+    for name in axes:
+        values = dataset[name].values
+        if len(values) < 2 or not np.isfinite(values).all() or not (np.diff(values) > 0).all():
+            return f'"{name}" is no row of values that rise'
+    if not np.isfinite([*held.values()]).all():
+        return "its held coordinates are not finite"
+    sizes = {"load": 9, "stroke_low": len(machine.chains), "stroke_high": len(machine.chains)}
+    for name, size in sizes.items():
+        if len(dataset.attrs.get(name, ())) != size:
+            return f'its attribute "{name}" has not {size} numbers'
+    return None
 
 
 def grid_and_reach(dataset: xr.Dataset, model: Model) -> tuple[Grid, Reach]:

@@ -13,6 +13,7 @@ from ...mechanism.mechanism import Mechanism
 from ...motion import Load, Motion
 from ...motion.memory import memory_at_hand
 from ...progress import step
+from ...results.solution import QUANTILE
 from ...results.warnings import Notice
 from ...status import Status
 from ..workers import PROCESSES, check_scheduler, run_parts
@@ -22,7 +23,6 @@ from .variants import OK, variants
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 AS_SOLVED = ["formulation", "route", "load_point", "distribution", "preload", "contact_weight"]
-SUFFIX = "_quantile"
 
 
 def with_bands(
@@ -55,7 +55,7 @@ def with_bands(
         about = {"units": solution[name].attrs["units"]}
         about["long_name"] = f"quantiles of {name} over {count} variants"
         dims = ("quantile", *solution[name].dims)
-        variables[name + SUFFIX] = dims, _quantiles(values), about
+        variables[name + QUANTILE] = dims, _quantiles(values), about
     level = ("quantile", list(QUANTILES), {"units": "1", "long_name": "share of variants below"})
     made = solution.assign(variables).assign_coords({"quantile": level})
     made.attrs["bands"] = json.dumps({"study": own.data(), "variants": count, "failed": failed})

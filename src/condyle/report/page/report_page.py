@@ -51,17 +51,10 @@ def opened(path: str | os.PathLike[str]) -> Iterator[xr.Dataset]:
 
     Raises: InputError: if the file is missing or is not a condyle solution.
     """
-    import xarray as xr
+    from ...results.solution import open_solution
 
-    from ...results.solution import as_solution, open_solution
-
-    try:
-        dataset = xr.open_dataset(path, engine="h5netcdf", cache=False)
-    except Exception:
-        yield open_solution(str(path))  # which says what is wrong
-        return
-    with dataset:
-        yield as_solution(dataset, path)
+    with open_solution(path, lazy=True) as solution:
+        yield solution
 
 
 def write_report(

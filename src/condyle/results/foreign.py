@@ -1,0 +1,326 @@
+"""The one door for datasets from files, which may be anybody's.
+
+The header is checked before any array is read: nothing leads out of the file, and what is read
+fits the file and memory. Only known names are read, and their dimensions, labels and attributes
+are those of the mechanism in the file. What is shown of it can neither move a cursor nor format.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import TypeAdapter, ValidationError
+
+from ..errors import InputError, as_path, no_such_file, printable, shortened
+from ..kinematics.causes import owners
+from ..kinematics.singularities import KINDS
+from ..mechanism.files import recall
+from ..mechanism.home import independent_coordinates
+from ..mechanism.mechanism import COORDINATES, Mechanism
+from ..motion.memory import at_most, memory_at_hand
+from ..status import STATUS_NAMES
+from .contacts import AXES
+from .variables import WRENCH
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    import h5py
+    import xarray as xr
+
+DENSITY = 100  # bytes of arrays that a byte of a file may stand for: compression of numbers is less
+SMALL = 1 << 26  # bytes that a file of any size may stand for
+ROOM = 1 << 28  # bytes to work with
+LABELS, LONGEST = 10_000, 1 << 20  # number of labels; characters of a text
+RANK = 32  # entries of an attribute of texts or references
+FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32"}
+CODES = {"status": len(STATUS_NAMES), "singularity": len(KINDS), "kind": len(KINDS)}
+LONE = 200  # characters of a line that is shown
+AXES_OF_STATUS = ".."
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of dataset.
+
+    name:       for messages.
+    variables:  name -> its dimensions, or None for a name that is not read; AXES_OF_STATUS stands
+                for those of `status`, and "chain*" for what begins so.
+    labels:     name -> the dimension that these values are along, or None if they are no labels.
+    attributes: name -> how its text or array is checked, besides `COMMON`.
+    """
+
+    name: str
+    variables: Callable[[str], tuple[str, ...] | None]
+    labels: Callable[[str], str | None]
+    attributes: Mapping[str, Callable[[Any], Any]]
+
+
+def open_netcdf(path: str | os.PathLike[str], kind: Kind, lazy: bool = False) -> xr.Dataset:
+    """A dataset in a NetCDF file, whoever wrote it.
+
+    Args:   lazy: leave arrays in the file until they are read; the caller closes it.
+    Raises: InputError: if the file is missing or is none of this kind.
+    """
+    import h5py
+    import xarray as xr
+
+    name = as_path(path)
+    if os.path.isdir(name):
+        raise InputError(f"{path}: is a folder; give the name of a {kind.name} (.nc) in it")
+    if not os.path.isfile(name):
+        raise no_such_file(path)
+    size = os.path.getsize(name)
+    try:
+        with at_most(ROOM + DENSITY * size), h5py.File(name, "r") as file:
+            shapes = _check_header(file, size, kind, lazy)
+            # Texts are as long as the file says, which is known only when they are read.
+            dataset = xr.open_dataset(
+                name,
+                engine="h5netcdf",
+                cache=not lazy,
+                drop_variables=[one for one, shape in shapes.items() if shape is None],
+                mask_and_scale=False,
+                decode_times=False,
+                concat_characters=False,
+                decode_coords=False,
+                phony_dims="sort",
+            )
+            try:
+                for one, variable in (dataset if lazy else dataset.load()).variables.items():
+                    sizes = tuple(dataset.sizes[dim] for dim in variable.dims)
+                    if not variable.shape == sizes == shapes[str(one)]:
+                        raise InputError(f'"{one}" does not fit its dimensions')
+                checked = _checked(dataset, kind)
+            finally:
+                if not lazy:
+                    dataset.close()
+    except _NotOursError as error:
+        raise InputError(f"{path} is NetCDF, but not a condyle {kind.name}: {error}") from None
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    except Exception as error:  # of h5py, h5netcdf and xarray, for which there is no list
+        why = shortened(printable(" ".join(str(error).split()), lines=False), LONE)
+        raise InputError(f"{path} is not a NetCDF {kind.name}: {why}") from None
+    checked.set_close(dataset.close)
+    return checked
+
+
+class _NotOursError(Exception):
+    """What a dataset of this kind has, and this one has not."""
+
+
+def _check_header(
+    file: h5py.File, size: int, kind: Kind, lazy: bool
+) -> dict[str, tuple[int, ...] | None]:
+    """Shapes of the variables by name; None for one that is not read.
+
+    Raises: InputError: where reading would leave the file, or take more than is there.
+    """
+    import h5py
+
+    shapes, total = dict[str, tuple[int, ...] | None](), 0
+    _check_attributes(file)
+    for name in file:
+        if not isinstance(file.get(name, getlink=True), h5py.HardLink):
+            raise InputError(f'"{name}" is a link; expected variables in the file itself')
+        found = file[name]
+        if not isinstance(found, h5py.Dataset):
+            raise InputError(f'"{name}" is a group; expected variables')
+        if found.is_virtual or found.external:
+            raise InputError(f'"{name}" is stored in another file; expected all in this one')
+        _check_attributes(found)
+        plan = found.id.get_create_plist()
+        filters = {plan.get_filter(i)[0] for i in range(plan.get_nfilters())}
+        if not filters <= {*FILTERS}:
+            raise InputError(f'"{name}" is packed; expected at most {", ".join(FILTERS.values())}')
+        if kind.variables(name) is None and kind.labels(name) is None:
+            shapes[name] = None
+            continue
+        shapes[name] = found.shape
+        if h5py.check_string_dtype(found.dtype) is not None:
+            _check_labels(found)
+        elif found.dtype.kind in "fiu":
+            total += found.size * found.dtype.itemsize
+        else:
+            raise InputError(f'"{name}" holds {found.dtype}, expected numbers or texts')
+    if total > max(SMALL, DENSITY * size):
+        raise InputError(f"{_size(total)} of arrays in a file of {_size(size)}: it is damaged")
+    if not lazy and total > (free := memory_at_hand()):
+        raise InputError(f"{_size(total)} of arrays, but only {_size(free)} of memory are free")
+    return shapes
+
+
+def _check_attributes(item: h5py.File | h5py.Dataset) -> None:
+    """Raises InputError for attributes too large to be read."""
+    import h5py
+
+    for name in item.attrs:
+        found = h5py.h5a.open(item.id, name.encode("utf-8", "surrogateescape"))
+        count, each = found.get_space().get_simple_extent_npoints(), found.get_type().get_size()
+        many = RANK if found.dtype.kind == "O" else LONGEST
+        if count > many or count * each > LONGEST:
+            raise InputError(f'its attribute "{name}" has {count} entries, too many')
+
+
+def _check_labels(found: h5py.Dataset) -> None:
+    """Raises InputError for labels too many or too long; each is read once."""
+    if found.size > LABELS:
+        raise InputError(f'"{found.name}" has {found.size} labels, expected up to {LABELS}')
+    room = LONGEST
+    for place in np.ndindex(found.shape):
+        room -= len(found[place])
+        if room < 0:
+            raise InputError(f'"{found.name}": its labels are too long')
+
+
+def _size(count: int) -> str:
+    return f"{count / 2**30:.3g} GiB" if count >> 30 else f"{count / 2**20:.3g} MiB"
+
+
+def _checked(found: xr.Dataset, kind: Kind) -> xr.Dataset:
+    """The dataset with known names alone, their labels as coordinates."""
+    machine = _mechanism(found)
+    _check_all_labels(found, machine)
+    names = [str(name) for name in found.data_vars]
+    for name in names:
+        if kind.labels(name) is None:
+            _check_variable(found, name, kind, machine)
+    result = found.set_coords([name for name in names if kind.labels(name) is not None])
+    for key, variable in result.variables.items():
+        name = str(key)
+        along = kind.labels(name)
+        if name in result.coords and variable.dims != (along,):
+            raise InputError(f'"{name}" is no row along "{along}"')
+        variable.attrs, variable.encoding = _about(name, variable.attrs), {}
+    attributes = {"mechanism": found.attrs["mechanism"], "mechanism_name": machine.name}
+    for name, check in {**COMMON, **kind.attributes}.items():
+        if name in found.attrs:
+            with _attribute(name):
+                attributes[name] = check(found.attrs[name])
+    result.attrs = {n: attributes[n] for n in found.attrs if n in attributes}
+    return result
+
+
+def _mechanism(found: xr.Dataset) -> Mechanism:
+    text = found.attrs.get("mechanism")
+    if not isinstance(text, str):
+        raise _NotOursError("it has no mechanism")
+    return recall(text, shortened(printable(found.attrs.get("mechanism_name", "mechanism")), 60))
+
+
+def _check_all_labels(found: xr.Dataset, machine: Mechanism) -> None:
+    """Raises InputError for labels that are not those of the mechanism, or cannot be shown."""
+    known = {
+        "chain": machine.chain_names,
+        "contact": machine.contact_names,
+        "coordinate": COORDINATES,
+        "independent": _independent(machine, found),
+        "axis": AXES,
+        "component": WRENCH,
+    }
+    for name, right in known.items():
+        got = found[name].values.ravel().tolist() if name in found.variables else [*right]
+        if got != [*right]:
+            raise InputError(
+                f'"{name}" is along {shortened(printable(got, lines=False), LONE)}, expected '
+                f"{', '.join(right) or 'nothing'}, as its mechanism has it"
+            )
+    for key, variable in found.variables.items():
+        if variable.dtype.kind == "O":
+            texts = variable.values.ravel().tolist()
+            if not all(isinstance(t, str) and t.isprintable() and len(t) <= LONE for t in texts):
+                raise InputError(f'"{key}" has labels that cannot be shown')
+    if "time" in found.variables:
+        time = found["time"].values
+        good = time.ndim == 1 and time.size and time.dtype.kind == "f" and np.isfinite(time).all()
+        if not (good and (np.diff(time) >= 0).all()):
+            raise InputError('"time" is no row of times that rise')
+
+
+def _independent(machine: Mechanism, found: xr.Dataset) -> tuple[str, ...]:
+    """Names of q; where a surface was written in Python, which no file has, those that stand."""
+    try:
+        return independent_coordinates(machine)
+    except InputError:
+        said = found["independent"].values.tolist() if "independent" in found.variables else []
+        return tuple(name for name in COORDINATES if name in said)
+
+
+def _check_variable(found: xr.Dataset, name: str, kind: Kind, machine: Mechanism) -> None:
+    variable, right = found[name], kind.variables(name)
+    assert right is not None
+    if right[0] == AXES_OF_STATUS and "status" in found:
+        right = (*map(str, found["status"].dims), *right[1:])
+    if not fnmatchcase(" ".join(map(str, variable.dims)), " ".join(right)):
+        got = ", ".join(printable(dim, lines=False) for dim in variable.dims)
+        raise InputError(f'"{name}" is over ({got[:LONE]}), expected ({", ".join(right)})')
+    if missing := [dim for dim in variable.dims if dim not in found.variables]:
+        raise InputError(f'"{name}" is over "{missing[0]}", whose values are missing')
+    if variable.dtype.kind not in "fiub":
+        raise InputError(f'"{name}" holds {variable.dtype}, expected numbers')
+    count = len(owners(machine)) if name == "cause" else CODES.get(name)
+    if count is not None:
+        if variable.dtype.kind not in "iu":
+            raise InputError(f'"{name}" holds {variable.dtype}, expected whole numbers')
+        if variable.size and not 0 <= int(variable.min()) <= int(variable.max()) < count:
+            raise InputError(f'"{name}" has codes beyond 0 to {count - 1}')
+
+
+def _about(name: str, given: Mapping[str, Any]) -> dict[str, str]:
+    """Attributes of a variable that are kept: lines that can be shown, also as a figure's title."""
+    kept = {}
+    for key in ("units", "long_name", "flag_meanings"):
+        text = given.get(key)
+        if text is None:
+            continue
+        long = LONGEST if key == "flag_meanings" else LONE
+        if not isinstance(text, str) or len(text) > long or not text.isprintable() or "$" in text:
+            raise InputError(f'the {key} of "{name}" cannot be shown: expected a short line')
+        kept[key] = text
+    return kept
+
+
+@contextmanager
+def _attribute(name: str) -> Iterator[None]:
+    try:
+        yield
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        place = ".".join(map(str, first["loc"]))
+        why = f"{place}: {first['msg']}" if place else first["msg"]
+        raise InputError(
+            f'its attribute "{name}" is damaged: {shortened(printable(why, lines=False), LONE)}'
+        ) from None
+
+
+def line(value: Any) -> str:
+    """A text that is shown in one line."""
+    return shortened(printable(TEXT.validate_python(value), lines=False), LONE)
+
+
+def json_of(adapter: TypeAdapter[Any]) -> Callable[[Any], str]:
+    """A check of JSON that an adapter must take."""
+
+    def check(value: Any) -> str:
+        adapter.validate_json(TEXT.validate_python(value))
+        return str(value)
+
+    return check
+
+
+def numbers(value: Any) -> np.ndarray:
+    """A row of numbers."""
+    return np.array(ROW.validate_python(np.atleast_1d(value).tolist()))
+
+
+TEXT, ROW = TypeAdapter(str), TypeAdapter(list[float])
+COMMON: dict[str, Callable[[Any], Any]] = dict.fromkeys(
+    ("title", "source", "condyle_version", "distribution"), line
+)
