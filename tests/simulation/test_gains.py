@@ -91,7 +91,7 @@ def test_unstable_drives_are_predicted(jaw: Model, damping: float, stable: bool)
 FIRM = {"kind": "food", "food": "firm_bolus", "point": "right_molar"}
 
 
-@pytest.mark.parametrize(("delay", "stable"), [(1, True), (5, False)])
+@pytest.mark.parametrize(("delay", "stable"), [(3, True), (4, False), (6, False)])
 def test_a_bite_that_swings_is_predicted(jaw: Model, delay: int, stable: bool) -> None:
     """50 N on a firm bolus at 1 kHz: while it bites, late efforts pump it up."""
     bite = {"kind": "bite_force", "stiffness": 900.0, "force": 50.0, "delay": delay}
@@ -105,6 +105,7 @@ def test_a_bite_that_swings_is_predicted(jaw: Model, delay: int, stable: bool) -
     said = condyle.check_gains(jaw, tables, motion=shut)
     holding = [point for point in said.points if point.holds == "food"]
     assert holding and all(point.stable == stable for point in holding)
+    assert all((point.phase > 0) == stable for point in holding)
     assert all(point.stable for point in said.points if point.holds is None)
     force = run(bind(jaw, scenario_from(tables), motion=shut)).force[-100:]
     assert (np.ptp(force) < 5.0) == stable
