@@ -62,7 +62,6 @@ def test_a_full_stdout(tmp_path: Path) -> None:
         (("view", "--no-browser"), "viser"),
         (("run", "--figures"), "matplotlib"),
         (("run", "--report"), "plotly"),
-        (("compare",), "matplotlib"),
         (("motion", "from-c3d", "a", "--markers", "m", "--mechanism", "x", "--out", "o"), "c3d"),
     ],
 )
@@ -77,6 +76,19 @@ def test_a_missing_extra_is_named(
     outcome = condyle_command(*arguments)
     assert outcome.status == 2 and f"needs {package}, which is not installed" in outcome.err
     assert 'pip install "condyle[' in outcome.err and [*Path().iterdir()] == []
+
+
+def test_a_map_without_matplotlib(
+    condyle_command: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What nobody asked for is left out with a word; where warnings are errors, it is one."""
+    real, gone = extras.find_spec, {"matplotlib", "contourpy"}
+    monkeypatch.setattr(extras, "find_spec", lambda n: None if n in gone else real(n))
+    words = ("map", "masticatory", "--over", "X=-1:1:3 mm", "--out", "maps")
+    assert condyle_command(*words, "--strict").status == 2 and not Path("maps").exists()
+    done = condyle_command(*words)
+    assert done.status == 0 and "no figures are drawn" in done.err
+    assert [file.name for file in Path("maps").iterdir()] == ["masticatory-map.nc"]
 
 
 def test_extras_that_are_named_exist() -> None:

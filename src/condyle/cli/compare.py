@@ -10,7 +10,7 @@ from ..errors import InputError
 from . import options
 from .answer import Answer, command_line, files_line
 from .command import COMPUTE, command
-from .inputs import output_folder, require_drawing, warn
+from .inputs import can_draw, output_folder, require_drawing, warn
 
 
 @command(COMPUTE, example="condyle compare jaw.toml --motion path.csv --load bite.csv")
@@ -34,7 +34,8 @@ def compare(
         out: Folder for the results.
         figures: Draw Figures 5 to 9 of the paper.
     """
-    require_drawing(figures, report)
+    require_drawing(False, report)
+    figures = can_draw(figures)
     import condyle
 
     from ..motion import motion_and_load

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..atomic import file_stem, make_folder
-from ..errors import InputError, WarningError
+from ..errors import InputError, MissingExtraError, WarningError
 from ..extras import require
 from .answer import command_line
 from .options import DistributionOptions, ModelOptions, OutputOptions
@@ -81,6 +81,16 @@ def require_drawing(figures: bool, report: bool) -> None:
         require("matplotlib", "figures")
     if report:
         require("plotly", "report")
+
+
+def can_draw(figures: bool) -> bool:
+    """Whether figures that a command draws by default are drawn; a warning where they cannot be."""
+    try:
+        require_drawing(figures, False)
+    except MissingExtraError as error:
+        warn([f"no figures are drawn: {error}"])
+        return False
+    return figures
 
 
 def warn(warnings: Iterable[str]) -> None:

@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from ..atomic import file_stem
-from ..extras import require
 from . import options
 from .answer import Answer, command_line, files_line
 from .command import COMPUTE, command
-from .inputs import model_of
+from .inputs import can_draw, model_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -71,8 +70,7 @@ def map_(
             Dask scheduler. Default: this process. The same numbers.
         margin: Smallest singularity ratio allowed in ball and box.
     """
-    if figures:
-        require("matplotlib", "figures")
+    figures = can_draw(figures)
     import condyle
 
     from ..report.map_text import size_text
