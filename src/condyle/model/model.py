@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import os
 from functools import cached_property, partial
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,7 +23,6 @@ from ..backends.kernel import Kernel
 from ..errors import as_flag, as_name
 from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
-from ..motion import Load, Motion
 from ..questions.equations import INTERNAL, part_names
 from .arguments import Arguments
 from .distributing import Distribution, Distributor, reference_force
@@ -34,6 +33,9 @@ from .model_result import ModelResult
 from .poses import Poses
 from .system import System
 from .unchecked import Unchecked
+
+if TYPE_CHECKING:
+    from ..motion import Load, Motion
 
 Array = np.ndarray
 Point = str | ArrayLike | None

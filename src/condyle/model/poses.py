@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InputError, did_you_mean
 from ..kinematics.constraints import closed_form_available, indices
 from ..kinematics.singularities import Singularity, length_sensitivity
-from ..motion import Motion, resolve_landmark
 from ..questions.bound import bound
 from ..questions.configuration import SURVEYED
 from ..status import Status
@@ -18,6 +17,9 @@ from .arguments import POSE, Arguments, Lead, requested, samples
 from .model_result import ModelResult
 from .surveying import Survey, judged
 from .system import System
+
+if TYPE_CHECKING:
+    from ..motion import Motion
 
 Array = np.ndarray
 States = tuple[Array, Array, Array]
@@ -152,6 +154,8 @@ class Poses:
             return (q, q1, q2), self.contact_residual(motion.value)
         landmark = None
         if motion.kind == "landmark":
+            from ..motion import resolve_landmark  # files and splines: most models need none
+
             landmark = resolve_landmark(motion.landmark, self._system.mechanism.platform.points)
         return self.states(motion.names, given, landmark), None
 
