@@ -249,3 +249,12 @@ def test_shares_of_actuators_and_friction_have_figures_and_panels() -> None:
     drawn = sum(column(data, line["column"]) for line in lines.values())
     np.testing.assert_allclose(drawn, solution["effort"].values[:, 0], rtol=1e-5, atol=1e-6)
     assert "actuators" in lines
+
+
+def test_joint_loads_that_are_contact_forces_are_shown_once(robot: xr.Dataset) -> None:
+    same = robot.copy(deep=True)
+    machine = robot.condyle.mechanism
+    free = tuple(c.model_copy(update={"one_sided": False}) for c in machine.contacts)
+    same.attrs["mechanism"] = condyle.dumps(machine.replace(contacts=free))
+    same["contact_force"].values[:] = abs(same["contact_force"].values)
+    assert "load-on-joints" not in {p["id"] for p in payload(report_html(same))["panels"]}

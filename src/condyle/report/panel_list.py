@@ -158,7 +158,8 @@ def activation(solution: xr.Dataset) -> Iterator[Panel]:
     note += " EMG: its measured envelope over its greatest." if measured else ""
     yield Panel("activation", "Activation", "activation", "1", rows, "field", note=note)
     loads = [Curve(n, f"joint_load.{n}", v) for n, v in joint_loads(solution).items()]
-    if loads:
+    forces = solution["contact_force"].values.T  # what another panel shows already
+    if not np.array_equal([one.values for one in loads] or forces, forces, equal_nan=True):
         note = "Along the normal; negative: the joint would have to pull."
         yield Panel("load-on-joints", "Joint load", "joint load", "N", loads, note=note)
 
