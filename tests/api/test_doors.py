@@ -113,9 +113,15 @@ def test_arguments_that_a_door_has_not(stage: Stage, name: str) -> None:
 def test_one_state_unchecked_needs_no_wrench(stage: Stage, backend: str) -> None:
     model, q = condyle.Model(MACHINE, backend=backend), np.zeros(4)
     fast = model.unchecked()
+    assert "inverse_dynamics(q, v, a" in repr(fast)
     effort = fast.inverse_dynamics(q, q, q)
     np.testing.assert_allclose(effort, model.inverse_dynamics(q, q, q).effort, atol=1e-12)
     np.testing.assert_allclose(fast.forward_dynamics(q, q, effort), q, atol=1e-9)
+
+
+def test_options_of_a_solution_are_named(stage: Stage) -> None:
+    with pytest.raises(TypeError, match="positional"):
+        stage.model.solve(stage.motion, stage.load, "incisor")  # type: ignore[misc]
 
 
 def test_failures_of_a_map(stage: Stage) -> None:

@@ -133,7 +133,7 @@ def compare(
         raise InputError("formulations: expected at least one")
     # The first derivation also pays for imports, so it is not one of those that are timed.
     model = TimedModel(mechanism, names[0], "core", distribution)
-    solution = model.solve(motion, load, load_point)
+    solution = model.solve(motion, load, load_point=load_point)
     models, unavailable = [], []
     kinds = list(product(names, ROUTES))
     with step("deriving every model", len(kinds)) as advance:

@@ -54,7 +54,9 @@ def run(
     model = derive(
         machine, formulation=formulation, route=route, distribution=distribution, backend=backend
     )
-    solution = model.solve(path, acting, load_point, flag, reactions, threads)
+    solution = model.solve(
+        path, acting, load_point=load_point, flag=flag, reactions=reactions, threads=threads
+    )
     if measured is not None:
         solution = solution.condyle.with_measured(measured)
     if study is not None:

@@ -96,7 +96,7 @@ def tradeoff(
         raise InputError(f"weights must be strictly increasing numbers, got {shown(weights)}")
     first = derive(mechanism, distribution=Distribution("weighted", preload), **model)
     one = first.with_distribution(Distribution("weighted", preload, float(asked[0])))
-    solution = one.solve(motion, load, load_point)
+    solution = one.solve(motion, load, load_point=load_point)
     states = states_of(one, solution)
     efforts, forces, good = [], [], np.ones(solution.sizes["time"], dtype=bool)
     with step("solving at every weight", len(asked)) as advance:

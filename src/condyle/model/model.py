@@ -50,6 +50,8 @@ class Model:
     independent, dependent: names of the coordinates q_EE, in order, and of those that the contacts
                             determine.
     characteristic_length:  factor that converts angles to lengths [m].
+    kernel, poses, system:  kernels of questions, configurations of poses, and the equations with
+                            their numbers: for extensions, and the rooms that stand on models.
 
     Shapes: m independent coordinates, n chains, k contacts; "..." is the leading shape.
         q, v, a: independent coordinates, rates and accelerations, (..., m) [m, rad; per s; per s^2]
@@ -241,7 +243,8 @@ class Model:
         return self.poses.matrix("inertia_matrix", q, None, space)
 
     def bias(self, q: ArrayLike, v: ArrayLike, *, space: str = "q") -> Array:
-        """C_r v, Coriolis and centrifugal forces, (..., m) [N, N m]; in `space` "X", (..., 6).
+        """C_r v, Coriolis and centrifugal forces without gravity, (..., m) [N, N m]; in `space`
+        "X", (..., 6).
 
         Friction of actuators is added.
         """
@@ -265,6 +268,7 @@ class Model:
 
     @cached_property
     def poses(self) -> Poses:
+        """Configurations and singularities of poses, and the states of motions."""
         return Poses(self.system, self._arguments)
 
     @cached_property
@@ -321,6 +325,7 @@ class Model:
         self,
         motion: Motion,
         load: Load | None = None,
+        *,
         load_point: str | None = None,
         flag: bool = False,
         reactions: bool = False,

@@ -29,6 +29,13 @@ class Unchecked:
     def __init__(self, inverse: Callable[[], Dynamics], forward: Callable[[], Dynamics]) -> None:
         self._inverse, self._forward = inverse, forward
 
+    def __repr__(self) -> str:
+        return (
+            "Dynamics of one state at least latency:\n"
+            "  inverse_dynamics(q, v, a, wrench=None, at=None)       effort\n"
+            "  forward_dynamics(q, v, effort, wrench=None, at=None)  acceleration"
+        )
+
     @cached_property
     def inverse_dynamics(self) -> Call:
         return self._inverse().unchecked()
