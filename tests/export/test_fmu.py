@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import casadi as ca
 import fmpy
 import numpy as np
 import pytest
@@ -292,15 +293,51 @@ def test_what_a_host_must_not_do_is_refused(plant: Unit) -> None:
     packed = plant.pack(plant.keep())
     outputs = [v.name for v in plant.variables.values() if v.causality == "output"]
     computed = [name for name in outputs if name.split(".")[0] not in ("q", "q1")]
+    masses = ("platform.mass", "platform.inertia.yy", "tolerance")
+    wrong = [(name, x) for name in masses for x in (0.0, -0.2, np.nan, np.inf)]
+    wrong += [("crank_inertia.masseter_left", -1e-9), ("dq.X", 1.0), ("acceleration.X", 1.0)]
     steps = ((0.0, 0.01), (0.02, 0.01), (0.01, -0.001), (0.01, np.nan), (np.nan, 0.01))
     for call in (
         *(partial(plant.step, *step) for step in steps),
         *(partial(plant.unpack, strange) for strange in (bytes(len(packed)), packed[:-1])),
         *(partial(plant.write, name, 1.0) for name in computed),
+        *(partial(plant.write, *one) for one in wrong),
     ):
         with pytest.raises(Exception, match=r"(?i)error"):
             call()
     assert computed and plant.step(0.01, 0.0) == before
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("kind", ["plant", "inverse", "controller"])
+def test_casadi_takes_derivatives(
+    fmus: dict[tuple[str, int], Path], kind: str, version: int, tmp_path: Path
+) -> None:
+    """Its DaeBuilder reads both versions; what the FMU says of slopes is how its values change."""
+    fmpy.extract(str(fmus[kind, version]), unzipdir=str(tmp_path))
+    dae = ca.DaeBuilder(kind, str(tmp_path))
+    names = {"x": dae.x(), "u": dae.u()}
+    ins = [name for name, own in names.items() if own]
+    outs = ["ode", "y"] if kind == "plant" else ["y"]
+    values = HERE | LOAD | row("q2", Q, AHEAD) | row("q_d", Q, STATE[0] + 0.002)
+    f = dae.create("f", ins, outs, {"verbose": False})
+    at = [ca.DM([values.get(name, 0.01) for name in names[i]]) for i in ins]
+    J = dae.create("f", ins, outs).factory("J", ins, [f"jac:{o}:{i}" for o in outs for i in ins])
+    slopes = [np.array(found) for found in J.call(at)]
+    for n, o in enumerate(outs):
+        for k in range(len(ins)):
+            exact = slopes[n * len(ins) + k]
+            found = np.zeros_like(exact)
+            for j in range(exact.shape[1]):
+                ends = []
+                for h in (1e-5, -1e-5):
+                    moved = [ca.DM(x) for x in at]
+                    moved[k][j] += h
+                    ends.append(np.array(f.call(moved)[n]).ravel())
+                found[:, j] = (ends[0] - ends[1]) / 2e-5
+            scale = np.abs(found).max(axis=1, keepdims=True) + 1e-6
+            assert np.abs(exact - found).max() <= 2e-6 * scale.max(), (o, ins[k])
+            assert exact.any()
 
 
 def test_a_plant_stops_where_it_cannot_go_on(plant: Unit) -> None:

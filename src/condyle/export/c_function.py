@@ -20,6 +20,7 @@ from ..graph.program import Output, Program
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
 from ..questions import Question
+from ..questions.derivative import PREFIX, derivative
 from ..questions.friction import MOST
 from .c_context import ANGLES, CODES, LARGEST, WHY, Body, Context, threshold
 from .catalogue import Entry, Wish, least_norm
@@ -218,6 +219,11 @@ def function(c: Context, name: str, entry: Entry, wish: Wish) -> Body:
     found = question.variants()
     program = _pruned(found.robust or found.main, results)
     given = renamed(entry.given or " ".join(_used(program)))
+    if entry.tangent:
+        checks, of = program.checks, results
+        program = replace(derivative(program, set(given), set(of)), checks=checks)
+        given |= {PREFIX + port: PREFIX + own for port, own in given.items()}
+        results = {PREFIX + result: PREFIX + own for result, own in of.items()}
     arguments = tuple(_arguments(c, entry, program, given, results))
     context = [f"const {c.prefix}_constants *constants"] * c.struct
     parameters = ", ".join([*context, *(a.declared(c.precision) for a in arguments)])
@@ -326,7 +332,10 @@ def _judged(
     given = [a for a in arguments if a.given]
     every = [f"fabs_s({a.name}[{i}])" for a in given for i in range(a.size)]
     angles = [
-        f"fabs_s({a.name}[{i}])" for a in given for i, unit in enumerate(a.units) if unit == "rad"
+        f"fabs_s({a.name}[{i}])"
+        for a in given
+        for i, unit in enumerate(a.units)
+        if unit == "rad" and not a.name.startswith(PREFIX)
     ]
     found = [(_sum(every), f"<= {body.number(LARGEST[c.precision])}", "OUT_OF_BOUNDS")]
     if angles and isinstance(body, Scalar):  # vector code takes far angles from the library

@@ -6,7 +6,7 @@ A new one is an entry of `CATALOGUE`. Every controller of `condyle.questions.law
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ..errors import InputError, did_you_mean
@@ -60,6 +60,7 @@ class Entry:
     steps:    fixed number of iterations; 0 for none.
     described: name in C -> description and unit, where `Arguments` has none.
     limited:  whether efforts are within limits.
+    tangent:  whether it is the derivative, along arguments `d_` of what is given.
     """
 
     text: str
@@ -74,6 +75,7 @@ class Entry:
     steps: int = 0
     described: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     limited: bool = False
+    tangent: bool = False
 
     def unsure(self, structure: Structure) -> str:
         """The status of samples that cannot be certified."""
@@ -165,6 +167,7 @@ CATALOGUE: dict[str, Entry] = {
         quick=True,
     ),
 }
+TANGENT = "_derivative"  # after the name of a question: how its results change
 DEFAULT = ("inverse", "contact", "forward", "motion", "pose", "computed_torque")
 
 
@@ -177,6 +180,10 @@ def require_question(name: str) -> Entry:
     """Raises InputError for an unknown question."""
     if name in CATALOGUE:
         return CATALOGUE[name]
+    if (base := CATALOGUE.get(name.removesuffix(TANGENT))) is not None:
+        text = f"Derivative along a direction of all arguments of: {base.text}"
+        question = base.question or name.removesuffix(TANGENT)
+        return replace(base, text=text, question=question, quick=False, tangent=True)
     table = CONTROLLERS.get(name)
     if table is None or not issubclass(table, ControllerTable):
         known = [*CATALOGUE, *CONTROLLERS]

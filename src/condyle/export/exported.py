@@ -15,6 +15,7 @@ from ..graph.program import Port, Result
 from ..kinematics.chain import FAMILIES
 from ..mechanism.home import independent_coordinates
 from ..mechanism.mechanism import COORDINATES, Mechanism
+from ..questions.derivative import PREFIX
 from .catalogue import Wish
 
 Precision = Literal["double", "float"]
@@ -206,13 +207,16 @@ class Arguments:
         Args: name: in C;  described: description and unit, where it is not `KNOWN`.
         """
         size = port.size if isinstance(port, Port) else math.prod(port.shape)
-        text, of, per = KNOWN.get(name, (name.replace("_", " "), "", "=1"))
+        known = name.removeprefix(PREFIX)
+        text, of, per = KNOWN.get(known, (name.replace("_", " "), "", "=1"))
+        if known != name:
+            text = f"{'direction in' if given else 'derivative of'} {text}"
         if described is not None:
             text, per = described[0], f"={described[1]}"
         if not of:
             of = JOINT if port.lanes else FREE if size == len(self.independent) else AXES
         labels = self._labels.get(of, [f"{LETTERS.get(name, '')}{axis}" for axis in "xyz"])
-        if not (port.lanes or name in KNOWN or size == len(labels)):
+        if not (port.lanes or known in KNOWN or size == len(labels)):
             labels = [str(i + 1) for i in range(size)] if size > 1 else [name]
         if name == "s" and self._landmark is not None:
             text = f'displacement of "{self._landmark}" from home, in {{S}}'

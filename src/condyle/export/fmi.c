@@ -6,7 +6,10 @@
  * many), MODEL_COMPUTED (the first that no one sets), MODEL_STATUS (where the status is shown),
  * MODEL_TOLERANCE (of steps), MODEL_START, MODEL_TOKEN, the type model_constants, and
  *     static void model_prepare(const double *v, model_constants *of)    from parameters,
- *     static int model_evaluate(const model_constants *of, double *v)    everything computed.
+ *     static int model_evaluate(const model_constants *of, double *v)    everything computed,
+ *     static int model_takes(uint32_t which, double value)    whether a variable can have a value,
+ * and where MODEL_DIRECTIONAL is 1 (MODEL_TUNED to MODEL_TUNED_END shape the mechanism)
+ *     static int model_differentiate(const model_constants *of, const double *v, double *d).
  */
 
 #if defined(__GNUC__)
@@ -263,10 +266,38 @@ REAL_API(Set)(Instance *me, const Reference *which, size_t n, const double *valu
     for (size_t i = 0; i < n; i++)
         if (which[i] >= MODEL_COMPUTED)
             return answered(me, NO_VARIABLE);
+        else if (!model_takes(which[i], values[i]))
+            return report(me, ERROR, "a mass, inertia or friction is negative, zero or no number");
     for (size_t i = 0; i < n; i++)
         s->v[which[i]] = values[i];
     s->dirty = s->unprepared = 1;
     return OK;
+}
+
+/* Derivatives of unknowns u along a direction in knowns k: inputs, states, and parameters that do
+ * not shape the mechanism. */
+static int directional(Instance *me, const Reference *u, size_t n, const Reference *k, size_t m,
+                       const double *seed, double *result)
+{
+#if MODEL_DIRECTIONAL
+    State *s = &me->state;
+    double d[MODEL_VALUES] = {0.0};
+    for (size_t i = 0; i < m; i++) {
+        if (k[i] >= MODEL_COMPUTED || (k[i] >= MODEL_TUNED && k[i] < MODEL_TUNED_END))
+            return report(me, ERROR, "no derivative by this variable");
+        d[k[i]] += seed[i];
+    }
+    for (size_t i = 0; i < n; i++)
+        if (u[i] >= MODEL_VALUES)
+            return answered(me, NO_VARIABLE);
+    if (update(s) || (s->failed = model_differentiate(&s->constants, s->v, d)) != 0)
+        return answered(me, NO_VALUE);
+    for (size_t i = 0; i < n; i++)
+        result[i] = d[u[i]];
+    return OK;
+#else
+    return report(me, ERROR, "this FMU has no derivatives");
+#endif
 }
 
 /* There are real variables alone. */
@@ -400,8 +431,11 @@ API(GetRealStatus)(Instance *me, int what, double *value)
     *value = me->state.time;
     return OK;
 }
-REFUSED(GetDirectionalDerivative, const Reference *u, size_t n, const Reference *k, size_t m,
-        const double *dk, double *du)
+API(GetDirectionalDerivative)(Instance *me, const Reference *u, size_t n, const Reference *k, size_t m,
+                              const double *seed, double *result)
+{
+    return directional(me, u, n, k, m, seed, result);
+}
 REFUSED(SetRealInputDerivatives, const Reference *r, size_t n, const int *orders, const double *v)
 REFUSED(GetRealOutputDerivatives, const Reference *r, size_t n, const int *orders, double *v)
 #else
@@ -458,7 +492,12 @@ API(DoStep)(Instance *me, double now, double span, Boolean kept, Boolean *event,
     return status;
 }
 #define DERIVATIVE const Reference *u, size_t n, const Reference *k, size_t m, const double *seed
-REFUSED(GetDirectionalDerivative, DERIVATIVE, size_t a, double *result, size_t b)
+API(GetDirectionalDerivative)(Instance *me, DERIVATIVE, size_t a, double *result, size_t b)
+{
+    if (a != m || b != n)
+        return report(me, ERROR, "expected one value for each variable");
+    return directional(me, u, n, k, m, seed, result);
+}
 REFUSED(GetAdjointDerivative, DERIVATIVE, size_t a, double *result, size_t b)
 REFUSED(GetBinary, const Reference *r, size_t n, size_t *sizes, const uint8_t **values, size_t m)
 REFUSED(SetBinary, const Reference *r, size_t n, const size_t *sizes, const uint8_t *const *values,

@@ -147,6 +147,7 @@ def description(fmu: Fmu, version: int) -> str:
     root = Element("fmiModelDescription", about)
     state = "State" if three else "state"
     able = {"modelIdentifier": fmu.name}
+    able |= {f"providesDirectionalDerivative{'s' * three}": "true"} if fmu.differentiable else {}
     able |= {f"can{what}FMU{state}": "true" for what in ("GetAndSet", "Serialize")}
     for kind, more in (("ModelExchange", {}), ("CoSimulation", STEP)):
         interface = SubElement(root, kind, able | more)
@@ -196,7 +197,8 @@ def exponents(unit: str) -> dict[str, int]:
 
 def _said(v: Scalar) -> dict[str, str]:
     said = {"name": v.name, "valueReference": str(v.index), "description": v.text}
-    said["causality"] = v.role if v.role in ("input", "parameter") else "output"
+    role = "local" if v.role == "rate" else "output"
+    said["causality"] = v.role if v.role in ("input", "parameter") else role
     said["variability"] = "tunable" if v.role == "parameter" else "continuous"
     if v.role != "input":
         said["initial"] = "exact" if v.role in ("state", "parameter") else "calculated"
@@ -210,17 +212,22 @@ def _quantity(v: Scalar, three: bool) -> dict[str, str]:
 
 
 def _structure(parent: Element, fmu: Fmu, three: bool) -> None:
-    outputs = [v for v in fmu.variables if v.role not in ("input", "parameter")]
-    rates = [v for v in outputs if v.role == "rate"]
-    unknown = [v for v in outputs if v.role != "state"]
+    outputs = [v for v in fmu.variables if v.role in ("state", "output")]
+    rates = [v for v in fmu.variables if v.role == "rate"]
+    unknown = [v for v in fmu.variables if v.role in ("output", "rate")]
+    by = [str(v.index) for v in fmu.variables if v.role in ("input", "state")]
+    shaping = [str(v.index) for v in fmu.variables if v.role == "parameter"]
     for tag, state, found in (
         ("Output", "", outputs),
         ("Derivative", "ContinuousState", rates),
         ("InitialUnknown", "", unknown),
     ):
         if three:
+            initial = shaping if tag == "InitialUnknown" else []
             for v in found:
-                SubElement(parent, f"{state}{tag}", {"valueReference": str(v.index)})
+                known = [str(v.index)] if v.role == "state" else [*by, *initial]
+                on = {"valueReference": str(v.index), "dependencies": " ".join(known)}
+                SubElement(parent, f"{state}{tag}", on)
         elif found:
             listed = SubElement(parent, f"{tag}s")
             for v in found:

@@ -16,9 +16,11 @@ from dataclasses import dataclass, replace
 from ..errors import InputError, did_you_mean
 from ..kinematics.chain import FAMILIES
 from ..mechanism import Mechanism
+from ..questions.derivative import PREFIX
 from .c_context import CODES as C_CODES
 from .c_names import identifier
 from .c_source import export
+from .catalogue import TANGENT
 from .exported import Argument, Exported
 
 KINDS = {
@@ -33,6 +35,7 @@ TEXTS = {
     "controller": "Computed torque: desired and measured motion in, efforts out",
     "bounded": "Inverse dynamics within limits: a motion and a load in, efforts and forces out",
 }
+ROUGH = ("bounded",)  # kinds without derivatives
 STATES, RATES = ("q", "q1"), ("dq", "acceleration")
 PARAMETERS = ("point", "kp", "kd")
 STARTS = {"kp": 400.0, "kd": 40.0}
@@ -68,6 +71,7 @@ class Fmu:
     order: int
     files: dict[str, str]
     head: str
+    differentiable: bool
 
 
 # A number of the mechanism that can be changed: name, unit, text and start of its parameter, and
@@ -82,7 +86,8 @@ def fmu_model(mechanism: Mechanism, kind: str) -> Fmu:
     """
     if kind not in KINDS:
         raise InputError(f'kind: no FMU "{kind}".{did_you_mean(kind, KINDS)}')
-    e = export(mechanism, KINDS[kind], constants="struct", lanes=0)
+    tangents = [f"{question}{TANGENT}" for question in KINDS[kind] if kind not in ROUGH]
+    e = export(mechanism, [*KINDS[kind], *tangents], constants="struct", lanes=0)
     plant, calls = kind == "plant", [e[question] for question in KINDS[kind]]
     arrays = {a.name: a for f in calls for a in f.arguments}
     states, rates = (STATES, RATES) if plant else ((), ())
@@ -119,11 +124,16 @@ def fmu_model(mechanism: Mechanism, kind: str) -> Fmu:
     for i in range(order):
         rate = places["dq"] + i
         variables[rate] = replace(variables[rate], of=places["q"] + i)
-    body = _evaluate(e, kind, places) + _prepare(e, tuned, places)
+    body = _evaluate(e, kind, places) + _prepare(e, tuned, places) + _takes(places)
+    if tangents:
+        body += _evaluate(e, kind, places, TANGENT)
     macros = {
         "VALUES": len(variables),
         "COMPUTED": places["status"],
         "STATUS": places["status"],
+        "DIRECTIONAL": int(bool(tangents)),
+        "TUNED": places[tuned[0][0]],
+        "TUNED_END": places.get("q", places["status"]) if plant else places["status"],
         "ORDER": order,
         "STATES": places.get("q", 0),
         "DERIVATIVES": places.get("dq", 0),
@@ -141,6 +151,7 @@ def fmu_model(mechanism: Mechanism, kind: str) -> Fmu:
         order=order,
         files={f"{e.prefix}.c": e.source, f"{e.prefix}.h": e.header},
         head=f'#include "{e.prefix}.c"\n\n{head}\n{body}',
+        differentiable=bool(tangents),
     )
 
 
@@ -181,18 +192,38 @@ def _tuned(mechanism: Mechanism, e: Exported) -> Iterator[Tuned]:
                 yield f"{key}.{name}", unit, text, *own
 
 
-def _evaluate(e: Exported, kind: str, places: dict[str, int]) -> str:
-    lines = ["static int model_evaluate(const model_constants *of, double *v)", "{"]
+def _takes(places: dict[str, int]) -> str:
+    """Whether a variable takes a value: masses and inertias are positive, those of bodies of chains
+    and friction may be 0."""
+    never = ("tolerance", "platform.mass", *(f"platform.inertia.{i * 2}" for i in "xyz"))
+    start = ("crank_inertia.", "slider_mass.", "viscous.", "coulomb.")
+    cases = {"> 0.0": [i for name, i in places.items() if name in never]}
+    cases[">= 0.0"] = [i for name, i in places.items() if name.startswith(start)]
+    lines = ["static int model_takes(uint32_t which, double value)", "{", "    switch (which) {"]
+    for bound, found in cases.items():
+        if found:
+            lines += [f"    case {i}:" for i in found]
+            lines[-1] += f" return value {bound} && value < HUGE_VAL;"
+    return "\n".join([*lines, "    default: return 1;", "    }", "}", "", ""])
+
+
+def _evaluate(e: Exported, kind: str, places: dict[str, int], suffix: str = "") -> str:
+    """Everything computed, in v; or with a suffix how it changes along d."""
+    name, to = ("differentiate", "d") if suffix else ("evaluate", "v")
+    given = ", const double *v, double *d" if suffix else ", double *v"
+    lines = [f"static int model_{name}(const model_constants *of{given})", "{"]
     if kind == "plant":
         m = len(e["forward"].inputs[0].labels)
         size = f"{m} * sizeof *v"
-        lines += [f"    memcpy(v + {places['dq']}, v + {places['q1']}, {size});"]
+        lines += [f"    memcpy({to} + {places['dq']}, {to} + {places['q1']}, {size});"]
     lines.append("    int status;")
     for question in KINDS[kind]:
-        function = e[question]
-        names = ["acceleration" if kind == "plant" and a.name == "q2" else a.name
-                 for a in function.arguments]  # fmt: skip
-        words = ", ".join(["of", *(f"v + {places[name]}" for name in names)])
+        function = e[f"{question}{suffix}"]
+        words = "of"
+        for a in function.arguments:
+            own = a.name.removeprefix(PREFIX) if suffix else a.name
+            place = places["acceleration" if kind == "plant" and own == "q2" else own]
+            words += f", {'v' if own == a.name else 'd'} + {place}"
         lines.append(
             f"    status = {function.name}({words});\n    if (status)\n        return status;"
         )
