@@ -19,6 +19,7 @@ _HOMES = {
     "CondyleError": "errors",
     "InfeasibleError": "errors",
     "InputError": "errors",
+    "AccuracyError": "errors",
     "GimbalLockError": "errors",
     "JammedError": "errors",
     "MechanismError": "errors",
@@ -77,6 +78,7 @@ if TYPE_CHECKING:
     from .analysis.sweep import Study, open_sweep, sweep
     from .analysis.weight_curve import tradeoff
     from .errors import (
+        AccuracyError,
         AmbiguousError,
         CondyleError,
         GimbalLockError,

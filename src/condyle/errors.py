@@ -221,6 +221,13 @@ class UncertifiedError(SampleError):
     """Efforts that could not be certified to the stated accuracy."""
 
 
+class AccuracyError(SampleError):
+    """A sample that is less accurate than required.
+
+    Attributes: value: the bound of its relative error;  bound: the one that is required.
+    """
+
+
 class GimbalLockError(SampleError):
     """A pose at which the rates of the Bryant angles do not determine the angular velocity's."""
 

@@ -408,22 +408,21 @@ class Machine:
         return [c.at(add(pose[:3], turned(R, c.point))) for c in self.contacts]
 
     def closed(
-        self, near: Sequence[float], q: Any, q1: Any, q2: Any
-    ) -> tuple[Vector, list[Vector]]:
-        """The pose as jets, from a pose nearby, and M_J (6, m)."""
+        self, near: Sequence[float], q: Any, q1: Any, *accelerations: Any
+    ) -> tuple[list[Vector], list[Vector]]:
+        """The pose as jets, of each acceleration, from a pose nearby, and M_J (6, m)."""
         pose = [mpf(v) for v in near]
         for i, x in zip(self.free, q, strict=True):
             pose[i] = mpf(x)
-        C: list[Vector] = []
+        C: list[Vector] = self._slopes(pose) if self.held else []
         for _ in range(60 if self.held else 0):
-            C = self._slopes(pose)
             phi = [p.x for p, *_ in self.phi([jet(x) for x in pose])]
             step = solved([[row[i] for i in self.held] for row in C], [-p for p in phi])
             for i, x in zip(self.held, step, strict=True):
                 pose[i] += x
+            C = self._slopes(pose)
             if max(abs(x) for x in step) < TINY:
                 break
-        C = self._slopes(pose) if self.held else []
         dep = [[row[i] for i in self.held] for row in C]
         M_J: list[Vector] = [[mpf(0)] * len(self.free) for _ in range(6)]
         for j, i in enumerate(self.free):
@@ -432,15 +431,17 @@ class Machine:
                 for h, x in zip(self.held, solved(dep, [-row[i] for row in C]), strict=True):
                     M_J[h][j] = x
         rate = turned(M_J, [mpf(v) for v in q1])
-        second = [mpf(0)] * 6
-        for i, x in zip(self.free, q2, strict=True):
-            second[i] = mpf(x)
+        found = []
+        bias: Vector = []
         if self.held:
-            jets = [Jet(*p) for p in zip(pose, rate, second, strict=True)]
+            jets = [Jet(*p) for p in zip(pose, rate, [0] * 6, strict=True)]
             bias = solved(dep, [-p.a for p, *_ in self.phi(jets)])
+        for q2 in accelerations:
+            second = turned(M_J, [mpf(v) for v in q2])
             for h, x in zip(self.held, bias, strict=True):
-                second[h] = x
-        return [Jet(*p) for p in zip(pose, rate, second, strict=True)], M_J
+                second[h] += x
+            found.append([Jet(*p) for p in zip(pose, rate, second, strict=True)])
+        return found, M_J
 
     def _slopes(self, pose: Vector) -> list[Vector]:
         columns = []
@@ -450,47 +451,44 @@ class Machine:
         return transposed(columns)
 
     def forces(
-        self, pose: Vector, wrench: Any, point: Any, gravity: bool = True
-    ) -> tuple[Vector, list[Vector], list[Vector], list[Vector]]:
-        """Q (6,), J (n, 6), N and T (k, 6), dual to X_EE'."""
-        at = plain(pose)
-        _, moving = self._kinetics(pose)
-        R = [plain(row) for row in self.rotation(pose)]
+        self, poses: Sequence[Vector], wrench: Any, point: Any
+    ) -> tuple[list[Vector], list[Vector], list[Vector], list[Vector]]:
+        """Q (6,) of each pose, alike but for X_EE'', J (n, 6), N and T (k, 6), dual to X_EE'."""
+        pose = poses[0]
+        at, whole = plain(pose), self.rotation(pose)
+        R, (omega, _) = [plain(row) for row in whole], spin(whole)
+        moving = [self._kinetics(p)[1] for p in poses]
         arm = turned(R, [mpf(v) for v in point])
         F, couple = [mpf(v) for v in wrench[:3]], [mpf(v) for v in wrench[3:]]
-        touch = self.phi(pose)
-        fixed, whole = [], self.rotation(pose)
-        for c, (_, n, w) in zip(self.contacts, touch, strict=True):
+        fixed = []
+        for c, (_, n, w) in zip(self.contacts, self.phi(pose), strict=True):
             own = add(plain(w), at[:3], -1)  # where it touches, from O_M
-            omega, _ = spin(whole)
             v = add(plain(pose[:3], "v"), cross(omega, own))
             u = times(c.friction / mp.sqrt(dot(v, v) + c.smooth**2), v)
-            lever = turned(R, c.point)
-            fixed.append((plain(n), lever, u, own))
-        Q: Vector = []
+            fixed.append((plain(n), turned(R, c.point), u, own))
+        Q: list[Vector] = [[] for _ in poses]
         J, N, T = [], [], []
         for j in range(6):
             along = [Jet(x, int(i == j)) for i, x in enumerate(at)]
             joints, unitary = self._kinetics(along)
-            total = mpf(0)
-            for body, partial in zip(moving, unitary, strict=True):
-                total += self._power(body, partial, gravity)
             turning, _ = spin(self.rotation(along))
             V = [mpf(int(i == j)) for i in range(3)]
-            total -= dot(F, add(V, cross(turning, arm))) + dot(couple, turning)
-            Q.append(total)
+            load = dot(F, add(V, cross(turning, arm))) + dot(couple, turning)
+            for one, bodies in zip(Q, moving, strict=True):
+                pairs = zip(bodies, unitary, strict=True)
+                one.append(sum((self._power(*pair) for pair in pairs), mpf(0)) - load)
             J.append([x.v for x in joints])
             N.append([dot(n, add(V, cross(turning, r))) for n, r, _, _ in fixed])
             T.append([dot(u, add(V, cross(turning, c))) for _, _, u, c in fixed])
         return Q, transposed(J), transposed(N) if fixed else [], transposed(T) if fixed else []
 
-    def _power(self, body: tuple[Any, ...], partial: tuple[Any, ...], gravity: bool) -> Number:
+    def _power(self, body: tuple[Any, ...], partial: tuple[Any, ...]) -> Number:
         """(m (a - g)) . v_j + (I omega' + omega x I omega) . omega_j."""
         if body[0] == "crank":
             return body[1] * body[2].a * partial[2].v
         mass, centre, R, inertia = body
         a = plain(centre, "a")
-        found = mass * dot(add(a, self.gravity, -int(gravity)), plain(partial[1], "v"))
+        found = mass * dot(add(a, self.gravity, -1), plain(partial[1], "v"))
         if R is None:
             return found
         omega, second = spin(R)
@@ -507,22 +505,21 @@ class Machine:
 
     def inverse(
         self,
-        pose: Vector,
-        M_J: list[Vector],
+        near: Any,
+        q: Any,
+        q1: Any,
+        q2: Any,
         wrench: Any,
         point: Any,
         force: Sequence[float] = (),
-        gravity: bool = True,
     ) -> tuple[Vector, Vector]:
-        """Minimum-norm efforts (n,) and contact forces (k,), in the pattern of given ones' signs.
+        """Minimum-norm efforts (n,) and contact forces (k,).
 
-        Args: force: contact forces whose signs decide the pattern of friction; 0 is held at 0.
+        Args: near: a pose nearby;  force: contact forces whose signs decide the pattern of
+              friction; one of 0 is held at 0.
         """
-        Q, J, N, T = self.forces(pose, wrench, point, gravity)
-        signs = [mp.sign(mpf(f)) for f in force] or [0] * len(N)
-        D = [add(n, t, -s) for n, t, s in zip(N, T, signs, strict=True)]
-        off = [i for i, c in enumerate(self.contacts) if c.friction and not signs[i]]
-        D = [row for i, row in enumerate(D) if i not in off]
+        (Q,), J, N, T = self.forces(self.closed(near, q, q1, q2)[0], wrench, point)
+        D, off = self._along(N, T, force)
         # J^T tau + D^T lambda = Q with least |tau|: tau = J y, D y = 0.
         k, JT = len(D), transposed(J)
         A = [
@@ -541,17 +538,25 @@ class Machine:
         wrench: Any,
         point: Any,
         force: Sequence[float] = (),
-        gravity: bool = True,
     ) -> tuple[Vector, Vector]:
         """q'' (m,) and contact forces (k,), in the pattern of given ones' signs."""
         m = len(self.free)
         units = [[int(i == j) for i in range(m)] for j in range(m)]
-        poses = [self.closed(near, q, q1, a)[0] for a in ([0] * m, *units)]
-        Q, J, N, T = self.forces(poses[0], wrench, point, gravity)
-        more = [self.forces(p, wrench, point, gravity)[0] for p in poses[1:]]
-        signs = [mp.sign(mpf(f)) for f in force] or [0] * len(N)
-        D = [add(n, t, -s) for n, t, s in zip(N, T, signs, strict=True)]
+        poses, _ = self.closed(near, q, q1, [0] * m, *units)
+        (Q, *more), J, N, T = self.forces(poses, wrench, point)
+        D, off = self._along(N, T, force)
+        assert not off
         A = [[row[i] - Q[i] for row in more] + [-d[i] for d in D] for i in range(6)]
         pulled = turned(transposed(J), [mpf(v) for v in effort])
         x = solved(A, add(pulled, Q, -1))
         return x[:m], x[m:]
+
+    def _along(
+        self, N: list[Vector], T: list[Vector], force: Sequence[float]
+    ) -> tuple[list[Vector], list[int]]:
+        """Rows along which the contacts act, and those that friction holds at 0."""
+        signs = [mp.sign(mpf(f)) for f in force] or [0] * len(N)
+        off = [i for i, c in enumerate(self.contacts) if c.friction and not signs[i]]
+        rows = zip(N, T, signs, strict=True)
+        D = [add(n, t, -sign) for i, (n, t, sign) in enumerate(rows) if i not in off]
+        return D, off

@@ -43,6 +43,7 @@ def made_up(mechanism: condyle.Mechanism, count: int) -> Any:
         configuration=configuration,
         status=rng.choice([0, 0, 0, 1, 2, 3], count).astype(np.int8),
         ambiguous=rng.uniform(size=count) > 0.9,
+        bound=10 ** rng.uniform(-12, -5, count),
     )
 
 

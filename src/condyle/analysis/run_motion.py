@@ -11,6 +11,7 @@ from ..mechanism import Mechanism, as_mechanism, load_mechanism
 from ..model.distributing import Distribution
 from ..model.model import derive
 from ..motion import motion_and_load
+from ..results.accuracy import max_error_of, require_accuracy
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,6 +32,7 @@ def run(
     distribution: str | Distribution | None = None,
     reactions: bool = False,
     flag: bool = False,
+    max_error: float | None = None,
     measured: str | Path | None = None,
     vary: Study | str | Path | None = None,
     **reading: Any,
@@ -43,12 +45,14 @@ def run(
             load_point: platform point at which the load acts.
             formulation, route, backend, distribution: as of `derive`.
             reactions, flag, threads: as of `Model.solve`.
+            max_error: largest bound of the relative error that is accepted; with it tables have a
+                column bound.
             measured: markers and EMG to keep with the results.
             vary: a study, or its file: quantiles of efforts and contact forces over its variants.
             reading: units, landmark, smooth, rate, trim: how the file of a motion is read.
     Raises: CondyleError: for input that cannot be used, or samples that cannot be computed.
     """
-    machine = as_mechanism(mechanism)
+    machine, max_error = as_mechanism(mechanism), max_error_of(max_error)
     study = None if vary is None else study_for(vary, machine)
     path, acting = motion_and_load(machine, motion, load, **reading)
     model = derive(
@@ -57,6 +61,9 @@ def run(
     solution = model.solve(
         path, acting, load_point=load_point, flag=flag, reactions=reactions, threads=threads
     )
+    if max_error is not None:
+        require_accuracy(solution["bound"].values, max_error, solution["time"].values)
+        solution["bound"].attrs["max_error"] = max_error
     if measured is not None:
         solution = solution.condyle.with_measured(measured)
     if study is not None:

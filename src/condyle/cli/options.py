@@ -94,6 +94,14 @@ Measured = Annotated[
 Flag = Annotated[
     bool, option("Keep samples that cannot be computed, empty, with a status, instead of failing.")
 ]
+MaxError = Annotated[
+    float | None,
+    option(
+        "Maximum relative error, such as 1e-8: a sample whose bound exceeds it is an error; the "
+        "bounds are written too, as column bound.",
+        min=0.0,
+    ),
+]
 Reactions = Annotated[bool, option("Also compute forces and moments in every joint.")]
 Mat = Annotated[bool, option("Also write the results for MATLAB (.mat).")]
 Figures = Annotated[bool, option("Also draw figures.")]

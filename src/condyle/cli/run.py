@@ -22,6 +22,7 @@ def run(
     mechanism: options.Mechanism = "masticatory",
     reactions: options.Reactions = False,
     flag: options.Flag = False,
+    max_error: options.MaxError = None,
     measured: options.Measured = None,
     vary: Path | None = None,
 ) -> Answer:
@@ -44,6 +45,7 @@ def run(
         distribution=distribution.chosen(),
         reactions=reactions,
         flag=flag,
+        max_error=max_error,
         measured=measured,
         vary=vary,
     )

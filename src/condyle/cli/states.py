@@ -22,6 +22,7 @@ def solve(
     reactions: options.Reactions = False,
     mat: options.Mat = False,
     flag: options.Flag = False,
+    max_error: options.MaxError = None,
 ) -> Answer:
     """Inverse dynamics of independent states, one per row.
 
@@ -45,6 +46,7 @@ def solve(
         reactions=reactions,
         threads=model.threads,
         mat=out.with_suffix(".mat") if mat else None,
+        max_error=max_error,
     )
     warn(solved.data["warnings"])
     return Answer(str(solved), solved.data, command_line("view", mechanism))
@@ -58,6 +60,7 @@ def forward(
     model: options.ModelOptions,
     load_point: options.LoadPoint = None,
     flag: options.Flag = False,
+    max_error: options.MaxError = None,
 ) -> Answer:
     """Forward dynamics of independent states, one per row.
 
@@ -80,6 +83,7 @@ def forward(
         flag=flag,
         strict=STRICT.get(),
         threads=model.threads,
+        max_error=max_error,
     )
     warn(solved.data["warnings"])
     return Answer(str(solved), solved.data, command_line("view", mechanism))
@@ -91,6 +95,7 @@ def pose(
     joints: Path,
     out: Path,
     flag: options.Flag = False,
+    max_error: options.MaxError = None,
     tolerance: Annotated[float, options.option(min=0.0)] = 1e-6,
     every: Annotated[bool, options.option("", "--all")] = False,
     seed: Annotated[int | None, options.option(min=0)] = None,
@@ -111,6 +116,6 @@ def pose(
     """
     import condyle
 
-    report = condyle.pose_states(mechanism, joints, out, flag, tolerance, every, seed)
+    report = condyle.pose_states(mechanism, joints, out, flag, tolerance, every, seed, max_error)
     text = f"{report}\n{files_line(report.data['files'])}"
     return Answer(text, report.data, command_line("view", mechanism))

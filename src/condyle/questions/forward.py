@@ -185,6 +185,19 @@ def _columns(eq: Affine) -> ca.SX:
     return eq.H[:, ind] + eq.H[:, dep] @ eq.basis.rest if dep else eq.H[:, ind]
 
 
+def _refined(b: Builder, eq: Affine, H: ca.SX, right: ca.SX, M: ca.SX, x: ca.SX) -> ca.SX:
+    """One step that refines x, M x = Pi^T right, by what is left of H x - G mu = right.
+
+    Where Pi is large, Pi^T right is a small difference of large numbers; what is left of all six
+    equations is not.
+    """
+    if not (dep := indices(b.structure.dependent)):
+        return x
+    mu = solve_small(eq.G[dep, :], H[dep, :] @ x - right[dep, :])
+    left = eq.basis.generalized_force(right - H @ x + eq.G @ mu)
+    return x + definite_solve(M, left, ca.diag(M), CONDITIONED)[0]
+
+
 def _solved(
     b: Builder,
     platform: Platform,
@@ -207,6 +220,7 @@ def _solved(
     M, pulled = eq.basis.generalized_force(H), eq.basis.generalized_force(right)
     lengths = ca.diag(M)
     x, excess, pivots = definite_solve(M, pulled, lengths, CONDITIONED)
+    x = _refined(b, eq, H, right, M, x)
     sure = all_of(one > 0 for one in excess)
     w, force, regular, found = x[:, 0], ca.SX(0, 1), pivots.square, None
     if wanted or touch is not None:

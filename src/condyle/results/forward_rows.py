@@ -24,6 +24,7 @@ from ..model.model import Model
 from ..model.model_result import ModelResult
 from ..motion import Table
 from ..status import Status
+from .accuracy import max_error_of, require_accuracy
 from .contacts import contact_loss, contact_loss_columns
 from .failed_samples import status_columns
 from .state_rows import Columns, StateColumns, StatesReport
@@ -40,6 +41,7 @@ def forward_states(
     flag: bool = False,
     threads: int | None = None,
     strict: bool = False,
+    max_error: float | None = None,
 ) -> StatesReport:
     """Forward dynamics of every row of a file; the output appears whole or not at all.
 
@@ -53,9 +55,12 @@ def forward_states(
              contact_loss_<contact> of unilateral contacts; with `flag` also status and cause.
              flag: keep rows that have no accelerations, empty, with a status.
              strict: a warning is an error.
+             max_error: largest bound of the relative error that is accepted; with it there is a
+             column bound.
     Raises:  InputError, SampleError, WarningError: nothing is written then.
     """
     flag, model = as_flag(flag, "flag"), as_model(model)
+    max_error = max_error_of(max_error)
     mechanism = model.mechanism
     efforts = [f"tau_{name}" for name in mechanism.chain_names]
     units = [FAMILIES[chain.kind].effort_unit for chain in mechanism.chains]
@@ -89,6 +94,9 @@ def forward_states(
         columns |= named_columns("contact_", mechanism.contact_names, found.contact_force)
         columns |= named_columns("", COORDINATES, pose)
         columns |= named_columns("joint_", mechanism.chain_names, joint)
+        if max_error is not None:
+            require_accuracy(found.bound, max_error, first_row=first_row)
+            columns["bound"] = found.bound
         lost = contact_loss(mechanism, np.nan_to_num(found.contact_force))
         pulled[:] += lost.sum(axis=0)
         columns |= contact_loss_columns(mechanism, lost)

@@ -16,6 +16,7 @@ from ..model.joint_reactions import reactions as joint_reactions
 from ..model.model import Model
 from ..model.model_result import require_ok
 from ..motion import Table
+from .accuracy import max_error_of, require_accuracy
 from .contacts import AXES, contact_loss_columns
 from .derived import Derived
 from .failed_samples import status_columns
@@ -42,6 +43,7 @@ def solve_states(
     reactions: bool = False,
     threads: int | None = None,
     mat: str | Path | None = None,
+    max_error: float | None = None,
 ) -> StatesReport:
     """Inverse dynamics of independent states, one per row; the output is complete or absent.
 
@@ -56,10 +58,12 @@ def solve_states(
              reactions: columns reaction_<joint>_<chain>_x, _y, _z ... too.
              strict: a warning is an error.
              threads: maximum number of threads; the file does not depend on it.
+             max_error: largest bound of the relative error that is accepted; with it there is a
+             column bound.
              mat: file for MATLAB to write as well; it takes the memory of the whole table.
     Raises:  InputError, SampleError, WarningError: nothing is written then.
     """
-    model = as_model(model)
+    model, max_error = as_model(model), max_error_of(max_error)
     if mat is not None and Path(as_path(mat, "mat")) == Path(as_path(out, "out")):
         raise InputError(f"--out {out}: --mat writes that file; give the table another name")
     watch = Watch(model.mechanism, rows=True)
@@ -71,6 +75,9 @@ def solve_states(
         columns, derived = solve_table(
             model, table, load_point, flag, first_row, reactions, threads
         )
+        if max_error is not None:
+            columns["bound"] = derived.evaluation.bound
+            require_accuracy(derived.evaluation.bound, max_error, first_row=first_row)
         watch.see(derived, np.arange(first_row, first_row + table.rows) + 1)
         greatest = _greater(greatest, derived, first_row)
         if mat is not None:

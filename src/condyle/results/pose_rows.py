@@ -21,6 +21,7 @@ from ..model.forward_kinematics import TOLERANCE, ForwardKinematics, PoseStatus
 from ..model.system import check_home
 from ..motion import Table, read_table, write_table
 from ..progress import step
+from .accuracy import max_error_of, require_accuracy
 from .state_rows import StatesReport
 
 ERRORS: dict[PoseStatus, tuple[type[SampleError], str]] = {
@@ -55,6 +56,7 @@ def pose_states(
     tolerance: float = TOLERANCE,
     every: bool = False,
     seed: int | None = None,
+    max_error: float | None = None,
 ) -> StatesReport:
     """Forward kinematics of every row of a file of joint coordinates.
 
@@ -71,6 +73,8 @@ def pose_states(
                     home: characteristic lengths and rad), residual and condition. Rows never
                     influence each other.
             seed:   of that search; 0 if not given.
+            max_error: largest bound of the poses' error that is accepted, in characteristic lengths
+                    and rad; with it there is a column bound.
     Returns: a summary; `data`: rows, missing (rows without a pose), failed (the same by status),
             residual (largest difference of a joint from the given one, by unit), condition (largest
             number of the dimensionless actuator Jacobian); with `every` rows and modes (of each).
@@ -84,6 +88,9 @@ def pose_states(
         )
     if seed is not None and not every:
         raise UnsupportedError("--seed requires --all")
+    if every and max_error is not None:
+        raise UnsupportedError("--max-error is of the pose that is followed, not of --all")
+    max_error = max_error_of(max_error)
     if every:
         return _modes(mechanism, joints, out, seed or 0, tolerance)
     table, given = _read(mechanism, joints)
@@ -111,6 +118,9 @@ def pose_states(
     columns |= {name: solution.pose[:, i] for i, name in enumerate(COORDINATES)}
     columns |= (worst := _largest(residual, units))
     columns["condition"] = solution.condition
+    if max_error is not None:
+        require_accuracy(solution.bound, max_error)
+        columns["bound"] = solution.bound
     if flag:
         columns["status"] = [PoseStatus(value).name.lower() for value in status]
     write_table(out, columns)

@@ -180,6 +180,8 @@ def solution_columns(d: xr.Dataset) -> dict[str, np.ndarray | list[str]]:
             for i, axis in enumerate(AXES):
                 along = named_columns(f"{prefix}_", entries, values[:, :, i])
                 columns |= {f"{column}_{axis}": one for column, one in along.items()}
+    if "bound" in d and "max_error" in d["bound"].attrs:
+        columns["bound"] = d["bound"].values
     mechanism = d.condyle.mechanism
     columns |= contact_loss_columns(mechanism, d["contact_loss"].values)
     if (status := d["status"].values).any():

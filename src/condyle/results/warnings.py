@@ -22,6 +22,7 @@ from ..mechanism.home import HOME_WARNING, home_residuals, home_warnings
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.mechanism_checks import mechanism_warnings
 from ..status import STATUS_NAMES, Status
+from .accuracy import FEW_DIGITS
 from .contacts import BOUND_TOLERANCE
 from .derived import Derived
 
@@ -73,6 +74,11 @@ KINDS = {
         "samples near a singularity",
         f"ratio below {NEAR_SINGULAR:g}: torques grow, and so does the effect of every error in "
         "the geometry",
+    ),
+    "accuracy": Kind(
+        "samples with few digits",
+        f"the bound of their relative error is above {FEW_DIGITS:g}: keep away from singularities; "
+        "`--max-error` makes it an error",
     ),
     "effort_limit": Kind(
         "effort beyond a limit",
@@ -174,6 +180,8 @@ class Watch:
                 tally("contact_loss", i, derived.contact_loss[:, i], np.abs(e.contact_force[:, i]))
             if "ambiguous" in vars(e):
                 tally("ambiguous", 0, e.ambiguous, np.zeros(len(ok)))
+            if "bound" in vars(e):
+                tally("accuracy", 0, e.bound > FEW_DIGITS, e.bound)
             tally("near_singularity", 0, derived.near != 0, -configuration.singularity.ratio)
             for i, chain in enumerate(self.mechanism.chains):
                 limit, effort, speed = limits(chain), e.effort[:, i], np.abs(e.joint_rate[:, i])
@@ -245,6 +253,9 @@ class Watch:
             name, value, bound, unit = None, None, None, None
             text = f"the efforts of {count} do not determine the motion, first "
             text += f"{self._at(tally.first)}: under friction other motions follow from them too"
+        elif kind == "accuracy":
+            name, value, bound, unit = None, size, FEW_DIGITS, "1"
+            text = f"{count} with few digits: the relative error may be {size:.2g} {worst}"
         elif kind == "near_singularity":
             name, value, bound, unit = None, -size, NEAR_SINGULAR, "1"
             are = "is" if tally.count == 1 else "are"
