@@ -299,7 +299,7 @@ def nearest(name: str, available: Iterable[str]) -> list[str]:
 def as_path(given: Any, name: str = "path", expected: str = "the path of a file") -> str:
     """The path of a file, as text; `name` is the argument's.
 
-    Raises: InputError: for what cannot name a file.
+    Raises: InputError: for anything but the name of a file.
     """
     with suppress(TypeError, ValueError):
         path = os.fspath(given)
@@ -311,7 +311,7 @@ def as_path(given: Any, name: str = "path", expected: str = "the path of a file"
 def as_name(given: Any, argument: str) -> str:
     """A name, as text; which ones there are is the caller's to check.
 
-    Raises: InputError: for what is no text.
+    Raises: InputError: for anything but text.
     """
     if isinstance(given, str):
         return given
@@ -321,7 +321,7 @@ def as_name(given: Any, argument: str) -> str:
 def as_flag(given: Any, name: str) -> bool:
     """True or False.
 
-    Raises: InputError: for what is neither, such as an array.
+    Raises: InputError: for anything else, such as an array.
     """
     with suppress(Exception):
         return bool(given)

@@ -78,7 +78,7 @@ def run(
 def study_for(given: Study | str | Path, machine: Mechanism) -> Study:
     """The study whose numbers are to vary in a mechanism.
 
-    Raises: InputError: for a file that is none, or that names another mechanism.
+    Raises: InputError: for another file, or one that names another mechanism.
     """
     from .sweep import read_study
 

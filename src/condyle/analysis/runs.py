@@ -48,7 +48,7 @@ class TimedModel(Model):
 
 @contextmanager
 def without_collection() -> Iterator[None]:
-    """No garbage is collected, which would be one model's seconds for what all have left."""
+    """Without collection of garbage, whose seconds would be counted for one model alone."""
     enabled = gc.isenabled()
     gc.disable()
     try:

@@ -105,7 +105,7 @@ def find_compiler() -> Compiler:
 
 @lru_cache(maxsize=8)
 def _find(cc: str, path: str, lanes: str) -> Compiler | str:
-    """The compiler, or why there is none: that too may have taken long to find out."""
+    """The compiler, or the reason why there is none: the search may take long."""
     try:
         return _search(cc, path, lanes)
     except CompilerError as error:

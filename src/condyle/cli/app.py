@@ -35,7 +35,7 @@ def run() -> None:
 
 
 def _status(as_json: bool) -> int:
-    """Run the command; 0, or what went wrong."""
+    """Run the command; returns 0, or the exit status of its error."""
     try:
         return app(standalone_mode=False) or 0
     except typer.Abort:

@@ -12,7 +12,7 @@ from ..progress import Advance, watched_by
 
 DELAY = 1.0  # seconds before anything is shown
 PERIOD = 0.1  # seconds between two pictures of the bar
-MANY = 1000  # things to do, of which a rate says something
+MANY = 1000  # steps from which a rate is shown
 
 
 @dataclass(eq=False)

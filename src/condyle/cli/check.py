@@ -1,14 +1,14 @@
-"""condyle check: summary of a mechanism, or what is wrong with it."""
+"""condyle check: summary of a mechanism, or its problems."""
 
 from __future__ import annotations
 
 from . import options
 from .answer import Answer, command_line
-from .command import BEGIN, command
+from .command import START, command
 from .inputs import warn
 
 
-@command(BEGIN, example="condyle check jaw.toml")
+@command(START, example="condyle check jaw.toml")
 def check(mechanism: options.Mechanism, project: bool = False) -> Answer:
     """Summary of a mechanism, or every mistake in its file.
 

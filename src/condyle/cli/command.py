@@ -24,7 +24,7 @@ from .bar import progress_bar
 from .inputs import strictly
 
 # The chapters of the help page.
-BEGIN, COMPUTE, LOOK, UPKEEP = "Begin", "Compute", "Look", "Upkeep"
+START, COMPUTE, INSPECT, MAINTENANCE = "Start", "Compute", "Inspect", "Maintenance"
 
 app = typer.Typer(
     name="condyle",

@@ -9,14 +9,14 @@ import typer
 
 from . import completion, options
 from .answer import Answer, command_line, files_line
-from .command import BEGIN, command, group
+from .command import START, command, group
 from .inputs import warn
 
-motion = group("motion", BEGIN, "Motions from laboratory recordings.")
+motion = group("motion", START, "Motions from laboratory recordings.")
 
 
 @command(
-    BEGIN,
+    START,
     example="condyle motion from-c3d chewing.c3d --markers markers.toml --mechanism jaw.toml "
     "--out chewing.csv",
     of=motion,

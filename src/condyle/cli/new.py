@@ -8,11 +8,11 @@ from typing import Annotated
 import typer
 
 from .answer import Answer, command_line
-from .command import BEGIN, command
+from .command import START, command
 from .inputs import STRICT, warn
 
 
-@command(BEGIN, example="condyle new my-robot")
+@command(START, example="condyle new my-robot")
 def new(
     name: Annotated[str, typer.Argument(help="Name of the mechanism; the file is NAME.toml.")],
     from_mjcf: Path | None = None,

@@ -11,13 +11,13 @@ import typer
 from ..errors import InputError, did_you_mean
 from ..extras import require
 from .answer import Answer, command_line
-from .command import LOOK, command
+from .command import INSPECT, command
 from .inputs import output_folder
 
 RESULT = Path("results/masticatory.nc")  # of `condyle run` as it stands
 
 
-@command(LOOK, example=f"condyle plot {RESULT} --figure effort --figure load")
+@command(INSPECT, example=f"condyle plot {RESULT} --figure effort --figure load")
 def plot(
     solution: Annotated[
         Path | None, typer.Argument(help="Results (.nc) of a run. Without it: list the figures.")

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from .answer import Answer, command_line
-from .command import BEGIN, command
+from .command import START, command
 from .inputs import output_folder
 
 
-@command(BEGIN, example="condyle reference --out case")
+@command(START, example="condyle reference --out case")
 def reference(
     out: Path = Path(),
 ) -> Answer:

@@ -10,10 +10,10 @@ import typer
 from ..extras import require
 from . import options
 from .answer import Answer, command_line
-from .command import LOOK, command
+from .command import INSPECT, command
 
 
-@command(LOOK, example="condyle report results/masticatory.nc")
+@command(INSPECT, example="condyle report results/masticatory.nc")
 def report(
     solution: Annotated[Path, typer.Argument(help="Results (.nc) of a run.")],
     out: Path | None = None,

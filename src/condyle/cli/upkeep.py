@@ -15,13 +15,13 @@ import typer
 from ..atomic import replacing
 from ..errors import UnsupportedError
 from .answer import Answer, files_line
-from .command import UPKEEP, command
+from .command import MAINTENANCE, command
 from .completion import one_of
 from .inputs import output_folder
 from .options import option
 
 
-@command(UPKEEP, example="condyle bench --seconds 0.2 --out bench.json")
+@command(MAINTENANCE, example="condyle bench --seconds 0.2 --out bench.json")
 def bench(
     out: Path | None = None,
     seconds: Annotated[float, option(min=0.01, max=600)] = 1.0,
@@ -74,7 +74,7 @@ def _benchmarks() -> ModuleType:
         sys.path.pop(0)
 
 
-@command(UPKEEP, example="condyle cache --clear")
+@command(MAINTENANCE, example="condyle cache --clear")
 def cache(
     clear: bool = False,
 ) -> Answer:
@@ -98,7 +98,7 @@ def cache(
     )
 
 
-@command(UPKEEP, example="condyle schema > condyle.schema.json")
+@command(MAINTENANCE, example="condyle schema > condyle.schema.json")
 def schema(
     of: Annotated[
         str,

@@ -10,12 +10,12 @@ import typer
 from ..extras import require
 from . import options
 from .answer import command_line
-from .command import LOOK, app
+from .command import INSPECT, app
 from .inputs import strictly
 from .options import option
 
 
-@app.command(rich_help_panel=LOOK, epilog="Example: condyle view jaw.toml")
+@app.command(rich_help_panel=INSPECT, epilog="Example: condyle view jaw.toml")
 def view(
     mechanism: options.Mechanism = "masticatory",
     solution: Annotated[

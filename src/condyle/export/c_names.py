@@ -69,7 +69,7 @@ def packaged(name: str) -> str:
 
 
 def require_prefix(prefix: str) -> str:
-    """Raises InputError for what no name in C can begin with."""
+    """Raises InputError for a prefix that C does not allow."""
     fits = re.fullmatch("[A-Za-z][A-Za-z0-9_]{0,39}", str(prefix))
     if not fits or prefix in RESERVED or prefix.lower() in OTHERS:
         raise InputError(

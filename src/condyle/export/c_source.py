@@ -64,7 +64,7 @@ def export(
             lanes:     width of the vector types (2, 4 or 8 doubles); 0: none. In float, or with
                        constants in a structure, there are none.
             coordinates, landmark: what `closure` starts from.
-    Raises: InputError, UnsupportedError: for what cannot be exported.
+    Raises: InputError, UnsupportedError: for options or mechanisms that C export has not.
             MechanismError: if the contacts do not hold the platform at home.
     """
     options = {

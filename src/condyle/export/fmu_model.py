@@ -82,7 +82,7 @@ Tuned = tuple[str, str, str, float, str]
 def fmu_model(mechanism: Mechanism, kind: str) -> Fmu:
     """The model of a kind.
 
-    Raises: InputError: for another kind;  UnsupportedError: for what cannot be exported to C.
+    Raises: InputError: for another kind;  UnsupportedError: for a mechanism that C export has not.
     """
     if kind not in KINDS:
         raise InputError(f'kind: no FMU "{kind}".{did_you_mean(kind, KINDS)}')

@@ -25,7 +25,7 @@ from .singularities import SINGULAR, Singularity
 
 FLAG = "or keep such samples with --flag (flag=True)."
 WEAK = "Stronger actuators, a slower motion or a smaller load"
-FAR_OFF = 20.0  # so many times its length away, a chain suggests another unit
+FAR_OFF = 20.0  # distance over a chain's length that suggests another unit
 FAR = (
     "Are the lengths of the motion in mm? Name their columns so, as X [mm], or say --units mm "
     '(units="mm"). Else scale the motion down'

@@ -18,7 +18,7 @@ _STRETCHES = 10  # in which exchanged labels are looked for
 _BETTER = 1 / 3  # of the misfit, once mended, so that a suspect is named
 _LOOSE = 1e-3  # m, root mean square change of distances in a body that has a loose marker
 _SAMPLES = 12  # frames looked at of a stretch
-_ALL_ORDERS = 5  # markers of a body, of which all orders are tried
+_ALL_ORDERS = 5  # maximum number of markers of a body whose orders are all tried
 
 
 def why_none(bodies: Bodies, max_residual: float, run: slice) -> str:

@@ -68,7 +68,7 @@ class MeasuredChannels:
 def read_channels(source: MeasuredChannels | str | os.PathLike[str]) -> MeasuredChannels:
     """Read a table (CSV or Parquet) of channels measured with a motion.
 
-    Raises: InputError: for a file without markers or EMG, or of which a column is none of them.
+    Raises: InputError: for a file without markers or EMG, or with other columns.
     """
     if isinstance(source, MeasuredChannels):
         return source

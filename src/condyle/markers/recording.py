@@ -69,7 +69,7 @@ def read_c3d(path: str | os.PathLike[str], unit: str | None = None) -> Recording
     """Read a C3D file.
 
     Args:   unit: of its lengths, in place of what it says itself: m, cm, mm or um.
-    Raises: InputError: for a file that is none, is cut short, or contradicts itself.
+    Raises: InputError: for another file, a truncated one, or one that contradicts itself.
             MissingExtraError: if the reader is not installed.
     """
     require("c3d", "c3d")

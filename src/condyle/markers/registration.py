@@ -15,7 +15,7 @@ from .rigid import FLATTEST, breadth, fit
 
 _ALONG = 0.999  # cosine between forward and up, above which they are one direction
 _BETTER = 1 / 3  # of the misfit, with names exchanged, so that it is said
-_MANY = 6  # points, of which all orders are tried
+_MANY = 6  # maximum number of points whose orders are all tried
 
 
 @dataclass(frozen=True, eq=False)

@@ -64,7 +64,7 @@ def without_unit(
 ) -> tuple[dict[str, Any], float, list[str]]:
     """The tables of a file but `length_unit`, units a metre, and what is wrong with that key.
 
-    Raises: InputError: for what are no tables of a `what`.
+    Raises: InputError: for anything but tables.
     """
     if not isinstance(data, Mapping):
         raise InputError(f"{source}: expected the tables of a {what}, got {shown(data)}")
@@ -140,7 +140,7 @@ def _contact_problems(data: Mapping[str, Any], context: Mapping[str, Any]) -> It
 
 
 def _valid(kind: Any, tables: Any, context: Mapping[str, Any]) -> list[Any]:
-    """Each table as a `kind`, None where it is none."""
+    """Each table as a `kind`, None where it is not valid."""
     adapter, found = TypeAdapter(kind), []
     for table in tables if isinstance(tables, list) else ():
         try:

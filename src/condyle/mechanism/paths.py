@@ -29,7 +29,7 @@ _STEP = re.compile(r'\[(?P<index>\d{1,6})\]|\.?\s*"(?P<quoted>[^"]*)"|\.?(?P<key
 def parsed(path: str) -> Path:
     """The keys of a path, ("chain", "masseter_left", "base", 2).
 
-    Raises: InputError: if it is none.
+    Raises: InputError: for anything else.
     """
     if not isinstance(path, str):
         raise InputError(f'path: expected text such as "platform.mass", got {shown(path)}')
@@ -64,7 +64,7 @@ def value_at(table: Table, path: str) -> Any:
 def changed(table: Table, values: Mapping[str, Any]) -> dict[str, Any]:
     """The entries of a table with other values at some places, not validated yet.
 
-    Raises: InputError: for a path that is none, or two of which one is within the other.
+    Raises: InputError: for anything else, or for paths of which one contains another.
     """
     places = {parsed(path): listed(value) for path, value in values.items()}
     result: Any = table

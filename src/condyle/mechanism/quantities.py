@@ -27,7 +27,7 @@ PER_METRE = {"m": 1.0, "mm": 1000.0}
 LONGEST, SHORTEST = 1e5, 1e-9  # metres; the shortest of those that must be positive
 LARGEST, SMALLEST = 1e6, 1e-18  # of all else, in SI; the smallest of what is not zero
 SLOWEST = 1e-9  # rad/s or m/s, of a speed below which friction fades
-LARGEST_LIMIT = 1e12  # N m, N, rad/s or m/s: some write a limit that is none
+LARGEST_LIMIT = 1e12  # N m, N, rad/s or m/s: for "no limit", as some files have it
 NAME_CHARACTERS, NAME_BYTES = 80, 160  # with an ending it names a file and a column
 
 

@@ -45,7 +45,7 @@ class Table(BaseModel):
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy with some entries changed, validated as the table itself was. SI.
 
-        Raises: MechanismError: with every problem found, keys that are none among them.
+        Raises: MechanismError: with every problem found, unknown keys among them.
         """
         if not update:
             return super().model_copy(deep=deep)

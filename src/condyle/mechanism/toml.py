@@ -58,7 +58,7 @@ def read_tables(text: str, source: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{source} is not TOML: {shortened(str(error), 300)}") from None
-    except ValueError:  # Python reads no integers of so many digits
+    except ValueError:  # more digits than Python reads
         raise InputError(f"{source}: an integer has thousands of digits") from None
     except RecursionError:
         raise too_deep(source) from None

@@ -25,7 +25,7 @@ class Argument(NamedTuple):
     def array(self, given: Any) -> Array:
         """As doubles.
 
-        Raises: InputError: for what is no array of numbers, or has another shape.
+        Raises: InputError: for anything but an array of numbers of this shape.
         """
         found = given if type(given) is np.ndarray else self._numbers(given)
         if found.dtype != np.float64:
@@ -78,7 +78,7 @@ class Arguments:
         """Where a wrench acts, (..., 3) [m] in {M}: a platform point by its name, or coordinates;
         None is O_M.
 
-        Raises: InputError: for a name that is no platform point, or what are no coordinates.
+        Raises: InputError: for an unknown platform point, or anything but coordinates.
         """
         if at is None:
             return ORIGIN
@@ -92,7 +92,7 @@ class Arguments:
     def state(self, third: Argument, q: Any, v: Any, x: Any, wrench: Any, at: Any) -> list[Array]:
         """q, v and a third argument of one state, (size,) each, its wrench and point.
 
-        Raises: InputError: for what is none.
+        Raises: InputError: for anything but one state.
         """
         w = NO_WRENCH if wrench is None else WRENCH.array(wrench)
         found = [self.q.array(q), self.v.array(v), third.array(x), w, self.point(at)]
@@ -147,7 +147,7 @@ def samples(arguments: Sequence[Argument], arrays: Sequence[Array]) -> tuple[Lea
 def requested(outputs: Any, known: Collection[str]) -> tuple[str, ...]:
     """Names of outputs, of those that are known; "all" is all.
 
-    Raises: InputError: for what is none of them.
+    Raises: InputError: for unknown names.
     """
     try:
         names = (outputs,) if isinstance(outputs, str) else tuple(outputs)

@@ -122,7 +122,7 @@ def _those(fit: Callable[[Objective], bool]) -> str:
 
 
 def _require_limits(mechanism: Mechanism, objective: str) -> None:
-    """Raises InputError where efforts would be measured by limits that there are not."""
+    """Raises InputError where efforts are measured by limits and actuators have none."""
     without = [chain.name for chain in mechanism.chains if not np.isfinite(limits(chain).greatest)]
     if without:
         raise InputError(

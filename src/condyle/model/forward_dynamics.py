@@ -30,7 +30,7 @@ OUTPUTS = {
     "slip": "sliding",
     "friction_force": "sliding",
 }
-# What is no number in a gimbal lock, and what is none where there is no solution at all.
+# Results that are NaN in a gimbal lock, and those that are NaN where there is no solution.
 OF_ANGLES = ("acceleration", "pose_acceleration", "bound")
 DEPENDENT = (*OF_ANGLES, "contact_force", "joint_acceleration", "twist_rate")
 EVERY = {"all_accelerations": "acceleration", "all_contact_forces": "contact_force"}

@@ -55,7 +55,7 @@ class Model:
 
     Shapes: m independent coordinates, n chains, k contacts; "..." is the leading shape.
         q, v, a: independent coordinates, rates and accelerations, (..., m) [m, rad; per s; per s^2]
-        wrench:  force [N] and moment [N m] on the platform in {S}, (..., 6); None is none
+        wrench:  force [N] and moment [N m] on the platform in {S}, (..., 6); None is zero
         at:      point of action: a platform point by name, or (..., 3) [m] in {M}; None is O_M
         effort:  of the actuators, in the order of the file, (..., n) [N m or N]
     Arrays, points or outputs that do not fit are an InputError.
@@ -399,8 +399,8 @@ def derive(
             distribution: how redundancy is resolved: a name of `condyle.distribution.OBJECTIVES`,
             or a `Distribution`; default: bounded with cables, else minimum_norm.
             backend: compiled, numpy, or auto (compiled where there is a C compiler).
-    Raises: InputError:       for what is no mechanism; an unknown formulation, route, distribution
-                              or backend.
+    Raises: InputError:       for anything but a mechanism; an unknown formulation, route,
+                              distribution or backend.
             UnsupportedError: where route `direct` has no closed form.
             MechanismError:   if the contacts do not hold the platform at home.
             CompilerError:    if compiled is asked for and there is no compiler.

@@ -77,7 +77,7 @@ class Poses:
         Args:    q: (N, m), in the order of `independent`.  wanted: of `SURVEYED`: pose, joint,
                  transmission, rates (of the joints on v, lanes last but one), rows (of the
                  dimensionless J_W), ratio, points (of the contacts).
-        Raises:  InputError: for a name that is none of these.
+        Raises:  InputError: for an unknown name.
         """
         requested(wanted, SURVEYED)
         system = self._system

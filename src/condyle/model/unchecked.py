@@ -86,7 +86,7 @@ class Dynamics:
 
     @cached_property
     def _one(self) -> Call:
-        """The results of one state in a row; None for what is none."""
+        """The results of one state in a row; None for anything else."""
         return self._bound(self.results, lambda *given: None)
 
     def unchecked(self) -> Call:

@@ -57,7 +57,7 @@ def as_samples(values: Any, name: str, source: str, size: int | None = None) -> 
 def as_doubles(values: Any, name: str) -> np.ndarray:
     """`values` as an array of doubles, a new one.
 
-    Raises: InputError: for what are no real numbers.
+    Raises: InputError: for anything but real numbers.
     """
     try:
         array = np.array(values)

@@ -110,7 +110,7 @@ def _parse(text: str) -> tuple[str, int, float] | None:
 
 
 def parse_units(text: str | Units | None) -> Units:
-    """Units from 'ms,mm,deg': a time, a length, an angle, in any order; SI for what is not given.
+    """Units from 'ms,mm,deg': a time, a length, an angle, in any order; default: SI.
 
     Raises: InputError: for an unknown unit, or two of a kind.
     """

@@ -33,7 +33,7 @@ def columns_are(names: Iterable[str]) -> str:
 
 
 def content_of(path: str | os.PathLike[str], most: int = -1) -> bytes:
-    """The bytes of a file, or so many of them.
+    """The bytes of a file, or the first ones.
 
     Raises: InputError: if it cannot be read.
     """

@@ -1,4 +1,4 @@
-"""A pandas DataFrame, or what looks like one, as a table. Nothing here imports pandas."""
+"""A pandas DataFrame, or an object like one, as a table. Nothing here imports pandas."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def is_frame(data: Any) -> bool:
 def table_from_frame(frame: Any, known: Known, source: str) -> Table:
     """The columns of a frame; its index is the time if no column is.
 
-    Raises: InputError: for what is not a frame of finite numbers.
+    Raises: InputError: for anything but a frame of finite numbers.
     """
     if not is_frame(frame):
         raise InputError(f"{source}: got a {type(frame).__name__}, expected a pandas DataFrame")

@@ -29,7 +29,7 @@ def memory_at_hand() -> int:
 
 @contextmanager
 def at_most(extra: int) -> Iterator[None]:
-    """Let this process allocate so many further bytes, where the system can say so.
+    """Let this process allocate a number of further bytes, where the system can say so.
 
     For a library that allocates what a damaged file asks for: it gets a MemoryError.
     """

@@ -1,4 +1,4 @@
-"""Which motion a run follows under which load: the files given, or what is bundled and fits."""
+"""Which motion a run follows under which load: the files given, or bundled ones that fit."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def motion_and_load(
 
     The bundled chewing path and bite force go together, and fit two contacts and a landmark.
 
-    Args:   motion: a file, or what `Model.solve` takes;  load: likewise.
+    Args:   motion: a file, or a `Motion`;  load: likewise.
             units, landmark, smooth, rate, trim: how the file of a motion is read, as of
             `Motion.from_csv`; of another motion none can be given.
     Raises: InputError: for options that do not fit the motion.

@@ -42,7 +42,7 @@ class Load:
 
     @classmethod
     def from_csv(cls, path: str | os.PathLike[str], point: str | None = None) -> Load:
-        """Read a load file: `t` and some of `Fx,Fy,Fz,Mx,My,Mz`; what is not there is zero.
+        """Read a load file: `t` and some of `Fx,Fy,Fz,Mx,My,Mz`; missing columns are zero.
 
         CSV, or Parquet if the name ends in .parquet. SI, unless the header names units.
         """

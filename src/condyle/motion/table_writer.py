@@ -89,7 +89,7 @@ class TableWriter:
             self._finish(_WAITING)
 
     def _finish(self, left: int) -> None:
-        """Write blocks in their order until so many are left."""
+        """Write blocks in their order until `left` are left."""
         while len(self._waiting) > left:
             self._file.write(self._waiting.popleft().result())
 

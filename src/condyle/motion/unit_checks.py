@@ -11,7 +11,7 @@ from .column_units import dimension
 SOUND = 343.0  # m/s
 _PATH = 3.0  # m: a platform goes no farther
 _SLOW = {"length": 0.1, "angle": 0.5}  # per second: a machine that is hardly seen to move
-_STEP, _STEPS = 0.5, 100  # s between samples, and so many of them: perhaps milliseconds
+_STEP, _STEPS = 0.5, 100  # s between samples, and number of samples: perhaps milliseconds
 _FORCE = 1e6  # N or N m
 
 _MS = 'if t is in milliseconds, name the column "t [ms]" or say --units ms'

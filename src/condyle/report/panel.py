@@ -127,7 +127,7 @@ class PanelGroup:
     """Panels that belong together: one figure, or a part of the page's `section`.
 
     name: of its figure;  heading: of that.   panels: gives them for a solution.
-    split: with more chains than so many, a figure draws each pair in a panel of its own; None:
+    split: maximum number of chains in one panel; beyond it a figure has a panel a pair; None:
     never.   same: then all of one unit have one scale.   empty: said where there are no panels.
     """
 

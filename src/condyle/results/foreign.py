@@ -66,7 +66,7 @@ def open_netcdf(path: str | os.PathLike[str], kind: Kind, lazy: bool = False) ->
     """A dataset in a NetCDF file, whoever wrote it.
 
     Args:   lazy: leave arrays in the file until they are read; the caller closes it.
-    Raises: InputError: if the file is missing or is none of this kind.
+    Raises: InputError: if the file is missing or of another kind.
     """
     import h5py
     import xarray as xr

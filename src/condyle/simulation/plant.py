@@ -18,7 +18,7 @@ from .events import KINDS
 from .integrators import NoRateError
 from .plan import ClosedLoop, OpenLoop, Plan
 
-WIDE = 1e100  # a limit that is none: products with it stay finite
+WIDE = 1e100  # stands for no limit: products with it stay finite
 CERTAIN = 0.5  # of a placement
 
 

@@ -28,7 +28,7 @@ SCAN = 121
 BEYOND = 1.25  # sliders go this much further than the reach, to show where it ends
 STEPS = 6  # of Gauss-Newton towards a dragged pose
 MOST_INTERNAL = 6  # directions of internal efforts that have a slider
-WIDE = 25  # the sliders of actuators without limits: so many times the largest effort at home
+WIDE = 25  # range of sliders of actuators without limits, over the largest effort at home
 NUDGE = 1e-6  # [m, rad], for differences
 
 NO_EFFORTS: dict[int, str] = {

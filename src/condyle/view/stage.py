@@ -18,7 +18,7 @@ RGB = tuple[int, int, int]
 
 EXTENT = 3.0  # scene units across the mechanism
 ARROW = EXTENT / 3  # of the largest load or contact force,
-LEAST_WEIGHTS = {"load": 5.0, "contact": 0.5}  # unless less than so many weights of the platform
+LEAST_WEIGHTS = {"load": 5.0, "contact": 0.5}  # or of this multiple of the weight, if larger
 AMBIENT = 2.0
 
 

@@ -87,7 +87,7 @@ def grid_of(mechanism: Mechanism, over: Over | None, hold: Values = "") -> Grid:
     Args:   over: texts such as "X=-5:5:200 mm", or {"X": (low, high, count)} in SI; default: the
             first two coordinates.
             hold: text such as "Y=0 mm,alpha=0 deg", or {"Y": value} in SI; 0 for the others.
-    Raises: InputError: for what is no independent coordinate, range, count or unit.
+    Raises: InputError: for an unknown coordinate or unit, or a wrong range or count.
     """
     names = independent_coordinates(mechanism)
     if over is None:

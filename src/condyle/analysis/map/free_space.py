@@ -2,7 +2,7 @@
 
 Free poses are reachable, within the contacts' bounds, off singularities by a margin, and, where
 actuators have limits, such that efforts within them hold the load. What is found is certified as
-far as it was looked at: at so many points, so far apart.
+far as it was sampled: at points a known distance apart.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ POINTS, FEW = 20_000, 500  # in the ball; where it has to be quick
 CONES = (0.5, 0.15, 0.05)  # half widths around the nearest pose that is not free
 RAYS, HALVINGS = 60, 24
 QUICK = 3.0  # seconds of looking around home
-TINY = 1e-4  # of the first pose found that is not free: a ball that is none
+TINY = 1e-4  # of the first pose found that is not free: an empty ball
 GROWTH = 2.0  # of the ball until it meets something
 STEPS, NUDGE = 12, 1e-6  # along the border
 ROUNDING = 1e-9  # of the radius, by which rays go further
@@ -136,7 +136,7 @@ def greatest_ball(free: FreeSpace, grid: Grid, points: int = POINTS) -> Ball:
             row = int(np.argmax(~(found[:, first] >= 0)))
             nearest, row = _along_rays(margins, radius * some[first], row, rng)
             nearest = _on_the_border(margins, nearest, row)
-            if spent():  # poses were given up, so what is not free is not known
+            if spent():  # poses were given up: the rest may be free
                 return _settled(Ball(radius, RANGE, FEW, 0.0, at_most), margins, few)
             radius, stops = float(np.linalg.norm(nearest)), free.reasons[row]
             at_most = radius

@@ -6,7 +6,7 @@ import numpy as np
 
 # A cube in six tetrahedra around its diagonal, corners as (x, y, z) in bits.
 TETRAHEDRA = ((0, 1, 3, 7), (0, 3, 2, 7), (0, 2, 6, 7), (0, 6, 4, 7), (0, 4, 5, 7), (0, 5, 1, 7))
-# With so many corners inside: edges from those inside to those outside that a triangle cuts.
+# By the number of corners inside: edges from those inside to those outside that a triangle cuts.
 TRIANGLES = (
     (1, ((0, 1), (0, 2), (0, 3))),
     (3, ((0, 3), (1, 3), (2, 3))),

@@ -59,7 +59,8 @@ def workspace_size(
     Args:   map: of `workspace_map`, or its file.
             margin: minimum singularity ratio in ball and box, 0 to 1.
             model: that of the map, if it is at hand; default: derived anew.
-    Raises: InputError: for what is no map, a margin out of range, or a model of another mechanism.
+    Raises: InputError: for anything but a map, a margin out of range, or a model of another
+            mechanism.
     """
     if isinstance(margin, bool) or not isinstance(margin, int | float) or not 0 <= margin <= 1:
         raise InputError(f"margin: expected a number from 0 to 1, got {shown(margin)}")

@@ -37,7 +37,7 @@ class Reach:
 
     @staticmethod
     def of(model: Model, stroke: Strokes = (), threads: int | None = None) -> Reach:
-        """Raises InputError for chains that there are not, or ranges that are none."""
+        """Raises InputError for unknown chains or empty ranges."""
         return Reach(model, *strokes_of(model.mechanism, stroke), threads)
 
     @cached_property

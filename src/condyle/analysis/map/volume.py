@@ -20,7 +20,7 @@ PARTS = {1: 64, 2: 8, 3: 4}  # of a border cell along each axis, where its margi
 BUDGET = 3_000_000  # poses
 ENOUGH = 1e-5  # relative change from one level to the next that is small enough
 DEEPEST = 12
-NEAR = 1.0  # cells where |margin| is less than so many times its change across the cell are halved
+NEAR = 1.0  # cells are halved where |margin| is less than this multiple of its change across
 
 
 @dataclass(frozen=True)

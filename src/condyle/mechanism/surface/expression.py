@@ -27,7 +27,7 @@ class Expression(Smooth):
     expressions are.
 
     Args:   function: (3,) SX -> scalar SX;  closed: whether the surface has an inside.
-    Raises: InputError: if `function` is none, or does not return a scalar expression of the point
+    Raises: InputError: if `function` does not return a scalar expression of the point
             alone.
     """
 

@@ -17,8 +17,8 @@ from ..continuation import CONVERGED, Steps
 from .orientation import principal
 from .pose_status import PoseStatus, judge
 
-STARTS = 2000  # that chains can reach, at most, of so many
-DRAWN = 20000
+STARTS = 2000  # maximum number of starts that chains can reach
+DRAWN = 20000  # poses drawn to find them
 WIDTHS = 4  # of boxes, each half as wide as the one before
 ITERATIONS = 60
 LONGEST = 0.5  # step, in characteristic lengths and radians

@@ -123,7 +123,7 @@ class FoodTable(LoadTable):
 
     @staticmethod
     def begin(at: Place) -> Any:
-        """Between closed teeth there is none: what was there is broken."""
+        """Between closed teeth there is no food left: it is broken."""
         return ca.if_else(squeeze(at) > 0, BROKEN, APART)
 
     @staticmethod

@@ -119,7 +119,7 @@ def pieces(starts: np.ndarray) -> Iterator[tuple[int, int]]:
 
 
 def _extremes(values: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Of spans of so many samples: least and greatest value, and their numbers in it, (4, B)."""
+    """Least and greatest value of each span of samples, and their indices in it, (4, B)."""
     inside = np.arange(size.max()) < size[:, None]
     wide = np.full(inside.shape, np.nan)
     wide[inside] = values
@@ -131,7 +131,7 @@ def _extremes(values: np.ndarray, size: np.ndarray) -> np.ndarray:
 
 
 def _edges(status: np.ndarray, most: int = 200) -> np.ndarray:
-    """Samples on both sides of a change of status; the first so many changes."""
+    """Samples on both sides of a change of status; a limited number of changes."""
     change = np.flatnonzero(np.diff(status))[:most]
     return np.concatenate([change, change + 1])
 
