@@ -19,6 +19,7 @@ from websockets.http11 import Request
 from websockets.sync.client import ClientConnection, connect
 
 from condyle.view import View, open_view
+from condyle.view.controls import note_html
 from condyle.view.gate import Gate, guarded
 
 PROTOCOL = f"viser-v{viser.__version__}"
@@ -182,3 +183,17 @@ def test_a_busy_port_is_said(
         assert f"port {port} is in use; took " in told
         took = int(told.split("took ")[1].split()[0])
         assert took != port and f"http://127.0.0.1:{took}/" in told
+
+
+def test_the_page_loads_nothing_from_elsewhere(view: View) -> None:
+    """Text of strangers' files stands on it; it holds the key."""
+    connection = http.client.HTTPConnection("127.0.0.1", view.port, timeout=30)
+    connection.request("GET", urlsplit(view.url).path)
+    policy = connection.getresponse().getheader("Content-Security-Policy") or ""
+    rules = dict(rule.split(maxsplit=1) for rule in policy.split("; "))
+    assert rules["default-src"].startswith("'self'") and rules["frame-src"] == "'none'"
+    assert not any("http" in rule or "*" in rule for rule in rules.values())
+
+
+def test_words_of_a_file_format_nothing() -> None:
+    assert "<img" not in note_html("<img src=http://example.org/x.png>")

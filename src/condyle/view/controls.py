@@ -13,7 +13,7 @@ import numpy as np
 import viser
 import xarray as xr
 
-from ..errors import InputError
+from ..errors import InputError, shortened
 from ..kinematics.chain import FAMILIES
 from ..mechanism import Mechanism, bundled_mechanisms, load_mechanism, parse
 from ..results.solution import open_solution
@@ -27,6 +27,7 @@ from .stage import VIEWS, Stage
 
 WEIGHTS = 25  # the load's sliders go to this many weights of the platform,
 LEAST_LOAD = 100.0  # and at least to this [N]
+LONGEST_ERROR = 600  # characters of one that the page shows
 SPEEDS = {"0.1×": 0.1, "0.25×": 0.25, "0.5×": 0.5, "1×": 1.0, "2×": 2.0}
 
 
@@ -147,7 +148,9 @@ class Panel:
             slider.value = 0.0
 
     def _add_player(self) -> None:
-        self._player_note = self._gui.add_markdown("No solution is open. Open one (.nc) here:")
+        self._player_note = self._gui.add_html(
+            note_html("No solution is open. Open one (.nc) here:")
+        )
         upload = self._gui.add_upload_button("Open a solution", mime_type=".nc")
         upload.on_upload(lambda _: self._view.request("open", partial(self.open_nc, upload.value)))
         self._time: Any = self._gui.add_slider("t [s]", 0.0, 1.0, 0.001, 0.0, disabled=True)
@@ -207,16 +210,15 @@ class Panel:
         self._time.disabled = self._play.disabled = False
         playback.speed = SPEEDS[self._speed.value]
         options = playback.solution.condyle.options
-        self._player_note.content = (
-            f"{len(playback.time)} samples, {options['formulation']}/{options['route']}"
-        )
+        said = f"{len(playback.time)} samples, {options['formulation']}/{options['route']}"
+        self._player_note.content = note_html(said)
 
     def show_error(self, message: str) -> None:
         """What went wrong, where the reader looks first."""
         colour = COLOURS["unreachable"]
         self._status.content = (
             f'<div role="alert" style="border-left:4px solid {colour};margin:4px 10px;'
-            f'padding:4px 8px;font-size:13px;white-space:pre-wrap">{escape(message)}</div>'
+            f'padding:4px 8px;font-size:13px;white-space:pre-wrap">{escape(shortened(message, LONGEST_ERROR))}</div>'
         )
 
     def move(self, name: str, value: float) -> None:
@@ -295,6 +297,11 @@ class Panel:
             except InputError as error:
                 raise InputError(str(error).replace(str(path), file.name)) from None
         self._view.play_solution(solution)
+
+
+def note_html(text: str) -> str:
+    """A line between controls; whatever it says, it formats nothing."""
+    return f'<div style="margin:4px 10px;font-size:13px">{escape(text)}</div>'
 
 
 def round_outwards(low: float, high: float) -> tuple[float, float]:

@@ -31,10 +31,16 @@ from websockets.http11 import Request, Response
 
 LOCAL = ("localhost", "127.0.0.1", "::1")
 ANYWHERE = ("", "0.0.0.0", "::")
-# The page is shown in no other page's frame, and tells no other page its address.
+# The page loads nothing from elsewhere, whatever text a file brings into it; it is shown in no
+# other page's frame, and tells no other page its address.
 HEADERS = {
     "Cache-Control": "no-store",
-    "Content-Security-Policy": "frame-ancestors 'none'",
+    "Content-Security-Policy": (
+        # viser's page unpacks itself and draws by WebAssembly; all of it comes from this server.
+        "default-src 'self' 'unsafe-inline' 'unsafe-eval' blob: data:; "
+        "frame-src 'none'; object-src 'none'; base-uri 'none'; form-action 'none'; "
+        "frame-ancestors 'none'"
+    ),
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
 }

@@ -194,7 +194,10 @@ class View:
             except CondyleError as error:
                 self.panel.show_error(str(error))
             except Exception as error:  # the page must say it and go on
-                self.panel.show_error(f"{type(error).__name__}: {error}")
+                self.panel.show_error(
+                    f"This cannot be shown ({type(error).__name__} inside condyle, please report "
+                    "it). The page goes on with what it had."
+                )
 
     def _run_requests(self) -> None:
         with self._noting:
