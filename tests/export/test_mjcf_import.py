@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -175,3 +176,15 @@ def test_the_command(condyle_command: Callable[..., Any], tmp_path: Path) -> Non
     assert "symmetric" not in outcome.err
     refused = condyle_command("new", "six", "--from-mjcf", "missing.xml", "--force")
     assert refused.status == 2 and "missing.xml" in refused.err
+
+
+def test_a_few_lines_that_stand_for_a_thousand_million_bodies(tmp_path: Path) -> None:
+    """MuJoCo reads in a process of its own, with limits of time and memory."""
+    path, body = tmp_path / "bomb.xml", '<geom size="1"/>'
+    for _ in range(3):
+        body = f'<replicate count="1000" offset="1 0 0">{body}</replicate>'
+    path.write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+    started = time.monotonic()
+    with pytest.raises(InputError, match="MuJoCo"):
+        from_mjcf(path, "bomb")
+    assert time.monotonic() - started < 60

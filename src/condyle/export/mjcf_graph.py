@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -141,10 +145,7 @@ def read_graph(path: str | Path) -> Graph:
     require("mujoco", "mujoco")
     import mujoco
 
-    try:
-        model = mujoco.MjModel.from_xml_path(str(path))
-    except ValueError as error:
-        raise InputError(f"{path}: MuJoCo cannot read it: {str(error).strip()}") from None
+    model = _compiled(path, mujoco)
     others = {int(t) for t in model.eq_type} - {int(mujoco.mjtEq.mjEQ_CONNECT)}
     if others:
         kinds = ", ".join(sorted(mujoco.mjtEq(t).name[5:].lower() for t in others))
@@ -167,6 +168,47 @@ def read_graph(path: str | Path) -> Graph:
         f"{path}: its loops are open at home, by {min(gaps) * 1e3:.3g} mm at least; let qpos0 or a "
         "keyframe close them"
     )
+
+
+# A few lines of XML can stand for millions of bodies, and MuJoCo hears no signal while it reads.
+SECONDS, BYTES, BODIES = 30, 4 << 30, 2000
+_READ = f"""
+import sys
+try:
+    import resource
+    resource.setrlimit(resource.RLIMIT_AS, ({BYTES}, {BYTES}))
+    resource.setrlimit(resource.RLIMIT_FSIZE, ({BYTES >> 4}, {BYTES >> 4}))
+except (ImportError, ValueError):
+    pass
+import mujoco
+try:
+    model = mujoco.MjModel.from_xml_path(sys.argv[1])
+except (ValueError, MemoryError) as error:
+    sys.exit(str(error) or "it needs too much memory")
+if model.nbody > {BODIES}:
+    sys.exit(f"it has {{model.nbody}} bodies, expected at most {BODIES}")
+mujoco.mj_saveModel(model, sys.argv[2])
+"""
+
+
+def _compiled(path: str | Path, mujoco: Any) -> Any:
+    """The model in a file, read by another process, with limits of time and memory.
+
+    Raises: InputError: if MuJoCo cannot read it within them.
+    """
+    with TemporaryDirectory() as folder:
+        binary = Path(folder) / "model.mjb"
+        try:
+            done = subprocess.run(
+                [sys.executable, "-c", _READ, os.path.abspath(path), str(binary)],
+                capture_output=True, text=True, errors="replace", timeout=SECONDS, cwd=folder,
+            )  # fmt: skip
+        except subprocess.TimeoutExpired:
+            raise InputError(f"{path}: MuJoCo has not read it after {SECONDS} s") from None
+        if done.returncode:
+            why = done.stderr.strip() or f"it ended with status {done.returncode}"
+            raise InputError(f"{path}: MuJoCo cannot read it: {why[-1000:]}")
+        return mujoco.MjModel.from_binary_path(str(binary))
 
 
 def _ends(model: Any, data: Any, i: int, mujoco: Any) -> tuple[int, int, np.ndarray, np.ndarray]:
