@@ -49,7 +49,7 @@ format: $(VENV)/test.stamp
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-FUZZ_RUNS := 10000
+FUZZ_RUNS := 20000
 fuzz: $(VENV)/test.stamp
 	$(PYTEST) tests/fuzz --fuzz-runs $(FUZZ_RUNS)
 

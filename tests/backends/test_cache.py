@@ -518,3 +518,17 @@ def test_folders_in_the_way(folder: Path) -> None:
     (manifest / "below").mkdir(parents=True)
     cache.clear()
     assert names(folder) == []
+
+
+def test_a_library_that_others_can_write_is_not_loaded(folder: Path, temporary: Path) -> None:
+    """It may stand in a folder that is trusted, which was not always."""
+    library = cache.build(RECIPE, Maker(), lambda *words: None).library
+    assert cache.find(RECIPE) is not None
+    library.chmod(0o666)
+    assert cache.find(RECIPE) is None
+    library.chmod(0o600)
+    assert cache.find(RECIPE) is not None
+    other = temporary / library.name
+    library.rename(other)
+    library.symlink_to(other)
+    assert cache.find(RECIPE) is None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -187,3 +188,10 @@ def test_the_room_imports_little() -> None:
         used = re.findall(rf"^\s*from {above}([\w.]*) import", path.read_text(), re.MULTILINE)
         assert {*used} <= {"errors", "atomic"}, path
     assert any("from ..errors import" in path.read_text() for path in room.glob("*.py"))
+
+
+@pytest.mark.parametrize("character", "\u3164\u2800\u115f\ufe0f\U000e0101")
+def test_names_that_nobody_sees(character: str) -> None:
+    table = tomllib.loads(bundled_text("hexaglide"))
+    with pytest.raises(CondyleError, match=f"invisible characters.*U.{ord(character):04X}"):
+        from_data({**table, "name": f"jaw{character}"})

@@ -33,6 +33,8 @@ FOOD = {"kind": "food", "food": "carrot", "point": "right_molar"}
         ({"controller": {"kind": "pid"}}, "controller: the kind 'pid' is unknown"),
         ({"controller": PD | {"stifness": 3.0}}, 'stifness.*Did you mean "stiffness"'),
         ({"controller": {"kind": "computed_torque"}}, "controller.stiffness: is missing"),
+        ({"load": [FOOD | {"food": ["bolus"]}]}, "food: expected a name such as"),
+        ({"controller": PD | {"rate": 5e-324}}, "controller.rate: expected"),
         ({"load": [FOOD | {"food": "peanutt"}]}, 'no food "peanutt". Did you mean "peanut"'),
         ({"controller": PD, "efforts": {"file": __file__}}, "efforts come from one of them"),
         ({"controller": PD | {"motion": "nowhere.csv"}}, "there is no file"),

@@ -206,6 +206,8 @@ def _whole(folder: Path, recipe: str) -> Entry | None:
         manifest = json.loads((folder / f"{recipe}.json").read_text(encoding="utf-8"))
         facts = manifest["facts"]
         library = folder / facts["library"]
+        if not _mine(library.lstat()):
+            return None
         if manifest["seal"] != _seal(recipe, facts) or _hash(library) != facts["sha256"]:
             return None
         return Entry(library, facts, True)
@@ -237,14 +239,19 @@ def _trusted(folder: Path) -> bool:
     """Whether nobody else can put libraries there."""
     if not folder.is_absolute() or not folder.is_dir():
         return False
-    if not hasattr(os, "getuid"):
-        return True
     try:
         about = folder.stat()
     except OSError:
         return False
-    mine = about.st_uid == os.getuid()
-    return mine and not about.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    return _mine(about)
+
+
+def _mine(about: os.stat_result) -> bool:
+    """Whether a file or folder is this user's, and nobody else can write it."""
+    if not hasattr(os, "getuid"):
+        return True
+    own = about.st_uid == os.getuid() and not stat.S_ISLNK(about.st_mode)
+    return own and not about.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
 def _has_room(folder: Path) -> bool:

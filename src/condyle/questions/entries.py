@@ -15,6 +15,7 @@ from ..mechanism.mechanism import Mechanism
 from ..mechanism.quantities import Number
 
 LARGEST = 1e12  # of a gain, SI
+SLOWEST = 1e-3  # Hz
 FASTEST = 1e6  # Hz
 
 
@@ -38,7 +39,7 @@ _Plain = Annotated[float, _number, AfterValidator(_bounded)]
 File = Annotated[str, Field(min_length=1, strict=True), AfterValidator(_file)]
 Gain = Annotated[_Plain, Field(ge=0)]
 Positive = Annotated[_Plain, Field(gt=0)]
-Frequency = Annotated[float, _number, Field(gt=0, le=FASTEST)]
+Frequency = Annotated[float, _number, Field(ge=SLOWEST, le=FASTEST)]
 Count = Annotated[int, Field(strict=True, ge=0, le=1000)]
 # One for all, or one each.
 Gains = Gain | tuple[Gain, ...]

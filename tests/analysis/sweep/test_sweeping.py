@@ -275,3 +275,10 @@ def test_wrong_schedulers_are_told_before_any_work(
         condyle.sweep(tables, tmp_path / "sweep", workers=workers, scheduler=scheduler)
     assert "\n" not in str(caught.value)
     assert not (tmp_path / "sweep").exists()
+
+
+def test_an_entry_twice_is_told_before_any_folder(tables: dict[str, Any], tmp_path: Path) -> None:
+    peak = {"of": "effort", "take": "max_abs", "over": ["time", "time"]}
+    with pytest.raises(condyle.InputError, match='over has "time" 2 times'):
+        condyle.sweep({**tables, "measure": {"peak": peak}}, tmp_path / "sweep", workers=1)
+    assert [*tmp_path.iterdir()] == []

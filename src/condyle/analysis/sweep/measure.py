@@ -86,6 +86,8 @@ def reading(name: str, measure: Measure, model: Model) -> Reading:
             raise InputError(
                 f'measure {name}: over has "{dim}", and {measure.of} goes over {", ".join(left)}'
             )
+        if over.count(dim) > 1:
+            raise InputError(f'measure {name}: over has "{dim}" {over.count(dim)} times')
     if "time" not in over:
         raise InputError(f'measure {name}: over must have "time"')
     kept = [labels[d] for d in left if d not in over]

@@ -20,7 +20,7 @@ from typing import Any, ClassVar, Literal, Self
 import casadi as ca
 from pydantic import Field, model_validator
 
-from ...errors import did_you_mean
+from ...errors import did_you_mean, shown
 from ...mechanism.quantities import Direction, NonNegativeLength, PositiveLength, per_metre
 from ..entries import Gain, Machine, Positive, unit
 from .acting import Jump, LoadTable, Place
@@ -103,8 +103,12 @@ class FoodTable(LoadTable):
         name = data.get("food") if isinstance(data, Mapping) else None
         if name is None:
             return data
+        if not isinstance(name, str):
+            raise ValueError(
+                f"food: expected a name such as {next(iter(FOODS))}, got {shown(name)}"
+            )
         if name not in FOODS:
-            raise ValueError(f'there is no food "{name}".{did_you_mean(str(name), FOODS)}')
+            raise ValueError(f'there is no food "{name}".{did_you_mean(name, FOODS)}')
         known = {key: getattr(FOODS[name], key) for key in _KEYS}
         scale = per_metre(info)
         known |= {key: known[key] * scale for key in _LENGTHS}
