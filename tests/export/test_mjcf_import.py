@@ -15,6 +15,7 @@ from support.mujoco_player import Player
 
 import condyle
 from condyle.errors import InputError, UnsupportedError
+from condyle.export import mjcf_graph
 from condyle.export.mjcf_import import ImportResult, from_mjcf
 from condyle.mechanism import load_mechanism
 
@@ -178,12 +179,16 @@ def test_the_command(condyle_command: Callable[..., Any], tmp_path: Path) -> Non
     assert refused.status == 2 and "missing.xml" in refused.err
 
 
-def test_a_few_lines_that_stand_for_a_thousand_million_bodies(tmp_path: Path) -> None:
+@pytest.mark.slow
+def test_a_few_lines_that_stand_for_a_thousand_million_bodies(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """MuJoCo reads in a process of its own, with limits of time and memory."""
     path, body = tmp_path / "bomb.xml", '<geom size="1"/>'
     for _ in range(3):
         body = f'<replicate count="1000" offset="1 0 0">{body}</replicate>'
     path.write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+    monkeypatch.setattr(mjcf_graph, "SECONDS", 3)
     started = time.monotonic()
     with pytest.raises(InputError, match="MuJoCo"):
         from_mjcf(path, "bomb")

@@ -23,3 +23,9 @@ def fuzz_seeds(request: pytest.FixtureRequest) -> range:
     """Seeds, one a run; a run that fails can be repeated with its seed alone."""
     first = request.config.getoption("--fuzz-seed", default=0)
     return range(first, first + request.config.getoption("--fuzz-runs", default=SHORT))
+
+
+@pytest.fixture
+def few_seeds(fuzz_seeds: range) -> range:
+    """The same for files that take long to open: a tenth of them in the normal tests."""
+    return fuzz_seeds[: SHORT // 10] if len(fuzz_seeds) == SHORT else fuzz_seeds

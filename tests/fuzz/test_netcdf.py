@@ -43,11 +43,11 @@ def map_file(path: Path) -> Path:
     ids=["solution", "map"],
 )
 def test_an_altered_file(
-    tmp_path: Path, fuzz_seeds: range, write: Callable[[Path], Path], read: Callable[[Path], Any]
+    tmp_path: Path, few_seeds: range, write: Callable[[Path], Path], read: Callable[[Path], Any]
 ) -> None:
     whole, path = write(tmp_path / "whole.nc"), tmp_path / "a.nc"
     good, before = 0, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    for seed in fuzz_seeds:
+    for seed in few_seeds:
         shutil.copy(whole, path)
         altered(random.Random(seed), path)
         start = time.monotonic()
@@ -67,4 +67,4 @@ def test_an_altered_file(
             assert len({len(column) for column in rows.values()}) == 1
         assert time.monotonic() - start < PATIENCE, seed
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < GIB_KB
-    assert 0 < good < 0.7 * len(fuzz_seeds)
+    assert 0 < good < 0.7 * len(few_seeds)

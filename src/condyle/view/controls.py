@@ -215,10 +215,10 @@ class Panel:
 
     def show_error(self, message: str) -> None:
         """What went wrong, where the reader looks first."""
-        colour = COLOURS["unreachable"]
+        colour, text = COLOURS["unreachable"], escape(shortened(message, LONGEST_ERROR))
         self._status.content = (
             f'<div role="alert" style="border-left:4px solid {colour};margin:4px 10px;'
-            f'padding:4px 8px;font-size:13px;white-space:pre-wrap">{escape(shortened(message, LONGEST_ERROR))}</div>'
+            f'padding:4px 8px;font-size:13px;white-space:pre-wrap">{text}</div>'
         )
 
     def move(self, name: str, value: float) -> None:
