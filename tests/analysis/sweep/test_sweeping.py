@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import random
 import signal
 import subprocess
 import sys
@@ -12,10 +13,13 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, CancelledError
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 import tomli_w
 import xarray as xr
@@ -121,13 +125,13 @@ def test_killed_at_any_instant_it_goes_on(
     file, folder = tmp_path / "study.toml", tmp_path / "sweep"
     file.write_text(tomli_w.dumps(study))
     command = [sys.executable, "-m", "condyle", "sweep", str(file), "--out", str(folder)]
-    random = np.random.default_rng()
+    draw = np.random.default_rng()
     for at in (1, 9, 17):
         with subprocess.Popen(
             [*command, "--workers", "2", "--resume"], stdout=subprocess.DEVNULL
         ) as process:
             wait_for_parts(folder, at)
-            time.sleep(random.uniform(0.0, 0.05))
+            time.sleep(draw.uniform(0.0, 0.05))
             process.kill()
         whole = open_sweep(folder)  # what is there can be read
         assert whole.sizes["row"] % 4 == 0
@@ -282,3 +286,30 @@ def test_an_entry_twice_is_told_before_any_folder(tables: dict[str, Any], tmp_pa
     with pytest.raises(condyle.InputError, match='over has "time" 2 times'):
         condyle.sweep({**tables, "measure": {"peak": peak}}, tmp_path / "sweep", workers=1)
     assert [*tmp_path.iterdir()] == []
+
+
+def test_a_folder_from_a_stranger(tables: dict[str, Any], tmp_path: Path) -> None:
+    condyle.sweep(tables, tmp_path, workers=1)
+    good = (tmp_path / "study.json").read_text()
+    [rows] = (tmp_path / "rows").iterdir()
+    whole = rows.read_bytes()
+    for said in ("[]", "3", "[" * 9000, "{}", good.replace('"rows": ', '"rows": "x" , "y": ')):
+        (tmp_path / "study.json").write_text(said)
+        with pytest.raises(condyle.InputError, match="cannot be read"):
+            open_sweep(tmp_path)
+    (tmp_path / "study.json").write_text(good)
+    table = pq.read_table(rows)
+    wide = table.append_column("more", table.column("variant"))
+    long = pa.concat_tables([table, table])
+    for made, words in ((wide, "columns that its study does not have"), (long, "and its study")):
+        pq.write_table(made, rows)
+        with pytest.raises(condyle.InputError, match=words):
+            open_sweep(tmp_path)
+    rng = random.Random(4)
+    for _ in range(40):
+        data = bytearray(whole)
+        for _ in range(rng.randrange(1, 5)):
+            data[rng.randrange(len(data))] = rng.randrange(256)
+        rows.write_bytes(bytes(data[: rng.choice((len(data), rng.randrange(len(data))))]))
+        with suppress(condyle.CondyleError):
+            open_sweep(tmp_path)

@@ -16,11 +16,13 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import xarray as xr
+from pydantic import BaseModel, Field, JsonValue
 
 from ...atomic import make_folder, replacing, write_text
-from ...errors import InputError, as_path
+from ...errors import InputError, as_path, printable, shortened
 from ...mechanism.toml import read_tables
 from ...mechanism.writing import record
+from ...motion.memory import at_most, memory_at_hand
 from ...version import __version__
 from .job import MOTION, REASON, SECONDS, STATUS, VARIANT, Job
 from .study import some_of
@@ -28,6 +30,7 @@ from .variants import Row
 
 STUDY, ROWS, SOLUTIONS = "study.json", "rows", "solutions"
 PART, ALL = "part-{:06d}.parquet", "all.parquet"
+ROOM = 1 << 29  # bytes to read with
 _MANY = 5  # differences that a message shows
 
 
@@ -127,17 +130,40 @@ def open_sweep(folder: str | os.PathLike[str]) -> xr.Dataset:
             f"{folder} has no rows yet; continue with --resume (in Python resume=True)"
         )
     try:
-        table = pa.concat_tables(pq.read_table(path) for path in parts)
-    except (OSError, pa.ArrowException) as error:
+        with at_most(ROOM + 4 * _size(folder, parts, kept)):
+            table = pa.concat_tables(pq.read_table(path) for path in parts)
+            variables = {
+                name: ("row", table.column(name).to_numpy(zero_copy_only=False))
+                for name in table.column_names
+            }
+    except (OSError, MemoryError, pa.ArrowException) as error:
         raise InputError(f"{folder}: a part cannot be read ({error})") from None
-    variables = {
-        name: ("row", table.column(name).to_numpy(zero_copy_only=False))
-        for name in table.column_names
-    }
     facts = {name: json.dumps(kept[name]) for name in ("study", "units", "better")}
     lists = {name: list(kept[name]) for name in ("parameters", "measures")}
     attributes = {"rows": kept["rows"], "condyle_version": kept["condyle"], **facts, **lists}
     return xr.Dataset(variables, attrs=attributes)
+
+
+def _size(folder: str | os.PathLike[str], parts: Sequence[Path], kept: Mapping[str, Any]) -> int:
+    """Bytes of all rows as arrays, from the parts' ends, before any row is read.
+
+    Raises: InputError: for rows or columns that the study does not have.
+    """
+    columns = [VARIANT, MOTION, *kept["parameters"], *kept["measures"], STATUS, REASON, SECONDS]
+    rows = 0
+    for path in parts:
+        about = pq.read_metadata(path)
+        names = about.schema.to_arrow_schema().names
+        if not {VARIANT, STATUS, REASON} <= {*names} <= {*columns}:
+            raise InputError(f"{folder}: {path.name} has columns that its study does not have")
+        rows += about.num_rows
+    if rows > kept["rows"]:
+        raise InputError(f"{folder} has {rows} rows, and its study {kept['rows']}")
+    if (total := 8 * rows * len(columns)) > (free := memory_at_hand()):
+        raise InputError(
+            f"{folder}: its rows take {total / 2**30:.3g} GiB, and {free / 2**30:.3g} GiB are free"
+        )
+    return total
 
 
 def _files(folder: Path) -> list[Path]:
@@ -173,14 +199,29 @@ def _sha256(*arrays: np.ndarray) -> str:
     return found.hexdigest()
 
 
+class Kept(BaseModel):
+    """What the file of a study says, as far as it is read."""
+
+    condyle: str
+    study: dict[str, JsonValue]
+    rows: int = Field(ge=0)
+    parameters: list[str]
+    measures: list[str]
+    units: dict[str, str]
+    better: dict[str, str]
+
+
 def _kept(folder: Path) -> dict[str, Any] | None:
     """What a folder says of its study; None if it holds none."""
     try:
-        return json.loads((folder / STUDY).read_text(encoding="utf-8"))
+        found = json.loads((folder / STUDY).read_text(encoding="utf-8"))
+        Kept.model_validate(found)
+        return found
     except (FileNotFoundError, NotADirectoryError):
         return None
-    except (OSError, ValueError) as error:
-        raise InputError(f"{folder / STUDY} cannot be read ({error})") from None
+    except (OSError, ValueError, RecursionError) as error:
+        why = shortened(printable(" ".join(str(error).split()), lines=False), 200)
+        raise InputError(f"{folder / STUDY} cannot be read ({why})") from None
 
 
 def _differences(kept: Mapping[str, Any], asked: Mapping[str, Any]) -> Iterator[str]:
