@@ -42,9 +42,7 @@ Lanes = list[ca.SX]  # one expression a family group
 Total = Callable[[Sequence[ca.SX]], ca.SX]
 
 
-def normal_equations(
-    total: Total, A: Lanes, b: ca.SX, cancellation: float = CANCELLATION
-) -> tuple[Lanes, ca.SX, Pivots]:
+def normal_equations(total: Total, A: Lanes, b: ca.SX) -> tuple[Lanes, ca.SX, Pivots]:
     """Minimum-norm solutions tau = A y with A^T A y = b.
 
     Fast, since all its sums run at once. Elimination leaves A^T tau - b of rounding times
@@ -69,7 +67,7 @@ def normal_equations(
     lengths = ca.diag(G)
     y, excess, pivots = definite_solve(G, b, lengths)
     terms = ca.dot(lengths, ca.sum2(y * y))
-    spare = cancellation**2 / m * ca.sum2(ca.sum1(y * b)) - terms
+    spare = CANCELLATION**2 / m * ca.sum2(ca.sum1(y * b)) - terms
     least = reduce(ca.fmin, excess)
     # Compared separately, since backends treat NaN differently in a minimum.
     return [a.T @ y for a in A], 2 * (least >= 0) * (spare >= 0) - 1, pivots

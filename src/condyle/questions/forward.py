@@ -122,7 +122,7 @@ def accelerated(
     """
     eq = affine(b, platform, load, effort)
     touch = contacts(b, platform) if b.structure.friction else None
-    carried = _sizes(b, platform, eq, load, effort) if touch is not None else ca.SX()
+    carried = _carried(b, eq, effort) if touch is not None else ca.SX()
     w, force, sure, regular, lengths, found = _solved(b, platform, eq, touch, forces, carried)
     q2 = solve_small(eq.S, w)
     b.check(feasibility(b, platform, eq.discriminants), DOUBTFUL, Status.unreachable)
@@ -163,20 +163,19 @@ def forward_system(structure: Structure) -> Program:
     touch.add_sliding(b)
     b.output("joint_rate", eq.rates, "rad/s or m/s")
     pairs = list(zip(eq.biases, eq.rows, strict=True))
-    b.output("size", _sizes(b, platform, eq, load, effort), "N, N m", 6)
+    force, turned = load.force, ca.fabs(ca.cross(platform.R @ load.point, load.force))
+    borne = ca.vertcat(ca.fabs(force), turned + ca.fabs(load.moment))
+    size = _carried(b, eq, effort) + ca.fabs(eq.B.T) @ borne
+    b.output("size", size, "N, N m", 6)
     b.output("bias", [bias + ca.dot(row, eq.start) for bias, row in pairs], "per s^2")
     along = eq.basis.rates(ca.SX.eye(m))
     b.output("J", [along.T @ row for row in eq.rows], "", m)
     return b.finish()
 
 
-def _sizes(b: Builder, platform: Platform, eq: Affine, load: Wrench, effort: Lanes) -> ca.SX:
-    """Sizes of the terms of F that may cancel: |J|^T |tau| and those of the load, (s,)."""
-    pairs = zip(eq.rows, effort, strict=True)
-    carried = b.total([ca.fabs(row * tau) for row, tau in pairs])
-    force, lever = load.force, platform.R @ load.point
-    turned = ca.fabs(load.moment) + ca.fabs(ca.cross(lever, force))
-    return carried + ca.fabs(eq.B.T) @ ca.vertcat(ca.fabs(force), turned)
+def _carried(b: Builder, eq: Affine, effort: Lanes) -> ca.SX:
+    """|J|^T |tau|, (s,): terms of F that may cancel."""
+    return b.total([ca.fabs(row * tau) for row, tau in zip(eq.rows, effort, strict=True)])
 
 
 def _columns(eq: Affine) -> ca.SX:
@@ -209,7 +208,7 @@ def _solved(
     """w, contact forces along the unit normals (on request), and whether they are reliable; V^2 and
     the diagonal of the inertia matrix; with friction, which of its patterns are consistent.
 
-    Args: carried: of `_sizes`, with friction.
+    Args: carried: of `_carried`, with friction.
     """
     H, F = _columns(eq), eq.F + eq.H @ eq.start
     rubbing = list(b.structure.friction)
@@ -229,9 +228,9 @@ def _solved(
         force = normal_forces(b, platform.motion, solve_small(eq.G[dep, :], left))
         if touch is not None:
             moved = H[dep, :] @ w
-            normal = ca.fabs((eq.B.T @ touch.N)[dep, :])
             terms = carried[dep] + ca.fabs(F[dep]) + ca.fabs(moved)
-            size = ca.sum1(terms / ca.sum2(normal))
+            inverse = 1 / b.parameter("length")
+            size = ca.sum1(terms * ca.vertcat(*(inverse if i >= 3 else ca.SX(1) for i in dep)))
             left = T[dep, :] - H[dep, :] @ x[:, 1:]
             each = ca.horzsplit(solve_small(eq.G[dep, :], left))
             K = ca.horzcat(*(normal_forces(b, platform.motion, mu) for mu in each))

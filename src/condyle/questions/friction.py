@@ -31,7 +31,7 @@ FLAT = 1e-3  # part of a square below which a difference has lost too many digit
 HELD = 0.1  # least determinant of the contacts' block over that without friction
 GROWTH = 30.0  # square of a step before it is projected, over that of the efforts
 BORDER = 1e-6  # of the forces that add up to a contact force: below, its sign is left to numpy
-PIVOT = 1e-3  # of a pivot's terms: below, it has lost too many digits
+PIVOT = 1e-3  # of 1: below, a pivot sigma - K has lost too many digits
 
 LeastNorm = Callable[..., tuple[Lanes, ca.SX, Pivots]]
 
@@ -71,7 +71,7 @@ class _Pattern:
     B:      lanes of d lambda = -B d effort, (k,).
     free:   by contact, the part of B_i in the null space of the equations, lanes.
     flat:   by contact, 1 where that part is too small to be known, else 0.
-    held:   how well the contacts hold the dependent coordinates: |det| over that of no friction.
+    held:   1 where the contacts hold the dependent coordinates nearly as well as without friction.
     """
 
     effort: Lanes
@@ -115,7 +115,7 @@ def least_norm_pattern(b: Builder, eq: Equations, c: Contacts, solve: LeastNorm)
     So it is found among the consistent candidates: every force with one sign, the other, or 0.
     """
     s = b.structure
-    best, stepped, held = ca.SX(float("inf")), ca.SX(0), ca.SX(0)
+    best, known = ca.SX(float("inf")), ca.SX(0)
     pivots, regular = ca.SX(1.0), ca.SX(1.0)
     effort: Lanes = []
     force = ca.SX.zeros(len(s.contacts))
@@ -126,15 +126,13 @@ def least_norm_pattern(b: Builder, eq: Equations, c: Contacts, solve: LeastNorm)
         norm, found, carried, steps = pattern.least(b)
         better = norm < best
         regular = ca.if_else(better, pattern.regular, regular)
-        stepped = ca.if_else(better, steps, stepped)
-        held = ca.if_else(better, pattern.held, held)
+        known = ca.if_else(better, pattern.held * (steps <= GROWTH * norm), known)
         best = ca.if_else(better, norm, best)
         force = ca.if_else(better, carried, force)
         effort = [
             t if not effort else ca.if_else(better, t, effort[g]) for g, t in enumerate(found)
         ]
-    sure = _sure(s.friction, tried, best) * (stepped <= GROWTH * best) * (held > HELD)
-    return Chosen(effort, force, sure, pivots, regular)
+    return Chosen(effort, force, known * _sure(s.friction, tried, best), pivots, regular)
 
 
 def _pattern(
@@ -147,7 +145,7 @@ def _pattern(
     sign = dict(zip(s.friction, signs, strict=True))
     for i in s.friction:
         D[:, i] = N[:, i] - sign[i] * T[:, i]
-    held = ca.fabs(determinant(D[dep, :]) / determinant(N[dep, :]))
+    held = ca.fabs(determinant(D[dep, :])) > HELD * ca.fabs(determinant(N[dep, :]))
     basis = Basis(ind, dep, -solve_small(D[dep, :].T, D[ind, :].T))
     rows = [basis.generalized_force(chain.row) for chain in eq.chains]
     found, pivots, eliminated = solve(b.total, rows, basis.generalized_force(eq.Q))
@@ -266,32 +264,32 @@ def consistent(K: ca.SX, force: ca.SX, size: ca.SX) -> Consistent:
     Args: K: (f, f).  force: lambda_0, (f,).  size: of the forces that lambda_0 is a sum of.
     """
     chosen, best = ca.SX.zeros(force.numel()), ca.SX(-float("inf"))
-    unique, regular, near, clear = ca.SX(1), ca.SX(1), ca.SX(0), ca.SX(0)
+    determinants, pivot = ca.SX(float("inf")), ca.SX(float("inf"))
+    near, clear = ca.SX(0), ca.SX(0)
     margin = BORDER * size
     for y, turned, quality in _solutions(-K, force):
         least = reduce(ca.fmin, y)
         better = least > best
         best = ca.if_else(better, least, best)
         chosen = ca.if_else(better, ca.vertcat(*y), chosen)
-        unique *= turned > 0
-        regular *= quality > 0
+        determinants, pivot = ca.fmin(determinants, turned), ca.fmin(pivot, quality)
         near += least >= -margin
         clear += least > margin
-    bounded = regular * all_of(one < HUGE for one in ca.vertsplit(chosen))
-    single = bounded * (1 - (1 - unique * (near > 0)) * (1 - (near == 1) * (clear == 1)))
-    open_ = regular * (1 - unique)
-    return Consistent(chosen, single, open_ * (clear > 1), open_ * (near == 0))
+    regular, unique = pivot > PIVOT, determinants > 0
+    single = ca.if_else(unique, near > 0, (near == 1) * (clear == 1))
+    several, none = (clear > 1) * (1 - unique), (near == 0) * (1 - unique)
+    return Consistent(chosen, regular * single, regular * several, regular * none)
 
 
 def _solutions(A: ca.SX, right: ca.SX) -> list[tuple[list[ca.SX], ca.SX, ca.SX]]:
     """Solutions of (sigma + A) y = right for every sigma; eliminations are shared.
 
-    Each with det(sigma + A) det(sigma), and a number that is positive where its pivots are known.
+    Each with det(sigma + A) det(sigma), and its smallest pivot.
     """
     found = []
     for sign in (1, -1):
         pivot = A[0, 0] + sign
-        known, inverse = ca.fabs(pivot) - PIVOT * (1 + ca.fabs(A[0, 0])), 1 / pivot
+        known, inverse = ca.fabs(pivot), 1 / pivot
         if right.numel() == 1:
             found.append(([right * inverse], sign * pivot, known))
             continue

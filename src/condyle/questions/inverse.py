@@ -39,7 +39,6 @@ OUTPUTS = ("contact", "share", "gravity", "motion", "joint", "configuration", "b
 DOUBTFUL = 1e-14  # minimum discriminant,
 WEAK = 1e-20  # and squared ratio of a pivot to its column, of samples that are not repeated
 HUGE = 1e300
-ROUGH = 10.0  # as `CANCELLATION` of the normal equations, with friction
 
 
 def inverse(structure: Structure, wanted: Collection[str] = ()) -> Variants:
@@ -140,9 +139,7 @@ def _minimum_norm(
     # Friction acts across the contacts, where route `direct` has no equations.
     route = "core" if s.friction else s.route
     eq = equations(b, platform, load, route=route, lump=lump, low_latency=low_latency)
-    # Forward dynamics of strong friction magnifies what is left over.
-    rough = partial(normal_equations, cancellation=ROUGH) if s.friction else normal_equations
-    solve = gram_schmidt if robust else rough
+    solve = gram_schmidt if robust else normal_equations
     best = _solved(b, platform, load, eq, solve, apart, wanted)
     discriminants = [c.dynamics.discriminant for c in eq.chains]
     b.check(feasibility(b, platform, discriminants), DOUBTFUL, Status.unreachable)
