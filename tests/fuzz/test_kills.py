@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 from support.children import PATIENCE, start, wait_for
 
+import condyle
 from condyle.motion import read_table
 from condyle.results.solution import open_solution
 
 RUNS_A_KILL = 30  # of the other fuzzers' runs: a kill takes longer than a broken file
 MOST = 100
 
-FILES = {"s.nc", "s.csv", "t.csv", "t.parquet", "t.html"}
+FILES = {"s.nc", "s.csv", "m.nc", "t.csv", "t.parquet", "t.html", "j.toml"}
 
 # A process that has imported everything, and forks one that writes whenever it is told to.
 NURSERY = """
@@ -32,11 +33,15 @@ import h5netcdf, pyarrow.csv, pyarrow.parquet, xarray
 
 model = condyle.derive("masticatory", backend="numpy")
 solution = model.solve(Motion.from_csv(bundled_reference()[0], rate=20))
+mapped = condyle.workspace_map(model, ["X=-6:14:9 mm", "beta=-15:35:8 deg"])
 
 def write_for_ever():
     for n in count():
         solution["effort"].values[:] = n
         solution.condyle.save("s.nc", "s.csv")
+        mapped["ratio"].values[:] = n
+        mapped.condyle.save("m.nc")
+        condyle.dump(model.mechanism.set("platform.mass", 1.0 + n), "j.toml")
         write_table("t.csv", {"a": np.full(20000, float(n)), "b": np.full(20000, float(n))})
         write_table("t.parquet", {"a": np.full(20000, float(n)), "b": np.full(20000, float(n))})
         write_text("t.html", str(n) * 100_000)
@@ -83,6 +88,8 @@ def check(folder: Path) -> None:
     """Every file is of one writing, from its first number to its last."""
     effort = open_solution(folder / "s.nc")["effort"].values
     assert effort.shape == (101, 6) and len(np.unique(effort)) == 1
+    assert len(np.unique(condyle.open_map(folder / "m.nc")["ratio"].values)) == 1
+    assert condyle.load_mechanism(folder / "j.toml").platform.mass % 1 == 0
     table = read_table(folder / "s.csv")
     assert table.rows == 101 and len(np.unique(table.columns["tau_temporalis_left"])) == 1
     for name in ("t.csv", "t.parquet"):
