@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from typing import Any
 
 import numpy as np
@@ -196,3 +197,22 @@ def test_sensitivity_to_the_characteristic_length(name: str) -> None:
         sigma = np.linalg.svd(rows / scale @ basis, compute_uv=False)
         logs.append(np.log(sigma[-1] / sigma[0]))
     assert found.length_sensitivity == pytest.approx((logs[1] - logs[0]) / (2 * step), rel=1e-5)
+
+
+def determinants(raw: dict[str, Any], q: np.ndarray) -> np.ndarray:
+    model = condyle.derive(from_data(raw), backend="numpy")
+    return np.linalg.det(np.moveaxis(model.poses.survey(q, ("rows",)).values["rows"], -1, 0))
+
+
+def test_the_determinant_changes_its_sign_at_singularities_alone() -> None:
+    """Neither in a gimbal lock, nor where a contact's normal turns past an axis."""
+    raw = tomllib.loads(condyle.dumps(condyle.load_mechanism("gough-stewart")))
+    q = np.array([[0, 0, 0, 0.1, np.pi / 2 + d, 0.2] for d in (-1e-3, 1e-3)])
+    ahead, behind = determinants(raw, q)
+    assert ahead == pytest.approx(behind, rel=0.02)
+    surface = {"kind": "sphere", "centre": [0.0, 0.0, -0.8], "radius": 0.8}
+    ball = {"name": "ball", "point": [0, 0, 0], "surface": surface}
+    five = raw | {"chain": raw["chain"][:5], "contact": [ball]}
+    q = np.array([[x, 0.1, 0.1, 0.2, 0.1] for x in (-1e-3, 1e-3)])
+    ahead, behind = determinants(five, q)
+    assert ahead == pytest.approx(behind, rel=0.02)
