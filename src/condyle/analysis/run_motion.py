@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,8 @@ from ..model.distributing import Distribution
 from ..model.model import derive
 from ..motion import motion_and_load
 from ..results.accuracy import max_error_of, require_accuracy
+from ..results.proof import count_of
+from ..results.proof import prove as proven
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,6 +36,7 @@ def run(
     reactions: bool = False,
     flag: bool = False,
     max_error: float | None = None,
+    prove: int | None = None,
     measured: str | Path | None = None,
     vary: Study | str | Path | None = None,
     **reading: Any,
@@ -47,12 +51,14 @@ def run(
             reactions, flag, threads: as of `Model.solve`.
             max_error: largest bound of the relative error that is accepted; with it tables have a
                 column bound.
+            prove: samples whose digits are to be proven, by intervals.
             measured: markers and EMG to keep with the results.
             vary: a study, or its file: quantiles of efforts and contact forces over its variants.
             reading: units, landmark, smooth, rate, trim: how the file of a motion is read.
     Raises: CondyleError: for input that cannot be used, or samples that cannot be computed.
     """
     machine, max_error = as_mechanism(mechanism), max_error_of(max_error)
+    prove = count_of(prove)
     study = None if vary is None else study_for(vary, machine)
     path, acting = motion_and_load(machine, motion, load, **reading)
     model = derive(
@@ -64,6 +70,10 @@ def run(
     if max_error is not None:
         require_accuracy(solution["bound"].values, max_error, solution["time"].values)
         solution["bound"].attrs["max_error"] = max_error
+    if prove is not None:
+        solution.attrs["proof"] = json.dumps(
+            [asdict(one) for one in proven(model, solution, prove)]
+        )
     if measured is not None:
         solution = solution.condyle.with_measured(measured)
     if study is not None:
