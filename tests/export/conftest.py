@@ -61,7 +61,10 @@ FOLDERS: dict[str, tuple[str, dict[str, Any]]] = {
         {
             "landmark": "incisor",
             "prefix": "jaw",
-            "questions": (*DEFAULT, "closure", "observer", "impedance", "bite_force"),
+            "questions": (
+                *(*DEFAULT, "closure", "observer", "state", "joints", "impedance", "bite_force"),
+                *("contact_derivative", "forward_derivative"),
+            ),
         },
     ),
     "single": ("gough-stewart", {"precision": "float", "questions": ("inverse", "pose")}),

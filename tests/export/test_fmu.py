@@ -24,7 +24,7 @@ from condyle.export import fmu as target
 from condyle.export.fmu import exponents
 
 Array = np.ndarray
-KINDS, VERSIONS = ("plant", "inverse", "controller", "bounded"), (2, 3)
+KINDS, VERSIONS = ("plant", "inverse", "controller", "bounded", "pose", "joints"), (2, 3)
 Q = ("X", "Y", "alpha", "beta")
 POINT = np.array([0.02, 0.01, 0.005])
 FORCE, MOMENT = np.array([3.0, -2.0, 10.0]), np.array([0.01, 0.02, -0.03])
@@ -390,3 +390,19 @@ def test_the_command(
     (path,) = (tmp_path / "f").iterdir()
     assert path.name == "gough-stewart-plant.fmu"
     assert not any("binaries" in name for name in zipfile.ZipFile(path).namelist())
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_joints_and_back(
+    fmus: dict[tuple[str, int], Path], model: condyle.Model, version: int
+) -> None:
+    """Joints of a state, and the pose that these joints give."""
+    chains = model.mechanism.chain_names
+    found = model.inverse_kinematics(STATE[0][None], STATE[1][None], 0 * AHEAD[None])
+    joints = [f"joint.{c}" for c in chains]
+    state = row("q", Q, STATE[0]) | row("q1", Q, STATE[1])
+    got = asked(fmus["joints", version], state, joints, "CoSimulation")
+    np.testing.assert_allclose(got, found.joint[0], rtol=0, atol=1e-12)
+    poses = [f"pose.{c}" for c in ("X", "Y", "Z", "alpha", "beta", "gamma")]
+    back = asked(fmus["pose", version], row("joint", chains, got), poses, "CoSimulation")
+    np.testing.assert_allclose(back, found.pose[0], rtol=0, atol=1e-10)

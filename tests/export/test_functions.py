@@ -125,6 +125,35 @@ def test_poses_from_encoders_follow_a_motion(jaw: Library) -> None:
     assert right != OK and jaw("pose", joint=joints[0] + 3.0)[0] in (UNREACHABLE, SINGULAR)
 
 
+def test_the_state_from_encoders_and_their_rates(jaw: Library) -> None:
+    """Joints and rates of a state give it back."""
+    q, q1 = np.array([[0.002, 0.001, 0.05, 0.02], [0.03, -0.02, 0.4, 0.3]])
+    status, found = jaw("joints", q=q, q1=q1)
+    assert status == OK
+    near = found["pose"] - 1e-3 * found["pose_rate"]
+    given = {"joint": found["joint"], "joint_rate": found["joint_rate"], "pose_before": near}
+    status, back = jaw("state", **given)
+    assert status == OK
+    np.testing.assert_allclose(back["q"], q, atol=1e-11)
+    np.testing.assert_allclose(back["q1"], q1, atol=1e-9)
+
+
+@pytest.mark.parametrize("question", ["contact", "forward"])
+def test_derivatives_are_differences(jaw: Library, question: str) -> None:
+    rng = np.random.default_rng(8)
+    sizes = {a.name: a.size for a in jaw.exported[question].inputs}
+    at = {name: 0.002 * rng.normal(size=n) for name, n in sizes.items()}
+    way = {name: rng.normal(size=n) for name, n in sizes.items()}
+    status, slope = jaw(f"{question}_derivative", **at, **{f"d_{k}": v for k, v in way.items()})
+    assert status == OK
+    h = 1e-6
+    ends = [jaw(question, **{k: at[k] + s * h * way[k] for k in at})[1] for s in (1, -1)]
+    for name in ends[0]:
+        found = (ends[0][name] - ends[1][name]) / (2 * h)
+        scale = np.abs(found).max()
+        np.testing.assert_allclose(slope[f"d_{name}"], found, rtol=0, atol=1e-6 * scale)
+
+
 def test_turning_joints_may_count_whole_turns(jaw: Library) -> None:
     assert jaw("pose", joint=2 * np.pi * np.arange(-3, 3))[0] == OK
 

@@ -46,8 +46,8 @@ def c(
         coordinates: Coordinates given to closure, such as X,Y,Z,alpha.
         out: Folder for source, header, example and tests.
         question: What to export; repeat for more: inverse, contact (with contact forces), bounded
-            (within limits), forward (accelerations), motion, closure, pose and observer (from
-            encoders), and controllers: computed_torque, impedance, joint_pd, bite_force. Default:
+            (within limits), forward (accelerations), motion, closure, joints, pose, observer and
+            state (from encoders), NAME_derivative, and controllers: computed_torque, impedance, joint_pd, bite_force. Default:
             inverse, contact, forward, motion, pose, computed_torque, and closure with --from or
             --landmark.
         landmark: Platform point whose path is given to closure.
@@ -93,7 +93,8 @@ def fmu(
     is a C compiler.
 
     Options:
-        kind: Unit to export; repeat for more: plant, inverse, controller, bounded. Default: the
+        kind: Unit to export; repeat for more: plant, inverse, controller, bounded,
+            pose, joints. Default: the
             first three.
         out: Folder for the files.
         fmi: Version of the standard: 2 or 3.

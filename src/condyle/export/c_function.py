@@ -220,10 +220,9 @@ def function(c: Context, name: str, entry: Entry, wish: Wish) -> Body:
     program = _pruned(found.robust or found.main, results)
     given = renamed(entry.given or " ".join(_used(program)))
     if entry.tangent:
-        checks, of = program.checks, results
-        program = replace(derivative(program, set(given), set(of)), checks=checks)
+        program = tangent(program, given, results)
         given |= {PREFIX + port: PREFIX + own for port, own in given.items()}
-        results = {PREFIX + result: PREFIX + own for result, own in of.items()}
+        results = {PREFIX + result: PREFIX + own for result, own in results.items()}
     arguments = tuple(_arguments(c, entry, program, given, results))
     context = [f"const {c.prefix}_constants *constants"] * c.struct
     parameters = ", ".join([*context, *(a.declared(c.precision) for a in arguments)])
@@ -255,6 +254,11 @@ def function(c: Context, name: str, entry: Entry, wish: Wish) -> Body:
 }}
 """
     return Body(made, code, wide, dispatch)
+
+
+def tangent(program: Program, given: Mapping[str, str], results: Mapping[str, str]) -> Program:
+    """The derivative of some results along all that is given, with the question's checks."""
+    return replace(derivative(program, set(given), set(results)), checks=program.checks)
 
 
 def _pruned(program: Program, results: Mapping[str, str]) -> Program:

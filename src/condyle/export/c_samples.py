@@ -7,14 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..backends.kernel import AGAIN
+from ..backends.kernel import AGAIN, Kernel
+from ..backends.numpy_kernel import NumpyKernel
+from ..graph.program import Variants
 from ..model.closing import Closure
 from ..model.model import Model
+from ..questions import Question
+from ..questions.derivative import PREFIX
+from ..questions.numbers import Layout
 from ..questions.structure import structure_of
 from ..status import Status
 from .c_context import CODES
-from .c_function import own_numbers, renamed
-from .catalogue import Wish, least_norm, require_question
+from .c_function import own_numbers, renamed, tangent
+from .catalogue import Entry, Wish, least_norm, require_question
 from .exported import Exported, Function
 
 Arrays = dict[str, np.ndarray]
@@ -53,8 +58,7 @@ class Reference:
 def _graph(r: Reference, question: str, given: Given) -> tuple[Arrays, np.ndarray]:
     """By numpy's kernel of the same question."""
     entry = require_question(question)
-    kernel = r.model.kernel(entry.question or question, *entry.details(r.wish))
-    names = renamed(entry.given)
+    kernel, names = _kernel(r, question, entry)
     ports, known = {}, own_numbers(r.model.mechanism)
     for port in kernel.interface.ports:
         size = port.size * (kernel.interface.lanes if port.lanes else 1)
@@ -67,11 +71,27 @@ def _graph(r: Reference, question: str, given: Given) -> tuple[Arrays, np.ndarra
     found = kernel.run(ports)
     results = {
         name: found.values[result].reshape(-1, len(found.status)).T
-        for result, name in renamed(entry.results).items()
+        for result, name in _along(entry, renamed(entry.results)).items()
         if result in found.values
     }
     unsure = CODES[entry.unsure(structure_of(r.model.mechanism))]
     return results, np.where(found.status == AGAIN, unsure, found.status)
+
+
+def _kernel(r: Reference, question: str, entry: Entry) -> tuple[Kernel, dict[str, str]]:
+    """The kernel, and its ports' names in C where not all are their own."""
+    names = renamed(entry.given)
+    if not entry.tangent:
+        return r.model.kernel(entry.question or question, *entry.details(r.wish)), names
+    structure = structure_of(r.model.mechanism, r.model.formulation, r.model.route)
+    numbers = Layout.of(structure).numbers(r.model.mechanism)
+    found = Question.about(structure, entry.question, *entry.details(r.wish)).variants()
+    program = tangent(found.robust or found.main, names, renamed(entry.results))
+    return NumpyKernel(Variants(program), numbers), names | _along(entry, names)
+
+
+def _along(entry: Entry, names: dict[str, str]) -> dict[str, str]:
+    return {PREFIX + a: PREFIX + b for a, b in names.items()} if entry.tangent else names
 
 
 def _load(given: Given) -> tuple[np.ndarray, np.ndarray]:
@@ -202,7 +222,8 @@ class Samples:
             return 0.98 * self._near.pose
         if name in ("start", "pose_rate_before", "memory_before"):
             return np.zeros(shape)
-        low = -1.0 if name in SIGNED or "rate" in name else 0.0
+        signed = name in SIGNED or "rate" in name or name.startswith(PREFIX)
+        low = -1.0 if signed else 0.0
         return rng.uniform(low, 1.0, shape) * SIZES.get(name, 1.0)
 
     def _prescribed(self, name: str, f: Function) -> np.ndarray:

@@ -15,6 +15,7 @@ from ..model.distributing import LEAST
 from ..questions.allocation import TERMS
 from ..questions.law import CONTROLLERS, ControllerTable
 from ..questions.law.computed_torque import ComputedTorque
+from ..questions.observer import EXACT
 from ..questions.observer import ITERATIONS as OBSERVER_STEPS
 from ..questions.structure import Structure
 
@@ -156,6 +157,22 @@ CATALOGUE: dict[str, Entry] = {
             "smoothing": ("weight of the previous rates, 0 to below 1", "1"),
         },
     ),
+    "state": Entry(
+        "State from encoders and their rates (tachometers): pose, q and q1.",
+        "joint joint_rate pose_before",
+        "q q1 pose pose_rate",
+        question="observer",
+        details=lambda wish: (EXACT,),
+        doubt="UNREACHABLE",
+        steps=OBSERVER_STEPS,
+    ),
+    "joints": Entry(
+        "Joint coordinates and their rates, and the pose, from the independent coordinates.",
+        "q q1",
+        "joint joint_rate pose pose_rate",
+        question="instant",
+        doubt="UNREACHABLE",
+    ),
     "computed_torque": Entry(
         "Controller: efforts that follow a desired motion, by "
         "q'' = q2_d + kd (q1_d - q1) + kp (q_d - q).",
@@ -180,7 +197,8 @@ def require_question(name: str) -> Entry:
     """Raises InputError for an unknown question."""
     if name in CATALOGUE:
         return CATALOGUE[name]
-    if (base := CATALOGUE.get(name.removesuffix(TANGENT))) is not None:
+    base = CATALOGUE.get(name.removesuffix(TANGENT))
+    if base is not None and not base.steps:
         text = f"Derivative along a direction of all arguments of: {base.text}"
         question = base.question or name.removesuffix(TANGENT)
         return replace(base, text=text, question=question, quick=False, tangent=True)

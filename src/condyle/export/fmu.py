@@ -58,7 +58,7 @@ def export_fmu(
 
     Args:   model: a model, a mechanism, its file, or the name of a bundled one.
             path: a folder for NAME-KIND.fmu; or, for one kind, a file that ends in .fmu.
-            kind: plant, inverse, controller, bounded; one or several.
+            kind: plant, inverse, controller, bounded, pose, joints; one or several.
             fmi: version of the standard: 2 or 3.
     Returns: the files. Its `data` says whether they hold a binary.
     Raises: InputError: for another kind or version, or a file that cannot be written;

@@ -1,7 +1,8 @@
 """What an FMU is of a mechanism, in C: its variables, and how they follow from each other.
 
-Four kinds: the `plant` (efforts and a load in, motion out), the `inverse` model (a motion in,
-efforts out), `bounded`, the same within limits, and the `controller` (computed torque). Every array
+Six kinds: the `plant` (efforts and a load in, motion out), the `inverse` model (a motion in,
+efforts out), `bounded`, the same within limits, the `controller`
+(computed torque), `pose` (encoders in) and `joints` (independent coordinates in). Every array
 of the exported functions is a row of scalar variables, called as array and label:
 `effort.masseter_left`, `q.X`.
 """
@@ -28,16 +29,20 @@ KINDS = {
     "inverse": ("contact",),
     "controller": ("computed_torque",),
     "bounded": ("bounded",),
+    "pose": ("pose",),
+    "joints": ("joints",),
 }
 TEXTS = {
     "plant": "Forward dynamics: efforts and a load in, motion and contact forces out",
     "inverse": "Inverse dynamics: a motion and a load in, efforts and contact forces out",
     "controller": "Computed torque: desired and measured motion in, efforts out",
     "bounded": "Inverse dynamics within limits: a motion and a load in, efforts and forces out",
+    "pose": "Forward kinematics: joint coordinates in, the pose out",
+    "joints": "Inverse kinematics: independent coordinates in, joints and the pose out",
 }
-ROUGH = ("bounded",)  # kinds without derivatives
+ROUGH = ("bounded", "pose")  # kinds without derivatives
 STATES, RATES = ("q", "q1"), ("dq", "acceleration")
-PARAMETERS = ("point", "kp", "kd")
+PARAMETERS = ("point", "kp", "kd", "start")
 STARTS = {"kp": 400.0, "kd": 40.0}
 TOLERANCE = 1e-9  # of a step of the plant, relative and absolute
 CODES = ", ".join(f"{code:d} {name.replace('_', ' ').lower()}" for name, code in C_CODES.items())
