@@ -47,9 +47,9 @@ def c(
         out: Folder for source, header, example and tests.
         question: What to export; repeat for more: inverse, contact (with contact forces), bounded
             (within limits), forward (accelerations), motion, closure, joints, pose, observer and
-            state (from encoders), NAME_derivative, and controllers: computed_torque, impedance, joint_pd, bite_force. Default:
-            inverse, contact, forward, motion, pose, computed_torque, and closure with --from or
-            --landmark.
+            state (from encoders), NAME_derivative, and controllers: computed_torque, impedance,
+            joint_pd, bite_force. Default: inverse, contact, forward, motion, pose,
+            computed_torque, and closure with --from or --landmark.
         landmark: Platform point whose path is given to closure.
         precision: double, or float for single-precision processors.
         constants: inside: compiled in; struct: in a structure that the program fills at run time.
