@@ -231,7 +231,7 @@ DOORS: dict[str, Door] = {
     ),
     "workspace_size": Door(
         {"map": lambda stage: stage.map, "margin": 1e-3, "model": lambda stage: stage.model},
-        calls=60,
+        calls=30,
         words=FILES,
         long=("model",),
     ),
@@ -256,10 +256,10 @@ DOORS: dict[str, Door] = {
         TO_FOLDER
         | {"question": "inverse", "coordinates": (), "landmark": None, "precision": "double"}
         | {"constants": "inside", "prefix": None, "lanes": 8, "formulation": None, "route": None},
-        calls=100,
+        calls=40,
         words=FILES,
     ),
-    "export_fmu": Door(TO_FOLDER | {"kind": "plant", "fmi": 3}, calls=100, words=FILES),
+    "export_fmu": Door(TO_FOLDER | {"kind": "inverse", "fmi": 3}, calls=10, words=FILES),
     "export_matlab": Door(TO_FOLDER | {"question": "inverse"}, calls=60, words=FILES),
     "export_mjcf": Door(TO_FOLDER | {"path": "out/machine.xml"}, calls=60, words=FILES),
     "solve_states": Door(ROWWISE | {"reactions": False, "mat": None}, calls=60, words=FILES),
@@ -275,7 +275,7 @@ DOORS: dict[str, Door] = {
     "write_report": Door(
         {"solution": lambda stage: stage.solution, "path": "out.html", "tables": None}
         | {"files": None, "measured": None, "sweep": None},
-        calls=60,
+        calls=30,
         words=FILES,
     ),
     "new_mechanism": Door(
@@ -298,6 +298,7 @@ DOORS: dict[str, Door] = {
             "scenario": {"controller": {"kind": "joint_pd", "stiffness": 5.0, "damping": 0.01}},
         },
         words=("mechanism", "controller"),
+        calls=60,
         long=("scenario", "model"),
     ),
     "load_scenario": Door(
