@@ -27,7 +27,7 @@ FMUS = ("plant", "inverse", "controller", "bounded")
 STYLES = ("screen", "journal", "journal-wide")
 EXPORTS = (
     *("inverse", "contact", "bounded", "forward"),
-    *("motion", "closure", "pose", "observer"),
+    *("motion", "closure", "pose", "observer", "state", "joints"),
     *("computed_torque", "impedance", "joint_pd", "bite_force"),
 )
 UNITS = ("m,rad", "m,deg", "mm,rad", "mm,deg", "cm,rad", "cm,deg")
