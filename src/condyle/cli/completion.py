@@ -23,7 +23,7 @@ DISTRIBUTIONS = {  # name -> objective, and constraints
     "minimax": "largest effort over its limit, then weighted",
 }
 BACKENDS = ("auto", "compiled", "numpy")
-FMUS = ("plant", "inverse", "controller", "bounded")
+FMUS = ("plant", "inverse", "controller", "bounded", "pose", "joints")
 STYLES = ("screen", "journal", "journal-wide")
 EXPORTS = (
     *("inverse", "contact", "bounded", "forward"),
