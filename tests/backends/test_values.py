@@ -156,7 +156,7 @@ def test_whole_answers(name: str) -> None:
     truth = results_of(variants.main.interface, columns.T, numpy.system.numbers.order)
     for name, right in truth.items():
         for values in (got.values, reference.values):
-            if name in ("bound", "data_error"):  # counts what rounding leaves of the contacts: noise
+            if name in ("bound", "data_error"):  # what rounding leaves is in it
                 np.testing.assert_array_less(abs(np.log10(values[name] / right)), 1.5)
                 continue
             assert error(values[name], right) < TOLERANCE, name

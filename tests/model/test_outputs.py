@@ -56,7 +56,7 @@ def test_what_is_asked_for_is_what_all_says(backend: str) -> None:
         found = model.inverse_dynamics(*c.arguments, outputs=(output,))
         assert set(vars(found)) == {*ALWAYS, output}
         for name in set(vars(found)) - {"configuration"}:
-            if name == "bound":  # it counts what rounding leaves of the contacts' equations: noise
+            if name == "bound":  # what rounding leaves is in it
                 np.testing.assert_array_less(abs(np.log10(found.bound / whole.bound)), 1.5)
                 continue
             assert error(getattr(found, name), getattr(whole, name)) < 1e-9, name
