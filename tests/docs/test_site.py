@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.ci  # the site takes a minute; what its pages run, test_docs runs too
+
 ROOT = Path(__file__).parents[2]
 # What sticks out of its box, in a page of the site.
 CUT = """() => [...document.querySelectorAll(".md-content .formula, .md-content math, .structure")]

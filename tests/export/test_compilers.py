@@ -130,6 +130,7 @@ def test_the_example(folder: Folders) -> None:
     assert [line.split(":")[0].removeprefix("effort ") for line in told] == list(effort.labels)
 
 
+@pytest.mark.ci
 def test_facts_are_measured_wherever_the_folder_is(
     folder: Folders, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -49,7 +49,7 @@ def test_what_stands_for_a_mechanism(door: Callable[..., Any], tmp_path: Path) -
         (3, "x", "mechanism: expected a mechanism, a model, .*got int"),
         (None, "x", "mechanism: .*NoneType"),
         ("gough-stuart", "x", "gough-stewart"),
-        ("gough-stewart", 3, "path: expected a folder, got 3"),
+        ("gough-stewart", 3, "path: expected (a folder|the path of a file or folder), got 3"),
         ("gough-stewart", "taken", "taken: cannot be made a folder"),
     ],
 )

@@ -160,7 +160,7 @@ def test_replace_looks_at_home(reference: Mechanism) -> None:
     up = left.model_copy(update={"point": (*left.point[:2], left.point[2] + 1e-3)})
     with pytest.raises(MechanismError, match=r'contact "left_condyle": the point is \+0\.67'):
         reference.replace(contacts=(up, right))
-    with pytest.raises(ValueError, match="mm off the surface"):
+    with pytest.raises(MechanismError, match="mm off the surface"):
         Mechanism(**{**reference.entries(), "contact": (up, right)})
     again = right.model_copy(update={"name": "again"})
     with pytest.raises(MechanismError, match="cannot hold the platform"):

@@ -317,12 +317,12 @@ def test_loads_and_the_plant(mode: int) -> None:
     assert (rate[:, 2 * M + 2 :] == 0).all()  # nothing rubs here
     close(found["contact_force"], moved_by.contact_force)
     close(found["too_fast"], np.abs(s["joint_rate"]) - 1.0)
-    on = found["guards"][:, 1:] != -1.0
+    on = found["guards"][:, 6:] != -1.0
     assert (on.sum(axis=1) == len(guards[0])).all()
-    np.testing.assert_allclose(found["guards"][:, 1:][on].reshape(N, -1), guards, atol=1e-9)
+    np.testing.assert_allclose(found["guards"][:, 6:][on].reshape(N, -1), guards, atol=1e-9)
     at = jaw().poses.configuration(pose_of(s["q"])).contact_point[:, 0]
-    beyond = np.max([-end - at[:, 0], at[:, 0] - end, -end - at[:, 1], at[:, 2] - end], axis=0)
-    np.testing.assert_allclose(found["guards"][:, 0], beyond, atol=1e-12)
+    faces = np.hstack([ports["bounds"][:, :3] - at, at - ports["bounds"][:, 3:]])
+    np.testing.assert_allclose(found["guards"][:, :6], faces, atol=1e-12)
     jumps = [jump.mode for jump in loads[1].jumps]
     assert jumps == [TOUCHING, APART, APART, BROKEN, BROKEN]
 

@@ -321,6 +321,7 @@ def test_a_file_is_read_piece_by_piece(long_run: xr.Dataset, tmp_path: Path) -> 
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bad.nc", "long.nc", "pieces.html"]
 
 
+@pytest.mark.ci
 def test_memory_does_not_grow_with_the_run(solution: xr.Dataset, tmp_path: Path) -> None:
     """Twice the samples, as much memory: of Python's and numpy's objects, at its largest."""
     peaks = []
