@@ -262,7 +262,9 @@ DOORS: dict[str, Door] = {
     "export_fmu": Door(TO_FOLDER | {"kind": "inverse", "fmi": 3}, calls=10, words=FILES),
     "export_matlab": Door(TO_FOLDER | {"question": "inverse"}, calls=60, words=FILES),
     "export_mjcf": Door(TO_FOLDER | {"path": "out/machine.xml"}, calls=60, words=FILES),
-    "solve_states": Door(ROWWISE | {"reactions": False, "mat": None}, calls=60, words=FILES),
+    "solve_states": Door(
+        ROWWISE | {"reactions": False, "mat": None, "noise": {"X": 1e-5}}, calls=60, words=FILES
+    ),
     "forward_states": Door(
         ROWWISE | {"states": lambda stage: stage.file("states.csv", EFFORTS)}, calls=60, words=FILES
     ),

@@ -23,6 +23,7 @@ def solve(
     mat: options.Mat = False,
     flag: options.Flag = False,
     max_error: options.MaxError = None,
+    noise: str | None = None,
 ) -> Answer:
     """Inverse dynamics of independent states, one per row.
 
@@ -33,6 +34,8 @@ def solve(
             (rad), their rates dX ... (per s) and accelerations ddX ... (per s^2; at rest without
             both), and, if any, Fx, Fy, Fz (N), Mx, My, Mz (N m).
         out: File for the results (.csv or .parquet).
+        noise: Standard deviations of columns of states, "X=0.01 mm,dX=1 mm/s": those of the efforts
+            are written too, as sd_tau_CHAIN.
     """
     import condyle
 
@@ -47,6 +50,7 @@ def solve(
         threads=model.threads,
         mat=out.with_suffix(".mat") if mat else None,
         max_error=max_error,
+        noise=noise,
     )
     warn(solved.data["warnings"])
     return Answer(str(solved), solved.data, command_line("view", mechanism))

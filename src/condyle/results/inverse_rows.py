@@ -16,11 +16,13 @@ from ..model.joint_reactions import reactions as joint_reactions
 from ..model.model import Model
 from ..model.model_result import require_ok
 from ..motion import Table
+from ..motion.written_values import Values
 from .accuracy import max_error_of, require_accuracy
 from .contacts import AXES, contact_loss_columns
 from .derived import Derived
 from .failed_samples import status_columns
 from .mat_file import table_variables, write_mat
+from .noise import deviation_columns, deviations_of
 from .state_rows import Columns, StateColumns, StatesReport
 from .summary import peak
 from .variables import VARIABLES, WRENCH, labels_of, variable_columns
@@ -44,6 +46,7 @@ def solve_states(
     threads: int | None = None,
     mat: str | Path | None = None,
     max_error: float | None = None,
+    noise: Values | None = None,
 ) -> StatesReport:
     """Inverse dynamics of independent states, one per row; the output is complete or absent.
 
@@ -60,12 +63,15 @@ def solve_states(
              threads: maximum number of threads; the file does not depend on it.
              max_error: largest bound of the relative error that is accepted; with it there is a
              column bound.
+             noise: standard deviations of independent coordinates, their rates and accelerations,
+             "X=0.01 mm,dX=1 mm/s" or by name in SI: columns sd_tau_<chain> too.
              mat: file for MATLAB to write as well; it takes the memory of the whole table.
     Raises:  InputError, SampleError, WarningError: nothing is written then.
     """
     model, max_error = as_model(model), max_error_of(max_error)
     if mat is not None and Path(as_path(mat, "mat")) == Path(as_path(out, "out")):
         raise InputError(f"--out {out}: --mat writes that file; give the table another name")
+    deviations = None if noise is None else deviations_of(model, noise)
     watch = Watch(model.mechanism, rows=True)
     greatest: dict[str, Any] | None = None  # effort over its limit
     kept: list[Columns] = []
@@ -73,7 +79,7 @@ def solve_states(
     def solved(table: Table, first_row: int) -> Columns:
         nonlocal greatest
         columns, derived = solve_table(
-            model, table, load_point, flag, first_row, reactions, threads
+            model, table, load_point, flag, first_row, reactions, threads, deviations
         )
         if max_error is not None:
             columns["bound"] = derived.evaluation.bound
@@ -129,6 +135,7 @@ def solve_table(
     first_row: int,
     reactions: bool = False,
     threads: int | None = None,
+    deviations: np.ndarray | None = None,
 ) -> tuple[Columns, Derived]:
     """Output columns for the rows of one table, and what follows from its evaluation."""
     given, mechanism = state_columns(model), model.mechanism
@@ -138,6 +145,11 @@ def solve_table(
         raise InputError(
             f"{table.source}: {', '.join(idle)} would not be used: the state is given by "
             f"{', '.join(names)}, their rates and accelerations. Remove the other columns"
+        )
+    if deviations is not None and {*names} != {*model.independent}:
+        raise InputError(
+            f"noise: {table.source} gives {', '.join(names)}; with noise states are given by "
+            f"{', '.join(model.independent)}"
         )
     states = given.states(table, names, threads)
     wrench, at = given.loads(table, load_point)
@@ -156,6 +168,8 @@ def solve_table(
         for name, reaction in joint_reactions(model, evaluation).items():
             array = np.where(derived.ok[:, None], reaction.array, np.nan)
             columns |= {f"reaction_{name}_{axis}": array[:, i] for i, axis in enumerate(AXES)}
+    if deviations is not None:
+        columns |= deviation_columns(model, derived, deviations, states, wrench, at)
     columns |= contact_loss_columns(mechanism, derived.contact_loss)
     if flag:
         shortfall = derived.shortfall if derived.limited else None

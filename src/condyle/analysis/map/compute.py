@@ -22,11 +22,12 @@ from ...model.model import Model
 from ...motion import resolve_load_point
 from ...motion.column_units import FORCE, MOMENT
 from ...motion.memory import memory_at_hand
+from ...motion.written_values import Values, number, values_of
 from ...progress import step
 from ...results.solution import Results
 from ...version import __version__
 from ..workers import check_scheduler, run_parts
-from .axes import Grid, Over, Values, grid_of, number, values_of
+from .axes import Grid, Over, grid_of
 from .block import Block, Setup
 from .map_quantities import Quantity, chosen, variables
 from .reach import Reach, Strokes

@@ -20,8 +20,8 @@ from ...mechanism.mechanism import Mechanism
 from ...model.model import Model
 from ...model.surveying import Survey
 from ...motion.column_units import unit_factor
+from ...motion.written_values import number, parsed
 from ...status import Status
-from .axes import number, parsed
 
 Strokes = Collection[str] | Mapping[str, tuple[float, float]]
 

@@ -1,0 +1,72 @@
+"""Values by name, as text with units: `Y=1 mm,alpha=2 deg`."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+
+from ..errors import InputError, did_you_mean, shown
+from .column_units import dimension, unit_factor
+
+_TEXT = re.compile(r"\s*(\S+?)\s*=\s*([^:\s]+(?:\s*:\s*[^:\s]+)*)\s*(.*?)\s*")
+
+Values = str | Mapping[str, float]
+
+
+def parsed(text: str, form: str, example: str) -> tuple[str, list[str], str]:
+    """Name, numbers and unit of text such as `X=-5:5:200 mm`.
+
+    Args: form: what is expected, with as many numbers, as in "name=low:high:count unit".
+    """
+    found = _TEXT.fullmatch(text)
+    numbers = re.split(r"\s*:\s*", found[2]) if found else []
+    if found is None or len(numbers) != form.count(":") + 1:
+        raise InputError(f'"{text.strip()}": expected {form}, as in "{example}"')
+    return found[1], numbers, found[3]
+
+
+def values_of(given: Values, known: Sequence[str], argument: str) -> dict[str, float]:
+    """`Y=0 mm,alpha=0 deg` by name, in SI.
+
+    Raises: InputError: for a name that is not known, one that stands twice, or no number.
+    """
+    if isinstance(given, Mapping):
+        pairs = [(name, number(value, f"{name}={value}")) for name, value in given.items()]
+    elif not isinstance(given, str):
+        raise InputError(
+            f"{argument}: expected text such as Y=1 mm, or numbers by name, got {shown(given)}"
+        )
+    else:
+        pairs = []
+        for part in given.split(",") if given.strip() else []:
+            name, (value,), unit = parsed(part, "name=value unit", "Y=1 mm")
+            pairs.append((name, number(value, part) * scale_of(name, unit, part)))
+    for name in (names := [name for name, _ in pairs]):
+        if name not in known:
+            raise InputError(f'{argument}: there is no "{name}".{did_you_mean(name, known)}')
+        if names.count(name) > 1:
+            raise InputError(f"{argument}: {name} is given twice")
+    return dict(pairs)
+
+
+def number(given: object, where: str) -> float:
+    """A finite number."""
+    try:
+        value = float(given)  # type: ignore[arg-type]
+    except Exception:  # of objects
+        raise InputError(f'"{where.strip()}": {shown(given)} is not a number') from None
+    if not math.isfinite(value):
+        raise InputError(f'"{where.strip()}": expected a finite number, got {given}')
+    return value
+
+
+def scale_of(name: str, unit: str, text: str) -> float:
+    """Factor to SI of the unit of a column's name; 1 without a unit."""
+    kind = dimension(name)
+    if not unit or kind is None:  # an unknown name is told of later, with what there is
+        return 1.0
+    try:
+        return unit_factor(unit, kind)
+    except InputError as error:
+        raise InputError(f'"{text.strip()}": {error}') from None

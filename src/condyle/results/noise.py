@@ -1,0 +1,52 @@
+"""Standard deviations of efforts from those of the states that they are computed for."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import InputError
+from ..model.effort_derivatives import effort_derivatives
+from ..model.model import Model
+from ..model.poses import States
+from ..motion.written_values import Values, values_of
+from .derived import Derived
+from .state_rows import Columns
+
+RATES = ("", "d", "dd")
+
+
+def deviations_of(model: Model, noise: Values) -> np.ndarray:
+    """Standard deviations of q, q', q'', (3 m,) [SI], from "X=0.01 mm,dX=1 mm/s" or by name.
+
+    Raises: InputError: for what is no column of a state, no positive number, and for models whose
+            efforts are not of least norm without friction.
+    """
+    if model.system.structure.friction or model.distribution.name != "minimum_norm":
+        raise InputError(
+            "noise: efforts with friction or within limits have kinks in the state, where they "
+            'have no derivatives; use distribution "minimum_norm" and contacts without friction'
+        )
+    names = [prefix + name for prefix in RATES for name in model.independent]
+    given = values_of(noise, names, "noise")
+    if not given:
+        raise InputError(f"noise: expected at least one of {', '.join(names)}, as in X=0.01 mm")
+    for name, value in given.items():
+        if value <= 0:
+            raise InputError(f"noise: {name}: expected a positive number, got {value:g}")
+    return np.array([given.get(name, 0.0) for name in names])
+
+
+def deviation_columns(
+    model: Model,
+    derived: Derived,
+    deviations: np.ndarray,
+    state: States,
+    wrench: np.ndarray,
+    at: str | None,
+) -> Columns:
+    """Columns sd_tau_<chain>: sqrt(sum (d tau / d x_i)^2 s_i^2), NaN where a row has no efforts."""
+    found = np.full((len(derived.ok), len(model.mechanism.chains)), np.nan)
+    if (good := np.flatnonzero(derived.ok)).size:
+        by = effort_derivatives(model, tuple(a[good] for a in state), wrench[good], at)
+        found[good] = np.sqrt(((by * deviations) ** 2).sum(axis=-1))
+    return {f"sd_tau_{c}": found[:, i] for i, c in enumerate(model.mechanism.chain_names)}

@@ -1,0 +1,71 @@
+"""Standard deviations of efforts from those of states, against differences of inverse dynamics."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.errors import InputError
+
+
+def solved(model: Any, rows: np.ndarray, noise: Any, folder: Path, **how: Any) -> np.ndarray:
+    """Columns sd_tau_<chain>, (N, n)."""
+    names = [prefix + name for prefix in ("", "d", "dd") for name in model.independent]
+    states, out = folder / "states.csv", folder / "out.csv"
+    np.savetxt(states, rows, "%.17g", ",", header=",".join(names), comments="")
+    condyle.solve_states(model, states, out, noise=noise, **how)
+    head = out.read_text().splitlines()[0].split(",")
+    chosen = [head.index(f"sd_tau_{c}") for c in model.mechanism.chain_names]
+    return np.genfromtxt(out, delimiter=",", skip_header=1, usecols=chosen)
+
+
+@pytest.mark.parametrize("name", ["masticatory", "gough-stewart"])
+def test_against_differences(name: str, tmp_path: Path) -> None:
+    model = condyle.derive(name, backend="numpy")
+    m = len(model.independent)
+    rng = np.random.default_rng(3)
+    rows = rng.normal(size=(3, 3 * m)) * np.repeat([1e-3, 0.1, 1.0], m)
+    names = [prefix + one for prefix in ("", "d", "dd") for one in model.independent]
+    deviations = rng.uniform(1e-6, 1e-4, 3 * m)
+    square = 0.0
+    for i, (s, step) in enumerate(zip(deviations, np.repeat([1e-6, 1e-3, 1e-2], m), strict=True)):
+        e = np.eye(3 * m)[i] * step
+        ends = [model.inverse_dynamics(*np.split(r, 3, 1)).effort for r in (rows + e, rows - e)]
+        square = square + ((ends[0] - ends[1]) / (2 * step) * s) ** 2
+    found = solved(model, rows, dict(zip(names, deviations, strict=True)), tmp_path)
+    np.testing.assert_allclose(found, np.sqrt(square), rtol=1e-6)
+
+
+def test_units_and_a_flagged_row(tmp_path: Path) -> None:
+    model = condyle.derive("masticatory", backend="numpy")
+    rows = np.zeros((2, 12))
+    rows[1, 0] = 10.0
+    found = solved(model, rows, "X=0.01 mm,ddalpha=2 deg/s^2", tmp_path, flag=True)
+    same = solved(model, rows[:1], {"X": 1e-5, "ddalpha": np.radians(2)}, tmp_path)
+    np.testing.assert_allclose(found[0], same, rtol=1e-12)
+    assert (found[0] > 0).all() and np.isnan(found[1]).all()
+
+
+@pytest.mark.parametrize(
+    ("noise", "message"),
+    [
+        ("Q=1 mm", 'noise: there is no "Q"'),
+        ("X=1 deg", "is not a unit of length"),
+        ("X=-1 mm", "noise: X: expected a positive number, got -0.001"),
+        ("", "noise: expected at least one of X, Y"),
+    ],
+)
+def test_what_is_refused(noise: str, message: str, tmp_path: Path) -> None:
+    model = condyle.derive("masticatory", backend="numpy")
+    with pytest.raises(InputError, match=message):
+        solved(model, np.zeros((1, 12)), noise, tmp_path)
+
+
+def test_limits_are_refused(tmp_path: Path) -> None:
+    model = condyle.derive("masticatory", distribution="bounded", backend="numpy")
+    with pytest.raises(InputError, match="have kinks in the state"):
+        solved(model, np.zeros((1, 12)), "X=1 mm", tmp_path)
