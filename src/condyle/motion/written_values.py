@@ -32,7 +32,9 @@ def values_of(given: Values, known: Sequence[str], argument: str) -> dict[str, f
     Raises: InputError: for a name that is not known, one that stands twice, or no number.
     """
     if isinstance(given, Mapping):
-        pairs = [(name, number(value, f"{name}={value}")) for name, value in given.items()]
+        pairs = [
+            (name, number(value, f"{argument}: {name}={value}")) for name, value in given.items()
+        ]
     elif not isinstance(given, str):
         raise InputError(
             f"{argument}: expected text such as Y=1 mm, or numbers by name, got {shown(given)}"
