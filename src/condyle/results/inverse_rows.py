@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..atomic import replacing
-from ..errors import InputError, as_path
+from ..errors import InputError, as_flag, as_path
 from ..model.given import as_model
 from ..model.inverse_dynamics import SOLVED
 from ..model.joint_reactions import reactions as joint_reactions
@@ -69,6 +69,7 @@ def solve_states(
     Raises:  InputError, SampleError, WarningError: nothing is written then.
     """
     model, max_error = as_model(model), max_error_of(max_error)
+    flag, reactions = as_flag(flag, "flag"), as_flag(reactions, "reactions")
     if mat is not None and Path(as_path(mat, "mat")) == Path(as_path(out, "out")):
         raise InputError(f"--out {out}: --mat writes that file; give the table another name")
     deviations = None if noise is None else deviations_of(model, noise)

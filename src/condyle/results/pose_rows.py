@@ -13,6 +13,7 @@ from ..errors import (
     SampleError,
     UnreachableError,
     UnsupportedError,
+    as_flag,
 )
 from ..kinematics.chain import FAMILIES
 from ..mechanism.files import as_mechanism
@@ -81,7 +82,7 @@ def pose_states(
     Raises: UnreachableError, LostError, InconsistentError: for such a row without `flag`; nothing
             is written then.
     """
-    mechanism = as_mechanism(mechanism)
+    mechanism, every, flag = as_mechanism(mechanism), as_flag(every, "every"), as_flag(flag, "flag")
     if every and flag:
         raise UnsupportedError(
             "--all and --flag exclude each other: --all lists every pose of a row, if any"

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, WarningError
+from ..errors import InputError, WarningError, as_flag
 from ..mechanism.mechanism import COORDINATES
 from ..model.model import Model
 from ..model.poses import States
@@ -116,7 +116,7 @@ class StateColumns:
         Returns: number of rows, and warnings.
         Raises:  WarningError: for one, if `strict`.
         """
-        rows, said = 0, list[str]()
+        rows, said, strict = 0, list[str](), as_flag(strict, "strict")
         with TableWriter(out) as writer:
             for table in iter_table(source, CHUNK_ROWS, known=self.known(), doing="solving"):
                 writer.write(solved(table, rows))
