@@ -147,6 +147,31 @@ def test_a_foreign_stewart_platform(tmp_path: Path, carried: bool) -> None:
     )
 
 
+def test_what_is_left_out_is_named(tmp_path: Path) -> None:
+    path = stewart(tmp_path, carried=False)
+    lossy = '<joint damping="0.1" armature="0.02"/>'
+    text = path.read_text().replace('<joint damping="0"/>', lossy)
+    text = text.replace('<joint name="u0"', '<joint name="u0" stiffness="5" range="-40 40"')
+    path.write_text(text)
+    notes = from_mjcf(path, "six").notes
+    passive = ", ".join(f"u{i}, v{i}" for i in range(5))
+    for said in (
+        f"damping of joints that no actuator drives: left out, at {passive} and ",
+        f"armature of joints that no actuator drives: left out, at {passive} and ",
+        "springs of joints: left out, at u0",
+        "ranges of joints: left out, at u0",
+        "laws of actuators that are no plain motors: left out, at servo0, servo1,",
+    ):
+        assert any(note.startswith(said) for note in notes), (said, notes)
+
+
+@pytest.mark.parametrize("name", ["masticatory-curved"])
+def test_our_surfaces_without_an_equivalent_are_refused_in_words(name: str, tmp_path: Path) -> None:
+    condyle.export_mjcf(name, tmp_path / "m.xml")
+    with pytest.raises(UnsupportedError, match="take the mechanism's own file"):
+        from_mjcf(tmp_path / "m.xml", name)
+
+
 NOES = {
     "a weld": ({"CONNECTS": '<weld body1="bar1" body2="bar2"/>'}, "kind weld"),
     "open loops": ({"CONNECTS": '<connect site1="end1" site2="tool"/>'}, "open at home, by"),

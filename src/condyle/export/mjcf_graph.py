@@ -70,13 +70,15 @@ class Body:
 class Graph:
     """model: of MuJoCo;  data: at home;  edges: between rigid bodies, 0 is the world.
 
-    origin: of {S}, (3,);  notes: what a mechanism does not have of it.
+    origin: of {S}, (3,);  driven: joints that chains' actuators turn or move.
+    notes: what a mechanism does not have of it.
     """
 
     model: Any
     data: Any
     edges: list[Edge] = field(default_factory=list)
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    driven: set[int] = field(default_factory=set)
     notes: list[str] = field(default_factory=list)
 
     @property
@@ -151,7 +153,8 @@ def read_graph(path: str | Path) -> Graph:
         kinds = ", ".join(sorted(mujoco.mjtEq(t).name[5:].lower() for t in others))
         raise UnsupportedError(
             f"{path}: it has equality constraints of kind {kinds}; a mechanism file has loops "
-            "that `connect` closes, and nothing that stands for these"
+            "that `connect` closes, and nothing that stands for these. If condyle exported it, take "
+            "the mechanism's own file: only planes, cylinders and spheres come back"
         )
     data = mujoco.MjData(model)
     gaps = []

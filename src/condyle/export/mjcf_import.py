@@ -15,14 +15,14 @@ What holds the platform to the world directly is a free joint or the joints of a
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import UnsupportedError
+from ..errors import UnsupportedError, few
 from ..mechanism import Mechanism
 from ..mechanism.files import from_data
 from .mjcf_graph import WORLD, Graph, Step, read_graph, turned
@@ -74,6 +74,7 @@ def from_mjcf(path: str | Path, name: str) -> ImportResult:
         else:
             chains.append(_chain(graph, limb))
     chains += _cables(graph, platform)
+    _note_left_out(graph)
     if not chains:
         raise UnsupportedError(f"{path}: nothing drives its platform, {graph.name(platform)}")
     # As the actuators stand, so that controls are efforts in the same order.
@@ -86,6 +87,30 @@ def from_mjcf(path: str | Path, name: str) -> ImportResult:
         "chain": sorted(chains, key=lambda chain: order.get(chain["name"], len(order))),
     }
     return ImportResult(from_data(data, str(path)), tuple(graph.notes))
+
+
+def _note_left_out(graph: Graph) -> None:
+    """Numbers of joints and laws of actuators that a mechanism has no place for, by name."""
+    m = graph.model
+    joints = range(m.njnt)
+    passive = [j for j in joints if j not in graph.driven]
+
+    def of_joints(what: str, among: Iterable[int], has: Callable[[int], bool]) -> None:
+        if names := [m.joint(j).name or f"joint {j}" for j in among if has(j)]:
+            graph.note(f"{what}: left out, at {few(names)}")
+
+    for what, values in (
+        ("damping of joints that no actuator drives", m.dof_damping),
+        ("armature of joints that no actuator drives", m.dof_armature),
+        ("friction of joints that no actuator drives", m.dof_frictionloss),
+    ):
+        owners = {int(j) for j in m.dof_jntid[np.asarray(values).reshape(m.nv, -1)[:, 0] > 0]}
+        of_joints(what, passive, owners.__contains__)
+    of_joints("springs of joints", joints, lambda j: np.ravel(m.jnt_stiffness[j])[0] > 0)
+    of_joints("ranges of joints", joints, lambda j: bool(m.jnt_limited[j]))
+    servos = [i for i in range(m.nu) if m.actuator_biastype[i] or m.actuator_gaintype[i]]
+    if named := [m.actuator(i).name or f"actuator {i}" for i in servos]:
+        graph.note(f"laws of actuators that are no plain motors: left out, at {few(named)}")
 
 
 def _platform(graph: Graph, path: str | Path) -> int:
@@ -405,6 +430,7 @@ def actuator_of(graph: Graph, step: Step, sign: float, name: str) -> dict[str, A
     """The actuator of a driven joint; `sign`: of its coordinate against ours."""
     m = graph.model
     dof = int(m.jnt_dofadr[step.index])
+    graph.driven.add(step.index)
     table = _losses(m.dof_armature[dof], m.dof_damping[dof], m.dof_frictionloss[dof])
     drives = _drives(m, step.index, joint=True)
     if not drives:
