@@ -153,8 +153,8 @@ def read_graph(path: str | Path) -> Graph:
         kinds = ", ".join(sorted(mujoco.mjtEq(t).name[5:].lower() for t in others))
         raise UnsupportedError(
             f"{path}: it has equality constraints of kind {kinds}; a mechanism file has loops "
-            "that `connect` closes, and nothing that stands for these. If condyle exported it, take "
-            "the mechanism's own file: only planes, cylinders and spheres come back"
+            "that `connect` closes, and nothing that stands for these. If condyle exported it, "
+            "take the mechanism's own file: only planes, cylinders and spheres come back"
         )
     data = mujoco.MjData(model)
     gaps = []

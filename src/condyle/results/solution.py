@@ -330,8 +330,8 @@ def write_netcdf(dataset: xr.Dataset, path: Path) -> None:
     image = BytesIO()
     with h5netcdf.File(image, "w") as file:
         dataset.dump_to_store(xr.backends.H5NetCDFStore(file))
-    with image.getbuffer() as written:
-        path.write_bytes(written)
+    with image.getbuffer() as written, path.open("wb") as out:
+        out.write(written)
 
 
 # How a dataset is written, by the suffix of the file.
