@@ -63,7 +63,7 @@ STRANGE = {
     "another mechanism": (say("mechanism", "name = 3"), "expected"),
     "no variable": (lambda file: file.__delitem__("pose"), 'it has no "pose"'),
     "no time": (lambda file: file.__delitem__("time"), "time"),
-    "sizes that do not go together": (put("joint", 6, 5), "dimension"),
+    "sizes that do not go together": (put("joint", 6, 5), "dimension|is over"),
     "times that fall": (write("time", np.arange(6)[::-1]), "times that rise"),
     "a code nobody has": (write("status", 77), "codes beyond"),
     "other chains": (write("chain", "a"), '"chain" is along'),
