@@ -14,7 +14,7 @@ FEW_DIGITS = 1e-6  # bound of the relative error above which a warning says so
 def max_error_of(given: Any) -> float | None:
     """The largest bound that is accepted; None: any.
 
-    Raises: InputError: for what is no positive number.
+    Raises: InputError: for anything but a positive number.
     """
     if given is None:
         return None

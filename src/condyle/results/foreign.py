@@ -197,7 +197,7 @@ def _checked(found: xr.Dataset, kind: Kind) -> xr.Dataset:
         name = str(key)
         along = kind.labels(name)
         if name in result.coords and variable.dims != (along,):
-            raise InputError(f'"{name}" is no row along "{along}"')
+            raise InputError(f'"{name}": expected one value for each "{along}"')
         variable.attrs, variable.encoding = _about(name, variable.attrs), {}
     attributes = {"mechanism": found.attrs["mechanism"], "mechanism_name": machine.name}
     for name, check in {**COMMON, **kind.attributes}.items():
@@ -241,7 +241,7 @@ def _check_all_labels(found: xr.Dataset, machine: Mechanism) -> None:
         time = found["time"].values
         good = time.ndim == 1 and time.size and time.dtype.kind == "f" and np.isfinite(time).all()
         if not (good and (np.diff(time) >= 0).all()):
-            raise InputError('"time" is no row of times that rise')
+            raise InputError('"time": expected finite times that rise')
 
 
 def _independent(machine: Mechanism, found: xr.Dataset) -> tuple[str, ...]:

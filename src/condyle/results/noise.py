@@ -18,7 +18,7 @@ RATES = ("", "d", "dd")
 def deviations_of(model: Model, noise: Values) -> np.ndarray:
     """Standard deviations of q, q', q'', (3 m,) [SI], from "X=0.01 mm,dX=1 mm/s" or by name.
 
-    Raises: InputError: for what is no column of a state, no positive number, and for models whose
+    Raises: InputError: for unknown columns, for anything but positive numbers, and for models whose
             efforts are not of least norm without friction.
     """
     if model.system.structure.friction or model.distribution.name != "minimum_norm":

@@ -69,7 +69,7 @@ def _objection(dataset: xr.Dataset) -> str | None:
     for name in axes:
         values = dataset[name].values
         if len(values) < 2 or not np.isfinite(values).all() or not (np.diff(values) > 0).all():
-            return f'"{name}" is no row of values that rise'
+            return f'"{name}": expected finite values that rise'
     if not np.isfinite([*held.values()]).all():
         return "its held coordinates are not finite"
     sizes = {"load": 9, "stroke_low": len(machine.chains), "stroke_high": len(machine.chains)}
