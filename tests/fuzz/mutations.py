@@ -11,9 +11,11 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+import pytest
 import tomli_w
 from oracles.random_mechanism import SURFACES, random_mechanism, random_surface, toml_text
 
+from condyle.errors import CondyleError
 from condyle.mechanism import bundled_mechanisms, bundled_text
 from condyle.mechanism.library import starter_text
 
@@ -190,3 +192,11 @@ def _end(text: str, rng: random.Random) -> str:
 
 
 ACCIDENTS = (_number, _number, _number, _word, _word, _lines, _characters, _end)
+
+
+def said_in_words(error: Exception, seed: int) -> None:
+    """Fail unless an error is one of ours, of a length and letters that a terminal can show."""
+    if not isinstance(error, CondyleError):
+        pytest.fail(f"seed {seed}: {type(error).__name__}: {str(error)[:300]}")
+    message = str(error)
+    assert len(message) < 4000 and message.replace("\n", "").isprintable(), (seed, message)

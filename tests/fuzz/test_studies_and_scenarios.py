@@ -12,10 +12,9 @@ import pytest
 import condyle
 from condyle.analysis.sweep.job import prepared
 from condyle.analysis.sweep.study import read_study
-from condyle.errors import CondyleError
 from condyle.mechanism import Mechanism
 from condyle.simulation.scenario import scenario_from
-from fuzz.mutations import STRANGE, _places, hostile
+from fuzz.mutations import STRANGE, _places, hostile, said_in_words
 
 STUDY: dict[str, Any] = {
     "motion": {"file": "trial", "rate": 4.0},
@@ -97,11 +96,8 @@ def test_altered_tables(
     for seed in few_seeds:
         try:
             attempt(altered(original, random.Random(seed)), machine)
-        except CondyleError as error:
-            message = str(error)
-            assert len(message) < 4000 and message.replace("\n", "").isprintable(), (seed, message)
         except Exception as error:
-            pytest.fail(f"seed {seed}: {type(error).__name__}: {str(error)[:300]}")
+            said_in_words(error, seed)
         else:
             good += 1
     assert 0 < good < len(few_seeds)
