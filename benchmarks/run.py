@@ -23,6 +23,7 @@ from condyle.model.model import Model
 from condyle.progress import step
 
 from . import peers
+from .device import device_probes
 from .exported import PORTABLE, WIDE, exported_probes
 from .motion import SECOND, motion_rows
 from .own import (
@@ -123,6 +124,10 @@ def run_benchmark(seconds: float = 1.0) -> Benchmark:
         ]
         probes += limit_probes(load_mechanism(REFERENCE), load_mechanism("human-jaw"), unavailable)
         probes += simulation_probes(load_mechanism(REFERENCE))
+        try:
+            probes += device_probes(Model(REFERENCE, backend="numpy"))
+        except Exception as error:  # of CuPy's own kinds, where there is no device
+            unavailable["CUDA"] = str(error).partition("\n")[0]
         probes.append(Probe(OPERATION, timer.vector_operation, 0.0))
         rows = _timed(probes, rounds)
         with step("swinging for a second"):

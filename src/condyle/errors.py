@@ -131,8 +131,7 @@ class MissingExtraError(CondyleError):
         self.package, self.extra = package, extra
         super().__init__(
             f"this needs {package}, which is not installed.",
-            f'Install it: pip install "condyle[{extra}]", or all that is optional: '
-            'pip install "condyle[all]"',
+            f'Install it: pip install "condyle[{extra}]"',
         )
 
 

@@ -1,4 +1,4 @@
-"""Which backend runs a question: compiled where there is a compiler, else numpy."""
+"""Which backend runs a question: compiled where there is a compiler, else numpy; or cuda."""
 
 from __future__ import annotations
 
@@ -6,14 +6,16 @@ import os
 from collections.abc import Callable
 
 from ..errors import InputError, did_you_mean
+from ..extras import require
 from ..graph.program import Numbers, Variants
 from .c.compiled_kernel import CompiledKernel
 from .compiler import REMEDY, CompilerError, find_compiler
+from .cuda import CudaKernel
 from .kernel import Kernel
 from .notice import notice
 from .numpy_kernel import NumpyKernel
 
-BACKENDS = ("auto", "compiled", "numpy")
+BACKENDS = ("auto", "compiled", "numpy", "cuda")
 ALIASES = {"interpreted": "numpy"}  # an older name
 
 
@@ -25,6 +27,7 @@ class Backend:
 
         Raises: InputError:    for an unknown backend.
                 CompilerError: if compiled is asked for and there is no compiler.
+                MissingExtraError: if cuda is asked for without CuPy.
         """
         self.asked = name
         chosen = os.environ.get("CONDYLE_BACKEND") or "auto" if name == "auto" else name
@@ -32,7 +35,9 @@ class Backend:
         if chosen not in BACKENDS:
             raise InputError(f'no backend "{chosen}".{did_you_mean(chosen, BACKENDS)}')
         self.required = chosen == "compiled"
-        self.name = "numpy" if chosen == "numpy" else "compiled"
+        self.name = "compiled" if chosen == "auto" else chosen
+        if self.name == "cuda":
+            require("cupy", "cuda")
         if self.name == "compiled":
             try:
                 find_compiler()
@@ -49,6 +54,8 @@ class Backend:
                 return CompiledKernel(key, build, numbers)
             except CompilerError as error:
                 self._give_up(error)
+        if self.name == "cuda":
+            return CudaKernel(build(), numbers)
         return NumpyKernel(build(), numbers)
 
     def _give_up(self, error: CompilerError) -> None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -116,6 +116,30 @@ def columns_of(
         lanes = order if port.lanes else range(port.size)
         columns += [block[:, k] for block in blocks for k in lanes]
     return count, columns
+
+
+def column_steps(
+    interface: Interface,
+    given: Sequence[Any],
+    order: tuple[int, ...],
+    count: int,
+    address: Callable[[Any], int],
+) -> tuple[list[int], list[int]]:
+    """Where every input column starts, and the bytes from sample to sample, 0 for a constant.
+
+    Args: given: an array for every port, also of a device;  address: of an array.
+    """
+    starts: list[int] = []
+    steps: list[int] = []
+    for port, a in zip(interface.ports, given, strict=True):
+        first, (row, *within) = address(a), a.strides
+        lanes = order if port.lanes else range(port.size)
+        blocks = [first]
+        if port.lanes and port.size > 1:
+            blocks = [first + i * within[0] for i in range(port.size)]
+        starts += [block + k * within[-1] for block in blocks for k in lanes]
+        steps += [row if len(a) == count else 0] * (len(blocks) * len(lanes))
+    return starts, steps
 
 
 def _fitting(name: str, want: tuple[int, ...], given: object) -> np.ndarray:

@@ -22,7 +22,7 @@ DISTRIBUTIONS = {  # name -> objective, and constraints
     "cubic": "sum of cubes of effort over its limit, for muscles, which only pull",
     "minimax": "largest effort over its limit, then weighted",
 }
-BACKENDS = ("auto", "compiled", "numpy")
+BACKENDS = ("auto", "compiled", "numpy", "cuda")
 FMUS = ("plant", "inverse", "controller", "bounded", "pose", "joints")
 STYLES = ("screen", "journal", "journal-wide")
 EXPORTS = (

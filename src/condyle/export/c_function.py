@@ -12,8 +12,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from ..backends.c.printer import nested, number
-from ..backends.c.straight_line import Straight
+from ..backends.c.printer import nested
+from ..backends.c.straight_line import HUGE, Straight
+from ..backends.c.straight_line import Scalar as Plain
 from ..errors import UnsupportedError
 from ..graph.graph import Value
 from ..graph.program import Output, Program
@@ -22,11 +23,10 @@ from ..mechanism.mechanism import Mechanism
 from ..questions import Question
 from ..questions.derivative import PREFIX, derivative
 from ..questions.friction import MOST
-from .c_context import ANGLES, CODES, LARGEST, WHY, Body, Context, threshold
+from .c_context import ANGLES, CODES, LARGEST, WHY, Body, Context
 from .catalogue import Entry, Wish, least_norm
 from .exported import Argument, Function
 
-HUGE = {"double": 1e300, "float": 1e37}  # numbers of a program are kept within
 NAMES = {int(code): name for name, code in CODES.items()}
 # Ports that are numbers of the mechanism: limits, and by what efforts are measured.
 LIMITS = ("low", "high", "scale", "contact_low", "contact_high")
@@ -55,8 +55,8 @@ class _Body(Straight):
     """What both have in common: where numbers come from and go to."""
 
     def __init__(self, program: Program, width: int, places: Places, precision: str) -> None:
-        super().__init__(program, width)
-        self.places, self.precision = places, precision
+        super().__init__(program, width, precision)
+        self.places = places
 
     def lines(self) -> Iterator[str]:
         """Statements that define every value."""
@@ -101,57 +101,16 @@ class _Body(Straight):
     ) -> Iterator[str]:
         """What keeps a result that differs from lane to lane."""
 
-    def number(self, value: object) -> str:
-        """A number in this precision."""
-        assert isinstance(value, float)
-        huge = HUGE[self.precision]
-        text = number(max(-huge, min(huge, value)) if abs(value) < float("inf") else value)
-        if self.precision == "double" or ("(" not in text and not text[0].isdigit()):
-            return text
-        return f"{text[:-1]}f)" if text.endswith(")") and text[1] == "-" else f"{text}f"
-
-    def name(self, v: Value, copy: int) -> str:
-        node = self.g.nodes[v]
-        return self.number(node.data[0]) if node.op == "const" else super().name(v, copy)
-
     def sample(self, i: object) -> str:
         assert isinstance(i, int)
         return self.places.columns[i]
 
 
-class Scalar(_Body):
+class Scalar(_Body, Plain):
     """Portable: every chain's statements by themselves, in `double` or `float`."""
 
     def __init__(self, program: Program, places: Places, precision: str) -> None:
         super().__init__(program, 1, places, precision)
-
-    def kind(self, v: Value) -> str:
-        return self.precision
-
-    def is_scalar(self, v: Value) -> bool:
-        return True
-
-    def bundles(self) -> list[list[Value]]:
-        return []
-
-    @property
-    def operations(self) -> int:
-        """Floating-point operations; a fused multiply-add counts one, sine with cosine too."""
-        total = 0
-        for v in self.varying:
-            node = self.g.nodes[v]
-            if node.op in ("sum", "least"):
-                total += sum(self.counts[g] for g, _ in self.lane_terms(v)) - 1
-            elif node.op not in ("input", "lane_input", "neg"):
-                total += 1 if node.group is None else self.counts[node.group]
-        return total
-
-    def reduction(self, v: Value) -> str:
-        lanes = self._lane_names(v)
-        shared = [self.repeated(v, t, count) for count, t in self.shared_terms(v)]
-        if self.g.nodes[v].op == "sum":
-            return " + ".join([*lanes, *shared])
-        return nested("fmin_s", [*lanes, *shared])
 
     def lane_sample(self, first: object, copy: int) -> str:
         assert isinstance(first, int)
@@ -345,7 +304,7 @@ def _judged(
     if angles and isinstance(body, Scalar):  # vector code takes far angles from the library
         found.append((_sum(angles), f"<= {body.number(ANGLES[c.precision])}", "OUT_OF_BOUNDS"))
     for i, check in enumerate(body.program.checks):
-        limit = body.number(threshold(check.tolerance, c.precision))
+        limit = body.number(check.tolerance)
         known = NAMES[int(check.below)] if check.below is not None else entry.unsure(c.structure)
         found.append((body.check(i), f">= {limit}", known))
     for store in body.stores() if entry.within else ():

@@ -9,6 +9,7 @@ from importlib.resources import files
 
 import numpy as np
 
+from ..backends.c.emit import text
 from ..errors import InputError
 
 # Words of C and C++ that no variable can be called.
@@ -66,6 +67,11 @@ def literal(x: float, precision: str) -> str:
 def packaged(name: str) -> str:
     """The text of a file of this folder."""
     return (files(__package__) / name).read_text(encoding="utf-8")
+
+
+def scalar_functions() -> str:
+    """The operations of graphs on `real`."""
+    return text("functions.h") + packaged("c_scalar.h")
 
 
 def require_prefix(prefix: str) -> str:

@@ -31,6 +31,7 @@ from .c_names import (
     packaged,
     picked,
     require_prefix,
+    scalar_functions,
     used,
 )
 from .catalogue import Entry, Wish, in_order, least_norm, require_question, usual
@@ -154,7 +155,7 @@ def _portable(c: Context, bodies: Sequence[Body]) -> str:
         constants = c_struct.prepared(c)
     else:
         constants = "\n".join(_table(c, name) for name in c.tables if not name.endswith("_quick"))
-    helpers = picked(packaged(f"c_{c.precision}.h") + packaged("c_scalar.h"), constants + code)
+    helpers = picked(packaged(f"c_{c.precision}.h") + scalar_functions(), constants + code)
     return "\n".join([helpers, constants, code])
 
 

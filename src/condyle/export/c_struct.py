@@ -18,7 +18,7 @@ from ..questions.file_numbers import file_numbers
 from ..questions.numbers import Layout
 from .c_context import Context
 from .c_function import Places, Scalar
-from .c_names import in_comment, packaged, picked
+from .c_names import in_comment, picked, scalar_functions
 
 FIELDS = {
     "gravity": "m/s^2, in {S}",
@@ -94,7 +94,7 @@ def prepared(c: Context) -> str:
     """`prepare` and what it is made of, for the source."""
     kernels = "\n".join(_prepare(c, name, printer) for name, printer in c.printers.items())
     code = f"{kernels}\n{_whole(c)}"
-    text = re.sub(r"\breal\b", "double", packaged("c_scalar.h"))
+    text = re.sub(r"\breal\b", "double", scalar_functions())
     text = re.sub(r"\bF\((\w+)\)", r"\1", re.sub(r"\bR\(([^()]*)\)", r"\1", text))
     text = picked(re.sub(r"\b(\w+)_s\b", r"\1_d", text), code)
     return f"{text}\n{code}"

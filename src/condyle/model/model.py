@@ -398,7 +398,7 @@ def derive(
             formulation, route: of `condyle.dynamics`; the results are the same.
             distribution: how redundancy is resolved: a name of `condyle.distribution.OBJECTIVES`,
             or a `Distribution`; default: bounded with cables, else minimum_norm.
-            backend: compiled, numpy, or auto (compiled where there is a C compiler).
+            backend: compiled, numpy, cuda, or auto (compiled where there is a C compiler).
     Raises: InputError:       for anything but a mechanism; an unknown formulation, route,
                               distribution or backend.
             UnsupportedError: where route `direct` has no closed form.

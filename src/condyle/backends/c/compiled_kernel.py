@@ -17,7 +17,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...graph.program import Interface, Numbers, Variants
-from ..kernel import Answer, arrays_of, places_of, results_at, shapes_of
+from ..kernel import Answer, arrays_of, column_steps, places_of, results_at, shapes_of
 from ..threads import shared_out, workers
 from .build import loaded
 from .shared_library import aligned, prepared
@@ -119,16 +119,8 @@ class CompiledKernel:
         threads: int | None,
     ) -> None:
         given = [_readable(a) for a in given]  # has to stay as long as C reads it
-        starts: list[int] = []
-        strides: list[int] = []
-        for port, a in zip(self.interface.ports, given, strict=True):
-            first, (row, *steps) = _address(a), a.strides
-            lanes = self.order if port.lanes else range(port.size)
-            blocks = [first]
-            if port.lanes and port.size > 1:
-                blocks = [first + i * steps[0] for i in range(port.size)]
-            starts += [block + k * steps[-1] for block in blocks for k in lanes]
-            strides += [row // 8 if len(a) == count else 0] * (len(blocks) * len(lanes))
+        starts, steps = column_steps(self.interface, given, self.order, count, _address)
+        strides = [step // 8 for step in steps]
         vector, call = self._vector, self._library.batch
         steps_at, (out, rows, judged) = _vector_of(tuple(strides)), goal
 

@@ -70,25 +70,26 @@ def emit(variants: Variants, width: int) -> Source:
     below = ", ".join(str(AGAIN if c.below is None else int(c.below)) for c in checks)
     head = [
         *(f"#define {name} {value}" for name, value in macros.items()),
-        _text("vector.h"),
+        text("vector.h"),
         f"static const double tolerance[CHECKS + 1] = {{{tolerances}}};",
         f"static const int below[CHECKS + 1] = {{{below}}};",
-        _text("judge.h"),
+        text("judge.h"),
     ]
     code = [prepare(step, "prepare_step"), step.function("step")]
-    batch = "\n".join([*head, *code, _text("batch.h")])
+    batch = "\n".join([*head, *code, text("batch.h")])
     single = None
     if apart:
         code = [
-            text
+            part
             for name, printer in apart.items()
-            for text in (prepare(printer, f"prepare_{name}"), printer.function(name))
+            for part in (prepare(printer, f"prepare_{name}"), printer.function(name))
         ]
-        single = "\n".join([*head, *code, _text("single.h")])
+        single = "\n".join([*head, *code, text("single.h")])
     return Source(single, batch, face, size, len(checks), step.operations())
 
 
-def _text(name: str) -> str:
+def text(name: str) -> str:
+    """A file of C of this folder."""
     return (files(__package__) / name).read_text(encoding="utf-8")
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from ...graph.graph import Value
 from ...graph.program import Program
 from ...graph.schedule import ready_times, scheduled
-from .printer import Printer, nested, padded_counts
+from .printer import Printer, nested, number, padded_counts
 
 WAIT = 12  # cycles between sums that are worth waiting for
+HUGE = {"double": 1e300, "float": 1e37}  # numbers are kept within, and 1 over it
 
 
 class Straight(Printer):
@@ -17,9 +19,25 @@ class Straight(Printer):
 
     shared = "double"
 
-    def __init__(self, program: Program, width: int) -> None:
+    def __init__(self, program: Program, width: int, precision: str = "double") -> None:
         copies = [count // width for count in padded_counts(program, width)]
         super().__init__(program, width, copies, width)
+        self.precision = precision
+
+    def number(self, value: object) -> str:
+        """A number in this precision."""
+        assert isinstance(value, float)
+        huge = HUGE[self.precision]
+        if 0 < abs(value) < 1 / huge:
+            value = math.copysign(1 / huge, value)
+        text = number(max(-huge, min(huge, value)) if abs(value) < float("inf") else value)
+        if self.precision == "double" or ("(" not in text and not text[0].isdigit()):
+            return text
+        return f"{text[:-1]}f)" if text.endswith(")") and text[1] == "-" else f"{text}f"
+
+    def name(self, v: Value, copy: int) -> str:
+        node = self.g.nodes[v]
+        return self.number(node.data[0]) if node.op == "const" else super().name(v, copy)
 
     def function(self, name: str) -> str:
         """`int name(table, in, out)`: whether every check is met beyond doubt."""
@@ -102,3 +120,35 @@ class Straight(Printer):
         return (
             f"  store(out + {at}, {row});" if whole else f"  store_some(out + {at}, {row}, {used});"
         )
+
+
+class Scalar(Straight):
+    """Every chain's statements by themselves, without vectors, in `double` or `float`."""
+
+    def kind(self, v: Value) -> str:
+        return self.precision
+
+    def is_scalar(self, v: Value) -> bool:
+        return True
+
+    def bundles(self) -> list[list[Value]]:
+        return []
+
+    def reduction(self, v: Value) -> str:
+        lanes = self._lane_names(v)
+        shared = [self.repeated(v, t, count) for count, t in self.shared_terms(v)]
+        if self.g.nodes[v].op == "sum":
+            return " + ".join([*lanes, *shared])
+        return nested("fmin_s", [*lanes, *shared])
+
+    @property
+    def operations(self) -> int:
+        """Floating-point operations; a fused multiply-add counts one, sine with cosine too."""
+        total = 0
+        for v in self.varying:
+            node = self.g.nodes[v]
+            if node.op in ("sum", "least"):
+                total += sum(self.counts[g] for g, _ in self.lane_terms(v)) - 1
+            elif node.op not in ("input", "lane_input", "neg"):
+                total += 1 if node.group is None else self.counts[node.group]
+        return total
