@@ -229,3 +229,8 @@ class Numbers:
     lanes: tuple[np.ndarray, ...]
     padding: tuple[np.ndarray, ...]
     order: tuple[int, ...]
+
+    @staticmethod
+    def none(order: tuple[int, ...]) -> Numbers:
+        """Of a program that takes them as ports."""
+        return Numbers(np.empty(0), (), (), order)

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from .graph import Graph, Value, reachable
 from .operations import OPERATIONS, REDUCTIONS
+from .program import Port, Program
+
+NUMBERS, LANE_NUMBERS = "numbers", "lane_numbers"  # ports of what else is fixed
 
 
 def substituted(
@@ -54,3 +58,32 @@ def tangents(graph: Graph, roots: Sequence[Value], seeds: Mapping[Value, Value])
                     total = graph.apply("add", total, graph.apply("mul", partial, x))
             found[v] = total
     return [found[v] for v in roots]
+
+
+def numbers_as_ports(program: Program, shared: int, lanes: Sequence[int]) -> Program:
+    """A program that takes a mechanism's numbers with every sample, by two more ports: `numbers`,
+    the shared ones, and `lane_numbers`, of every lane as many as the group with most has.
+
+    Args: shared: how many parameters there are;  lanes: numbers of a lane, group by group.
+    """
+    graph, counts, first = program.graph, program.counts, program.columns
+    n, size = sum(counts), max(lanes, default=0)
+    starts = [sum(counts[:group]) for group in range(len(counts))]
+    replaced: dict[Value, Value] = {}
+    for v in program.order:
+        node = graph.nodes[v]
+        if node.op == "parameter":
+            (i,) = node.data
+            assert isinstance(i, int)
+            replaced[v] = graph.leaf("input", first + i)
+        elif node.op == "lane":
+            group, i = node.data
+            assert isinstance(group, int) and isinstance(i, int)
+            column = first + shared + i * n + starts[group]
+            replaced[v] = graph.leaf("lane_input", group, column, group=group)
+    moved = substituted(graph, program.roots, replaced)
+    ports = [Port(NUMBERS, shared, "", False, first)] if shared else []
+    ports += [Port(LANE_NUMBERS, size, "", True, first + shared)] if size else []
+    found = program.moved(graph, dict(zip(program.roots, moved, strict=True)))
+    columns = first + shared + size * n
+    return replace(found, columns=columns, ports=(*program.ports, *ports))

@@ -18,6 +18,8 @@ from typing import Any
 
 from ..errors import InputError, did_you_mean, shown
 from ..graph.program import Program, Variants
+from ..graph.transform import numbers_as_ports
+from .numbers import Layout
 from .structure import Structure
 
 _FILES = {
@@ -35,6 +37,7 @@ _FILES = {
     "rate": "rate",
     "observer": "observer",
     "tick": "tick",
+    "file_numbers": "file_numbers",
 }
 # Name -> its file in this folder, or the function itself if it is a user's.
 QUESTIONS: dict[str, str | Callable[..., Program | Variants]] = {
@@ -68,11 +71,14 @@ class Question:
     """A question about a structure, not yet written out.
 
     details: its other arguments, such as the requested outputs.
+    ports:   whether the mechanism's numbers are ports, columns as states are: see
+             `graph.transform.numbers_as_ports`. Then there is no robust program.
     """
 
     name: str
     structure: Structure
     details: tuple[Any, ...] = ()
+    ports: bool = False
 
     @staticmethod
     def about(structure: Structure, name: str, *details: Any) -> Question:
@@ -80,18 +86,26 @@ class Question:
             structure = replace(structure, formulation="virtual_power", route="core")
         return Question(name, structure, details)
 
+    def with_ports(self) -> Question:
+        """The same with the mechanism's numbers as ports."""
+        return replace(self, ports=True)
+
     @property
     def key(self) -> str:
         """A text that identifies the answer's graph."""
         s = self.structure
         shape = replace(s, zeros=frozenset()), sorted(s.zeros)
-        known = repr((self.name, shape, self.details, _casadi(), _sources()))
+        known = repr((self.name, shape, self.details, self.ports, _casadi(), _sources()))
         return known + (self.variants().digest if _foreign(self.details) else "")
 
     def variants(self) -> Variants:
         """The graph."""
         found = written(self.name)(self.structure, *self.details)
-        return found if isinstance(found, Variants) else Variants(found)
+        variants = found if isinstance(found, Variants) else Variants(found)
+        if not self.ports:
+            return variants
+        layout = Layout.of_file if self.name == "file_numbers" else Layout.of
+        return Variants(numbers_as_ports(variants.main, *layout(self.structure).sizes))
 
 
 def _foreign(details: Any) -> bool:

@@ -79,6 +79,15 @@ class Layout:
         lanes = [_slots(FAMILIES[kind].numbers | losses) for kind in structure.families]
         return Layout(structure, _slots(sizes), lanes)
 
+    @property
+    def sizes(self) -> tuple[int, list[int]]:
+        """How many shared numbers there are, and numbers of a lane, group by group."""
+
+        def total(slots: dict[str, Slot]) -> int:
+            return sum(count for _, count in slots.values())
+
+        return total(self.parameters), [total(slots) for slots in self.lanes]
+
     def file_values(self, mechanism: Mechanism, landmark: str | None = None) -> dict[str, Any]:
         """Shared numbers of `of_file`, by name; of friction the smoothing speed, not its square."""
         values = self._values(mechanism, landmark, constants_of(mechanism))
