@@ -44,6 +44,11 @@ class Status(IntEnum):
         "sample",
     )
     ambiguous = 8, "under Coulomb friction several motions follow from these efforts", "sample"
+    kink = (
+        9,
+        "derivatives are of one side: a limit or a contact's sign is about to change",
+        "sample",
+    )
 
 
 STATUS_NAMES = tuple(status.name for status in Status)

@@ -116,6 +116,14 @@ class Door:
 Q, EFFORT, WRENCH = np.zeros(4), np.zeros(6), np.ones(6)
 STATE: dict[str, Value] = {"q": Q, "v": Q, "a": Q}
 FORCED: dict[str, Value] = {"wrench": WRENCH, "at": "incisor", "outputs": "pose", "threads": 1}
+TAKEN: dict[str, Value] = (
+    STATE
+    | {"wrench": WRENCH, "at": "incisor", "effort": None}
+    | {
+        "joint": None,
+        "zeros": False,
+    }
+)
 OWN_MODEL: dict[str, Value] = {"model": lambda stage: stage.mechanism}
 CSV = "t,Fx\n0,1\n1,2\n"
 FILES = ("path", "file", "folder", "no such", "mechanism")  # what messages say of files
@@ -201,6 +209,24 @@ DOORS: dict[str, Door] = {
         {"q": Q, "v": Q, "effort": EFFORT, "wrench": WRENCH, "at": "incisor"},
         states=("q", "v", "effort"),
         calls=60,
+    ),
+    "Model.derivatives": Door(
+        {"of": "effort", "wrt": ("q", "wrench")} | TAKEN,
+        states=("q", "v", "a"),
+        calls=60,
+        words=("derivatives", "q", "cannot depend"),
+    ),
+    "Model.jvp": Door(
+        {"of": "effort", "tangents": {"q": Q, "at": np.ones(3)}} | TAKEN,
+        states=("q", "v", "a"),
+        calls=60,
+        words=("derivatives", "wrt"),
+    ),
+    "Model.vjp": Door(
+        {"of": "effort", "cotangents": EFFORT, "wrt": "q"} | TAKEN,
+        states=("q", "v", "a"),
+        calls=60,
+        words=("derivatives",),
     ),
     "Model.forward_kinematics": Door(
         {"joint": EFFORT, "start": EFFORT, "time": None, "tolerance": 1e-6},

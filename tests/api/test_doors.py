@@ -7,7 +7,7 @@ import pkgutil
 import random
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -97,8 +97,9 @@ def test_a_vector_and_a_batch(stage: Stage, name: str) -> None:
 
 
 def numbers(result: object) -> dict[str, np.ndarray]:
-    """Arrays of a result: itself, or its attributes."""
+    """Arrays of a result: itself, its entries, or its attributes."""
     found = {"": result} if isinstance(result, np.ndarray) else dict(vars(result))
+    found |= {str(k): v for k, v in result.items()} if isinstance(result, Mapping) else {}
     return {k: v for k, v in found.items() if isinstance(v, np.ndarray) and v.dtype.kind in "fiu"}
 
 

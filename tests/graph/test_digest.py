@@ -119,10 +119,10 @@ from condyle.questions import QUESTIONS, Question
 from condyle.questions.law import CONTROLLERS
 from condyle.questions.structure import structure_of
 structure = structure_of(case("mixed_k2_n8").mechanism)
-given = {"tick": CONTROLLERS["impedance"]}
+given = {"tick": (CONTROLLERS["impedance"],)}
+given["derivative"] = ("slopes", "linear", (), ("q",), ("residual",))
 for name in QUESTIONS:
-    details = (given[name],) if name in given else ()
-    question = Question.about(structure, name, *details)
+    question = Question.about(structure, name, *given.get(name, ()))
     print(name, question.variants().digest, question.key)
 """
 

@@ -13,7 +13,7 @@ from condyle.backends.numpy_kernel import NumpyKernel
 from condyle.graph.graph import Graph, Value, reachable
 from condyle.graph.operations import OPERATIONS
 from condyle.graph.program import Numbers, Output, Port, Program, Variants
-from condyle.graph.transform import substituted, tangents
+from condyle.graph.transform import adjoints, substituted, tangents
 
 STEP = 1e-6
 JUMPS = ("le", "lt", "eq", "ne", "and", "or", "not", "sign", "floor", "ceil")
@@ -88,6 +88,50 @@ def test_tangents_go_through_sums_over_lanes() -> None:
     np.testing.assert_allclose(run([root], 0.0), by_hand, rtol=1e-12)
 
 
+def test_adjoints_sum_over_lanes_what_these_hand_to_shared_values() -> None:
+    """Of a sum of a shared root and of lanes of another, by samples, lanes and a shared term."""
+    graph, rng = Graph(), np.random.default_rng(4)
+    x, w = graph.leaf("input", 0), graph.leaf("input", 1)
+    y, z = (graph.leaf("lane_input", 0, 2 + LANES * i, group=0) for i in range(2))
+    swing = graph.apply("sin", graph.apply("mul", x, y))
+    inner = graph.reduce("sum", [graph.apply("mul", swing, z)])
+    alike = graph.reduce("sum", [graph.apply("mul", x, w)])  # the same in every lane
+    shared = graph.apply("mul", inner, graph.apply("add", alike, x))
+    own = graph.apply("add", graph.apply("mul", w, w), graph.apply("mul", inner, y))
+    leaves = [x, w, y, z]
+    by = adjoints(graph, [shared, own], [w, graph.const(3.0)], leaves, (LANES,))
+    assert [graph.nodes[v].group for v in by] == [None, None, 0, 0]
+    # A cotangent is held: the root is w' shared + 3 own, with w' = w.
+    held = graph.leaf("lane_input", 0, 2 + 2 * LANES, group=0)  # in every lane
+    root = graph.apply(
+        "add", graph.apply("mul", held, shared), graph.apply("mul", graph.const(3.0 * LANES), own)
+    )
+    numbers = Numbers(np.zeros(1), (np.zeros((1, LANES)),), (np.zeros(1),), (2, 0, 1))
+    given, per_lane = rng.normal(0, 1, (20, 2)), rng.normal(0, 1, (20, 3, LANES))
+    per_lane[:, 2] = given[:, 1:]
+
+    def run(value: Value, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        ports = (Port("x", 2, "", False, 0), Port("y", 3, "", True, 2))
+        lanes = graph.nodes[value].group is not None
+        outputs = (Output("0", (), "", lanes, ((value,),)),)
+        p = Program(graph, (LANES,), 2 + 3 * LANES, ports, outputs, ())
+        return NumpyKernel(Variants(p), numbers).run({"x": a, "y": b}).values["0"]
+
+    def slope(place: str, *at: int) -> np.ndarray:
+        found = []
+        for sign in (1, -1):
+            a, b = given.copy(), per_lane.copy()
+            (a if place == "x" else b)[(slice(None), *at)] += sign * 1e-5
+            found.append(run(root, a, b).sum(axis=0) / LANES)
+        return (found[0] - found[1]) / 2e-5
+
+    for i, v in enumerate(by[:2]):
+        np.testing.assert_allclose(run(v, given, per_lane), slope("x", i), rtol=1e-7, atol=1e-7)
+    for i, v in enumerate(by[2:]):
+        lanes = [slope("y", i, lane) for lane in range(LANES)]
+        np.testing.assert_allclose(run(v, given, per_lane), lanes, rtol=1e-7, atol=1e-7)
+
+
 def test_what_does_not_depend_has_no_derivative() -> None:
     graph = Graph()
     a, b = graph.leaf("input", 0), graph.leaf("input", 1)
@@ -103,6 +147,8 @@ def test_a_minimum_over_lanes_is_refused() -> None:
     least = graph.reduce("least", [y])
     with pytest.raises(AssertionError, match="minimum over lanes"):
         tangents(graph, [least], {y: graph.const(1.0)})
+    with pytest.raises(AssertionError, match="minimum over lanes"):
+        adjoints(graph, [least], [graph.const(1.0)], [y], (LANES,))
 
 
 def test_substituted_puts_values_in_the_place_of_others() -> None:

@@ -467,6 +467,10 @@ class Machine:
             u = times(c.friction / mp.sqrt(dot(v, v) + c.smooth**2), v)
             fixed.append((plain(n), turned(R, c.point), u, own))
         Q: list[Vector] = [[] for _ in poses]
+        losses = [
+            [self._loss(*p) for p in zip(self.chains, self._kinetics(x)[0], strict=True)]
+            for x in poses
+        ]
         J, N, T = [], [], []
         for j in range(6):
             along = [Jet(x, int(i == j)) for i, x in enumerate(at)]
@@ -474,13 +478,28 @@ class Machine:
             turning, _ = spin(self.rotation(along))
             V = [mpf(int(i == j)) for i in range(3)]
             load = dot(F, add(V, cross(turning, arm))) + dot(couple, turning)
-            for one, bodies in zip(Q, moving, strict=True):
-                pairs = zip(bodies, unitary, strict=True)
-                one.append(sum((self._power(*pair) for pair in pairs), mpf(0)) - load)
             J.append([x.v for x in joints])
+            for one, bodies, loss in zip(Q, moving, losses, strict=True):
+                pairs = zip(bodies, unitary, strict=True)
+                own = sum((self._power(*pair) for pair in pairs), mpf(0)) - load
+                one.append(own + dot(J[-1], loss))
             N.append([dot(n, add(V, cross(turning, r))) for n, r, _, _ in fixed])
             T.append([dot(u, add(V, cross(turning, c))) for _, _, u, c in fixed])
         return Q, transposed(J), transposed(N) if fixed else [], transposed(T) if fixed else []
+
+    def _loss(self, chain: Raw, joint: Jet) -> Number:
+        """What an actuator needs for its own rotor and friction."""
+        raw = chain["raw"].get("actuator", {})
+        inertia, gear, viscous, coulomb, smooth = (
+            mpf(raw.get(key, usual))
+            for key, usual in (
+                ("rotor_inertia", 0), ("gear", 1), ("viscous", 0), ("coulomb", 0),
+                ("smoothing_speed", 1e-3),
+            )
+        )  # fmt: skip
+        rate = joint.v
+        rubbed = coulomb * rate / mp.sqrt(rate**2 + smooth**2)
+        return inertia * gear**2 * joint.a + viscous * rate + rubbed
 
     def _power(self, body: tuple[Any, ...], partial: tuple[Any, ...]) -> Number:
         """(m (a - g)) . v_j + (I omega' + omega x I omega) . omega_j."""

@@ -90,9 +90,7 @@ def _kernel(n: int, k: int, term: str, weighs: bool, backend: str) -> Kernel:
     """One kernel for every mechanism with n efforts and k contacts."""
     structure = Structure("virtual_power", "core", (("cable", n),), (("plane", 4),) * k, ())
     layout = Layout.of(structure)
-    shared, lane = (
-        sum(size for _, size in slots.values()) for slots in (layout.parameters, *layout.lanes)
-    )
+    shared, (lane,) = layout.sizes
     numbers = Numbers(np.zeros(shared), (np.ones((lane, n)),), (np.zeros(lane),), tuple(range(n)))
     question = Question.about(structure, "allocation", term, weighs)
     if backend == "compiled":

@@ -21,7 +21,7 @@ from ..graph.program import Output, Program
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
 from ..questions import Question
-from ..questions.derivative import PREFIX, derivative
+from ..questions.derivative import PREFIX, directional
 from ..questions.friction import MOST
 from .c_context import ANGLES, CODES, LARGEST, WHY, Body, Context
 from .catalogue import Entry, Wish, least_norm
@@ -217,7 +217,7 @@ def function(c: Context, name: str, entry: Entry, wish: Wish) -> Body:
 
 def tangent(program: Program, given: Mapping[str, str], results: Mapping[str, str]) -> Program:
     """The derivative of some results along all that is given, with the question's checks."""
-    return replace(derivative(program, set(given), set(results)), checks=program.checks)
+    return replace(directional(program, set(given), set(results)), checks=program.checks)
 
 
 def _pruned(program: Program, results: Mapping[str, str]) -> Program:

@@ -1,4 +1,4 @@
-"""Graphs from graphs: with some values replaced, and their derivatives."""
+"""Graphs from graphs: with some values replaced, and their derivatives, forward and reverse."""
 
 from __future__ import annotations
 
@@ -87,3 +87,68 @@ def numbers_as_ports(program: Program, shared: int, lanes: Sequence[int]) -> Pro
     found = program.moved(graph, dict(zip(program.roots, moved, strict=True)))
     columns = first + shared + size * n
     return replace(found, columns=columns, ports=(*program.ports, *ports))
+
+
+def adjoints(
+    graph: Graph,
+    roots: Sequence[Value],
+    cotangents: Sequence[Value],
+    of: Sequence[Value],
+    counts: Sequence[int],
+) -> list[Value]:
+    """Derivatives of sum root * cotangent, over roots and lanes, in some values: one reverse sweep.
+
+    A sum hands its adjoint to every lane; what the lanes hand to a shared value is summed. That of
+    a lane value is each lane's own.
+
+    Args:    cotangents: one a root, shared as it is or of its lanes.
+             of: values, which are taken as independent;  counts: lanes of each group.
+    Returns: values of the same graph. A minimum over lanes has no derivative here.
+    """
+    nodes, zero = graph.nodes, graph.const(0.0)
+    handed: dict[Value, list[Value]] = {}
+
+    def hand(v: Value, x: Value) -> None:
+        if x != zero:
+            handed.setdefault(v, []).append(x)
+
+    def total(v: Value) -> Value:
+        """What was handed to a value, over the lanes if it is shared."""
+        found, lanes = zero, [zero] * len(counts)
+        for x in handed.get(v, ()):
+            group = nodes[x].group
+            if nodes[v].group is None and group is not None:
+                lanes[group] = graph.apply("add", lanes[group], x)
+            else:
+                found = graph.apply("add", found, x)
+        if any(x != zero for x in lanes):
+            found = graph.apply("add", found, graph.reduce("sum", lanes))
+        return found
+
+    for v, x in zip(roots, cotangents, strict=True):
+        hand(v, x)
+    order, leaves = reachable(graph, roots), set(of)
+    depend = set[Value]()
+    for v in order:
+        if v in leaves or any(a in depend for a in nodes[v].args):
+            depend.add(v)
+    for v in reversed(order):
+        if v in leaves or v not in depend or (own := total(v)) == zero:
+            continue
+        node = nodes[v]
+        if node.op in REDUCTIONS:
+            assert node.op == "sum", "a minimum over lanes is not differentiated"
+            for a, count in zip(node.args, counts, strict=True):
+                shared = nodes[a].group is None
+                hand(a, graph.apply("mul", graph.const(float(count)), own) if shared else own)
+            continue
+        for a, partial in zip(
+            node.args, OPERATIONS[node.op].partials(graph, v, node.args), strict=True
+        ):
+            # A lane value may hand to a shared one what is the same in all its lanes.
+            if partial is not None and a in depend:
+                x = graph.apply("mul", partial, own)
+                if node.group is not None and nodes[a].group is None and nodes[x].group is None:
+                    x = graph.apply("mul", graph.const(float(counts[node.group])), x)
+                hand(a, x)
+    return [total(v) for v in of]

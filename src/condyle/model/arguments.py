@@ -27,14 +27,15 @@ class Argument(NamedTuple):
 
         Raises: InputError: for anything but an array of numbers of this shape.
         """
-        found = given if type(given) is np.ndarray else self._numbers(given)
+        found = given if type(given) is np.ndarray else self.numbers(given)
         if found.dtype != np.float64:
-            found = self._numbers(found)
+            found = self.numbers(found)
         if not found.ndim or found.shape[-1] != self.size:
             raise self._refused(f"shape {found.shape}" if found.ndim else _described(given))
         return found
 
-    def _numbers(self, given: Any) -> Array:
+    def numbers(self, given: Any) -> Array:
+        """As doubles, of any shape."""
         try:
             found = np.asarray(given)
             if found.dtype.kind == "O" and any(x is None for x in found.flat):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -194,9 +195,14 @@ class Distributor:
         # Cubes take twice the steps, and compilers a minute.
         if objective.term != "square" or self.unsolved_friction:
             return (), {}
-        empty = np.zeros((0, len(self._low), 6)), np.zeros((0, len(self._push), 6))
-        ports = objective.ports(self._problem(np.zeros((0, 6)), *empty))
+        ports = objective.ports(self.problem)
         return ("limited", objective.term, "weight" in ports), ports
+
+    @cached_property
+    def problem(self) -> Problem:
+        """What the distribution asks for, of no samples."""
+        empty = np.zeros((0, len(self._low), 6)), np.zeros((0, len(self._push), 6))
+        return self._problem(np.zeros((0, 6)), *empty)
 
     def rows(self, values: Mapping[str, np.ndarray], status: np.ndarray) -> np.ndarray:
         """Good samples that the least norm does not serve."""

@@ -89,26 +89,3 @@ class ForwardDynamics(Dynamics):
                 every[several] = np.moveaxis(better[name], -1, 0)
             found[name] = every
         return found
-
-    def linearise(self, q: Any, v: Any, effort: Any, wrench: Any, at: Any) -> ModelResult:
-        """As `Model.linearise`."""
-        own = self._arguments
-        lead, inputs = own.samples((own.q, own.v, own.effort), (q, v, effort), wrench, at)
-        loads = np.hstack([inputs["force"], inputs["moment"]]), inputs["point"]
-        states = [inputs[name] for name in ("q", "q1", "effort")]
-        about = self.many(states, *loads, ("pose",), None)
-        ports = {name: inputs[name] for name in ("q1", "effort", "force", "moment", "point")}
-        ports |= {"pose": about.pose, "q2": about.acceleration}
-        ports["contact_force"] = about.contact_force
-        found = self._system.robust.linear(ports)
-        s = {name: np.moveaxis(a, -1, 0) for name, a in found.items()}
-        count, m = about.acceleration.shape
-        A, B = np.zeros((count, 2 * m, 2 * m)), np.zeros((count, 2 * m, s["J"].shape[2]))
-        A[:, :m, m:] = np.eye(m)
-        good = about.status == Status.ok
-        A[~good] = B[~good] = np.nan
-        unknown = np.concatenate([s["by_q2"], s["by_force"]], axis=2)[good]
-        known = np.concatenate([-s["by_q"], -s["by_q1"], s["J"]], axis=2)[good]
-        solved = np.linalg.solve(unknown, known)[:, :m]
-        A[good, m:], B[good, m:] = solved[..., : 2 * m], solved[..., 2 * m :]
-        return ModelResult(A=A, B=B, status=about.status).shaped(lead)

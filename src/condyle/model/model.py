@@ -12,6 +12,7 @@ by a kernel of the backend; samples that it cannot vouch for are solved again by
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Self
 
@@ -25,6 +26,7 @@ from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
 from ..questions.equations import INTERNAL, part_names
 from .arguments import Arguments
+from .derivatives import Derivatives, Derived
 from .distributing import Distribution, Distributor, reference_force
 from .forward_dynamics import ForwardDynamics
 from .forward_kinematics import TOLERANCE, ForwardKinematics
@@ -148,6 +150,10 @@ class Model:
         return ForwardDynamics(self.system, self._arguments, self.poses)
 
     @cached_property
+    def _derived(self) -> Derived:
+        return Derived(self)
+
+    @cached_property
     def _unchecked(self) -> Unchecked:
         return Unchecked(lambda: self._inverse, lambda: self._forward)
 
@@ -230,7 +236,90 @@ class Model:
         Returns: A (..., 2 m, 2 m), B (..., 2 m, n), status (...); NaN where there are no
                  accelerations.
         """
-        return self._forward.linearise(q, v, effort, wrench, at)
+        return self._derived.linearised(q, v, effort, wrench, at)
+
+    def derivatives(
+        self,
+        of: str | tuple[str, ...] | list[str],
+        wrt: str | tuple[str, ...] | list[str],
+        *,
+        q: ArrayLike | None = None,
+        v: ArrayLike | None = None,
+        a: ArrayLike | None = None,
+        effort: ArrayLike | None = None,
+        joint: ArrayLike | None = None,
+        wrench: ArrayLike | None = None,
+        at: Point = None,
+        zeros: bool = False,
+    ) -> Derivatives:
+        """Exact derivatives of results by states, loads and numbers of the file.
+
+            d = model.derivatives("effort", ("q", "v", "a", "platform.mass"), q=q, v=v, a=a)
+            d["effort", "q"]                                    (..., n, m)
+
+        Within limits they are those of the active set; where it is about to change the status is
+        `kink`, and they are those of the set that was chosen.
+
+        Args:    of: of effort, contact_force (inverse dynamics, by the model's distribution);
+                 acceleration, contact_force (forward dynamics, with `effort`); pose, joint,
+                 contact_point, singularity_ratio; q (forward kinematics, with `joint`).
+                 wrt: of q, v, a, wrench, at, effort, joint, as far as the result depends on them,
+                 and paths of numbers of the file.
+                 q, v, a, effort, wrench, at: as of `Model`;  joint: (..., n) [rad or m].
+                 zeros: whether what cannot matter gives zeros, not an error.
+        Returns: by name, (..., of the result, of what it is taken by) [SI], status (...), and
+                 units. NaN where the status is neither ok nor kink.
+        Raises:  InputError: for unknown names, missing arguments, and what cannot matter.
+        """
+        given = {"q": q, "v": v, "a": a, "effort": effort, "joint": joint}
+        given |= {"wrench": wrench, "at": at}
+        return self._derived.matrices(of, wrt, given, zeros)
+
+    def jvp(
+        self,
+        of: str | tuple[str, ...] | list[str],
+        tangents: Mapping[str, ArrayLike],
+        *,
+        q: ArrayLike | None = None,
+        v: ArrayLike | None = None,
+        a: ArrayLike | None = None,
+        effort: ArrayLike | None = None,
+        joint: ArrayLike | None = None,
+        wrench: ArrayLike | None = None,
+        at: Point = None,
+        zeros: bool = False,
+    ) -> Derivatives:
+        """Derivatives along a direction, by one sweep: d["effort"], (..., n).
+
+        Args: tangents: what each of `wrt` changes by, of its shape;  others: as of `derivatives`.
+        """
+        given = {"q": q, "v": v, "a": a, "effort": effort, "joint": joint}
+        given |= {"wrench": wrench, "at": at}
+        return self._derived.jvp(of, tangents, given, zeros)
+
+    def vjp(
+        self,
+        of: str | tuple[str, ...] | list[str],
+        cotangents: Mapping[str, ArrayLike] | ArrayLike,
+        wrt: str | tuple[str, ...] | list[str],
+        *,
+        q: ArrayLike | None = None,
+        v: ArrayLike | None = None,
+        a: ArrayLike | None = None,
+        effort: ArrayLike | None = None,
+        joint: ArrayLike | None = None,
+        wrench: ArrayLike | None = None,
+        at: Point = None,
+        zeros: bool = False,
+    ) -> Derivatives:
+        """Derivatives of a weighted sum of results, by one reverse sweep: d["q"], (..., m).
+
+        Args: cotangents: weights of each result, of its shape, or of the one in `of`;  others: as
+              of `derivatives`.
+        """
+        given = {"q": q, "v": v, "a": a, "effort": effort, "joint": joint}
+        given |= {"wrench": wrench, "at": at}
+        return self._derived.vjp(of, cotangents, wrt, given, zeros)
 
     def mass_matrix(self, q: ArrayLike, *, space: str = "q") -> Array:
         """M_r of [Cheng2023] eqs (57), (63), (..., m, m) [kg, kg m, kg m^2].

@@ -15,12 +15,11 @@ import numpy as np
 from ..backends.kernel import Arrays
 from ..backends.numpy_kernel import NumpyKernel
 from ..dynamics.minimum_norm import minimum_norm
-from ..graph.program import Numbers, Variants
+from ..graph.program import Numbers
 from ..kinematics.rotation import GIMBAL_LOCK
 from ..kinematics.singularities import SINGULAR, ratio
-from ..questions import Question, written
+from ..questions import Question
 from ..questions.bound import CERTIFIED, TINY, bound
-from ..questions.derivative import PREFIX, derivative
 from ..questions.numbers import characteristic
 from ..questions.structure import Structure
 from ..status import Status, judge
@@ -144,29 +143,6 @@ class Robust:
         answer = self._kernel("forward").run(inputs)
         answer.mend(inputs, self.forward)
         return answer.status
-
-    def linear(self, ports: Mapping[str, np.ndarray]) -> Arrays:
-        """Results of the question of that name: asked for too seldom to be worth a compiler."""
-        return self._kernel("linear").run(ports).values
-
-    def derivative(
-        self, question: str, by: tuple[str, ...], of: str, ports: Mapping[str, np.ndarray]
-    ) -> np.ndarray:
-        """Exact derivatives of a result in ports of numbers, (N, size, sizes of ports)."""
-        key = question, by, of
-        if key not in self._kernels:
-            program = derivative(written(question)(self._structure), by, (of,))
-            self._kernels[key] = NumpyKernel(Variants(program), self._numbers)
-        sizes = [ports[name].shape[1] for name in by]
-        count, width = max(len(a) for a in ports.values()), sum(sizes)
-        given = {
-            name: np.repeat(np.broadcast_to(a, (count, a.shape[1])), width, axis=0)
-            for name, a in ports.items()
-        }
-        unit = np.split(np.tile(np.eye(width), (count, 1)), np.cumsum(sizes)[:-1], axis=1)
-        given |= {PREFIX + name: one for name, one in zip(by, unit, strict=True)}
-        found = self._kernels[key].run(given).values[PREFIX + of]
-        return np.moveaxis(found.reshape(-1, count, width), 0, 1)
 
     def coriolis(self, whole: bool, ports: Mapping[str, np.ndarray]) -> np.ndarray:
         """Result of the question of that name, samples last."""

@@ -104,6 +104,30 @@ class System:
             self._kernels[asked] = self.backend.kernel(q.key, q.variants, self.numbers)
         return self._kernels[asked]
 
+    def derivative(
+        self, how: str, question: str, by: tuple[str, ...], of: tuple[str, ...]
+    ) -> Kernel:
+        """The kernel of a question's derivatives: see `questions.derivative`."""
+        return self.kernel("derivative", how, question, (), by, of)
+
+    @cached_property
+    def wide(self) -> System:
+        """The same with all numbers of the kernel, for derivatives in those that are at zero.
+
+        Contacts on parallel planes stand alone, every contact has friction, every actuator losses.
+        """
+        other = copy(self)
+        other.structure = replace(
+            self.structure,
+            zeros=frozenset(),
+            parallel=False,
+            losses=True,
+            friction=tuple(range(len(self.structure.contacts))),
+        )
+        other.numbers = Layout.of(other.structure).numbers(self.mechanism)
+        other.general, other._kernels = None, {}
+        return other
+
     def closure(self, names: tuple[str, ...], landmark: str | None) -> Closure:
         """What leads from other coordinates, or from a landmark's path, to whole poses."""
         key = names, landmark

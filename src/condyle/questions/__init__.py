@@ -27,7 +27,8 @@ _FILES = {
     "inverse": "inverse motion balance system",
     "limited": "limited",
     "forward": "forward forward_system",
-    "linear": "linear",
+    "linear": "linear places",
+    "derivative": "derivative",
     "closure": "closure conditions",
     "configuration": "configuration survey",
     "pose": "encoders pose",
@@ -61,7 +62,7 @@ SOURCES = ("mechanism", "kinematics", "dynamics", "graph", "questions")
 # Questions that do not depend on formulation and route, or that twists serve best.
 GEOMETRY = (
     "allocation", "motion", "closure", "conditions", "configuration", "survey", "encoders", "pose",
-    "instant", "energy", "jacobians", "coriolis", "reactions", "linear", "forward_system",
+    "instant", "energy", "jacobians", "coriolis", "reactions", "linear", "places", "forward_system",
     "system",
 )  # fmt: skip
 
@@ -82,7 +83,8 @@ class Question:
 
     @staticmethod
     def about(structure: Structure, name: str, *details: Any) -> Question:
-        if name in GEOMETRY:
+        asked = details[1] if name == "derivative" else name
+        if asked in GEOMETRY:
             structure = replace(structure, formulation="virtual_power", route="core")
         return Question(name, structure, details)
 

@@ -49,7 +49,7 @@ def configuration(structure: Structure) -> Program:
 def add_configuration(b: Builder, platform: Platform) -> Lanes:
     """The configuration among a question's outputs; returns the dimensionless rows of J_W."""
     loops = loops_of(b, platform)
-    rows = _rows_of_J_W(b, platform, loops)
+    rows = rows_of_J_W(b, platform, loops)
     _add_loops(b, loops, OF_LOOPS)
     _add_singularity(b, loops, rows)
     contacts(b, platform).add_places(b)
@@ -69,7 +69,7 @@ def survey(structure: Structure, wanted: Collection[str] = (), at_pose: bool = F
     met = platform.placement.discriminant
     b.output("met", ca.SX(1) if met is None else met, "1")
     loops = loops_of(b, platform)
-    rows = _rows_of_J_W(b, platform, loops)
+    rows = rows_of_J_W(b, platform, loops)
     _add_loops(b, loops, ("discriminant", *(name for name in OF_LOOPS if name in wanted)))
     if "pose" in wanted:
         b.output("pose", platform.pose, ANGLE_UNITS)
@@ -90,7 +90,7 @@ def _add_loops(b: Builder, loops: list[Loop], names: Collection[str]) -> None:
         b.output(name, [value(loop) for loop in loops], unit)
 
 
-def _rows_of_J_W(b: Builder, platform: Platform, loops: list[Loop]) -> Lanes:
+def rows_of_J_W(b: Builder, platform: Platform, loops: list[Loop]) -> Lanes:
     """The dimensionless rows of J_W on the admissible twists, (m,) each.
 
     Householder's reflections take the contacts' k wrenches to the first k axes; the other axes are

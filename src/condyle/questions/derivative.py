@@ -1,55 +1,200 @@
-"""Exact directional derivatives of another question, by tangents of its graph.
+"""Exact derivatives of another question, by its graph.
 
-With unit directions as samples, all derivatives are one batch.
+Forward, along directions of ports and numbers; in unit directions of ports, whose intermediate
+values share all that does not depend on the direction; and reverse, from weights of results.
+Numbers are those of the kernel: PARAMETER and LANE stand among the ports for all of them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
-from ..graph.graph import Value
-from ..graph.program import Program, Variants
-from ..graph.transform import tangents
+from ..graph.graph import Graph, Value
+from ..graph.program import Output, Port, Program, Variants
+from ..graph.transform import adjoints, tangents
+from .numbers import Layout
+from .structure import Structure
 
 PREFIX = "d_"  # of a port's direction, and of a result's derivative along it
+WEIGHT, GRADIENT = "w_", "g_"  # of a result's weight, and of the derivative in a port
+PARAMETER, LANE = "parameter", "lane"
+NUMBERS = (PARAMETER, LANE)
+Entries = list[tuple[Value | None, ...]]  # of a port, as those of an `Output`
 
 
-def derivative(found: Program | Variants, by: Collection[str], of: Collection[str]) -> Program:
-    """A question with additional ports `d_<port>` and results `d_<result>`, without checks.
+def derivative(
+    structure: Structure,
+    how: str,
+    question: str,
+    details: tuple[object, ...],
+    by: tuple[str, ...],
+    of: tuple[str, ...],
+) -> Program:
+    """A question's derivatives of results `of` by ports and numbers `by`.
 
-    Args: by: ports;  of: results.
+    Args: how: directional, slopes or gradient: the functions of this file.
     """
-    program = found.robust or found.main if isinstance(found, Variants) else found
+    from . import written
+
+    found = written(question)(structure, *details)
+    return HOW[how](found, by, of, Layout.of(structure))
+
+
+def directional(
+    found: Program | Variants,
+    by: Collection[str],
+    of: Collection[str],
+    layout: Layout | None = None,
+) -> Program:
+    """A question with additional ports `d_<port>` and results `d_<result>`, without checks."""
+    program = _checkless(found, of)
     graph, columns, ports = program.graph, program.columns, list(program.ports)
     seeds: dict[Value, Value] = {}
-    lanes = sum(program.counts)
-    for port in program.ports:
-        if port.name not in by:
-            continue
-        ports.append(replace(port, name=PREFIX + port.name, start=columns))
-        for i in range(port.size):
-            if not port.lanes:
-                seeds[graph.leaf("input", port.start + i)] = graph.leaf("input", columns + i)
-                continue
-            before = i * lanes
-            for group, count in enumerate(program.counts):
-                here, along = (
-                    graph.leaf("lane_input", group, start + before, group=group)
-                    for start in (port.start, columns)
-                )
-                seeds[here] = along
-                before += count
-        columns += port.size * (lanes if port.lanes else 1)
-    chosen = [o for o in program.outputs if o.name in of]
-    roots = [v for o in chosen for entry in o.entries for v in entry if v is not None]
-    moved: Mapping[Value | None, Value | None] = {
-        None: None, **dict(zip(roots, tangents(graph, roots, seeds), strict=True))
-    }  # fmt: skip
+    for name, lanes, entries in _places(program, by, layout):
+        ports.append(Port(PREFIX + name, len(entries), "", lanes, columns))
+        direction = _entries(program, ports[-1])
+        for here, towards in zip(entries, direction, strict=True):
+            pairs = zip(here, towards, strict=True)
+            seeds |= {v: d for v, d in pairs if v is not None and d is not None}
+        columns += _width(program, ports[-1])
+    moved = tangents(graph, program.roots, seeds)
+    where = dict(zip(program.roots, moved, strict=True))
     outputs = tuple(
         replace(
-            o, name=PREFIX + o.name, entries=tuple(tuple(moved[v] for v in e) for e in o.entries)
+            o,
+            name=PREFIX + o.name,
+            entries=tuple(_moved(e, where) for e in o.entries),
         )
-        for o in chosen
+        for o in program.outputs
     )
-    return Program(graph, program.counts, columns, tuple(ports), outputs, ())
+    return replace(program, columns=columns, ports=tuple(ports), outputs=outputs)
+
+
+def slopes(
+    found: Program | Variants, by: Collection[str], of: Collection[str], layout: Layout
+) -> Program:
+    """Results `<result>/<port>`, with the entries of the port as a last dimension.
+
+    Ports of lanes are asked for shared results alone, and give lanes.
+    """
+    program = _checkless(found, of)
+    graph, one, outputs = program.graph, program.graph.const(1.0), []
+    for name, lanes, entries in _places(program, by, layout):
+        for o in program.outputs:
+            assert not (o.lanes and lanes), "lanes by lanes"
+            shape = (*o.shape, len(entries))
+            if lanes:
+                leaves = [v for e in entries for v in e if v is not None]
+                rows = [
+                    adjoints(graph, [v], [one], leaves, program.counts)
+                    for (v,) in o.entries
+                    if v is not None
+                ]
+                found_ = [dict(zip(leaves, row, strict=True)) for row in rows]
+                own = [_moved(e, row) for row in found_ for e in entries]
+            else:
+                roots = [v for e in o.entries for v in e if v is not None]
+                moved = [
+                    dict(zip(roots, tangents(graph, roots, _unit(graph, entries, i)), strict=True))
+                    for i in range(len(entries))
+                ]
+                own = [_moved(e, to) for e in o.entries for to in moved]
+            outputs.append(Output(f"{o.name}/{name}", shape, "", lanes or o.lanes, tuple(own)))
+    return replace(program, outputs=tuple(outputs))
+
+
+def gradient(
+    found: Program | Variants, by: Collection[str], of: Collection[str], layout: Layout
+) -> Program:
+    """Results `g_<port>`: the derivatives of sum w . result, with ports `w_<result>`."""
+    program = _checkless(found, of)
+    columns, ports = program.columns, list(program.ports)
+    roots: list[Value] = []
+    weights: list[Value] = []
+    for o in program.outputs:
+        ports.append(Port(WEIGHT + o.name, len(o.entries), "", o.lanes, columns))
+        for entry, weight in zip(o.entries, _entries(program, ports[-1]), strict=True):
+            pairs = [(v, w) for v, w in zip(entry, weight, strict=True) if v is not None]
+            roots += [v for v, _ in pairs]
+            weights += [w for _, w in pairs if w is not None]
+        columns += _width(program, ports[-1])
+    asked = _places(program, by, layout)
+    leaves = [v for *_, entries in asked for e in entries for v in e if v is not None]
+    to = dict(
+        zip(leaves, adjoints(program.graph, roots, weights, leaves, program.counts), strict=True)
+    )
+    outputs = tuple(
+        Output(
+            GRADIENT + name,
+            (len(entries),),
+            "",
+            lanes,
+            tuple(_moved(e, to) for e in entries),
+        )
+        for name, lanes, entries in asked
+    )
+    return replace(program, columns=columns, ports=tuple(ports), outputs=outputs)
+
+
+HOW = {"directional": directional, "slopes": slopes, "gradient": gradient}
+
+
+def _checkless(found: Program | Variants, of: Collection[str]) -> Program:
+    """The results of a question's robust program alone."""
+    program = found.robust or found.main if isinstance(found, Variants) else found
+    return replace(program, outputs=tuple(o for o in program.outputs if o.name in of), checks=())
+
+
+def _places(
+    program: Program, by: Collection[str], layout: Layout | None
+) -> list[tuple[str, bool, Entries]]:
+    """Ports and numbers: name, whether they are of lanes, entries."""
+    found = [(p.name, p.lanes, _entries(program, p)) for p in program.ports if p.name in by]
+    graph = program.graph
+    if layout is not None:
+        shared, lanes = layout.sizes
+        if PARAMETER in by:
+            found.append((PARAMETER, False, [(graph.leaf("parameter", i),) for i in range(shared)]))
+        if LANE in by:
+            rows: Entries = [
+                tuple(
+                    graph.leaf("lane", g, i, group=g) if i < size else None
+                    for g, size in enumerate(lanes)
+                )
+                for i in range(max(lanes))
+            ]
+            found.append((LANE, True, rows))
+    return found
+
+
+def _entries(program: Program, port: Port) -> Entries:
+    graph = program.graph
+    if not port.lanes:
+        return [(graph.leaf("input", port.start + i),) for i in range(port.size)]
+    found: Entries = []
+    for i in range(port.size):
+        start, row = port.start + i * sum(program.counts), []
+        for group, count in enumerate(program.counts):
+            row.append(graph.leaf("lane_input", group, start, group=group))
+            start += count
+        found.append(tuple(row))
+    return found
+
+
+def _moved(
+    entry: tuple[Value | None, ...], where: Mapping[Value, Value]
+) -> tuple[Value | None, ...]:
+    return tuple(v if v is None else where[v] for v in entry)
+
+
+def _width(program: Program, port: Port) -> int:
+    return port.size * (sum(program.counts) if port.lanes else 1)
+
+
+def _unit(
+    graph: Graph, entries: Sequence[tuple[Value | None, ...]], i: int
+) -> Mapping[Value, Value]:
+    return {
+        v: graph.const(float(i == j)) for j, e in enumerate(entries) for v in e if v is not None
+    }

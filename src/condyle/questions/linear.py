@@ -1,12 +1,8 @@
-"""Derivatives of the equations of motion about a state, exact, by tangents of the graph.
+"""What is differentiated about a known solution: equations that hold there, with its unknowns held.
 
-With the balance in twists
-
-    r(q, q', q'', lambda, tau) = Q - J^T tau - N lambda + T |lambda| = 0
-
-the accelerations' derivatives are those of an implicit function, and so six equations a state:
-
-    [r_q'' r_lambda] d(q'', lambda) = - (r_q dq + r_q' dq' - J^T dtau).
+Derivatives of the unknowns follow from the implicit function theorem, whatever found them. The pose
+is a start that meets the contacts: one Newton step, which changes nothing, closes them again from
+q, so that derivatives in q and in numbers of contacts move the dependent coordinates too.
 """
 
 from __future__ import annotations
@@ -14,36 +10,84 @@ from __future__ import annotations
 import casadi as ca
 
 from ..graph.program import Program
-from ..kinematics.constraints import Placement
+from ..kinematics.chain import FAMILIES
+from ..kinematics.constraints import Placement, contact_frame, indices, residuals, solve_small
 from ..kinematics.parasitic import whole_motion
 from ..kinematics.rotation import Bryant
 from .builder import Builder
+from .configuration import loops_of, on_rates, rows_of_J_W
 from .equations import Wrench, equations
 from .numbers import contact_symbols
 from .platform import ANGLE_UNITS, Platform, contacts, independent_indices
+from .pose import without_turns
 from .structure import Structure
 
 
 def linear(structure: Structure) -> Program:
-    """At whole poses that meet the contacts; ports q1, q2 and contact_force along unit normals."""
-    b, s = Builder(structure), structure
-    m, k = s.m, len(s.contacts)
-    pose = b.sample("pose", 6, ANGLE_UNITS)
-    q1, q2, force = b.sample("q1", m), b.sample("q2", m), b.sample("contact_force", k, "N")
+    """The balance in twists, and what multipliers y of it make of efforts and contact forces:
+
+        residual = Q - J^T tau - D lambda,    along = J y,    across = D^T y,
+
+    D = N - sign(lambda) T, with J, N and T themselves. Ports: q and a pose of it, q1, q2, the load,
+    effort tau, contact_force lambda along unit normals, and multiplier y.
+    """
+    b = Builder(structure)
+    platform = _placed(b, rates=True)
+    k, load = len(structure.contacts), Wrench.of(b)
     effort = b.lane_sample("effort", unit="N m or N")
-    placement = Placement(pose[:3], Bryant.of(pose[3:]), None)
-    motion = whole_motion(contact_symbols(s, b.parameter), s.dependent, placement, q1, q2)
-    q = pose[independent_indices(s.dependent)]
-    platform = Platform(q, q1, q2, pose, placement, motion)
-    eq = equations(b, platform, Wrench.of(b), "virtual_power", "core", lump=True)
-    carried = b.total([c.row * t for c, t in zip(eq.chains, effort, strict=True)])
+    force, y = b.sample("contact_force", k, "N"), b.sample("multiplier", 6)
+    eq = equations(b, platform, load, "virtual_power", "core", lump=True)
     touch = contacts(b, platform)
-    r = b.cut(eq.Q - carried - touch.N @ force + touch.T @ ca.fabs(force))
-    # The pose follows q along M_J.
-    b.output("by_q", b.jacobian(r, pose) @ motion.M_J, "", 6, m)
-    b.output("by_q1", b.jacobian(r, q1), "", 6, m)
-    b.output("by_q2", b.jacobian(r, q2), "", 6, m)
-    signs = ca.diag(ca.sign(force)) if k else ca.SX(0, 0)
-    b.output("by_force", touch.T @ signs - touch.N, "", 6, k)
-    b.output("J", [c.row for c in eq.chains], "", 6)
+    D = touch.N - touch.T @ ca.diag(ca.sign(force)) if k else touch.N
+    rows = [chain.row for chain in eq.chains]
+    carried = b.total([row * tau for row, tau in zip(rows, effort, strict=True)])
+    b.output("residual", eq.Q - carried - D @ force, "N, N m", 6)
+    b.output("along", [ca.dot(row, y) for row in rows], "")
+    b.output("across", D.T @ y, "", k)
+    b.output("J", rows, "", 6)
+    b.output("N", touch.N.T, "", k, 6)
+    b.output("T", touch.T.T, "", k, 6)
     return b.finish()
+
+
+def places(structure: Structure) -> Program:
+    """Pose, joints and contacts of q, and what the singularity ratio is made of.
+
+    pull is the gradient, (m,), of half the sum of squares that forward kinematics minimises: of
+    joints less readings, port `reading`, those that turn multiplied by the characteristic length.
+    """
+    b = Builder(structure)
+    platform, m = _placed(b, rates=False), structure.m
+    reading = b.lane_sample("reading", unit="rad or m")
+    loops, length = loops_of(b, platform), b.parameter("length")
+    b.output("pose", platform.pose, ANGLE_UNITS)
+    b.output("joint", [loop.q_r[0] for loop in loops], "rad or m")
+    b.output("contact_point", contacts(b, platform).point.T, "m", len(structure.contacts), 3)
+    b.output("transmission", [loop.transmission for loop in loops], "1")
+    b.output("J_W", rows_of_J_W(b, platform, loops), "1", m)
+    rates, terms = on_rates(b, platform, [loop.J for loop in loops]), []
+    for kind, loop, given, rate in zip(structure.families, loops, reading, rates, strict=True):
+        turns = FAMILIES[kind].joint_unit == "rad"
+        left = loop.q_r[0] - given
+        own = length * length * without_turns(left) if turns else left
+        terms.append(own * rate)
+    b.output("pull", b.total(terms), "m^2", m)
+    return b.finish()
+
+
+def _placed(b: Builder, rates: bool) -> Platform:
+    """From q and a pose of it, ports q, q1, q2 and pose."""
+    s, m = b.structure, b.structure.m
+    dep, ind = indices(s.dependent), independent_indices(s.dependent)
+    start, q = b.sample("pose", 6, ANGLE_UNITS), b.sample("q", m)
+    q1, q2 = (b.sample(n, m) if rates else ca.SX.zeros(m) for n in ("q1", "q2"))
+    found = contact_symbols(s, b.parameter)
+    pose = ca.SX(start)
+    pose[ind] = q
+    if dep:
+        bryant = Bryant.of(pose[3:])
+        C = contact_frame(found, pose[:3], bryant.rotation()).N.T @ bryant.twist_jacobian()
+        pose[dep] -= solve_small(C[:, dep], residuals(found, pose))
+    placement = Placement(pose[:3], Bryant.of(pose[3:]), None)
+    motion = whole_motion(found, s.dependent, placement, q1, q2)
+    return Platform(q, q1, q2, pose, placement, motion)

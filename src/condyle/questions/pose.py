@@ -138,7 +138,7 @@ def step_at(
     for group, kind in enumerate(b.structure.families):
         turns = FAMILIES[kind].joint_unit == "rad"
         left = joint[group] - at.joint[group]
-        residual.append(_without_turns(left) if turns else left)
+        residual.append(without_turns(left) if turns else left)
         own = b.lane(group, "mask") * (ca.SX(1) if turns else 1 / length)
         weights.append(own if weight is None else own * weight[group])
         rows.append(weights[-1] * (unit[free] * (at.M_J.T @ at.J[group])))
@@ -230,7 +230,7 @@ def _near(contacts: Sequence[ContactSymbols], pose: ca.SX) -> list[ContactSymbol
     return [c.started_at(c.at(pose[:3], R)) for c in contacts]
 
 
-def _without_turns(difference: ca.SX) -> ca.SX:
+def without_turns(difference: ca.SX) -> ca.SX:
     """An angle's difference without whole turns."""
     turn = 2 * math.pi
     return difference - turn * ca.floor(difference / turn + 0.5)

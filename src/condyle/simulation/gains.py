@@ -33,7 +33,7 @@ from ..graph.program import Variants
 from ..mechanism.home import characteristic_length
 from ..model.model import Model
 from ..questions import written
-from ..questions.derivative import PREFIX, derivative
+from ..questions.derivative import PREFIX, directional
 from ..questions.numbers import Layout, specialised
 from ..questions.structure import structure_of
 from .columns import Columns
@@ -310,7 +310,7 @@ class Derivative:
         structure = structure_of(model.mechanism, model.formulation, model.route)
         numbers = Layout.of(structure).numbers(model.mechanism)
         structure = specialised(structure, numbers)
-        program = derivative(written(question)(structure, *details), by, of)
+        program = directional(written(question)(structure, *details), by, of)
         self._kernel, self._columns, self.by = NumpyKernel(Variants(program), numbers), columns, by
 
     def __call__(self) -> dict[str, np.ndarray]:
