@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,13 +13,14 @@ from ..errors import InputError, as_flag, did_you_mean, shown
 from ..kinematics.constraints import indices
 from ..questions.derivative import GRADIENT, LANE, NUMBERS, PARAMETER, PREFIX, WEIGHT
 from ..status import Status
-from .arguments import Argument, Lead
+from .arguments import Argument, Arguments, Lead
+from .forward_dynamics import ForwardDynamics
+from .forward_kinematics import ForwardKinematics
 from .implicit import Held, accelerated, balanced, placed, read_back, samples_first
+from .inverse_dynamics import InverseDynamics
 from .model_result import ModelResult
+from .poses import Poses
 from .system import System
-
-if TYPE_CHECKING:
-    from .model import Model
 
 Array = np.ndarray
 Arrays = dict[str, Array]
@@ -103,14 +104,24 @@ class _Solved:
 class Derived:
     """Takes derivatives of one model's results; see `Model.derivatives`."""
 
-    def __init__(self, model: Model) -> None:
-        self._model, self._own = model, model._arguments
+    def __init__(
+        self,
+        system: System,
+        arguments: Arguments,
+        poses: Poses,
+        inverse: Callable[[], InverseDynamics],
+        forward: Callable[[], ForwardDynamics],
+        readings: Callable[[], ForwardKinematics],
+    ) -> None:
+        """Args: inverse, forward, readings: what finds solutions, made when it is first wanted."""
+        self._system, self._own, self._poses = system, arguments, poses
+        self._inverse, self._forward, self._readings = inverse, forward, readings
 
     # -- what a model offers -----------------------------------------------------------------
 
     def matrices(self, of: Any, wrt: Any, given: Mapping[str, Any], zeros: bool) -> Derivatives:
         """As `Model.derivatives`."""
-        asked = _Asked.of(self._model, of, wrt, given, zeros)
+        asked = _Asked.of(self._system, of, wrt, given, zeros)
         lead, count, ports = self._samples(given)
         values: dict[Any, Array] = {}
         status = np.zeros(count, dtype=np.uint8)
@@ -141,7 +152,7 @@ class Derived:
         """As `Model.jvp`."""
         if not isinstance(tangents, Mapping):
             raise InputError(f"tangents: expected arrays by name, got {shown(tangents)}")
-        asked = _Asked.of(self._model, of, tuple(tangents), given, zeros)
+        asked = _Asked.of(self._system, of, tuple(tangents), given, zeros)
         lead, count, ports = self._samples(given)
         along = {name: asked.rows(name, a, lead, count) for name, a in tangents.items()}
         values: dict[Any, Array] = {}
@@ -171,7 +182,7 @@ class Derived:
         """As `Model.vjp`."""
         names = _names(of, "of")
         weights = weights if isinstance(weights, Mapping) else dict.fromkeys(names, weights)
-        asked = _Asked.of(self._model, of, wrt, given, zeros)
+        asked = _Asked.of(self._system, of, wrt, given, zeros)
         lead, count, ports = self._samples(given)
         values = {by: np.zeros((count, asked.sizes[by])) for by in asked.wrt}
         status = np.zeros(count, dtype=np.uint8)
@@ -233,29 +244,29 @@ class Derived:
     def _solved(
         self, kind: Kind, of: tuple[str, ...], ports: Arrays, count: int, numbers: bool
     ) -> _Solved:
-        model = self._model
-        system = model.system.wide if numbers else model.system
+        own = self._system
+        system = own.wide if numbers else own
         load = {name: ports[name] for name in ("force", "moment", "point")}
         wrench, at = np.hstack([load["force"], load["moment"]]), load["point"]
         if kind is READINGS:
-            found = model.forward_kinematics(ports["joint"])
+            found = self._readings().solve(ports["joint"])
             status = np.where(found.status == 0, Status.ok, Status.unreachable).astype(np.uint8)
         elif kind is PLACES:
-            found = model.inverse_kinematics(ports["q"])
+            found = self._poses.inverse_kinematics(ports["q"], None, None)
             status = found.status.astype(np.uint8)
         elif kind is INVERSE:
             state = [ports[n] for n in ("q", "q1", "q2")]
-            found = model._inverse.many(state, wrench, at, ("pose",), None)
+            found = self._inverse().many(state, wrench, at, ("pose",), None)
             status = found.status
         else:
             state = [ports[n] for n in ("q", "q1", "effort")]
-            found = model._forward.many(state, wrench, at, ("pose",), None)
+            found = self._forward().many(state, wrench, at, ("pose",), None)
             status = found.status
         good = np.flatnonzero(status == Status.ok)
         if not good.size:
             return _Solved(None, good, status)
         pose = found.pose[good]
-        places = {"pose": pose, "q": pose[:, indices(model.independent)]}
+        places = {"pose": pose, "q": pose[:, indices(own.independent)]}
         if kind in (READINGS, PLACES):
             reading = (
                 ports["joint"] if kind is READINGS else np.zeros((count, self._own.effort.size))
@@ -268,12 +279,10 @@ class Derived:
             error = np.fmax(found.bound[good], 0.0)
             if kind is INVERSE:
                 places |= {"q2": ports["q2"][good], "effort": found.effort[good]}
-                held = balanced(system, places, model._inverse.distributor, error)
+                held = balanced(system, places, self._inverse().distributor, error)
             else:
                 places |= {"q2": found.acceleration[good], "effort": ports["effort"][good]}
-                rubs = np.array(
-                    [c.friction.coefficient > 0 for c in model.mechanism.contacts], bool
-                )
+                rubs = np.array([c.friction.coefficient > 0 for c in own.mechanism.contacts], bool)
                 held = accelerated(system, places, rubs, error)
         status = status.copy()
         status[good[held.kink]] = Status.kink
@@ -349,7 +358,7 @@ class Derived:
 
     def _as_ports(self, numbers: Array) -> Arrays:
         """Directions of the kernel's numbers, (N, K), as ports take them."""
-        system = self._model.system.wide
+        system = self._system.wide
         shared = len(system.numbers.parameters)
         groups = self._groups(system)
         lanes = np.zeros((len(numbers), max(s for _, s in groups), system.structure.n))
@@ -371,7 +380,7 @@ class Derived:
     # -- shapes ------------------------------------------------------------------------------
 
     def _shape(self, name: str) -> tuple[int, ...]:
-        m, k = self._own.q.size, len(self._model.mechanism.contacts)
+        m, k = self._own.q.size, len(self._system.mechanism.contacts)
         n = self._own.effort.size
         known: dict[str, tuple[int, ...]] = {
             "q": (m,), "acceleration": (m,), "effort": (n,), "joint": (n,), "contact_force": (k,),
@@ -401,12 +410,12 @@ class _Asked:
     J: Array
 
     @staticmethod
-    def of(model: Model, of: Any, wrt: Any, given: Mapping[str, Any], zeros: bool) -> _Asked:
+    def of(system: System, of: Any, wrt: Any, given: Mapping[str, Any], zeros: bool) -> _Asked:
         zeros = as_flag(zeros, "zeros")
         kinds = _kinds(_names(of, "of"), given)
         states = {
-            "q": (m := len(model.independent),), "v": (m,), "a": (m,), "wrench": (6,), "at": (3,),
-            "effort": (n := len(model.mechanism.chains),), "joint": (n,),
+            "q": (m := len(system.independent),), "v": (m,), "a": (m,), "wrench": (6,), "at": (3,),
+            "effort": (n := len(system.mechanism.chains),), "joint": (n,),
         }  # fmt: skip
         asked, shapes, units = _names(wrt, "wrt"), dict[str, tuple[int, ...]](), dict[str, str]()
         for by in asked:

@@ -151,7 +151,14 @@ class Model:
 
     @cached_property
     def _derived(self) -> Derived:
-        return Derived(self)
+        return Derived(
+            self.system,
+            self._arguments,
+            self.poses,
+            lambda: self._inverse,
+            lambda: self._forward,
+            lambda: self._forward_kinematics,
+        )
 
     @cached_property
     def _unchecked(self) -> Unchecked:
