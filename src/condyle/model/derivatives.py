@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, as_flag, did_you_mean, shown
+from ..graph.transform import LANE_NUMBERS, NUMBERS
 from ..kinematics.constraints import indices
-from ..questions.derivative import GRADIENT, LANE, NUMBERS, PARAMETER, PREFIX, WEIGHT
+from ..questions.derivative import GRADIENT, OF_NUMBERS, PREFIX, WEIGHT
 from ..status import Status
 from .arguments import Argument, Arguments, Lead
 from .forward_dynamics import ForwardDynamics
@@ -205,12 +206,12 @@ class Derived:
                 w = w.reshape(count, -1)[s.good]
                 total += (w[:, None] @ s.held.maps[name])[:, 0]
             states = [b for b in asked.wrt if b in kind.by]
-            by = [p for b in states for p in PORTS[b]] + list(NUMBERS if asked.numbers else ())
+            by = [p for b in states for p in PORTS[b]] + list(OF_NUMBERS if asked.numbers else ())
             found = self._gradient(s.held, total, tuple(by))
             for b in states:
                 values[b][s.good] += np.concatenate([found[p] for p in PORTS[b]], axis=1)
             if asked.numbers:
-                block = found[PARAMETER] @ asked.J
+                block = found[NUMBERS] @ asked.J
                 for b, at in asked.columns.items():
                     values[b][s.good] += block[:, at]
         shaped = {by: a.reshape(*lead, *asked.shapes[by]) for by, a in values.items()}
@@ -315,7 +316,7 @@ class Derived:
         return np.concatenate(flat, axis=1)
 
     def _gradient(self, held: Held, weights: Array, by: tuple[str, ...]) -> Arrays:
-        """Of weights (N, rows) . rows by each port, (N, size); all numbers under PARAMETER."""
+        """Of weights (N, rows) . rows by each port, (N, size); all numbers under NUMBERS."""
         kernel = held.system.derivative("gradient", held.question, by, held.rows)
         ports, start = dict(held.ports), 0
         for port in kernel.interface.ports:
@@ -327,13 +328,13 @@ class Derived:
                 ports[port.name] = block
                 start += width
         values = kernel.run(ports).values
-        found = {p: _flat(values[GRADIENT + p]) for p in by if p not in NUMBERS}
-        if PARAMETER in by:
-            parts = [_flat(values[GRADIENT + PARAMETER])]
-            lanes = values[GRADIENT + LANE]
+        found = {p: _flat(values[GRADIENT + p]) for p in by if p not in OF_NUMBERS}
+        if NUMBERS in by:
+            parts = [_flat(values[GRADIENT + NUMBERS])]
+            lanes = values[GRADIENT + LANE_NUMBERS]
             for at, size in self._groups(held.system):
                 parts.append(_flat(lanes[:size][:, at]))
-            found[PARAMETER] = np.concatenate(parts, axis=1)
+            found[NUMBERS] = np.concatenate(parts, axis=1)
         return found
 
     def _by_numbers(self, held: Held, of: Sequence[str], J: Array) -> Arrays:
@@ -352,7 +353,7 @@ class Derived:
             return found
         for name in of:
             for i in range(sizes[name]):
-                by = self._gradient(held, held.maps[name][:, i], NUMBERS)[PARAMETER]
+                by = self._gradient(held, held.maps[name][:, i], OF_NUMBERS)[NUMBERS]
                 found[name][:, i] = by @ J
         return found
 
@@ -367,7 +368,7 @@ class Derived:
             end = start + size * len(at)
             lanes[:, :size, at] = numbers[:, start:end].reshape(len(numbers), size, len(at))
             start = end
-        return {PARAMETER: numbers[:, :shared], LANE: lanes}
+        return {NUMBERS: numbers[:, :shared], LANE_NUMBERS: lanes}
 
     def _groups(self, system: System) -> list[tuple[Array, int]]:
         """Of each group: its chains in the order of the file, and how many numbers each has."""

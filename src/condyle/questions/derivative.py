@@ -2,7 +2,8 @@
 
 Forward, along directions of ports and numbers; in unit directions of ports, whose intermediate
 values share all that does not depend on the direction; and reverse, from weights of results.
-Numbers are those of the kernel: PARAMETER and LANE stand among the ports for all of them.
+Numbers are those of the kernel: `numbers` and `lane_numbers` stand among the ports for all of
+them, as if these were ports.
 """
 
 from __future__ import annotations
@@ -12,14 +13,13 @@ from dataclasses import replace
 
 from ..graph.graph import Graph, Value
 from ..graph.program import Output, Port, Program, Variants
-from ..graph.transform import adjoints, tangents
+from ..graph.transform import LANE_NUMBERS, NUMBERS, adjoints, tangents
 from .numbers import Layout
 from .structure import Structure
 
 PREFIX = "d_"  # of a port's direction, and of a result's derivative along it
 WEIGHT, GRADIENT = "w_", "g_"  # of a result's weight, and of the derivative in a port
-PARAMETER, LANE = "parameter", "lane"
-NUMBERS = (PARAMETER, LANE)
+OF_NUMBERS = (NUMBERS, LANE_NUMBERS)  # names of the kernel's numbers among ports
 Entries = list[tuple[Value | None, ...]]  # of a port, as those of an `Output`
 
 
@@ -154,9 +154,9 @@ def _places(
     graph = program.graph
     if layout is not None:
         shared, lanes = layout.sizes
-        if PARAMETER in by:
-            found.append((PARAMETER, False, [(graph.leaf("parameter", i),) for i in range(shared)]))
-        if LANE in by:
+        if NUMBERS in by:
+            found.append((NUMBERS, False, [(graph.leaf("parameter", i),) for i in range(shared)]))
+        if LANE_NUMBERS in by:
             rows: Entries = [
                 tuple(
                     graph.leaf("lane", g, i, group=g) if i < size else None
@@ -164,7 +164,7 @@ def _places(
                 )
                 for i in range(max(lanes))
             ]
-            found.append((LANE, True, rows))
+            found.append((LANE_NUMBERS, True, rows))
     return found
 
 

@@ -68,14 +68,6 @@ class Layout:
         ]
         return Layout(structure, _slots(sizes), lanes)
 
-    @property
-    def sizes(self) -> tuple[int, tuple[int, ...]]:
-        """Of the shared numbers, and of a chain's in each group."""
-        shared, *lanes = (
-            sum(size for _, size in slots.values()) for slots in (self.parameters, *self.lanes)
-        )
-        return shared, tuple(lanes)
-
     @staticmethod
     def of_file(structure: Structure) -> Layout:
         """Numbers as a mechanism file has them, which `file_numbers` makes the others of."""
