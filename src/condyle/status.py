@@ -49,6 +49,7 @@ class Status(IntEnum):
         "derivatives are of one side: a limit or a contact's sign is about to change",
         "sample",
     )
+    refused = 10, "a variant whose numbers are those of no mechanism", "sample"
 
 
 STATUS_NAMES = tuple(status.name for status in Status)

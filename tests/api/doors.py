@@ -243,6 +243,9 @@ DOORS: dict[str, Door] = {
     "Model.with_mechanism": Door(
         {"mechanism": lambda stage: stage.mechanism}, model="mechanism", words=("general",)
     ),
+    "Model.variants": Door(
+        {"table": {"platform.mass": [0.2, 0.3]}}, words=("platform.mass", "mechanism"), calls=20
+    ),
     "Model.kernel": Door({"question": "inverse"}),
     "Model.unchecked": Door(),
     "open_solution": Door({"path": lambda stage: stage.saved("solution")}, words=FILES, calls=20),

@@ -40,7 +40,7 @@ def paths(size: float) -> tuple[np.ndarray, ...]:
 
 
 def kernel_alone(closure: Closure, s: np.ndarray, s1: np.ndarray, s2: np.ndarray) -> tuple:
-    answer = closure._kernel.run({"s": s, "s1": s1, "s2": s2})
+    answer = closure.kernel.run({"s": s, "s1": s1, "s2": s2})
     names = ("pose", "pose_rate", "pose_acceleration")
     return [answer.values[name].T for name in names], answer.status
 

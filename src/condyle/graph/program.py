@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -234,3 +234,31 @@ class Numbers:
     def none(order: tuple[int, ...]) -> Numbers:
         """Of a program that takes them as ports."""
         return Numbers(np.empty(0), (), (), order)
+
+
+@dataclass(frozen=True)
+class ManyNumbers:
+    """Numbers of V mechanisms of one structure: as of `Numbers`, with a leading axis."""
+
+    parameters: np.ndarray
+    lanes: tuple[np.ndarray, ...]
+    padding: tuple[np.ndarray, ...]
+    order: tuple[int, ...]
+
+    @staticmethod
+    def of(each: Sequence[Numbers]) -> ManyNumbers:
+        """Of mechanisms one by one, at least one."""
+        groups = range(len(each[0].lanes))
+        lanes, padding = (
+            tuple(np.stack([getattr(one, name)[g] for one in each]) for g in groups)
+            for name in ("lanes", "padding")
+        )
+        parameters = np.stack([one.parameters for one in each])
+        return ManyNumbers(parameters, lanes, padding, each[0].order)
+
+    def __len__(self) -> int:
+        return len(self.parameters)
+
+    def __getitem__(self, i: int) -> Numbers:
+        lanes, padding = (tuple(own[i] for own in each) for each in (self.lanes, self.padding))
+        return Numbers(self.parameters[i], lanes, padding, self.order)

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ..backends.choose import Backend
-from ..backends.kernel import Arrays, Kernel
+from ..backends.kernel import Answer, Arrays, Kernel
 from ..backends.numpy_kernel import NumpyKernel
 from ..errors import InputError, did_you_mean
 from ..graph.program import Numbers
@@ -39,6 +39,16 @@ class PlatformMotion:
     rate: Array
     acceleration: Array
     reached: Array
+
+    @staticmethod
+    def of(answer: Answer) -> PlatformMotion:
+        """From what a question answers; NaN where the conditions are not met."""
+        reached = answer.status == Status.ok
+        found = [answer.values[name].T for name in MOTION]
+        if not reached.all():
+            for a in found:
+                a[~reached] = np.nan
+        return PlatformMotion(found[0], found[1], found[2], reached)
 
     def answer(self) -> tuple[Arrays, Array]:
         """As questions answer: arrays by name, samples last, and statuses."""
@@ -144,34 +154,31 @@ class Closure:
         else:
             require_landmark(mechanism, landmark)
             self.names = ()
-        structure = lender._robust[0] if lender else structure_of(mechanism)
+        structure = lender.structure if lender else structure_of(mechanism)
         numbers = Layout.of(structure).numbers(mechanism, landmark)
         if not general:
             structure = specialised(structure, numbers)
         if lender:
-            self._kernel: Kernel = lender._kernel.renumbered(numbers)
+            self.kernel: Kernel = lender.kernel.renumbered(numbers)
         else:
             question = Question.about(structure, "closure", self.names)
-            self._kernel = (backend or Backend()).kernel(question.key, question.variants, numbers)
-        self._robust: tuple[Structure, Numbers, tuple[str, ...]] = (structure, numbers, self.names)
+            self.kernel = (backend or Backend()).kernel(question.key, question.variants, numbers)
+        self.structure: Structure = structure
+        self._numbers = numbers
 
     @cached_property
-    def _followed(self) -> FollowedClosure:
-        return FollowedClosure.of(*self._robust)
+    def followed(self) -> FollowedClosure:
+        """Where samples go that the kernel cannot vouch for."""
+        return FollowedClosure.of(self.structure, self._numbers, self.names)
 
     def solve(
         self, s: np.ndarray, s1: np.ndarray, s2: np.ndarray, threads: int | None = None
     ) -> PlatformMotion:
         """X_EE and its rates where g = s, g' = s1, g'' = s2, (N, 6 - k) each."""
         inputs = {"s": s, "s1": s1, "s2": s2}
-        answer = self._kernel.run(inputs, threads)
-        answer.mend(inputs, lambda few: self._followed.solve(*few.values()).answer())
-        reached = answer.status == Status.ok
-        found = [answer.values[name].T for name in MOTION]
-        if not reached.all():
-            for a in found:
-                a[~reached] = np.nan
-        return PlatformMotion(found[0], found[1], found[2], reached)
+        answer = self.kernel.run(inputs, threads)
+        answer.mend(inputs, lambda few: self.followed.solve(*few.values()).answer())
+        return PlatformMotion.of(answer)
 
 
 def require_independent(mechanism: Mechanism, names: Sequence[str]) -> None:

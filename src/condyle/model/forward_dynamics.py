@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -53,6 +54,7 @@ class ForwardDynamics(Dynamics):
     ) -> ModelResult:
         names, own = requested(outputs, OUTPUTS), self._arguments
         lead, inputs = own.samples((own.q, own.v, own.effort), state, wrench, at)
+        inputs |= self._system.labels(math.prod(lead))
         asked = {"contact", "bound", *(OUTPUTS[name] for name in names)}
         kernel = self._system.kernel("forward", tuple(name for name in ASKED if name in asked))
         answer = kernel.run(inputs, threads)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from typing import Any
 
@@ -55,6 +56,7 @@ class InverseDynamics(Dynamics):
     ) -> ModelResult:
         names, own = requested(outputs, OUTPUTS), self._arguments
         lead, inputs = own.samples((own.q, own.v, own.a), state, wrench, at)
+        inputs |= self._system.labels(math.prod(lead))
         answer = self._solve(inputs, {OUTPUTS[name] for name in names}, threads)
         values, status = answer.values, answer.status
         found = {name: values[name].T for name in self.results}
@@ -64,7 +66,8 @@ class InverseDynamics(Dynamics):
         found["status"] = status
         if "ambiguous" in names:
             values["ambiguous"] = self._ambiguous(inputs, found["effort"], status)
-        more = {name: self._read(name, values, status) for name in names}
+        length = self._system.lengths(inputs)
+        more = {name: self._read(name, values, status, length) for name in names}
         return ModelResult(**found, **more).shaped(lead)
 
     def _ambiguous(self, inputs: Mapping[str, Array], effort: Array, status: Array) -> Array:
@@ -76,14 +79,14 @@ class InverseDynamics(Dynamics):
             found[good] = self._system.robust.forward_statuses(given) == Status.ambiguous
         return found
 
-    def _read(self, name: str, values: Mapping[str, Array], status: Array) -> Any:
+    def _read(self, name: str, values: Mapping[str, Array], status: Array, length: Any) -> Any:
         """One output, samples first."""
         if name in ("share", "gravity_share"):
             return np.moveaxis(values[OUTPUTS[name]], -1, 0)
         if name == "configuration":
-            return configured(values, self._system.length)
+            return configured(values, length)
         if name == "condition":
-            return singularity(values, self._system.length).condition
+            return singularity(values, length).condition
         if name == "shortfall":
             return values.get(name, np.where(status == Status.ok, 1.0, np.nan))
         if name not in ("slip", "friction_force"):
@@ -122,16 +125,25 @@ class InverseDynamics(Dynamics):
         values["shortfall"] = np.where(status == Status.ok, 1.0, np.nan)
         if not self._system.structure.friction:
             _add_parts(values, 1)
-        rows = self.distributor.rows(values, status)
+        self._redistribute(self.distributor, values, status, inputs)
+
+    def _redistribute(
+        self,
+        distributor: Distributor,
+        values: Mapping[str, Array],
+        status: Array,
+        inputs: Mapping[str, Array],
+    ) -> None:
+        rows = distributor.rows(values, status)
         if not rows.size:
             return
-        load = {name: inputs[name] for name in ("force", "moment", "point")}
+        load = {name: a for name, a in inputs.items() if name not in ("q", "q1", "q2")}
         ports = {name: values[name].T[rows] for name in MOTION}
         ports |= sample_rows(load, rows, len(status))
         # Shares cost more than all the rest.
         question = "system" if {"share", "slip"} & values.keys() else "balance"
         system = self._system.kernel(question).run(ports).values
-        better = self.distributor.solve(system)
+        better = distributor.solve(system)
         better["bound"] = np.fmax(CERTIFIED, bound(system["data_error"], 1.0))
         status[rows] = better.pop("status")
         for name, value in better.items():

@@ -440,6 +440,18 @@ class Model:
         """
         return extend("model.solve", self, motion, load, load_point, flag, reactions, threads)
 
+    def variants(self, table: Mapping[str, ArrayLike]) -> Any:
+        """Variants of the mechanism, by numbers of its file as columns: `condyle.model.variants`.
+
+        The coordinates stay independent and dependent as they are here.
+
+        Args:   table: path of `mechanism.get` -> values, (V, ...) [SI]: a mapping, a Dataset or a
+                data frame. `chain.*.base` is (V, chains, 3); a table is its entries in the file's
+                order.
+        Raises: InputError: for an unknown path, or values that do not fit.
+        """
+        return extend("model.variants", self, table)
+
     # -- what it is made of ------------------------------------------------------------------
 
     @cached_property

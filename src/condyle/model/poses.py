@@ -34,10 +34,10 @@ class Poses:
     def configuration(self, pose: Any, threads: int | None = None) -> ModelResult:
         """Joints, contact points and singularity at whole poses X_EE, (..., 6), on the contacts."""
         lead, (pose,) = samples((POSE,), (POSE.array(pose),))
-        inputs = {"pose": pose}
+        inputs = {"pose": pose, **self._system.labels(len(pose))}
         answer = self._system.kernel("configuration").run(inputs, threads)
-        answer.mend(inputs, lambda few: (self._system.robust.configuration(few["pose"]), 0))
-        return configured(answer.values, self._system.length).shaped(lead)
+        answer.mend(inputs, lambda few: (self._system.robust.configuration(few), 0))
+        return configured(answer.values, self._system.lengths(inputs)).shaped(lead)
 
     def inverse_kinematics(self, q: Any, v: Any, a: Any) -> ModelResult:
         """As `Model.inverse_kinematics`."""
@@ -213,7 +213,7 @@ def _ordered(given: States, names: list[str], wanted: Collection[str]) -> States
 CONFIGURATION = ("joint", "beta", "gamma", "cos_gamma", "discriminant")
 
 
-def configured(values: Mapping[str, Array], length: float) -> ModelResult:
+def configured(values: Mapping[str, Array], length: Any) -> ModelResult:
     """Results of a kernel, samples last, as a configuration; length: the characteristic one [m]."""
     found = {name: values[name].T for name in CONFIGURATION}
     for name in ("contact_point", "contact_normal"):
@@ -223,7 +223,7 @@ def configured(values: Mapping[str, Array], length: float) -> ModelResult:
     return ModelResult(**found, singularity=singularity(values, length))
 
 
-def singularity(values: Mapping[str, Array], length: float) -> Singularity:
+def singularity(values: Mapping[str, Array], length: Any) -> Singularity:
     """Its singularity measures alone."""
     J_A, transmission, sigma = (values[name].T for name in ("J_A", "transmission", "J_W_sigma"))
     return Singularity.of(J_A, transmission, sigma, values["J_A_extremes"], length)

@@ -63,7 +63,7 @@ class Robust:
         poses, reached = {name: a.T for name, a in values.items()}, closed == Status.ok
         load = {name: inputs[name] for name in ("force", "moment", "point")}
         with np.errstate(all="ignore"):
-            values |= self.configuration(poses["pose"])
+            values |= self.configuration(poses)
             system = self._kernel("system").run(poses | load).values
             s = {name: np.moveaxis(a, -1, 0) for name, a in system.items()}
             values["joint_rate"], values["joint_acceleration"] = (
@@ -101,7 +101,7 @@ class Robust:
         poses, reached = {name: a.T for name, a in values.items()}, closed == Status.ok
         others = {name: inputs[name] for name in ("effort", "force", "moment", "point")}
         with np.errstate(all="ignore"):
-            configuration = self.configuration(poses["pose"])
+            configuration = self.configuration(poses)
             system = self._kernel("forward_system").run(poses | others).values
             s = {name: np.moveaxis(a, -1, 0) for name, a in system.items()}
             found = balanced(s, self._structure.friction)
@@ -156,9 +156,9 @@ class Robust:
         )
         return answer.values, answer.status
 
-    def configuration(self, pose: np.ndarray) -> Arrays:
-        """The configuration's results by name, samples last; always by LAPACK."""
-        values = self._kernel("configuration").run({"pose": pose}).values
+    def configuration(self, inputs: Mapping[str, np.ndarray]) -> Arrays:
+        """The configuration's results at poses by name, samples last; always by LAPACK."""
+        values = self._kernel("configuration").run({"pose": inputs["pose"]}).values
         return values | {"J_W_sigma": _singular_values(values["J_W"])}
 
     def survey(self, wanted: tuple[str, ...], q: np.ndarray) -> Arrays:

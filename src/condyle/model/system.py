@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from ..backends.choose import Backend
-from ..backends.kernel import Kernel
+from ..backends.kernel import Arrays, Kernel
 from ..dynamics import ROUTES
 from ..dynamics import formulation as formulation_named
 from ..errors import InputError, MechanismError, did_you_mean
+from ..graph.program import Numbers
 from ..mechanism.home import holding_problems, home_problem
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..progress import step
@@ -50,6 +54,7 @@ class System:
             self.numbers = Layout.of(structure).numbers(mechanism)
             self.structure = structure if general else specialised(structure, self.numbers)
         self.general: System | None = self if general else None  # who lends kernels
+        self._lender: System | None = None
         self._kernels: dict[Any, Kernel] = {}
         self._closures: dict[Any, Closure] = {}
         self.seconds = time.perf_counter() - start
@@ -69,13 +74,32 @@ class System:
                 f'mechanism: "{mechanism.name}" has other chains, contacts or surfaces than '
                 f'"{self.mechanism.name}"; derive a model of its own'
             )
-        other = copy(self.general)
+        return self.general.lent(mechanism, Layout.of(self.structure).numbers(mechanism))
+
+    def lent(self, mechanism: Mechanism, numbers: Numbers) -> System:
+        """The same with these numbers, sharing kernels: they leave out what is zero here."""
+        other = copy(self)
         for name in [n for n, of in vars(System).items() if isinstance(of, cached_property)]:
             other.__dict__.pop(name, None)
-        other.mechanism = mechanism
-        other.numbers = Layout.of(self.structure).numbers(mechanism)
+        other.mechanism, other.numbers, other._lender = mechanism, numbers, self._lender or self
         other._kernels, other._closures = {}, {}
         return other
+
+    @cached_property
+    def serving_all(self) -> System:
+        """One whose kernels serve every mechanism of the structure, whatever is zero in this."""
+        if self.general is not None:
+            return self.general
+        given = self.mechanism, self.formulation, self.route, self.backend.asked
+        return System(*given, general=True)
+
+    def labels(self, count: int) -> Arrays:
+        """What kernels take beside the inputs of samples."""
+        return {}
+
+    def lengths(self, inputs: Mapping[str, np.ndarray]) -> Any:
+        """The characteristic length of samples [m]."""
+        return self.length
 
     @cached_property
     def dependent(self) -> tuple[str, ...]:
@@ -93,8 +117,8 @@ class System:
     def kernel(self, question: str, *details: Any) -> Kernel:
         """The kernel of a question."""
         asked = question, details
-        if asked not in self._kernels and self.general not in (None, self):
-            shared = self.general.kernel(question, *details)
+        if asked not in self._kernels and self._lender is not None:
+            shared = self._lender.kernel(question, *details)
             self._kernels[asked] = shared.renumbered(self.numbers)
         if asked not in self._kernels:
             structure = self.structure
@@ -132,10 +156,10 @@ class System:
         """What leads from other coordinates, or from a landmark's path, to whole poses."""
         key = names, landmark
         if key not in self._closures:
-            general = self.general
-            lender = None if general in (None, self) else general.closure(names, landmark)
+            lender = None if self._lender is None else self._lender.closure(names, landmark)
+            general = self.general is not None
             self._closures[key] = Closure(
-                self.mechanism, names, landmark, self.backend, general is not None, lender
+                self.mechanism, names, landmark, self.backend, general, lender
             )
         return self._closures[key]
 

@@ -27,7 +27,7 @@ import xarray as xr
 import condyle
 from condyle.analysis import workers as pool
 from condyle.analysis.sweep import open_sweep, study_folder
-from condyle.analysis.sweep.variants import solve_part
+from condyle.analysis.sweep.part import solve_part
 from condyle.analysis.workers import LostWorkerError
 
 Same = Callable[[xr.Dataset, xr.Dataset], None]

@@ -18,8 +18,8 @@ from ...results.warnings import Notice
 from ...status import Status
 from ..workers import PROCESSES, check_scheduler, run_parts
 from .job import Job, prepared
+from .part import OK, variants
 from .study import Study
-from .variants import OK, variants
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 AS_SOLVED = ["formulation", "route", "load_point", "distribution", "preload", "contact_weight"]

@@ -12,8 +12,8 @@ import xarray as xr
 
 from ...errors import InputError
 from ...extras import require
+from .part import OK
 from .study import Study
-from .variants import OK
 
 BINS = 10  # of equal counts, over which a main effect is averaged
 FEWEST = 4  # good rows for any statement

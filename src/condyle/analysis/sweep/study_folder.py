@@ -25,8 +25,8 @@ from ...mechanism.writing import record
 from ...motion.memory import at_most, memory_at_hand
 from ...version import __version__
 from .job import MOTION, REASON, SECONDS, STATUS, VARIANT, Job
+from .part import Row
 from .study import some_of
-from .variants import Row
 
 STUDY, ROWS, SOLUTIONS = "study.json", "rows", "solutions"
 PART, ALL = "part-{:06d}.parquet", "all.parquet"

@@ -16,9 +16,9 @@ from ...motion import Load, Motion, as_load, as_motion
 from ...progress import step
 from ..workers import PROCESSES, check_scheduler, run_parts
 from .job import prepared
+from .part import solve_part
 from .study import Study, read_study
 from .study_folder import Store, open_sweep
-from .variants import solve_part
 
 
 def sweep(

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...graph.program import Interface, Numbers, Variants
+from ...graph.program import Interface, ManyNumbers, Numbers, Variants
 from ..kernel import Answer, arrays_of, column_steps, places_of, results_at, shapes_of
 from ..threads import shared_out, workers
 from .build import loaded
-from .shared_library import aligned, prepared
+from .shared_library import aligned, padded, prepared
 
 # Vector operations that are worth a thread of their own: some 0.3 ms.
 WORTH_A_THREAD = 1_000_000
@@ -81,6 +81,54 @@ class CompiledKernel:
         else:
             self._run_many(count, given, goal, threads)
         return Answer(results_at(self._places, results, count), status)
+
+    def run_each(
+        self,
+        numbers: ManyNumbers,
+        which: np.ndarray,
+        cuts: np.ndarray,
+        inputs: Mapping[str, np.ndarray],
+        threads: int | None = None,
+    ) -> Answer:
+        """Evaluate samples of several mechanisms.
+
+        Args: which: the mechanism of each sample, (N,);  cuts: where it changes, 0 and N included.
+        """
+        count, runs = len(which), len(cuts) - 1
+        _, given = arrays_of(self._shapes, inputs)
+        given = [_readable(a) for a in given]
+        status, raw = np.empty(count, dtype=np.uint8), np.empty(self.columns * count)
+        starts, steps = column_steps(self.interface, given, self.order, count, _address)
+        steps = [0 if count == 1 else step for step in steps]
+        first = cuts[:-1, None]
+        columns = np.ascontiguousarray(np.array(starts, dtype=np.int64) + first * np.array(steps))
+        blocks = [
+            np.ascontiguousarray(padded(own, pad, self.facts["lanes"]))
+            for own, pad in zip(numbers.lanes, numbers.padding, strict=True)
+        ]
+        rows = which[cuts[:-1]].astype(np.int64)[:, None]
+        lanes = np.array([[_address(b) for b in blocks]], dtype=np.int64) + rows * np.array(
+            [b.strides[0] for b in blocks], dtype=np.int64
+        )
+        parameters = np.ascontiguousarray(numbers.parameters)
+        ends, owners = cuts.tolist(), rows[:, 0].tolist()
+        strides = _vector_of(tuple(step // 8 for step in steps))
+        library, out, judged = self._library, _address(raw), _address(status)
+        at_columns, at_lanes, at_numbers = map(_address, (columns, lanes, parameters))
+        width, groups, size = 8 * len(starts), 8 * len(blocks), parameters.strides[0]
+
+        def piece(start: int, end: int) -> None:
+            own = aligned(self.facts["table_size"])  # of this thread
+            table, prepare, batch = _address(own), library.prepare, library.batch
+            for r in range(start, end):
+                prepare(at_numbers + size * owners[r], at_lanes + groups * r, table)
+                s, e = ends[r], ends[r + 1]
+                at = at_columns + width * r
+                batch(table, at, strides, e - s, out + 8 * s, count, judged + s)
+
+        most = 1 + self.facts["operations"] * count // self.facts["lanes"] // WORTH_A_THREAD
+        shared_out(piece, runs, min(workers(threads), most), 1)
+        return Answer(results_at(self._places, raw.reshape(self.columns, count), count), status)
 
     def _copied(self, count: int, given: Sequence[np.ndarray]) -> tuple[Any, Any]:
         """Where columns start, and the steps from sample to sample, of inputs side by side.

@@ -58,7 +58,7 @@ def load(path: str) -> ctypes.CDLL:
     pointer, size = ctypes.c_void_p, ctypes.c_size_t
     library.batch.argtypes = [pointer, pointer, pointer, size, pointer, size, pointer]
     library.batch.restype = None
-    library.prepare.restype = None
+    library.prepare.argtypes, library.prepare.restype = [pointer] * 3, None
     if hasattr(library, "one"):
         library.one.argtypes = [pointer] * 3
     return library
@@ -68,7 +68,7 @@ def prepared(library: ctypes.CDLL, facts: Mapping[str, Any], numbers: Numbers) -
     """The table of what does not change from sample to sample, (table_size,)."""
     table = aligned(facts["table_size"])
     blocks = [
-        np.ascontiguousarray(_padded(own, pad, facts["lanes"]))
+        np.ascontiguousarray(padded(own, pad, facts["lanes"]))
         for own, pad in zip(numbers.lanes, numbers.padding, strict=True)
     ]
     pointers = (_doubles * len(blocks))(*(_pointer(block) for block in blocks))
@@ -83,10 +83,10 @@ def aligned(count: int) -> np.ndarray:
     return raw[offset : offset + count]
 
 
-def _padded(own: np.ndarray, pad: np.ndarray, width: int) -> np.ndarray:
-    """Constants (size, lanes), filled up to whole vectors."""
-    extra = -own.shape[1] % width
-    return np.hstack([own, np.repeat(pad[:, None], extra, axis=1)])
+def padded(own: np.ndarray, pad: np.ndarray, width: int) -> np.ndarray:
+    """Constants (..., size, lanes), filled up to whole vectors by pad, (..., size)."""
+    extra = -own.shape[-1] % width
+    return np.concatenate([own, np.repeat(pad[..., None], extra, axis=-1)], axis=-1)
 
 
 def _pointer(a: np.ndarray) -> Any:

@@ -1,0 +1,174 @@
+"""Many mechanisms of one structure asked together: samples carry the number of their mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from copy import copy
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+
+from ..backends.kernel import Answer, Arrays, sample_rows
+from ..backends.many_kernel import WHICH, ManyKernel
+from ..graph.program import ManyNumbers
+from ..questions.numbers import Layout
+from ..questions.structure import Structure
+from .closing import Closure, PlatformMotion
+from .distributing import Distributor
+from .inverse_dynamics import InverseDynamics
+from .robust_path import Robust
+from .system import System
+
+One = Callable[[int], System]
+Points = Callable[[str], np.ndarray]
+
+
+class ManySystem(System):
+    """What `System` is of one mechanism. Samples come in whole rows of mechanisms, V N of them, or
+    with an input `variant`.
+
+    length: characteristic lengths, (V,) [m].
+    """
+
+    length: Any
+
+    def __init__(self, base: System, numbers: ManyNumbers, one: One, points: Points) -> None:
+        """Args: one: the system of each mechanism, for samples that no kernel can vouch for.
+        points: of the platform, by name: of every mechanism, (V, 3) [m].
+        """
+        self.__dict__.update(
+            (name, value) for name, value in vars(base).items() if not name.startswith("_")
+        )
+        shares = agree(base.structure, numbers)
+        self._base = base if shares else base.serving_all
+        self.structure = self._base.structure
+        self.many, self._one, self._points = numbers, one, points
+        self._asked: dict[Any, Any] = {}
+        place = Layout.of(self.structure).parameters["length"][0]
+        self.length = numbers.parameters[:, place]
+
+    def kernel(self, question: str, *details: Any) -> Any:
+        key = question, details
+        if key not in self._asked:
+            self._asked[key] = ManyKernel(self._base.kernel(question, *details), self.many)
+        return self._asked[key]
+
+    def closure(self, names: tuple[str, ...], landmark: str | None) -> Any:
+        key = names, landmark
+        if key not in self._asked:
+            numbers = self.many
+            if landmark is not None:
+                start, count = Layout.of(self.structure).parameters["landmark"]
+                numbers = copy(numbers)
+                parameters = numbers.parameters.copy()
+                parameters[:, start : start + count] = self._points(landmark)
+                object.__setattr__(numbers, "parameters", parameters)
+            closure = self._base.closure(names, landmark)
+            if not agree(closure.structure, numbers):
+                closure = self._base.serving_all.closure(names, landmark)
+            own = lambda i: self._one(i).closure(names, landmark)  # noqa: E731
+            self._asked[key] = ManyClosure(closure, numbers, own)
+        return self._asked[key]
+
+    @cached_property
+    def robust(self) -> Any:
+        return Each(lambda i: self._one(i).robust)
+
+    def labels(self, count: int) -> Arrays:
+        return {WHICH: np.repeat(np.arange(len(self.many)), count // len(self.many))}
+
+    def lengths(self, inputs: Mapping[str, np.ndarray]) -> Any:
+        return self.length[inputs[WHICH]]
+
+
+class Each:
+    """The functions of a `Robust`, of samples of several mechanisms: one after the other."""
+
+    def __init__(self, one: Callable[[int], Robust]) -> None:
+        self._one = one
+
+    def __getattr__(self, name: str) -> Callable[[Mapping[str, np.ndarray]], Any]:
+        return partial(self._asked, name)
+
+    def _asked(self, name: str, inputs: Mapping[str, np.ndarray]) -> Any:
+        which = inputs[WHICH]
+        order = np.argsort(which, kind="stable")
+        found = []
+        for i in np.unique(which).tolist():
+            few = sample_rows(inputs, np.flatnonzero(which == i), len(which))
+            found.append(getattr(self._one(i), name)(few))
+        return _joined(found, np.argsort(order))
+
+
+def _joined(parts: list[Any], order: np.ndarray) -> Any:
+    """Arrays with samples last, dicts and tuples of them, in the order of the samples."""
+    first = parts[0]
+    if isinstance(first, dict):
+        return {name: _joined([one[name] for one in parts], order) for name in first}
+    if isinstance(first, tuple):
+        return tuple(_joined(list(own), order) for own in zip(*parts, strict=True))
+    return np.concatenate(parts, axis=-1)[..., order]
+
+
+class ManyClosure:
+    """What `Closure` is of one mechanism, of the same N conditions for each: (V N, 6)."""
+
+    def __init__(
+        self, closure: Closure, numbers: ManyNumbers, one: Callable[[int], Closure]
+    ) -> None:
+        self.names, self._count = closure.names, len(numbers)
+        self._kernel = ManyKernel(closure.kernel, numbers)
+        self._followed = Each(lambda i: _Followed(one(i)))  # type: ignore[arg-type, return-value]
+
+    def solve(
+        self, s: np.ndarray, s1: np.ndarray, s2: np.ndarray, threads: int | None = None
+    ) -> PlatformMotion:
+        """X_EE and its rates where g = s, g' = s1, g'' = s2, (N, 6 - k) each, mechanism by
+        mechanism."""
+        conditions = {"s": s, "s1": s1, "s2": s2}
+        inputs = {name: np.tile(a, (self._count, 1)) for name, a in conditions.items()}
+        inputs[WHICH] = np.repeat(np.arange(self._count), len(s))
+        answer: Answer = self._kernel.run(inputs, threads)
+        answer.mend(inputs, self._followed.solve)
+        return PlatformMotion.of(answer)
+
+
+class _Followed:
+    def __init__(self, closure: Closure) -> None:
+        self._closure = closure
+
+    def solve(self, few: Mapping[str, np.ndarray]) -> tuple[Arrays, np.ndarray]:
+        return self._closure.followed.solve(few["s"], few["s1"], few["s2"]).answer()
+
+
+class ManyInverse(InverseDynamics):
+    """Inverse dynamics of many; `distributor_of`: each mechanism's own, where they differ."""
+
+    distributor_of: Callable[[int], Distributor] | None = None
+
+    def _redistribute(
+        self,
+        distributor: Distributor,
+        values: Mapping[str, np.ndarray],
+        status: np.ndarray,
+        inputs: Mapping[str, np.ndarray],
+    ) -> None:
+        if self.distributor_of is None:
+            super()._redistribute(distributor, values, status, inputs)
+            return
+        which = inputs[WHICH]
+        for i in np.unique(which).tolist():
+            rows = np.flatnonzero(which == i)
+            part = slice(rows[0], rows[-1] + 1)
+            own = {name: a[..., part] for name, a in values.items()}
+            few = sample_rows(inputs, rows, len(which))
+            super()._redistribute(self.distributor_of(i), own, status[part], few)
+
+
+def agree(structure: Structure, numbers: ManyNumbers) -> bool:
+    """Whether what a structure takes as zero is zero in all mechanisms."""
+    return all(
+        not (numbers.parameters[:, i] if group < 0 else numbers.lanes[group][:, i]).any()
+        for group, i in structure.zeros
+    )

@@ -1,0 +1,378 @@
+"""Variants of a mechanism: numbers of its file as columns, every variant on every state.
+
+    batch = model.variants({"platform.mass": masses, "chain.masseter_left.base": bases})
+    batch.status, batch.reason(3)
+    found = batch.inverse_dynamics(q, v, a, wrench)      found.effort, (V, ..., n)
+
+Variants keep the coordinates of the mechanism that they come from, and the kernels of its model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..accessors import extend
+from ..errors import CondyleError, InputError, MechanismError, shown
+from ..graph.program import ManyNumbers, Numbers
+from ..kinematics.singularities import Singularity
+from ..mechanism.home import holding_problems, off_surface
+from ..mechanism.mechanism import Mechanism
+from ..mechanism.paths import changed, parsed, written
+from ..mechanism.table import Table
+from ..motion import Load, Motion
+from ..questions.numbers import Layout
+from ..questions.structure import Structure, structure_of
+from ..status import Status
+from .arguments import ORIGIN, POINT, WRENCH, Argument
+from .distributing import Distributor
+from .many_systems import ManyInverse, ManySystem
+from .model import Model
+from .model_result import ModelResult
+
+Array = np.ndarray
+KEPT = 64  # mechanisms and models at hand
+FILLS: dict[str, Any] = {"f": np.nan, "b": False}
+
+
+class Variants:
+    """V variants of a model's mechanism, each checked as a file is; see `Model.variants`.
+
+    table:  path -> values, (V, ...), SI.
+    status: (V,), of `Status`: ok, refused, or singular where the contacts do not determine the
+            dependent coordinates at home.
+
+    Results have the leading shape (V, ...): every variant on every state. NaN, with the variant's
+    own status, where a variant is no mechanism.
+    """
+
+    def __init__(self, model: Model, table: Mapping[str, ArrayLike]) -> None:
+        self.model = model
+        machine = model.mechanism
+        if machine.contacts and machine.dependent is None:
+            machine = machine.set("dependent", model.dependent)
+        self.base = machine
+        self.table = _columns(machine, table)
+        self.count = len(next(iter(self.table.values())))
+        self.status = np.zeros(self.count, dtype=np.uint8)
+        self._reasons: dict[int, str] = {}
+        self._mechanism = lru_cache(KEPT)(self._made)
+        limited = any("limit" in path for path in self.table)
+        weighed = bool(model.distribution.contact_weight)
+        self._own_limits = (limited or weighed) and (model.chooses_efforts)
+        self._groups = list(self._grouped())
+
+    def __len__(self) -> int:
+        return self.count
+
+    def __repr__(self) -> str:
+        bad = int(np.count_nonzero(self.status))
+        refused = f", {bad} of them refused" if bad else ""
+        return f'{self.count} variants of "{self.base.name}"{refused}:\n  {", ".join(self.table)}'
+
+    # -- each by itself ----------------------------------------------------------------------
+
+    def changes(self, i: int) -> dict[str, Any]:
+        """What `mechanism.set` is given for a variant."""
+        return {
+            path: self._entries(path, values[i].tolist()) for path, values in self.table.items()
+        }
+
+    def _entries(self, path: str, value: Any) -> Any:
+        here = self.base.get(path)
+        if isinstance(here, Table):
+            return dict(zip(here.entries(), value, strict=True))
+        return tuple(value) if isinstance(value, list) else value
+
+    def mechanism(self, i: int) -> Mechanism:
+        """A variant as a mechanism.
+
+        Raises: MechanismError: as of `mechanism.set`.
+        """
+        found = self._mechanism(i)
+        if isinstance(found, CondyleError):
+            raise found
+        return found
+
+    def reason(self, i: int) -> str:
+        """Why a variant is no mechanism; empty where it is one."""
+        found = self._mechanism(i)
+        if isinstance(found, CondyleError):
+            return "; ".join(getattr(found, "problems", ())) or str(found)
+        return ""
+
+    def _made(self, i: int) -> Mechanism | CondyleError:
+        name = self.base.name
+        try:
+            made = super(Mechanism, type(self.base)).checked(
+                changed(self.base, self.changes(i)), name
+            )
+            problems = list(off_surface(made.contacts)) or list(holding_problems(made))
+            if problems:
+                raise MechanismError(name, problems)
+            self.model._asked.checked(made)
+        except CondyleError as error:
+            return error
+        return made
+
+    def _grouped(self) -> Iterator[tuple[np.ndarray, Model]]:
+        """Variants of one structure together, and what answers for them."""
+        own: dict[Structure, list[tuple[int, Numbers]]] = {}
+        system = self.model.system
+        for i in range(self.count):
+            made = self._mechanism(i)
+            if isinstance(made, CondyleError):
+                problems = getattr(made, "problems", [""])
+                held = all(one.startswith(("contact: ", "dependent: ")) for one in problems)
+                self.status[i] = Status.singular if held else Status.refused
+                continue
+            structure = structure_of(made, system.formulation, system.route)
+            numbers = Layout.of(structure).numbers(made)
+            own.setdefault(structure, []).append((i, numbers))
+        for structure, members in own.items():
+            rows = np.array([i for i, _ in members])
+            yield rows, self._together(structure, rows, ManyNumbers.of([n for _, n in members]))
+
+    def _together(self, structure: Structure, rows: np.ndarray, numbers: ManyNumbers) -> Model:
+        system = self.model.system
+        if replace(system.structure, zeros=frozenset()) != structure:
+            first = self.mechanism(int(rows[0]))
+            system = type(self.model)(
+                first,
+                formulation=system.formulation,
+                route=system.route,
+                distribution=self.model._asked,
+                backend=system.backend.asked,
+            ).system
+
+        @lru_cache(KEPT)
+        def one(i: int) -> Any:
+            source = system if agree_one(system.structure, numbers[i]) else system.serving_all
+            return source.lent(self.mechanism(int(rows[i])), numbers[i])
+
+        def points(name: str) -> np.ndarray:
+            return self.points(name)[rows]
+
+        many = ManySystem(system, numbers, one, points)
+        model = self.model._with(many, self.model._asked)
+        inverse = ManyInverse(many, model._arguments, model._inverse.distributor)
+        if self._own_limits:
+
+            @lru_cache(KEPT)
+            def distributor(i: int) -> Distributor:
+                return Distributor(self.mechanism(int(rows[i])), model.distribution, system.backend)
+
+            inverse.distributor_of = distributor
+        model.__dict__["_inverse"] = inverse
+        return model
+
+    def points(self, name: str) -> Array:
+        """A point of the platform in every variant, (V, 3) [m] in {M}."""
+        found = np.tile(np.array(self.base.platform.points[name], dtype=float), (self.count, 1))
+        for path, values in self.table.items():
+            keys = parsed(path)
+            if keys[:3] == ("platform", "points", name):
+                found[:, keys[3] if keys[3:] else slice(None)] = values  # type: ignore[index]
+        return found
+
+    # -- all together ------------------------------------------------------------------------
+
+    def inverse_dynamics(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        wrench: ArrayLike | None = None,
+        at: Any = None,
+        *,
+        outputs: Any = (),
+        threads: int | None = None,
+    ) -> ModelResult:
+        """Efforts of every variant on every state; as of `Model.inverse_dynamics`."""
+        own = self.model._arguments
+        state = self._state((own.q, own.v, own.a), (q, v, a))
+        return self._asked("_inverse", state, wrench, at, outputs, threads)
+
+    def forward_dynamics(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        effort: ArrayLike,
+        wrench: ArrayLike | None = None,
+        at: Any = None,
+        *,
+        outputs: Any = (),
+        threads: int | None = None,
+    ) -> ModelResult:
+        """Accelerations of every variant in every state; as of `Model.forward_dynamics`."""
+        own = self.model._arguments
+        state = self._state((own.q, own.v, own.effort), (q, v, effort))
+        return self._asked("_forward", state, wrench, at, outputs, threads)
+
+    def solve(
+        self,
+        motion: Motion,
+        load: Load | None = None,
+        *,
+        keep: Sequence[str] = ("effort",),
+        load_point: str | None = None,
+        threads: int | None = None,
+    ) -> Any:
+        """Inverse dynamics of every variant along a motion: an `xarray.Dataset` with `variant`.
+
+        Args:   motion, load, load_point: as of `Model.solve`;  keep: variables of a solution.
+        Raises: InputError: for an unknown variable, or what does not fit the mechanism.
+        """
+        return extend("variants.solve", self, motion, load, keep, load_point, threads)
+
+    def simulate(self, scenario: Any = None, *, threads: int | None = None) -> Any:
+        """A simulation of every variant, those alike in lockstep: a list of datasets, None where a
+        variant is no mechanism. As of `condyle.simulate`."""
+        return extend("variants.simulate", self, scenario, threads)
+
+    def states(self, motion: Motion) -> list[tuple[np.ndarray, tuple[Array, Array, Array]]]:
+        """Independent coordinates and rates along a motion, of variants that are alike: their
+        numbers, and states (N, m) or, where they differ from one to another, (V, N, m)."""
+        found = []
+        for rows, model in self._groups:
+            given, _ = model.poses.of_motion(motion)
+            N = len(motion.t)
+            states = tuple(
+                a.reshape(len(rows), N, -1) if len(a) != N or len(rows) == N == 1 else a
+                for a in given
+            )
+            found.append((rows, states))
+        return found  # type: ignore[return-value]
+
+    def _state(self, arguments: Sequence[Argument], given: Sequence[Any]) -> list[Array]:
+        return [x.array(a) for x, a in zip(arguments, given, strict=True)]
+
+    def _asked(
+        self, kind: str, state: Sequence[Array], wrench: Any, at: Any, outputs: Any, threads: Any
+    ) -> ModelResult:
+        w = None if wrench is None else WRENCH.array(wrench)
+        shapes = [a.shape[:-1] for a in (*state, *(() if w is None else (w,)))]
+        point = None if at is None or isinstance(at, str) else POINT.array(at)
+        shapes += [] if point is None else [point.shape[:-1]]
+        try:
+            lead = np.broadcast_shapes(*shapes)
+        except ValueError:
+            raise InputError(
+                f"the leading shapes do not go together: {', '.join(map(str, shapes))}"
+            ) from None
+        parts = []
+        for rows, model in self._groups:
+            count = len(rows)
+            each = [np.broadcast_to(a, (count, *lead, a.shape[-1])) for a in state]
+            if isinstance(at, str):
+                model._arguments.point(at)  # has to be there
+                own = self.points(at)[rows].reshape(count, *(1 for _ in lead), 3)
+            else:
+                own = ORIGIN if point is None else point
+            parts.append((rows, getattr(model, kind).many(each, w, own, outputs, threads)))
+        return self._whole(parts, lead)
+
+    def along(
+        self, parts: Sequence[tuple[np.ndarray, Any]], wrench: Array, at: Any, outputs: Any
+    ) -> ModelResult:
+        """Inverse dynamics along a motion, by one thread: parts as of `states`."""
+        found = []
+        for (rows, states), (_, model) in zip(parts, self._groups, strict=True):
+            lead = (len(rows), len(wrench))
+            each = [np.broadcast_to(a, (*lead, a.shape[-1])) for a in states]
+            own = self.points(at)[rows][:, None] if isinstance(at, str) else at
+            found.append((rows, model._inverse.many(each, wrench, own, outputs, 1)))
+        return self._whole(found, (len(wrench),))
+
+    def _whole(self, parts: Sequence[tuple[np.ndarray, Any]], lead: tuple[int, ...]) -> Any:
+        """Results of all variants from those of some, each."""
+        if len(parts) == 1 and len(parts[0][0]) == self.count:
+            return parts[0][1]
+        if not parts:
+            status = np.broadcast_to(
+                self.status.reshape(-1, *(1 for _ in lead)), (self.count, *lead)
+            )
+            return ModelResult(status=status.copy())
+        found = _scattered([(rows, result) for rows, result in parts], self.count)
+        bad = np.flatnonzero(self.status)
+        found.status[bad] = self.status[bad].reshape(-1, *(1 for _ in lead))
+        return found
+
+
+def agree_one(structure: Structure, numbers: Numbers) -> bool:
+    """Whether what a structure takes as zero is zero in a mechanism."""
+    return all(
+        not (numbers.parameters[i] if group < 0 else numbers.lanes[group][i]).any()
+        for group, i in structure.zeros
+    )
+
+
+def _scattered(parts: list[tuple[np.ndarray, Any]], count: int) -> Any:
+    """Results of some variants each, where they stand among all; NaN elsewhere."""
+    first = parts[0][1]
+    if isinstance(first, ModelResult):
+        return type(first)(
+            **{
+                name: _scattered([(rows, getattr(one, name)) for rows, one in parts], count)
+                for name in vars(first)
+            }
+        )
+    if isinstance(first, Singularity):
+        own = {
+            f.name: _scattered([(rows, getattr(one, f.name)) for rows, one in parts], count)
+            for f in fields(first)
+        }
+        return replace(first, **own)
+    shape = np.max([one.shape[1:] for _, one in parts], axis=0).tolist()
+    found = np.full((count, *shape), FILLS.get(first.dtype.kind, 0), dtype=first.dtype)
+    for rows, one in parts:
+        part: Any = (rows, *(slice(n) for n in one.shape[1:]))
+        found[part] = one
+    return found
+
+
+def _columns(mechanism: Mechanism, table: Mapping[str, ArrayLike]) -> dict[str, Array]:
+    """Path -> values, (V, ...), one of a chain where a path had all of them.
+
+    Raises: InputError: for anything but paths with numbers, as many each.
+    """
+    try:
+        given = {str(path): np.asarray(values, dtype=float) for path, values in table.items()}
+    except (AttributeError, TypeError, ValueError):
+        raise InputError(
+            "variants: expected a table of paths with numbers, (V, ...) each, such as "
+            f'{{"platform.mass": [0.2, 0.3]}}; got {shown(table)}'
+        ) from None
+    found: dict[str, Array] = {}
+    for path, values in given.items():
+        keys = parsed(path)
+        names = {"chain": mechanism.chain_names, "contact": mechanism.contact_names}
+        if keys[1:2] == ("*",) and keys[0] in names:
+            all_of = names[str(keys[0])]
+            if values.ndim < 2 or values.shape[1] != len(all_of):
+                raise InputError(
+                    f"{path}: expected numbers of every {keys[0]}, (V, {len(all_of)}, ...); got "
+                    f"shape {values.shape}"
+                )
+            for i, name in enumerate(all_of):
+                found[written((keys[0], name, *keys[2:]))] = values[:, i]
+            continue
+        here = mechanism.get(path)
+        size = len(here.entries()) if isinstance(here, Table) else np.shape(here)
+        wanted = (size,) if isinstance(size, int) else size
+        if values.ndim < 1 or (here is not None and values.shape[1:] != wanted):
+            shape = ", ".join(["V", *map(str, wanted)])
+            raise InputError(f"{path}: expected numbers of shape ({shape}); got {values.shape}")
+        found[path] = values
+    counts = {len(values) for values in found.values()}
+    if len(counts) != 1 or 0 in counts:
+        raise InputError(
+            "variants: expected as many values of every path, at least one; got "
+            f"{', '.join(f'{path} {len(values)}' for path, values in found.items()) or 'no path'}"
+        )
+    return found
