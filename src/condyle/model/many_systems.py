@@ -43,7 +43,7 @@ class ManySystem(System):
         shares = agree(base.structure, numbers)
         self._base = base if shares else base.serving_all
         self.structure = self._base.structure
-        self.many, self._one, self._points = numbers, one, points
+        self.many, self.one, self._points = numbers, one, points
         self._asked: dict[Any, Any] = {}
         place = Layout.of(self.structure).parameters["length"][0]
         self.length = numbers.parameters[:, place]
@@ -67,13 +67,13 @@ class ManySystem(System):
             closure = self._base.closure(names, landmark)
             if not agree(closure.structure, numbers):
                 closure = self._base.serving_all.closure(names, landmark)
-            own = lambda i: self._one(i).closure(names, landmark)  # noqa: E731
+            own = lambda i: self.one(i).closure(names, landmark)  # noqa: E731
             self._asked[key] = ManyClosure(closure, numbers, own)
         return self._asked[key]
 
     @cached_property
     def robust(self) -> Any:
-        return Each(lambda i: self._one(i).robust)
+        return Each(lambda i: self.one(i).robust)
 
     def labels(self, count: int) -> Arrays:
         return {WHICH: np.repeat(np.arange(len(self.many)), count // len(self.many))}

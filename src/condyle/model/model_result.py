@@ -108,6 +108,20 @@ class ModelResult:
             return self
         return type(self)(**{name: _shaped(value, lead) for name, value in vars(self).items()})
 
+    def rows(self, start: int, stop: int) -> Self:
+        """Some of flat samples."""
+        return type(self)(**{name: _part(a, slice(start, stop)) for name, a in vars(self).items()})
+
+
+def _part(value: Any, part: slice) -> Any:
+    if isinstance(value, np.ndarray):
+        return value[part]
+    if isinstance(value, Singularity):
+        own = {f.name: getattr(value, f.name) for f in fields(value)}
+        changed: dict[str, Any] = {n: a[part] for n, a in own.items() if isinstance(a, np.ndarray)}
+        return replace(value, **changed)
+    return value.rows(part.start, part.stop)
+
 
 def _shaped(value: Any, lead: Lead) -> Any:
     if isinstance(value, np.ndarray):

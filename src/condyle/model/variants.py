@@ -10,7 +10,7 @@ Variants keep the coordinates of the mechanism that they come from, and the kern
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from typing import Any
 
@@ -40,6 +40,36 @@ KEPT = 64  # mechanisms and models at hand
 FILLS: dict[str, Any] = {"f": np.nan, "b": False}
 
 
+@dataclass(frozen=True)
+class Group:
+    """Variants of one structure, by their numbers, and what answers for them together."""
+
+    variants: Variants
+    rows: np.ndarray
+    model: Model
+
+    def along(
+        self,
+        motion: Motion,
+        wrench: Array,
+        at: str | None,
+        outputs: Sequence[str],
+        threads: int | None = None,
+    ) -> ModelResult:
+        """Inverse dynamics along a motion, flat: the N samples of one variant after the other.
+
+        Args: wrench: (N, 6), at a point of the platform, by name.
+        """
+        V, N, model = len(self.rows), len(motion.t), self.model
+        states, _ = model.poses.of_motion(motion)
+        if len(states[0]) == N:
+            states = tuple(np.tile(a, (V, 1)) for a in states)  # type: ignore[assignment]
+        point = ORIGIN
+        if at is not None:
+            point = np.repeat(self.variants.points(at)[self.rows], N, axis=0)
+        return model._inverse.many(states, np.tile(wrench, (V, 1)), point, outputs, threads)
+
+
 class Variants:
     """V variants of a model's mechanism, each checked as a file is; see `Model.variants`.
 
@@ -65,7 +95,9 @@ class Variants:
         limited = any("limit" in path for path in self.table)
         weighed = bool(model.distribution.contact_weight)
         self._own_limits = (limited or weighed) and (model.chooses_efforts)
-        self._groups = list(self._grouped())
+        # Whether what samples are measured by is each variant's own.
+        self.measured_apart = limited or any("bounds" in path for path in self.table)
+        self.groups = list(self._grouped())
 
     def __len__(self) -> int:
         return self.count
@@ -106,6 +138,17 @@ class Variants:
             return "; ".join(getattr(found, "problems", ())) or str(found)
         return ""
 
+    def alone(self, i: int) -> Model:
+        """The model of one variant, which shares kernels.
+
+        Raises: as of `mechanism`.
+        """
+        self.mechanism(i)
+        group = next(group for group in self.groups if i in group.rows)
+        system = group.model.system
+        assert isinstance(system, ManySystem)
+        return self.model._with(system.one(int(np.searchsorted(group.rows, i))), self.model._asked)
+
     def _made(self, i: int) -> Mechanism | CondyleError:
         name = self.base.name
         try:
@@ -120,7 +163,7 @@ class Variants:
             return error
         return made
 
-    def _grouped(self) -> Iterator[tuple[np.ndarray, Model]]:
+    def _grouped(self) -> Iterator[Group]:
         """Variants of one structure together, and what answers for them."""
         own: dict[Structure, list[tuple[int, Numbers]]] = {}
         system = self.model.system
@@ -136,7 +179,8 @@ class Variants:
             own.setdefault(structure, []).append((i, numbers))
         for structure, members in own.items():
             rows = np.array([i for i, _ in members])
-            yield rows, self._together(structure, rows, ManyNumbers.of([n for _, n in members]))
+            many = ManyNumbers.of([numbers for _, numbers in members])
+            yield Group(self, rows, self._together(structure, rows, many))
 
     def _together(self, structure: Structure, rows: np.ndarray, numbers: ManyNumbers) -> Model:
         system = self.model.system
@@ -235,20 +279,6 @@ class Variants:
         variant is no mechanism. As of `condyle.simulate`."""
         return extend("variants.simulate", self, scenario, threads)
 
-    def states(self, motion: Motion) -> list[tuple[np.ndarray, tuple[Array, Array, Array]]]:
-        """Independent coordinates and rates along a motion, of variants that are alike: their
-        numbers, and states (N, m) or, where they differ from one to another, (V, N, m)."""
-        found = []
-        for rows, model in self._groups:
-            given, _ = model.poses.of_motion(motion)
-            N = len(motion.t)
-            states = tuple(
-                a.reshape(len(rows), N, -1) if len(a) != N or len(rows) == N == 1 else a
-                for a in given
-            )
-            found.append((rows, states))
-        return found  # type: ignore[return-value]
-
     def _state(self, arguments: Sequence[Argument], given: Sequence[Any]) -> list[Array]:
         return [x.array(a) for x, a in zip(arguments, given, strict=True)]
 
@@ -266,8 +296,8 @@ class Variants:
                 f"the leading shapes do not go together: {', '.join(map(str, shapes))}"
             ) from None
         parts = []
-        for rows, model in self._groups:
-            count = len(rows)
+        for group in self.groups:
+            rows, model, count = group.rows, group.model, len(group.rows)
             each = [np.broadcast_to(a, (count, *lead, a.shape[-1])) for a in state]
             if isinstance(at, str):
                 model._arguments.point(at)  # has to be there
@@ -276,18 +306,6 @@ class Variants:
                 own = ORIGIN if point is None else point
             parts.append((rows, getattr(model, kind).many(each, w, own, outputs, threads)))
         return self._whole(parts, lead)
-
-    def along(
-        self, parts: Sequence[tuple[np.ndarray, Any]], wrench: Array, at: Any, outputs: Any
-    ) -> ModelResult:
-        """Inverse dynamics along a motion, by one thread: parts as of `states`."""
-        found = []
-        for (rows, states), (_, model) in zip(parts, self._groups, strict=True):
-            lead = (len(rows), len(wrench))
-            each = [np.broadcast_to(a, (*lead, a.shape[-1])) for a in states]
-            own = self.points(at)[rows][:, None] if isinstance(at, str) else at
-            found.append((rows, model._inverse.many(each, wrench, own, outputs, 1)))
-        return self._whole(found, (len(wrench),))
 
     def _whole(self, parts: Sequence[tuple[np.ndarray, Any]], lead: tuple[int, ...]) -> Any:
         """Results of all variants from those of some, each."""

@@ -151,9 +151,9 @@ def test_what_follows_moves_with_what_varies() -> None:
     left = condyle.load_mechanism("masticatory").get(y("left"))
     vary = [{"what": y("left"), "values": [left, left + 1e-4], "mirror": mirror}]
     job = prepared(read_study(spoiled(vary=vary)))
-    changes = job.changes(job.design.rows(1, 2)[0])
-    assert changes == {
-        y("left"): left + 1e-4,
-        y("right"): -left - 1e-4,
-        "gravity[2]": 2.0 * (left + 1e-4) - 10.0,
+    columns = job.columns(job.design.rows(1, 2))
+    assert columns == {
+        y("left"): [left + 1e-4],
+        y("right"): [-left - 1e-4],
+        "gravity[2]": [2.0 * (left + 1e-4) - 10.0],
     }

@@ -18,7 +18,7 @@ from ...results.warnings import Notice
 from ...status import Status
 from ..workers import PROCESSES, check_scheduler, run_parts
 from .job import Job, prepared
-from .part import OK, variants
+from .part import OK, batches
 from .study import Study
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -95,13 +95,14 @@ def curves(job: Job, part: int) -> tuple[np.ndarray, np.ndarray, int]:
     shape = len(job.numbers(part)), len(job.motions[0].t)
     effort = np.full((*shape, len(job.mechanism.chains)), np.nan)
     force = np.full((*shape, len(job.mechanism.contacts)), np.nan)
-    failed = 0
-    for i, (_, _, (one,)) in enumerate(variants(job, part)):
-        failed += one.status != OK
-        if one.evaluation is not None:
-            good = one.evaluation.status == Status.ok
-            effort[i][good] = one.evaluation.effort[good]
-            force[i][good] = one.evaluation.contact_force[good]
+    failed, first = 0, job.numbers(part).start
+    for start, _, (one,) in batches(job, part):
+        failed += sum(status != OK for status in one.status)
+        for group, found in one.found:
+            rows, good = group.rows + (start - first), found.status == Status.ok
+            for to, values in ((effort, found.effort), (force, found.contact_force)):
+                values = np.where(good[:, None], values, np.nan)
+                to[rows] = values.reshape(len(rows), *to.shape[1:])
     return effort, force, failed
 
 

@@ -17,6 +17,7 @@ from ...mechanism.mechanism import Mechanism
 from ...model.distributing import Distribution
 from ...model.inverse_dynamics import SOLVED
 from ...model.model import Model
+from ...model.model_result import ModelResult
 from ...motion import (
     Load,
     Motion,
@@ -26,7 +27,7 @@ from ...motion import (
     trial_motion,
 )
 from ...motion.reference_case import bundled_reference, fits_load, fits_reference
-from ...questions.structure import Structure, structure_of
+from ...results.derived import Derived
 from .measure import Reading, reading
 from .sampling import Design
 from .study import NONE, REFERENCE, TRIAL, MotionFile, Study
@@ -44,6 +45,7 @@ class Job:
 
     wrenches: on the platform, (N, 6) [N, N m], of each motion.
     point: the platform's point that the load acts at, by name; None without a load.
+    outputs: of inverse dynamics, which the readings are of.
     """
 
     study: Study
@@ -54,6 +56,7 @@ class Job:
     point: str | None
     design: Design
     readings: tuple[Reading, ...] = ()
+    outputs: tuple[str, ...] = ()
 
     @property
     def rows(self) -> int:
@@ -81,32 +84,24 @@ class Job:
     def measures(self) -> tuple[str, ...]:
         return tuple(name for one in self.readings for name in one.names)
 
-    def changes(self, row: np.ndarray) -> dict[str, float]:
-        """Path -> number of one row of the design."""
-        values: dict[str, float] = {}
-        for one, value in zip(self.study.vary, row.tolist(), strict=True):
-            values[one.what] = value
-            values |= {f.what: f.times * value + f.plus for f in one.mirror}
-        return values
+    def columns(self, rows: np.ndarray) -> dict[str, np.ndarray]:
+        """Path -> values, of rows of the design."""
+        found: dict[str, np.ndarray] = {}
+        for one, values in zip(self.study.vary, rows.T, strict=True):
+            found[one.what] = values
+            found |= {f.what: f.times * values + f.plus for f in one.mirror}
+        return found
 
     @cached_property
-    def _models(self) -> dict[Structure, Model]:
-        return {}
-
-    def model(self, mechanism: Mechanism) -> Model:
-        """A model, with the kernels of the first mechanism of its structure.
+    def model(self) -> Model:
+        """Of the mechanism itself, whose kernels variants share.
 
         Raises: as of `condyle.derive`.
         """
         s = self.study
-        structure = structure_of(mechanism, s.formulation, s.route)
-        if structure in self._models:
-            return self._models[structure].with_mechanism(mechanism)
         chosen = Distribution(s.distribution, s.preload, s.contact_weight)
         how: Any = {"formulation": s.formulation, "route": s.route, "backend": s.backend}
-        made = Model(mechanism, **how, distribution=chosen, general=True)
-        self._models[structure] = made
-        return made
+        return Model(self.mechanism, **how, distribution=chosen)
 
 
 def prepared(
@@ -131,7 +126,7 @@ def prepared(
         name = resolve_load_point(name, machine.platform.points)
     wrenches = tuple(acting.at(path.t) for path in paths)
     job = Job(study, machine, paths, acting, wrenches, name, design)
-    model = job.model(machine)
+    model = job.model
     found = tuple(reading(name, measure, model) for name, measure in study.measure.items())
     job = replace(job, readings=found)
     taken = [*OWN, *job.parameters, *job.measures]
@@ -140,8 +135,28 @@ def prepared(
     for path in paths:  # what does not fit the mechanism shows here, and kernels are built
         few: Any = {k: getattr(path, k)[:2] for k in ("t", "value", "rate", "acceleration")}
         (q, q1, q2), _ = model.poses.of_motion(replace(path, **few))
-        model.inverse_dynamics(q, q1, q2, outputs=SOLVED, threads=1)
-    return job
+        few_of = model.inverse_dynamics(q, q1, q2, outputs=SOLVED, threads=1)
+    return replace(job, outputs=_outputs(job, few_of))
+
+
+def _outputs(job: Job, found: ModelResult) -> tuple[str, ...]:
+    """What the readings look at, of results with all of it."""
+    seen = Seen(found)
+    derived = Derived(job.mechanism, seen, np.zeros((len(found.status), 6)), job.model.limited)
+    for each in job.readings:
+        each.values(derived)
+    return tuple(name for name in SOLVED if name in seen.names)
+
+
+class Seen:
+    """Results that note which of them are asked for."""
+
+    def __init__(self, found: ModelResult) -> None:
+        self._found, self.names = found, set[str]()
+
+    def __getattr__(self, name: str) -> Any:
+        self.names.add(name)
+        return getattr(self._found, name)
 
 
 def _numbers(study: Study, machine: Mechanism) -> Iterator[float]:

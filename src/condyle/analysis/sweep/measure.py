@@ -43,12 +43,17 @@ class Reading:
     names: tuple[str, ...]
     units: str
 
-    def values(self, derived: Derived) -> np.ndarray:
-        """The columns, (len(names),), of a solution whose samples are all good."""
-        a = BY_NAME[self.variable].values(derived)[self.place]
+    def values(self, derived: Derived, count: int = 1) -> np.ndarray:
+        """The columns, (count, len(names)), of as many solutions whose samples are all good, one
+        after the other in time."""
+        variable = BY_NAME[self.variable]
+        a, time = variable.values(derived), variable.dims.index("time")
+        a = a.reshape(*a.shape[:time], count, -1, *a.shape[time + 1 :])
+        a = np.moveaxis(a, time, 0)[(slice(None), *self.place)]
         if a.dtype == bool:
             a = a.astype(float)
-        return np.atleast_1d(TAKES[self.take](a, axis=self.axes)).ravel()
+        found = TAKES[self.take](a, axis=tuple(axis + 1 for axis in self.axes))
+        return np.reshape(found, (count, len(self.names)))
 
 
 def reading(name: str, measure: Measure, model: Model) -> Reading:

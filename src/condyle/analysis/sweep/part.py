@@ -1,112 +1,198 @@
-"""One part of a study: its variants one after the other, each checked as a file is."""
+"""One part of a study: its variants together, each checked as a file is."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
-from ...errors import CondyleError, InputError, SampleError, shortened
+from ...errors import InputError, ProblemsError, SampleError, shortened
+from ...mechanism.mechanism import Mechanism
 from ...model.inverse_dynamics import SOLVED
-from ...model.model import Model
 from ...model.model_result import ModelResult, require_ok
+from ...model.variants import Group, Variants
 from ...results.derived import Derived
 from ...results.solving import assemble
+from ...status import STATUS_NAMES, Status
 from .job import Job
 
 OK, REFUSED, FAILED = "ok", "refused", "failed"
 LONGEST_REASON = 300
+TOGETHER = 2**15  # samples of a batch: what they take stays small
 
 
-class Row(NamedTuple):
-    """A variant along one motion.
+@dataclass
+class Rows:
+    """Rows of a table, one for each variant and motion, in the order of the study.
 
-    measures: (measures,), NaN where the row has a reason.
-    solution: a NetCDF file, where solutions are kept.
+    measures:  (rows, measures), NaN where the row has a reason.
+    solutions: by variant and motion a NetCDF file, where solutions are kept.
     """
 
-    variant: int
-    motion: int
+    variant: np.ndarray
+    motion: np.ndarray
     parameters: np.ndarray
     measures: np.ndarray
-    status: str
-    reason: str
-    seconds: float
-    solution: bytes | None
+    status: list[str]
+    reason: list[str]
+    seconds: np.ndarray
+    solutions: dict[tuple[int, int], bytes] = field(default_factory=dict)
+
+    @property
+    def count(self) -> int:
+        return len(self.variant)
 
 
-@dataclass(frozen=True)
-class Solved:
-    """A variant along one motion: what came of it, or the reason why nothing did."""
+@dataclass
+class Along:
+    """Some variants along one motion.
+
+    found:  results of those alike, flat, sample by sample of one variant after the other.
+    status: of each variant, or the kind of its first failed sample, with its reason.
+    """
 
     motion: int
-    model: Model | None
-    evaluation: ModelResult | None
-    status: str
-    reason: str
-    residual: float | None = None
+    found: list[tuple[Group, ModelResult]]
+    status: list[str]
+    reason: list[str]
 
 
-def variants(job: Job, part: int) -> Iterator[tuple[int, np.ndarray, list[Solved]]]:
-    """Number, values and outcomes of the variants of a part, one after the other."""
-    numbers, motions = job.numbers(part), range(len(job.motions))
+def batches(job: Job, part: int) -> Iterator[tuple[int, np.ndarray, list[Along]]]:
+    """Number of the first variant, values, and what came of them along each motion, of some
+    variants after the others."""
+    numbers = job.numbers(part)
+    size = max(1, TOGETHER // max(len(motion.t) for motion in job.motions))
     with np.errstate(all="ignore"):
-        for number, row in zip(numbers, job.design.rows(numbers.start, numbers.stop), strict=True):
-            try:
-                model = job.model(job.mechanism.set(job.changes(row)))
-            except CondyleError as error:
-                yield number, row, [Solved(m, None, None, REFUSED, _reason(error)) for m in motions]
-            else:
-                yield number, row, [_along(job, model, m) for m in motions]
+        for start in range(numbers.start, numbers.stop, size):
+            yield from _batch(job, start, min(start + size, numbers.stop))
 
 
-def _along(job: Job, model: Model, m: int) -> Solved:
-    motion = job.motions[m]
+def _batch(job: Job, start: int, stop: int) -> Iterator[tuple[int, np.ndarray, list[Along]]]:
+    """Variants start to stop; those with which numbers fail by themselves."""
+    values = job.design.rows(start, stop)
+    problem: Exception
     try:
-        states, residual = model.poses.of_motion(motion)
-        found = model.inverse_dynamics(
-            *states, job.wrenches[m], job.point, outputs=SOLVED, threads=1
-        )
-        require_ok(model.mechanism, found, motion.t)
-    except SampleError as error:
-        return Solved(m, model, found, error.kind, _reason(error), residual)
-    except InputError as error:  # such as coordinates that are independent no more
-        return Solved(m, model, None, REFUSED, _reason(error))
+        batch = job.model.variants(job.columns(values))
+        found = [_along(job, batch, m) for m in range(len(job.motions))]
+    except InputError as error:
+        problem, kind = error, REFUSED
     except (ArithmeticError, np.linalg.LinAlgError) as error:
-        return Solved(m, model, None, FAILED, _reason(error))
-    return Solved(m, model, found, OK, "", residual)
+        problem, kind = error, FAILED
+    else:
+        yield start, values, found
+        return
+    if stop - start > 1:
+        middle = (start + stop) // 2
+        yield from _batch(job, start, middle)
+        yield from _batch(job, middle, stop)
+    else:
+        why = [kind], [_reason(problem)]
+        yield start, values, [Along(m, [], *why) for m in range(len(job.motions))]
 
 
-def solve_part(job: Job, part: int) -> list[Row]:
+def _along(job: Job, batch: Variants, m: int) -> Along:
+    motion, wrench = job.motions[m], job.wrenches[m]
+    status, reason = [OK] * len(batch), [""] * len(batch)
+    for i in np.flatnonzero(batch.status).tolist():
+        status[i], reason[i] = STATUS_NAMES[batch.status[i]], _in_line(batch.reason(i))
+    found = []
+    for group in batch.groups:
+        answer = group.along(motion, wrench, job.point, job.outputs, 1)
+        found.append((group, answer))
+        failed = answer.status.reshape(len(group.rows), -1).any(axis=1)
+        for i in group.rows[failed].tolist():
+            status[i], reason[i] = _failure(job, batch, i, m)
+    return Along(m, found, status, reason)
+
+
+def _failure(job: Job, batch: Variants, i: int, m: int) -> tuple[str, str]:
+    try:
+        require_ok(batch.mechanism(i), _alone(job, batch, i, m)[0], job.motions[m].t)
+    except SampleError as error:
+        return error.kind, _reason(error)
+    raise AssertionError("a sample failed among others only")
+
+
+def _alone(job: Job, batch: Variants, i: int, m: int) -> tuple[ModelResult, float | None]:
+    """All results of one variant along a motion, and the residual of its poses."""
+    model = batch.alone(i)
+    states, residual = model.poses.of_motion(job.motions[m])
+    found = model.inverse_dynamics(*states, job.wrenches[m], job.point, outputs=SOLVED, threads=1)
+    return found, residual
+
+
+def solve_part(job: Job, part: int) -> Rows:
     """The rows of one part."""
-    rows, clock = [], time.perf_counter()
-    for number, values, outcomes in variants(job, part):
-        for one in outcomes:
-            measured = np.full(len(job.measures), np.nan)
-            if one.status == OK and one.model is not None:
-                wrench = job.wrenches[one.motion]
-                derived = Derived(one.model.mechanism, one.evaluation, wrench, one.model.limited)
-                measured = np.concatenate([each.values(derived) for each in job.readings])
-            kept = job.study.solutions and one.evaluation is not None
-            solution = _netcdf(job, one) if kept else None
-            seconds, clock = time.perf_counter() - clock, time.perf_counter()
-            about = one.status, one.reason, seconds, solution
-            rows.append(Row(number, one.motion, values, measured, *about))
-    return rows
+    parts = [_rows(job, *one) for one in batches(job, part)]
+    joined: dict[str, Any] = {
+        name: np.concatenate([getattr(one, name) for one in parts])
+        for name in ("variant", "motion", "parameters", "measures", "seconds")
+    }
+    for name in ("status", "reason"):
+        joined[name] = [x for one in parts for x in getattr(one, name)]
+    solutions = {key: file for one in parts for key, file in one.solutions.items()}
+    return Rows(**joined, solutions=solutions)
 
 
-def _netcdf(job: Job, one: Solved) -> bytes:
-    """The whole solution, as a file."""
-    assert one.model is not None and one.evaluation is not None
-    motion, wrench = job.motions[one.motion], job.wrenches[one.motion]
-    solution = assemble(
-        one.model, motion, job.load, wrench, job.point, one.evaluation, one.residual, 0.0
+def _rows(job: Job, start: int, values: np.ndarray, outcomes: list[Along]) -> Rows:
+    clock = time.perf_counter()
+    V, M = len(values), len(outcomes)
+    measures = np.full((V, M, len(job.measures)), np.nan)
+    solutions: dict[tuple[int, int], bytes] = {}
+    for one in outcomes:
+        for group, found in one.found:
+            rows = group.rows
+            good = (found.status == Status.ok).reshape(len(rows), -1).all(axis=1)
+            measured = _measures(job, one.motion, group, found)
+            measures[rows[good], one.motion] = measured[good]
+            if job.study.solutions:
+                for i in rows.tolist():
+                    solutions[start + i, one.motion] = _netcdf(job, group.variants, i, one.motion)
+    own = zip(*(zip(one.status, one.reason, strict=True) for one in outcomes), strict=True)
+    status, reason = zip(*(pair for row in own for pair in row), strict=True)
+    return Rows(
+        np.repeat(np.arange(start, start + V), M),
+        np.tile(np.arange(M), V),
+        np.repeat(values, M, axis=0),
+        measures.reshape(V * M, -1),
+        list(status),
+        list(reason),
+        np.full(V * M, (time.perf_counter() - clock) / (V * M)),
+        solutions,
     )
+
+
+def _measures(job: Job, m: int, group: Group, found: ModelResult) -> np.ndarray:
+    """Measures of the variants of a group, (variants, measures)."""
+    V, wrench, batch = len(group.rows), job.wrenches[m], group.variants
+    if batch.measured_apart:
+        N = len(wrench)
+        return np.concatenate(
+            [
+                _measured(job, batch.mechanism(i), found.rows(v * N, (v + 1) * N), wrench, 1)
+                for v, i in enumerate(group.rows.tolist())
+            ]
+        )
+    return _measured(job, job.mechanism, found, np.tile(wrench, (V, 1)), V)
+
+
+def _measured(
+    job: Job, mechanism: Mechanism, found: ModelResult, wrench: np.ndarray, count: int
+) -> np.ndarray:
+    derived = Derived(mechanism, found, wrench, job.model.limited)
+    return np.concatenate([each.values(derived, count) for each in job.readings], axis=1)
+
+
+def _netcdf(job: Job, batch: Variants, i: int, m: int) -> bytes:
+    """The whole solution, as a file."""
+    motion, wrench = job.motions[m], job.wrenches[m]
+    found, residual = _alone(job, batch, i, m)
+    solution = assemble(batch.alone(i), motion, job.load, wrench, job.point, found, residual, 0.0)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "solution.nc"
         solution.condyle.save(path)
@@ -115,5 +201,9 @@ def _netcdf(job: Job, one: Solved) -> bytes:
 
 def _reason(error: Exception) -> str:
     """In one line."""
-    text = "; ".join(getattr(error, "problems", ())) or str(error) or type(error).__name__
+    problems = error.problems if isinstance(error, ProblemsError) else ()
+    return _in_line("; ".join(problems) or str(error) or type(error).__name__)
+
+
+def _in_line(text: str) -> str:
     return shortened(" ".join(text.split()), LONGEST_REASON)

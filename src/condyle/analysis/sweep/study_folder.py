@@ -25,7 +25,7 @@ from ...mechanism.writing import record
 from ...motion.memory import at_most, memory_at_hand
 from ...version import __version__
 from .job import MOTION, REASON, SECONDS, STATUS, VARIANT, Job
-from .part import Row
+from .part import Rows
 from .study import some_of
 
 STUDY, ROWS, SOLUTIONS = "study.json", "rows", "solutions"
@@ -71,17 +71,15 @@ class Store:
             return []
         return [p for p in range(self._job.parts) if PART.format(p) not in there]
 
-    def write(self, part: int, rows: Sequence[Row]) -> None:
+    def write(self, part: int, rows: Rows) -> None:
         """Write a part, whole or not at all; solutions first, so that a row has its own.
 
         Raises: InputError: if that fails, on a full disk for one.
         """
-        for row in rows:
-            if row.solution is not None:
-                (self.folder / SOLUTIONS).mkdir(exist_ok=True)
-                file = self.folder / SOLUTIONS / f"{row.variant:09d}-{row.motion}.nc"
-                with replacing(file) as temporary:
-                    temporary.write_bytes(row.solution)
+        for (variant, motion), solution in rows.solutions.items():
+            (self.folder / SOLUTIONS).mkdir(exist_ok=True)
+            with replacing(self.folder / SOLUTIONS / f"{variant:09d}-{motion}.nc") as temporary:
+                temporary.write_bytes(solution)
         with replacing(self.folder / ROWS / PART.format(part)) as temporary:
             pq.write_table(_table(self._job, rows), temporary)
 
@@ -102,16 +100,15 @@ class Store:
             part.unlink(missing_ok=True)
 
 
-def _table(job: Job, rows: Sequence[Row]) -> pa.Table:
+def _table(job: Job, rows: Rows) -> pa.Table:
     sources = [motion.source for motion in job.motions]
-    variant, motion, parameters, measures, status, reason, seconds, _ = zip(*rows, strict=True)
-    columns: dict[str, Any] = {VARIANT: pa.array(variant, pa.int64())}
+    columns: dict[str, Any] = {VARIANT: pa.array(rows.variant, pa.int64())}
     if len(sources) > 1:
-        columns[MOTION] = pa.array([sources[m] for m in motion], pa.string())
-    columns |= dict(zip(job.parameters, np.array(parameters).T, strict=True))
-    columns |= dict(zip(job.measures, np.array(measures).T, strict=True))
-    columns |= {STATUS: pa.array(status, pa.string()), REASON: pa.array(reason, pa.string())}
-    return pa.table({**columns, SECONDS: pa.array(seconds, pa.float64())})
+        columns[MOTION] = pa.array([sources[m] for m in rows.motion], pa.string())
+    columns |= dict(zip(job.parameters, rows.parameters.T, strict=True))
+    columns |= dict(zip(job.measures, rows.measures.T, strict=True))
+    columns |= {name: pa.array(getattr(rows, name), pa.string()) for name in (STATUS, REASON)}
+    return pa.table({**columns, SECONDS: pa.array(rows.seconds, pa.float64())})
 
 
 def open_sweep(folder: str | os.PathLike[str]) -> xr.Dataset:
