@@ -120,6 +120,7 @@ if TYPE_CHECKING:
 # What later rooms give to models, solutions, comparisons and exports, which do not know them.
 register("model.solve", "condyle.results.solving:solve")
 register("model.variants", "condyle.model.variants:Variants")
+register("variants.solve", "condyle.results.variant_solutions:solve")
 register("solution.plot", "condyle.report.figures:solution_plots")
 register("solution.table", "condyle.results.summary:summarize")
 register("map.plot", "condyle.report.figures.map_figures:map_plots")

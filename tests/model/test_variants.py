@@ -9,6 +9,7 @@ import pytest
 from support.cases import BUNDLED, Case, case, error
 from support.speeds import few, slow
 
+import condyle
 from condyle.errors import CondyleError
 from condyle.model.model import Model
 from condyle.status import Status
@@ -70,3 +71,27 @@ def test_one_by_one(name: str, backend: str) -> None:
         forward = own.forward_dynamics(q, v, np.nan_to_num(found.effort[0]), wrench, at)
         assert error(moved.acceleration[i], forward.acceleration) < 1e-10
     assert 2 <= good < 6
+
+
+def test_solutions_of_all() -> None:
+    """Along a motion of other coordinates, with an own limit of each; one variant fails."""
+    base = condyle.load_mechanism("masticatory")
+    motion = condyle.Motion.from_csv(condyle.motion.bundled_reference()[0], rate=4.0)
+    load = condyle.reference_load()
+    own = np.array(base.get("chain.temporalis_left.base"))
+    rows = {
+        "platform.mass": [0.2, 0.31, -1.0, 0.25],
+        "platform.points.incisor[0]": base.get("platform.points.incisor[0]") + np.arange(4) * 1e-3,
+        "chain.temporalis_left.base": own + np.outer([0, 0, 0, -0.0165], (1.0, 0, 0)),
+        "chain.temporalis_left.actuator.torque_limit": [1.0, 2.0, 3.0, 4.0],
+    }
+    batch = Model(base, backend="numpy").variants(rows)
+    found = batch.solve(motion, load, keep=("effort", "share", "activation", "singularity_ratio"))
+    assert found["share"].dims == ("variant", "part", "time", "chain")
+    for i in (0, 1, 3):
+        alone = Model(batch.mechanism(i), backend="numpy").solve(motion, load, flag=True)
+        np.testing.assert_array_equal(found["status"][i], alone["status"])
+        for name in ("effort", "share", "activation", "singularity_ratio"):
+            assert error(found[name][i], alone[name]) < 1e-12, name
+    assert found["status"][3].any() and not found["status"][1].any()
+    assert "platform.mass" in found["reason"].values[2] and np.isnan(found["effort"][2]).all()

@@ -121,7 +121,7 @@ def labelled(
     if len(kept) < len(parts):
         dims, share, attributes = variables["share"]
         variables["share"] = dims, share[kept], attributes
-    solution = xr.Dataset(variables, _coordinates(model, times, [parts[i] for i in kept]))
+    solution = xr.Dataset(variables, coordinates(model, times, [parts[i] for i in kept]))
     solution.attrs = {
         "title": title,
         "source": f"condyle {__version__}",
@@ -135,7 +135,7 @@ def labelled(
     return solution
 
 
-def _coordinates(model: Model, times: np.ndarray, parts: Sequence[str]) -> dict[str, Any]:
+def coordinates(model: Model, times: np.ndarray, parts: Sequence[str]) -> dict[str, Any]:
     """Labels along every dimension of `DIMENSIONS`, and the units of each chain."""
     mechanism = model.mechanism
     families = [FAMILIES[chain.kind] for chain in mechanism.chains]

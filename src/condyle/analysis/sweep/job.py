@@ -17,7 +17,6 @@ from ...mechanism.mechanism import Mechanism
 from ...model.distributing import Distribution
 from ...model.inverse_dynamics import SOLVED
 from ...model.model import Model
-from ...model.model_result import ModelResult
 from ...motion import (
     Load,
     Motion,
@@ -27,7 +26,7 @@ from ...motion import (
     trial_motion,
 )
 from ...motion.reference_case import bundled_reference, fits_load, fits_reference
-from ...results.derived import Derived
+from ...results.variant_solutions import outputs_of
 from .measure import Reading, reading
 from .sampling import Design
 from .study import NONE, REFERENCE, TRIAL, MotionFile, Study
@@ -135,28 +134,9 @@ def prepared(
     for path in paths:  # what does not fit the mechanism shows here, and kernels are built
         few: Any = {k: getattr(path, k)[:2] for k in ("t", "value", "rate", "acceleration")}
         (q, q1, q2), _ = model.poses.of_motion(replace(path, **few))
-        few_of = model.inverse_dynamics(q, q1, q2, outputs=SOLVED, threads=1)
-    return replace(job, outputs=_outputs(job, few_of))
-
-
-def _outputs(job: Job, found: ModelResult) -> tuple[str, ...]:
-    """What the readings look at, of results with all of it."""
-    seen = Seen(found)
-    derived = Derived(job.mechanism, seen, np.zeros((len(found.status), 6)), job.model.limited)
-    for each in job.readings:
-        each.values(derived)
-    return tuple(name for name in SOLVED if name in seen.names)
-
-
-class Seen:
-    """Results that note which of them are asked for."""
-
-    def __init__(self, found: ModelResult) -> None:
-        self._found, self.names = found, set[str]()
-
-    def __getattr__(self, name: str) -> Any:
-        self.names.add(name)
-        return getattr(self._found, name)
+        model.inverse_dynamics(q, q1, q2, outputs=SOLVED, threads=1)
+    needed = SOLVED if study.solutions else outputs_of(model, (one.values for one in found))
+    return replace(job, outputs=needed)
 
 
 def _numbers(study: Study, machine: Mechanism) -> Iterator[float]:

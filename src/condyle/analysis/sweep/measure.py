@@ -14,6 +14,7 @@ from ...model.model import Model
 from ...results.contacts import AXES
 from ...results.derived import Derived
 from ...results.variables import BY_NAME, VARIABLES, WRENCH
+from ...results.variant_solutions import each_of
 from .study import Measure
 
 Reduction = Callable[..., np.ndarray]
@@ -46,10 +47,7 @@ class Reading:
     def values(self, derived: Derived, count: int = 1) -> np.ndarray:
         """The columns, (count, len(names)), of as many solutions whose samples are all good, one
         after the other in time."""
-        variable = BY_NAME[self.variable]
-        a, time = variable.values(derived), variable.dims.index("time")
-        a = a.reshape(*a.shape[:time], count, -1, *a.shape[time + 1 :])
-        a = np.moveaxis(a, time, 0)[(slice(None), *self.place)]
+        a = each_of(BY_NAME[self.variable], derived, count)[(slice(None), *self.place)]
         if a.dtype == bool:
             a = a.astype(float)
         found = TAKES[self.take](a, axis=tuple(axis + 1 for axis in self.axes))

@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError, ProblemsError, SampleError, shortened
-from ...mechanism.mechanism import Mechanism
 from ...model.inverse_dynamics import SOLVED
 from ...model.model_result import ModelResult, require_ok
 from ...model.variants import Group, Variants
-from ...results.derived import Derived
 from ...results.solving import assemble
+from ...results.variant_solutions import measured
 from ...status import STATUS_NAMES, Status
 from .job import Job
 
@@ -148,8 +147,11 @@ def _rows(job: Job, start: int, values: np.ndarray, outcomes: list[Along]) -> Ro
         for group, found in one.found:
             rows = group.rows
             good = (found.status == Status.ok).reshape(len(rows), -1).all(axis=1)
-            measured = _measures(job, one.motion, group, found)
-            measures[rows[good], one.motion] = measured[good]
+            read = lambda derived, V: np.concatenate(  # noqa: E731
+                [each.values(derived, V) for each in job.readings], axis=1
+            )
+            about = job.wrenches[one.motion], job.model.limited
+            measures[rows[good], one.motion] = measured(group, found, *about, read)[good]
             if job.study.solutions:
                 for i in rows.tolist():
                     solutions[start + i, one.motion] = _netcdf(job, group.variants, i, one.motion)
@@ -165,27 +167,6 @@ def _rows(job: Job, start: int, values: np.ndarray, outcomes: list[Along]) -> Ro
         np.full(V * M, (time.perf_counter() - clock) / (V * M)),
         solutions,
     )
-
-
-def _measures(job: Job, m: int, group: Group, found: ModelResult) -> np.ndarray:
-    """Measures of the variants of a group, (variants, measures)."""
-    V, wrench, batch = len(group.rows), job.wrenches[m], group.variants
-    if batch.measured_apart:
-        N = len(wrench)
-        return np.concatenate(
-            [
-                _measured(job, batch.mechanism(i), found.rows(v * N, (v + 1) * N), wrench, 1)
-                for v, i in enumerate(group.rows.tolist())
-            ]
-        )
-    return _measured(job, job.mechanism, found, np.tile(wrench, (V, 1)), V)
-
-
-def _measured(
-    job: Job, mechanism: Mechanism, found: ModelResult, wrench: np.ndarray, count: int
-) -> np.ndarray:
-    derived = Derived(mechanism, found, wrench, job.model.limited)
-    return np.concatenate([each.values(derived, count) for each in job.readings], axis=1)
 
 
 def _netcdf(job: Job, batch: Variants, i: int, m: int) -> bytes:

@@ -1,0 +1,130 @@
+"""Solutions of many variants of a mechanism along one motion, in one dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..errors import InputError, did_you_mean
+from ..model.inverse_dynamics import SOLVED
+from ..model.model import Model
+from ..model.model_result import ModelResult
+from ..model.variants import Group, Variants
+from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
+from ..status import STATUS_NAMES, Status
+from .derived import Derived
+from .solving import coordinates
+from .variables import BY_NAME, Variable
+
+Measure = Callable[[Derived, int], np.ndarray]  # of as many solutions, (count, ...)
+
+
+def solve(
+    variants: Variants,
+    motion: Motion,
+    load: Load | None,
+    keep: Sequence[str],
+    load_point: str | None,
+    threads: int | None,
+) -> xr.Dataset:
+    """As `Variants.solve`."""
+    motion, load = as_motion(motion), as_load(load)
+    model, wrench = variants.model, load.at(motion.t)
+    name = load.point if load_point is None else load_point
+    if np.any(wrench) or name is not None:
+        name = resolve_load_point(name, model.mechanism.platform.points)
+    chosen = _variables(model, [keep] if isinstance(keep, str) else keep)
+    needed = outputs_of(model, [partial(each_of, v) for v in chosen])
+    found: dict[str, np.ndarray] = {}
+    status = np.repeat(variants.status[:, None], len(motion.t), axis=1)
+    for group in variants.groups:
+        answer = group.along(motion, wrench, name, needed, threads)
+        good = (answer.status == Status.ok).reshape(len(group.rows), -1)
+        status[group.rows] = answer.status.reshape(good.shape)
+        for v in chosen:
+            values = measured(group, answer, wrench, model.limited, partial(each_of, v))
+            if values.dtype.kind == "f" and not good.all():
+                values = values.copy()
+                values[_failed(v, ~good, values)] = np.nan
+            if v.name not in found:
+                fill = np.nan if values.dtype.kind == "f" else 0
+                found[v.name] = np.full((len(variants), *values.shape[1:]), fill, values.dtype)
+            found[v.name][group.rows] = values
+    machine = variants.base
+    made: dict[str, Any] = {
+        v.name: (("variant", *v.dims), found[v.name], v.attributes(machine))
+        for v in chosen
+        if v.name in found
+    }
+    flags = {"units": "1", "long_name": "status", "flag_meanings": " ".join(STATUS_NAMES)}
+    made["status"] = ("variant", "time"), status.astype(np.int8), flags
+    reasons = [variants.reason(i) if variants.status[i] else "" for i in range(len(variants))]
+    made["reason"] = "variant", np.array(reasons, dtype=object)
+    used = {dim for dims, *_ in made.values() for dim in np.atleast_1d(dims)}
+    known = coordinates(model, motion.t, model.parts)
+    kept = {k: v for k, v in known.items() if k in used or (k.endswith("unit") and "chain" in used)}
+    return xr.Dataset(made, {**kept, "variant": np.arange(len(variants))})
+
+
+def _variables(model: Model, names: Iterable[str]) -> list[Variable]:
+    about = Derived(model.mechanism, None, limited=model.limited)
+    there = [v.name for v in BY_NAME.values() if not v.simulated and v.when(about)]
+    for name in names:
+        if name not in there:
+            raise InputError(f'keep: no variable "{name!s:.80}".{did_you_mean(str(name), there)}')
+    return [BY_NAME[name] for name in names]
+
+
+def _failed(variable: Variable, bad: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Where samples failed, (V, N), as an index of values (V, *dims)."""
+    shape = [1] * values.ndim
+    shape[0], shape[1 + variable.dims.index("time")] = bad.shape
+    return np.broadcast_to(bad.reshape(shape), values.shape)
+
+
+def each_of(variable: Variable, derived: Derived, count: int) -> np.ndarray:
+    """A variable of `count` solutions, one after the other in time: (count, *dims)."""
+    values, time = variable.values(derived), variable.dims.index("time")
+    values = values.reshape(*values.shape[:time], count, -1, *values.shape[time + 1 :])
+    return np.moveaxis(values, time, 0)
+
+
+def measured(
+    group: Group, found: ModelResult, wrench: np.ndarray, limited: bool, read: Measure
+) -> np.ndarray:
+    """What is read of the solutions of a group of variants, (V, ...).
+
+    Args: found: flat;  wrench: of one variant, (N, 6).
+    """
+    V, N, batch = len(group.rows), len(wrench), group.variants
+    if not batch.measured_apart:
+        return read(Derived(batch.base, found, np.tile(wrench, (V, 1)), limited), V)
+    parts = [
+        read(Derived(batch.mechanism(i), found.rows(v * N, (v + 1) * N), wrench, limited), 1)
+        for v, i in enumerate(group.rows.tolist())
+    ]
+    return np.concatenate(parts)
+
+
+def outputs_of(model: Model, reads: Iterable[Measure]) -> tuple[str, ...]:
+    """Outputs of inverse dynamics that something is read of."""
+    home = np.zeros((1, len(model.independent)))
+    seen = _Seen(model.inverse_dynamics(home, home, home, outputs=SOLVED))
+    for read in reads:
+        read(Derived(model.mechanism, seen, np.zeros((1, 6)), model.limited), 1)
+    return tuple(name for name in SOLVED if name in seen.names)
+
+
+class _Seen:
+    """Results that note which of them are asked for."""
+
+    def __init__(self, found: ModelResult) -> None:
+        self._found, self.names = found, set[str]()
+
+    def __getattr__(self, name: str) -> Any:
+        self.names.add(name)
+        return getattr(self._found, name)
