@@ -14,9 +14,11 @@ from support.loads import parts
 from support.tools import run
 
 import condyle
+from condyle.errors import InputError
 from condyle.export import Exported, export
 from condyle.model.forward_kinematics import ForwardKinematics
 from condyle.questions.law import CONTROLLERS, Control, ControllerTable
+from condyle.status import Status
 
 Folders = Callable[[str], Folder]
 OK, UNREACHABLE, SINGULAR, OUT_OF_BOUNDS, INFEASIBLE = range(5)
@@ -38,7 +40,10 @@ class Library:
         self, question: str, **given: np.ndarray | float
     ) -> tuple[int, dict[str, np.ndarray]]:
         f = self.exported[question]
-        arrays = {a.name: np.full(a.size, 0.0 if a.given else KEPT) for a in f.arguments}
+        real = np.float32 if self.exported.precision == "float" else np.float64
+        arrays = {
+            a.name: np.full(a.size, 0.0 if a.given else KEPT, dtype=real) for a in f.arguments
+        }
         for name, value in given.items():
             arrays[name][:] = value
         pointers = [a.ctypes.data_as(ctypes.c_void_p) for a in arrays.values()]
@@ -93,6 +98,68 @@ def test_a_singular_pose_is_named_and_others_balance(tmp_path: Path) -> None:
             assert off <= 1e-11 * np.abs(J.T @ np.diag(right)).max()
             passed += 1
     assert passed >= 5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("precision", "formulation"),
+    [("double", "virtual_power"), ("float", "virtual_power"), ("double", "lagrange")],
+)
+def test_a_gimbal_lock_is_named_before_digits_are_lost(
+    tmp_path: Path, precision: str, formulation: str
+) -> None:
+    """Towards it by tenths: accelerations that are given are right, and below there is one word.
+
+    A hexapod held by its efforts: the platform does not accelerate.
+    """
+    mechanism = condyle.load_mechanism("gough-stewart")
+    model = condyle.derive(mechanism, backend="numpy")
+    options = {"precision": precision, "prefix": "p", "lanes": 0, "formulation": formulation}
+    hexapod = Library(export(mechanism, ("forward",), **options), tmp_path)
+    word, most = int(Status.gimbal_lock), 1e-6 if precision == "double" else 2e-1
+    told = []
+    for away in 10.0 ** -np.arange(1, 10):
+        q = np.array([0, 0, 0, 0.1, np.pi / 2 - away, 0.2])
+        effort = model.inverse_dynamics(q, 0 * q, 0 * q).effort
+        status, found = hexapod("forward", q=q, effort=effort)
+        assert status == word or np.abs(found["acceleration"]).max() < most, away
+        told.append(status)
+    assert set(told) == {OK, word} and told == sorted(told)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("precision", ["double", "float"])
+def test_the_bound_of_the_library(tmp_path: Path, precision: str) -> None:
+    """To a few percent in double; in float it holds, too, and is in the scale of float."""
+    mechanism = condyle.load_mechanism("masticatory")
+    questions = ("inverse", "contact", "forward")
+    jaw = Library(export(mechanism, questions, outputs=("bound",), precision=precision), tmp_path)
+    model = condyle.derive(mechanism, backend="numpy")
+    rng = np.random.default_rng(3)
+    for size in (0.01, 0.05, 0.1):
+        q, q1, q2 = (rng.uniform(-size, size, (3, 4)) * [0.02, 0.02, 1, 1]).astype(np.float32)
+        right = model.inverse_dynamics(q, q1, q2)
+        back = model.forward_dynamics(q, q1, right.effort)
+        for question in questions:
+            given = {"effort": right.effort} if question == "forward" else {"q2": q2}
+            status, found = jaw(question, q=q, q1=q1, **given)
+            assert status == OK
+            own, name = (back, "acceleration") if question == "forward" else (right, "effort")
+            if precision == "double":
+                assert found["bound"][0] == pytest.approx(float(own.bound), rel=0.05)
+                continue
+            best = getattr(own, name)
+            off = np.abs(found[name] - best).max() / np.abs(best).max()
+            assert off < found["bound"][0]
+            assert found["bound"][0] == pytest.approx(float(own.bound) * 2.0**29, rel=0.5)
+
+
+def test_outputs_that_there_are_not() -> None:
+    mechanism = condyle.load_mechanism("masticatory")
+    with pytest.raises(InputError, match="expected bound"):
+        export(mechanism, ("inverse",), outputs=("share",))
+    with pytest.raises(InputError, match="none of motion, pose has a bound"):
+        export(mechanism, ("motion", "pose"), outputs=("bound",))
 
 
 def test_small_and_denormal_numbers_are_numbers(jaw: Library) -> None:

@@ -30,6 +30,7 @@ def c(
     question: list[str] | None = None,
     coordinates: Annotated[str | None, options.option("", "--from")] = None,
     landmark: options.Landmark = None,
+    outputs: str | None = None,
     precision: str = "double",
     constants: str = "inside",
     prefix: str | None = None,
@@ -51,6 +52,8 @@ def c(
             joint_pd, bite_force. Default: inverse, contact, forward, motion, pose,
             computed_torque, and closure with --from or --landmark.
         landmark: Platform point whose path is given to closure.
+        outputs: bound: inverse, contact, bounded and forward also return the bound of their
+            relative error.
         precision: double, or float for single-precision processors.
         constants: inside: compiled in; struct: in a structure that the program fills at run time.
         prefix: Prefix of all names in C. Default: the mechanism's name.
@@ -64,6 +67,7 @@ def c(
         question=question,
         coordinates=coordinates or (),
         landmark=landmark,
+        outputs=outputs or (),
         precision=precision,
         constants=constants,
         prefix=prefix,

@@ -41,7 +41,7 @@ WHY = {
     "INFEASIBLE": "no efforts within the limits, or no pose, fit the arguments",
     "JAMMED": "Coulomb friction has no solution",
     "UNCERTIFIED": "the result could not be certified",
-    "GIMBAL_LOCK": "beta is +-90 degrees: accelerations of the angles are not determined",
+    "GIMBAL_LOCK": "beta is too near +-90 degrees for rates of the angles",
     "AMBIGUOUS": "Coulomb friction has several solutions",
 }
 

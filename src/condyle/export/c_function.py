@@ -18,11 +18,13 @@ from ..backends.c.straight_line import Scalar as Plain
 from ..errors import UnsupportedError
 from ..graph.graph import Value
 from ..graph.program import Output, Program
+from ..kinematics.rotation import NEAR_LOCK
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
 from ..questions import Question
 from ..questions.derivative import PREFIX, directional
 from ..questions.friction import MOST
+from ..questions.precision import threshold
 from .c_context import ANGLES, CODES, LARGEST, WHY, Body, Context
 from .catalogue import Entry, Wish, least_norm
 from .exported import Argument, Function
@@ -303,10 +305,17 @@ def _judged(
     found = [(_sum(every), f"<= {body.number(LARGEST[c.precision])}", "OUT_OF_BOUNDS")]
     if angles and isinstance(body, Scalar):  # vector code takes far angles from the library
         found.append((_sum(angles), f"<= {body.number(ANGLES[c.precision])}", "OUT_OF_BOUNDS"))
+    nodes, doubted = body.program.graph.nodes, []
+    near = threshold(NEAR_LOCK, c.precision)
     for i, check in enumerate(body.program.checks):
-        limit = body.number(check.tolerance)
-        known = NAMES[int(check.below)] if check.below is not None else entry.unsure(c.structure)
-        found.append((body.check(i), f">= {limit}", known))
+        judged = body.check(i), f">= {body.number(check.tolerance)}"
+        if check.below is not None:
+            found.append((*judged, NAMES[int(check.below)]))
+        elif any(nodes[v].data == (near,) for v in nodes[check.value].args):
+            found.append((*judged, "GIMBAL_LOCK"))  # which a robust path would tell
+        else:
+            doubted.append((*judged, entry.unsure(c.structure)))
+    found += doubted
     for store in body.stores() if entry.within else ():
         place, value = store.rstrip(";").split(" = ", 1)
         if bound := entry.within.get(place.partition("[")[0]):

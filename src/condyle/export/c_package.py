@@ -45,6 +45,7 @@ def export_c(
     question: str | Sequence[str] | None = None,
     coordinates: str | Sequence[str] = (),
     landmark: str | None = None,
+    outputs: str | Sequence[str] = (),
     precision: str = "double",
     constants: str = "inside",
     prefix: str | None = None,
@@ -62,6 +63,7 @@ def export_c(
                       need nothing else, and `closure` with `coordinates` or `landmark`.
             coordinates, landmark: the coordinates that `closure` starts from, or the platform point
                       whose path it starts from.
+            outputs: bound, for dynamics to return the bound of their relative error too.
             precision: double or float.
             constants: inside, or struct: in a structure that a program fills at run time.
             prefix: of all names in C; default: the mechanism's name.
@@ -89,6 +91,7 @@ def export_c(
         lanes=lanes,
         coordinates=names,
         landmark=landmark,
+        outputs=texts_of("outputs", outputs),
     )
     folder = make_folder(path)
     files = write_package(exported, folder)
@@ -205,7 +208,7 @@ def _checked(e: Exported, f: Function) -> list[str]:
     ok, count = f"{e.prefix.upper()}_OK", f"{f.name.upper()}_SAMPLES"
     constants, prepared = _constants(e)
     words = [f"{f.name}_{a.name}[i]" if a.given else a.name for a in f.arguments]
-    compared = [a for a in f.outputs if a.name != "residual"]  # which is rounding
+    compared = [a for a in f.outputs if a.name not in ("residual", "bound")]  # of rounding
     return [
         f"static int check_{f.question}(void)\n{{",
         *(*constants, "    double worst = 0.0;\n    int wrong = 0;", *prepared),

@@ -57,7 +57,7 @@ class Reference:
 
 def _graph(r: Reference, question: str, given: Given) -> tuple[Arrays, np.ndarray]:
     """By numpy's kernel of the same question."""
-    entry = require_question(question)
+    entry = require_question(question).asking(r.wish)
     kernel, names = _kernel(r, question, entry)
     ports, known = {}, own_numbers(r.model.mechanism)
     for port in kernel.interface.ports:
@@ -101,13 +101,14 @@ def _load(given: Given) -> tuple[np.ndarray, np.ndarray]:
 
 def _inverse(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
     found = r.model.inverse_dynamics(given["q"], given["q1"], given["q2"], *_load(given))
-    return {"effort": found.effort, "contact_force": found.contact_force}, found.status
+    results = {"effort": found.effort, "contact_force": found.contact_force}
+    return results | {"bound": found.bound[:, None]}, found.status
 
 
 def _forward(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
     found = r.model.forward_dynamics(given["q"], given["q1"], given["effort"], *_load(given))
     results = {"acceleration": found.acceleration, "contact_force": found.contact_force}
-    return results, found.status
+    return results | {"bound": found.bound[:, None]}, found.status
 
 
 def _closure(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:

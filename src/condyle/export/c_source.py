@@ -34,7 +34,7 @@ from .c_names import (
     scalar_functions,
     used,
 )
-from .catalogue import Entry, Wish, in_order, least_norm, require_question, usual
+from .catalogue import CATALOGUE, Entry, Wish, in_order, least_norm, require_question, usual
 from .exported import Arguments, Exported, Function
 
 # Functions of the C library that a source may call, in `double`.
@@ -55,6 +55,7 @@ def export(
     lanes: int = 8,
     coordinates: Sequence[str] = (),
     landmark: str | None = None,
+    outputs: Sequence[str] = (),
 ) -> Exported:
     """A mechanism in C: source, header and interface.
 
@@ -65,6 +66,7 @@ def export(
             lanes:     width of the vector types (2, 4 or 8 doubles); 0: none. In float, or with
                        constants in a structure, there are none.
             coordinates, landmark: what `closure` starts from.
+            outputs:   results besides the usual ones: bound, of the relative error.
     Raises: InputError, UnsupportedError: for options or mechanisms that C export has not.
             MechanismError: if the contacts do not hold the platform at home.
     """
@@ -83,7 +85,8 @@ def export(
     how: dict[str, Any] = {"formulation": formulation, "route": route, "backend": "numpy"}
     model = Model(mechanism, **how, distribution=least_norm(mechanism))
     asked = usual(mechanism) if questions is None else questions
-    entries = _entries(mechanism, asked, coordinates, landmark)
+    wish = Wish(in_order(coordinates), landmark, _bounded(outputs))
+    entries = _entries(mechanism, asked, wish)
     structure = structure_of(mechanism, formulation_named(formulation).name, route)
     numbers = Layout.of(structure).numbers(mechanism, landmark)
     if constants not in ("inside", "struct"):
@@ -98,7 +101,6 @@ def export(
     plain = struct or real != "double"
     own = identifier(mechanism.name).lower()
     name = require_prefix((f"{own}_" if own in OTHERS else own) if prefix is None else prefix)
-    wish = Wish(in_order(coordinates), landmark)
     arguments = Arguments(mechanism, wish.coordinates, landmark)
     c = Context(
         mechanism,
@@ -134,18 +136,33 @@ def export(
     return replace(exported, header=header_text(exported, extra))
 
 
-def _entries(
-    mechanism: Mechanism, questions: Sequence[str], coordinates: Sequence[str], landmark: str | None
-) -> dict[str, Entry]:
+def _entries(mechanism: Mechanism, questions: Sequence[str], wish: Wish) -> dict[str, Entry]:
     """The questions, each once."""
-    found = {question: require_question(question) for question in questions}
+    found = {question: require_question(question).asking(wish) for question in questions}
     if not found:
         raise InputError("no question to export")
-    if landmark is not None:
-        require_landmark(mechanism, landmark)
+    if wish.landmark is not None:
+        require_landmark(mechanism, wish.landmark)
     elif "closure" in found:
-        require_independent(mechanism, in_order(coordinates))
+        require_independent(mechanism, wish.coordinates)
+    if wish.bound and all(entry.bounding is None for entry in found.values()):
+        able = ", ".join(name for name, entry in CATALOGUE.items() if entry.bounding is not None)
+        raise InputError(
+            f"outputs: none of {', '.join(found)} has a bound of its error; add one of {able}, or "
+            "leave bound out"
+        )
     return found
+
+
+def _bounded(outputs: Sequence[str]) -> bool:
+    """Whether the bound is among the outputs.
+
+    Raises: InputError: for any other output.
+    """
+    for name in outputs:
+        if name != "bound":
+            raise InputError(f"outputs: expected bound, got {shown(name)}")
+    return bool(outputs)
 
 
 def _portable(c: Context, bodies: Sequence[Body]) -> str:

@@ -29,10 +29,12 @@ class Wish:
     coordinates: names of 6 - k pose coordinates that `closure` starts from, in the order of X_EE,
                  or
     landmark:    the platform's point whose path it starts from.
+    bound:       whether dynamics return the bound of their relative error too.
     """
 
     coordinates: tuple[str, ...] = ()
     landmark: str | None = None
+    bound: bool = False
 
 
 def in_order(coordinates: Sequence[str]) -> tuple[str, ...]:
@@ -62,6 +64,7 @@ class Entry:
     described: name in C -> description and unit, where `Arguments` has none.
     limited:  whether efforts are within limits.
     tangent:  whether it is the derivative, along arguments `d_` of what is given.
+    bounding: details with which the question has a result `bound`; None: it has none.
     """
 
     text: str
@@ -77,6 +80,14 @@ class Entry:
     described: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     limited: bool = False
     tangent: bool = False
+    bounding: tuple[Any, ...] | None = None
+
+    def asking(self, wish: Wish) -> Entry:
+        """With the bound of its relative error among its results, if that is wished."""
+        if not wish.bound or self.bounding is None or self.tangent:
+            return self
+        bounding = self.bounding
+        return replace(self, results=f"{self.results} bound", details=lambda wish: bounding)
 
     def unsure(self, structure: Structure) -> str:
         """The status of samples that cannot be certified."""
@@ -98,6 +109,7 @@ CATALOGUE: dict[str, Entry] = {
         f"{STATE} {LOAD}",
         rubbing="UNCERTIFIED",
         quick=True,
+        bounding=(("bound",),),
     ),
     "contact": Entry(
         "Inverse dynamics: efforts of least norm and contact forces for a motion under a load.",
@@ -107,6 +119,7 @@ CATALOGUE: dict[str, Entry] = {
         details=lambda wish: (("contact",),),
         rubbing="UNCERTIFIED",
         quick=True,
+        bounding=(("contact", "bound"),),
     ),
     "bounded": Entry(
         "Inverse dynamics within limits: efforts of least norm, and contact forces.",
@@ -117,6 +130,7 @@ CATALOGUE: dict[str, Entry] = {
         rubbing="UNCERTIFIED",
         limited=True,
         steps=TERMS["square"].turns,
+        bounding=(),
     ),
     "forward": Entry(
         "Forward dynamics: accelerations under efforts and a load, and the contact forces.",
@@ -125,6 +139,7 @@ CATALOGUE: dict[str, Entry] = {
         details=lambda wish: (("contact",),),
         rubbing="UNCERTIFIED",
         quick=True,
+        bounding=(("contact", "bound"),),
     ),
     "motion": Entry(
         "Pose and its rates from the independent coordinates.", STATE, WHOLE, doubt="UNREACHABLE"

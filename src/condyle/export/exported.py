@@ -127,9 +127,9 @@ class Exported:
 
 
 # What entries are of: independent coordinates, X_EE, those that `closure` starts from, joints,
-# actuators, contacts, axes.
+# actuators, contacts, axes; the sample.
 FREE, WHOLE, GIVEN = "free", "whole", "given"
-JOINT, EFFORT, CONTACT, AXES = "joint", "effort", "contact", "axes"
+JOINT, EFFORT, CONTACT, AXES, ONE = "joint", "effort", "contact", "axes", "one"
 # Name -> what it is, what its entries are of, and their unit: what follows that of a coordinate or
 # joint, or all of it.
 KNOWN = {
@@ -169,6 +169,7 @@ KNOWN = {
     "contact_force": (
         "contact forces on the platform, along the unit normals of the surfaces", CONTACT, "N",
     ),
+    "bound": ("bound of the relative error of the other results, by rounding", ONE, "=1"),
 }  # fmt: skip
 LETTERS = {"force": "F", "moment": "M"}  # of axes
 
@@ -193,6 +194,7 @@ class Arguments:
             JOINT: chains,
             EFFORT: chains,
             CONTACT: mechanism.contact_names,
+            ONE: ("relative",),
         }
         self._units: dict[str, Sequence[str]] = {
             JOINT: [family.joint_unit for family in families],

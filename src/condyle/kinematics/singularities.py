@@ -89,12 +89,21 @@ def length_sensitivity(J_W: np.ndarray, N: np.ndarray, transmission: np.ndarray)
         if known.any():
             found[known] = length_sensitivity(J_W[known], N[known], transmission[known])
         return found
-    free = np.linalg.svd(np.pad(N, ((0, 0), (0, 6 - N.shape[1]), (0, 0))))[2][:, N.shape[1] :]
+    free = admitted_twists(N)
     _, sigma, Vt = np.linalg.svd(J_W @ free.transpose(0, 2, 1))
     turning = ((Vt @ free)[..., 3:] ** 2).sum(axis=2)
     size = np.abs(transmission)
     inverse, direct = ratio(size.min(axis=1), size.max(axis=1)), ratio(sigma[:, -1], sigma[:, 0])
     return np.where(direct <= inverse, turning[:, 0] - turning[:, -1], 0.0)
+
+
+def admitted_twists(N: np.ndarray) -> np.ndarray:
+    """Orthonormal twists that contacts admit, as rows, (samples, 6 - k, 6).
+
+    Args: N: wrenches of the contacts, dual to the twists, (samples, k, 6), finite.
+    """
+    k = N.shape[1]
+    return np.linalg.svd(np.pad(N, ((0, 0), (0, 6 - k), (0, 0))))[2][:, k:]
 
 
 def ratio(small: np.ndarray, large: np.ndarray) -> np.ndarray:

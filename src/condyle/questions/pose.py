@@ -157,6 +157,7 @@ class JointsAt:
     joint, discriminant: lane values.   J: (6,) a group, theta' = J . X_EE'.
     M_J: (6, m).   back: (6,), moves the dependent coordinates back onto the surfaces.
     phi: (k,) [m], distances of the contacts from their surfaces.
+    twist: (6,) a group, theta' = twist . [V; omega].   N: (6, k), wrenches of the contacts.
     """
 
     joint: Lanes
@@ -165,6 +166,8 @@ class JointsAt:
     M_J: ca.SX
     back: ca.SX
     phi: ca.SX
+    twist: Lanes
+    N: ca.SX
 
 
 def joints_at(b: Builder, pose: ca.SX, contacts: Sequence[ContactSymbols]) -> JointsAt:
@@ -173,16 +176,17 @@ def joints_at(b: Builder, pose: ca.SX, contacts: Sequence[ContactSymbols]) -> Jo
     R, E = bryant.rotation(), ca.diagcat(ca.SX.eye(3), bryant.angular_velocity())
     dep = indices(s.dependent)
     phi = ca.vertcat(ca.SX(0, 1), *(c.phi(c.at(position, R)) for c in contacts))
-    C = contact_frame(contacts, position, R).N.T @ E
+    N = contact_frame(contacts, position, R).N
+    C = N.T @ E
     M_J, back = parasitic_jacobian(C, s.dependent), ca.SX.zeros(6)
     if dep:
         back[dep] = -solve_small(C[:, dep], phi)
     levers = [R @ b.lane(group, "joint") for group in range(len(s.families))]
     loops = loops_at(b, position, R)
     pairs = zip(loops, levers, strict=True)
-    J = [E.T @ ca.vertcat(loop.J, ca.cross(lever, loop.J)) for loop, lever in pairs]
-    reach = [loop.discriminant for loop in loops]
-    return JointsAt([loop.q_r[0] for loop in loops], reach, J, M_J, back, phi)
+    twist = [ca.vertcat(loop.J, ca.cross(lever, loop.J)) for loop, lever in pairs]
+    J, reach = [E.T @ row for row in twist], [loop.discriminant for loop in loops]
+    return JointsAt([loop.q_r[0] for loop in loops], reach, J, M_J, back, phi, twist, N)
 
 
 def least_squares(b: Builder, A: Lanes, right: Lanes) -> tuple[ca.SX, ca.SX]:
@@ -221,6 +225,8 @@ def encoders(structure: Structure) -> Program:
     b.output("M_J", at.M_J, "", 6, structure.m)
     b.output("correction", at.back, "m, rad", 6)
     b.output("phi", at.phi, "m", len(contacts))
+    b.output("twist", at.twist, "")
+    b.output("N", at.N.T, "", len(contacts), 6)
     return b.finish()
 
 

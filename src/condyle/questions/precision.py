@@ -1,4 +1,4 @@
-"""Questions in `float`: what rounding decides there, where it decides otherwise in `double`."""
+"""Questions without a robust path, and in `float`: what rounding decides otherwise there."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from ..graph.graph import Graph, Value
 from ..graph.program import Program
 from ..kinematics.iteration import CLOSED, TINY
 from ..kinematics.one_angle import CLOSED as ANGLE_CLOSED
+from ..kinematics.rotation import GIMBAL_LOCK, NEAR_LOCK
+from .bound import ROUNDING
+from .bound import TINY as LEAST_FORCE
 from .inverse import DOUBTFUL, WEAK
 from .pose import CLOSED as POSE_CLOSED
 from .pose import CONDITIONED
@@ -17,18 +20,22 @@ from .pose import TINY as POSE_TINY
 _FLOAT = {DOUBTFUL: 1e-6, WEAK: 1e-8, CLOSED**2: 4e-12, TINY**2: 1e-10, ANGLE_CLOSED: 4e-6}
 _ENCODERS = {POSE_CLOSED**2: 4e-10, POSE_TINY**2: 1e-10, CONDITIONED: 1e-6}
 _FLOAT_OF = {"pose": _ENCODERS, "observer": _ENCODERS}
+# Of bounds: rounding, and what avoids 0 / 0.
+_FLOAT |= {ROUNDING: 2.0**-24, LEAST_FORCE: 1e-30}
+# |cos beta| at which accelerations of angles are off by 1e-4; without twists, at which pivots, of
+# its square, are in doubt.
+_FLOAT |= {GIMBAL_LOCK: 1e-3, NEAR_LOCK: 3e-2}
+_DOUBLE = {NEAR_LOCK: 1e-2}
 
 
 def threshold(value: float, precision: str, question: str = "") -> float:
     """A number of a question as this precision has it."""
-    table = {} if precision == "double" else _FLOAT | _FLOAT_OF.get(question, {})
+    table = _DOUBLE if precision == "double" else _FLOAT | _FLOAT_OF.get(question, {})
     return table.get(value, value)
 
 
 def rescaled(program: Program, question: str, precision: str) -> Program:
     """The program, where constants that rounding decides are those of `precision`."""
-    if precision == "double":
-        return program
     graph = Graph()
     moved: dict[Value | None, Value] = {}
     for v in program.order:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from oracles.random_mechanism import random_mechanism
 from oracles.rotations import bryant
+from scipy.spatial.transform import Rotation
 
 import condyle
 from condyle.errors import InconsistentError, InputError, UnreachableError
@@ -40,6 +41,30 @@ def test_inverts_inverse_kinematics(name: str) -> None:
     np.testing.assert_allclose(found.pose, pose, rtol=0, atol=1e-12)
     assert np.abs(found.residual).max() < 1e-11
     assert (found.condition >= 1).all()
+
+
+def test_condition_is_of_twists_not_of_angles() -> None:
+    """By central differences along turns about fixed axes; near a gimbal lock nothing happens."""
+    model = condyle.derive("gough-stewart", backend="numpy")
+    L, h = model.characteristic_length, 1e-6
+    for beta in (0.3, np.pi / 2 - 1e-3):
+        pose = np.array([0.005, 0.003, -0.004, 0.2, beta, -0.1])
+        joint = model.poses.configuration(pose[None]).joint[0]
+        found = model.forward_kinematics(joint, start=pose)
+        columns = []
+        for i in range(6):
+            ends = []
+            for step in (h, -h):
+                moved = pose.copy()
+                if i < 3:
+                    moved[i] += step * L
+                else:
+                    turn = Rotation.from_rotvec(step * np.eye(3)[i - 3]).as_matrix()
+                    moved[3:] = bryant_angles(turn @ rotations(pose[None, 3:])[0])
+                ends.append(model.poses.configuration(moved[None]).joint[0])
+            columns.append((ends[0] - ends[1]) / (2 * h))
+        right = np.linalg.cond(np.array(columns).T)
+        assert found.condition == pytest.approx(right, rel=1e-4)
 
 
 def test_turns_of_a_joint_do_not_matter() -> None:

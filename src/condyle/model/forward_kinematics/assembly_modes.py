@@ -14,6 +14,7 @@ import numpy as np
 from ...mechanism.coordinates import bryant_angles, rotations
 from ...mechanism.mechanism import Mechanism
 from ..continuation import CONVERGED, Steps
+from .joint_steps import JointSteps
 from .orientation import principal
 from .pose_status import PoseStatus, judge
 
@@ -34,7 +35,7 @@ class AssemblyModes:
     distance:  from home, (M,): root of squares of O_M's way in characteristic lengths and of the
                angle of the rotation [rad].
     residual:  (M, n), given less computed joint coordinates [rad or m].
-    condition: (M,), condition number of the dimensionless actuator Jacobian.
+    condition: (M,), condition number of the joints' rates on twists, without dimension.
     """
 
     pose: np.ndarray
@@ -44,7 +45,7 @@ class AssemblyModes:
 
 
 def search(
-    mechanism: Mechanism, steps: Steps, joints: np.ndarray, seed: int, tolerance: float
+    mechanism: Mechanism, steps: JointSteps, joints: np.ndarray, seed: int, tolerance: float
 ) -> AssemblyModes:
     """Poses of joint coordinates, (n,), that fit within `tolerance` [rad or m]."""
     starts = _starts(mechanism, np.random.default_rng(seed))
@@ -63,7 +64,7 @@ def search(
         if not kept or (np.abs(place[kept] - place[i]).max(axis=1) > SAME).all():
             kept.append(int(i))
     at = steps.step(pose[kept], given[: len(kept)])
-    condition = np.linalg.cond(at.A) if kept else np.zeros(0)
+    condition = steps.condition(pose[kept]) if kept else np.zeros(0)
     return AssemblyModes(pose[kept], distance[kept], at.residual, condition)
 
 

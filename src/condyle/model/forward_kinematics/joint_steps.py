@@ -6,11 +6,14 @@ turn count by the characteristic length, and so do angles of the pose: see `ques
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ...backends.numpy_kernel import NumpyKernel
 from ...kinematics.chain import FAMILIES
 from ...kinematics.constraints import indices
+from ...kinematics.singularities import admitted_twists
 from ...mechanism.home import characteristic_length, independent_coordinates
 from ...mechanism.mechanism import Mechanism
 from ...questions import Question
@@ -19,8 +22,24 @@ from ...questions.structure import structure_of
 from ..continuation import Conditions, Steps
 
 
-def joint_steps(mechanism: Mechanism) -> Steps:
-    """Steps towards joint coordinates (N, n); NaN where a chain cannot reach the pose."""
+class JointSteps(Steps):
+    """Steps towards joint coordinates (N, n); NaN where a chain cannot reach the pose.
+
+    twists: poses (N, 6) -> the joints' rates on [V; omega], (N, n, 6), and the wrenches of the
+            contacts, (N, k, 6).
+    """
+
+    twists: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+    def condition(self, pose: np.ndarray) -> np.ndarray:
+        """Of the joints' rates on the twists that the contacts admit, without dimension, (N,)."""
+        J, N = self.twists(pose)
+        A = J * self._weight[:, None] * self._unit
+        return np.linalg.cond(A @ admitted_twists(N * self._unit).transpose(0, 2, 1))
+
+
+def joint_steps(mechanism: Mechanism) -> JointSteps:
+    """The steps of a mechanism."""
     structure = structure_of(mechanism)
     numbers = Layout.of(structure).numbers(mechanism)
     question = Question.about(specialised(structure, numbers), "encoders")
@@ -34,6 +53,12 @@ def joint_steps(mechanism: Mechanism) -> Steps:
         joint, back, off = (values[name].T for name in ("joint", "correction", "phi"))
         return Conditions(joint, J @ M_J, M_J, back, (J @ back[..., None])[..., 0], off)
 
+    def twists(pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        values = kernel.run({"pose": pose}).values
+        return values["twist"].transpose(2, 1, 0), np.moveaxis(values["N"], -1, 0)
+
     turns = np.array([FAMILIES[chain.kind].joint_unit == "rad" for chain in mechanism.chains])
     free = np.array(indices(independent_coordinates(mechanism)))
-    return Steps(at, characteristic_length(mechanism), turns, free, turning=True)
+    steps = JointSteps(at, characteristic_length(mechanism), turns, free, turning=True)
+    steps.twists = twists
+    return steps

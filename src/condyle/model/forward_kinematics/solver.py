@@ -65,7 +65,7 @@ class ForwardKinematics:
         at_pose = self._steps.step(pose, joints)
         found = status == PoseStatus.OK
         condition = np.full(count, np.nan)
-        condition[found] = np.linalg.cond(at_pose.A[found])
+        condition[found] = self._steps.condition(pose[found])
         nowhere = (status != PoseStatus.OK) & (status != PoseStatus.INCONSISTENT)
         residual = np.where(nowhere[:, None], np.nan, at_pose.residual)
         pose = np.where(found[:, None], principal(pose), np.nan)
