@@ -24,8 +24,9 @@ from condyle.mechanism.contact import Friction
 from condyle.mechanism.mechanism import Mechanism
 from condyle.model.model import Model
 from condyle.motion import Motion, reference_load, reference_motion
+from condyle.questions.file_numbers import numbers_of
 from condyle.questions.inverse import inverse
-from condyle.questions.numbers import Layout, has_closed_form, specialised
+from condyle.questions.numbers import has_closed_form, specialised
 from condyle.questions.structure import structure_of
 
 from .programs import Bites, program_probes, tight
@@ -311,7 +312,7 @@ def _python_probe(name: str, call: Callable[[], object], count: int) -> Probe:
 
 def _straight_probes(label: str, timer: Timer, case: Case) -> Iterator[Probe]:
     structure = structure_of(case.mechanism)
-    numbers = Layout.of(structure).numbers(case.mechanism)
+    numbers = numbers_of(structure, case.mechanism)
     program = inverse(specialised(structure, numbers)).main
     function = torque_function(program, numbers, case.point)
     folder = Path(tempfile.mkdtemp(prefix="condyle-bench-"))

@@ -18,7 +18,7 @@ from condyle.backends.numpy_kernel import NumpyKernel
 from condyle.export import export
 from condyle.export.c_package import FLAGS
 from condyle.questions import Question
-from condyle.questions.numbers import Layout
+from condyle.questions.file_numbers import numbers_of
 from condyle.questions.structure import structure_of
 
 BODIES = ["crank", "coupler", "slider", "rod", "cylinder", "piston", "actuator"]
@@ -77,9 +77,7 @@ def shared_path(name: str, i: int, of: condyle.Mechanism, several: bool) -> str:
     if kind == "contact_surface":
         return f"{contact}.surface." + ("slope[0]", "slope[1]", "offset")[i]
     if kind == "friction":
-        return ("", *(f"{contact}.friction.{k}" for k in ("coefficient", "smoothing_speed")), "")[
-            i + 1
-        ]
+        return f"{contact}.friction.{('coefficient', 'smoothing_speed')[i]}"
     return f"{contact}.point[{i}]"
 
 
@@ -119,9 +117,9 @@ def test_each_number_changed_is_that_of_the_file(name: str, tmp_path: Path) -> N
     states = dict(zip(("q", "q1", "q2"), STATE[:, : nominal.degrees_of_freedom], strict=True))
     states = {key: np.ascontiguousarray(values) for key, values in states.items()}
     structure = replace(structure_of(nominal), parallel=False)
-    layout = Layout.of(structure)
     kernel = NumpyKernel(
-        Question.about(structure, "inverse", ("contact",)).variants(), layout.numbers(nominal)
+        Question.about(structure, "inverse", ("contact",)).variants(),
+        numbers_of(structure, nominal),
     )
     ports, chains = kernel.interface.ports, nominal.chains
     one_each = {next(c.name for c in chains if c.kind == kind) for kind in {c.kind for c in chains}}
@@ -137,7 +135,7 @@ def test_each_number_changed_is_that_of_the_file(name: str, tmp_path: Path) -> N
         pointers = [a.ctypes.data_as(ctypes.c_void_p) for a in (constants, *given.values())]
         assert library.arm_contact(*pointers) == 0, path
         numbers[at] = old
-        file = layout.numbers(changed(nominal, path, new - old))
+        file = numbers_of(structure, changed(nominal, path, new - old))
         asked = {k: v[None] for k, v in given.items() if k in [p.name for p in ports]}
         right = kernel.renumbered(file).run(asked).values["effort"].ravel()
         np.testing.assert_allclose(

@@ -16,13 +16,14 @@ from condyle.backends.numpy_kernel import NumpyKernel
 from condyle.errors import InputError
 from condyle.graph.program import Program, Variants
 from condyle.questions.builder import Builder
-from condyle.questions.numbers import INERTIA, Layout
+from condyle.questions.file_numbers import numbers_of
+from condyle.questions.numbers import INERTIA
 from condyle.questions.structure import structure_of
 from condyle.status import Status
 
 MECHANISM = case("all_kinds").mechanism  # families interleaved, groups of 3, 3 and 2
 STRUCTURE = structure_of(MECHANISM)
-NUMBERS = Layout.of(STRUCTURE).numbers(MECHANISM)
+NUMBERS = numbers_of(STRUCTURE, MECHANISM)
 KINDS = np.array([chain.kind for chain in MECHANISM.chains])
 JOINTS = np.array([chain.platform for chain in MECHANISM.chains])
 GRAVITY = np.array(MECHANISM.gravity)

@@ -14,7 +14,7 @@ from condyle.backends.kernel import AGAIN
 from condyle.backends.numpy_kernel import NumpyKernel
 from condyle.graph.program import Numbers
 from condyle.questions import Question
-from condyle.questions.numbers import Layout
+from condyle.questions.file_numbers import numbers_of
 from condyle.questions.structure import Structure, structure_of
 
 # Chains of one family, of two in turn (in another order than the file's), contacts on quadrics.
@@ -27,8 +27,8 @@ def two(name: str) -> tuple[Structure, list[Numbers]]:
     first = machine.chains[0].name
     at = f"chain.{first}.platform"
     other = machine.set({"platform.mass": 0.31, at: np.add(machine.get(at), (0.001, 0.002, 0.0))})
-    layout = Layout.of(structure := structure_of(machine))
-    return structure, [layout.numbers(one) for one in (machine, other)]
+    structure = structure_of(machine)
+    return structure, [numbers_of(structure, one) for one in (machine, other)]
 
 
 def ports(numbers: Numbers) -> dict[str, np.ndarray]:

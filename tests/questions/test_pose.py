@@ -16,7 +16,7 @@ from condyle.kinematics.chain import FAMILIES
 from condyle.model.forward_kinematics import ForwardKinematics, PoseStatus
 from condyle.model.model import Model
 from condyle.questions.builder import Builder
-from condyle.questions.numbers import Layout
+from condyle.questions.file_numbers import numbers_of
 from condyle.questions.pose import pose_from_encoders
 from condyle.questions.structure import structure_of
 
@@ -139,7 +139,7 @@ def test_rates_and_weights_in_a_question_of_ones_own(name: str) -> None:
     b.output("q", found.q, "m, rad", structure.m)
     b.output("q1", found.last.rates(rate), "per s", structure.m)
     b.output("sure", found.sure, "1")
-    kernel = NumpyKernel(Variants(b.finish()), Layout.of(structure).numbers(c.mechanism))
+    kernel = NumpyKernel(Variants(b.finish()), numbers_of(structure, c.mechanism))
     pose = truth(name)[0]
     q = pose[:, [["X", "Y", "Z", "alpha", "beta", "gamma"].index(x) for x in m.independent]]
     q1 = np.random.default_rng(4).normal(size=q.shape)

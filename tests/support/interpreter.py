@@ -35,7 +35,9 @@ from condyle.mechanism.home import (
     dependent_coordinates,
     independent_coordinates,
 )
-from condyle.questions.numbers import closed_branch, has_closed_form
+from condyle.questions.file_numbers import numbers_of
+from condyle.questions.numbers import Layout, has_closed_form
+from condyle.questions.structure import structure_of
 
 from .following import coordinate_closure
 
@@ -192,7 +194,10 @@ def closure_function(mechanism: Mechanism) -> ca.Function:
     m = 6 - len(dependent)
     q, q1, q2 = (ca.SX.sym(name, m) for name in ("q", "q1", "q2"))
     contacts = contacts_of(mechanism)
-    placement = closed_form(contacts, dependent, q, ca.SX(closed_branch(mechanism)))
+    structure = structure_of(mechanism)
+    at, _ = Layout.of(structure).parameters["branch"]
+    branch = float(numbers_of(structure, mechanism).parameters[at])
+    placement = closed_form(contacts, dependent, q, ca.SX(branch))
     motion = whole_motion(contacts, dependent, placement, q1, q2)
     pose = placement.pose()
     # The given angles as they are: arc functions would take them to their principal values.

@@ -5,7 +5,8 @@ It needs no compiler, and is what the other backends are tested against.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from functools import cached_property
 from typing import Any
@@ -85,19 +86,40 @@ class _Runner:
 
     def _fix(self, numbers: Numbers) -> None:
         """Compute what does not vary; each has the same place whatever the numbers."""
-        self._fixed = []
-        for v in self._program.order:
-            node = self._program.graph.nodes[v]
-            if not node.varies:
+        self._fixed, nodes = [], self._program.graph.nodes
+        with np.errstate(all="ignore"):
+            for v in self._program.order:
+                node = nodes[v]
+                if node.varies:
+                    continue
                 self._place[v] = len(self._fixed)
-                self._fixed.append(_number(node.op, node.data, numbers) if not node.args else None)
-                if node.args:
-                    given = [self._fixed[self._place[a]] for a in node.args]
-                    lanes = self._lanes(v)
-                    out = np.empty((lanes, 1) if lanes else 1)
-                    with np.errstate(all="ignore"):
-                        self._call(v)(*given, out=out)
-                    self._fixed[-1] = out
+                given = [self._fixed[self._place[a]] for a in node.args]
+                if not given:
+                    self._fixed.append(_number(node.op, node.data, numbers))
+                elif node.op == "sum":
+                    self._fixed.append(self._summed(node.args, given))
+                elif node.op in REDUCTIONS:
+                    self._fixed.append(np.empty(1))
+                    self._call(v)(*given, out=self._fixed[-1])
+                else:
+                    self._fixed.append(OPERATIONS[node.op].numpy(*given))
+
+    def _summed(self, args: Sequence[Value], terms: Sequence[Any]) -> np.float64:
+        """A sum over lanes that is rounded once: what is symmetric is exactly zero."""
+        nodes, counts = self._program.graph.nodes, self._program.counts
+        each = (
+            np.ravel(term) if nodes[a].group is not None else count * np.ravel(term)
+            for a, term, count in zip(args, terms, counts, strict=True)
+        )
+        found = [float(x) for part in each for x in part]
+        return np.float64(math.fsum(found) if np.isfinite(found).all() else sum(found))
+
+    def fixed(self) -> list[np.ndarray]:
+        """What does not vary of every result, (lanes,) each, in the order of `Program.stored`."""
+        return [
+            np.broadcast_to(np.ravel(self._fixed[self._place[v]]), lanes)
+            for _, v, lanes in self._program.stored()
+        ]
 
     def _lanes(self, v: Value) -> int:
         group = self._program.graph.nodes[v].group
@@ -177,6 +199,16 @@ class _Runner:
             better = (status == OK) | ((status == AGAIN) & (own != OK) & (own != AGAIN))
             status = np.where(better, own, status).astype(np.uint8)
         return status
+
+
+def fixed_results(program: Program, numbers: Numbers) -> dict[str, np.ndarray]:
+    """Results of a program without ports, by name: (*shape), or (*shape, lanes) of lanes."""
+    with np.errstate(all="ignore"):
+        found = iter(_Runner(program, numbers).fixed())
+    return {
+        r.name: np.array([next(found) for _ in range(math.prod(r.shape) * max(1, len(r.groups)))])
+        for r in program.interface.results
+    }
 
 
 def _number(op: str, data: tuple[Any, ...], numbers: Numbers) -> Any:

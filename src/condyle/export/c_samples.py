@@ -14,7 +14,7 @@ from ..model.closing import Closure
 from ..model.model import Model
 from ..questions import Question
 from ..questions.derivative import PREFIX
-from ..questions.numbers import Layout
+from ..questions.file_numbers import numbers_of
 from ..questions.structure import structure_of
 from ..status import Status
 from .c_context import CODES
@@ -84,7 +84,7 @@ def _kernel(r: Reference, question: str, entry: Entry) -> tuple[Kernel, dict[str
     if not entry.tangent:
         return r.model.kernel(entry.question or question, *entry.details(r.wish)), names
     structure = structure_of(r.model.mechanism, r.model.formulation, r.model.route)
-    numbers = Layout.of(structure).numbers(r.model.mechanism)
+    numbers = numbers_of(structure, r.model.mechanism)
     found = Question.about(structure, entry.question, *entry.details(r.wish)).variants()
     program = tangent(found.robust or found.main, names, renamed(entry.results))
     return NumpyKernel(Variants(program), numbers), names | _along(entry, names)

@@ -16,7 +16,8 @@ from ..mechanism.home import dependent_coordinates, independent_coordinates
 from ..mechanism.mechanism import Mechanism
 from ..model.closing import require_independent, require_landmark
 from ..model.model import Model
-from ..questions.numbers import Layout, specialised
+from ..questions.file_numbers import numbers_of
+from ..questions.numbers import specialised
 from ..questions.structure import structure_of
 from ..version import __version__
 from . import c_struct
@@ -88,13 +89,13 @@ def export(
     wish = Wish(in_order(coordinates), landmark, _bounded(outputs))
     entries = _entries(mechanism, asked, wish)
     structure = structure_of(mechanism, formulation_named(formulation).name, route)
-    numbers = Layout.of(structure).numbers(mechanism, landmark)
+    numbers = numbers_of(structure, mechanism, landmark)
     if constants not in ("inside", "struct"):
         raise InputError(f'constants: expected inside or struct, got "{constants}"')
     struct = constants == "struct"
     if struct:  # two planes need not stay parallel
         structure = replace(structure, parallel=False)
-        numbers = Layout.of(structure).numbers(mechanism, landmark)
+        numbers = numbers_of(structure, mechanism, landmark)
     else:
         structure = specialised(structure, numbers)
     real = require_precision(precision)

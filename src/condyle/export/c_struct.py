@@ -13,9 +13,9 @@ from ..backends.c.prepare import fixed_name, fixed_values, prepare
 from ..backends.c.printer import Printer
 from ..graph.graph import Value
 from ..graph.program import Output
-from ..kinematics.chain import FAMILIES
-from ..questions.file_numbers import file_numbers
+from ..questions.file_numbers import file_numbers, numbers_of_file
 from ..questions.numbers import Layout
+from ..questions.structure import walls_of
 from .c_context import Context
 from .c_function import Places, Scalar
 from .c_names import in_comment, picked, scalar_functions
@@ -26,8 +26,10 @@ FIELDS = {
     "inertia": "kg m^2, of the platform about O_M, in {M}: xx, yy, zz, xy, xz, yz",
     "landmark": "m, in {M}: the point whose path is given",
     "contact_point": "m, centre of the ball in {M}",
-    "contact_surface": "constants of the surface that the ball's centre stays on",
-    "friction": "coefficient, smoothing speed [m/s], ball radius [m] by the sign of its side",
+    "contact_surface": "the numbers of its surface",
+    "contact_ball": "m, radius of the ball",
+    "contact_home": "where the search for the touching point begins: normal at home; 0",
+    "friction": "coefficient, smoothing speed [m/s]",
 }
 LANES = {
     "base": "m, in {S}: crank pivot, slider's joint at home, or base joint",
@@ -44,15 +46,11 @@ LANES = {
     "coulomb": "N m or N",
     "smoothing_speed": "rad/s or m/s",
 }
-SURFACES = {
-    "plane": "slopes by x and y; height at the origin [m]",
-    "quadratic": "m, height at the origin; slopes by x and y; xx, xy, yy [1/m]",
-}
 
 
 def declared(c: Context) -> str:
     """Both types, the mechanism's own numbers, and `prepare`, for the header."""
-    p, P, layout = c.prefix, c.prefix.upper(), Layout.of_file(c.structure)
+    p, P, layout = c.prefix, c.prefix.upper(), _layout(c)
     lines = ["/* The numbers of the mechanism file; chains of a family in its order. */"]
     lines += ["typedef struct {"]
     for name, (_, size) in layout.parameters.items():
@@ -85,8 +83,7 @@ def _about(c: Context, name: str) -> str:
     contact = c.mechanism.contact_names[int(i)]
     about = FIELDS[kind]
     if kind == "contact_surface":
-        form, _ = c.structure.contacts[int(i)]
-        about += f": {SURFACES[form]}" if form in SURFACES else ""
+        about += f": {', '.join(c.mechanism.contacts[int(i)].surface.numbers)}"
     return f"{in_comment(contact)}: {about}"
 
 
@@ -102,9 +99,10 @@ def prepared(c: Context) -> str:
 
 def _whole(c: Context) -> str:
     """`prepare`: the file's numbers to the kernel's, and these to constants."""
-    program, layout, p = file_numbers(c.structure), Layout.of(c.structure), c.prefix
+    program = file_numbers(c.structure, walls_of(c.mechanism, c.structure))
+    layout, p = Layout.of(c.structure), c.prefix
     printer = Scalar(program, Places((), {}, c.numbers.order), "double")
-    own = Layout.of_file(c.structure)
+    own = _layout(c)
     shared = {
         start + i: _at(name, size, i)
         for name, (start, size) in own.parameters.items()
@@ -182,17 +180,22 @@ def _in_double(text: str) -> str:
 
 
 def _initialiser(c: Context) -> list[str]:
-    layout = Layout.of_file(c.structure)
-    values = layout.file_values(c.mechanism, c.landmark)
-    rows = [_values(values[name]) for name, (_, size) in layout.parameters.items() if size]
-    for kind, lane in zip(c.structure.families, layout.lanes, strict=True):
+    layout, walls = _layout(c), walls_of(c.mechanism, c.structure)
+    numbers = numbers_of_file(c.mechanism, c.structure, walls, c.landmark)
+    own = numbers.parameters
+    rows = [_values(own[at : at + size]) for at, size in layout.parameters.values() if size]
+    for lane, values in zip(layout.lanes, numbers.lanes, strict=True):
         chains = []
-        for chain in (chain for chain in c.mechanism.chains if chain.kind == kind):
-            own, fields = FAMILIES[kind].file_numbers(chain, lane), []
+        for own in values.T:
             fields = [_values(own[start : start + size]) for start, size in lane.values()]
             chains.append(f"{{{', '.join(fields)}}}")
         rows.append("{" + ", \\\n     ".join(chains) + "}")
     return [*(f"{row}," for row in rows[:-1]), rows[-1]]
+
+
+def _layout(c: Context) -> Layout:
+    """Of the numbers of the file."""
+    return Layout.of_file(c.structure, walls_of(c.mechanism, c.structure))
 
 
 def _values(numbers: object) -> str:

@@ -15,6 +15,7 @@ from .chain import Chain
 from .contact import Bounds, Contact
 from .coordinates import COORDINATES, Coordinate
 from .home import home_problems, usable_sets
+from .kept_home import followed, kept_contacts
 from .paths import changed, parsed, value_at
 from .portrait import in_html, in_words
 from .quantities import Gravity, Name
@@ -47,7 +48,9 @@ class Mechanism(Table):
         """
         return value_at(self, path)
 
-    def set(self, path: str | Mapping[str, Any], value: Any = _NOTHING) -> Self:
+    def set(
+        self, path: str | Mapping[str, Any], value: Any = _NOTHING, *, keep: str = "all"
+    ) -> Self:
         """A copy with other values at some paths of the file, validated like a file.
 
             mechanism.set("platform.mass", 0.25)
@@ -57,17 +60,29 @@ class Mechanism(Table):
         changes are made together: what must agree, such as a contact point and its surface, is
         checked at the end. None removes an optional entry.
 
-        Args:   path: one path, or paths with their values;  value: the new one, SI.
+        Args:   path: one path, or paths with their values;  value: the new one, SI;
+                keep: `home`: a surface that a change takes off its contact's home follows it with
+                its offset, or with its centre along the normal, unless that number is changed
+                itself; `all`: all else stays.
         Raises: MechanismError: with every problem found;  InputError: for an unknown path.
         """
         if isinstance(path, Mapping):
             if value is not _NOTHING:
                 raise InputError("set: expected a path and a value, or one {path: value, ...}")
-            return self.checked(changed(self, path), self.name)
-        if value is _NOTHING:
+        elif value is _NOTHING:
             raise InputError(f"set: expected a path and a value, got {shown(path)} alone")
-        parsed(path)
-        return self.checked(changed(self, {path: value}), self.name)
+        else:
+            parsed(path)
+            path = {path: value}
+        kept = set(kept_contacts(self, path, keep))
+        if not kept:
+            return self.checked(changed(self, path), self.name)
+        made = super().checked(changed(self, path), self.name)
+        if len(made.contacts) != len(self.contacts):
+            raise InputError('set: keep="home" needs as many contacts as before')
+        pairs = enumerate(zip(self.contacts, made.contacts, strict=True))
+        contacts = tuple(followed(*pair) if i in kept else pair[1] for i, pair in pairs)
+        return self.checked({**made.entries(), "contact": contacts}, self.name)
 
     def replace(self, **changes: Any) -> Self:
         """A copy with some fields changed, validated like a file.

@@ -22,7 +22,8 @@ from ..mechanism.home import (
 )
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..questions import Question
-from ..questions.numbers import Layout, characteristic, specialised
+from ..questions.file_numbers import numbers_of
+from ..questions.numbers import characteristic, specialised
 from ..questions.structure import Structure, structure_of
 from ..status import Status
 from .continuation import Conditions, Steps, follow, least_squares, nearest
@@ -155,7 +156,7 @@ class Closure:
             require_landmark(mechanism, landmark)
             self.names = ()
         structure = lender.structure if lender else structure_of(mechanism)
-        numbers = Layout.of(structure).numbers(mechanism, landmark)
+        numbers = numbers_of(structure, mechanism, landmark)
         if not general:
             structure = specialised(structure, numbers)
         if lender:

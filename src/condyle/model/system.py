@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
@@ -21,8 +21,10 @@ from ..mechanism.home import holding_problems, home_problem
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..progress import step
 from ..questions import Question
+from ..questions.file_numbers import numbers_of
 from ..questions.friction import MOST
-from ..questions.numbers import Layout, characteristic, require_closed_form, specialised
+from ..questions.number_paths import number_jacobian
+from ..questions.numbers import characteristic, require_closed_form, specialised
 from ..questions.structure import structure_of
 from .closing import Closure
 from .distributing import LEAST, Distribution, Distributor
@@ -51,7 +53,7 @@ class System:
         self.backend = Backend(backend)
         with step("deriving the equations"):
             structure = structure_of(mechanism, self.formulation, route)
-            self.numbers = Layout.of(structure).numbers(mechanism)
+            self.numbers = numbers_of(structure, mechanism)
             self.structure = structure if general else specialised(structure, self.numbers)
         self.general: System | None = self if general else None  # who lends kernels
         self._lender: System | None = None
@@ -74,7 +76,7 @@ class System:
                 f'mechanism: "{mechanism.name}" has other chains, contacts or surfaces than '
                 f'"{self.mechanism.name}"; derive a model of its own'
             )
-        return self.general.lent(mechanism, Layout.of(self.structure).numbers(mechanism))
+        return self.general.lent(mechanism, numbers_of(self.structure, mechanism))
 
     def lent(self, mechanism: Mechanism, numbers: Numbers) -> System:
         """The same with these numbers, sharing kernels: they leave out what is zero here."""
@@ -148,9 +150,13 @@ class System:
             losses=True,
             friction=tuple(range(len(self.structure.contacts))),
         )
-        other.numbers = Layout.of(other.structure).numbers(self.mechanism)
+        other.numbers = numbers_of(other.structure, self.mechanism)
         other.general, other._kernels = None, {}
         return other
+
+    def number_jacobian(self, paths: Sequence[str], keep: str = "home") -> np.ndarray:
+        """Derivatives of `numbers` by numbers of the file: see `number_paths.number_jacobian`."""
+        return number_jacobian(self.mechanism, self.structure, paths, keep)
 
     def closure(self, names: tuple[str, ...], landmark: str | None) -> Closure:
         """What leads from other coordinates, or from a landmark's path, to whole poses."""

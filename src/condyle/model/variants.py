@@ -26,7 +26,7 @@ from ..mechanism.mechanism import Mechanism
 from ..mechanism.paths import changed, parsed, written
 from ..mechanism.table import Table
 from ..motion import Load, Motion
-from ..questions.numbers import Layout
+from ..questions.file_numbers import numbers_of
 from ..questions.structure import Structure, structure_of
 from ..status import Status
 from .arguments import ORIGIN, POINT, WRENCH, Argument
@@ -175,7 +175,7 @@ class Variants:
                 self.status[i] = Status.singular if held else Status.refused
                 continue
             structure = structure_of(made, system.formulation, system.route)
-            numbers = Layout.of(structure).numbers(made)
+            numbers = numbers_of(structure, made)
             own.setdefault(structure, []).append((i, numbers))
         for structure, members in own.items():
             rows = np.array([i for i, _ in members])

@@ -106,8 +106,10 @@ class Question:
         variants = found if isinstance(found, Variants) else Variants(found)
         if not self.ports:
             return variants
-        layout = Layout.of_file if self.name == "file_numbers" else Layout.of
-        return Variants(numbers_as_ports(variants.main, *layout(self.structure).sizes))
+        file = self.name == "file_numbers"
+        s = self.structure
+        layout = Layout.of_file(s, *self.details) if file else Layout.of(s)
+        return Variants(numbers_as_ports(variants.main, *layout.sizes))
 
 
 def _foreign(details: Any) -> bool:

@@ -1,32 +1,45 @@
-"""From a mechanism file's numbers to the kernel's, in the graph: `Layout.numbers` as a question.
+"""From a mechanism file's numbers to the kernel's: a question, and a mechanism's answer to it.
 
-Chains' constants are those of their families. A contact's surface is given by its constants: those
-of the surface on which the ball's centre stays.
+Chains' constants are those of their families, a contact's those of its surface.
 """
 
 from __future__ import annotations
 
-from functools import cache
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
 
 import casadi as ca
+import numpy as np
 
-from ..graph.program import Program
+from ..backends.numpy_kernel import fixed_results
+from ..graph.program import Numbers, Program
 from ..kinematics.chain import FAMILIES
 from ..kinematics.constraints import angle_equation, closed_form_available
+from ..mechanism.mechanism import Mechanism
+from ..mechanism.surface.wall import Wall, home_of
 from .builder import Builder
 from .numbers import INERTIA, Layout, single_contacts
-from .structure import Structure
+from .structure import Structure, walls_of
 
 
-@cache
-def file_numbers(structure: Structure) -> Program:
+def file_numbers(structure: Structure, walls: tuple[Wall, ...]) -> Program:
     """The kernel's numbers by their names in `Layout.of`, from those of `Layout.of_file`.
 
     Nothing varies from sample to sample: there are no ports.
+
+    Args: walls: see `walls_of`.
     """
-    layout, b = Layout.of(structure), Builder(structure, Layout.of_file(structure))
+    bare = replace(structure, formulation="virtual_power", route="core", zeros=frozenset())
+    return _written(bare, walls)
+
+
+@lru_cache(maxsize=64)
+def _written(structure: Structure, walls: tuple[Wall, ...]) -> Program:
+    layout, b = Layout.of(structure), Builder(structure, Layout.of_file(structure, walls))
     groups = range(len(structure.chains))
-    values = _shared(b)
+    values = _shared(b, walls)
     for name, (_, count) in layout.parameters.items():
         if count:
             b.output(name, ca.densify(values[name]), "", count)
@@ -56,7 +69,7 @@ def _lane(b: Builder, group: int, name: str) -> ca.SX:
     return ca.vertcat(rotor * gear**2, viscous, coulomb, speed**2)
 
 
-def _shared(b: Builder) -> dict[str, ca.SX]:
+def _shared(b: Builder, walls: Sequence[Wall]) -> dict[str, ca.SX]:
     structure = b.structure
     k, groups = len(structure.contacts), range(len(structure.chains))
     own = {name: b.parameter(name) for name in b.layout.parameters}
@@ -87,19 +100,22 @@ def _shared(b: Builder) -> dict[str, ca.SX]:
         "landmark": own["landmark"],
         "middle": sum(points, ca.SX.zeros(3)) / max(1, k),
     }
-    for i in range(k):
+    for i, wall in enumerate(walls):
         values[f"contact_point_{i}"] = points[i]
-        values[f"contact_surface_{i}"] = own[f"contact_surface_{i}"]
+        ball = own.get(f"contact_ball_{i}", ca.SX(0))
+        home = own.get(f"contact_home_{i}", ca.SX(0, 1))
+        found = wall.constants(own[f"contact_surface_{i}"], points[i], ball, home)
+        values[f"contact_surface_{i}"], _ = found
         if i in structure.friction:
             f = own[f"friction_{i}"]
-            values[f"friction_{i}"] = ca.vertcat(f[0], f[1] ** 2, f[2])
+            values[f"friction_{i}"] = ca.vertcat(f[0], f[1] ** 2, wall.push * ball)
     if structure.parallel:
-        s, t = own["contact_surface_0"], own["contact_surface_1"]
+        s, t = values["contact_surface_0"], values["contact_surface_1"]
         values |= {"slope": s[:2], "mean": (points[0] + points[1]) / 2}
         values |= {"difference": points[0] - points[1]}
         values |= {"mean_offset": (s[2] + t[2]) / 2, "gap": s[2] - t[2]}
     if closed_form_available([form for form, _ in structure.contacts], structure.dependent):
-        contacts = single_contacts(structure, own.__getitem__)
+        contacts = single_contacts(structure, values.__getitem__)
         home = ca.SX.zeros(6)
         B = angle_equation(contacts, structure.dependent, home).B if contacts else ca.SX(0)
         values["branch"] = -ca.sign(B)
@@ -110,3 +126,52 @@ def _end_mass(b: Builder, group: int) -> ca.SX:
     family = FAMILIES[b.structure.families[group]]
     own = family.end_masses(family.named(_lane(b, group, "constants")))
     return sum(own.values(), ca.SX(0))
+
+
+def numbers_of_file(
+    mechanism: Mechanism, structure: Structure, walls: Sequence[Wall], landmark: str | None = None
+) -> Numbers:
+    """A mechanism's numbers as of `Layout.of_file`.
+
+    Args: landmark: the platform point whose path is given, if one is.
+    """
+    layout, platform = Layout.of_file(structure, walls), mechanism.platform
+    values: dict[str, Any] = {
+        "gravity": mechanism.gravity,
+        "mass": platform.mass,
+        "inertia": [platform.inertia.tensor()[i] for i in INERTIA],
+        "landmark": platform.points[landmark] if landmark else (0.0, 0.0, 0.0),
+    }
+    for i, contact in enumerate(mechanism.contacts):
+        friction = contact.friction
+        values[f"contact_point_{i}"] = contact.point
+        values[f"contact_surface_{i}"] = contact.surface.own_numbers()
+        values[f"contact_ball_{i}"] = contact.ball_radius
+        values[f"friction_{i}"] = friction.coefficient, friction.smoothing_speed
+        if f"contact_home_{i}" in layout.parameters:
+            values[f"contact_home_{i}"] = home_of(contact, walls[i].kept)
+    lanes, order = [], []
+    for kind, names in zip(structure.families, layout.lanes, strict=True):
+        own = [(i, chain) for i, chain in enumerate(mechanism.chains) if chain.kind == kind]
+        lanes.append(np.array([FAMILIES[kind].file_numbers(chain, names) for _, chain in own]).T)
+        order += [i for i, _ in own]
+    shared = [np.ravel(values[name]) for name in layout.parameters]
+    parameters = np.concatenate(shared).astype(float)
+    return Numbers(parameters, tuple(lanes), tuple(lane[:, 0] for lane in lanes), tuple(order))
+
+
+def numbers_of(structure: Structure, mechanism: Mechanism, landmark: str | None = None) -> Numbers:
+    """The numbers of a mechanism, as backends take them: `Layout.of(structure)`.
+
+    Args: landmark: as of `numbers_of_file`.
+    """
+    walls, layout = walls_of(mechanism, structure), Layout.of(structure)
+    own = numbers_of_file(mechanism, structure, walls, landmark)
+    found = fixed_results(file_numbers(structure, walls), own)
+    parameters = np.concatenate([found.get(n, np.empty(0)).ravel() for n in layout.parameters])
+    lanes, padding = [], []
+    for group, names in enumerate(layout.lanes):
+        lanes.append(np.concatenate([found[f"{name}_{group}"] for name in names]))
+        lanes[-1] = np.ascontiguousarray(lanes[-1])
+        padding.append(layout.idle(group, lanes[-1][:, 0]))
+    return Numbers(parameters, tuple(lanes), tuple(padding), own.order)

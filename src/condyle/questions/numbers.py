@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -15,17 +12,15 @@ from ..dynamics import FORMULATIONS
 from ..errors import UnsupportedError
 from ..graph.program import Numbers
 from ..kinematics.chain import FAMILIES
-from ..kinematics.chain.family import Constants
 from ..kinematics.constraints import (
     ContactSymbols,
-    angle_equation,
     closed_form_available,
     mean_and_difference,
 )
-from ..mechanism.chain import Chain
-from ..mechanism.home import characteristic_length, dependent_coordinates
+from ..mechanism.home import dependent_coordinates
 from ..mechanism.mechanism import Mechanism
 from ..mechanism.surface import of_form
+from ..mechanism.surface.wall import Wall
 from .structure import Structure
 
 LOSSES = tuple(
@@ -34,8 +29,6 @@ LOSSES = tuple(
 NO_LOSSES = (0.0, 0.0, 0.0, 1.0)
 Parameter = Callable[[str], ca.SX]  # a mechanism's number by name
 Slot = tuple[int, int]  # start, count
-Vector = tuple[float, ...]
-ChainNumbers = dict[str, np.ndarray]  # constants of a chain by name
 INERTIA = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # order of an inertia's entries
 
 
@@ -69,12 +62,18 @@ class Layout:
         return Layout(structure, _slots(sizes), lanes)
 
     @staticmethod
-    def of_file(structure: Structure) -> Layout:
-        """Numbers as a mechanism file has them, which `file_numbers` makes the others of."""
+    def of_file(structure: Structure, walls: Sequence[Wall]) -> Layout:
+        """Numbers as a mechanism file has them, which `file_numbers` makes the others of.
+
+        A contact's `home` is no number of the file, but where Newton starts and what is kept: the
+        unit normal and `Wall.miss` of the nominal mechanism.
+        """
         sizes = {"gravity": 3, "mass": 1, "inertia": 6, "landmark": 3}
-        for i, (_, count) in enumerate(structure.contacts):
-            sizes |= {f"contact_point_{i}": 3, f"contact_surface_{i}": count}
-        sizes |= {f"friction_{i}": 3 for i in structure.friction}
+        for i, wall in enumerate(walls):
+            sizes |= {f"contact_point_{i}": 3, f"contact_surface_{i}": wall.size}
+            sizes |= {f"contact_ball_{i}": 1} if wall.push else {}
+            sizes |= {f"contact_home_{i}": 4} if wall.general or wall.kept else {}
+        sizes |= {f"friction_{i}": 2 for i in structure.friction}
         losses = dict.fromkeys(LOSSES, 1) if structure.losses else {}
         lanes = [_slots(FAMILIES[kind].numbers | losses) for kind in structure.families]
         return Layout(structure, _slots(sizes), lanes)
@@ -88,82 +87,24 @@ class Layout:
 
         return total(self.parameters), [total(slots) for slots in self.lanes]
 
-    def file_values(self, mechanism: Mechanism, landmark: str | None = None) -> dict[str, Any]:
-        """Shared numbers of `of_file`, by name; of friction the smoothing speed, not its square."""
-        values = self._values(mechanism, landmark, constants_of(mechanism))
-        for i in self.structure.friction:
-            f = mechanism.contacts[i].friction
-            values[f"friction_{i}"] = (f.coefficient, f.smoothing_speed, values[f"friction_{i}"][2])
-        return {name: np.ravel(values[name]) for name in self.parameters}
+    def idle(self, group: int, first: np.ndarray) -> np.ndarray:
+        """Numbers of a lane without a chain, which contributes nothing.
 
-    def _values(
-        self, mechanism: Mechanism, landmark: str | None, constants: Sequence[ChainNumbers]
-    ) -> dict[str, Any]:
-        """Shared numbers of a mechanism, by name."""
-        points = [contact.point for contact in mechanism.contacts]
-        masses = end_masses(mechanism, constants)
-        values: dict[str, Any] = {
-            "gravity": mechanism.gravity,
-            **_body(mechanism, {}),
-            **{f"lumped_{name}": v for name, v in _body(mechanism, masses).items()},
-            "branch": 1.0,
-            "length": characteristic_length(mechanism),
-            "landmark": mechanism.platform.points[landmark] if landmark else (0.0, 0.0, 0.0),
-            "middle": np.mean(points, axis=0) if points else (0.0, 0.0, 0.0),
-        }
-        for i, contact in enumerate(mechanism.contacts):
-            values[f"contact_point_{i}"] = contact.point
-            values[f"contact_surface_{i}"] = contact.offset_surface.constants()
-            if i in self.structure.friction:
-                f, radius = contact.friction, contact.push * (contact.ball_radius or 0.0)
-                values[f"friction_{i}"] = (f.coefficient, f.smoothing_speed**2, radius)
-        if self.structure.parallel:
-            first, second = (np.array(c.point) for c in mechanism.contacts)
-            a, b = (c.offset_surface.constants() for c in mechanism.contacts)
-            values |= {"slope": a[:2], "mean": (first + second) / 2, "difference": first - second}
-            values |= {"mean_offset": (a[2] + b[2]) / 2, "gap": a[2] - b[2]}
-        if has_closed_form(mechanism):
-            values["branch"] = closed_branch(mechanism)
-        return values
-
-    def numbers(self, mechanism: Mechanism, landmark: str | None = None) -> Numbers:
-        """The numbers of a mechanism, as backends take them.
-
-        Args: landmark: the platform point whose path is given, if one is.
+        Args: first: those of the group's first chain.
         """
-        constants = constants_of(mechanism)
-        values = self._values(mechanism, landmark, constants)
-        parameters = np.concatenate([np.ravel(values[name]) for name in self.parameters])
-        lanes, padding = [], []
-        for kind in self.structure.families:
-            family = FAMILIES[kind]
-            own = zip(mechanism.chains, constants, strict=True)
-            chains = [(chain, given) for chain, given in own if chain.kind == kind]
-            rows = [[1.0, *c.platform, *family.vector(g), *self._losses(c)] for c, g in chains]
-            first, idle = chains[0]
-            idle = idle | {name: np.zeros_like(idle[name]) for name in self.pads(kind)}
-            lanes.append(np.array(rows, dtype=float).T.copy())
-            none = [*NO_LOSSES] if self.structure.losses else []
-            padding.append(np.array([0.0, *first.platform, *family.vector(idle), *none]))
-        order = tuple(
-            i
-            for kind in self.structure.families
-            for i, chain in enumerate(mechanism.chains)
-            if chain.kind == kind
-        )
-        return Numbers(parameters.astype(float), tuple(lanes), tuple(padding), order)
-
-    def _losses(self, chain: Chain) -> list[float]:
-        """Rotor's inertia at the joint, viscous and Coulomb friction, squared smoothing speed."""
-        if not self.structure.losses:
-            return []
-        a = chain.actuator
-        return [a.reflected_inertia, a.viscous, a.coulomb, a.smoothing_speed**2]
-
-    def pads(self, kind: str) -> tuple[str, ...]:
-        """Constants of a family that are 0 in a padding lane, so that it contributes nothing."""
+        family = FAMILIES[self.structure.families[group]]
         own = FORMULATIONS[self.structure.formulation].pads
-        return FAMILIES[kind].padding if own else ()
+        idle, slots = first.copy(), self.lanes[group]
+        idle[slots["mask"][0]] = 0.0
+        start, at = slots["constants"][0], 0
+        for name, count in family.shapes.items():
+            if own and name in family.padding:
+                idle[start + at : start + at + count] = 0.0
+            at += count
+        if self.structure.losses:
+            start, count = slots["actuator"]
+            idle[start : start + count] = NO_LOSSES
+        return idle
 
 
 def specialised(structure: Structure, numbers: Numbers) -> Structure:
@@ -219,67 +160,6 @@ def require_closed_form(mechanism: Mechanism) -> None:
             f"({', '.join(kinds)}) with dependent {', '.join(dependent)}. Use route core, which "
             "gives the same efforts"
         )
-
-
-def closed_branch(mechanism: Mechanism) -> float:
-    """-sign(B) of the angle equation at home, which keeps the dependent angle on its branch."""
-    if not mechanism.contacts:
-        return 0.0
-    forms = tuple((c.offset_surface.form, 3) for c in mechanism.contacts)
-    given = [n for c in mechanism.contacts for n in (*c.point, *c.offset_surface.constants())]
-    B = _angle_sine(forms, dependent_coordinates(mechanism))
-    return -float(np.sign(float(B(*given))))
-
-
-@lru_cache(maxsize=32)
-def _angle_sine(forms: tuple[tuple[str, int], ...], dependent: tuple[str, ...]) -> ca.Function:
-    """B of the angle equation at home, from each contact's point and the constants of its plane."""
-    symbols = [(ca.SX.sym("p", 3), ca.SX.sym("c", count)) for _, count in forms]
-    contacts = [
-        ContactSymbols(of_form(form), p, c)
-        for (form, _), (p, c) in zip(forms, symbols, strict=True)
-    ]
-    given = [entry for pair in symbols for part in pair for entry in ca.vertsplit(part)]
-    return ca.Function("B", given, [angle_equation(contacts, dependent, ca.SX.zeros(6)).B])
-
-
-def constants_of(mechanism: Mechanism) -> list[ChainNumbers]:
-    """Constants of every chain, by the names of its family."""
-    found = ((FAMILIES[chain.kind], chain) for chain in mechanism.chains)
-    return [
-        {name: np.asarray(v, dtype=float) for name, v in family.constants(chain).items()}
-        for family, chain in found
-    ]
-
-
-def end_masses(mechanism: Mechanism, constants: Sequence[ChainNumbers]) -> dict[Vector, float]:
-    """End masses of the chains [kg], by the points of the platform joints.
-
-    Args: constants: as of `constants_of`.
-    """
-    masses: dict[Vector, float] = {}
-    for chain, own in zip(mechanism.chains, constants, strict=True):
-        found = FAMILIES[chain.kind].end_masses(Constants({n: v[()] for n, v in own.items()}))
-        joint = tuple(chain.platform)
-        masses[joint] = masses.get(joint, 0.0) + sum(map(float, found.values()))
-    return masses
-
-
-def _body(mechanism: Mechanism, points: dict[Vector, float]) -> dict[str, Any]:
-    """Mass, first moment and inertia about O_M, in {M}, of the platform and point masses on it.
-
-    Sums are rounded once, so that symmetric mechanisms have exact zeros.
-    """
-    platform, xx = mechanism.platform, range(3)
-    own = platform.inertia.tensor()
-    second = [[math.fsum(m * p[i] * p[j] for p, m in points.items()) for j in xx] for i in xx]
-    trace = math.fsum(second[i][i] for i in xx)
-    inertia = [own[i, j] + (trace if i == j else 0.0) - second[i][j] for i, j in INERTIA]
-    return {
-        "mass": platform.mass + math.fsum(points.values()),
-        "first_moment": [math.fsum(m * p[i] for p, m in points.items()) for i in xx],
-        "inertia": inertia,
-    }
 
 
 def _slots(sizes: dict[str, int]) -> dict[str, Slot]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from ..mechanism.home import dependent_coordinates
 from ..mechanism.mechanism import Mechanism
+from ..mechanism.surface.wall import Wall, wall_of
 
 
 @dataclass(frozen=True)
@@ -76,3 +78,15 @@ def structure_of(
         losses=any(not chain.actuator.ideal for chain in mechanism.chains),
         friction=friction,
     )
+
+
+def walls_of(
+    mechanism: Mechanism, structure: Structure, kept: Collection[int] = ()
+) -> tuple[Wall, ...]:
+    """The contacts' surfaces, as `file_numbers` takes them.
+
+    Args: structure: whose numbers of the kernel are wanted;
+          kept: contacts whose home is kept, by number.
+    """
+    forms = [form for form, _ in structure.contacts]
+    return tuple(wall_of(c, i in kept, forms[i]) for i, c in enumerate(mechanism.contacts))

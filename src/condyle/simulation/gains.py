@@ -34,7 +34,8 @@ from ..mechanism.home import characteristic_length
 from ..model.model import Model
 from ..questions import written
 from ..questions.derivative import PREFIX, directional
-from ..questions.numbers import Layout, specialised
+from ..questions.file_numbers import numbers_of
+from ..questions.numbers import specialised
 from ..questions.structure import structure_of
 from .columns import Columns
 from .control import MEASURED, Controller
@@ -308,7 +309,7 @@ class Derivative:
     ) -> None:
         """Args: columns: what its ports are given;  by: ports;  of: results."""
         structure = structure_of(model.mechanism, model.formulation, model.route)
-        numbers = Layout.of(structure).numbers(model.mechanism)
+        numbers = numbers_of(structure, model.mechanism)
         structure = specialised(structure, numbers)
         program = directional(written(question)(structure, *details), by, of)
         self._kernel, self._columns, self.by = NumpyKernel(Variants(program), numbers), columns, by

@@ -96,7 +96,7 @@ def test_expression() -> None:
     close(got.gradient, np.array([0.4 * np.sin(40 * x), -0.2, 1]), 1e-15)
     close(got.second, np.diag([16 * np.cos(40 * x), 0, 0]), 1e-15)
     assert float(of_form(wave.form).phi(point)) == float(wave.phi(point))
-    assert not wave.closed and wave.constants() == ()
+    assert not wave.closed and wave.constants() == (0.0,)
 
 
 def test_expression_of_no_function() -> None:

@@ -10,9 +10,13 @@ derivatives come from CasADi.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from functools import lru_cache
+from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import casadi as ca
+import numpy as np
 
 from ..table import Table
 
@@ -23,10 +27,16 @@ Coordinates = Any  # anything with [0], [1], [2]
 class Smooth(ABC):
     """What has an equation phi(point, constants), twice differentiable.
 
-    known: whether that equation is at hand.
+    known:   whether that equation is at hand.
+    numbers: its numbers in a file, of which `from_numbers` makes the constants.
+    lifted:  whether an offset along Z brings it to a point; else its centre moves.
+    carrier: the number that does, by its name.
     """
 
     known: ClassVar[bool] = True
+    numbers: ClassVar[tuple[str, ...]] = ()
+    lifted: ClassVar[bool] = True
+    carrier: ClassVar[str] = "offset"
 
     @abstractmethod
     def phi(self, point: Coordinates, constants: Coordinates | None = None) -> Scalar:
@@ -35,9 +45,23 @@ class Smooth(ABC):
         Args: constants: `constants()` of this or another surface of the kind; default: its own.
         """
 
-    @abstractmethod
     def constants(self) -> tuple[float, ...]:
         """The numbers of the equation, SI."""
+        derive = _derivation(type(self), tuple(self.sizes().items()))
+        return tuple(map(float, derive(self.own_numbers()).nonzeros()))
+
+    @staticmethod
+    @abstractmethod
+    def from_numbers(f: Any) -> ca.SX:
+        """The numbers of the equation from those of the file. Args: f: `named` numbers."""
+
+    def sizes(self) -> dict[str, int]:
+        """Names of its numbers in a file and how many each is."""
+        return {name: int(np.size(getattr(self, name))) for name in self.numbers}
+
+    def own_numbers(self) -> list[float]:
+        """Its numbers in a file, one after another, SI."""
+        return [float(x) for name in self.numbers for x in np.ravel(getattr(self, name))]
 
     def at_distance(self, distance: float) -> Any:
         """The parallel surface at a signed distance [m], if it is one of the same kind."""
@@ -60,6 +84,23 @@ class Smooth(ABC):
         It is the less exact the farther they are; it may be this surface itself.
         """
         return self
+
+
+def named(vector: Any, sizes: Mapping[str, int]) -> SimpleNamespace:
+    """Numbers by name, from all of them one after another."""
+    values, start = {}, 0
+    for name, count in sizes.items():
+        values[name] = vector[start] if count == 1 else vector[start : start + count]
+        start += count
+    return SimpleNamespace(**values)
+
+
+@lru_cache(maxsize=64)
+def _derivation(kind: type[Smooth], sizes: tuple[tuple[str, int], ...]) -> ca.Function:
+    """The constants of a kind of surface, as a function of its numbers in a file."""
+    given = ca.SX.sym("f", sum(count for _, count in sizes))
+    found = kind.from_numbers(named(given, dict(sizes)))
+    return ca.Function("constants", [given], [ca.densify(found)])
 
 
 class SurfaceTable(Smooth, Table):

@@ -26,16 +26,19 @@ class Expression(Smooth):
     It can be pickled: what travels is the expression, not the function. Two are equal where their
     expressions are.
 
-    Args:   function: (3,) SX -> scalar SX;  closed: whether the surface has an inside.
+    Args:   function: (3,) SX -> scalar SX;  closed: whether the surface has an inside;
+            offset: [m]: the surface is where phi(p) = offset.
     Raises: InputError: if `function` does not return a scalar expression of the point
             alone.
     """
 
     function: Callable[[ca.SX], Any]
     closed: bool = False
+    offset: float = 0.0
     _equation: ca.Function = field(init=False, repr=False)
 
     kind: ClassVar[str] = "expression"
+    numbers: ClassVar[tuple[str, ...]] = ("offset",)
 
     def __post_init__(self) -> None:
         if not callable(self.function):
@@ -57,13 +60,16 @@ class Expression(Smooth):
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Expression):
             return NotImplemented
-        return self is other or (self.closed, self.form) == (other.closed, other.form)
+        return self is other or self._what() == other._what()
 
     def __hash__(self) -> int:
-        return hash((self.closed, self.form))
+        return hash(self._what())
 
-    def __reduce__(self) -> tuple[Callable[[str, bool], Expression], tuple[str, bool]]:
-        return _unpickled, (self._serialized, self.closed)
+    def _what(self) -> tuple[str, bool, float]:
+        return self._serialized, self.closed, self.offset
+
+    def __reduce__(self) -> tuple[Callable[..., Expression], tuple[str, bool, float]]:
+        return _unpickled, self._what()
 
     def __deepcopy__(self, memo: Any) -> Expression:
         return self  # frozen
@@ -73,18 +79,20 @@ class Expression(Smooth):
         return self._equation.serialize()
 
     def phi(self, point: Any, constants: Any = None) -> Any:
-        return self._equation(ca.vertcat(point[0], point[1], point[2]))
+        offset = self.offset if constants is None else constants[0]
+        return self._equation(ca.vertcat(point[0], point[1], point[2])) - offset
 
-    def constants(self) -> tuple[float, ...]:
-        return ()
+    @staticmethod
+    def from_numbers(f: Any) -> ca.SX:
+        return ca.SX(f.offset)
 
     @property
     def form(self) -> str:
         return f"expression {self._serialized}"
 
 
-def _unpickled(serialized: str, closed: bool) -> Expression:
-    return Expression(ca.Function.deserialize(serialized), closed)
+def _unpickled(serialized: str, closed: bool, offset: float = 0.0) -> Expression:
+    return Expression(ca.Function.deserialize(serialized), closed, offset)
 
 
 @dataclass(frozen=True)
@@ -109,6 +117,10 @@ class Unknown(Smooth):
 
     def constants(self) -> NoReturn:
         self.phi(None)
+
+    @staticmethod
+    def from_numbers(f: Any) -> NoReturn:
+        Unknown().phi(None)
 
     @property
     def form(self) -> NoReturn:

@@ -29,12 +29,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, NoReturn
 
 import casadi as ca
 import numpy as np
 
-from .base import Smooth
+from .base import Smooth, named
 
 ON_THE_WAY = (1 / 3, 2 / 3)  # parts of the way from home at which Newton makes one step,
 STEPS = 6  # and how many it makes at the point itself,
@@ -79,6 +79,10 @@ class Parallel(Smooth):
         """distance, centre, closest point, multiplier, then the wall's."""
         start = (*self.centre, *self.closest_point, self.multiplier)
         return (self.distance, *start, *self.wall.constants())
+
+    @staticmethod
+    def from_numbers(f: Any) -> NoReturn:
+        raise AssertionError("a parallel surface has no numbers in a file; its wall has")
 
     def phi(self, point: Any, constants: Any = None) -> Any:
         return self._at(point, constants)[0]
@@ -142,10 +146,29 @@ def parallel(wall: Any, distance: float, point: tuple[float, ...]) -> Any:
     equation = _functions(wall, len(numbers))[0]
     closest_point, mu = _home_closest_point(equation, numbers, distance, np.array(point))
     kind = Parallel
-    if hasattr(wall, "quadric"):
-        h = np.linalg.eigvalsh(2 * wall.quadric()[0])
+    if hasattr(wall, "principal"):
+        h = np.array(principal(wall)[12:15])
         kind = ParallelQuadric if (1 + mu * h > EASY).all() else Parallel
     return kind(wall, distance, tuple(point), tuple(map(float, closest_point)), float(mu))
+
+
+def principal(wall: Any) -> tuple[float, ...]:
+    """origin, axes, h, b and e of a wall: see `ParallelQuadric.constants`."""
+    kind: Any = type(wall)
+    find = _principal(kind, tuple(wall.sizes().items()))
+    return tuple(map(float, find(wall.own_numbers()).nonzeros()))
+
+
+@lru_cache(maxsize=16)
+def _principal(kind: Any, sizes: tuple[tuple[str, int], ...]) -> ca.Function:
+    given = ca.SX.sym("f", sum(count for _, count in sizes))
+    found = kind.principal(named(given, dict(sizes)))
+    return ca.Function("principal", [given], [ca.densify(found)])
+
+
+def equation_of(wall: Any, count: int) -> ca.Function:
+    """(w, constants) -> g, grad g, second derivative of the equation of a wall's form."""
+    return _functions(wall, count)[0]
 
 
 def _functions(wall: Any, count: int) -> tuple[ca.Function, ca.Function]:
@@ -243,7 +266,7 @@ def spread_directions(count: int) -> np.ndarray:
 
 @dataclass(frozen=True)
 class ParallelQuadric(Parallel):
-    """Points at a signed distance [m] from a wall with `quadric`."""
+    """Points at a signed distance [m] from a wall with `principal`."""
 
     @property
     def form(self) -> str:
@@ -251,10 +274,7 @@ class ParallelQuadric(Parallel):
 
     def constants(self) -> tuple[float, ...]:
         """distance; origin (3), axes (9, by columns), h (3), b (3) and e of g."""
-        A, origin, b, e = self.wall.quadric()
-        h, axes = np.linalg.eigh(2 * A)
-        numbers = (*origin, *axes.T.ravel(), *h, *(axes.T @ b), e)
-        return (self.distance, *map(float, numbers))
+        return (self.distance, *principal(self.wall))
 
     def bending(self, point: ca.SX, velocity: ca.SX, constants: Any = None) -> ca.SX:
         """v . dn/dt, in principal axes."""

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from types import SimpleNamespace
+from typing import Any, ClassVar, Literal
+
+import casadi as ca
 
 from ..quantities import Length, Number
 from .base import Coordinates, Scalar, SurfaceTable
@@ -16,12 +19,23 @@ class Plane(SurfaceTable):
     slope: tuple[Number, Number]
     offset: Length
 
+    numbers: ClassVar[tuple[str, ...]] = ("slope", "offset")
+
     def phi(self, point: Coordinates, constants: Coordinates | None = None) -> Scalar:
         c = self.constants() if constants is None else constants
         return point[2] - c[0] * point[0] - c[1] * point[1] - c[2]
 
     def constants(self) -> tuple[float, ...]:
         return (*self.slope, self.offset)
+
+    @staticmethod
+    def from_numbers(f: Any) -> ca.SX:
+        return ca.vertcat(f.slope, f.offset)
+
+    @staticmethod
+    def beyond(f: Any, distance: ca.SX) -> Any:
+        steepness = ca.sqrt(1 + ca.dot(f.slope, f.slope))
+        return SimpleNamespace(slope=f.slope, offset=f.offset + distance * steepness)
 
     def at_distance(self, distance: float) -> Plane:
         steepness = math.hypot(1.0, *self.slope)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
-import numpy as np
+import casadi as ca
 from pydantic import AfterValidator, Field
 
 from ..quantities import Length, Number
@@ -50,6 +50,9 @@ class Profile(SurfaceTable):
         AfterValidator(_rising),
     ] = Field(description="[[s, z], ...] with rising s")
 
+    numbers: ClassVar[tuple[str, ...]] = ("direction", "points")
+    carrier: ClassVar[str] = "points"
+
     def phi(self, point: Coordinates, constants: Coordinates | None = None) -> Scalar:
         c = self.constants() if constants is None else constants
         s = c[0] * point[0] + c[1] * point[1]
@@ -64,34 +67,45 @@ class Profile(SurfaceTable):
         u = s - knot
         return point[2] - z - u * (slope + u * (second + u * third))
 
-    def constants(self) -> tuple[float, ...]:
+    @staticmethod
+    def from_numbers(f: Any) -> ca.SX:
         """direction; z and slope before the first knot; for each knot s and what changes there.
 
         What changes: the coefficients of 1, u, u^2, u^3 in z, with u = s - s_k.
         """
-        length = math.hypot(*self.direction)
-        s, z = np.array(self.points).T
+        s, z = f.points[0::2], f.points[1::2]
         pieces = spline_pieces(s, z)
-        changes = np.column_stack([s, np.diff(pieces, axis=0)])
-        dx, dy = (d / length for d in self.direction)
-        return (dx, dy, *map(float, pieces[0, :2]), *map(float, changes.ravel()))
+        changes = ca.horzcat(s, pieces[1:, :] - pieces[:-1, :])
+        return ca.vertcat(f.direction / ca.norm_2(f.direction), pieces[0, :2].T, ca.vec(changes.T))
 
 
-def spline_pieces(s: np.ndarray, z: np.ndarray) -> np.ndarray:
+def spline_pieces(s: ca.SX, z: ca.SX) -> ca.SX:
     """Coefficients of 1, u, u^2, u^3 of the natural cubic spline, (n + 1, 4).
 
     The first piece is the straight line before s[0], with u = s - s[0]; piece k begins at knot
     k - 1, and the last is straight again.
     """
-    h, rise = np.diff(s), np.diff(z) / np.diff(s)
-    # Equal slopes at the inner knots, f'' = 0 at both ends.
-    system = np.eye(len(s))
-    right = np.zeros(len(s))
-    for k in range(1, len(s) - 1):
-        system[k, k - 1 : k + 2] = h[k - 1], 2 * (h[k - 1] + h[k]), h[k]
-        right[k] = 6 * (rise[k] - rise[k - 1])
-    bend = np.linalg.solve(system, right)  # f'' at the knots
+    h = s[1:] - s[:-1]
+    rise = (z[1:] - z[:-1]) / h
+    bend = _bends(h, rise)
     slope = rise - h * (2 * bend[:-1] + bend[1:]) / 6
-    inner = np.column_stack([z[:-1], slope, bend[:-1] / 2, np.diff(bend) / (6 * h)])
+    inner = ca.horzcat(z[:-1], slope, bend[:-1] / 2, (bend[1:] - bend[:-1]) / (6 * h))
     end = rise[-1] + h[-1] * (bend[-2] + 2 * bend[-1]) / 6
-    return np.vstack([[z[0], slope[0], 0, 0], inner, [z[-1], end, 0, 0]])
+    return ca.vertcat(ca.horzcat(z[0], slope[0], 0, 0), inner, ca.horzcat(z[-1], end, 0, 0))
+
+
+def _bends(h: ca.SX, rise: ca.SX) -> ca.SX:
+    """f'' at the knots: equal slopes at the inner ones, 0 at both ends.
+
+    h[k-1] f''[k-1] + 2 (h[k-1] + h[k]) f''[k] + h[k] f''[k+1] = 6 (rise[k] - rise[k-1]).
+    """
+    count = h.numel()
+    above, right = [ca.SX(0)], [ca.SX(0)]
+    for k in range(1, count):
+        pivot = 2 * (h[k - 1] + h[k]) - h[k - 1] * above[-1]
+        right.append((6 * (rise[k] - rise[k - 1]) - h[k - 1] * right[-1]) / pivot)
+        above.append(h[k] / pivot)
+    bend = [ca.SX(0)]
+    for k in range(count - 1, 0, -1):
+        bend.append(right[k] - above[k] * bend[-1])
+    return ca.vertcat(0, *reversed(bend))

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, ClassVar, Literal
 
-import numpy as np
+import casadi as ca
 from pydantic import Field
 
 from ..quantities import Curvature, Length, Number
@@ -21,15 +21,35 @@ class Quadratic(SurfaceTable):
     xy: Curvature = Field(default=0.0, description="per length")
     yy: Curvature = Field(default=0.0, description="per length")
 
+    numbers: ClassVar[tuple[str, ...]] = ("offset", "slope", "xx", "xy", "yy")
+
     def phi(self, point: Coordinates, constants: Coordinates | None = None) -> Scalar:
         c = self.constants() if constants is None else constants
         x, y, z = point[0], point[1], point[2]
         return z - c[0] - (c[1] + c[3] * x + c[4] * y) * x - (c[2] + c[5] * y) * y
 
-    def quadric(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-        """A, origin, b, e of phi = d^T A d + b . d + e, d = p - origin."""
-        A = -np.array([[self.xx, self.xy / 2, 0], [self.xy / 2, self.yy, 0], [0, 0, 0]])
-        return A, np.zeros(3), np.array([-self.slope[0], -self.slope[1], 1.0]), -self.offset
+    @staticmethod
+    def from_numbers(f: Any) -> ca.SX:
+        return ca.vertcat(f.offset, f.slope, f.xx, f.xy, f.yy)
 
-    def constants(self) -> tuple[float, ...]:
-        return (self.offset, *self.slope, self.xx, self.xy, self.yy)
+    @staticmethod
+    def principal(f: Any) -> ca.SX:
+        """As of `ParallelQuadric`; the first axis is the one nearest X.
+
+        Where the surface is equally curved all round, the axes have no derivative.
+        """
+        across, twist = f.xx - f.yy, f.xy
+        size = ca.sqrt(across**2 + twist**2)
+        none = ca.logic_not(size)
+        size += none
+        side = 1 - 2 * (across < 0)
+        cosine = ca.sqrt((1 + (ca.fabs(across) + none) / size) / 2)
+        sine = side * twist / size / (2 * cosine)
+        turn = ca.SX.eye(3)
+        turn[:2, :2] = ca.vertcat(ca.horzcat(cosine, -sine), ca.horzcat(sine, cosine))
+        bend = ca.SX.zeros(3, 3)
+        bend[0, 0], bend[1, 1], bend[0, 1] = 2 * f.xx, 2 * f.yy, f.xy
+        bend[1, 0] = f.xy
+        h = -ca.vertcat(*(turn[:, i].T @ bend @ turn[:, i] for i in (0, 1)), 0)
+        b = turn.T @ ca.vertcat(-f.slope, 1)
+        return ca.vertcat(ca.SX.zeros(3), ca.vec(turn), h, b, -f.offset)

@@ -8,13 +8,13 @@ exact as its tangent plane, and a small one far from O_M as one at hand.
 
 from __future__ import annotations
 
-import math
-from typing import ClassVar, Literal
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any, ClassVar, Literal
 
-import numpy as np
+import casadi as ca
 from pydantic import Field
 
-from ..coordinates import rotations
 from ..quantities import Direction, Point, PositiveLength, Vector
 from .base import Coordinates, Scalar, SurfaceTable
 
@@ -23,6 +23,8 @@ class Quadric(SurfaceTable):
     """phi of constants as `about_itself` gives them."""
 
     closed: ClassVar[bool] = True
+    lifted: ClassVar[bool] = False
+    carrier: ClassVar[str] = "centre"
 
     def phi(self, point: Coordinates, constants: Coordinates | None = None) -> Scalar:
         c = self.constants() if constants is None else constants
@@ -43,15 +45,28 @@ class Sphere(Quadric):
     centre: Point
     radius: PositiveLength
 
+    numbers: ClassVar[tuple[str, ...]] = ("centre", "radius")
+
     def phi(self, point: Coordinates, constants: Coordinates | None = None) -> Scalar:
         c = self.constants() if constants is None else constants
         x, y, z = point[0] - c[0], point[1] - c[1], point[2] - c[2]
         return x * (c[7] * x + c[3]) + y * (c[7] * y + c[4]) + z * (c[7] * z + c[5]) + c[6]
 
-    def constants(self) -> tuple[float, ...]:
+    @staticmethod
+    def from_numbers(f: Any) -> ca.SX:
         """A point of the sphere, its unit normal, phi there, and 1 / (2 radius)."""
-        A = np.eye(3) / (2 * self.radius)
-        return about_itself(A, np.array(self.centre), self.radius / 2)[:8]
+        A = ca.SX.eye(3) / (2 * f.radius)
+        return about_itself(A, f.centre, f.radius / 2, ca.SX([0, 0, 1]))[:8]
+
+    @staticmethod
+    def beyond(f: Any, distance: ca.SX) -> Any:
+        return SimpleNamespace(centre=f.centre, radius=f.radius + distance)
+
+    @staticmethod
+    def nearest(f: Any, point: ca.SX, foot: Foot) -> tuple[ca.SX, ca.SX]:
+        lever = point - f.centre
+        size = ca.norm_2(lever)
+        return size - f.radius, lever / size
 
     def at_distance(self, distance: float) -> Sphere:
         return self.derived(radius=self.radius + distance)
@@ -68,11 +83,26 @@ class Cylinder(Quadric):
     axis: Direction = Field(description="direction of the axis, in {S}")
     radius: PositiveLength
 
-    def constants(self) -> tuple[float, ...]:
+    numbers: ClassVar[tuple[str, ...]] = ("point", "axis", "radius")
+    carrier: ClassVar[str] = "point"
+
+    @staticmethod
+    def from_numbers(f: Any) -> ca.SX:
         """The centre is the axis' point nearest O_M."""
-        axis = np.array(self.axis) / np.linalg.norm(self.axis)
-        across = np.eye(3) - np.outer(axis, axis)
-        return about_itself(across / (2 * self.radius), across @ self.point, self.radius / 2)
+        across = _across(f)
+        flat = ca.if_else(f.axis[2] ** 2 > f.axis[0] ** 2, ca.SX([1, 0, 0]), ca.SX([0, 0, 1]))
+        A = across / (2 * f.radius)
+        return about_itself(A, across @ f.point, f.radius / 2, across @ flat)
+
+    @staticmethod
+    def beyond(f: Any, distance: ca.SX) -> Any:
+        return SimpleNamespace(point=f.point, axis=f.axis, radius=f.radius + distance)
+
+    @staticmethod
+    def nearest(f: Any, point: ca.SX, foot: Foot) -> tuple[ca.SX, ca.SX]:
+        lever = _across(f) @ (point - f.point)
+        size = ca.norm_2(lever)
+        return size - f.radius, lever / size
 
     def at_distance(self, distance: float) -> Cylinder:
         return self.derived(radius=self.radius + distance)
@@ -93,28 +123,56 @@ class Ellipsoid(Quadric):
         description="Bryant angles of the semi-axes [rad]: R = Rx Ry Rz maps them to {S}",
     )
 
-    def constants(self) -> tuple[float, ...]:
-        s = math.prod(self.semi_axes) ** (1 / 3)
-        R = rotations(np.array(self.rotation))
-        A = (R * (s / (2 * np.square(self.semi_axes)))) @ R.T
-        return about_itself(A, np.array(self.centre), s / 2)
+    numbers: ClassVar[tuple[str, ...]] = ("centre", "semi_axes", "rotation")
 
-    def quadric(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-        """A, origin, b, e of phi = d^T A d + b . d + e, d = p - origin."""
-        c = np.array(self.constants())
-        A = c[[7, 10, 11, 10, 8, 12, 11, 12, 9]].reshape(3, 3)
-        return A, c[:3], c[3:6], float(c[6])
+    @staticmethod
+    def from_numbers(f: Any) -> ca.SX:
+        R, h, level = _shape(f)
+        return about_itself(R @ ca.diag(h / 2) @ R.T, f.centre, level, R[:, 2])
+
+    @staticmethod
+    def principal(f: Any) -> ca.SX:
+        """As of `ParallelQuadric`."""
+        R, h, _ = _shape(f)
+        c = Ellipsoid.from_numbers(f)
+        return ca.vertcat(c[:3], ca.vec(R), h, R.T @ c[3:6], c[6])
+
+    @staticmethod
+    def nearest(f: Any, point: ca.SX, foot: Foot) -> tuple[ca.SX, ca.SX]:
+        w, _, n = foot(f)
+        return ca.dot(n, point - w), n
 
 
-def about_itself(A: np.ndarray, centre: np.ndarray, level: float) -> tuple[float, ...]:
+Foot = Callable[[Any], tuple[ca.SX, ca.SX, ca.SX]]  # numbers -> closest point, mu, unit normal
+
+
+def _across(f: Any) -> ca.SX:
+    """What a cylinder's axis leaves of vectors, (3, 3)."""
+    axis = f.axis / ca.norm_2(f.axis)
+    return ca.SX.eye(3) - axis @ axis.T
+
+
+def _shape(f: Any) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """R, s / semi_axes^2 (3,) and s / 2 of an ellipsoid."""
+    s = (f.semi_axes[0] * f.semi_axes[1] * f.semi_axes[2]) ** (1 / 3)
+    (a, b, c), (d, e, g) = (ca.vertsplit(of(f.rotation)) for of in (ca.cos, ca.sin))
+    R = ca.vertcat(
+        ca.horzcat(b * c, -b * g, e),
+        ca.horzcat(a * g + d * e * c, a * c - d * e * g, -d * b),
+        ca.horzcat(d * g - a * e * c, d * c + a * e * g, a * b),
+    )
+    return R, s / f.semi_axes**2, s / 2
+
+
+def about_itself(A: ca.SX, centre: ca.SX, level: ca.SX, other: ca.SX) -> ca.SX:
     """origin (3), b (3), e, and the entries xx, yy, zz, xy, xz, yz of A.
 
-    The origin is where the line from the centre to O_M meets the surface.
+    The origin is where the line from the centre to O_M meets the surface; where O_M is the centre,
+    the one along `other`.
     """
-    ray = -centre
-    if not ray @ A @ ray > 1e-12 * level:
-        ray = np.linalg.eigh(A)[1][:, -1]
-    origin = centre + ray * np.sqrt(level / (ray @ A @ ray))
+    towards = -centre
+    ray = ca.if_else(towards.T @ A @ towards > 1e-12 * level, towards, other)
+    origin = centre + ray * ca.sqrt(level / (ray.T @ A @ ray))
     lever = origin - centre
     entries = (A[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
-    return tuple(map(float, (*origin, *(2 * A @ lever), lever @ A @ lever - level, *entries)))
+    return ca.vertcat(origin, 2 * A @ lever, lever.T @ A @ lever - level, *entries)

@@ -17,7 +17,8 @@ from ...kinematics.singularities import admitted_twists
 from ...mechanism.home import characteristic_length, independent_coordinates
 from ...mechanism.mechanism import Mechanism
 from ...questions import Question
-from ...questions.numbers import Layout, specialised
+from ...questions.file_numbers import numbers_of
+from ...questions.numbers import specialised
 from ...questions.structure import structure_of
 from ..continuation import Conditions, Steps
 
@@ -41,7 +42,7 @@ class JointSteps(Steps):
 def joint_steps(mechanism: Mechanism) -> JointSteps:
     """The steps of a mechanism."""
     structure = structure_of(mechanism)
-    numbers = Layout.of(structure).numbers(mechanism)
+    numbers = numbers_of(structure, mechanism)
     question = Question.about(specialised(structure, numbers), "encoders")
     kernel = NumpyKernel(question.variants(), numbers)
 

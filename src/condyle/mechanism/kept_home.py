@@ -1,0 +1,75 @@
+"""Home kept: a surface follows a change that would take its contact off it.
+
+It goes with its offset along Z (planes, quadratics, profiles, expressions), or its centre along the
+normal at home (spheres, cylinders, ellipsoids), unless that number is itself among those changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..errors import InputError, shown
+from .contact import Contact
+from .paths import Path, parsed
+from .surface import Expression
+from .surface.wall import missed
+
+KEEP = ("home", "all")
+
+
+class HasContacts(Protocol):
+    """A mechanism, as its contacts see it."""
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]: ...
+
+
+def kept_contacts(mechanism: HasContacts, paths: Iterable[str], keep: str) -> list[int]:
+    """Contacts whose home is kept, by number: all but those whose own offset or centre is given.
+
+    Raises: InputError: for another `keep` than `home` or `all`.
+    """
+    if keep not in KEEP:
+        raise InputError(f'keep: expected "home" or "all", got {shown(keep)}')
+    given = [parsed(path) for path in paths]
+    every = enumerate(mechanism.contacts)
+    return [
+        i for i, c in every if keep == "home" and not any(_carries(keys, i, c) for keys in given)
+    ]
+
+
+def _carries(keys: Path, i: int, contact: Contact) -> bool:
+    """Whether a path is, or contains, or is within what carries a contact's surface."""
+    if keys[0] != "contact" or (len(keys) > 1 and keys[1] not in (i, contact.name, "*")):
+        return False
+    return keys[2:4] == ("surface", contact.surface.carrier)[: max(0, len(keys) - 2)]
+
+
+def followed(old: Contact, new: Contact) -> Contact:
+    """The new contact with its surface where home misses it by as much as the old one's did."""
+    if old == new or old.surface.kind != new.surface.kind or not new.surface.known:
+        return new
+    _, gradient = old.gradient()
+    normal = gradient / np.linalg.norm(gradient)
+    before, _ = missed(old, normal)
+    after, along = missed(new, normal, old.offset_surface.form)
+    by = after - before
+    return new if by == 0 else new.model_copy(update={"surface": _moved(new.surface, by, along)})
+
+
+def _moved(surface: Any, by: float, along: np.ndarray) -> Any:
+    if isinstance(surface, Expression):
+        return replace(surface, offset=surface.offset + by)
+    place = surface.carrier
+    own: Any = getattr(surface, place)
+    if not surface.lifted:
+        own = tuple(map(float, np.add(own, by * along)))
+    elif place == "points":
+        own = tuple((s, z + by) for s, z in own)
+    else:
+        own += by
+    return surface.derived(**{place: own})

@@ -1,0 +1,188 @@
+"""Numbers of the file by their paths, and the kernel's numbers' derivatives in them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from oracles.random_mechanism import random_mechanism
+from support.families import ALL as FAMILIES
+from support.families import case as families
+
+import condyle
+from condyle.errors import InputError
+from condyle.mechanism import Mechanism
+from condyle.mechanism.files import from_data
+from condyle.mechanism.home import dependent_coordinates
+from condyle.mechanism.paths import written
+from condyle.questions.file_numbers import numbers_of
+from condyle.questions.number_paths import FileNumbers, number_jacobian
+from condyle.questions.numbers import Layout
+from condyle.questions.structure import Structure, structure_of, walls_of
+
+SURFACES: dict[str, dict[str, Any]] = {
+    "every_kind": {"surface": "mixed", "contacts": 5, "chains": 8},
+    "balls": {"surface": ("ellipsoid", "quadratic", "plane"), "contacts": 3, "ball_radius": 4.0},
+    "balls_round": {"surface": ("sphere", "cylinder"), "ball_radius": 4.0},
+    "balls_profile": {"surface": "profile", "ball_radius": 4.0},
+}
+CARRIERS = ("surface.offset", "surface.centre", "surface.point", "surface.points")
+
+
+def wide(mechanism: Mechanism) -> Structure:
+    """With every number of the file."""
+    every = tuple(range(len(mechanism.contacts)))
+    found = structure_of(mechanism)
+    return replace(found, parallel=False, losses=True, friction=every)
+
+
+def numbers(mechanism: Mechanism) -> FileNumbers:
+    structure = wide(mechanism)
+    return FileNumbers(mechanism, structure, walls_of(mechanism, structure))
+
+
+def flat(structure: Structure, mechanism: Mechanism) -> np.ndarray:
+    found = numbers_of(structure, mechanism)
+    return np.concatenate([found.parameters, *(lane.ravel() for lane in found.lanes)])
+
+
+def test_where_numbers_stand() -> None:
+    jaw = condyle.load_mechanism("masticatory")
+    one, inertia, base, entry, viscous = numbers(jaw).at(
+        [
+            "platform.mass",
+            "platform.inertia",
+            "chain[0].base",
+            f"chain.{jaw.chain_names[2]}.crank_tip[2]",
+            "chain.*.actuator.viscous",
+        ]
+    )
+    layout = Layout.of_file(wide(jaw), walls_of(jaw, wide(jaw)))
+    assert (one.unit, one.shape, one.size) == ("kg", (), 1)
+    assert one.slots == ((-1, layout.parameters["mass"][0], 0),)
+    assert inertia.shape == (6,) and base.shape == (3,) and entry.shape == ()
+    assert [slot[2] for slot in base.slots] == [0, 0, 0] and entry.slots[0][2] == 2
+    assert viscous.shape == (6,) and viscous.unit == "N m s/rad"
+    assert [slot[2] for slot in viscous.slots] == list(range(6))
+
+
+def test_refusals() -> None:
+    jaw = condyle.load_mechanism("masticatory")
+    for path, text in {
+        "platform.weight": 'has no "weight"',
+        "platform.points": "no such number. Available: gravity, platform.mass",
+        "chain.*.actuator.torque_limit": "it has no such number",
+        "contact[0].ball_radius": "left out, and has no default",
+        "chain[0].name": "expected a number or vector",
+    }.items():
+        with pytest.raises(InputError, match=text):
+            numbers(jaw).at([path])
+    with pytest.raises(InputError, match=r"shares numbers with chain\.\*\.base"):
+        numbers(jaw).at(["chain.*.base", "chain[1].base[0]"])
+    with pytest.raises(InputError, match='keep: expected "home" or "all"'):
+        number_jacobian(jaw, wide(jaw), ["platform.mass"], "none")
+
+
+def every_path(of: FileNumbers) -> list[str]:
+    """Paths of all numbers and vectors of a mechanism's file."""
+    parts = [("gravity",), *(("contact", n) for n in of.mechanism.contact_names)]
+    parts += [("chain", n) for n in of.mechanism.chain_names]
+    return [written(leaf) for part in parts for leaf, _ in of._leaves(part)]
+
+
+def rubbing(machine: Mechanism) -> Mechanism:
+    """With losses and friction, `dependent` held."""
+    losses = {"rotor_inertia": 1e-5, "gear": 3.0, "viscous": 0.02, "coulomb": 0.03}
+    changes: dict[str, object] = {
+        f"chain.{chain.name}.actuator.{key}": value
+        for chain in machine.chains
+        for key, value in (losses | {"smoothing_speed": 2e-3}).items()
+    }
+    for contact in machine.contacts:
+        changes[f"contact.{contact.name}.friction"] = {"coefficient": 0.1}
+    return machine.set({**changes, "dependent": dependent_coordinates(machine) or None})
+
+
+def machine_of(name: str) -> Mechanism:
+    if name in condyle.bundled_mechanisms():
+        return rubbing(condyle.load_mechanism(name))
+    if name in FAMILIES:
+        return rubbing(families(name).mechanism)
+    rng = np.random.default_rng(sum(map(ord, name)))
+    return rubbing(from_data(random_mechanism(rng, **SURFACES[name])))
+
+
+def differences(
+    machine: Mechanism, structure: Structure, path: str, keep: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """d (numbers of the kernel) / d (numbers at a path), by differences of eighth order.
+
+    Returns: also what rounding makes of them.
+    """
+    value = np.asarray(machine.get(path), dtype=float)
+    h = 3e-5 * (float(np.abs(value).max()) or 1e-3)
+    if path.endswith("direction"):
+        h = 2e-7  # its length is checked, and does not matter
+    if keep == "all":
+        h = min(h, 5e-7)  # home stays within what is accepted
+    columns = []
+    for i in range(value.size):
+        total: Any = 0.0
+        for step, weight in ((1, 4 / 5), (2, -1 / 5), (3, 4 / 105), (4, -1 / 280)):
+            for sign in (1, -1):
+                new = value.copy()
+                new.flat[i] += sign * step * h
+                moved = flat(structure, machine.set(path, new.tolist(), keep=keep))
+                total = total + sign * weight * moved / h
+        columns.append(total)
+    size = np.abs(flat(structure, machine))
+    for name, (start, count) in Layout.of(structure).parameters.items():
+        if "surface" in name:  # a spline's coefficients are third differences
+            size[start : start + count] += 3e5 if count > 30 else 0.0
+    return np.stack(columns, axis=1), 1e-15 * size[:, None] / h
+
+
+def one_each(machine: Mechanism) -> list[str]:
+    """Every path, of one chain of a family."""
+    found = {}
+    for path in every_path(numbers(machine)):
+        head, name, *rest = [*path.split(".", 2), ""]
+        kind = machine.get(f"chain.{name}.kind") if head == "chain" else name
+        found.setdefault((head, kind, *rest), path)
+    return list(found.values())
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "every_family",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in SURFACES),
+        *(pytest.param(name, marks=pytest.mark.ci) for name in condyle.bundled_mechanisms()),
+    ],
+)
+def test_derivatives_of_the_kernels_numbers(name: str) -> None:
+    machine = machine_of(name)
+    structure = wide(machine)
+    for path in one_each(machine):
+        keep = "all" if path.endswith(CARRIERS) else "home"
+        got = number_jacobian(machine, structure, [path])
+        want, noise = differences(machine, structure, path, keep)
+        off = np.abs(got - want) - noise
+        worst, largest = float(off.max()), float(np.abs(want).max())
+        assert worst <= 1e-9 * max(1.0, largest), path
+
+
+def test_all_else_held() -> None:
+    """A point alone moves nothing of its surface, and an offset among those changed stays."""
+    machine = machine_of("masticatory")
+    name, structure = machine.contact_names[0], wide(machine)
+    at = Layout.of(structure).parameters["contact_surface_0"][0] + 2
+    point, offset = f"contact.{name}.point", f"contact.{name}.surface.offset"
+    assert not number_jacobian(machine, structure, [point], keep="all")[at].any()
+    slope = np.array(machine.contacts[0].surface.slope)
+    kept = number_jacobian(machine, structure, [point])[at]
+    np.testing.assert_allclose(kept, [*-slope, 1.0], rtol=0, atol=1e-15)
+    both = number_jacobian(machine, structure, [point, offset])[at]
+    np.testing.assert_allclose(both, [0, 0, 0, 1], rtol=0, atol=1e-15)
