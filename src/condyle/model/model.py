@@ -452,6 +452,34 @@ class Model:
         """
         return extend("model.variants", self, table)
 
+    # -- in other frameworks -----------------------------------------------------------------
+
+    def to_jax(self, door: str = "kernel") -> Any:
+        """Dynamics as pure functions of JAX, which jit, vmap and differentiate: `JaxFunctions`.
+
+        Args:   door: kernel: our own C, called by XLA on processors; graph: traced operation by
+                operation, slower there, but it runs wherever JAX does.
+        Raises: MissingExtraError: without JAX.
+                InputError:        where JAX is set to float32; for another door.
+                UnsupportedError:  for `kernel` without a compiler; for efforts within limits.
+        """
+        return extend("model.to_jax", self, door)
+
+    def to_torch(self) -> Any:
+        """Dynamics as operators of PyTorch, with exact derivatives: `TorchFunctions`.
+
+        Raises: MissingExtraError: without PyTorch.
+        """
+        return extend("model.to_torch", self)
+
+    def to_casadi(self) -> Any:
+        """Dynamics as functions of CasADi, with exact first derivatives: `CasadiFunctions`.
+
+        Raises: CompilerError:    without a compiler.
+                UnsupportedError: for efforts within limits.
+        """
+        return extend("model.to_casadi", self)
+
     # -- what it is made of ------------------------------------------------------------------
 
     @cached_property

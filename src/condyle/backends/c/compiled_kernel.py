@@ -204,9 +204,9 @@ class CompiledKernel:
 
     @property
     def address(self) -> tuple[int, int, int]:
-        """Addresses of `one`, of `batch` and of the table, to call them from C."""
+        """Addresses of `one`, if there is one, `batch` and the table, to call them from C."""
         one, batch = (
-            ctypes.cast(getattr(self._library, name), ctypes.c_void_p).value or 0
+            ctypes.cast(getattr(self._library, name, 0), ctypes.c_void_p).value or 0
             for name in ("one", "batch")
         )
         return one, batch, self._table.ctypes.data

@@ -1,0 +1,219 @@
+"""Models as functions of JAX that jit, vmap, and are differentiated.
+
+The kernel is called by XLA itself; its derivatives are those of the same graph.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..backends import cache
+from ..backends.c.compiled_kernel import CompiledKernel
+from ..backends.c.shared_library import obtained, tool
+from ..backends.compiler import Compiler, find_compiler
+from ..backends.kernel import AGAIN, Kernel
+from ..errors import InputError, UnsupportedError, as_name, did_you_mean, shown
+from ..extras import require
+from ..model.model import Model
+from ..questions import Question
+from ..status import Status
+from .asked import Asked, Placed, dynamics, inputs_of
+from .traced import traced
+
+TARGET = "condyle_batch"
+UNSURE = int(Status.uncertified)
+Function = Callable[..., dict[str, Any]]
+Called = Callable[..., dict[str, Any]]  # of one array a port, of one leading shape
+
+
+class JaxFunctions:
+    """Inverse and forward dynamics of a model as pure functions.
+
+        dynamics = model.to_jax()
+        jax.jit(jax.vmap(dynamics.inverse_dynamics))(q, v, a)["effort"]
+
+    Arguments are as of `Model`, without names of points; results are `effort` (..., n) or
+    `acceleration` (..., m), `contact_force` (..., k) and `status` (...), NaN where that is not 0.
+    Samples that no kernel can vouch for, and a model solves by robust methods, are `uncertified`.
+    """
+
+    inverse_dynamics: Function
+    forward_dynamics: Function
+
+    def __init__(self, model: Model, door: str = "kernel") -> None:
+        """As of `Model.to_jax`."""
+        as_name(door, "door")
+        if door not in DOORS:
+            raise InputError(f"door: there is no {shown(door)}.{did_you_mean(door, DOORS)}")
+        require("jax", "jax")
+        import jax
+
+        if not jax.config.read("jax_enable_x64"):
+            raise InputError(
+                "to_jax computes in doubles, and JAX is set to float32. First call "
+                'jax.config.update("jax_enable_x64", True)'
+            )
+        if door == "kernel" and model.backend.name != "compiled":
+            raise UnsupportedError(
+                f"to_jax calls compiled kernels, and this model has {model.backend.name}; "
+                'door="graph" needs none'
+            )
+        for name, asked in dynamics(model).items():
+            setattr(self, name, _function(asked, DOORS[door](asked)))
+
+
+def _traced(asked: Asked) -> Called:
+    """The graph, operation by operation."""
+    import jax.numpy as jnp
+
+    question = Question.about(asked.model.system.structure, asked.question, *asked.details)
+    run = traced(question.variants(), asked.model.system.numbers)
+
+    def called(*given: Any) -> dict[str, Any]:
+        found = run(dict(zip(asked.ports, given, strict=True)))
+        status = jnp.where(found["status"] == AGAIN, jnp.uint8(UNSURE), found["status"])
+        good = (status == 0)[..., None]
+        found |= {name: jnp.where(good, found[name], jnp.nan) for name in asked.results}
+        return found | {"status": status}
+
+    return called
+
+
+def _compiled(asked: Asked) -> Called:
+    """The kernel, with derivatives by another."""
+    import jax
+    import jax.numpy as jnp
+
+    _registered()
+    ports, values = asked.ports, _caller(asked.values, asked.ports)
+
+    @jax.custom_jvp
+    def called(*given: Any) -> dict[str, Any]:
+        return values(*given)
+
+    def rule(primals: Any, tangents: Any) -> Any:
+        moving = {
+            port: t
+            for port, t in zip(ports, tangents, strict=True)
+            if type(t) is not jax.custom_derivatives.SymbolicZero
+        }
+        found = called(*primals)
+        slopes = _caller(asked.slopes(tuple(moving)), ports)(*primals) if moving else {}
+        change: dict[str, Any] = {name: jnp.zeros_like(found[name]) for name in asked.results}
+        for name in (own for own in asked.results if found[own].shape[-1]):
+            for port, t in moving.items():
+                own = slopes[f"{name}/{port}"]
+                change[name] = change[name] + jnp.einsum(
+                    "...rp,...p->...r", asked.matrix(name, port, own), t
+                )
+        change["status"] = np.zeros(found["status"].shape, dtype=jax.dtypes.float0)
+        return found, change
+
+    called.defjvp(rule, symbolic_zeros=True)
+    return called
+
+
+DOORS: dict[str, Callable[[Asked], Called]] = {"kernel": _compiled, "graph": _traced}
+
+
+def _function(asked: Asked, called: Called) -> Function:
+    import jax.numpy as jnp
+
+    sizes = asked.sizes()
+
+    def function(*given: Any, **named: Any) -> dict[str, Any]:
+        flat = _ports(asked, sizes, given, named)
+        lead = jnp.broadcast_shapes(*(a.shape[:-1] for a in flat))
+        found: dict[str, Any] = called(*(jnp.broadcast_to(a, (*lead, a.shape[-1])) for a in flat))
+        return found
+
+    function.__name__ = asked.question
+    return function
+
+
+def _ports(asked: Asked, sizes: dict[str, int], given: Sequence[Any], named: Any) -> list[Any]:
+    """An array for each port, of what a call gave."""
+    import jax.numpy as jnp
+
+    names = [name for name, _ in asked.arguments]
+    if len(given) > len(names) or not {*named} <= {*names[len(given) :]}:
+        raise InputError(f"expected the arguments {', '.join(names)}")
+    known = dict(zip(names, given, strict=False)) | named
+    flat = []
+    for name, ports in asked.arguments:
+        own = [sizes[port] for port in ports]
+        a = known.get(name)
+        if a is None:
+            if name not in ("wrench", "at"):
+                raise InputError(f"{name} is missing")
+            a = jnp.zeros(sum(own))
+        a = jnp.asarray(a, dtype=float)
+        if not a.ndim or a.shape[-1] != sum(own):
+            raise InputError(f"{name}: expected an array of shape (..., {sum(own)}), got {a.shape}")
+        flat += jnp.split(a, np.cumsum(own)[:-1].tolist(), axis=-1)
+    return flat
+
+
+def _caller(kernel: Kernel, ports: Sequence[str]) -> Callable[..., dict[str, Any]]:
+    """The batch of a kernel as XLA calls it."""
+    import jax
+    import jax.numpy as jnp
+
+    assert isinstance(kernel, CompiledKernel)
+    _keep.append(kernel)
+    _, batch, table = kernel.address
+    placed = Placed.of(kernel)
+    argument, entry = inputs_of(kernel, [(port, (port,)) for port in ports])
+    given = {"address": (batch, table), "argument": argument, "entry": entry}
+    given |= {"result": placed.result, "place": placed.place}
+    attributes = {name: np.array(value, dtype=np.int64) for name, value in given.items()}
+
+    def call(*arrays: Any) -> dict[str, Any]:
+        lead = arrays[0].shape[:-1]
+        sizes = [math.prod(shape) for shape in placed.shapes.values()]
+        wanted = [jax.ShapeDtypeStruct((*lead, size), jnp.float64) for size in sizes]
+        wanted.append(jax.ShapeDtypeStruct(lead, jnp.uint8))
+        called = jax.ffi.ffi_call(TARGET, wanted, vmap_method="broadcast_all")
+        *found, status = called(*arrays, **attributes)
+        return {
+            name: a.reshape(*lead, *shape)
+            for a, (name, shape) in zip(found, placed.shapes.items(), strict=True)
+        } | {"status": status}
+
+    return call
+
+
+_keep: list[Kernel] = []  # compiled functions outlive the model they call
+
+
+@lru_cache(maxsize=1)
+def _registered() -> ctypes.CDLL:
+    """The handler, built for this JAX."""
+    import jax
+
+    compiler = find_compiler()
+    source = Path(__file__).with_name("xla_handler.c")
+    headers = jax.ffi.include_dir()
+    recipe = cache.digest(source.read_bytes(), jax.__version__, tool(compiler))
+
+    def make(folder: Path) -> tuple[Path, dict[str, Any]]:
+        library = folder / "kernel.so"
+        including = Compiler(
+            compiler.command,
+            (*compiler.flags, f"-I{headers}", f"-DAGAIN={AGAIN}", f"-DUNCERTIFIED={UNSURE}"),
+            compiler.identity,
+            compiler.lanes,
+        )
+        including.build(library, source)
+        return library, {}
+
+    _, library = obtained(recipe, make, ctypes.CDLL)
+    jax.ffi.register_ffi_target(TARGET, jax.ffi.pycapsule(library.condyle_batch), platform="cpu")
+    return library

@@ -1,0 +1,104 @@
+"""Models in JAX: values of both doors against numpy's, derivatives against differences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.errors import InputError, UnsupportedError
+
+from .conftest import ARGUMENTS, RESULTS, slopes, state
+
+jax = pytest.importorskip("jax")
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(autouse=True)
+def doubles():
+    jax.config.update("jax_enable_x64", True)
+
+
+@pytest.mark.parametrize("door", ["kernel", "graph"])
+@pytest.mark.parametrize("question", ARGUMENTS)
+def test_values(model, door, question):
+    given = state(model, count=30)
+    given["q"][3] = 9.0  # out of reach
+    function = jax.jit(getattr(model.to_jax(door), question))
+    arguments = [given[name] for name in ARGUMENTS[question]]
+    found = function(*arguments)
+    plain = condyle.derive(model.mechanism, backend="numpy")
+    expected = getattr(plain, question)(*arguments)
+    good = np.asarray(found["status"]) == 0
+    assert (good == (expected.status == 0)).all()
+    assert not (good[3] and model.mechanism.contacts)
+    for name in (RESULTS[question], "contact_force"):
+        value, right = np.asarray(found[name]), getattr(expected, name)
+        assert value.shape == right.shape and np.isnan(value[~good]).all()
+        largest = np.abs(right[good]).max(initial=0.0)
+        assert np.abs(value[good] - right[good]).max(initial=0.0) <= 1e-11 * largest, name
+
+
+@pytest.mark.parametrize("question", ARGUMENTS)
+def test_derivatives(model, question):
+    given, result = state(model), RESULTS[question]
+    names = ARGUMENTS[question]
+    for door, ways in (("kernel", (jax.jacfwd, jax.jacrev)), ("graph", (jax.jacfwd,))):
+        function = getattr(model.to_jax(door), question)
+
+        def first(*x, function=function):
+            return function(*x)[result]
+
+        wanted = range(len(names))
+        both = [way(first, argnums=wanted)(*(given[n] for n in names)) for way in ways]
+        for i, name in enumerate(names):
+            right = slopes(model, question, given, name)
+            for found in both:
+                error = np.abs(np.asarray(found[i]) - right).max()
+                assert error <= 3e-8 * np.abs(right).max(), (door, name)
+
+
+def test_jit_of_vmap_of_grad(model):
+    given, dynamics = state(model, count=4), model.to_jax()
+
+    def cost(q, v):
+        return (dynamics.inverse_dynamics(q, v, v * 0)["effort"] ** 2).sum()
+
+    many = jax.jit(jax.vmap(jax.grad(cost, argnums=(0, 1))))(given["q"], given["v"])
+    one = jax.grad(cost, argnums=(0, 1))(given["q"][2], given["v"][2])
+    for a, b in zip(many, one, strict=True):
+        assert np.asarray(a)[2] == pytest.approx(np.asarray(b), rel=1e-9, abs=1e-12)
+
+
+def test_two_models_in_one_function(compiler_command):
+    light = condyle.load_mechanism("masticatory")
+    heavy = light.set({"platform.mass": 2 * light.platform.mass})
+    models = [condyle.derive(mechanism, backend="compiled") for mechanism in (light, heavy)]
+    given = state(models[0])
+    functions = [model.to_jax().inverse_dynamics for model in models]
+    both = jax.jit(lambda q, v, a: [f(q, v, a)["effort"] for f in functions])
+    found = both(*(given[name] for name in "qva"))
+    for value, model in zip(found, models, strict=True):
+        right = model.inverse_dynamics(*(given[name] for name in "qva")).effort
+        assert np.asarray(value) == pytest.approx(right, rel=1e-12)
+
+
+def test_refused(model):
+    function = model.to_jax().inverse_dynamics
+    given = state(model)
+    with pytest.raises(InputError, match=r"q: expected an array of shape \(\.\.\., \d\)"):
+        function(np.zeros(2), given["v"], given["a"])
+    with pytest.raises(InputError, match="a is missing"):
+        function(given["q"], given["v"])
+    with pytest.raises(InputError, match="expected the arguments q, v, a"):
+        function(given["q"], given["v"], given["a"], speed=1.0)
+    with pytest.raises(InputError, match="door: there is no 'window'"):
+        model.to_jax("window")
+    plain = condyle.derive(model.mechanism, backend="numpy")
+    with pytest.raises(UnsupportedError, match='door="graph"'):
+        plain.to_jax()
+    with pytest.raises(UnsupportedError, match="least norm"):
+        condyle.derive("human-jaw", backend="compiled").to_jax()
+    jax.config.update("jax_enable_x64", False)
+    with pytest.raises(InputError, match="jax_enable_x64"):
+        model.to_jax()
