@@ -13,7 +13,7 @@ from condyle.backends.numpy_kernel import NumpyKernel
 from condyle.graph.graph import Graph, Value, reachable
 from condyle.graph.operations import OPERATIONS
 from condyle.graph.program import Numbers, Output, Port, Program, Variants
-from condyle.graph.transform import adjoints, substituted, tangents
+from condyle.graph.transform import adjoints, jacobian, substituted, tangents
 
 STEP = 1e-6
 JUMPS = ("le", "lt", "eq", "ne", "and", "or", "not", "sign", "floor", "ceil")
@@ -86,6 +86,37 @@ def test_tangents_go_through_sums_over_lanes() -> None:
     total = (np.sin(a * per_lane[:, 0]) * per_lane[:, 1]).sum(axis=1)
     by_hand = total * (per_lane[:, 0] + b).sum(axis=1) + given[:, 0] ** 2
     np.testing.assert_allclose(run([root], 0.0), by_hand, rtol=1e-12)
+
+
+def test_a_waist_shortens_derivatives_and_leaves_them_as_they_are() -> None:
+    """sum_i exp(s_i) sin(s_i) + s_i x_0 by four leaves that meet in s_i = sum x_k y_i^k."""
+    graph = Graph()
+    x = [graph.leaf("input", i) for i in range(4)]
+    y = graph.leaf("lane_input", 0, 4, group=0)
+    s, power = x[0], y
+    for leaf in x[1:]:
+        s = graph.apply("add", s, graph.apply("mul", leaf, power))
+        power = graph.apply("mul", power, y)
+    wave = graph.apply("mul", graph.apply("exp", s), graph.apply("sin", s))
+    term = graph.apply("add", wave, graph.apply("mul", s, x[0]))
+    root = graph.reduce("sum", [term])
+    plain = [by[root] for by in jacobian(graph, [root], x)]
+    graph.waists.append((s,))
+    short = [by[root] for by in jacobian(graph, [root], x)]
+    assert len(reachable(graph, short)) < len(reachable(graph, plain))
+    outputs = tuple(Output(str(i), (), "", False, ((v,),)) for i, v in enumerate([*plain, *short]))
+    ports = (Port("x", 4, "", False, 0), Port("y", 1, "", True, 4))
+    p = Program(graph, (LANES,), 4 + LANES, ports, outputs, ())
+    rng = np.random.default_rng(6)
+    given = {"x": rng.normal(0, 1, (9, 4)), "y": rng.normal(0, 1, (9, LANES))}
+    found = NumpyKernel(Variants(p), no_numbers()).run(given).values
+    a, b = given["x"], given["y"][:, None]
+    at = (a[:, :, None] * b ** np.arange(4)[:, None]).sum(axis=1)
+    slope = np.exp(at) * (np.sin(at) + np.cos(at)) + a[:, :1]
+    for i in range(4):
+        wanted = (slope * b[:, 0] ** i).sum(axis=1) + (at.sum(axis=1) if i == 0 else 0.0)
+        np.testing.assert_allclose(found[str(i)], wanted, rtol=1e-11)
+        np.testing.assert_allclose(found[str(i + 4)], wanted, rtol=1e-11)
 
 
 def test_adjoints_sum_over_lanes_what_these_hand_to_shared_values() -> None:

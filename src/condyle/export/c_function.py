@@ -181,7 +181,7 @@ def function(c: Context, name: str, entry: Entry, wish: Wish) -> Body:
     program = _pruned(found.robust or found.main, results)
     given = renamed(entry.given or " ".join(_used(program)))
     if entry.tangent:
-        program = tangent(program, given, results)
+        program = directional(program, set(given), set(results))
         given |= {PREFIX + port: PREFIX + own for port, own in given.items()}
         results = {PREFIX + result: PREFIX + own for result, own in results.items()}
     arguments = tuple(_arguments(c, entry, program, given, results))
@@ -215,11 +215,6 @@ def function(c: Context, name: str, entry: Entry, wish: Wish) -> Body:
 }}
 """
     return Body(made, code, wide, dispatch)
-
-
-def tangent(program: Program, given: Mapping[str, str], results: Mapping[str, str]) -> Program:
-    """The derivative of some results along all that is given, with the question's checks."""
-    return replace(directional(program, set(given), set(results)), checks=program.checks)
 
 
 def _pruned(program: Program, results: Mapping[str, str]) -> Program:

@@ -13,12 +13,12 @@ from ..graph.program import Variants
 from ..model.closing import Closure
 from ..model.model import Model
 from ..questions import Question
-from ..questions.derivative import PREFIX
+from ..questions.derivative import PREFIX, directional
 from ..questions.file_numbers import numbers_of
 from ..questions.structure import structure_of
 from ..status import Status
 from .c_context import CODES
-from .c_function import own_numbers, renamed, tangent
+from .c_function import own_numbers, renamed
 from .catalogue import Entry, Wish, least_norm, require_question
 from .exported import Exported, Function
 
@@ -86,7 +86,7 @@ def _kernel(r: Reference, question: str, entry: Entry) -> tuple[Kernel, dict[str
     structure = structure_of(r.model.mechanism, r.model.formulation, r.model.route)
     numbers = numbers_of(structure, r.model.mechanism)
     found = Question.about(structure, entry.question, *entry.details(r.wish)).variants()
-    program = tangent(found.robust or found.main, names, renamed(entry.results))
+    program = directional(found.robust or found.main, set(names), set(renamed(entry.results)))
     return NumpyKernel(Variants(program), numbers), names | _along(entry, names)
 
 

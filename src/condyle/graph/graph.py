@@ -33,9 +33,13 @@ class Node:
 
 @dataclass
 class Graph:
-    """Nodes in an order in which arguments come first."""
+    """Nodes in an order in which arguments come first.
+
+    waists: sets of few values through which many others depend on the inputs, for derivatives.
+    """
 
     nodes: list[Node] = field(default_factory=list)
+    waists: list[tuple[Value, ...]] = field(default_factory=list)
     _known: dict[tuple[object, ...], Value] = field(default_factory=dict)
 
     def leaf(self, op: str, *data: object, group: int | None = None) -> Value:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import reduce
 
 from .graph import Graph, Value, reachable
 from .operations import OPERATIONS, REDUCTIONS
@@ -87,6 +88,56 @@ def numbers_as_ports(program: Program, shared: int, lanes: Sequence[int]) -> Pro
     found = program.moved(graph, dict(zip(program.roots, moved, strict=True)))
     columns = first + shared + size * n
     return replace(found, columns=columns, ports=(*program.ports, *ports))
+
+
+def jacobian(
+    graph: Graph, roots: Sequence[Value], leaves: Sequence[Value]
+) -> list[dict[Value, Value]]:
+    """Derivatives of the roots by each of some shared leaves: root -> its derivative.
+
+    What depends on the leaves through a waist alone is differentiated by the waist, whose values
+    are fewer than the leaves, and joined to the rest by the chain rule.
+    """
+    zero, one = graph.const(0.0), graph.const(1.0)
+    order = reachable(graph, roots)
+    depend = set(leaves)
+    for v in order:
+        if any(a in depend for a in graph.nodes[v].args):
+            depend.add(v)
+    beyond: list[tuple[tuple[Value, ...], list[Value], list[list[Value]]]] = []
+    for waist in graph.waists:
+        if len(waist) < len(leaves) and depend.issuperset(waist):
+            ends = _ends(graph, order, depend, waist, roots)
+            units = [dict.fromkeys(waist, zero) | {w: one} for w in waist]
+            beyond.append((waist, ends, [tangents(graph, ends, unit) for unit in units]))
+    found = []
+    for leaf in leaves:
+        seeds = dict.fromkeys(leaves, zero) | {leaf: one}
+        for waist, ends, slopes in beyond:
+            moved = tangents(graph, waist, seeds)
+            for i, end in enumerate(ends):
+                terms = (graph.apply("mul", s[i], d) for s, d in zip(slopes, moved, strict=True))
+                seeds[end] = reduce(lambda a, b: graph.apply("add", a, b), terms)
+            seeds |= zip(waist, moved, strict=True)
+        found.append(dict(zip(roots, tangents(graph, roots, seeds), strict=True)))
+    return found
+
+
+def _ends(
+    graph: Graph,
+    order: Sequence[Value],
+    depend: set[Value],
+    waist: Sequence[Value],
+    roots: Sequence[Value],
+) -> list[Value]:
+    """Values that depend on the leaves through a waist alone, and that others use."""
+    nodes, beyond = graph.nodes, set(waist)
+    for v in order:
+        own = [a for a in nodes[v].args if a in depend]
+        if own and nodes[v].op not in REDUCTIONS and beyond.issuperset(own):
+            beyond.add(v)
+    used = {a for v in order if v not in beyond for a in nodes[v].args} | set(roots)
+    return [v for v in order if v in beyond and v in used and v not in waist]
 
 
 def adjoints(

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from ..backends.kernel import AGAIN, OK
 from ..errors import InputError, as_flag, did_you_mean, shown
+from ..graph.program import Interface
 from ..graph.transform import LANE_NUMBERS, NUMBERS
 from ..kinematics.constraints import indices
 from ..questions.derivative import GRADIENT, OF_NUMBERS, PREFIX, WEIGHT
@@ -35,6 +37,7 @@ PORTS = {
     "effort": ("effort",),
     "joint": ("reading",),
 }
+DYNAMIC = ("q", "q1", "q2", "force", "moment", "point")  # ports of inverse dynamics
 OF_LANES = ("along", "joint", "transmission", "J_W", "effort", "reading")  # rows and ports
 UNITS = {"q": "m, rad", "v": "m/s, rad/s", "a": "m/s^2, rad/s^2", "wrench": "N, N m", "at": "m"}
 UNITS |= {"effort": "N m or N", "joint": "rad or m", "acceleration": "m/s^2, rad/s^2"}
@@ -94,12 +97,13 @@ class Derivatives(Mapping[Any, Array]):
 
 
 @dataclass(frozen=True)
-class _Solved:
-    """Solutions of N samples: what is held at the good ones, by number, and all statuses."""
+class _Part:
+    """Good samples of one kind, by number, and what is held at their solutions."""
 
-    held: Held | None
+    names: tuple[str, ...]
+    kind: Kind
+    held: Held
     good: Array
-    status: Array
 
 
 class Derived:
@@ -124,25 +128,23 @@ class Derived:
         """As `Model.derivatives`."""
         asked = _Asked.of(self._system, of, wrt, given, zeros)
         lead, count, ports = self._samples(given)
-        values: dict[Any, Array] = {}
-        status = np.zeros(count, dtype=np.uint8)
-        for kind, names in asked.kinds:
-            s = self._solved(kind, names, ports, count, bool(asked.numbers))
-            status = _worse(status, s.status)
-            for by in asked.wrt:
-                size = asked.sizes[by]
-                for name in names:
-                    values[name, by] = np.full((count, self._size(name), size), np.nan)
-                    values[name, by][s.good] = 0.0
-            if s.held is None:
-                continue
-            for name, columns in self._by_states(s.held, [b for b in asked.wrt if b in kind.by]):
-                for one in names:
-                    values[one, name][s.good] = s.held.maps[one] @ columns
-            if asked.numbers:
-                for one, block in self._by_numbers(s.held, names, asked.J).items():
-                    for by, at in asked.columns.items():
-                        values[one, by][s.good] += block[:, :, at]
+        parts, status = self._parts(asked, ports, count)
+        values = {
+            (name, by): np.full((count, self._size(name), size), np.nan)
+            for _, names in asked.kinds
+            for name in names
+            for by, size in asked.sizes.items()
+        }
+        for part in parts:
+            for name in part.names:
+                for by in asked.wrt:
+                    values[name, by][part.good] = 0.0
+            for by, columns in self._by_states(part, asked.wrt):
+                for name in part.names:
+                    values[name, by][part.good] = part.held.applied(name, columns)
+            for name, block in self._by_numbers(part, asked.J).items():
+                for by, at in asked.columns.items():
+                    values[name, by][part.good] += block[:, :, at]
         units = {(n, by): f"({UNITS[n]}) / ({asked.unit(by)})" for n, by in values}
         shaped = {(n, by): self._shaped(a, lead, n) for (n, by), a in values.items()}
         return Derivatives(shaped, status.reshape(lead), units)
@@ -156,24 +158,22 @@ class Derived:
         asked = _Asked.of(self._system, of, tuple(tangents), given, zeros)
         lead, count, ports = self._samples(given)
         along = {name: asked.rows(name, a, lead, count) for name, a in tangents.items()}
-        values: dict[Any, Array] = {}
-        status = np.zeros(count, dtype=np.uint8)
-        for kind, names in asked.kinds:
-            s = self._solved(kind, names, ports, count, bool(asked.numbers))
-            status = _worse(status, s.status)
-            for name in names:
-                values[name] = np.full((count, self._size(name)), np.nan)
-            if s.held is None:
-                continue
+        parts, status = self._parts(asked, ports, count)
+        values = {
+            name: np.full((count, self._size(name)), np.nan)
+            for _, names in asked.kinds
+            for name in names
+        }
+        for part in parts:
             directions: Arrays = {}
-            for by in [b for b in along if b in kind.by]:
-                directions |= _split(by, along[by][s.good])
+            for by in [b for b in along if b in part.kind.by]:
+                directions |= _split(by, along[by][part.good])
             if asked.numbers:
-                steps = np.concatenate([along[by] for by in asked.columns], axis=1)[s.good]
-                directions |= self._as_ports(steps @ asked.J.T)
-            rows = self._along(s.held, directions)
-            for name in names:
-                values[name][s.good] = (s.held.maps[name] @ rows[..., None])[..., 0]
+                steps = np.concatenate([along[by] for by in asked.columns], axis=1)[part.good]
+                directions |= _as_ports(part.held.system, steps @ asked.J.T)
+            rows = self._along(part.held, directions)[..., None]
+            for name in part.names:
+                values[name][part.good] = part.held.applied(name, rows)[..., 0]
         shaped = {n: self._shaped(a[..., None], lead, n)[..., 0] for n, a in values.items()}
         return Derivatives(shaped, status.reshape(lead), {n: UNITS[n] for n in shaped})
 
@@ -185,35 +185,27 @@ class Derived:
         weights = weights if isinstance(weights, Mapping) else dict.fromkeys(names, weights)
         asked = _Asked.of(self._system, of, wrt, given, zeros)
         lead, count, ports = self._samples(given)
-        values = {by: np.zeros((count, asked.sizes[by])) for by in asked.wrt}
-        status = np.zeros(count, dtype=np.uint8)
-        for kind, mine in asked.kinds:
-            s = self._solved(kind, mine, ports, count, bool(asked.numbers))
-            status = _worse(status, s.status)
-            bad = np.setdiff1d(np.arange(count), s.good)
-            for a in values.values():
-                a[bad] = np.nan
-            if s.held is None:
-                continue
-            total = np.zeros(s.held.maps[mine[0]].shape[::2])
-            for name in mine:
-                if name not in weights:
-                    raise InputError(
-                        f"cotangents: expected one of {name}; got {', '.join(map(str, weights))}"
-                    )
-                shape = *lead, *self._shape(name)
-                w = _fitting(f"cotangents: {name}", weights[name], shape)
-                w = w.reshape(count, -1)[s.good]
-                total += (w[:, None] @ s.held.maps[name])[:, 0]
-            states = [b for b in asked.wrt if b in kind.by]
+        every = [name for _, some in asked.kinds for name in some]
+        if missing := [name for name in every if name not in weights]:
+            raise InputError(f"cotangents: expected those of {', '.join(missing)} too")
+        given_weights = {
+            name: _fitting(f"cotangents: {name}", weights[name], (*lead, *self._shape(name)))
+            for name in every
+        }
+        parts, status = self._parts(asked, ports, count)
+        values = {by: np.full((count, size), np.nan) for by, size in asked.sizes.items()}
+        for a in values.values():
+            a[(status == Status.ok) | (status == Status.kink)] = 0.0
+        for part in parts:
+            rows = [given_weights[n].reshape(count, -1)[part.good] for n in part.names]
+            total = sum(part.held.pulled(n, w) for n, w in zip(part.names, rows, strict=True))
+            states = [b for b in asked.wrt if b in part.kind.by]
             by = [p for b in states for p in PORTS[b]] + list(OF_NUMBERS if asked.numbers else ())
-            found = self._gradient(s.held, total, tuple(by))
+            found = self._gradient(part.held, np.asarray(total), tuple(by)) if by else {}
             for b in states:
-                values[b][s.good] += np.concatenate([found[p] for p in PORTS[b]], axis=1)
-            if asked.numbers:
-                block = found[NUMBERS] @ asked.J
-                for b, at in asked.columns.items():
-                    values[b][s.good] += block[:, at]
+                values[b][part.good] += np.concatenate([found[p] for p in PORTS[b]], axis=1)
+            for b, at in asked.columns.items():
+                values[b][part.good] += (found[NUMBERS] @ asked.J)[:, at]
         shaped = {by: a.reshape(*lead, *asked.shapes[by]) for by, a in values.items()}
         return Derivatives(shaped, status.reshape(lead), {by: asked.unit(by) for by in shaped})
 
@@ -242,38 +234,60 @@ class Derived:
         count = math.prod(lead)
         return lead, count, {n: np.broadcast_to(a, (count, a.shape[1])) for n, a in ports.items()}
 
-    def _solved(
-        self, kind: Kind, of: tuple[str, ...], ports: Arrays, count: int, numbers: bool
-    ) -> _Solved:
-        own = self._system
-        system = own.wide if numbers else own
-        load = {name: ports[name] for name in ("force", "moment", "point")}
-        wrench, at = np.hstack([load["force"], load["moment"]]), load["point"]
+    def _parts(self, asked: _Asked, ports: Arrays, count: int) -> tuple[list[_Part], Array]:
+        """Good samples, kind by kind, and all statuses: of several kinds, what failed first."""
+        parts, status = [], np.zeros(count, dtype=np.uint8)
+        for kind, names in asked.kinds:
+            own, rows = np.zeros(count, dtype=np.uint8), np.arange(count)
+            if kind is INVERSE and names == ("effort",) and self._plain(asked.system):
+                kernel = asked.system.kernel("inverse")
+                state = {n: ports[n] for n in DYNAMIC}
+                own = kernel.run(state).status
+                good, rows = np.flatnonzero(own == OK), np.flatnonzero(own == AGAIN)
+                state, still = {n: a[good] for n, a in state.items()}, np.zeros(len(good), bool)
+                held = Held(asked.system, "inverse", state, ("effort",), {}, still)
+                parts.append(_Part(names, kind, held, good))
+            if rows.size:
+                some = {name: a[rows] for name, a in ports.items()}
+                other, own[rows] = self._held(asked.system, kind, names, some)
+                if other is not None:
+                    good = rows[np.isin(own[rows], (Status.ok, Status.kink))]
+                    parts.append(_Part(names, kind, other, good))
+            status = _worse(status, own)
+        return [part for part in parts if part.good.size], status
+
+    def _plain(self, system: System) -> bool:
+        """Whether efforts can be differentiated as the kernel computes them."""
+        return not self._inverse().distributor.chooses and not system.structure.friction
+
+    def _held(
+        self, system: System, kind: Kind, of: tuple[str, ...], ports: Arrays
+    ) -> tuple[Held | None, Array]:
+        """What is held at solutions that are good, and the statuses of all."""
+        own, load = self._system, ("force", "moment", "point")
+        wrench, at = np.hstack([ports["force"], ports["moment"]]), ports["point"]
         if kind is READINGS:
             found = self._readings().solve(ports["joint"])
-            status = np.where(found.status == 0, Status.ok, Status.unreachable).astype(np.uint8)
+            found.status = np.where(found.status == 0, Status.ok, Status.unreachable)
         elif kind is PLACES:
             found = self._poses.inverse_kinematics(ports["q"], None, None)
-            status = found.status.astype(np.uint8)
         elif kind is INVERSE:
             state = [ports[n] for n in ("q", "q1", "q2")]
             found = self._inverse().many(state, wrench, at, ("pose",), None)
-            status = found.status
         else:
             state = [ports[n] for n in ("q", "q1", "effort")]
             found = self._forward().many(state, wrench, at, ("pose",), None)
-            status = found.status
+        status = found.status.astype(np.uint8)
         good = np.flatnonzero(status == Status.ok)
         if not good.size:
-            return _Solved(None, good, status)
+            return None, status
         pose = found.pose[good]
         places = {"pose": pose, "q": pose[:, indices(own.independent)]}
-        if kind in (READINGS, PLACES):
-            reading = (
-                ports["joint"] if kind is READINGS else np.zeros((count, self._own.effort.size))
-            )
-            places["reading"] = reading[good]
-            held = read_back(system, places) if kind is READINGS else placed(system, places, of)
+        if kind is READINGS:
+            held = read_back(system, places | {"reading": ports["joint"][good]})
+        elif kind is PLACES:
+            still = np.zeros((len(good), self._own.effort.size))
+            held = placed(system, places | {"reading": still}, of)
         else:
             places |= {n: ports[n][good] for n in ("q", "q1", *load)}
             places["contact_force"] = found.contact_force[good]
@@ -285,15 +299,14 @@ class Derived:
                 places |= {"q2": found.acceleration[good], "effort": ports["effort"][good]}
                 rubs = np.array([c.friction.coefficient > 0 for c in own.mechanism.contacts], bool)
                 held = accelerated(system, places, rubs, error)
-        status = status.copy()
         status[good[held.kink]] = Status.kink
-        return _Solved(held, good, status)
+        return held, status
 
     # -- derivatives of the rows -------------------------------------------------------------
 
-    def _by_states(self, held: Held, wrt: Iterable[str]) -> Iterator[tuple[str, Array]]:
-        """Of the rows by each of these, (N, rows, size)."""
-        wrt = tuple(wrt)
+    def _by_states(self, part: _Part, wrt: Iterable[str]) -> Iterator[tuple[str, Array]]:
+        """Of the rows by each of these that matter, (N, rows, size)."""
+        held, wrt = part.held, [by for by in wrt if by in part.kind.by]
         if by := tuple(p for name in wrt for p in PORTS[name]):
             kernel = held.system.derivative("slopes", held.question, by, held.rows)
             values = kernel.run(held.ports).values
@@ -330,52 +343,44 @@ class Derived:
         values = kernel.run(ports).values
         found = {p: _flat(values[GRADIENT + p]) for p in by if p not in OF_NUMBERS}
         if NUMBERS in by:
-            parts = [_flat(values[GRADIENT + NUMBERS])]
-            lanes = values[GRADIENT + LANE_NUMBERS]
-            for at, size in self._groups(held.system):
-                parts.append(_flat(lanes[:size][:, at]))
-            found[NUMBERS] = np.concatenate(parts, axis=1)
+            found[NUMBERS] = self._numbers_of(held.system, kernel.interface, values)
         return found
 
-    def _by_numbers(self, held: Held, of: Sequence[str], J: Array) -> Arrays:
+    def _numbers_of(self, system: System, interface: Interface, values: Arrays) -> Array:
+        """Derivatives by the kernel's numbers, (N, K), from those that matter."""
+        count = next(iter(values.values())).shape[-1]
+        shared, groups = np.zeros((len(system.numbers.parameters), count)), _groups(system)
+        lanes = [np.zeros((size, len(at), count)) for at, size in groups]
+        for r in interface.results:
+            which, _, i = r.name.removeprefix(GRADIENT).partition("/")
+            if which == NUMBERS:
+                shared[int(i)] = values[r.name][0]
+            elif which == LANE_NUMBERS:
+                there = np.sort(np.concatenate([groups[g][0] for g in r.groups]))
+                for g in r.groups:
+                    lanes[g][int(i)] = values[r.name][0][np.searchsorted(there, groups[g][0])]
+        return np.concatenate([shared, *(a.reshape(-1, count) for a in lanes)]).T
+
+    def _by_numbers(self, part: _Part, J: Array) -> Arrays:
         """Of results by numbers of the file, (N, size, F), in as few sweeps as will do.
 
         Args: J: of the kernel's numbers by those, (K, F).
         """
-        count, F = len(held.ports["q"]), J.shape[1]
-        sizes = {name: held.maps[name].shape[1] for name in of}
+        held, count, F = part.held, len(part.good), J.shape[1]
+        if not F:
+            return {}
+        sizes = {name: self._size(name) for name in part.names}
         found = {name: np.empty((count, size, F)) for name, size in sizes.items()}
         if sum(sizes.values()) >= F:
             for i in range(F):
-                rows = self._along(held, self._as_ports(J[None, :, i]))
-                for name in of:
-                    found[name][:, :, i] = (held.maps[name] @ rows[..., None])[..., 0]
+                rows = self._along(held, _as_ports(held.system, J[None, :, i]))[..., None]
+                for name in part.names:
+                    found[name][:, :, i] = held.applied(name, rows)[..., 0]
             return found
-        for name in of:
-            for i in range(sizes[name]):
-                by = self._gradient(held, held.maps[name][:, i], OF_NUMBERS)[NUMBERS]
-                found[name][:, i] = by @ J
-        return found
-
-    def _as_ports(self, numbers: Array) -> Arrays:
-        """Directions of the kernel's numbers, (N, K), as ports take them."""
-        system = self._system.wide
-        shared = len(system.numbers.parameters)
-        groups = self._groups(system)
-        lanes = np.zeros((len(numbers), max(s for _, s in groups), system.structure.n))
-        start = shared
-        for at, size in groups:
-            end = start + size * len(at)
-            lanes[:, :size, at] = numbers[:, start:end].reshape(len(numbers), size, len(at))
-            start = end
-        return {NUMBERS: numbers[:, :shared], LANE_NUMBERS: lanes}
-
-    def _groups(self, system: System) -> list[tuple[Array, int]]:
-        """Of each group: its chains in the order of the file, and how many numbers each has."""
-        order, start, found = np.array(system.numbers.order), 0, []
-        for values in system.numbers.lanes:
-            found.append((order[start : start + values.shape[1]], values.shape[0]))
-            start += values.shape[1]
+        for name, size in sizes.items():
+            for i, unit in enumerate(np.eye(size)):
+                weights = held.pulled(name, np.broadcast_to(unit, (count, size)))
+                found[name][:, i] = self._gradient(held, weights, OF_NUMBERS)[NUMBERS] @ J
         return found
 
     # -- shapes ------------------------------------------------------------------------------
@@ -400,9 +405,11 @@ class Derived:
 class _Asked:
     """What is asked for: results by kind, and what they are differentiated by.
 
+    system: whose kernels have the derivatives.
     shapes: of each of `wrt`;  columns: of each number of the file among those of J, (K, F).
     """
 
+    system: System
     kinds: list[tuple[Kind, tuple[str, ...]]]
     wrt: tuple[str, ...]
     shapes: dict[str, tuple[int, ...]]
@@ -429,7 +436,7 @@ class _Asked:
                         f"wrt: {', '.join(names)} cannot depend on {by}, only on "
                         f"{', '.join(kind.by)} and numbers of the file; zeros=True gives zeros"
                     )
-        return _Asked(kinds, asked, shapes, units, {}, np.zeros((0, 0)))
+        return _Asked(system, kinds, asked, shapes, units, {}, np.zeros((0, 0)))
 
     @property
     def numbers(self) -> bool:
@@ -448,6 +455,27 @@ class _Asked:
         Raises: InputError: for other shapes.
         """
         return _fitting(f"tangents: {by}", given, (*lead, *self.shapes[by])).reshape(count, -1)
+
+
+def _as_ports(system: System, numbers: Array) -> Arrays:
+    """Directions of the kernel's numbers, (N, K), as ports take them."""
+    start, groups = len(system.numbers.parameters), _groups(system)
+    found = {NUMBERS: numbers[:, :start]}
+    lanes = np.zeros((len(numbers), max(s for _, s in groups), system.structure.n))
+    for at, size in groups:
+        end = start + size * len(at)
+        lanes[:, :size, at] = numbers[:, start:end].reshape(len(numbers), size, len(at))
+        start = end
+    return found | {LANE_NUMBERS: lanes}
+
+
+def _groups(system: System) -> list[tuple[Array, int]]:
+    """Of each group: its chains in the order of the file, and how many numbers each has."""
+    order, start, found = np.array(system.numbers.order), 0, []
+    for values in system.numbers.lanes:
+        found.append((order[start : start + values.shape[1]], values.shape[0]))
+        start += values.shape[1]
+    return found
 
 
 def _kinds(of: tuple[str, ...], given: Mapping[str, Any]) -> list[tuple[Kind, tuple[str, ...]]]:

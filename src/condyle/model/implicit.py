@@ -29,7 +29,7 @@ class Held:
 
     system, question: whose results are the rows;  ports: what it is given.
     rows:     results of the question, in the order of the columns of `maps`.
-    maps:     of each result asked for, (N, its size, rows).
+    maps:     of each result asked for, (N, its size, rows); none: the rows are the result.
     kink:     where the active set is about to change, (N,).
     """
 
@@ -39,6 +39,14 @@ class Held:
     rows: tuple[str, ...]
     maps: Arrays
     kink: Array
+
+    def applied(self, name: str, rows: Array) -> Array:
+        """Changes of a result, (N, size, c), from those of the rows, (N, rows, c)."""
+        return self.maps[name] @ rows if self.maps else rows
+
+    def pulled(self, name: str, weights: Array) -> Array:
+        """Weights of the rows, (N, rows), from those of a result, (N, size)."""
+        return (weights[:, None] @ self.maps[name])[:, 0] if self.maps else weights
 
 
 def samples_first(a: Array) -> Array:

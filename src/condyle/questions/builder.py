@@ -98,6 +98,10 @@ class Builder:
         """Symbols for the value of an expression, to differentiate with respect to."""
         return self.symbols("cut", self.values([expression])[0])
 
+    def waist(self, *parts: ca.SX) -> None:
+        """Few values through which many others depend on the inputs: see `transform.jacobian`."""
+        self.graph.waists.append(tuple(v for found in self.values(parts) for v in found))
+
     def tangent(self, expression: ca.SX, wrt: ca.SX, direction: Sequence[float]) -> ca.SX:
         """Derivative of an expression along a direction of cut or input symbols.
 

@@ -8,12 +8,12 @@ them, as if these were ports.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
-from ..graph.graph import Graph, Value
+from ..graph.graph import Value, reachable
 from ..graph.program import Output, Port, Program, Variants
-from ..graph.transform import LANE_NUMBERS, NUMBERS, adjoints, tangents
+from ..graph.transform import LANE_NUMBERS, NUMBERS, adjoints, jacobian, tangents
 from .numbers import Layout
 from .structure import Structure
 
@@ -30,25 +30,28 @@ def derivative(
     details: tuple[object, ...],
     by: tuple[str, ...],
     of: tuple[str, ...],
-) -> Program:
-    """A question's derivatives of results `of` by ports and numbers `by`.
+) -> Variants:
+    """A question's derivatives of results `of` by ports and numbers `by`, with its checks.
 
     Args: how: directional, slopes or gradient: the functions of this file.
     """
     from . import written
 
     found = written(question)(structure, *details)
-    return HOW[how](found, by, of, Layout.of(structure))
+    take, layout = HOW[how], Layout.of(structure)
+    if isinstance(found, Program):
+        return Variants(take(found, by, of, layout))
+    robust = found.write_robust
+    return Variants(
+        take(found.main, by, of, layout), robust and (lambda: take(robust(), by, of, layout))
+    )
 
 
 def directional(
-    found: Program | Variants,
-    by: Collection[str],
-    of: Collection[str],
-    layout: Layout | None = None,
+    program: Program, by: Collection[str], of: Collection[str], layout: Layout | None = None
 ) -> Program:
-    """A question with additional ports `d_<port>` and results `d_<result>`, without checks."""
-    program = _checkless(found, of)
+    """A question with additional ports `d_<port>` and results `d_<result>`."""
+    program, roots = _of(program, of)
     graph, columns, ports = program.graph, program.columns, list(program.ports)
     seeds: dict[Value, Value] = {}
     for name, lanes, entries in _places(program, by, layout):
@@ -58,8 +61,7 @@ def directional(
             pairs = zip(here, towards, strict=True)
             seeds |= {v: d for v, d in pairs if v is not None and d is not None}
         columns += _width(program, ports[-1])
-    moved = tangents(graph, program.roots, seeds)
-    where = dict(zip(program.roots, moved, strict=True))
+    where = dict(zip(roots, tangents(graph, roots, seeds), strict=True))
     outputs = tuple(
         replace(
             o,
@@ -71,44 +73,41 @@ def directional(
     return replace(program, columns=columns, ports=tuple(ports), outputs=outputs)
 
 
-def slopes(
-    found: Program | Variants, by: Collection[str], of: Collection[str], layout: Layout
-) -> Program:
+def slopes(program: Program, by: Collection[str], of: Collection[str], layout: Layout) -> Program:
     """Results `<result>/<port>`, with the entries of the port as a last dimension.
 
     Ports of lanes are asked for shared results alone, and give lanes.
     """
-    program = _checkless(found, of)
-    graph, one, outputs = program.graph, program.graph.const(1.0), []
-    for name, lanes, entries in _places(program, by, layout):
+    program, roots = _of(program, of)
+    graph, one, outputs = program.graph, program.graph.const(1.0), list[Output]()
+    asked = _places(program, by, layout)
+    shared = [v for _, lanes, entries in asked if not lanes for (v,) in entries if v is not None]
+    to = dict(zip(shared, jacobian(graph, roots, shared), strict=True))
+    for name, lanes, entries in asked:
         for o in program.outputs:
             assert not (o.lanes and lanes), "lanes by lanes"
-            shape = (*o.shape, len(entries))
             if lanes:
                 leaves = [v for e in entries for v in e if v is not None]
-                rows = [
+                found = [
                     adjoints(graph, [v], [one], leaves, program.counts)
                     for (v,) in o.entries
                     if v is not None
                 ]
-                found_ = [dict(zip(leaves, row, strict=True)) for row in rows]
-                own = [_moved(e, row) for row in found_ for e in entries]
+                rows = [dict(zip(leaves, row, strict=True)) for row in found]
+                own = [_moved(e, row) for row in rows for e in entries]
             else:
-                roots = [v for e in o.entries for v in e if v is not None]
-                moved = [
-                    dict(zip(roots, tangents(graph, roots, _unit(graph, entries, i)), strict=True))
-                    for i in range(len(entries))
-                ]
-                own = [_moved(e, to) for e in o.entries for to in moved]
+                own = [_moved(e, to[v]) for e in o.entries for (v,) in entries if v is not None]
+            shape = (*o.shape, len(entries))
             outputs.append(Output(f"{o.name}/{name}", shape, "", lanes or o.lanes, tuple(own)))
     return replace(program, outputs=tuple(outputs))
 
 
-def gradient(
-    found: Program | Variants, by: Collection[str], of: Collection[str], layout: Layout
-) -> Program:
-    """Results `g_<port>`: the derivatives of sum w . result, with ports `w_<result>`."""
-    program = _checkless(found, of)
+def gradient(program: Program, by: Collection[str], of: Collection[str], layout: Layout) -> Program:
+    """Results `g_<port>`: the derivatives of sum w . result, with ports `w_<result>`.
+
+    Of numbers there is one result each, `g_numbers/<i>`, of those that matter.
+    """
+    program, _ = _of(program, of)
     columns, ports = program.columns, list(program.ports)
     roots: list[Value] = []
     weights: list[Value] = []
@@ -119,31 +118,34 @@ def gradient(
             roots += [v for v, _ in pairs]
             weights += [w for _, w in pairs if w is not None]
         columns += _width(program, ports[-1])
-    asked = _places(program, by, layout)
+    used = set(reachable(program.graph, roots))
+    asked: list[tuple[str, bool, Entries]] = []
+    for name, lanes, entries in _places(program, by, layout):
+        if name not in OF_NUMBERS:
+            asked.append((name, lanes, entries))
+            continue
+        for i, entry in enumerate(entries):
+            if own := used.intersection(entry):
+                one = tuple(v if v in own else None for v in entry)
+                asked.append((f"{name}/{i}", lanes, [one]))
     leaves = [v for *_, entries in asked for e in entries for v in e if v is not None]
-    to = dict(
-        zip(leaves, adjoints(program.graph, roots, weights, leaves, program.counts), strict=True)
-    )
-    outputs = tuple(
-        Output(
-            GRADIENT + name,
-            (len(entries),),
-            "",
-            lanes,
-            tuple(_moved(e, to) for e in entries),
-        )
+    moved = adjoints(program.graph, roots, weights, leaves, program.counts)
+    to = dict(zip(leaves, moved, strict=True))
+    outputs = (
+        Output(GRADIENT + name, (len(entries),), "", lanes, tuple(_moved(e, to) for e in entries))
         for name, lanes, entries in asked
     )
-    return replace(program, columns=columns, ports=tuple(ports), outputs=outputs)
+    return replace(program, columns=columns, ports=tuple(ports), outputs=tuple(outputs))
 
 
 HOW = {"directional": directional, "slopes": slopes, "gradient": gradient}
 
 
-def _checkless(found: Program | Variants, of: Collection[str]) -> Program:
-    """The results of a question's robust program alone."""
-    program = found.robust or found.main if isinstance(found, Variants) else found
-    return replace(program, outputs=tuple(o for o in program.outputs if o.name in of), checks=())
+def _of(program: Program, of: Collection[str]) -> tuple[Program, list[Value]]:
+    """A program with some of its results alone, and their values."""
+    outputs = tuple(o for o in program.outputs if o.name in of)
+    found = (v for o in outputs for entry in o.entries for v in entry if v is not None)
+    return replace(program, outputs=outputs), list(dict.fromkeys(found))
 
 
 def _places(
@@ -190,11 +192,3 @@ def _moved(
 
 def _width(program: Program, port: Port) -> int:
     return port.size * (sum(program.counts) if port.lanes else 1)
-
-
-def _unit(
-    graph: Graph, entries: Sequence[tuple[Value | None, ...]], i: int
-) -> Mapping[Value, Value]:
-    return {
-        v: graph.const(float(i == j)) for j, e in enumerate(entries) for v in e if v is not None
-    }

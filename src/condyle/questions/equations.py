@@ -184,6 +184,7 @@ def _chain_terms(
     family = FAMILIES[b.structure.families[group]]
     constants: Constants = family.named(b.lane(group, "constants"))
     M = state.point(b.lane(group, "joint"))
+    b.waist(M.position, M.velocity, M.acceleration)
     if lump:
         dynamics, force = _lumped(family, constants, M, g, low_latency)
         forces = {"chains": force}

@@ -32,7 +32,7 @@ from ..errors import UnsupportedError
 from ..graph.program import Variants
 from ..mechanism.home import characteristic_length
 from ..model.model import Model
-from ..questions import written
+from ..questions import Question
 from ..questions.derivative import PREFIX, directional
 from ..questions.file_numbers import numbers_of
 from ..questions.numbers import specialised
@@ -311,7 +311,8 @@ class Derivative:
         structure = structure_of(model.mechanism, model.formulation, model.route)
         numbers = numbers_of(structure, model.mechanism)
         structure = specialised(structure, numbers)
-        program = directional(written(question)(structure, *details), by, of)
+        asked = Question.about(structure, question, *details).variants()
+        program = directional(asked.robust or asked.main, by, of)
         self._kernel, self._columns, self.by = NumpyKernel(Variants(program), numbers), columns, by
 
     def __call__(self) -> dict[str, np.ndarray]:

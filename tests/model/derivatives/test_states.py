@@ -101,6 +101,59 @@ def test_efforts_and_contact_forces(name: str) -> None:
         return machine(name).inverse(near, g["q"], g["v"], g["a"], g["wrench"], g["at"], signs)
 
     compared(d, given, solved, "effort", "contact_force")
+    alone = model(name).derivatives("effort", tuple(given), **given)
+    for by in given:  # as the kernel computes them, where there is no friction
+        same(alone["effort", by], d["effort", by])
+
+
+def same(got: Array, wanted: Array) -> None:
+    assert got.shape == wanted.shape
+    atol = 1e-9 * np.abs(wanted).max(initial=0.0)
+    np.testing.assert_allclose(got, wanted, rtol=0, atol=atol)
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        ("lagrange", "direct"),
+        *(
+            pytest.param(how, marks=pytest.mark.ci)
+            for how in (("lagrange", "core"), ("momentum", "core"), ("virtual_power", "direct"))
+        ),
+    ],
+)
+def test_every_formulation_has_the_same(how: tuple[str, str]) -> None:
+    formulation, route = how
+    usual = Model("masticatory", backend="numpy")
+    other = Model("masticatory", backend="numpy", formulation=formulation, route=route)
+    rng = np.random.default_rng(4)
+    given = {n: s * rng.normal(0, 1, (3, 4)) for n, s in (("q", 2e-3), ("v", 0.1), ("a", 1.0))}
+    given["wrench"] = rng.normal(0, 1, (3, 6))
+    wanted = usual.derivatives(("effort", "contact_force"), tuple(given), **given)
+    assert not wanted.status.any()
+    for of in ("effort", ("effort", "contact_force")):
+        found = other.derivatives(of, tuple(given), **given)
+        for key in found:
+            same(found[key], wanted[key])
+
+
+@pytest.mark.parametrize("name", ["RSS k2 n8", "RSS k0 n8"])
+def test_forward_and_reverse_are_the_matrix(name: str) -> None:
+    m, given = model(name), state(name)
+    rng = np.random.default_rng(5)
+    for of in ("effort", ("effort", "contact_force")):
+        d = m.derivatives(of, tuple(given), **given)
+        names = (of,) if isinstance(of, str) else of
+        way = {by: rng.normal(0, 1, np.shape(a)) for by, a in given.items()}
+        along = m.jvp(of, way, **given)
+        for name in names:
+            total = sum((d[name, by] @ x[..., None])[..., 0] for by, x in way.items())
+            same(along[name], np.asarray(total))
+        weights = {name: rng.normal(0, 1, along[name].shape) for name in names}
+        back = m.vjp(of, weights, tuple(given), **given)
+        for by in given:
+            total = sum((w[:, None] @ d[name, by])[:, 0] for name, w in weights.items())
+            same(back[by], np.asarray(total))
 
 
 @pytest.mark.parametrize("name", CASES)
