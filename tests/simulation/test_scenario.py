@@ -73,6 +73,46 @@ def test_a_start_that_only_the_robust_path_closes() -> None:
         condyle.simulate(model, {"start": q})
 
 
+LOCKED = {"alpha": 0.1, "gamma": 0.2, "dX": 0.01}
+
+
+@pytest.mark.parametrize(
+    ("name", "start", "said"),
+    [
+        ("gough-stewart", LOCKED | {"beta": np.pi / 2}, "gimbal_lock: beta is"),
+        ("gough-stewart", LOCKED | {"beta": np.pi / 2 - 1e-9}, "gimbal_lock: beta is"),
+        ("gough-stewart", LOCKED | {"beta": np.pi / 2 - 1e-6}, "stiff: the integrator"),
+        ("masticatory", {"X": "the end"}, "singular|unreachable"),
+    ],
+)
+def test_a_start_without_a_way_on_is_an_error(name: str, start: dict[str, Any], said: str) -> None:
+    """Not a run of one sample. The end is where a chain is stretched, to the last bit."""
+    model = condyle.derive(name, backend="numpy")
+    if start.get("X") == "the end":
+        low, high = 0.0, 0.05
+        while low < (middle := (low + high) / 2) < high:
+            reached = model.inverse_kinematics([middle, 0.0, 0.0, 0.0]).status == 0
+            low, high = (middle, high) if reached else (low, middle)
+        start = {"X": low}
+    with pytest.raises(ScenarioError, match=rf"start: nothing moves from .*({said})"):
+        condyle.simulate(model, {"duration": 0.01, "start": start})
+
+
+@pytest.mark.parametrize(
+    ("formulation", "start"),
+    [
+        ("virtual_power", {"gamma": np.pi / 2}),
+        ("virtual_power", {"gamma": np.pi / 2 - 1e-13}),
+        ("lagrange", LOCKED | {"beta": np.pi / 2 - 1e-3}),
+    ],
+)
+def test_starts_that_a_kernel_cannot_vouch_for(formulation: str, start: dict[str, Any]) -> None:
+    """A direct singularity, in which forward dynamics is regular, and near a gimbal lock."""
+    model = condyle.derive("gough-stewart", backend="numpy", formulation=formulation)
+    found = condyle.simulate(model, {"duration": 0.002, "start": start})
+    assert len(found.time) == 3 and not found.condyle.events
+
+
 def test_a_ball_at_the_origin_of_the_platform() -> None:
     """O_M slides on a sphere, by kernels that close it."""
     mechanism = condyle.load_mechanism("gough-stewart")

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias, overload
 
 import xarray as xr
 
-from ..errors import InputError
+from ..errors import InputError, ScenarioError
 from ..mechanism.mechanism import Mechanism
 from ..model.given import as_model
 from ..model.model import Model
@@ -17,8 +17,8 @@ from ..motion import Motion
 from .bind import bind
 from .first_scenario import default_scenario
 from .gains import GainReport, report
-from .plan import Plan
-from .running import run_all
+from .plan import Plan, Trace
+from .running import ROUNDING, run_all
 from .scenario import Scenario, load_scenario, scenario_from
 from .simulated import solved
 
@@ -79,15 +79,30 @@ def simulate(
             threads: maximum number; default: the processors at hand. Results do not depend on it.
     Returns: a dataset at `rate`, up to the end of the run; `.condyle.events` lists events.
             For a list of scenarios a list.
-    Raises: ScenarioError: for problems of any scenario, before the first run.
+    Raises: ScenarioError: for problems of any scenario, before the first run, and for one that
+            ends where it starts, as in a gimbal lock.
     """
     start = time.perf_counter()
     many = isinstance(scenario, list | tuple)
     given = scenario if many else [scenario]
     own = {"controller": controller, "loads": loads, "motion": motion}
     plans = planned(model, given, stop_at_bounds=stop_at_bounds, **own)
-    found = [solved(*pair, start) for pair in zip(plans, run_all(plans, threads), strict=True)]
+    traces = run_all(plans, threads)
+    _require_begun(plans, traces)
+    found = [solved(*pair, start) for pair in zip(plans, traces, strict=True)]
     return found if many else found[0]
+
+
+def _require_begun(plans: Sequence[Plan], traces: Sequence[Trace]) -> None:
+    """Raises ScenarioError for a run that ends where it starts: it has no motion to show."""
+    for plan, trace in zip(plans, traces, strict=True):
+        last = trace.events[-1] if trace.events else None
+        if last is None or not last.ends or last.time > ROUNDING:
+            continue
+        owner = f' "{last.owner}"' if last.owner else ""
+        state = ", ".join(f"{name} = {x:g}" for name, x in last.state.items() if x) or "home"
+        problem = f"start: nothing moves from {state}: {last.kind}{owner}: {last.text}"
+        raise ScenarioError(plan.source, [f"{problem}; begin elsewhere"])
 
 
 def check_gains(
