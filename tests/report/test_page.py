@@ -22,7 +22,7 @@ from condyle.report.page import report_html, write_report
 from condyle.report.page.html import fill, json_for_script, tag
 from condyle.report.page.reduce import BUDGET, reduced
 from condyle.report.page.report_page import opened
-from condyle.report.panel_list import magnitudes
+from condyle.report.panel_list import accuracy, magnitudes
 from condyle.report.scene import DARK, LIGHT, styles
 from condyle.report.tables import Table, kept_tables, with_tables
 from condyle.results.failed_samples import at_sample
@@ -112,6 +112,20 @@ def test_names_are_text_and_never_markup(
     assert len(elements.scripts) == 3, "the data, plotly and the page's own script"
     assert ATTACK in elements.text
     assert ATTACK in payload(page)["panels"][6]["sets"][0]["lines"][0]["label"]
+
+
+def test_the_page_says_how_many_digits_there_are(solution: xr.Dataset) -> None:
+    """The largest bound and when; an alarm, and a limit in its panel, where digits are few."""
+    small = solution.isel(time=slice(0, 50)).copy(deep=True)
+    small["bound"].values[:] = 3e-14
+    small["bound"].values[7] = 2.5e-13
+    fact = r'class="fact{}"><dt>Bound of the relative error</dt><dd>{}<small>largest, t = {:g} s'
+    when = float(small["time"][7])
+    assert re.search(fact.format("", "2.5e-13", when), report_html(small))
+    assert not next(accuracy(small)).limits
+    small["bound"].values[7] = 2e-6
+    assert re.search(fact.format(" alarm", "2.0e-06", when), report_html(small))
+    assert next(accuracy(small)).limits
 
 
 def test_warnings_stand_at_the_top(reference: condyle.Mechanism) -> None:

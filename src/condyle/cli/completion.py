@@ -36,7 +36,15 @@ QUANTITIES = (
     *("transmission", "effort", "contact_force", "load_limit", "speed", "stiffness"),
 )
 FIGURES = (
-    *("activation", "contact_force", "contact_track", "effort", "effort_speed", "jacobian"),
+    *(
+        "accuracy",
+        "activation",
+        "contact_force",
+        "contact_track",
+        "effort",
+        "effort_speed",
+        "jacobian",
+    ),
     *("joint", "load", "marker", "motion", "path", "reaction", "share", "singularity"),
 )
 

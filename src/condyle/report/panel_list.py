@@ -25,6 +25,7 @@ import numpy as np
 from ..errors import InputError, did_you_mean
 from ..kinematics.singularities import NEAR_SINGULAR
 from ..mechanism.chain import limits as actuator_limits
+from ..results.accuracy import FEW_DIGITS
 from .actuators import (
     EMG_ROW,
     Duty,
@@ -324,6 +325,19 @@ def singularity(solution: xr.Dataset) -> Iterator[Panel]:
     finite = np.where(np.isfinite(condition), condition, np.nan)
     one = [Curve("condition", "condition", finite)]
     yield Panel("condition", "Condition number of J_W", "condition", "1", one, log=True)
+
+
+@panels("singularity", "Bound of the relative error", empty="this solution has no bounds")
+def accuracy(solution: xr.Dataset) -> Iterator[Panel]:
+    """Bound of the relative error of each sample, and above which digits are few."""
+    if "bound" not in solution:
+        return
+    values = solution["bound"].values
+    few = Limit(-math.inf, FEW_DIGITS, f"few digits: {FEW_DIGITS:g}")
+    limits = [few] if (values > FEW_DIGITS).any() else []  # else it is far off
+    note = "By rounding, on the safe side, of the largest entry or term of a sample."
+    one, title = [Curve("bound", "bound", values)], "Bound of the relative error"
+    yield Panel("accuracy", title, "bound", "1", one, note=note, log=True, limits=limits)
 
 
 @panels("singularity", "Diagonal of J_A", split=0)

@@ -14,6 +14,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...extras import require
+from ...results.accuracy import FEW_DIGITS
 from ...results.contacts import BOUND_TOLERANCE
 from ...results.failed_samples import longest
 from ...results.summary import peak, summarize
@@ -96,6 +97,10 @@ def _facts(page: Reduced) -> Iterator[tuple[Any, ...]]:
     if near is not None:
         where = f"ratio, t = {near['time']:g} s"
         yield "Closest to a singularity", f"{near['ratio']:.4g}", where, bool(page.near)
+    if "bound" in solution and (worst := peak(solution["bound"].values[:, None])) is not None:
+        sample, _, value = worst
+        where = f"largest, t = {time[sample]:g} s"
+        yield "Bound of the relative error", f"{value:.1e}", where, value > FEW_DIGITS
 
 
 def failure_table(page: Reduced) -> Markup:
