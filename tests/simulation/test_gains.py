@@ -111,6 +111,35 @@ def test_a_bite_that_swings_is_predicted(jaw: Model, delay: int, stable: bool) -
     assert (np.ptp(force) < 5.0) == stable
 
 
+@pytest.mark.parametrize(("delay", "stable"), [(3, True), (4, False)])
+def test_food_in_two_halves_is_the_whole_of_it(jaw: Model, delay: int, stable: bool) -> None:
+    """Each half alone is held at ease; together they are as stiff, and swing, as the whole."""
+    t = np.linspace(0, 0.5, 51)
+    s = 3 * (t / 0.5) ** 2 - 2 * (t / 0.5) ** 3
+    shut = condyle.Motion.from_arrays(
+        t, {"X": 0 * t, "Y": 0 * t, "alpha": 0 * t, "beta": 0.15 * (1 - s) - 0.02 * s}
+    )
+    bite = {"kind": "bite_force", "stiffness": 900.0, "force": 50.0, "delay": delay}
+    tables = {"duration": 0.6, "method": "rk4", "step": 2e-4, "start": {"on_motion": True}}
+    tables |= {"controller": bite}
+    half = FIRM | {"stiffness": 13.75e3 / 2, "damping": 5.0}
+    halves = tables | {"load": [half | {"name": "first"}, half | {"name": "second"}]}
+    apart = [halves["load"][0], half | {"name": "left", "point": "left_molar"}]
+    whole = condyle.check_gains(jaw, tables | {"load": [FIRM]}, motion=shut)
+    said = condyle.check_gains(jaw, halves, motion=shut)
+    found = {
+        name: np.array([point.radius for point in report.points if point.holds == name])
+        for report, name in ((whole, "food"), (said, "first and second"), (said, "second"))
+    }
+    assert np.allclose(found["first and second"], found["food"], rtol=1e-7)
+    assert len(found["second"]) and (found["second"] < 1).all()
+    assert said.stable == stable
+    force = run(bind(jaw, scenario_from(halves), motion=shut)).force[-100:]
+    assert (np.abs(force - 50.0).max() < 5.0) == stable
+    two = condyle.check_gains(jaw, tables | {"load": apart}, motion=shut)
+    assert {point.holds for point in two.points} == {None, "first", "first and left"}
+
+
 @pytest.mark.parametrize("sensors", [None, {"encoder_resolution": 0.0, "velocity_cutoff": 150.0}])
 def test_the_loop_s_derivatives_are_its_differences(jaw: Model, sensors: Any) -> None:
     """Plant with loads and tick, exact, beside central differences of the same kernels."""

@@ -11,7 +11,8 @@ periods late,
 
     x+ = Phi x + Gamma u_-d,    Phi = exp(A T),    Gamma = int exp(A s) ds B.
 
-A law that holds a force is checked while it does, on each load that can bear one. It is stable
+A law that holds a force is checked while it does: on each load at its point alone, since others may
+have broken, and on all that bear together. It is stable
 where all eigenvalues z lie within the unit circle; s = log(z) / T are those of a continuous loop,
 of damping -Re s / |s|. The margin of phase is how much all efforts may lag together: the smallest
 angle between -1 and an eigenvalue of the open loop L(exp(i w T)) of modulus 1 (generalised Nyquist;
@@ -55,7 +56,7 @@ FAST = 1e-3  # of the unit circle: eigenvalues within it are gone after a period
 class Point:
     """The loop at a point of the path.
 
-    time:  [s], None at home.   holds: name of the load that it holds a force on, or None.
+    time:  [s], None at home.   holds: names of the loads it bites on, or None.
     eigenvalues: s [1/s], complex.
     radius: largest |z|, or 1 + largest Re s of a continuous loop [1/s].
     damping: least of all eigenvalues that last.
@@ -191,17 +192,18 @@ class Loop:
         time: float | None,
         reference: np.ndarray,
         q: np.ndarray | None = None,
-        load: int | None = None,
+        loads: Sequence[int] = (),
     ) -> Point:
-        """Linearised about a reference, or about q while load `load` is held."""
+        """Linearised about a reference, or about q while `loads` bear the force."""
         plan, m, drive = self._plan, self._m, self._drive
         y = np.zeros(plan.size)
         y[: 2 * m] = reference[: 2 * m]
         modes = self._modes(y)
         memory = drive.law.memory
-        if q is not None and load is not None:
+        if q is not None:
             y[:m], y[m : 2 * m] = q, 0.0
-            modes[load] = plan.loads[load].law.bears or 0
+            for i in loads:
+                modes[i] = plan.loads[i].law.bears or 0
             memory = np.array(drive.law.table.holding)  # type: ignore[union-attr]
         self.plant.set_modes(modes)
         self.plant.evaluate(time or 0.0, y)
@@ -223,7 +225,7 @@ class Loop:
         n, k = len(plan.low), len(by_x)
         H, E = results[:n, :k] @ by_x, results[n:, :k] @ by_x
         step = Sampled(A, B, H, results[:n, k:], E, results[n:, k:], drive.period, drive.delay)
-        holds = None if load is None else plan.loads[load].name
+        holds = " and ".join(plan.loads[i].name for i in loads) or None
         s = z = np.linalg.eigvals(step.closed())
         if drive.period is None:
             worst = 1.0 + float(s.real.max())
@@ -250,44 +252,57 @@ class Loop:
         holding = None if law.table is None else law.table.holding
         if holding is None or not reference[-1] > 0:
             return
-        for i, load in enumerate(self._plan.loads):
-            if load.place != law.place or load.law.bears is None:
-                continue
-            q = self._pressed(i, reference[:m], float(reference[-1]), law.numbers["direction"])
+        loads = self._plan.loads
+        bearing = [i for i, load in enumerate(loads) if load.law.bears is not None]
+        groups = [[i] for i in bearing if loads[i].place == law.place]
+        if groups and len(bearing) > 1:
+            groups.append(bearing)
+        for group in groups:
+            q = self._pressed(group, reference[:m], float(reference[-1]), law.numbers["direction"])
             if q is None:
                 continue
-            point = self.at(time, reference, q, i)
+            if len(group) > 1:  # those that the teeth reach
+                forces = self.plant["load_force"].reshape(-1, 3)
+                group = [i for i in group if forces[i].any()]
+                if len(group) == 1:
+                    continue
+            point = self.at(time, reference, q, group)
             if self.control.columns["memory"][0] == holding[0]:  # it goes on holding
                 yield point
 
     def _pressed(
-        self, load: int, q: np.ndarray, force: float, direction: np.ndarray
+        self, loads: Sequence[int], q: np.ndarray, force: float, direction: np.ndarray
     ) -> np.ndarray | None:
-        """Coordinates along the bite from q where a load bears a force [N], if there are any."""
+        """Coordinates along the bite from q where loads bear a force [N], if there are any."""
         from scipy.optimize import brentq
 
         plan, plant, m = self._plan, self.plant, self._m
         y = np.zeros(plan.size)
         modes = [0] * len(plan.loads)
-        modes[load] = plan.loads[load].law.bears or 0
+        for i in loads:
+            modes[i] = plan.loads[i].law.bears or 0
 
         def beyond(way: float) -> float:
             y[:m] = q + way * along
             plant.evaluate(0.0, y)
-            return float(-direction @ plant["load_force"].reshape(-1, 3)[load]) - force
+            return float(-direction @ plant["measured_force"]) - force
 
+        here = next(i for i in loads if plan.loads[i].place == self._drive.law.place)
         plant.set_modes(modes)
         y[:m] = q
         try:
             plant.evaluate(0.0, y)
-            row = direction @ self.rate()["load_place"].reshape(len(modes), 6, -1)[load, :3, :m]
+            row = direction @ self.rate()["load_place"].reshape(len(modes), 6, -1)[here, :3, :m]
             along = row / (row @ row)
             size = characteristic_length(plan.model.mechanism)
             ends = [SHORT * size, SHORT * size]
             for i, sign in enumerate((1, -1)):
                 while sign * beyond(sign * ends[i]) < 0 and ends[i] < size:
                     ends[i] *= 2
-            return q + brentq(beyond, -ends[1], ends[0]) * along
+            found = q + brentq(beyond, -ends[1], ends[0]) * along
+            y[:m] = found
+            plant.evaluate(0.0, y)
+            return found
         except (NoRateError, ValueError):  # out of reach, or too soft for it
             return None
 
