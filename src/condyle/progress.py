@@ -11,10 +11,12 @@ Nobody watches unless asked to; then a step costs next to nothing.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
+from typing import TypeVar
 
+Item = TypeVar("Item")
 Advance = Callable[[float], None]
 # What is done and how much of it there is, None if that is not known -> a step to be entered.
 Watcher = Callable[[str, float | None], AbstractContextManager[Advance]]
@@ -57,6 +59,14 @@ def step(what: str, total: float | None = None) -> Iterator[Advance]:
     else:
         with watcher(what, total) as advance:
             yield advance
+
+
+def stepping(what: str, items: Sequence[Item]) -> Iterator[Item]:
+    """The items, each a part of a step."""
+    with step(what, len(items)) as advance:
+        for item in items:
+            yield item
+            advance(1)
 
 
 def _unwatched(amount: float) -> None:

@@ -18,6 +18,8 @@ import pytest
 import condyle
 from condyle.analysis.comparison import compare
 from condyle.cli import bar
+from condyle.export import export
+from condyle.export.c_samples import vectors
 from condyle.motion import Motion, iter_table
 from condyle.progress import Advance, step, watched_by
 from condyle.report.figures import save_figures, save_solution_figures
@@ -250,3 +252,16 @@ def test_the_library_never_loads_a_bar() -> None:
         inside = file.relative_to(sources).parts
         assert inside[0] == "cli" or "import rich" not in file.read_text(encoding="utf-8")
         assert inside[0] == "cli" or "from rich" not in file.read_text(encoding="utf-8")
+
+
+def test_exports_of_c_say_how_far_they_are() -> None:
+    """Functions one by one, then their samples."""
+    said: dict[str, float] = {}
+
+    @contextmanager
+    def watch(what: str, total: float | None) -> Iterator[Advance]:
+        yield lambda amount: said.update({what: said.get(what, 0.0) + amount})
+
+    with watched_by(watch):
+        vectors(export(condyle.load_mechanism("gough-stewart"), ("inverse", "motion"), lanes=0))
+    assert said["writing functions"] == said["recording samples"] == 2

@@ -70,8 +70,27 @@ def test_food_breaks_where_its_force_is_reached(jaw: Model) -> None:
     t, broken = found["time"].values, events[1]["time"]
     assert (force[t > broken] == 0).all() and force[t < events[0]["time"]].max() == 0
     assert 10 < force.max() <= 20
+    assert events[1]["text"].endswith("at 20 N") and abs(events[1]["force"] - 20.0) < 1e-6
     mode = found["load_mode"].sel(source="food").values
     assert (mode[0], mode[-1]) == (APART, BROKEN) and TOUCHING in mode
+
+
+def test_food_bitten_through_says_at_which_force(jaw: Model) -> None:
+    """Its peak lies between results: 1 ms of them see less."""
+    soft = {"kind": "food", "thickness": 1e-3, "break_thickness": 4e-4, "stiffness": 2e4}
+    tables = {
+        "duration": 0.05,
+        "start": {"beta": 0.05, "X": 0.001},
+        "load": [
+            soft | {"damping": 0.0, "point": "right_molar"},
+            {"kind": "constant", "point": "right_molar", "force": [0, 0, 30.0]},
+        ],
+    }
+    found = condyle.simulate(jaw, tables)
+    broken = next(e for e in found.condyle.events if e["kind"] == "food_broken")
+    assert broken["text"] == "the food is bitten to 0.4 mm, at 12 N"
+    assert abs(broken["force"] - 2e4 * 6e-4) < 1e-6
+    assert found["load_force"].sel(source="food", axis="z").values.min() > -broken["force"]
 
 
 def test_a_table_of_loads_is_the_load_of_the_inverse(jaw: Model, tmp_path: Path) -> None:

@@ -123,8 +123,9 @@ def test_food_in_two_halves_is_the_whole_of_it(jaw: Model, delay: int, stable: b
     tables = {"duration": 0.6, "method": "rk4", "step": 2e-4, "start": {"on_motion": True}}
     tables |= {"controller": bite}
     half = FIRM | {"stiffness": 13.75e3 / 2, "damping": 5.0}
-    halves = tables | {"load": [half | {"name": "first"}, half | {"name": "second"}]}
-    apart = [halves["load"][0], half | {"name": "left", "point": "left_molar"}]
+    first = half | {"name": "first"}
+    halves = tables | {"load": [first, half | {"name": "second"}]}
+    apart = [first, half | {"name": "left", "point": "left_molar"}]
     whole = condyle.check_gains(jaw, tables | {"load": [FIRM]}, motion=shut)
     said = condyle.check_gains(jaw, halves, motion=shut)
     found = {

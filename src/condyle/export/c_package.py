@@ -22,6 +22,7 @@ from ..backends.compiler import CompilerError, find_compiler
 from ..errors import texts_of
 from ..mechanism import Mechanism, as_mechanism
 from ..model.model import FORMULATION, ROUTE, Model
+from ..progress import step
 from .c_names import in_format, literal, packaged
 from .c_samples import Vectors, vectors
 from .c_source import export
@@ -95,7 +96,8 @@ def export_c(
     )
     folder = make_folder(path)
     files = write_package(exported, folder)
-    facts, warnings = write_facts(exported, folder)
+    with step("compiling, to measure"):
+        facts, warnings = write_facts(exported, folder)
     data = {
         "mechanism": mechanism.name,
         "prefix": exported.prefix,

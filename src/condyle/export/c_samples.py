@@ -12,6 +12,7 @@ from ..backends.numpy_kernel import NumpyKernel
 from ..graph.program import Variants
 from ..model.closing import Closure
 from ..model.model import Model
+from ..progress import stepping
 from ..questions import Question
 from ..questions.derivative import PREFIX, directional
 from ..questions.file_numbers import numbers_of
@@ -158,7 +159,7 @@ def vectors(exported: Exported) -> list[Vectors]:
     reference = Reference(model, exported.wish)
     draw = Samples(model)
     found = []
-    for f in exported.functions:
+    for f in stepping("recording samples", exported.functions):
         given = {a.name: draw(a.name, a.size, f) for a in f.inputs}
         if exported.precision == "float":
             given = {name: a.astype(np.float32).astype(float) for name, a in given.items()}

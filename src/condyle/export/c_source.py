@@ -16,6 +16,7 @@ from ..mechanism.home import dependent_coordinates, independent_coordinates
 from ..mechanism.mechanism import Mechanism
 from ..model.closing import require_independent, require_landmark
 from ..model.model import Model
+from ..progress import stepping
 from ..questions.file_numbers import numbers_of
 from ..questions.numbers import specialised
 from ..questions.structure import structure_of
@@ -114,7 +115,8 @@ def export(
         struct,
         landmark,
     )
-    bodies = [function(c, question, entry, wish) for question, entry in entries.items()]
+    asking = stepping("writing functions", [*entries.items()])
+    bodies = [function(c, question, entry, wish) for question, entry in asking]
     named = [*(chain.name for chain in mechanism.chains), *mechanism.contact_names]
     portable = _portable(c, bodies)
     source = _source(c, bodies, portable)

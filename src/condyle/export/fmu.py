@@ -22,6 +22,7 @@ from ..backends.compiler import CompilerError, find_compiler
 from ..errors import InputError, as_path, shown, texts_of
 from ..mechanism import Mechanism, as_mechanism
 from ..model.model import Model
+from ..progress import stepping
 from ..version import __version__
 from .c_names import in_comment
 from .catalogue import least_norm
@@ -72,7 +73,8 @@ def export_fmu(
         raise InputError(f"{path}: name a folder for the FMUs of {len(kinds)} kinds")
     models = [fmu_model(mechanism, one) for one in kinds]
     files = [file_at(path, f"{mechanism.name}-{one}", ".fmu") for one in kinds]
-    binary = all([_write(fmu, fmi, file) for fmu, file in zip(models, files, strict=True)])
+    pairs = stepping("building FMUs", [*zip(models, files, strict=True)])
+    binary = all([_write(fmu, fmi, file) for fmu, file in pairs])
     notes = []
     if not binary:
         notes.append("no binary for this machine: the FMUs hold sources only")

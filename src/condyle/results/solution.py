@@ -213,6 +213,7 @@ class Said(BaseModel):
     owner: str = ""
     ends: bool = False
     state: dict[str, float] = {}
+    force: float | None = None
 
 
 class Run(BaseModel):

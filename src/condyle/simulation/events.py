@@ -40,6 +40,7 @@ class Event:
 
     kind:  of `KINDS`;  owner: name of the chain, contact or load;  text: for people.
     state: independent coordinates and rates there, by name;  ends: whether it ended the run.
+    force: of the load, at its point, up to the event [N]; None of what is no load.
     """
 
     time: float
@@ -48,6 +49,7 @@ class Event:
     owner: str = ""
     ends: bool = False
     state: dict[str, float] = field(default_factory=dict)
+    force: float | None = None
 
     def __str__(self) -> str:
         whose = f' "{self.owner}"' if self.owner else ""
@@ -68,7 +70,14 @@ class EventLog:
         self.counts: Counter[tuple[str, str]] = Counter()
 
     def note(
-        self, t: float, y: np.ndarray, kind: str, text: str, owner: str = "", ends: bool = False
+        self,
+        t: float,
+        y: np.ndarray,
+        kind: str,
+        text: str,
+        owner: str = "",
+        ends: bool = False,
+        force: float | None = None,
     ) -> None:
         """Add an event at state y, (size,)."""
         self.counts[kind, owner] += 1
@@ -78,4 +87,4 @@ class EventLog:
         if count == MANY and not ends:
             text += "; more of these are not listed"
         state = dict(zip(self.names, y[: len(self.names)].tolist(), strict=True))
-        self.events.append(Event(float(t), kind, text, owner, ends, state))
+        self.events.append(Event(float(t), kind, text, owner, ends, state, force))

@@ -363,13 +363,18 @@ class Run:
 
     def _happened(self, crossing: Crossing) -> None:
         t, y, guard = crossing.time, crossing.state, crossing.guard
+        text, force = guard.text, None
         if guard.load is not None:
+            self.plant.set_modes(self.modes)
+            self._evaluate(t, y)
+            force = float(np.linalg.norm(self.plant["load_force"].reshape(-1, 3)[guard.load]))
+            text = text.replace("{force}", f"{force:.4g} N")
             self.modes[guard.load] = guard.mode
             self.plant.set_modes(self.modes)
         if guard.ends:
             self._keep_end(t, y)
-            self._end(t, y, guard.kind, guard.text, guard.owner)
-        self.logs[0].note(t, y, guard.kind, guard.text, guard.owner)
+            self._end(t, y, guard.kind, text, guard.owner)
+        self.logs[0].note(t, y, guard.kind, text, guard.owner, force=force)
 
     def _end_without_rate(self, t: float, y: np.ndarray, error: NoRateError) -> NoReturn:
         self._keep_end(t, y)

@@ -75,7 +75,7 @@ class LoadTable(Table):
 
     @staticmethod
     def jumps(numbers: Any) -> Sequence[Jump]:
-        """What happens where the guards pass zero, in their order."""
+        """What happens where the guards pass zero, in their order; `{force}`: the load's then."""
         return ()
 
     @staticmethod

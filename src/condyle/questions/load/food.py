@@ -154,7 +154,7 @@ class FoodTable(LoadTable):
             Jump(APART, "food_whole", "the teeth have parted: the food is whole again"),
             Jump(APART, "food_left", "the teeth leave the food"),
             Jump(BROKEN, "food_broken", f"the food breaks at {force:g} N"),
-            Jump(BROKEN, "food_broken", f"the food is bitten to {thin:g} mm"),
+            Jump(BROKEN, "food_broken", f"the food is bitten to {thin:g} mm, at {{force}}"),
         )
 
 
