@@ -2,45 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from oracles.random_mechanism import random_mechanism
-from support.families import ALL as FAMILIES
-from support.families import case as families
+from support.file_paths import SURFACES, machine_of, numbers, one_each, wide
 
 import condyle
 from condyle.errors import InputError
 from condyle.mechanism import Mechanism
-from condyle.mechanism.files import from_data
-from condyle.mechanism.home import dependent_coordinates
-from condyle.mechanism.paths import written
 from condyle.questions.file_numbers import numbers_of
-from condyle.questions.number_paths import FileNumbers, number_jacobian
+from condyle.questions.number_paths import number_jacobian
 from condyle.questions.numbers import Layout
-from condyle.questions.structure import Structure, structure_of, walls_of
+from condyle.questions.structure import Structure, walls_of
 
-SURFACES: dict[str, dict[str, Any]] = {
-    "every_kind": {"surface": "mixed", "contacts": 5, "chains": 8},
-    "balls": {"surface": ("ellipsoid", "quadratic", "plane"), "contacts": 3, "ball_radius": 4.0},
-    "balls_round": {"surface": ("sphere", "cylinder"), "ball_radius": 4.0},
-    "balls_profile": {"surface": "profile", "ball_radius": 4.0},
-}
+BUNDLED = [name for name in condyle.bundled_mechanisms() if name != "gough-stewart"]
 CARRIERS = ("surface.offset", "surface.centre", "surface.point", "surface.points")
-
-
-def wide(mechanism: Mechanism) -> Structure:
-    """With every number of the file."""
-    every = tuple(range(len(mechanism.contacts)))
-    found = structure_of(mechanism)
-    return replace(found, parallel=False, losses=True, friction=every)
-
-
-def numbers(mechanism: Mechanism) -> FileNumbers:
-    structure = wide(mechanism)
-    return FileNumbers(mechanism, structure, walls_of(mechanism, structure))
 
 
 def flat(structure: Structure, mechanism: Mechanism) -> np.ndarray:
@@ -85,35 +62,6 @@ def test_refusals() -> None:
         number_jacobian(jaw, wide(jaw), ["platform.mass"], "none")
 
 
-def every_path(of: FileNumbers) -> list[str]:
-    """Paths of all numbers and vectors of a mechanism's file."""
-    parts = [("gravity",), *(("contact", n) for n in of.mechanism.contact_names)]
-    parts += [("chain", n) for n in of.mechanism.chain_names]
-    return [written(leaf) for part in parts for leaf, _ in of._leaves(part)]
-
-
-def rubbing(machine: Mechanism) -> Mechanism:
-    """With losses and friction, `dependent` held."""
-    losses = {"rotor_inertia": 1e-5, "gear": 3.0, "viscous": 0.02, "coulomb": 0.03}
-    changes: dict[str, object] = {
-        f"chain.{chain.name}.actuator.{key}": value
-        for chain in machine.chains
-        for key, value in (losses | {"smoothing_speed": 2e-3}).items()
-    }
-    for contact in machine.contacts:
-        changes[f"contact.{contact.name}.friction"] = {"coefficient": 0.1}
-    return machine.set({**changes, "dependent": dependent_coordinates(machine) or None})
-
-
-def machine_of(name: str) -> Mechanism:
-    if name in condyle.bundled_mechanisms():
-        return rubbing(condyle.load_mechanism(name))
-    if name in FAMILIES:
-        return rubbing(families(name).mechanism)
-    rng = np.random.default_rng(sum(map(ord, name)))
-    return rubbing(from_data(random_mechanism(rng, **SURFACES[name])))
-
-
 def differences(
     machine: Mechanism, structure: Structure, path: str, keep: str
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -144,22 +92,13 @@ def differences(
     return np.stack(columns, axis=1), 1e-15 * size[:, None] / h
 
 
-def one_each(machine: Mechanism) -> list[str]:
-    """Every path, of one chain of a family."""
-    found = {}
-    for path in every_path(numbers(machine)):
-        head, name, *rest = [*path.split(".", 2), ""]
-        kind = machine.get(f"chain.{name}.kind") if head == "chain" else name
-        found.setdefault((head, kind, *rest), path)
-    return list(found.values())
-
-
 @pytest.mark.parametrize(
     "name",
     [
-        "every_family",
+        "gough-stewart",
+        pytest.param("every_family", marks=pytest.mark.slow),
         *(pytest.param(name, marks=pytest.mark.slow) for name in SURFACES),
-        *(pytest.param(name, marks=pytest.mark.ci) for name in condyle.bundled_mechanisms()),
+        *(pytest.param(name, marks=pytest.mark.ci) for name in BUNDLED),
     ],
 )
 def test_derivatives_of_the_kernels_numbers(name: str) -> None:

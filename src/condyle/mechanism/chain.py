@@ -179,6 +179,7 @@ class Cable(ChainTable):
         return data
 
 
+CHAINS: dict[str, type[ChainTable]] = {"RSS": RSS, "PSS": PSS, "SPS": SPS, "cable": Cable}
 Chain = Annotated[RSS | PSS | SPS | Cable, Field(discriminator="kind")]
 
 

@@ -12,7 +12,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from typing import Annotated, Any
+from dataclasses import dataclass
+from typing import Annotated, Any, get_args
 
 from pydantic import (
     AfterValidator,
@@ -22,6 +23,7 @@ from pydantic import (
     ValidationInfo,
     WithJsonSchema,
 )
+from pydantic.fields import FieldInfo
 
 PER_METRE = {"m": 1.0, "mm": 1000.0}
 LONGEST, SHORTEST = 1e5, 1e-9  # metres; the shortest of those that must be positive
@@ -47,6 +49,49 @@ def _within(value: float, least: float, most: float, unit: str) -> None:
         raise ValueError(f"expected at least {least:g}{unit}, got {value:g}")
 
 
+@dataclass(frozen=True)
+class Range:
+    """What a kind of number may be, SI: low <= x <= high, |x| <= most, and 0 or |x| >= least.
+
+    above:     x > 0;  direction: one of a vector that is not zero.
+    """
+
+    low: float = -math.inf
+    high: float = math.inf
+    least: float = 0.0
+    most: float = math.inf
+    above: bool = False
+    direction: bool = False
+
+
+_BOUNDS: dict[Callable[..., Any], tuple[float, float]] = {}  # least and most of a validator
+
+
+def range_of(kind: Any) -> Range:
+    """The range of a type of this file, or of its entries, or of a field of a table."""
+    found: dict[str, Any] = {}
+    _collect(kind, found)
+    return Range(**found)
+
+
+def _collect(kind: Any, found: dict[str, Any]) -> None:
+    for item in (*getattr(kind, "__metadata__", ()), *getattr(kind, "metadata", ())):
+        if isinstance(item, FieldInfo):
+            _collect(item, found)
+        for name, bound in (("ge", "low"), ("le", "high")):
+            if (value := getattr(item, name, None)) is not None:
+                found[bound] = value
+        if getattr(item, "gt", None) == 0:
+            found["above"] = True
+        function = getattr(item, "func", None)
+        if function in _BOUNDS:
+            found["least"], found["most"] = _BOUNDS[function]
+        found |= {"direction": True} if function is _nonzero else {}
+    for part in (getattr(kind, "annotation", None), *get_args(kind)[:1]):
+        if part is not None:
+            _collect(part, found)
+
+
 def _bounded(unit: str, least: float = 0.0, most: float = LARGEST) -> AfterValidator:
     """Refuses a number that is out of all proportion."""
 
@@ -54,6 +99,7 @@ def _bounded(unit: str, least: float = 0.0, most: float = LARGEST) -> AfterValid
         _within(value, least, most, f" {unit}".rstrip())
         return value
 
+    _BOUNDS[check] = least, most
     return AfterValidator(check)
 
 
@@ -64,6 +110,7 @@ def _in_metres(least: float = 0.0) -> AfterValidator:
         # Division rounds once: 13.215 mm becomes the double nearest to 0.013215.
         return value / scale
 
+    _BOUNDS[convert] = least, LONGEST
     return AfterValidator(convert)
 
 
@@ -71,6 +118,9 @@ def _curvature(value: float, info: ValidationInfo) -> float:
     scale = per_metre(info)
     _within(value, 0.0, LARGEST / scale, f" per {_unit(info)}")
     return value * scale
+
+
+_BOUNDS[_curvature] = 0.0, LARGEST
 
 
 # Printable for Unicode, and drawn by no font: fillers, blank Braille, joiners, selectors.

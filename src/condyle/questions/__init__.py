@@ -108,7 +108,7 @@ class Question:
             return variants
         file = self.name == "file_numbers"
         s = self.structure
-        layout = Layout.of_file(s, *self.details) if file else Layout.of(s)
+        layout = Layout.of_file(s, self.details[0]) if file else Layout.of(s)
         return Variants(numbers_as_ports(variants.main, *layout.sizes))
 
 

@@ -18,28 +18,32 @@ from ..graph.program import Numbers, Program
 from ..kinematics.chain import FAMILIES
 from ..kinematics.constraints import angle_equation, closed_form_available
 from ..mechanism.mechanism import Mechanism
-from ..mechanism.surface.wall import Wall, home_of
+from ..mechanism.surface.wall import Placed, Wall, home_of
 from .builder import Builder
+from .number_checks import judge
 from .numbers import INERTIA, Layout, single_contacts
 from .structure import Structure, walls_of
 
 
-def file_numbers(structure: Structure, walls: tuple[Wall, ...]) -> Program:
+def file_numbers(structure: Structure, walls: tuple[Wall, ...], judged: bool = False) -> Program:
     """The kernel's numbers by their names in `Layout.of`, from those of `Layout.of_file`.
 
     Nothing varies from sample to sample: there are no ports.
 
-    Args: walls: see `walls_of`.
+    Args: walls: see `walls_of`;  judged: whether it is checked that these are a mechanism's
+          numbers: statuses `refused` and `singular`.
     """
     bare = replace(structure, formulation="virtual_power", route="core", zeros=frozenset())
-    return _written(bare, walls)
+    return _written(bare, walls, judged)
 
 
 @lru_cache(maxsize=64)
-def _written(structure: Structure, walls: tuple[Wall, ...]) -> Program:
+def _written(structure: Structure, walls: tuple[Wall, ...], judged: bool) -> Program:
     layout, b = Layout.of(structure), Builder(structure, Layout.of_file(structure, walls))
     groups = range(len(structure.chains))
-    values = _shared(b, walls)
+    values, placed = _shared(b, walls)
+    if judged:
+        judge(b, walls, placed, values)
     for name, (_, count) in layout.parameters.items():
         if count:
             b.output(name, ca.densify(values[name]), "", count)
@@ -69,7 +73,8 @@ def _lane(b: Builder, group: int, name: str) -> ca.SX:
     return ca.vertcat(rotor * gear**2, viscous, coulomb, speed**2)
 
 
-def _shared(b: Builder, walls: Sequence[Wall]) -> dict[str, ca.SX]:
+def _shared(b: Builder, walls: Sequence[Wall]) -> tuple[dict[str, ca.SX], list[Placed]]:
+    """Shared numbers by name, and what the contacts lead to."""
     structure = b.structure
     k, groups = len(structure.contacts), range(len(structure.chains))
     own = {name: b.parameter(name) for name in b.layout.parameters}
@@ -100,12 +105,14 @@ def _shared(b: Builder, walls: Sequence[Wall]) -> dict[str, ca.SX]:
         "landmark": own["landmark"],
         "middle": sum(points, ca.SX.zeros(3)) / max(1, k),
     }
+    placed = []
     for i, wall in enumerate(walls):
         values[f"contact_point_{i}"] = points[i]
         ball = own.get(f"contact_ball_{i}", ca.SX(0))
         home = own.get(f"contact_home_{i}", ca.SX(0, 1))
         found = wall.constants(own[f"contact_surface_{i}"], points[i], ball, home)
-        values[f"contact_surface_{i}"], _ = found
+        values[f"contact_surface_{i}"] = found.constants
+        placed.append(found)
         if i in structure.friction:
             f = own[f"friction_{i}"]
             values[f"friction_{i}"] = ca.vertcat(f[0], f[1] ** 2, wall.push * ball)
@@ -119,7 +126,7 @@ def _shared(b: Builder, walls: Sequence[Wall]) -> dict[str, ca.SX]:
         home = ca.SX.zeros(6)
         B = angle_equation(contacts, structure.dependent, home).B if contacts else ca.SX(0)
         values["branch"] = -ca.sign(B)
-    return values
+    return values, placed
 
 
 def _end_mass(b: Builder, group: int) -> ca.SX:

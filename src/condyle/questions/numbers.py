@@ -88,22 +88,22 @@ class Layout:
         return total(self.parameters), [total(slots) for slots in self.lanes]
 
     def idle(self, group: int, first: np.ndarray) -> np.ndarray:
-        """Numbers of a lane without a chain, which contributes nothing.
+        """Numbers of a lane without a chain, which contributes nothing, (..., size).
 
-        Args: first: those of the group's first chain.
+        Args: first: those of the group's first chain, (..., size).
         """
         family = FAMILIES[self.structure.families[group]]
         own = FORMULATIONS[self.structure.formulation].pads
         idle, slots = first.copy(), self.lanes[group]
-        idle[slots["mask"][0]] = 0.0
+        idle[..., slots["mask"][0]] = 0.0
         start, at = slots["constants"][0], 0
         for name, count in family.shapes.items():
             if own and name in family.padding:
-                idle[start + at : start + at + count] = 0.0
+                idle[..., start + at : start + at + count] = 0.0
             at += count
         if self.structure.losses:
             start, count = slots["actuator"]
-            idle[start : start + count] = NO_LOSSES
+            idle[..., start : start + count] = NO_LOSSES
         return idle
 
 

@@ -55,6 +55,11 @@ class Smooth(ABC):
     def from_numbers(f: Any) -> ca.SX:
         """The numbers of the equation from those of the file. Args: f: `named` numbers."""
 
+    @staticmethod
+    def sound(f: Any) -> list[ca.SX]:
+        """Truth values that its numbers together have to have: see `from_numbers`."""
+        return []
+
     def sizes(self) -> dict[str, int]:
         """Names of its numbers in a file and how many each is."""
         return {name: int(np.size(getattr(self, name))) for name in self.numbers}

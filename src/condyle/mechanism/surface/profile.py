@@ -68,6 +68,11 @@ class Profile(SurfaceTable):
         return point[2] - z - u * (slope + u * (second + u * third))
 
     @staticmethod
+    def sound(f: Any) -> list[ca.SX]:
+        s, off = f.points[0::2], ca.norm_2(f.direction) - 1
+        return [ca.fabs(off) <= UNIT, *ca.vertsplit(s[1:] > s[:-1])]
+
+    @staticmethod
     def from_numbers(f: Any) -> ca.SX:
         """direction; z and slope before the first knot; for each knot s and what changes there.
 

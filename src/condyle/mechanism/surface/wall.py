@@ -25,6 +25,22 @@ STEPS = 8  # of Newton, to where the ball touches
 
 
 @dataclass(frozen=True)
+class Placed:
+    """What a contact's numbers lead to.
+
+    constants: of the locus;  numbers: of the surface, by name, moved where home is kept.
+    rest:  how far Newton is from the touching point, squared;  turned: cosine by which the normal
+           has turned from where it began;  fits: positive where the ball can touch there.
+    """
+
+    constants: ca.SX
+    numbers: Any
+    rest: ca.SX | None = None
+    turned: ca.SX | None = None
+    fits: ca.SX | None = None
+
+
+@dataclass(frozen=True)
 class Wall:
     """The surface of a contact, without its numbers.
 
@@ -51,13 +67,12 @@ class Wall:
         return self.locus.startswith("parallel")
 
     @cached_property
-    def _surface(self) -> Any:
+    def surface(self) -> Any:
+        """A surface of its kind, without numbers."""
         return of_form(self.form)
 
-    def constants(
-        self, numbers: ca.SX, point: ca.SX, ball: ca.SX, home: ca.SX
-    ) -> tuple[ca.SX, ca.SX]:
-        """Those of the locus, and how far the touching point is from having been found, squared.
+    def constants(self, numbers: ca.SX, point: ca.SX, ball: ca.SX, home: ca.SX) -> Placed:
+        """Those of the locus.
 
         Args: numbers, point, ball: of the file;
               home: unit normal (3,) and `miss` of the nominal mechanism.
@@ -65,28 +80,34 @@ class Wall:
         f, distance = named(numbers, dict(self.sizes)), self.push * ball
         if self.kept:
             f = self._moved(f, point, distance, home)
-        if self.locus == self.form:
-            return self._own(f, distance), ca.SX(0)
-        w, mu, _ = self._foot(f, point, distance, home)
-        g, a, _ = self._equation(f)(w)
+        if not self.general:
+            return Placed(self._own(f, distance), f)
+        w, mu, n = self._foot(f, point, distance, home)
+        g, a, H = self._equation(f)(w)
         off = point - w - mu * a
         rest = ca.dot(off, off) + g * g
+        across = ca.SX.eye(3) - n @ n.T
+        grip = ca.SX.eye(3) + distance * across @ H @ across / ca.norm_2(a)
+        # Of its eigenvalues one is 1; both others are positive where their product and sum are.
+        fits = ca.fmin(ca.det(grip), ca.trace(grip) - 1)
         if self.locus == "parallel-quadric":
-            return ca.vertcat(distance, self._surface.principal(f)), rest
-        return ca.vertcat(distance, point, w, mu, self._surface.from_numbers(f)), rest
+            own = ca.vertcat(distance, self.surface.principal(f))
+        else:
+            own = ca.vertcat(distance, point, w, mu, self.surface.from_numbers(f))
+        return Placed(own, f, rest, ca.dot(n, home[:3]), fits)
 
     def miss(self, numbers: Any, point: Any, ball: Any, normal: Any) -> tuple[ca.SX, ca.SX]:
         """How far the surface would have to move for home to be on it [m], and along what, (3,)."""
         return self._miss(named(numbers, dict(self.sizes)), point, self.push * ball, normal)
 
     def _own(self, f: Any, distance: ca.SX) -> ca.SX:
-        return self._surface.from_numbers(self._surface.beyond(f, distance) if self.push else f)
+        return self.surface.from_numbers(self.surface.beyond(f, distance) if self.push else f)
 
     def _moved(self, f: Any, point: ca.SX, distance: ca.SX, home: ca.SX) -> Any:
         off, n = self._miss(f, point, distance, home)
         by = off - home[3]
-        place = self._surface.carrier
-        if not self._surface.lifted:
+        place = self.surface.carrier
+        if not self.surface.lifted:
             move = by * n
         elif place == "points":
             move = ca.repmat(ca.vertcat(0, by), f.points.numel() // 2)
@@ -95,7 +116,7 @@ class Wall:
         return SimpleNamespace(**{**vars(f), place: getattr(f, place) + move})
 
     def _miss(self, f: Any, point: ca.SX, distance: ca.SX, home: ca.SX) -> tuple[ca.SX, ca.SX]:
-        surface, up = self._surface, ca.SX([0, 0, 1])
+        surface, up = self.surface, ca.SX([0, 0, 1])
         if not surface.lifted:
             size, n = surface.nearest(f, point, lambda f: self._foot(f, point, distance, home))
             return size - distance, n
@@ -111,16 +132,16 @@ class Wall:
         return equation(w)[0], up
 
     def _equation(self, f: Any) -> Any:
-        c = self._surface.from_numbers(f)
-        equation = equation_of(self._surface, c.numel())
+        c = self.surface.from_numbers(f)
+        equation = equation_of(self.surface, c.numel())
         return lambda w: equation(w, c)
 
     def _foot(
         self, f: Any, point: ca.SX, distance: ca.SX, home: ca.SX
     ) -> tuple[ca.SX, ca.SX, ca.SX]:
         """The closest point, its mu, and the unit normal there."""
-        c, w = self._surface.from_numbers(f), point - distance * home[:3]
-        equation = equation_of(self._surface, c.numel())
+        c, w = self.surface.from_numbers(f), point - distance * home[:3]
+        equation = equation_of(self.surface, c.numel())
         mu = distance / ca.norm_2(equation(w, c)[1])
         for _ in range(STEPS):
             w, mu = newton_step(equation, point, w, mu, c)

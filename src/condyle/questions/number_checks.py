@@ -1,0 +1,220 @@
+"""What decides whether a file's numbers are those of a mechanism, as checks of a question.
+
+Ranges of single numbers are those of the tables' fields. What is too near a limit for rounding, or
+was not found by Newton, is left in doubt: for `mechanism.set` to decide.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+import casadi as ca
+
+from ..kinematics.chain import FAMILIES
+from ..mechanism.bodies import Inertia, Platform
+from ..mechanism.chain import AXIS_TOLERANCE, CHAINS, NO_BRANCH
+from ..mechanism.contact import Contact, Friction
+from ..mechanism.home import HOME_ERROR, MAX_CONDITION
+from ..mechanism.mechanism import COORDINATES, Mechanism
+from ..mechanism.quantities import LARGEST, Range, range_of
+from ..mechanism.surface import of_form
+from ..mechanism.surface.base import named
+from ..mechanism.surface.parallel import CONVERGED
+from ..mechanism.surface.wall import Placed, Wall
+from ..status import Status
+from .builder import Builder
+from .numbers import INERTIA
+
+NEAR = 1e-12  # relative distance from a limit within which rounding decides
+TURNED = 0.8  # cosine of a turn of the normal beyond which another touching point may be nearer
+TRIANGLE = 1e-9  # slack of `Inertia`'s triangle inequality, relative
+
+
+def judge(
+    b: Builder, walls: Sequence[Wall], placed: Sequence[Placed], values: Mapping[str, ca.SX]
+) -> None:
+    """Add the checks. Args: placed: what the contacts lead to;  values: shared numbers."""
+    groups = range(len(b.structure.chains))
+    sound = [*_shared_ranges(b, walls), *_of_contacts(b, walls, placed)]
+    lanes = [_product(_of_chain(b, group)) for group in groups]
+    _check(b, _product(sound) * b.least(lanes) - 0.5, 0.0, Status.refused)
+    margins = [*_inertia(b.parameter("inertia")), *_homes(placed, b, values)]
+    families = zip(*(_margins(b, group) for group in groups), strict=True)
+    for margin in (*margins, *(b.least(list(terms)) for terms in families)):
+        _check(b, margin, NEAR, Status.refused)
+    for one in placed:
+        if one.rest is not None and one.turned is not None:
+            _check(b, CONVERGED**2 - one.rest, 0.0, None)
+            _check(b, one.turned - TURNED, 0.0, None)
+    if placed:
+        holds, fails = _condition(b, values)
+        _check(b, -fails, 0.0, Status.singular)
+        _check(b, holds, 0.0, None)
+
+
+def _check(b: Builder, value: ca.SX, tolerance: float, below: Status | None) -> None:
+    b.check(value, tolerance, None if below is None else int(below))
+
+
+def _product(truths: Iterable[ca.SX]) -> ca.SX:
+    """1 where all are true, else 0."""
+    found = ca.SX(1)
+    for truth in truths:
+        found = found * truth
+    return found
+
+
+# -- one number by itself ------------------------------------------------------------------
+
+
+def within(x: ca.SX, own: Range) -> Iterator[ca.SX]:
+    """Whether numbers, (n,), are in a range: truth values."""
+    entries = ca.vertsplit(x)
+    for e in entries:
+        size = ca.fabs(e)
+        yield size <= min(own.most, 1e300)  # NaN and infinity are refused
+        if own.above:
+            yield e >= max(own.least, 5e-324)
+        elif own.least:
+            yield 1 - ca.logic_not(e == 0) * (size < own.least)
+        if math.isfinite(own.low):
+            yield e >= own.low
+        if math.isfinite(own.high):
+            yield e <= own.high
+    if own.direction:
+        largest = ca.fabs(entries[0])
+        for e in entries[1:]:
+            largest = ca.fmax(largest, ca.fabs(e))
+        yield largest >= 1 / LARGEST
+
+
+def field_range(table: Any, path: str) -> Range:
+    """The range of a field of a table, `crank.inertia`."""
+    first, _, rest = path.partition(".")
+    field = table.model_fields[first]
+    return field_range(field.annotation, rest) if rest else range_of(field)
+
+
+def _shared_ranges(b: Builder, walls: Sequence[Wall]) -> Iterator[ca.SX]:
+    own = b.parameter
+    yield from within(own("gravity"), field_range(Mechanism, "gravity"))
+    yield from within(own("mass"), field_range(Platform, "mass"))
+    for i, (j, k) in enumerate(INERTIA):
+        yield from within(own("inertia")[i], field_range(Inertia, "xyz"[j] + "xyz"[k]))
+    yield from within(own("landmark"), field_range(Contact, "point"))
+    for i, wall in enumerate(walls):
+        yield from within(own(f"contact_point_{i}"), field_range(Contact, "point"))
+        if wall.push:
+            yield from within(own(f"contact_ball_{i}"), field_range(Contact, "ball_radius"))
+        if i in b.structure.friction:
+            f = own(f"friction_{i}")
+            for j, name in enumerate(("coefficient", "smoothing_speed")):
+                yield from within(f[j], field_range(Friction, name))
+
+
+def _of_chain(b: Builder, group: int) -> Iterator[ca.SX]:
+    """What every number of a chain, and each body's together, have to be."""
+    kind = b.structure.families[group]
+    table, own = CHAINS[kind], {path: b.lane(group, path) for path in b.layout.lanes[group]}
+    for path, x in own.items():
+        yield from within(x, field_range(table, path))
+        if path.endswith(".axial"):
+            transverse = own[path.replace("axial", "transverse")]
+            yield x <= 2 * transverse * (1 + 1e-12)
+    for start, end in table.links.values():
+        line = own[end] - own[start]
+        yield ca.dot(line, line) > 0
+
+
+# -- numbers together ----------------------------------------------------------------------
+
+
+def _inertia(entries: ca.SX) -> Iterator[ca.SX]:
+    """Positive where a tensor is positive definite and no moment exceeds the others' sum."""
+    J = ca.SX.zeros(3, 3)
+    for n, (i, j) in enumerate(INERTIA):
+        J[i, j] = J[j, i] = entries[n]
+    trace = ca.trace(J)
+    yield from _minors(J / trace)
+    # The largest moment is at most half of all; only one can be more.
+    half = (1 + TRIANGLE) / (2 + TRIANGLE)
+    yield ca.det(half * ca.SX.eye(3) - J / trace)
+
+
+def _minors(A: ca.SX) -> Iterator[ca.SX]:
+    yield A[0, 0]
+    yield A[0, 0] * A[1, 1] - A[0, 1] ** 2
+    yield ca.det(A)
+
+
+def _margins(b: Builder, group: int) -> list[ca.SX]:
+    """Positive where a chain's axis is near enough the perpendicular, and home has a branch."""
+    kind = b.structure.families[group]
+    own = {path: b.lane(group, path) for path in FAMILIES[kind].numbers}
+    axis, branch = ca.SX(1), ca.SX(1)
+    if kind == "RSS":
+        crank = own["crank_tip"] - own["base"]
+        axis = math.sin(AXIS_TOLERANCE) - _sine(own["axis"], crank)
+        tangent = ca.cross(own["axis"], crank)
+        branch = _sine(own["platform"] - own["crank_tip"], tangent) - NO_BRANCH
+    if kind == "PSS":
+        branch = _sine(own["platform"] - own["base"], own["axis"]) - NO_BRANCH
+    return [axis, branch]
+
+
+def _sine(a: ca.SX, b: ca.SX) -> ca.SX:
+    return ca.fabs(ca.dot(a, b)) / (ca.norm_2(a) * ca.norm_2(b))
+
+
+def _of_contacts(b: Builder, walls: Sequence[Wall], placed: Sequence[Placed]) -> Iterator[ca.SX]:
+    """What the numbers of surfaces have to be, also where home is kept."""
+    for i, (wall, one) in enumerate(zip(walls, placed, strict=True)):
+        surface = wall.surface
+        given = named(b.parameter(f"contact_surface_{i}"), dict(wall.sizes))
+        for f in (given, one.numbers) if wall.kept else (given,):
+            yield from surface.sound(f)
+            for name, x in vars(f).items():
+                if wall.form.startswith("expression"):
+                    yield ca.fabs(x) <= 1e300
+                else:
+                    yield from within(x, field_range(type(surface), name))
+            if wall.push < 0 and hasattr(f, "radius"):
+                yield b.parameter(f"contact_ball_{i}") < f.radius
+
+
+def _homes(placed: Sequence[Placed], b: Builder, values: Mapping[str, ca.SX]) -> Iterator[ca.SX]:
+    """Positive where the points are on their surfaces at home, and balls fit."""
+    for i, one in enumerate(placed):
+        phi, gradient = _at_home(b, i, values)
+        yield (HOME_ERROR - ca.fabs(phi) / ca.norm_2(gradient)) / HOME_ERROR
+        if one.fits is not None:
+            yield one.fits
+
+
+def _at_home(b: Builder, i: int, values: Mapping[str, ca.SX]) -> tuple[ca.SX, ca.SX]:
+    """phi and its gradient."""
+    form, _ = b.structure.contacts[i]
+    surface = of_form(form)
+    point, constants = values[f"contact_point_{i}"], values[f"contact_surface_{i}"]
+    return surface.phi(point, constants), surface.gradient(point, constants)
+
+
+def _condition(b: Builder, values: Mapping[str, ca.SX]) -> tuple[ca.SX, ca.SX]:
+    """Positive where the dependent columns' condition number is below its limit for sure; and where
+    it is not.
+
+    It is between |A| |adj A| / |det A| of Frobenius norms over k, and that.
+    """
+    rows = []
+    for i in range(len(b.structure.contacts)):
+        _, gradient = _at_home(b, i, values)
+        turning = ca.cross(values[f"contact_point_{i}"], gradient) / values["length"]
+        rows.append(ca.vertcat(gradient, turning).T)
+    columns = [COORDINATES.index(name) for name in b.structure.dependent]
+    A = ca.vertcat(*rows)[:, columns]
+    k = len(rows)
+    size = ca.norm_fro(A) * ca.norm_fro(ca.adj(A))
+    limit = MAX_CONDITION * ca.fabs(ca.det(A))
+    return limit * (1 - NEAR) - size, size / k - limit * (1 + NEAR)

@@ -1,0 +1,99 @@
+"""Numbers of many variants of a mechanism: `file_numbers` with the file's numbers as columns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..backends.choose import Backend
+from ..backends.kernel import AGAIN
+from ..graph.program import ManyNumbers, Numbers
+from ..graph.transform import LANE_NUMBERS, NUMBERS
+from ..mechanism.kept_home import kept_contacts
+from ..mechanism.mechanism import Mechanism
+from . import Question
+from .file_numbers import numbers_of_file
+from .number_paths import FileNumbers
+from .numbers import Layout
+from .structure import Structure, walls_of
+
+BLOCK = 256  # variants at a time, whose numbers stay in a cache
+
+
+@dataclass(frozen=True)
+class VariantNumbers:
+    """Numbers of V variants.
+
+    numbers: as of `numbers_of`;  status: (V,), of `Status`: ok, refused, singular.
+    doubt:   those that only `mechanism.set` can judge, by number: their numbers are not to be used.
+    """
+
+    numbers: ManyNumbers
+    status: np.ndarray
+    doubt: np.ndarray
+
+
+def variant_numbers(
+    mechanism: Mechanism,
+    structure: Structure,
+    table: Mapping[str, np.ndarray],
+    keep: str = "home",
+    backend: str = "auto",
+) -> VariantNumbers:
+    """The kernel's numbers of every variant, and whether it is a mechanism.
+
+    Args:   structure: of all variants, whose dependent coordinates they keep;
+            table: path -> values, (V, ...), SI;  keep: as of `mechanism.set`.
+    Raises: InputError: for a path without numbers of this structure.
+    """
+    walls = walls_of(mechanism, structure, kept_contacts(mechanism, table, keep))
+    bare = replace(structure, formulation="virtual_power", route="core", zeros=frozenset())
+    places = FileNumbers(mechanism, bare, walls).at(list(table))
+    own = numbers_of_file(mechanism, bare, walls)
+    question = Question.about(bare, "file_numbers", walls, True).with_ports()
+    kernel = Backend(backend).kernel(question.key, question.variants, Numbers.none(own.order))
+    layout, file = Layout.of(structure), Layout.of_file(bare, walls)
+    starts = np.cumsum([0, *bare.counts])
+    lanes = np.full((max(file.sizes[1]), len(own.order)), np.nan)  # what is not there is not read
+    for group, values in enumerate(own.lanes):
+        lanes[: len(values), own.order[starts[group] : starts[group + 1]]] = values
+    count = len(next(iter(table.values())))
+    found = ManyNumbers(
+        np.empty((count, layout.sizes[0])),
+        tuple(
+            np.empty((count, size, chains))
+            for size, chains in zip(layout.sizes[1], bare.counts, strict=True)
+        ),
+        tuple(np.empty((count, size)) for size in layout.sizes[1]),
+        own.order,
+    )
+    status = np.empty(count, dtype=np.uint8)
+    most = min(BLOCK, count)  # buffers with the variants of a number side by side
+    all_shared = np.repeat(own.parameters[:, None], most, axis=1)
+    all_lanes = np.repeat(lanes[:, :, None], most, axis=2)
+    for at in range(0, count, BLOCK):
+        rows = slice(at, min(at + BLOCK, count))
+        size = rows.stop - at
+        shared, each = all_shared[:, :size], all_lanes[:, :, :size]
+        for values, place in zip(table.values(), places, strict=True):
+            columns = np.reshape(values[rows], (size, -1))
+            for column, (group, i, lane) in zip(columns.T, place.slots, strict=True):
+                if group < 0:
+                    shared[i] = column
+                else:
+                    each[i, own.order[starts[group] + lane]] = column
+        answer = kernel.run({NUMBERS: shared.T, LANE_NUMBERS: np.moveaxis(each, -1, 0)})
+        status[rows] = answer.status
+        for name, (start, n) in layout.parameters.items():
+            if n:
+                found.parameters[rows, start : start + n] = answer.values[name].reshape(n, size).T
+        for group, names in enumerate(layout.lanes):
+            for name, (start, n) in names.items():
+                value = answer.values[f"{name}_{group}"].reshape(n, -1, size)
+                found.lanes[group][rows, start : start + n] = np.moveaxis(value, -1, 0)
+    for group, first in enumerate(found.lanes):
+        found.padding[group][...] = layout.idle(group, first[:, :, 0])
+    doubt = np.flatnonzero(status == AGAIN)
+    return VariantNumbers(found, status, doubt)
