@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import casadi as ca
 import numpy as np
 from oracles.random_mechanism import random_mechanism
 
@@ -13,6 +14,7 @@ from condyle.mechanism import Mechanism
 from condyle.mechanism.files import from_data
 from condyle.mechanism.home import dependent_coordinates
 from condyle.mechanism.paths import written
+from condyle.mechanism.surface import Expression
 from condyle.questions.number_paths import FileNumbers
 from condyle.questions.structure import Structure, structure_of, walls_of
 from support.families import ALL as FAMILIES
@@ -22,7 +24,8 @@ SURFACES: dict[str, dict[str, Any]] = {
     "every_kind": {"surface": "mixed", "contacts": 5, "chains": 8},
     "balls": {"surface": ("ellipsoid", "quadratic", "plane"), "contacts": 3, "ball_radius": 4.0},
     "balls_round": {"surface": ("sphere", "cylinder"), "ball_radius": 4.0},
-    "balls_profile": {"surface": "profile", "ball_radius": 4.0},
+    "balls_profile": {"surface": "profile"},
+    "balls_written": {"surface": "plane"},
 }
 
 
@@ -64,7 +67,18 @@ def machine_of(name: str) -> Mechanism:
     if name in FAMILIES:
         return rubbing(families(name).mechanism)
     rng = np.random.default_rng(sum(map(ord, name)))
-    return rubbing(from_data(random_mechanism(rng, **SURFACES[name])))
+    machine = from_data(random_mechanism(rng, **SURFACES[name]))
+    for contact in machine.contacts:
+        at = f"contact.{contact.name}"
+        if name == "balls_written":  # the plane, and waves on it
+            a, b = contact.surface.slope
+            waves = lambda p, a=a, b=b: p[2] - a * p[0] - b * p[1] - 2e-4 * ca.sin(90 * p[0])  # noqa: E731
+            off = float(waves(contact.point))
+            machine = machine.set(f"{at}.surface", Expression(waves, offset=off))
+        if name in ("balls_profile", "balls_written"):
+            ball = {f"{at}.ball_radius": 0.002, f"{at}.side": "above"}
+            machine = machine.set(ball, keep="home")
+    return rubbing(machine)
 
 
 def one_each(machine: Mechanism) -> list[str]:

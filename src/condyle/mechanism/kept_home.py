@@ -56,7 +56,8 @@ def followed(old: Contact, new: Contact) -> Contact:
     _, gradient = old.gradient()
     normal = gradient / np.linalg.norm(gradient)
     before, _ = missed(old, normal)
-    after, along = missed(new, normal, old.offset_surface.form)
+    same = (old.ball_radius is None) == (new.ball_radius is None)
+    after, along = missed(new, normal, old.offset_surface.form if same else None)
     by = after - before
     return new if by == 0 else new.model_copy(update={"surface": _moved(new.surface, by, along)})
 

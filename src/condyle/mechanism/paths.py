@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any, NoReturn
 
 from pydantic import BaseModel
@@ -18,6 +19,7 @@ from pydantic import BaseModel
 from ..errors import InputError, did_you_mean, printable, shortened, shown
 from .messages import entry
 from .quantities import listed
+from .surface import Expression
 from .table import Table
 from .table_schema import SIDE_OPTIONS
 
@@ -98,6 +100,8 @@ def _put(here: Any, keys: Path, depth: int, value: Any) -> Any:
     if isinstance(here, list | tuple):
         index = key if isinstance(key, int) else _names(here).index(key)
         return [*here[:index], below, *here[index + 1 :]]
+    if isinstance(here, Expression):
+        return replace(here, offset=below)
     return {**(here.entries() if isinstance(here, Table) else here), key: below}
 
 
@@ -111,6 +115,8 @@ def _child(here: Any, key: str | int, above: Path) -> Any:
         return _item(here, key, above)
     if isinstance(here, Table):
         entries: Mapping[str, Any] = here.entries()
+    elif isinstance(here, Expression):
+        entries = {"offset": here.offset}
     elif isinstance(here, Mapping):
         entries = here
     else:

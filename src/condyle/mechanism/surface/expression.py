@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -43,6 +44,8 @@ class Expression(Smooth):
     def __post_init__(self) -> None:
         if not callable(self.function):
             raise InputError(f"a surface needs a function of a point, got {self.function!r}")
+        if not isinstance(self.offset, int | float) or not math.isfinite(self.offset):
+            raise InputError(f"offset: expected a finite number [m], got {self.offset!r}")
         p = ca.SX.sym("p", 3)
         value = self.function(p)
         if not isinstance(value, ca.SX) or value.shape != (1, 1):
