@@ -6,9 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import reduce
 
+import numpy as np
+
 from .graph import Graph, Value, reachable
 from .operations import OPERATIONS, REDUCTIONS
-from .program import Port, Program
+from .program import ManyNumbers, Port, Program
 
 NUMBERS, LANE_NUMBERS = "numbers", "lane_numbers"  # ports of what else is fixed
 
@@ -88,6 +90,17 @@ def numbers_as_ports(program: Program, shared: int, lanes: Sequence[int]) -> Pro
     found = program.moved(graph, dict(zip(program.roots, moved, strict=True)))
     columns = first + shared + size * n
     return replace(found, columns=columns, ports=(*program.ports, *ports))
+
+
+def number_ports(numbers: ManyNumbers) -> dict[str, np.ndarray]:
+    """Mechanisms' numbers as `numbers_as_ports` takes them, a sample each: (V, size), and of lanes
+    (V, size, lanes) in the callers' order."""
+    size, n = max((own.shape[1] for own in numbers.lanes), default=0), len(numbers.order)
+    lanes, start = np.zeros((len(numbers), size, n)), 0
+    for own in numbers.lanes:
+        lanes[:, : own.shape[1], list(numbers.order[start : start + own.shape[2]])] = own
+        start += own.shape[2]
+    return {NUMBERS: numbers.parameters, LANE_NUMBERS: lanes}
 
 
 def jacobian(

@@ -165,7 +165,11 @@ class Closure:
             question = Question.about(structure, "closure", self.names)
             self.kernel = (backend or Backend()).kernel(question.key, question.variants, numbers)
         self.structure: Structure = structure
-        self._numbers = numbers
+        self._numbers, self._landmark = numbers, landmark
+
+    def numbers_of(self, mechanism: Mechanism) -> Numbers:
+        """The numbers of another mechanism of its structure, for its kernel."""
+        return Layout.of(self.structure).numbers(mechanism, self._landmark)
 
     @cached_property
     def followed(self) -> FollowedClosure:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from copy import copy
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -12,15 +12,16 @@ import numpy as np
 from ..backends.kernel import Answer, Arrays, sample_rows
 from ..backends.many_kernel import WHICH, ManyKernel
 from ..graph.program import ManyNumbers
-from ..questions.numbers import Layout
-from ..questions.structure import Structure
+from ..mechanism.mechanism import Mechanism
+from ..questions.numbers import Layout, agree
 from .closing import Closure, PlatformMotion
 from .distributing import Distributor
 from .inverse_dynamics import InverseDynamics
 from .robust_path import Robust
 from .system import System
 
-One = Callable[[int], System]
+KEPT = 64  # systems at hand
+Mechanisms = Callable[[int], Mechanism]
 Points = Callable[[str], np.ndarray]
 
 
@@ -33,8 +34,10 @@ class ManySystem(System):
 
     length: Any
 
-    def __init__(self, base: System, numbers: ManyNumbers, one: One, points: Points) -> None:
-        """Args: one: the system of each mechanism, for samples that no kernel can vouch for.
+    def __init__(
+        self, base: System, numbers: ManyNumbers, mechanism: Mechanisms, points: Points
+    ) -> None:
+        """Args: mechanism: each, for samples that no kernel can vouch for.
         points: of the platform, by name: of every mechanism, (V, 3) [m].
         """
         self.__dict__.update(
@@ -43,10 +46,14 @@ class ManySystem(System):
         shares = agree(base.structure, numbers)
         self._base = base if shares else base.serving_all
         self.structure = self._base.structure
-        self.many, self.one, self._points = numbers, one, points
+        self.many, self._mechanism, self._points = numbers, mechanism, points
+        self.one = lru_cache(KEPT)(self._lent)
         self._asked: dict[Any, Any] = {}
         place = Layout.of(self.structure).parameters["length"][0]
         self.length = numbers.parameters[:, place]
+
+    def _lent(self, i: int) -> System:
+        return self._base.lent(self._mechanism(i), self.many[i])
 
     def kernel(self, question: str, *details: Any) -> Any:
         key = question, details
@@ -164,11 +171,3 @@ class ManyInverse(InverseDynamics):
             own = {name: a[..., part] for name, a in values.items()}
             few = sample_rows(inputs, rows, len(which))
             super()._redistribute(self.distributor_of(i), own, status[part], few)
-
-
-def agree(structure: Structure, numbers: ManyNumbers) -> bool:
-    """Whether what a structure takes as zero is zero in all mechanisms."""
-    return all(
-        not (numbers.parameters[:, i] if group < 0 else numbers.lanes[group][:, i]).any()
-        for group, i in structure.zeros
-    )

@@ -87,6 +87,20 @@ class System:
         other._kernels, other._closures = {}, {}
         return other
 
+    @property
+    def family(self) -> System:
+        """Whose kernels it shares; itself where it has its own."""
+        return self._lender or self
+
+    def numberless(self, question: str, *details: Any) -> Kernel:
+        """The kernel of a question that takes the mechanism's numbers as ports."""
+        asked = question, details, "ports"
+        if asked not in self._kernels:
+            q = Question.about(self.structure, question, *details).with_ports()
+            none = Numbers.none(self.numbers.order)
+            self._kernels[asked] = self.backend.kernel(q.key, q.variants, none)
+        return self._kernels[asked]
+
     @cached_property
     def serving_all(self) -> System:
         """One whose kernels serve every mechanism of the structure, whatever is zero in this."""
@@ -163,6 +177,8 @@ class System:
         key = names, landmark
         if key not in self._closures:
             lender = None if self._lender is None else self._lender.closure(names, landmark)
+            if lender and not agree(lender.structure, lender.numbers_of(self.mechanism)):
+                lender = self.family.serving_all.closure(names, landmark)
             general = self.general is not None
             self._closures[key] = Closure(
                 self.mechanism, names, landmark, self.backend, general, lender

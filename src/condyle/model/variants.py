@@ -194,15 +194,10 @@ class Variants:
                 backend=system.backend.asked,
             ).system
 
-        @lru_cache(KEPT)
-        def one(i: int) -> Any:
-            source = system if agree_one(system.structure, numbers[i]) else system.serving_all
-            return source.lent(self.mechanism(int(rows[i])), numbers[i])
-
         def points(name: str) -> np.ndarray:
             return self.points(name)[rows]
 
-        many = ManySystem(system, numbers, one, points)
+        many = ManySystem(system, numbers, lambda i: self.mechanism(int(rows[i])), points)
         model = self.model._with(many, self.model._asked)
         inverse = ManyInverse(many, model._arguments, model._inverse.distributor)
         if self._own_limits:
@@ -320,14 +315,6 @@ class Variants:
         bad = np.flatnonzero(self.status)
         found.status[bad] = self.status[bad].reshape(-1, *(1 for _ in lead))
         return found
-
-
-def agree_one(structure: Structure, numbers: Numbers) -> bool:
-    """Whether what a structure takes as zero is zero in a mechanism."""
-    return all(
-        not (numbers.parameters[i] if group < 0 else numbers.lanes[group][i]).any()
-        for group, i in structure.zeros
-    )
 
 
 def _scattered(parts: list[tuple[np.ndarray, Any]], count: int) -> Any:

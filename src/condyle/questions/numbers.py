@@ -10,7 +10,7 @@ import numpy as np
 
 from ..dynamics import FORMULATIONS
 from ..errors import UnsupportedError
-from ..graph.program import Numbers
+from ..graph.program import ManyNumbers, Numbers
 from ..kinematics.chain import FAMILIES
 from ..kinematics.constraints import (
     ContactSymbols,
@@ -114,6 +114,14 @@ def specialised(structure: Structure, numbers: Numbers) -> Structure:
         none = (values == 0).all(axis=1) & (pad == 0)
         zeros += [(group, int(i)) for i in np.flatnonzero(none)]
     return replace(structure, zeros=frozenset(zeros))
+
+
+def agree(structure: Structure, numbers: Numbers | ManyNumbers) -> bool:
+    """Whether what a structure takes as zero is zero in a mechanism, or in all of them."""
+    return all(
+        not (numbers.parameters[..., i] if g < 0 else numbers.lanes[g][..., i, :]).any()
+        for g, i in structure.zeros
+    )
 
 
 def characteristic(structure: Structure, numbers: Numbers) -> float:

@@ -201,7 +201,7 @@ def _closed(
     shared: dict[Any, Any],
 ) -> ClosedLoop:
     table = scenario.controller
-    key = table.model, table.distribution, table.preload
+    key = table.model or id(model), table.distribution, table.preload
     if key not in shared:
         shared[key] = _own_model(model, table)
     own: Model = shared[key]

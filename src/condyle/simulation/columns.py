@@ -7,6 +7,7 @@ runs at once: it reads and writes the same rows.
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -14,7 +15,10 @@ import numpy as np
 
 from ..backends.c.compiled_kernel import ONE, CompiledKernel
 from ..backends.c.shared_library import aligned
-from ..backends.kernel import Kernel
+from ..backends.kernel import Kernel, shapes_of
+from ..graph.program import ManyNumbers
+from ..graph.transform import number_ports
+from ..model.model import Model
 
 SPARE = 64  # rows that a kernel may read past its inputs
 ALIGNED = 8  # numbers
@@ -34,7 +38,9 @@ class Columns:
         lanes[order] = np.arange(face.lanes)
         self._ports: dict[str, np.ndarray] = {}
         for port in face.ports:
-            self._ports[port.name] = port.start + (lanes if port.lanes else np.arange(port.size))
+            own = np.arange(port.size)
+            rows = (own[:, None] * face.lanes + lanes).ravel() if port.lanes else own
+            self._ports[port.name] = port.start + rows
         self._results: dict[str, np.ndarray] = {}
         start = 0
         for result in face.results:
@@ -53,6 +59,18 @@ class Columns:
         else:
             self.run = self._run
 
+    @staticmethod
+    def of(models: Sequence[Model], question: str, *details: Any) -> Columns:
+        """Of runs of models: where these differ in numbers, each run has its own in more rows."""
+        systems = [model.system for model in models]
+        if all(system is systems[0] for system in systems):
+            return Columns(models[0].kernel(question, *details), len(models))
+        found = Columns(systems[0].family.numberless(question, *details), len(models))
+        for name, values in number_ports(ManyNumbers.of([s.numbers for s in systems])).items():
+            if found.has(name):
+                found.fill(name, values)
+        return found
+
     def _rows(self, count: int) -> np.ndarray:
         found = aligned(count * self.stride).reshape(count, self.stride)
         found[:] = 0.0
@@ -60,9 +78,10 @@ class Columns:
 
     def _run(self) -> int:
         """By arrays; at the first run alone."""
+        shapes = shapes_of(self.kernel.interface)
         ports = {
-            port.name: self.given[self._ports[port.name], :1].T
-            for port in self.kernel.interface.ports
+            name: self.given[self._ports[name], 0].reshape(1, *shape)
+            for name, shape in shapes.items()
         }
         answer = self.kernel.run(ports)
         for name, rows in self._results.items():

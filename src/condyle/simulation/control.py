@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ..errors import InputError
+from ..graph.program import ManyNumbers
+from ..graph.transform import number_ports
+from ..model.model import Model
 from ..questions.law.controller import Reference
 from ..questions.observer import Measured
 from ..questions.tick import REFERENCE, REQUEST, carried
@@ -47,7 +50,7 @@ class Controller:
         self.outside = function or drive.model.chooses_efforts
         apart = self.outside and not function
         details = (*self.details, True) if apart else self.details
-        self.columns = Columns(drive.model.kernel("tick", *details), len(plans))
+        self.columns = Columns.of([drive_of(p).model for p in plans], "tick", *details)
         self._apart = self.columns if self.outside else None
         self.ticks = plan.ticks()
         self._rows = np.concatenate([self.columns.rows(name) for name in REFERENCE])
@@ -91,7 +94,8 @@ class Controller:
             return
         at = np.array([plan.q for plan in plans]), np.array([plan.q1 for plan in plans])
         ports = dict(zip(("q", "q1"), at, strict=True))
-        own, true = (m.kernel("instant").run(ports).values for m in (self._model, self.plan.model))
+        models = [drive.model for drive in drives], [plan.model for plan in plans]
+        own, true = (_instants(each, ports) for each in models)
         joint = true["joint"].T
         step = np.array([drive.sensing.resolution for drive in drives])  # type: ignore[union-attr]
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -225,3 +229,12 @@ class Controller:
                 f"shape ({n},), one a chain, finite"
             )
         return effort
+
+
+def _instants(models: Sequence[Model], ports: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The question `instant` of a state of each model, which are alike."""
+    systems = [model.system for model in models]
+    if all(system is systems[0] for system in systems):
+        return models[0].kernel("instant").run(ports).values
+    numbers = number_ports(ManyNumbers.of([system.numbers for system in systems]))
+    return systems[0].family.numberless("instant").run({**ports, **numbers}).values

@@ -75,7 +75,7 @@ class Plant:
             measured = [i for i, load in enumerate(plan.loads) if load.place == place]
         laws = tuple(load.law for load in plan.loads)
         self.details = (laws, tuple(measured), tuple(self._bounded), tuple(self._sided))
-        self.columns = Columns(plan.model.kernel("rate", *self.details), len(plans))
+        self.columns = Columns.of([p.model for p in plans], "rate", *self.details)
         self.fill(plans)
 
     def fill(self, plans: Sequence[Plan]) -> None:
@@ -85,7 +85,7 @@ class Plant:
         for name in ("low", "high", "speed"):
             fill(name, np.clip([getattr(plan, name) for plan in plans], -WIDE, WIDE))
         if self._bounded:
-            fill("bounds", [bounds(plans[0], self._bounded)])
+            fill("bounds", [bounds(plan, self._bounded) for plan in plans])
         if self._sided:
             fill("push", [self._push])
         for i, load in enumerate(plans[0].loads):

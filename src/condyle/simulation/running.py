@@ -16,6 +16,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from ..backends.threads import workers
+from ..model.model import Model
 from ..progress import step as progress
 from ..status import STATUS_NAMES, Status
 from .control import Controller, PoseLostError
@@ -58,7 +59,10 @@ def run_all(plans: Sequence[Plan], threads: int | None = None) -> list[Trace]:
             found.update(zip(part, crowd.traces(), strict=True))
 
         for part in alike.values():
-            Run([plans[part[0]]])  # kernels are there before threads ask for them
+            Run([plans[part[0]]])
+            Run(
+                [plans[i] for i in part[:TOGETHER]]
+            )  # kernels are there before threads ask for them
         with ThreadPoolExecutor(workers(threads)) as pool:
             list(pool.map(together, parts))
     return [found[i] for i in range(len(plans))]
@@ -71,12 +75,17 @@ def _shape(plan: Plan) -> Any:
         own: tuple[Any, ...] = (drive.times.tobytes(),)
     else:
         sensing = None if drive.sensing is None else drive.sensing.velocity
-        own = (id(drive.model), drive.law.table, drive.law.choices, drive.period, drive.delay)
+        own = (_family(drive.model), drive.law.table, drive.law.choices, drive.period, drive.delay)
         own += (sensing, drive.law.place, drive.function)
     loads = tuple((load.law, load.place, load.times.tobytes()) for load in plan.loads)
     limits = np.isfinite(plan.speed).tobytes()
     time = (plan.duration, plan.times.tobytes(), plan.method, plan.settings.step)
-    return id(plan.model), own, loads, limits, time, tuple(plan.functions)
+    return _family(plan.model), own, loads, limits, time, tuple(plan.functions)
+
+
+def _family(model: Model) -> Any:
+    """What models have in common whose numbers alone differ."""
+    return id(model.system.family), model.distribution, model.mechanism.contact_names
 
 
 class Run:
@@ -240,8 +249,8 @@ class Run:
                 (own.samples[:sampled], theirs.samples[:sampled]),
                 (own.states[:sampled], theirs.states[:sampled]),
             ]
-        for to, source in pairs:
-            to[..., 0] = source[..., i]
+        for to, source in pairs:  # rows of the crowd's numbers come last
+            to[..., 0] = source[: len(to), ..., i]
 
     def _trace(self, i: int) -> Trace:
         plan, control, sampled = self.plans[i], self.control, self.clock.tick + 1
