@@ -121,6 +121,7 @@ if TYPE_CHECKING:
 register("model.solve", "condyle.results.solving:solve")
 register("model.variants", "condyle.model.variants:Variants")
 register("variants.solve", "condyle.results.variant_solutions:solve")
+register("variants.simulate", "condyle.simulation.simulating:of_variants")
 register("model.to_casadi", "condyle.frameworks.casadi_functions:CasadiFunctions")
 register("model.to_torch", "condyle.frameworks.torch_functions:TorchFunctions")
 register("model.to_jax", "condyle.frameworks.jax_functions:JaxFunctions")

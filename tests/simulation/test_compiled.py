@@ -300,3 +300,39 @@ def test_drives_that_chatter_stay_in_compiled_code() -> None:
     assert trace.ended is None and sum(run.logs[0].counts.values()) > 300
     assert {event.kind for event in trace.events} == {"saturated"}
     assert set(codes) == {running.DONE, running.PAUSE} and len(codes) < 10
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["encoders", "computed torque, late, with loads", "impedance"])
+def test_variants_in_lockstep(model: condyle.Model, name: str) -> None:
+    """Each with numbers of its own, one of which is no mechanism, against each by itself."""
+    scenario = {**BASE, "start": {"beta": 0.05, "dbeta": -0.3}, **CASES[name]}
+    machine = model.mechanism
+    axis = np.array(machine.get("chain.masseter_left.base"))
+    batch = model.variants(
+        {
+            "platform.mass": [0.2, 0.3, -1.0, 0.26, 0.28],
+            "chain.masseter_left.base": axis + np.outer(np.arange(5), (1e-5, 0.0, 0.0)),
+            "platform.points.incisor[1]": [0.0, 0.0, 0.0, 0.0, 2e-3],
+        }
+    )
+    seen: list[int] = []
+    crowd = running.Run.__init__
+
+    def noted(run: Any, plans: Any, *rest: Any) -> None:
+        seen.append(len(plans))
+        crowd(run, plans, *rest)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(running.Run, "__init__", noted)
+        found = batch.simulate(scenario)
+    assert 4 in seen and found[2] is None
+    for i in (0, 1, 3, 4):
+        own = condyle.simulate(condyle.derive(batch.mechanism(i)), scenario)
+        for variable in ("pose", "effort", "energy", "contact_force"):
+            got, wanted = found[i][variable].values, own[variable].values
+            assert np.abs(got - wanted).max() < 1e-10 * np.abs(wanted).max(), variable
+        assert [e["kind"] for e in found[i].condyle.events] == [
+            e["kind"] for e in own.condyle.events
+        ]
+    assert np.abs(found[0]["effort"].values - found[1]["effort"].values).max() > 1e-6

@@ -24,7 +24,7 @@ from ..questions import Question
 from ..questions.file_numbers import numbers_of
 from ..questions.friction import MOST
 from ..questions.number_paths import number_jacobian
-from ..questions.numbers import characteristic, require_closed_form, specialised
+from ..questions.numbers import agree, characteristic, require_closed_form, specialised
 from ..questions.structure import structure_of
 from .closing import Closure
 from .distributing import LEAST, Distribution, Distributor

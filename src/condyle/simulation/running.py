@@ -59,10 +59,8 @@ def run_all(plans: Sequence[Plan], threads: int | None = None) -> list[Trace]:
             found.update(zip(part, crowd.traces(), strict=True))
 
         for part in alike.values():
-            Run([plans[part[0]]])
-            Run(
-                [plans[i] for i in part[:TOGETHER]]
-            )  # kernels are there before threads ask for them
+            for some in (part[:1], part[:TOGETHER]):
+                Run([plans[i] for i in some])  # kernels are there before threads ask for them
         with ThreadPoolExecutor(workers(threads)) as pool:
             list(pool.map(together, parts))
     return [found[i] for i in range(len(plans))]

@@ -13,6 +13,7 @@ from ..errors import InputError, ScenarioError
 from ..mechanism.mechanism import Mechanism
 from ..model.given import as_model
 from ..model.model import Model
+from ..model.variants import Variants
 from ..motion import Motion
 from .bind import bind
 from .first_scenario import default_scenario
@@ -103,6 +104,19 @@ def _require_begun(plans: Sequence[Plan], traces: Sequence[Trace]) -> None:
         state = ", ".join(f"{name} = {x:g}" for name, x in last.state.items() if x) or "home"
         problem = f"start: nothing moves from {state}: {last.kind}{owner}: {last.text}"
         raise ScenarioError(plan.source, [f"{problem}; begin elsewhere"])
+
+
+def of_variants(variants: Variants, scenario: ScenarioLike, threads: int | None) -> list[Any]:
+    """As `Variants.simulate`."""
+    start, asked, shared = time.perf_counter(), as_scenario(scenario), dict[Any, Any]()
+    good = [i for i in range(len(variants)) if not variants.status[i]]
+    plans = [bind(variants.alone(i), asked, source=f"variant {i}", shared=shared) for i in good]
+    found: list[Any] = [None] * len(variants)
+    traces = run_all(plans, threads) if plans else []
+    _require_begun(plans, traces)
+    for i, plan, trace in zip(good, plans, traces, strict=True):
+        found[i] = solved(plan, trace, start)
+    return found
 
 
 def check_gains(
