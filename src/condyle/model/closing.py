@@ -167,9 +167,9 @@ class Closure:
         self.structure: Structure = structure
         self._numbers, self._landmark = numbers, landmark
 
-    def numbers_of(self, mechanism: Mechanism) -> Numbers:
+    def numbers_for(self, mechanism: Mechanism) -> Numbers:
         """The numbers of another mechanism of its structure, for its kernel."""
-        return Layout.of(self.structure).numbers(mechanism, self._landmark)
+        return numbers_of(self.structure, mechanism, self._landmark)
 
     @cached_property
     def followed(self) -> FollowedClosure:

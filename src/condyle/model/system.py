@@ -177,7 +177,7 @@ class System:
         key = names, landmark
         if key not in self._closures:
             lender = None if self._lender is None else self._lender.closure(names, landmark)
-            if lender and not agree(lender.structure, lender.numbers_of(self.mechanism)):
+            if lender and not agree(lender.structure, lender.numbers_for(self.mechanism)):
                 lender = self.family.serving_all.closure(names, landmark)
             general = self.general is not None
             self._closures[key] = Closure(
