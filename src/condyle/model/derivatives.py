@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from .forward_kinematics import ForwardKinematics
 from .implicit import Held, accelerated, balanced, placed, read_back, samples_first
 from .inverse_dynamics import InverseDynamics
 from .model_result import ModelResult
+from .number_columns import NumberColumns
 from .poses import Poses
 from .system import System
 
@@ -124,9 +126,11 @@ class Derived:
 
     # -- what a model offers -----------------------------------------------------------------
 
-    def matrices(self, of: Any, wrt: Any, given: Mapping[str, Any], zeros: bool) -> Derivatives:
+    def matrices(
+        self, of: Any, wrt: Any, given: Mapping[str, Any], zeros: bool = False, keep: str = "home"
+    ) -> Derivatives:
         """As `Model.derivatives`."""
-        asked = _Asked.of(self._system, of, wrt, given, zeros)
+        asked = _Asked.of(self._system, of, wrt, given, zeros, keep)
         lead, count, ports = self._samples(given)
         parts, status = self._parts(asked, ports, count)
         values = {
@@ -139,23 +143,26 @@ class Derived:
             for name in part.names:
                 for by in asked.wrt:
                     values[name, by][part.good] = 0.0
-            for by, columns in self._by_states(part, asked.wrt):
+            for by, columns in self._by_states(part, asked.states):
                 for name in part.names:
                     values[name, by][part.good] = part.held.applied(name, columns)
             for name, block in self._by_numbers(part, asked.J).items():
                 for by, at in asked.columns.items():
                     values[name, by][part.good] += block[:, :, at]
         units = {(n, by): f"({UNITS[n]}) / ({asked.unit(by)})" for n, by in values}
-        shaped = {(n, by): self._shaped(a, lead, n) for (n, by), a in values.items()}
+        shaped = {
+            (n, by): a.reshape(*lead, *self._shape(n), *asked.shapes[by])
+            for (n, by), a in values.items()
+        }
         return Derivatives(shaped, status.reshape(lead), units)
 
     def jvp(
-        self, of: Any, tangents: Mapping[str, Any], given: Mapping[str, Any], zeros: bool
+        self, of: Any, tangents: Mapping[str, Any], given: Mapping[str, Any], zeros: bool, keep: str
     ) -> Derivatives:
         """As `Model.jvp`."""
         if not isinstance(tangents, Mapping):
             raise InputError(f"tangents: expected arrays by name, got {shown(tangents)}")
-        asked = _Asked.of(self._system, of, tuple(tangents), given, zeros)
+        asked = _Asked.of(self._system, of, tuple(tangents), given, zeros, keep)
         lead, count, ports = self._samples(given)
         along = {name: asked.rows(name, a, lead, count) for name, a in tangents.items()}
         parts, status = self._parts(asked, ports, count)
@@ -166,24 +173,25 @@ class Derived:
         }
         for part in parts:
             directions: Arrays = {}
-            for by in [b for b in along if b in part.kind.by]:
-                directions |= _split(by, along[by][part.good])
+            for by, state in asked.states.items():
+                if state in part.kind.by:
+                    directions |= _split(state, along[by][part.good])
             if asked.numbers:
                 steps = np.concatenate([along[by] for by in asked.columns], axis=1)[part.good]
                 directions |= _as_ports(part.held.system, steps @ asked.J.T)
             rows = self._along(part.held, directions)[..., None]
             for name in part.names:
                 values[name][part.good] = part.held.applied(name, rows)[..., 0]
-        shaped = {n: self._shaped(a[..., None], lead, n)[..., 0] for n, a in values.items()}
+        shaped = {n: a.reshape(*lead, *self._shape(n)) for n, a in values.items()}
         return Derivatives(shaped, status.reshape(lead), {n: UNITS[n] for n in shaped})
 
     def vjp(
-        self, of: Any, weights: Any, wrt: Any, given: Mapping[str, Any], zeros: bool
+        self, of: Any, weights: Any, wrt: Any, given: Mapping[str, Any], zeros: bool, keep: str
     ) -> Derivatives:
         """As `Model.vjp`."""
         names = _names(of, "of")
         weights = weights if isinstance(weights, Mapping) else dict.fromkeys(names, weights)
-        asked = _Asked.of(self._system, of, wrt, given, zeros)
+        asked = _Asked.of(self._system, of, wrt, given, zeros, keep)
         lead, count, ports = self._samples(given)
         every = [name for _, some in asked.kinds for name in some]
         if missing := [name for name in every if name not in weights]:
@@ -199,11 +207,13 @@ class Derived:
         for part in parts:
             rows = [given_weights[n].reshape(count, -1)[part.good] for n in part.names]
             total = sum(part.held.pulled(n, w) for n, w in zip(part.names, rows, strict=True))
-            states = [b for b in asked.wrt if b in part.kind.by]
-            by = [p for b in states for p in PORTS[b]] + list(OF_NUMBERS if asked.numbers else ())
+            states = {b: state for b, state in asked.states.items() if state in part.kind.by}
+            by = [p for state in states.values() for p in PORTS[state]] + list(
+                OF_NUMBERS if asked.numbers else ()
+            )
             found = self._gradient(part.held, np.asarray(total), tuple(by)) if by else {}
-            for b in states:
-                values[b][part.good] += np.concatenate([found[p] for p in PORTS[b]], axis=1)
+            for b, state in states.items():
+                values[b][part.good] += np.concatenate([found[p] for p in PORTS[state]], axis=1)
             for b, at in asked.columns.items():
                 values[b][part.good] += (found[NUMBERS] @ asked.J)[:, at]
         shaped = {by: a.reshape(*lead, *asked.shapes[by]) for by, a in values.items()}
@@ -212,7 +222,7 @@ class Derived:
     def linearised(self, q: Any, v: Any, effort: Any, wrench: Any, at: Any) -> ModelResult:
         """As `Model.linearise`."""
         given = {"q": q, "v": v, "effort": effort, "wrench": wrench, "at": at}
-        d = self.matrices("acceleration", ("q", "v", "effort"), given, False)
+        d = self.matrices("acceleration", ("q", "v", "effort"), given)
         by = {name: d["acceleration", name] for name in ("q", "v", "effort")}
         shape, known = by["q"].shape, np.isfinite(by["q"]).all(axis=(-1, -2))
         still = np.where(known[..., None, None], 0.0, np.nan)
@@ -304,19 +314,19 @@ class Derived:
 
     # -- derivatives of the rows -------------------------------------------------------------
 
-    def _by_states(self, part: _Part, wrt: Iterable[str]) -> Iterator[tuple[str, Array]]:
+    def _by_states(self, part: _Part, states: Mapping[str, str]) -> Iterator[tuple[str, Array]]:
         """Of the rows by each of these that matter, (N, rows, size)."""
-        held, wrt = part.held, [by for by in wrt if by in part.kind.by]
-        if by := tuple(p for name in wrt for p in PORTS[name]):
+        held, states = part.held, {by: s for by, s in states.items() if s in part.kind.by}
+        if by := tuple(dict.fromkeys(p for state in states.values() for p in PORTS[state])):
             kernel = held.system.derivative("slopes", held.question, by, held.rows)
             values = kernel.run(held.ports).values
-            for name in wrt:
+            for name, state in states.items():
                 ports = (
                     [
-                        _columns(values[f"{row}/{p}"], row in OF_LANES, p in OF_LANES)
+                        _columns(values[f"{row}/{port}"], row in OF_LANES, port in OF_LANES)
                         for row in held.rows
                     ]
-                    for p in PORTS[name]
+                    for port in PORTS[state]
                 )
                 yield name, np.concatenate([np.concatenate(p, axis=1) for p in ports], axis=2)
 
@@ -397,46 +407,61 @@ class Derived:
     def _size(self, name: str) -> int:
         return math.prod(self._shape(name))
 
-    def _shaped(self, a: Array, lead: Lead, name: str) -> Array:
-        return a.reshape(*lead, *self._shape(name), a.shape[-1])
-
 
 @dataclass(frozen=True)
 class _Asked:
     """What is asked for: results by kind, and what they are differentiated by.
 
     system: whose kernels have the derivatives.
+    states: those of `wrt` that are states or loads, and which.
     shapes: of each of `wrt`;  columns: of each number of the file among those of J, (K, F).
     """
 
     system: System
     kinds: list[tuple[Kind, tuple[str, ...]]]
     wrt: tuple[str, ...]
-    shapes: dict[str, tuple[int, ...]]
+    states: dict[str, str]
+    shapes: Mapping[str, tuple[int, ...]]
     units: dict[str, str]
     columns: dict[str, slice]
     J: Array
 
     @staticmethod
-    def of(system: System, of: Any, wrt: Any, given: Mapping[str, Any], zeros: bool) -> _Asked:
+    def of(
+        own: System, of: Any, wrt: Any, given: Mapping[str, Any], zeros: bool, keep: str
+    ) -> _Asked:
         zeros = as_flag(zeros, "zeros")
         kinds = _kinds(_names(of, "of"), given)
-        states = {
-            "q": (m := len(system.independent),), "v": (m,), "a": (m,), "wrench": (6,), "at": (3,),
-            "effort": (n := len(system.mechanism.chains),), "joint": (n,),
+        sizes = {
+            "q": (m := len(own.independent),), "v": (m,), "a": (m,), "wrench": (6,), "at": (3,),
+            "effort": (n := len(own.mechanism.chains),), "joint": (n,),
         }  # fmt: skip
-        asked, shapes, units = _names(wrt, "wrt"), dict[str, tuple[int, ...]](), dict[str, str]()
-        for by in asked:
-            if by not in states:
-                raise InputError(f"wrt: there is no {shown(by)}.{did_you_mean(by, states)}")
-            shapes[by], units[by] = states[by], UNITS[by]
-            for kind, names in kinds:
-                if by not in kind.by and not zeros:
-                    raise InputError(
-                        f"wrt: {', '.join(names)} cannot depend on {by}, only on "
-                        f"{', '.join(kind.by)} and numbers of the file; zeros=True gives zeros"
-                    )
-        return _Asked(system, kinds, asked, shapes, units, {}, np.zeros((0, 0)))
+        asked = _names(wrt, "wrt")
+        states = {by: by for by in asked if by in sizes}
+        if isinstance(at := given.get("at"), str):  # that point is a number of the file
+            states |= {by: "at" for by in asked if by == f"platform.points.{at}"}
+        for (kind, names), (by, state) in product(kinds, states.items()):
+            if state not in kind.by and not zeros:
+                raise InputError(
+                    f"wrt: {', '.join(names)} cannot depend on {by}, only on "
+                    f"{', '.join(kind.by)} and numbers of the file; zeros=True gives zeros"
+                )
+        shapes: dict[str, tuple[int, ...]] = {by: sizes[state] for by, state in states.items()}
+        units = {by: UNITS[state] for by, state in states.items()}
+        paths = [by for by in asked if by not in states]
+        for by in paths:
+            if "." not in by and by != "gravity":
+                raise InputError(
+                    f"wrt: there is no {shown(by)}.{did_you_mean(by, sizes)} Or the path of a "
+                    "number of the file, such as platform.mass"
+                )
+        if not paths:
+            return _Asked(own, kinds, asked, states, shapes, units, {}, np.zeros((0, 0)))
+        terms = [term for kind, names in kinds for term in _terms(kind, names)]
+        n_ = NumberColumns.of(own, paths, keep, zeros, terms)
+        return _Asked(
+            n_.system, kinds, asked, states, shapes | n_.shapes, units | n_.units, n_.columns, n_.J
+        )
 
     @property
     def numbers(self) -> bool:
@@ -444,7 +469,7 @@ class _Asked:
 
     @property
     def sizes(self) -> dict[str, int]:
-        return {by: math.prod(shape) for by, shape in self.shapes.items()}
+        return {by: math.prod(self.shapes[by]) for by in self.wrt}
 
     def unit(self, by: str) -> str:
         return self.units[by]
@@ -476,6 +501,15 @@ def _groups(system: System) -> list[tuple[Array, int]]:
         found.append((order[start : start + values.shape[1]], values.shape[0]))
         start += values.shape[1]
     return found
+
+
+def _terms(kind: Kind, names: tuple[str, ...]) -> list[tuple[str, str, tuple[str, ...]]]:
+    """Results, and the question and its results that they follow from."""
+    if kind in (INVERSE, FORWARD):
+        rows = ("residual", "along", "across") if kind is INVERSE else ("residual",)
+        return [(name, "linear", rows) for name in names]
+    own = {"q": ("pull",), "singularity_ratio": ("transmission", "J_W")}
+    return [(name, "places", own.get(name, (name,))) for name in names]
 
 
 def _kinds(of: tuple[str, ...], given: Mapping[str, Any]) -> list[tuple[Kind, tuple[str, ...]]]:

@@ -258,6 +258,7 @@ class Model:
         wrench: ArrayLike | None = None,
         at: Point = None,
         zeros: bool = False,
+        keep: str = "home",
     ) -> Derivatives:
         """Exact derivatives of results by states, loads and numbers of the file.
 
@@ -274,13 +275,15 @@ class Model:
                  and paths of numbers of the file.
                  q, v, a, effort, wrench, at: as of `Model`;  joint: (..., n) [rad or m].
                  zeros: whether what cannot matter gives zeros, not an error.
+                 keep: home: a surface follows a change of other numbers, so that its contact stays
+                 on it at home; all: all else is held.
         Returns: by name, (..., of the result, of what it is taken by) [SI], status (...), and
                  units. NaN where the status is neither ok nor kink.
         Raises:  InputError: for unknown names, missing arguments, and what cannot matter.
         """
         given = {"q": q, "v": v, "a": a, "effort": effort, "joint": joint}
         given |= {"wrench": wrench, "at": at}
-        return self._derived.matrices(of, wrt, given, zeros)
+        return self._derived.matrices(of, wrt, given, zeros, keep)
 
     def jvp(
         self,
@@ -295,6 +298,7 @@ class Model:
         wrench: ArrayLike | None = None,
         at: Point = None,
         zeros: bool = False,
+        keep: str = "home",
     ) -> Derivatives:
         """Derivatives along a direction, by one sweep: d["effort"], (..., n).
 
@@ -302,7 +306,7 @@ class Model:
         """
         given = {"q": q, "v": v, "a": a, "effort": effort, "joint": joint}
         given |= {"wrench": wrench, "at": at}
-        return self._derived.jvp(of, tangents, given, zeros)
+        return self._derived.jvp(of, tangents, given, zeros, keep)
 
     def vjp(
         self,
@@ -318,6 +322,7 @@ class Model:
         wrench: ArrayLike | None = None,
         at: Point = None,
         zeros: bool = False,
+        keep: str = "home",
     ) -> Derivatives:
         """Derivatives of a weighted sum of results, by one reverse sweep: d["q"], (..., m).
 
@@ -326,7 +331,7 @@ class Model:
         """
         given = {"q": q, "v": v, "a": a, "effort": effort, "joint": joint}
         given |= {"wrench": wrench, "at": at}
-        return self._derived.vjp(of, cotangents, wrt, given, zeros)
+        return self._derived.vjp(of, cotangents, wrt, given, zeros, keep)
 
     def mass_matrix(self, q: ArrayLike, *, space: str = "q") -> Array:
         """M_r of [Cheng2023] eqs (57), (63), (..., m, m) [kg, kg m, kg m^2].

@@ -154,18 +154,20 @@ class System:
     def wide(self) -> System:
         """The same with all numbers of the kernel, for derivatives in those that are at zero.
 
-        Contacts on parallel planes stand alone, every contact has friction, every actuator losses.
+        Contacts on parallel planes stand alone, and every actuator has losses.
         """
+        return self._restructured(zeros=frozenset(), parallel=False, losses=True)
+
+    @cached_property
+    def rubbing(self) -> System:
+        """The same with friction at every contact."""
+        return self.wide._restructured(friction=tuple(range(len(self.structure.contacts))))
+
+    def _restructured(self, **changes: Any) -> System:
         other = copy(self)
-        other.structure = replace(
-            self.structure,
-            zeros=frozenset(),
-            parallel=False,
-            losses=True,
-            friction=tuple(range(len(self.structure.contacts))),
-        )
+        other.structure = replace(self.structure, **changes)
         other.numbers = numbers_of(other.structure, self.mechanism)
-        other.general, other._kernels = None, {}
+        other.general, other._lender, other._kernels = None, None, {}
         return other
 
     def number_jacobian(self, paths: Sequence[str], keep: str = "home") -> np.ndarray:

@@ -105,8 +105,9 @@ def rows_of_J_W(b: Builder, platform: Platform, loops: list[Loop]) -> Lanes:
         x = _reflected_by(reflections, column)[i:]
         size = ca.norm_2(x)
         sign = ca.copysign(sign, sign * x[0])
-        w = ca.vertcat(x[0] + ca.copysign(size, x[0]), x[1:])
-        reflections.append((w, 1 / (size * (size + ca.fabs(x[0])))))
+        size = ca.copysign(size, x[0])  # |x_0| would have no slope where it is 0
+        w = ca.vertcat(x[0] + size, x[1:])
+        reflections.append((w, 1 / (size * w[0])))
     rows = []
     for row in twist_rows(b, platform, [loop.rod / loop.rod_length for loop in loops]):
         own = _reflected_by(reflections, scale * row)[len(columns) :]

@@ -1,0 +1,145 @@
+"""Numbers of the mechanism file that derivatives are taken by."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from ..errors import InputError
+from ..graph.graph import reachable
+from ..graph.program import Program
+from ..mechanism.kept_home import kept_contacts
+from ..mechanism.paths import value_at
+from ..questions import Question
+from ..questions.file_numbers import file_numbers
+from ..questions.number_paths import FileNumbers, NumberPath, Slot
+from ..questions.numbers import Layout
+from ..questions.structure import Structure, walls_of
+from .system import System
+
+Place = tuple[object, ...]  # of a number: group or -1, index
+
+
+@dataclass(frozen=True)
+class NumberColumns:
+    """Numbers of the file, and what they make of the kernel's.
+
+    system: whose kernels take all these numbers.
+    J:      derivatives of the kernel's numbers, (K, F);  columns: of each path, in J.
+    shapes, units: of each path, also of those that have no columns: they cannot matter.
+    """
+
+    system: System
+    J: np.ndarray
+    columns: dict[str, slice]
+    shapes: dict[str, tuple[int, ...]]
+    units: dict[str, str]
+
+    @staticmethod
+    def of(
+        own: System,
+        paths: Sequence[str],
+        keep: str,
+        zeros: bool,
+        terms: Sequence[tuple[str, str, tuple[str, ...]]],
+    ) -> NumberColumns:
+        """Args: zeros: whether numbers that cannot matter are no error.
+        terms: results by name, and the question and its results that they follow from.
+
+        Raises: InputError: for unknown paths, and numbers that cannot matter.
+        """
+        rubs = any("friction" in path for path in paths)
+        system = own.rubbing if rubs else own.wide
+        structure, mechanism = system.structure, own.mechanism
+        walls = walls_of(mechanism, structure, kept_contacts(mechanism, paths, keep))
+        every, known = FileNumbers(mechanism, structure, walls), dict[str, NumberPath]()
+        shapes, units = dict[str, tuple[int, ...]](), dict[str, str]()
+        for path in paths:
+            try:
+                (known[path],) = every.at([path])
+                shapes[path], units[path] = known[path].shape, known[path].unit
+            except InputError:
+                value = value_at(mechanism, path) if "*" not in path else ""
+                shape = () if value is None else np.shape(value)
+                if isinstance(value, str) or not _numeric(value):
+                    raise
+                _require(zeros, path, [name for name, *_ in terms])
+                shapes[path], units[path] = shape, ""
+        every.at(list(known))  # none shares a number with another
+        J = np.zeros((_size(system), 0))
+        if known:
+            J = system.number_jacobian(list(known), keep)
+        program, places = file_numbers(structure, walls), _places(structure)
+        columns, start = dict[str, slice](), 0
+        for path, one in known.items():
+            columns[path] = slice(start, start + one.size)
+            moved = {places[i] for i in np.flatnonzero(J[:, columns[path]].any(axis=1))}
+            start += one.size
+            for name, question, rows in terms:
+                used = _used(structure, question, rows)
+                if not (moved & used or _joined(program, structure, one.slots, used)):
+                    _require(zeros, path, [name])
+        return NumberColumns(system, J, columns, shapes, units)
+
+
+def _numeric(value: object) -> bool:
+    try:
+        return value is None or np.asarray(value, dtype=float).size > 0
+    except (TypeError, ValueError):
+        return False
+
+
+def _require(zeros: bool, path: str, names: Sequence[str]) -> None:
+    if not zeros:
+        raise InputError(
+            f"wrt: {', '.join(names)} cannot depend on {path}; leave it out, or take zeros=True "
+            "for zeros"
+        )
+
+
+def _size(system: System) -> int:
+    return system.numbers.parameters.size + sum(a.size for a in system.numbers.lanes)
+
+
+def _places(structure: Structure) -> list[Place]:
+    """Of each of the K numbers of a kernel."""
+    shared, lanes = Layout.of(structure).sizes
+    found: list[Place] = [(-1, i) for i in range(shared)]
+    for group, (size, count) in enumerate(zip(lanes, structure.counts, strict=True)):
+        found += [(group, i) for i in range(size) for _ in range(count)]
+    return found
+
+
+@lru_cache(maxsize=64)
+def _used(structure: Structure, question: str, rows: tuple[str, ...]) -> frozenset[Place]:
+    """Numbers of the kernel that results of a question depend on."""
+    program = Question.about(structure, question).variants().main
+    found = [o for o in program.outputs if o.name in rows]
+    return frozenset(_leaves(program, [v for o in found for e in o.entries for v in e]))
+
+
+def _leaves(program: Program, values: Sequence[int | None]) -> set[Place]:
+    graph = program.graph
+    nodes = (graph.nodes[v] for v in reachable(graph, [v for v in values if v is not None]))
+    both = {"parameter": lambda data: (-1, *data), "lane": tuple}
+    return {both[n.op](n.data) for n in nodes if n.op in both}
+
+
+def _joined(
+    program: Program, structure: Structure, slots: Sequence[Slot], used: frozenset[Place]
+) -> bool:
+    """Whether numbers of the file lead to some of the kernel's, even where the slope is 0."""
+    layout, own = Layout.of(structure), {slot[:2] for slot in slots}
+    for o in program.outputs:
+        name, _, group = o.name.rpartition("_")
+        at, slots_of = (-1, layout.parameters)
+        if o.name not in slots_of:
+            at, slots_of = int(group), layout.lanes[int(group)]
+        start, _ = slots_of[o.name if at < 0 else name]
+        values = [e[max(at, 0)] for i, e in enumerate(o.entries) if (at, start + i) in used]
+        if own & _leaves(program, values):
+            return True
+    return False
