@@ -12,8 +12,8 @@ import condyle
 from condyle.errors import CondyleError
 from condyle.mechanism import Mechanism
 from condyle.questions.file_numbers import numbers_of
+from condyle.questions.many_numbers import variant_numbers
 from condyle.questions.structure import structure_of
-from condyle.questions.variant_numbers import variant_numbers
 from condyle.status import Status
 
 COUNT = 60
