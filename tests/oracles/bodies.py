@@ -62,7 +62,7 @@ def rod(start: Jet, end: Jet, home: Array) -> Rod:
     return Rod(start, u, R, guide)
 
 
-def platform(raw: dict[str, Any], pose: Jet) -> Body:
+def platform(raw: dict[str, Any], pose: Jet, unit: float) -> Body:
     angles = [pose[3], pose[4], pose[5]]
     R = rotation_x(cos(angles[0]), sin(angles[0]))
     R = R @ rotation_y(cos(angles[1]), sin(angles[1])) @ rotation_z(cos(angles[2]), sin(angles[2]))
@@ -70,7 +70,8 @@ def platform(raw: dict[str, Any], pose: Jet) -> Body:
     rows = [["xx", "xy", "xz"], ["xy", "yy", "yz"], ["xz", "yz", "zz"]]
     inertia = np.array([[i[name] for name in row] for row in rows])
     origin = Jet(pose.x[:3], pose.v[:3], pose.a[:3])
-    return Body("platform", raw["platform"]["mass"], origin, R, inertia)
+    arm = np.multiply(raw["platform"].get("com", (0.0, 0.0, 0.0)), unit)
+    return Body("platform", raw["platform"]["mass"], origin + R @ arm, R, inertia)
 
 
 def table(data: dict[str, Any]) -> Array:
@@ -130,8 +131,11 @@ def drive(chain: dict[str, Any], M: Jet, unit: float) -> tuple[Rod, list[Body]]:
     if crank:
         turn = jet(np.eye(3)) + sin(x) * cross_matrix(axis)
         turn = turn + (jet(1.0) - cos(x)) * (cross_matrix(axis) @ cross_matrix(axis))
-        about = chain["crank"]["inertia"] * np.outer(axis, axis)
-        first = Body(f"{chain['name']}.crank", 0.0, jet(base), turn, about)
+        own = {"mass": 0.0, "com": 0.0} | chain["crank"]
+        com = own["com"] * unit
+        about = (own["inertia"] - own["mass"] * com**2) * np.outer(axis, axis)
+        place = jet(base) + turn @ (com / np.linalg.norm(arm) * arm)
+        first = Body(f"{chain['name']}.crank", own["mass"], place, turn, about)
     else:
         first = Body(f"{chain['name']}.slider", chain["slider"]["mass"], S, jet(EYE), 0 * EYE)
     return r, [first, second]
@@ -144,10 +148,10 @@ def cross_matrix(v: Array) -> Array:
 def bodies(raw: dict[str, Any], pose: Jet) -> dict[str, Body]:
     """Every body of a mechanism at a moving pose."""
     unit = {"m": 1.0, "mm": 1e-3}[raw.get("length_unit", "m")]
-    ground = platform(raw, pose)
+    ground, origin = platform(raw, pose, unit), Jet(pose.x[:3], pose.v[:3], pose.a[:3])
     found = {"platform": ground}
     for chain in raw["chain"]:
-        M = ground.centre + ground.R @ np.multiply(chain["platform"], unit)
+        M = origin + ground.R @ np.multiply(chain["platform"], unit)
         make = leg if chain["kind"] == "SPS" else drive
         found |= {body.name: body for body in make(chain, M, unit)[1]}
     return found

@@ -1,6 +1,6 @@
 """A mechanism's raw TOML dictionary in SI, and the closed-form position of each chain.
 
-Rules from formats.md. {S} is fixed, {M} at the platform's mass centre and equal to {S} at home.
+Rules from formats.md. {S} is fixed, {M} on the platform and equal to {S} at home.
 """
 
 from __future__ import annotations
@@ -57,6 +57,8 @@ class Chain:
         default_factory=lambda: np.zeros(3)
     )  # shaft (RSS, perpendicular to the crank) or rail (PSS), unit
     drive: float = 0.0  # crank inertia [kg m^2] or slider mass [kg]
+    drive_mass: float = 0.0  # of a crank [kg], and
+    drive_com: Array = field(default_factory=lambda: np.zeros(3))  # its centre from G at home
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,8 @@ class Description:
     name: str
     gravity: Array
     mass: float
-    inertia: Array  # about O_M, in {M}
+    com: Array  # in {M}
+    inertia: Array  # about it, in {M}
     points: dict[str, Array]
     contacts: tuple[Contact, ...]
     chains: tuple[Chain, ...]
@@ -109,6 +112,8 @@ def _chain(table: Raw, unit_length: float) -> Chain:
         length = float(np.linalg.norm(M - S))
         own: Raw = {"rods": (_rod(table["coupler"], length),), "G": base, "axis": axis}
         own["drive"] = table["crank"]["inertia"]
+        own["drive_mass"] = table["crank"].get("mass", 0.0)
+        own["drive_com"] = table["crank"].get("com", 0.0) * unit_length * crank
     else:
         S = base
         length = float(np.linalg.norm(M - S))
@@ -138,6 +143,7 @@ def read(description: Raw | Description) -> Description:
         name=description["name"],
         gravity=np.array(description.get("gravity", [0, 0, -9.81]), float),
         mass=platform["mass"],
+        com=np.array(platform.get("com", (0, 0, 0)), float) * unit_length,
         inertia=np.array(inertia, float),
         points={name: np.array(p, float) * unit_length for name, p in points.items()},
         contacts=tuple(

@@ -292,6 +292,7 @@ class Machine:
         self.gravity = [mpf(v) for v in raw.get("gravity", (0, 0, -9.81))]
         platform = raw["platform"]
         self.mass = mpf(platform["mass"])
+        self.com = [mpf(v) * scale for v in platform.get("com", (0, 0, 0))]
         i = {k: mpf(platform["inertia"].get(k, 0)) for k in ("xx", "yy", "zz", "xy", "xz", "yz")}
         self.inertia = [
             [i["xx"], i["xy"], i["xz"]],
@@ -368,7 +369,15 @@ class Machine:
             tip = [
                 c["base"][i] + c["l"] * (cosine * c["u"][i] + sine * c["w"][i]) for i in range(3)
             ]
-            bodies = [("crank", mpf(raw["crank"]["inertia"]), joint, None)]
+            own = raw["crank"]
+            m, com = mpf(own.get("mass", 0)), mpf(own.get("com", 0)) * self.scale
+            centre = [
+                c["base"][i] + com * (cosine * c["u"][i] + sine * c["w"][i]) for i in range(3)
+            ]
+            bodies = [
+                ("crank", mpf(own["inertia"]) - m * com**2, joint, None),
+                (m, centre, None, None),
+            ]
             rod = raw["coupler"]
         e = add(P, tip, -1)
         R, x = self._rod(c, e)
@@ -394,7 +403,8 @@ class Machine:
             joint, more = self._legs(c, add(pose[:3], turned(R, c["M"])))
             joints.append(joint)
             bodies += more
-        return joints, [(self.mass, pose[:3], R, self.inertia), *bodies]
+        centre = add(pose[:3], turned(R, self.com))
+        return joints, [(self.mass, centre, R, self.inertia), *bodies]
 
     @staticmethod
     def rotation(pose: Vector) -> list[Vector]:

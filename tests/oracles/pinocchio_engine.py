@@ -28,7 +28,7 @@ class PinocchioEngine(CutTree):
         for kind in (pin.JointModelRX(), pin.JointModelRY(), pin.JointModelRZ()):
             at = self._joint(at, kind)
         self.platform = at
-        self._body(at, d.mass, 0.0, d.inertia)
+        self._body(at, d.mass, d.com, d.inertia)
         self.contacts = [self._frame(at, c.point) for c in d.contacts]
         self.drives = [self._chain(chain) for chain in d.chains]  # velocity index of each drive
         self.data = self.model.createData()
@@ -37,8 +37,10 @@ class PinocchioEngine(CutTree):
         place = pin.SE3(R, at)
         return self.model.addJoint(parent, kind, place, f"joint {self.model.njoints}")
 
-    def _body(self, at: int, mass: float, along: float, inertia: Array) -> None:
-        body = pin.Inertia(float(mass), along * np.eye(3)[0], inertia)
+    def _body(self, at: int, mass: float, centre: float | Array, inertia: Array) -> None:
+        """Args: centre: its place, or how far along X it is."""
+        place = centre if isinstance(centre, np.ndarray) else centre * np.eye(3)[0]
+        body = pin.Inertia(float(mass), place, inertia)
         self.model.appendBodyToJoint(at, body, pin.SE3.Identity())
 
     def _frame(self, at: int, point: Array) -> int:
@@ -60,7 +62,9 @@ class PinocchioEngine(CutTree):
             if chain.kind == "RSS":
                 drive = self._joint(0, pin.JointModelRevoluteUnaligned(chain.axis), at=chain.G)
                 about = chain.drive * np.outer(chain.axis, chain.axis)
-                self._body(drive, 0.0, 0.0, about)
+                m, com = chain.drive_mass, chain.drive_com
+                about -= m * (com @ com) * np.outer(chain.axis, chain.axis)
+                self._body(drive, m, com, about)
                 S = self._frame(drive, chain.S - chain.G)
             else:
                 drive = self._joint(0, pin.JointModelPrismaticUnaligned(chain.axis), at=chain.S)

@@ -356,6 +356,19 @@ def _value(value: Any) -> str:
     return f'"{value}"' if isinstance(value, str) else repr(value).lower()
 
 
+def off_centre(rng: Rng, raw: Raw) -> Raw:
+    """The same with a platform and cranks whose mass centres are anywhere."""
+    found = {**raw, "platform": {**raw["platform"], "com": _list(rng.normal(0, 10, 3))}}
+    found["chain"] = [dict(chain) for chain in raw["chain"]]
+    for chain in found["chain"]:
+        if chain["kind"] == "RSS":
+            mass, com = float(rng.uniform(0.01, 0.05)), float(rng.normal(0, 8))
+            unit = {"m": 1.0, "mm": 1e-3}[raw.get("length_unit", "m")]
+            inertia = chain["crank"]["inertia"] + mass * (com * unit) ** 2
+            chain["crank"] = {"inertia": inertia, "mass": mass, "com": com}
+    return found
+
+
 def toml_text(description: Raw) -> str:
     """The dictionary as a mechanism file."""
     lines = []

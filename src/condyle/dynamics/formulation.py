@@ -20,7 +20,7 @@ from ..kinematics.state import PointMotion, State
 
 @dataclass(frozen=True)
 class Body:
-    """The platform: mass [kg], first moment about O_M (3,) [kg m] and inertia (3, 3) in {M}.
+    """The platform: mass [kg], first moment s (3,) [kg m] and inertia I (3, 3) about O_M in {M}.
 
     The paper's platform has its mass centre at O_M, so its first moment vanishes.
     """
@@ -28,6 +28,21 @@ class Body:
     mass: ca.SX
     first_moment: ca.SX
     inertia: ca.SX
+
+    def of_twist(self, R: ca.SX) -> ca.SX:
+        """Inertia dual to the twist, (6, 6): [m E, -[S]; [S], R I R^T] with S = R s."""
+        spin, turned = ca.skew(R @ self.first_moment), R @ self.inertia @ R.T
+        return ca.vertcat(ca.horzcat(self.mass * ca.SX.eye(3), spin.T), ca.horzcat(spin, turned))
+
+    def kinetic(self, R: ca.SX, V: ca.SX, omega: ca.SX) -> ca.SX:
+        """Kinetic energy [J]: m V^2 / 2 + V . (omega x S) + omega . I omega / 2."""
+        spin = R.T @ omega
+        square = self.mass * ca.dot(V, V) + ca.dot(spin, self.inertia @ spin)
+        return square / 2 + ca.dot(V, ca.cross(omega, R @ self.first_moment))
+
+    def height(self, position: ca.SX, R: ca.SX) -> ca.SX:
+        """Mass times the place of the mass centre in {S}, (3,) [kg m]: m O_M + S."""
+        return self.mass * position + R @ self.first_moment
 
 
 class Formulation(ABC):

@@ -31,17 +31,15 @@ class Hessian(JointSpace):
     name: ClassVar[str] = "hessian"
 
     def platform(self, state: State, body: Body, g: ca.SX) -> ca.SX:
-        V, omega_M = state.twist[:3], state.R.T @ state.twist[3:]
-        kinetic = (body.mass * ca.dot(V, V) + ca.dot(omega_M, body.inertia @ omega_M)) / 2
-        c = state.coordinates
+        kinetic, c = body.kinetic(state.R, state.twist[:3], state.twist[3:]), state.coordinates
         force = hessian_force(kinetic, c, state.rate, state.acceleration)
-        return force + weight(body.mass, state.pose[:3], g, c)
+        return force + weight(body.height(state.pose[:3], state.R), g, c)
 
     def link_force(self, link: Link, s: JointState, g: ca.SX) -> ca.SX:
         V, omega = ca.jacobian(link.centre, s.q) @ s.rate, link.spin @ s.rate
         kinetic = (link.mass * ca.dot(V, V) + ca.dot(omega, link.inertia @ omega)) / 2
         force = hessian_force(kinetic, s.q, s.rate, s.acceleration)
-        return force + weight(link.mass, link.centre, g, s.q)
+        return force + weight(link.mass * link.centre, g, s.q)
 
     @staticmethod
     def bias(end_point: ca.SX, s: JointState) -> ca.SX:

@@ -108,6 +108,9 @@ class JointSpace(Formulation):
         return motion.dynamics({link.name: f for link, f in zip(links, forces, strict=True)})
 
 
-def weight(mass: ca.SX, centre: ca.SX, g: ca.SX, c: ca.SX) -> ca.SX:
-    """Gradient of a body's potential in coordinates c, (m,): gravity's force, negative."""
-    return ca.gradient(-mass * ca.dot(g, centre), c)
+def weight(height: ca.SX, g: ca.SX, c: ca.SX) -> ca.SX:
+    """Gradient of a body's potential in coordinates c, (m,): gravity's force, negative.
+
+    Args: height: mass times the place of the mass centre, (3,) [kg m].
+    """
+    return ca.gradient(-ca.dot(g, height), c)

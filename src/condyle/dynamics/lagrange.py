@@ -24,18 +24,17 @@ class Lagrange(JointSpace):
 
     def platform(self, state: State, body: Body, g: ca.SX) -> ca.SX:
         """Eqs (48)-(52)."""
-        inertia = state.R @ body.inertia @ state.R.T
-        J, c = state.B, state.coordinates
-        mass_matrix = body.mass * (J[:3, :].T @ J[:3, :]) + J[3:, :].T @ inertia @ J[3:, :]
+        c = state.coordinates
+        mass_matrix = state.B.T @ body.of_twist(state.R) @ state.B
         force = lagrange_force(mass_matrix, c, state.rate, state.acceleration)
-        return force + weight(body.mass, state.pose[:3], g, c)
+        return force + weight(body.height(state.pose[:3], state.R), g, c)
 
     def link_force(self, link: Link, s: JointState, g: ca.SX) -> ca.SX:
         """Eq. (53)."""
         J_E = ca.jacobian(link.centre, s.q)
         mass_matrix = link.mass * (J_E.T @ J_E) + link.spin.T @ link.inertia @ link.spin
         force = lagrange_force(mass_matrix, s.q, s.rate, s.acceleration)
-        return force + weight(link.mass, link.centre, g, s.q)
+        return force + weight(link.mass * link.centre, g, s.q)
 
 
 def lagrange_force(mass_matrix: ca.SX, c: ca.SX, rate: ca.SX, acceleration: ca.SX) -> ca.SX:

@@ -25,10 +25,12 @@ class Momentum(JointSpace):
 
     def platform(self, state: State, body: Body, g: ca.SX) -> ca.SX:
         """Eqs (29)-(32)."""
-        inertia = state.R @ body.inertia @ state.R.T
-        momentum = ca.vertcat(body.mass * state.twist[:3], inertia @ state.twist[3:])
-        kinetic = state.B.T @ state.time_derivative(momentum)
-        return kinetic + weight(body.mass, state.pose[:3], g, state.coordinates)
+        momentum = body.of_twist(state.R) @ state.twist
+        # The angular one is about O_M, which moves: V x (m V + omega x S) is lost on the way.
+        moving = ca.cross(state.twist[:3], ca.cross(state.twist[3:], state.R @ body.first_moment))
+        change = state.time_derivative(momentum) + ca.vertcat(ca.SX.zeros(3), moving)
+        height = body.height(state.pose[:3], state.R)
+        return state.B.T @ change + weight(height, g, state.coordinates)
 
     def link_force(self, link: Link, s: JointState, g: ca.SX) -> ca.SX:
         """Eqs (33)-(40)."""
@@ -36,4 +38,4 @@ class Momentum(JointSpace):
         linear = link.mass * (J_E @ s.rate)
         angular = link.inertia @ (link.spin @ s.rate)
         kinetic = J_E.T @ s.time_derivative(linear) + link.spin.T @ s.time_derivative(angular)
-        return kinetic + weight(link.mass, link.centre, g, s.q)
+        return kinetic + weight(link.mass * link.centre, g, s.q)

@@ -38,12 +38,6 @@ class VirtualPower(Formulation):
         moment = ca.cross(S, lift) + state.R @ moment_M
         return state.B.T @ ca.vertcat(force, moment)
 
-    def inertia(self, state: State, body: Body) -> ca.SX:
-        """Of the platform, dual to the twist, (6, 6): [m E, -[S]; [S], I] with S = R s."""
-        spin = ca.skew(state.R @ body.first_moment)
-        turned = state.R @ body.inertia @ state.R.T
-        return ca.vertcat(ca.horzcat(body.mass * ca.SX.eye(3), spin.T), ca.horzcat(spin, turned))
-
     def chain(self, family: Family, c: Constants, M: PointMotion, g: ca.SX) -> ChainDynamics:
         dynamics = family.dynamics(c, M.position, M.velocity, M.acceleration, g)
         return dynamics.complete(M.acceleration, g)

@@ -23,7 +23,8 @@ from .c_names import in_comment, picked, scalar_functions
 FIELDS = {
     "gravity": "m/s^2, in {S}",
     "mass": "kg, of the platform",
-    "inertia": "kg m^2, of the platform about O_M, in {M}: xx, yy, zz, xy, xz, yz",
+    "com": "m, mass centre of the platform, in {M}",
+    "inertia": "kg m^2, of the platform about its mass centre, in {M}: xx, yy, zz, xy, xz, yz",
     "landmark": "m, in {M}: the point whose path is given",
     "contact_point": "m, centre of the ball in {M}",
     "contact_surface": "the numbers of its surface",

@@ -168,13 +168,16 @@ def _scalars(e: Exported, a: Argument, role: str, first: int) -> Iterable[Scalar
 
 
 def _tuned(mechanism: Mechanism, e: Exported) -> Iterator[Tuned]:
-    """Gravity, mass and inertia of the platform, and numbers of single chains."""
+    """Gravity, mass, mass centre and inertia of the platform, and numbers of single chains."""
     platform = mechanism.platform
     losses = any(not chain.actuator.ideal for chain in mechanism.chains)
     for i, (axis, start) in enumerate(zip("xyz", map(float, mechanism.gravity), strict=True)):
         about = f"gravity.{axis}", "m/s^2", f"gravity along {axis} of {{S}}"
         yield *about, start, f"n.gravity[{i}] = value"
     yield "platform.mass", "kg", "mass of the platform", platform.mass, "n.mass = value"
+    for i, (axis, start) in enumerate(zip("xyz", map(float, platform.com), strict=True)):
+        about = f"platform.com.{axis}", "m", f"mass centre of the platform along {axis} of {{M}}"
+        yield *about, start, f"n.com[{i}] = value"
     for i, key in enumerate(("xx", "yy", "zz", "xy", "xz", "yz")):
         start = float(getattr(platform.inertia, key))
         about = f"platform.inertia.{key}", "kg m^2", f"inertia {key} of the platform"

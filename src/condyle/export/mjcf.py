@@ -181,7 +181,7 @@ def _platform(d: Document, body: Element) -> None:
     platform = d.mechanism.platform
     i = platform.inertia
     tensor = [i.xx, i.yy, i.zz, i.xy, i.xz, i.yz]
-    element(body, "inertial", mass=platform.mass, pos=np.zeros(3), fullinertia=tensor)
+    element(body, "inertial", mass=platform.mass, pos=platform.com, fullinertia=tensor)
     d.add("asset", "mesh", name="platform", vertex=d.look.hull)
     element(body, "geom", class_="platform", type="mesh", mesh="platform")
     sites = {f"{chain.name}_platform": chain.platform for chain in d.mechanism.chains}
@@ -281,8 +281,11 @@ def _rss(d: Document, chain: Any) -> None:
     c = FAMILIES["RSS"].constants(chain)
     crank = element(d.world, "body", name=f"{chain.name}_crank", pos=c["G"])
     _driven(crank, chain, "hinge", c["C"][:, 2])
-    # Its shaft stands on the base: neither its mass nor its inertia across ever matter.
-    inertial(crank, c["crank"] / c["l"] ** 2, ZERO, [c["crank"]] * 3)
+    # Its shaft stands on the base: of its inertia only that about the shaft matters.
+    own = chain.crank
+    central = max(own.inertia - own.mass * own.com**2, THIN * own.inertia)
+    mass = own.mass or own.inertia / c["l"] ** 2
+    inertial(crank, mass, own.com * c["C"][:, 0] if own.mass else ZERO, [central] * 3)
     _line(d, crank, chain, 1.6, ZERO, c["l"] * c["C"][:, 0])
     _rod(d, crank, chain, "coupler", c["l"] * c["C"][:, 0], c["N"], float(c["L"]))
     _fixed(d, c["G"], 0.25 * c["l"] * c["C"][:, 2], 2.0)

@@ -237,18 +237,23 @@ def _rss(graph: Graph, limb: Limb) -> dict[str, Any]:
     arm = crank.centre - pivot
     off = arm - axis * (axis @ arm)
     inertia = axis @ crank.inertia @ axis + crank.mass * (off @ off)
-    line, high = top.point - ball.point, float(np.linalg.norm(off))
-    if high > 1e-3 * np.linalg.norm(ball.point - pivot):
+    line, length = top.point - ball.point, float(np.linalg.norm(ball.point - pivot))
+    table, along = {"inertia": float(inertia)}, (ball.point - pivot) / length
+    com = float(off @ along)
+    side = float(np.linalg.norm(off - com * along))
+    if crank.weight and max(abs(com), side) > 1e-9 * length:
+        table |= {"mass": crank.weight, "com": com}
+    if side > 1e-3 * length:
         graph.note(
-            f"crank of {limb.name}: its mass centre is {high * 1e3:.3g} mm off the shaft; its "
-            "weight is left out"
+            f"crank of {limb.name}: its mass centre is {side * 1e3:.3g} mm off the line to its "
+            "tip; moved onto it"
         )
     return {
         "kind": "RSS",
         "base": graph.point(pivot),
         "axis": [float(v) for v in axis],
         "crank_tip": graph.point(ball.point),
-        "crank": {"inertia": float(inertia)},
+        "crank": table,
         "coupler": part(graph, f"coupler of {limb.name}", coupler, ball.point, line, True),
         **actuator_of(graph, shaft, 1.0, limb.name),
     }

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from .quantities import (
     Fraction,
+    Length,
     Mass,
     MassOrNone,
     Moment,
@@ -24,7 +25,7 @@ from .table import FrozenTable, Table
 
 
 class Inertia(Table):
-    """Entries of the inertia tensor about O_M along the axes of {M}, kg m^2."""
+    """Entries of the inertia tensor about the mass centre along the axes of {M}, kg m^2."""
 
     xx: Moment
     yy: Moment
@@ -65,9 +66,12 @@ class Inertia(Table):
 
 
 class Platform(Table):
-    """The moving body; {M} is at its mass centre."""
+    """The moving body."""
+
+    implied: ClassVar[tuple[str, ...]] = ("com",)
 
     mass: Mass
+    com: Point = Field(default=(0.0, 0.0, 0.0), description="mass centre, in {M}")
     inertia: Inertia
     points: Annotated[dict[Name, Point], AfterValidator(FrozenTable)] = Field(
         default_factory=FrozenTable, description="landmarks, in {M}"
@@ -97,7 +101,23 @@ class Rod(Table):
 
 
 class Crank(Table):
-    inertia: Moment = Field(description="about the shaft; its mass centre is on the shaft")
+    implied: ClassVar[tuple[str, ...]] = ("mass", "com")
+
+    inertia: Moment = Field(description="about the shaft")
+    mass: MassOrNone = 0.0
+    com: Length = Field(
+        default=0.0, description="mass centre: distance from the shaft towards crank_tip"
+    )
+
+    @model_validator(mode="after")
+    def _about_the_shaft(self) -> Self:
+        least = self.mass * self.com**2
+        if least > self.inertia * (1 + 1e-12):
+            raise ValueError(
+                f"inertia is about the shaft: {self.inertia:g} kg m^2 is less than mass com^2, "
+                f"{least:g} kg m^2; no rigid body has such moments"
+            )
+        return self
 
 
 class Slider(Table):

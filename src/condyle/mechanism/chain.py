@@ -41,7 +41,8 @@ class ChainTable(Table):
     @property
     def masses(self) -> dict[str, float]:
         """Of its moving bodies [kg], those that have one."""
-        return {name: b.mass for name, b in self if isinstance(b, Rod | LegBody | Slider)}
+        bodies = {name: b for name, b in self if isinstance(b, Crank | Rod | LegBody | Slider)}
+        return {n: b.mass for n, b in bodies.items() if b.mass or not isinstance(b, Crank)}
 
     @property
     def radii_of_gyration(self) -> dict[str, float]:

@@ -88,18 +88,21 @@ def _shared(b: Builder, walls: Sequence[Wall]) -> tuple[dict[str, ca.SX], list[P
             for m, p in zip(masses, joints, strict=True)
         ]
     )
-    trace = second[0] + second[1] + second[2]
-    about = ca.vertcat(*(trace * (i == j) - second[n] for n, (i, j) in enumerate(INERTIA)))
+    own_first, own_inertia = (
+        own["mass"] * own["com"],
+        own["inertia"]
+        + _about(own["mass"] * ca.vertcat(*(own["com"][i] * own["com"][j] for i, j in INERTIA))),
+    )
     mean = b.total([ca.norm_2(p) for p in joints]) + sum(map(ca.norm_2, points), ca.SX(0))
     mean = mean / (structure.n + k)
     values = {
         "gravity": own["gravity"],
         "mass": own["mass"],
-        "first_moment": ca.SX.zeros(3),
-        "inertia": own["inertia"],
+        "first_moment": own_first,
+        "inertia": own_inertia,
         "lumped_mass": own["mass"] + b.total(masses),
-        "lumped_first_moment": first,
-        "lumped_inertia": own["inertia"] + about,
+        "lumped_first_moment": own_first + first,
+        "lumped_inertia": own_inertia + _about(second),
         "branch": ca.SX(1),
         "length": mean + ca.logic_not(mean),
         "landmark": own["landmark"],
@@ -129,6 +132,12 @@ def _shared(b: Builder, walls: Sequence[Wall]) -> tuple[dict[str, ca.SX], list[P
     return values, placed
 
 
+def _about(second: ca.SX) -> ca.SX:
+    """The inertia, (6,), of masses with these second moments, (6,) [kg m^2]."""
+    trace = second[0] + second[1] + second[2]
+    return ca.vertcat(*(trace * (i == j) - second[n] for n, (i, j) in enumerate(INERTIA)))
+
+
 def _end_mass(b: Builder, group: int) -> ca.SX:
     family = FAMILIES[b.structure.families[group]]
     own = family.end_masses(family.named(_lane(b, group, "constants")))
@@ -146,6 +155,7 @@ def numbers_of_file(
     values: dict[str, Any] = {
         "gravity": mechanism.gravity,
         "mass": platform.mass,
+        "com": platform.com,
         "inertia": [platform.inertia.tensor()[i] for i in INERTIA],
         "landmark": platform.points[landmark] if landmark else (0.0, 0.0, 0.0),
     }

@@ -71,7 +71,7 @@ def _by_chains(b: Builder, platform: Platform, load: Wrench, effort: Lanes) -> A
     found = b.total([c.terms for c in chains])
     coupled = ca.reshape(found[12:21], 3, 3)
     mass, turned = (symmetric(ca.vertsplit(part)) for part in (found[6:12], found[21:27]))
-    own = method.inertia(state, body)
+    own = body.of_twist(state.R)
     parts = [found[:6], method.platform(state, body, g), -load.about_centre(motion.R)]
     basis = twist_basis(motion, s.dependent)
     return Affine(

@@ -43,9 +43,8 @@ def energy(structure: Structure) -> Program:
     motion, g = platform.motion, b.parameter("gravity")
     body = platform_body(b, lumped=False)
     V, omega = motion.twist[:3], motion.twist[3:]
-    spin = platform.R.T @ omega
-    kinetic = body.mass * ca.dot(V, V) / 2 + ca.dot(spin, body.inertia @ spin) / 2
-    potential = -body.mass * ca.dot(g, platform.placement.position)
+    kinetic = body.kinetic(platform.R, V, omega)
+    potential = -ca.dot(g, body.height(platform.placement.position, platform.R))
     moving, held = [], []
     for group, loop in enumerate(loops_of(b, platform)):
         family = FAMILIES[structure.families[group]]

@@ -130,6 +130,7 @@ class FileNumbers:
         if keys[0] in ("gravity", "platform"):
             yield ("gravity",), ("m/s^2", self._shared("gravity"))
             yield ("platform", "mass"), ("kg", self._shared("mass"))
+            yield ("platform", "com"), ("m", self._shared("com"))
             for i, name in enumerate(ENTRIES):
                 yield ("platform", "inertia", name), ("kg m^2", self._shared("inertia", i, 1))
             if self.landmark is not None:

@@ -68,7 +68,7 @@ class Layout:
         A contact's `home` is no number of the file, but where Newton starts and what is kept: the
         unit normal and `Wall.miss` of the nominal mechanism.
         """
-        sizes = {"gravity": 3, "mass": 1, "inertia": 6, "landmark": 3}
+        sizes = {"gravity": 3, "mass": 1, "com": 3, "inertia": 6, "landmark": 3}
         for i, wall in enumerate(walls):
             sizes |= {f"contact_point_{i}": 3, f"contact_surface_{i}": wall.size}
             sizes |= {f"contact_ball_{i}": 1} if wall.push else {}

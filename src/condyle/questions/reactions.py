@@ -2,8 +2,7 @@
 
 The free bodies of each chain (`free_body`) are solved for the efforts, so that Newton and Euler
 hold for every body. All vectors are in {S}; each acts on the body it names, and its opposite on the
-other. A crank's own weight is not included: a mechanism file states no mass for a crank, which
-rotates about its mass centre.
+other. A crank's own weight is included as far as the mechanism file states its mass.
 """
 
 from __future__ import annotations

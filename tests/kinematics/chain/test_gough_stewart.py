@@ -37,7 +37,7 @@ def states(count: int = 6) -> tuple[Array, Array, Array, Array]:
 
 def plain_newton_euler(pose: Jet, wrench: Array) -> dict[str, Any]:
     """Efforts, and forces at B and M and on the piston, of one sample."""
-    top = platform(RAW, pose)
+    top = platform(RAW, pose, 1.0)
     A, b = np.zeros((78, 78)), np.zeros(78)
 
     def balance(row: int, body: Body) -> None:

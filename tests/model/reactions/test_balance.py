@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from oracles.bodies import Body, bodies
 from oracles.jets import Jet
-from oracles.random_mechanism import random_mechanism
+from oracles.random_mechanism import off_centre, random_mechanism
 from support.families import MECHANISMS, Case, case, of_raw
 from support.loads import parts
 from support.speeds import few
@@ -20,10 +20,15 @@ SURFACES = {
 }
 
 
+OFF_CENTRE = "off_centre"
 LENGTH = 0.05  # metres: a lever of these mechanisms
 
 
 def build(name: str) -> Case:
+    if name == OFF_CENTRE:
+        rng = np.random.default_rng(5)
+        raw = random_mechanism(rng, families=("RSS", "PSS", "SPS"), contacts=1)
+        return of_raw(off_centre(rng, raw))
     if name not in SURFACES:
         return case(name)
     return of_raw(random_mechanism(np.random.default_rng(8), **SURFACES[name]))
@@ -61,9 +66,10 @@ def body_of(reaction: Reaction, name: str) -> str:
     return name if name in ("platform", "base", "surface") else f"{reaction.owner}.{name}"
 
 
-@pytest.mark.parametrize(
-    "name", few([*MECHANISMS, *SURFACES], "rss", "pss_k0", "sps_k3", "mixed_k1_n7")
-)
+EVERY = [*MECHANISMS, *SURFACES, OFF_CENTRE]
+
+
+@pytest.mark.parametrize("name", few(EVERY, OFF_CENTRE, "rss", "pss_k0", "sps_k3", "mixed_k1_n7"))
 def test_every_body_balances(name: str) -> None:
     c = build(name)
     found = found_reactions(c)
@@ -77,7 +83,7 @@ def test_every_body_balances(name: str) -> None:
             ledger.act(body_of(r, r.body), force, moment, r.point[i])
             ledger.act(body_of(r, r.by), -force, -moment, r.point[i])
         top = free["platform"]
-        where = top.centre.x + top.R.x @ c.load[i, 6:]
+        where = motion.x[:3] + top.R.x @ c.load[i, 6:]
         ledger.act("platform", c.load[i, :3], c.load[i, 3:6], where)
         for key, largest in ledger.largest.items():
             assert np.abs(ledger.force[key]).max() < 1e-9 * largest, key

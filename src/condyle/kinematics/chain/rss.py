@@ -26,12 +26,14 @@ class RSSFamily(RodFamily):
     joint_unit = "rad"
     effort_unit = "N m"
     # `plane_1` and `plane_2` span the crank plane; plane_1[2] = 0 saves a constant. C is C_i0.
-    padding = ("branch", "mass", "transverse", "axial", "crank")
+    padding = ("branch", "mass", "transverse", "axial", "crank", "crank_mass")
     numbers = {
         **dict.fromkeys(("base", "axis", "crank_tip", "platform"), 3),
-        **dict.fromkeys(("crank.inertia", *(f"coupler.{name}" for name in ROD_NUMBERS)), 1),
+        **dict.fromkeys((f"crank.{name}" for name in ("inertia", "mass", "com")), 1),
+        **dict.fromkeys((f"coupler.{name}" for name in ROD_NUMBERS), 1),
     }
-    shapes = {"G": 3, "plane_1": 2, "plane_2": 3, "l": 1, **ROD, "crank": 1, "C": 9, "N": 9}
+    shapes = {"G": 3, "plane_1": 2, "plane_2": 3, "l": 1, **ROD}
+    shapes |= {"crank": 1, "crank_mass": 1, "crank_com": 1, "C": 9, "N": 9}
 
     def derived(self, f: Constants) -> dict[str, ca.SX]:
         crank, coupler = f.crank_tip - f.base, f.platform - f.crank_tip
@@ -49,6 +51,8 @@ class RSSFamily(RodFamily):
             "l": ca.norm_2(crank),
             "branch": -ca.sign(ca.dot(coupler, y)),
             "crank": f.crank_inertia,
+            "crank_mass": f.crank_mass,
+            "crank_com": f.crank_com,
             "C": ca.horzcat(x, y, z),
             **self.rod_constants(f, "coupler", coupler),
         }
@@ -58,9 +62,11 @@ class RSSFamily(RodFamily):
 
     def driven(self, c: Constants, q_r: ca.SX) -> tuple[Link, Joint]:
         Z_C = c.C[:, 2]
-        # The crank's mass centre is on its shaft, so its mass never matters (eq. 39).
+        # In the paper the crank's mass centre is on its shaft, so its mass never matters (eq. 39).
         spin = ca.horzcat(Z_C, ca.SX(3, 2))
-        link = Link("cranks", ca.SX(0), c.G, spin, c.crank * (Z_C @ Z_C.T))
+        arm = (c.C @ rotation_z(ca.cos(q_r[0]), ca.sin(q_r[0])))[:, 0] * c.crank_com
+        central = c.crank - c.crank_mass * c.crank_com**2
+        link = Link("cranks", c.crank_mass, c.G + arm, spin, central * (Z_C @ Z_C.T))
         return link, Joint.shaft("shaft", "crank pivot G", c.G, Z_C)
 
     def loop(self, c: Constants, M: ca.SX) -> Loop:
@@ -119,7 +125,10 @@ class RSSFamily(RodFamily):
             discriminant=root * (1 / (c.l * c.L) ** 2),
             rate=rate,
             acceleration=acceleration,
-            efforts={"couplers": ca.dot(t, m_SM * A - (m_SM + m_SS) * g - axial)},
+            efforts={
+                "cranks": ca.dot(t, g) * (-c.crank_mass * c.crank_com / c.l),
+                "couplers": ca.dot(t, m_SM * A - (m_SM + m_SS) * g - axial),
+            },
             inertias={"cranks": c.crank, "couplers": m_SS * c.l**2},
             end_masses=self.end_masses(c),
         )
