@@ -186,7 +186,7 @@ def _unit(path: str, family: Family) -> str:
     own = {
         "axis": "",
         "mass": "kg",
-        "com": "m" if path.startswith(("cylinder", "piston")) else "",
+        "com": "m" if path.startswith(("crank", "cylinder", "piston")) else "",
         **dict.fromkeys(("inertia", "rotor_inertia", "transverse", "axial"), "kg m^2"),
         "gear": "rad/m" if slides else "",
         "viscous": "N s/m" if slides else "N m s/rad",
