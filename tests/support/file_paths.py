@@ -20,6 +20,7 @@ from condyle.questions.structure import Structure, structure_of, walls_of
 from support.families import ALL as FAMILIES
 from support.families import case as families
 
+UNBALANCED = {"mass": 0.02, "com": -0.004}  # cranks
 SURFACES: dict[str, dict[str, Any]] = {
     "every_kind": {"surface": "mixed", "contacts": 5, "chains": 8},
     "balls": {"surface": ("ellipsoid", "quadratic", "plane"), "contacts": 3, "ball_radius": 4.0},
@@ -56,6 +57,9 @@ def rubbing(machine: Mechanism) -> Mechanism:
         for chain in machine.chains
         for key, value in (losses | {"smoothing_speed": 2e-3}).items()
     }
+    for chain in machine.chains:
+        if chain.kind == "RSS":
+            changes |= {f"chain.{chain.name}.crank.{k}": v for k, v in UNBALANCED.items()}
     for contact in machine.contacts:
         changes[f"contact.{contact.name}.friction"] = {"coefficient": 0.1}
     return machine.set({**changes, "dependent": dependent_coordinates(machine) or None})
