@@ -42,6 +42,7 @@ _HOMES = {
     "trial_motion": "motion",
     "write_reference": "motion",
     "open_solution": "results.solution",
+    "derivative_states": "results.derivative_rows",
     "forward_states": "results.forward_rows",
     "pose_states": "results.pose_rows",
     "solve_states": "results.inverse_rows",
@@ -110,6 +111,7 @@ if TYPE_CHECKING:
     )
     from .report.mechanism_summary import check
     from .report.page import write_report
+    from .results.derivative_rows import derivative_states
     from .results.forward_rows import forward_states
     from .results.inverse_rows import solve_states
     from .results.pose_rows import pose_states

@@ -294,6 +294,12 @@ DOORS: dict[str, Door] = {
     "solve_states": Door(
         ROWWISE | {"reactions": False, "mat": None, "noise": {"X": 1e-5}}, calls=60, words=FILES
     ),
+    "derivative_states": Door(
+        {k: v for k, v in ROWWISE.items() if k != "threads"}
+        | {"of": "effort", "wrt": ["q", "platform.mass"], "zeros": False},
+        calls=60,
+        words=(*FILES, "derivatives"),
+    ),
     "forward_states": Door(
         ROWWISE | {"states": lambda stage: stage.file("states.csv", EFFORTS)}, calls=60, words=FILES
     ),

@@ -38,6 +38,10 @@ CALLS: dict[str, tuple[str, ...]] = {
     "simulate": ("simulate", "my jaw.toml", "--scenario", "a fall.toml", "--out", "fallen"),
     "simulate --check-gains": ("simulate", "my jaw.toml", "--scenario", "pd.toml", "--check-gains"),
     "forward": ("forward", "my jaw.toml", "--states", "efforts.csv", "--out", "found.csv"),
+    "derivatives": (
+        *("derivatives", "my jaw.toml", "--states", "states.csv", "--of", "pose"),
+        *("--out", "my slopes.csv"),
+    ),
     "pose": ("pose", "masticatory", "--joints", "joints.csv", "--out", "poses.csv"),
     "pose --flag": ("pose", "masticatory", "--joints", "far.csv", "--out", "poses.csv", "--flag"),
     "pose --all": ("pose", "masticatory", "--joints", "joints.csv", "--out", "modes.csv", "--all"),

@@ -70,3 +70,23 @@ def test_limits_that_do_not_bind_change_nothing(tmp_path: Path) -> None:
     wide = free.with_distribution("bounded")
     found = [solved(model, np.full((1, 12), 1e-3), "X=1 mm", tmp_path) for model in (free, wide)]
     np.testing.assert_allclose(found[1], found[0], rtol=1e-9)
+
+
+def test_numbers_of_the_file_count_too(tmp_path: Path) -> None:
+    """Each entry by itself, with states: squares add."""
+    model = condyle.derive("masticatory", backend="numpy")
+    rows, by = np.full((1, 12), 1e-3), {"platform.mass": 0.01, "chain.masseter_left.base": 1e-4}
+    both = solved(
+        model, rows, "X=1 mm,platform.mass=0.01,chain.masseter_left.base=0.0001", tmp_path
+    )
+    square = solved(model, rows, {"X": 1e-3}, tmp_path) ** 2
+    for path, deviation in by.items():
+        value = np.atleast_1d(np.array(model.mechanism.get(path), dtype=float))
+        for step in np.eye(len(value)) * deviation * 1e-2:
+            ends = []
+            for moved in (value + step, value - step):
+                new = moved.tolist() if len(value) > 1 else float(moved[0])
+                other = condyle.derive(model.mechanism.set({path: new}), backend="numpy")
+                ends.append(other.inverse_dynamics(*np.split(rows, 3, 1)).effort[0])
+            square = square + ((ends[0] - ends[1]) / 2e-2) ** 2
+    np.testing.assert_allclose(both, np.sqrt(square), rtol=1e-6)

@@ -34,8 +34,9 @@ def solve(
             (rad), their rates dX ... (per s) and accelerations ddX ... (per s^2; at rest without
             both), and, if any, Fx, Fy, Fz (N), Mx, My, Mz (N m).
         out: File for the results (.csv or .parquet).
-        noise: Standard deviations of columns of states, "X=0.01 mm,dX=1 mm/s": those of the efforts
-            are written too, as sd_tau_CHAIN.
+        noise: Standard deviations of columns of states, "X=0.01 mm,dX=1 mm/s", and of numbers of
+            the mechanism file (SI), "platform.mass=0.01": those of the efforts are written too, as
+            sd_tau_CHAIN.
     """
     import condyle
 
@@ -91,6 +92,53 @@ def forward(
     )
     warn(solved.data["warnings"])
     return Answer(str(solved), solved.data, command_line("view", mechanism))
+
+
+@command(
+    COMPUTE,
+    example="condyle derivatives jaw.toml --states states.csv --wrt platform.mass --out slopes.csv",
+)
+def derivatives(
+    mechanism: options.Mechanism,
+    states: Path,
+    out: Path,
+    model: options.ModelOptions,
+    distribution: options.DistributionOptions,
+    of: Annotated[list[str] | None, options.option()] = None,
+    wrt: Annotated[list[str] | None, options.option()] = None,
+    load_point: options.LoadPoint = None,
+    flag: options.Flag = False,
+    zeros: bool = False,
+) -> Answer:
+    """Exact derivatives at independent states, one per row, in SI units.
+
+    Columns are called "d tau_CHAIN / d X", "d tau_CHAIN / d platform.mass" and so on.
+
+    Options:
+        states: States (CSV or Parquet), one per row, as condyle solve reads them; for acceleration
+            as condyle forward does.
+        out: File for the derivatives (.csv or .parquet).
+        of: effort, contact_force, acceleration, pose, joint, contact_point or singularity_ratio;
+            several times for several. Default: effort.
+        wrt: q, v, a, wrench, at, effort, or the path of a number of the mechanism file such as
+            platform.mass; several times for several. Default: q.
+        zeros: Write zeros where a number cannot matter, instead of failing.
+    """
+    import condyle
+
+    report = condyle.derivative_states(
+        model_of(mechanism, model, distribution),
+        states,
+        out,
+        of or ["effort"],
+        wrt or ["q"],
+        load_point=load_point,
+        flag=flag,
+        zeros=zeros,
+        strict=STRICT.get(),
+    )
+    warn(report.data["warnings"])
+    return Answer(str(report), report.data, command_line("view", mechanism))
 
 
 @command(COMPUTE, example="condyle pose jaw.toml --joints encoders.csv --out poses.csv")

@@ -189,7 +189,7 @@ class Derived:
         self, of: Any, weights: Any, wrt: Any, given: Mapping[str, Any], zeros: bool, keep: str
     ) -> Derivatives:
         """As `Model.vjp`."""
-        names = _names(of, "of")
+        names = names_of(of, "of")
         weights = weights if isinstance(weights, Mapping) else dict.fromkeys(names, weights)
         asked = _Asked.of(self._system, of, wrt, given, zeros, keep)
         lead, count, ports = self._samples(given)
@@ -431,12 +431,12 @@ class _Asked:
         own: System, of: Any, wrt: Any, given: Mapping[str, Any], zeros: bool, keep: str
     ) -> _Asked:
         zeros = as_flag(zeros, "zeros")
-        kinds = _kinds(_names(of, "of"), given)
+        kinds = _kinds(names_of(of, "of"), given)
         sizes = {
             "q": (m := len(own.independent),), "v": (m,), "a": (m,), "wrench": (6,), "at": (3,),
             "effort": (n := len(own.mechanism.chains),), "joint": (n,),
         }  # fmt: skip
-        asked = _names(wrt, "wrt")
+        asked = names_of(wrt, "wrt")
         states = {by: by for by in asked if by in sizes}
         if isinstance(at := given.get("at"), str):  # that point is a number of the file
             states |= {by: "at" for by in asked if by == f"platform.points.{at}"}
@@ -538,7 +538,7 @@ def _kinds(of: tuple[str, ...], given: Mapping[str, Any]) -> list[tuple[Kind, tu
     return [(kind, tuple(names)) for kind, names in found.items()]
 
 
-def _names(given: Any, what: str) -> tuple[str, ...]:
+def names_of(given: Any, what: str) -> tuple[str, ...]:
     names = (given,) if isinstance(given, str) else given
     if (
         not isinstance(names, list | tuple)

@@ -64,7 +64,8 @@ def solve_states(
              max_error: largest bound of the relative error that is accepted; with it there is a
              column bound.
              noise: standard deviations of independent coordinates, their rates and accelerations,
-             "X=0.01 mm,dX=1 mm/s" or by name in SI: columns sd_tau_<chain> too.
+             and numbers of the file in SI, "X=0.01 mm,dX=1 mm/s,platform.mass=0.01" or by name in
+             SI: columns sd_tau_<chain> too.
              mat: file for MATLAB to write as well; it takes the memory of the whole table.
     Raises:  InputError, SampleError, WarningError: nothing is written then.
     """
@@ -136,7 +137,7 @@ def solve_table(
     first_row: int,
     reactions: bool = False,
     threads: int | None = None,
-    deviations: np.ndarray | None = None,
+    deviations: dict[str, np.ndarray] | None = None,
 ) -> tuple[Columns, Derived]:
     """Output columns for the rows of one table, and what follows from its evaluation."""
     given, mechanism = state_columns(model), model.mechanism

@@ -1,4 +1,4 @@
-"""Standard deviations of efforts from those of the states that they are computed for."""
+"""Standard deviations of efforts from those of states and numbers."""
 
 from __future__ import annotations
 
@@ -12,28 +12,35 @@ from ..status import Status
 from .derived import Derived
 from .state_rows import Columns
 
-RATES = ("", "d", "dd")
+STATES, RATES = ("q", "v", "a"), ("", "d", "dd")
 
 
-def deviations_of(model: Model, noise: Values) -> np.ndarray:
-    """Standard deviations of q, q', q'', (3 m,) [SI], from "X=0.01 mm,dX=1 mm/s" or by name.
+def deviations_of(model: Model, noise: Values) -> dict[str, np.ndarray]:
+    """Standard deviations [SI] by what efforts are differentiated by: q, v and a, (m,), and numbers
+    of the file, of every entry; from "X=0.01 mm,dX=1 mm/s,platform.mass=0.01" or by name.
 
     Raises: InputError: for unknown columns, and for anything but positive numbers.
     """
     names = [prefix + name for prefix in RATES for name in model.independent]
-    given = values_of(noise, names, "noise")
+    text = noise.split(",") if isinstance(noise, str) else list(noise)
+    paths = [one.split("=")[0].strip() for one in text if isinstance(one, str) and "." in one]
+    numbers = [p for p in paths if p.partition(".")[0] in ("platform", "chain", "contact")]
+    given = values_of(noise, [*names, "gravity", *numbers], "noise")
     if not given:
         raise InputError(f"noise: expected at least one of {', '.join(names)}, as in X=0.01 mm")
     for name, value in given.items():
         if value <= 0:
             raise InputError(f"noise: {name}: expected a positive number, got {value:g}")
-    return np.array([given.get(name, 0.0) for name in names])
+    found = {name: np.array([given[name]]) for name in given if name not in names}
+    for by, prefix in zip(STATES, RATES, strict=True):
+        found[by] = np.array([given.get(prefix + name, 0.0) for name in model.independent])
+    return {by: a for by, a in found.items() if a.any()}
 
 
 def deviation_columns(
     model: Model,
     derived: Derived,
-    deviations: np.ndarray,
+    deviations: dict[str, np.ndarray],
     state: States,
     wrench: np.ndarray,
     at: str | None,
@@ -42,11 +49,15 @@ def deviation_columns(
 
     NaN where a row has no efforts, or these have a kink.
     """
-    found = np.full((len(derived.ok), len(model.mechanism.chains)), np.nan)
+    chains = model.mechanism.chain_names
+    found = np.full((len(derived.ok), len(chains)), np.nan)
     if (good := np.flatnonzero(derived.ok)).size:
         q, v, a = (x[good] for x in state)
-        d = model.derivatives("effort", ("q", "v", "a"), q=q, v=v, a=a, wrench=wrench[good], at=at)
-        by = np.concatenate([d["effort", name] for name in ("q", "v", "a")], axis=2)
-        by[d.status != Status.ok] = np.nan
-        found[good] = np.sqrt(((by * deviations) ** 2).sum(axis=-1))
-    return {f"sd_tau_{c}": found[:, i] for i, c in enumerate(model.mechanism.chain_names)}
+        d = model.derivatives(
+            "effort", tuple(deviations), q=q, v=v, a=a, wrench=wrench[good], at=at
+        )
+        shape = len(good), len(chains), -1
+        parts = [(d["effort", by].reshape(shape) * s) ** 2 for by, s in deviations.items()]
+        square = np.concatenate(parts, axis=2).sum(axis=2)
+        found[good] = np.sqrt(np.where(d.status[:, None] == Status.ok, square, np.nan))
+    return {f"sd_tau_{c}": found[:, i] for i, c in enumerate(chains)}
