@@ -117,10 +117,12 @@ DIGESTS = """
 from support.cases import case
 from condyle.questions import QUESTIONS, Question
 from condyle.questions.law import CONTROLLERS
-from condyle.questions.structure import structure_of
-structure = structure_of(case("mixed_k2_n8").mechanism)
+from condyle.questions.structure import structure_of, walls_of
+machine = case("mixed_k2_n8").mechanism
+structure = structure_of(machine)
 given = {"tick": (CONTROLLERS["impedance"],)}
 given["derivative"] = ("slopes", "linear", (), ("q",), ("residual",))
+given["file_numbers"] = (walls_of(machine, structure), True)
 for name in QUESTIONS:
     question = Question.about(structure, name, *given.get(name, ()))
     print(name, question.variants().digest, question.key)

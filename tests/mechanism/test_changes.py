@@ -12,10 +12,12 @@ import casadi as ca
 import numpy as np
 import pytest
 
+import condyle
 from condyle.errors import InputError, MechanismError
 from condyle.mechanism import Mechanism, bundled_text, dumps, parse
 from condyle.mechanism.bodies import Platform
 from condyle.mechanism.files import from_data
+from condyle.mechanism.home import home_residuals
 from condyle.mechanism.paths import parsed, written
 from condyle.mechanism.surface import Expression, Sphere
 
@@ -214,3 +216,50 @@ def test_errors_travel() -> None:
         parse("name = 3")
     again = pickle.loads(pickle.dumps(caught.value))
     assert (str(again), again.problems) == (str(caught.value), caught.value.problems)
+
+
+@pytest.mark.parametrize(
+    ("name", "path", "by"),
+    [
+        ("masticatory", "contact[0].point", (2e-3, -1e-3, 3e-3)),
+        ("masticatory-curved", "contact[0].surface.xx", 1.0),
+        ("human-jaw-curved", "contact[1].point", (1e-3, 0.0, 0.0)),
+    ],
+)
+def test_home_kept(name: str, path: str, by: object) -> None:
+    """A surface follows with its offset, and misses home by as much as before."""
+    machine = condyle.load_mechanism(name)
+    new = np.add(machine.get(path), by).tolist()
+    with pytest.raises(MechanismError, match="off the surface at home"):
+        machine.set(path, new)
+    kept = machine.set(path, new, keep="home")
+    assert np.array_equal(kept.get(path), new)
+    np.testing.assert_allclose(home_residuals(kept), home_residuals(machine), rtol=0, atol=1e-17)
+    i = int(path[8])
+    before, after = (m.contacts[i].surface for m in (machine, kept))
+    if before.kind == "profile":
+        moved = np.array(after.points) - np.array(before.points)
+        assert (moved[:, 0] == 0).all() and np.ptp(moved[:, 1]) < 1e-17
+    else:
+        moved = {key for key, x in after.entries().items() if x != before.entries()[key]}
+        assert moved == {"offset"} | ({"xx"} if path.endswith("xx") else set())
+    assert kept.contacts[1 - i] == machine.contacts[1 - i]
+    assert machine.set("platform.mass", 0.3, keep="home") == machine.set("platform.mass", 0.3)
+
+
+def test_home_kept_by_a_centre() -> None:
+    """A sphere's centre goes along the normal; one that is set itself stays."""
+    machine = condyle.load_mechanism("masticatory")
+    name = machine.contact_names[0]
+    point = np.array(machine.contacts[0].point)
+    centre = point - 0.03 * np.array([0.6, 0.0, 0.8])
+    ball = {"kind": "sphere", "centre": centre, "radius": 0.03}
+    round_one = machine.set(f"contact.{name}.surface", ball)
+    kept = round_one.set(f"contact.{name}.surface.radius", 0.04, keep="home")
+    wanted = point - 0.04 * np.array([0.6, 0.0, 0.8])
+    np.testing.assert_allclose(kept.contacts[0].surface.centre, wanted, rtol=0, atol=1e-16)
+    off = np.add(centre, (0, 0, 1e-3)).tolist()
+    with pytest.raises(MechanismError, match="off the surface at home"):
+        round_one.set(f"contact.{name}.surface.centre", off, keep="home")
+    with pytest.raises(InputError, match='keep: expected "home" or "all", got'):
+        round_one.set("platform.mass", 0.2, keep="some")
