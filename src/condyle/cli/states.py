@@ -154,12 +154,12 @@ def pose(
 ) -> Answer:
     """Pose of the platform from encoder readings (forward kinematics), one per row.
 
-    Joint coordinates in, pose X, Y, Z (m), alpha, beta, gamma (rad) out.
+    Readings in, pose X, Y, Z (m), alpha, beta, gamma (rad) out.
 
     Options:
-        joints: Joint coordinates (CSV or Parquet): joint_CHAIN for each chain (rad, or m for a
-            slider), zero at home. With a column t (s) each row starts from the row before,
-            otherwise each starts from home.
+        joints: Encoder readings (CSV or Parquet): joint_CHAIN for each chain (rad, or m for a
+            slider), its joint coordinate plus its actuator's zero. With a column t (s) each row
+            starts from the row before, otherwise each starts from home.
         out: File for the poses (.csv or .parquet).
         tolerance: Largest difference between a joint coordinate of the pose and the given one (rad,
             or m).

@@ -219,7 +219,8 @@ class Samples:
         if name in ("s", "s1", "s2"):
             return self._prescribed(name, f)
         if name.startswith("joint") and "rate" not in name:
-            return self._near.joint * (0.98 if name == "joint_before" else 1.0)
+            joint = self._near.joint * (0.98 if name == "joint_before" else 1.0)
+            return joint + self._model.mechanism.zeros if name == "joint" else joint  # a reading
         if name == "pose_before":  # where `joint` is, but for the last period's way
             return 0.98 * self._near.pose
         if name in ("start", "pose_rate_before", "memory_before"):

@@ -46,6 +46,7 @@ LANES = {
     "viscous": "N m s/rad or N s/m",
     "coulomb": "N m or N",
     "smoothing_speed": "rad/s or m/s",
+    "zero": "rad or m, what the encoder reads at home",
 }
 
 

@@ -20,6 +20,7 @@ from ..questions.observer import ITERATIONS as OBSERVER_STEPS
 from ..questions.structure import Structure
 
 POSE_STEPS = 8  # Newton steps from a start that is off by a third of the largest step
+READ = {"joint": ("encoder readings: joint coordinates plus actuator.zero", "")}
 
 
 @dataclass(frozen=True)
@@ -152,13 +153,14 @@ CATALOGUE: dict[str, Entry] = {
         doubt="UNREACHABLE",
     ),
     "pose": Entry(
-        "Forward kinematics: the pose from joint coordinates, as encoders give them.",
+        "Forward kinematics: the pose from encoder readings.",
         "joint start",
         "pose residual",
         details=lambda wish: (POSE_STEPS,),
         doubt="UNREACHABLE",
         within={"residual": {"double": 1e-6, "float": 1e-4}},
         steps=POSE_STEPS,
+        described=READ,
     ),
     "observer": Entry(
         "State from encoders, period by period: pose, and rates of the counts.",
@@ -170,6 +172,7 @@ CATALOGUE: dict[str, Entry] = {
         described={
             "period": ("time between calls", "s"),
             "smoothing": ("weight of the previous rates, 0 to below 1", "1"),
+            **READ,
         },
     ),
     "state": Entry(
@@ -180,6 +183,7 @@ CATALOGUE: dict[str, Entry] = {
         details=lambda wish: (EXACT,),
         doubt="UNREACHABLE",
         steps=OBSERVER_STEPS,
+        described=READ,
     ),
     "joints": Entry(
         "Joint coordinates and their rates, and the pose, from the independent coordinates.",

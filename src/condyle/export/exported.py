@@ -159,7 +159,7 @@ KNOWN = {
     "joint_rate": ("rates of joints", JOINT, "/s"),
     "joint_d": ("desired joint coordinates", JOINT, ""),
     "joint_rate_d": ("desired rates of joints", JOINT, "/s"),
-    "joint_read": ("joint coordinates as read by the encoders", JOINT, ""),
+    "joint_read": ("joint coordinates, zero at home, as read by the encoders", JOINT, ""),
     "joint_rate_read": ("rates of joints, filtered", JOINT, "/s"),
     "joint_before": ("joint_read of the previous call; first as joint", JOINT, ""),
     "joint_rate_before": ("joint_rate_read of the previous call; first 0", JOINT, "/s"),
@@ -206,7 +206,7 @@ class Arguments:
     ) -> Argument:
         """What a port or result is in C.
 
-        Args: name: in C;  described: description and unit, where it is not `KNOWN`.
+        Args: name: in C;  described: description, and unit where that is not `KNOWN` either.
         """
         size = port.size if isinstance(port, Port) else math.prod(port.shape)
         known = name.removeprefix(PREFIX)
@@ -214,7 +214,8 @@ class Arguments:
         if known != name:
             text = f"{'direction in' if given else 'derivative of'} {text}"
         if described is not None:
-            text, per = described[0], f"={described[1]}"
+            text = described[0]
+            per = f"={described[1]}" if described[1] else per
         if not of:
             of = JOINT if port.lanes else FREE if size == len(self.independent) else AXES
         labels = self._labels.get(of, [f"{LETTERS.get(name, '')}{axis}" for axis in "xyz"])

@@ -5,7 +5,7 @@ Effort is what the actuator delivers at its joint,
     effort = tau + rotor_inertia gear^2 theta'' + viscous theta'
              + coulomb theta' / sqrt(theta'^2 + smoothing_speed^2),
 
-with tau what the mechanism takes.
+with tau what the mechanism takes. Its encoder reads joint + zero.
 """
 
 from __future__ import annotations
@@ -16,9 +16,20 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from .quantities import EffortLimit, Gear, Limit, Loss, MomentOrNone, PullLimit, SmoothingSpeed
+from .quantities import (
+    EffortLimit,
+    Gear,
+    Length,
+    Limit,
+    Loss,
+    MomentOrNone,
+    Number,
+    PullLimit,
+    SmoothingSpeed,
+)
 from .table import Table
 
+READS = "what the encoder reads at home"
 SMOOTHING_SPEED = 1e-3  # rad/s or m/s: default speed below which Coulomb friction fades
 
 
@@ -86,6 +97,7 @@ class Actuator(Table):
         "viscous",
         "coulomb",
         "smoothing_speed",
+        "zero",
     )
 
     speed_limit: Limit | None = Field(default=None, description="rad/s, or m/s where it slides")
@@ -124,12 +136,14 @@ class RotaryActuator(Actuator):
     torque_limit: EffortLimit | None = Field(
         default=None, description="N m: |effort| is at most this, or [least, greatest]"
     )
+    zero: Number = Field(default=0.0, description=f"{READS}, rad")
 
 
 class LinearActuator(Actuator):
     force_limit: EffortLimit | None = Field(
         default=None, description="N: |effort| is at most this, or [least, greatest]"
     )
+    zero: Length = Field(default=0.0, description=READS)
 
 
 class CableActuator(Actuator):
@@ -138,6 +152,7 @@ class CableActuator(Actuator):
     force_limit: PullLimit | None = Field(
         default=None, description="N: the greatest tension, or [least, greatest]"
     )
+    zero: Length = Field(default=0.0, description=READS)
 
     @property
     def effort_range(self) -> tuple[float, float]:

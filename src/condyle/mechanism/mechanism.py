@@ -112,6 +112,11 @@ class Mechanism(Table):
         return tuple(chain.name for chain in self.chains)
 
     @cached_property
+    def zeros(self) -> tuple[float, ...]:
+        """What the encoders read at home [rad or m]: readings are joint coordinates plus these."""
+        return tuple(chain.actuator.zero for chain in self.chains)
+
+    @cached_property
     def contact_names(self) -> tuple[str, ...]:
         return tuple(contact.name for contact in self.contacts)
 

@@ -397,9 +397,9 @@ class Model:
         time: ArrayLike | None = None,
         tolerance: float = TOLERANCE,
     ) -> ModelResult:
-        """Poses from joint coordinates, such as encoder readings, by least squares.
+        """Poses from encoder readings, joint coordinates plus `actuator.zero`, by least squares.
 
-        Args:    joint: (..., n) [rad or m], zero at home; turning joints may count whole turns.
+        Args:    joint: readings, (..., n) [rad or m]; turning joints may count whole turns.
                  start: poses X_EE (..., 6) from which each is followed; default: home.
                  time: (N,) [s], increasing: each row of joint, (N, n), follows the row before.
                  tolerance: largest residual of a joint [rad or m].

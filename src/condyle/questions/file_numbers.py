@@ -21,7 +21,7 @@ from ..mechanism.mechanism import Mechanism
 from ..mechanism.surface.wall import Placed, Wall, home_of
 from .builder import Builder
 from .number_checks import judge
-from .numbers import INERTIA, Layout, single_contacts
+from .numbers import INERTIA, ZERO, Layout, single_contacts
 from .structure import Structure, walls_of
 
 
@@ -47,7 +47,7 @@ def _written(structure: Structure, walls: tuple[Wall, ...], judged: bool) -> Pro
     for name, (_, count) in layout.parameters.items():
         if count:
             b.output(name, ca.densify(values[name]), "", count)
-    for name in ("mask", "joint", "constants", "actuator"):
+    for name in ("mask", "joint", "constants", "zero", "actuator"):
         if all(name in lane for lane in layout.lanes):
             for group in groups:
                 alone: list[ca.SX | None] = [None] * len(groups)
@@ -65,6 +65,8 @@ def _lane(b: Builder, group: int, name: str) -> ca.SX:
     if name == "constants":
         given = ca.vertcat(*(b.lane(group, path) for path in family.numbers))
         return family.derived_vector(given)
+    if name == "zero":
+        return b.lane(group, ZERO)
     assert structure.losses
     rotor, gear, viscous, coulomb, speed = (
         b.lane(group, f"actuator.{key}")

@@ -189,6 +189,7 @@ def _unit(path: str, family: Family) -> str:
         "com": "m" if path.startswith(("crank", "cylinder", "piston")) else "",
         **dict.fromkeys(("inertia", "rotor_inertia", "transverse", "axial"), "kg m^2"),
         "gear": "rad/m" if slides else "",
+        "zero": family.joint_unit,
         "viscous": "N s/m" if slides else "N m s/rad",
         "coulomb": family.effort_unit,
         "smoothing_speed": f"{family.joint_unit}/s",

@@ -26,6 +26,7 @@ from .structure import Structure
 LOSSES = tuple(
     f"actuator.{key}" for key in ("rotor_inertia", "gear", "viscous", "coulomb", "smoothing_speed")
 )
+ZERO = "actuator.zero"  # what an encoder reads at home
 NO_LOSSES = (0.0, 0.0, 0.0, 1.0)
 Parameter = Callable[[str], ca.SX]  # a mechanism's number by name
 Slot = tuple[int, int]  # start, count
@@ -56,7 +57,7 @@ class Layout:
             sizes |= {"slope": 2, "mean": 3, "mean_offset": 1, "difference": 3, "gap": 1}
         losses = {"actuator": len(NO_LOSSES)} if structure.losses else {}
         lanes = [
-            _slots({"mask": 1, "joint": 3, "constants": FAMILIES[kind].size()} | losses)
+            _slots({"mask": 1, "joint": 3, "constants": FAMILIES[kind].size(), "zero": 1} | losses)
             for kind in structure.families
         ]
         return Layout(structure, _slots(sizes), lanes)
@@ -75,7 +76,9 @@ class Layout:
             sizes |= {f"contact_home_{i}": 4} if wall.general or wall.kept else {}
         sizes |= {f"friction_{i}": 2 for i in structure.friction}
         losses = dict.fromkeys(LOSSES, 1) if structure.losses else {}
-        lanes = [_slots(FAMILIES[kind].numbers | losses) for kind in structure.families]
+        lanes = [
+            _slots({**FAMILIES[kind].numbers, ZERO: 1} | losses) for kind in structure.families
+        ]
         return Layout(structure, _slots(sizes), lanes)
 
     @property

@@ -1,6 +1,6 @@
 """From encoders to the state: counts, the pose that they give, rates.
 
-    count = resolution round(theta / resolution)
+    count = resolution round(reading / resolution) - zero,    reading = theta + zero
     pose:  that of the counts, from the last one on, carried on by its rate (`pose_from_encoders`)
     q':    A q' ~ theta',   theta' = smoothing theta'_before + (1 - smoothing) (count - before) / T
 
@@ -19,7 +19,7 @@ import casadi as ca
 from ..graph.program import Variants
 from .builder import Builder, Lanes
 from .platform import ANGLE_UNITS
-from .pose import pose_from_encoders
+from .pose import joints_read, pose_from_encoders
 from .structure import Structure
 
 ITERATIONS = 3  # from one period to the next
@@ -36,7 +36,8 @@ BEFORE = {  # port -> result
 class Measured:
     """What a controller measures at a tick: expressions in a law, arrays where it is in Python.
 
-    q, q1:  estimated state, (m,) each;  joint, joint_rate: a chain's, as encoders have it.
+    q, q1:  estimated state, (m,) each.
+    joint, joint_rate: a chain's, as its encoder has it, zero at home.
     force:  of the loads on the platform at the controller's point, (3,) [N] in {S};  t: [s].
     """
 
@@ -51,28 +52,30 @@ class Measured:
 def observer(structure: Structure, velocity: str = DIFFERENCE) -> Variants:
     """The state that encoders give.
 
-    Results: q, q1 (m,); joint, joint_rate: counts, and rates as filtered; pose, pose_rate (6,).
-    Ports joint and joint_rate are as they are; tachometers' rates are `EXACT`.
+    Ports: joint: readings, theta + zero; joint_rate: as they are; tachometers' rates are `EXACT`.
+    Results: q, q1 (m,); joint, joint_rate: counts less zeros, and rates as filtered; pose,
+    pose_rate (6,).
     """
     b = Builder(structure)
-    joint, rate = b.lane_sample("joint", unit="rad or m"), b.lane_sample("joint_rate")
-    found = observe(b, joint, rate, velocity, b.sample("period", 1, "s"))
+    reading, rate = b.lane_sample("joint", unit="rad or m"), b.lane_sample("joint_rate")
+    found = observe(b, reading, rate, velocity, b.sample("period", 1, "s"))
     b.output("q", found.q, "m, rad", structure.m)
     b.output("q1", found.q1, "per s", structure.m)
     return Variants(b.finish(), single=True)
 
 
-def observe(b: Builder, joint: Lanes, rate: Lanes, velocity: str, period: ca.SX) -> Measured:
+def observe(b: Builder, reading: Lanes, rate: Lanes, velocity: str, period: ca.SX) -> Measured:
     """The same as a part of another question: its other ports, results of `BEFORE`, and check."""
     resolution = b.lane_sample("resolution", unit="rad or m")
     smoothing = b.sample("smoothing", 1)
     pose, pose_rate = b.sample("pose_before", 6, ANGLE_UNITS), b.sample("pose_rate_before", 6)
     before, rate_before = b.lane_sample("joint_before"), b.lane_sample("joint_rate_before")
-    groups = range(len(joint))
+    groups = range(len(reading))
     counts = [
-        joint[i] - ca.if_else(resolution[i] > 0, ca.remainder(joint[i], resolution[i]), 0)
+        reading[i] - ca.if_else(resolution[i] > 0, ca.remainder(reading[i], resolution[i]), 0)
         for i in groups
     ]
+    counts = joints_read(b, counts)
     if velocity == DIFFERENCE:
         part = (1 - smoothing) / period
         rate = [smoothing * rate_before[i] + part * (counts[i] - before[i]) for i in groups]

@@ -52,7 +52,7 @@ class Step:
 
     pose, move: X_EE and the step, (6,).   square: of the move, without dimension.
     M_J: (6, m).   A: (m,) a group, lane values, without dimension; `weight` of each group's.
-    residual: readings less joint coordinates, lane values [rad or m].
+    residual: joint coordinates as read, less those of the pose, lane values [rad or m].
     regular: 1, or 0 where A has not full rank, or a chain cannot reach the pose.
     """
 
@@ -99,6 +99,11 @@ class Estimate:
         return self.pose[self.last.free]
 
 
+def joints_read(b: Builder, reading: Lanes) -> Lanes:
+    """Joint coordinates, zero at home, that encoders' readings stand for: reading - zero."""
+    return [one - b.lane(group, "zero") for group, one in enumerate(reading)]
+
+
 def pose_from_encoders(
     b: Builder,
     joint: Lanes,
@@ -106,7 +111,7 @@ def pose_from_encoders(
     iterations: int = ITERATIONS,
     weight: Lanes | None = None,
 ) -> Estimate:
-    """The pose on the contacts whose joint coordinates are nearest to readings.
+    """The pose on the contacts whose joint coordinates are nearest to those read.
 
     Args: joint: lane values [rad or m], zero at home; turning joints may count whole turns.
           start: X_EE, (6,), near by: on the contacts, or a little off them.
@@ -202,12 +207,12 @@ def least_squares(b: Builder, A: Lanes, right: Lanes) -> tuple[ca.SX, ca.SX]:
 
 
 def pose(structure: Structure, iterations: int = ITERATIONS) -> Variants:
-    """The pose of readings, port joint, from a pose near by, port start.
+    """The pose of encoders' readings, port joint, from a pose near by, port start.
 
-    Results: pose (6,); residual, readings less joint coordinates of the pose.
+    Results: pose (6,); residual, readings less joint coordinates of the pose and zeros.
     """
     b = Builder(structure)
-    joint = b.lane_sample("joint", unit="rad or m")
+    joint = joints_read(b, b.lane_sample("joint", unit="rad or m"))
     found = pose_from_encoders(b, joint, b.sample("start", 6, ANGLE_UNITS), iterations)
     b.output("pose", found.pose, ANGLE_UNITS)
     b.output("residual", found.last.residual, "rad or m")

@@ -43,7 +43,7 @@ def rate(
     unilateral ones `push`, the sign of their normal force.
     Results: rate (2 m + 4,); guards: of bounded contacts, of unilateral ones, of the loads' jumps;
     too_fast, a lane's. wrench (6,) of all loads about O_M, load_force (loads, 3);
-    measured_force (3,).
+    measured_force (3,). joint, and its encoder's reading, a lane's.
 
     Args: loads: their laws;  measured: loads whose forces sum up to `measured_force`.
           bounded, sided: contacts whose bounds and pushes are guarded.
@@ -76,7 +76,9 @@ def rate(
         b.output("guards", ca.vertcat(*guards), "", len(guards))
     b.output("too_fast", [ca.fabs(r) - v for r, v in zip(rates, speed, strict=True)], "")
     b.output("pose", platform.pose, ANGLE_UNITS)
-    b.output("joint", [loop.q_r[0] for loop in loops_of(b, platform)], "rad or m")
+    joints = [loop.q_r[0] for loop in loops_of(b, platform)]
+    b.output("joint", joints, "rad or m")
+    b.output("reading", [joint + b.lane(i, "zero") for i, joint in enumerate(joints)], "rad or m")
     b.output("joint_rate", rates, "rad/s or m/s")
     b.output("loss", lost, "W")
     b.output("contact_force", moved.force, "N", k)

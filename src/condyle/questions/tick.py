@@ -38,7 +38,8 @@ def tick(
 ) -> Variants:
     """Efforts that a law asks for at what is measured, and what lasts until the next tick.
 
-    Ports: q, q1, joint, joint_rate: as they are, or joints alone where there are sensors;
+    Ports: q, q1, joint, joint_rate: as they are; where there are sensors only joint, which is then
+    the encoders' reading, and joint_rate;
     reference `REFERENCE`; force at the law's point, (3,); its gains; low, high: limits, a lane's.
     Results: effort; asked, without limits; q, q1, joint, joint_rate, measured_force, as sampled;
     memory.

@@ -120,6 +120,8 @@ def _losses(losses: Mapping[str, float], effort: str, joint: str) -> Iterator[st
             f"Coulomb {losses['coulomb']:g} {effort}, fading below "
             f"{losses['smoothing_speed']:g} {joint}/s"
         )
+    if losses["zero"]:
+        yield f"encoder reads {losses['zero']:g} {joint} at home"
 
 
 def _contact(contact: Mapping[str, Any]) -> str:
@@ -230,7 +232,8 @@ def check(mechanism: Any) -> MechanismSummary:
 def _chain_data(chain: Any) -> dict[str, Any]:
     family, actuator, limit = FAMILIES[chain.kind], chain.actuator, limits(chain)
     ends = [v if np.isfinite(v) else None for v in (limit.low, limit.high)]
-    losses = ("rotor_inertia", "gear", "reflected_inertia", "viscous", "coulomb", "smoothing_speed")
+    losses = ["rotor_inertia", "gear", "reflected_inertia", "viscous", "coulomb", "smoothing_speed"]
+    losses += ["zero"]
     return {
         "kind": chain.kind,
         "joint_unit": family.joint_unit,

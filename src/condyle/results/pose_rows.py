@@ -29,7 +29,7 @@ ERRORS: dict[PoseStatus, tuple[type[SampleError], str]] = {
     PoseStatus.UNREACHABLE: (
         UnreachableError,
         "no pose has the joint coordinates of row {row}, or none that is reached from {start} "
-        "without passing a singularity. Check units and zero positions (zero at home); "
+        "without passing a singularity. Check units and zero positions (`zero` of actuators); "
         "--all looks for poses anywhere",
     ),
     PoseStatus.LOST: (
@@ -62,8 +62,8 @@ def pose_states(
     """Forward kinematics of every row of a file of joint coordinates.
 
     Args:   mechanism: one, a model, the path of a file, or the name of a bundled one.
-            joints: CSV with the columns joint_<chain> [rad or m, zero at home], optionally t [s]:
-                    then each row follows the one before, else each follows from home.
+            joints: CSV with the columns joint_<chain> [rad or m], readings of encoders;
+                    optionally t [s]: then each row follows the one before, else from home.
             out:    CSV: t if given, X ... gamma, residual (largest of the row, in the unit of the
                     joints; where chains slide and turn, residual_m and residual_rad) and
                     condition; with `flag` also status.

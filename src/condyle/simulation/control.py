@@ -44,6 +44,9 @@ class Controller:
         sensing = drive.sensing
         self._inverse = drive.model.unchecked()
         self._model, velocity = drive.model, None if sensing is None else sensing.velocity
+        # Ports of a tick -> results of the plant: encoders read joint + zero.
+        joint = "joint" if sensing is None else "reading"
+        self.measured = {"joint": joint, "joint_rate": "joint_rate"}
         self.details = (drive.law.table, drive.law.choices, velocity)
         function = drive.law.table is None
         # Whether efforts are found in Python, and not by the kernel.
@@ -96,10 +99,11 @@ class Controller:
         ports = dict(zip(("q", "q1"), at, strict=True))
         models = [drive.model for drive in drives], [plan.model for plan in plans]
         own, true = (_instants(each, ports) for each in models)
-        joint = true["joint"].T
+        reading = true["joint"].T + np.array([plan.model.mechanism.zeros for plan in plans])
         step = np.array([drive.sensing.resolution for drive in drives])  # type: ignore[union-attr]
         with np.errstate(divide="ignore", invalid="ignore"):
-            counts = np.where(step > 0, step * np.round(joint / step), joint)
+            counts = np.where(step > 0, step * np.round(reading / step), reading)
+        counts = counts - np.array([drive.model.mechanism.zeros for drive in drives])
         self._remember(own["pose"].T, counts, own["joint_rate"].T)
 
     def _remember(self, pose: np.ndarray, joint: np.ndarray, rate: np.ndarray) -> None:
@@ -166,13 +170,14 @@ class Controller:
         if memory.size:
             columns.give("memory_before", memory)
         if columns.has("pose_before"):
-            self._remember(*(plant[name][None] for name in ("pose", "joint", "joint_rate")))
+            pose, reading, rate = (plant[name][None] for name in ("pose", *self.measured.values()))
+            self._remember(pose, reading - self._model.mechanism.zeros, rate)
         return self._solve(0.0, y, plant)
 
     def _solve(self, t: float, y: np.ndarray, plant: Plant) -> np.ndarray:
         columns, m = self.columns, len(self.plan.q)
-        for name in ("joint", "joint_rate"):
-            columns.give(name, plant[name])
+        for name, found in self.measured.items():
+            columns.give(name, plant[found])
         if columns.has("q"):
             columns.give("q", y[:m])
             columns.give("q1", y[m : 2 * m])

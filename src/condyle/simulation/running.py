@@ -268,7 +268,7 @@ class Run:
             effort = samples[:, rows("effort")][due] if sampled else np.zeros((len(t), n))
             columns = {
                 "command": samples[:, rows("asked")],
-                "count": samples[:, rows("joint")],
+                "count": samples[:, rows("joint")] + drive.model.mechanism.zeros,
                 "estimate": samples[:, np.concatenate([rows("q"), rows("q1")])],
                 "force": np.linalg.norm(samples[:, rows("measured_force")], axis=1),
             }

@@ -215,7 +215,7 @@ class Steps:
         run.references = control.references.ctypes.data
         run.reference = columns.address(control.first)
         run.reference_rows = control.references.shape[1]
-        measured = [(plant.columns, name, name) for name in ("joint", "joint_rate")]
+        measured = [(plant.columns, found, port) for port, found in control.measured.items()]
         measured += [(plant.columns, "measured_force", "force")] * bool(
             plant.columns.result("measured_force").size
         )

@@ -1,4 +1,4 @@
-"""Forward kinematics: from joint coordinates, as encoders give them, to the pose.
+"""Forward kinematics: from encoder readings, joint + zero, to the pose.
 
 n joint coordinates over-determine a pose that the contacts leave 6 - k freedoms. The pose is the
 one on the contacts whose joints are nearest in the least-squares sense, with angles multiplied by
@@ -31,7 +31,7 @@ START = POSE._replace(name="start")
 
 
 class ForwardKinematics:
-    """Solves poses of one mechanism from its joint coordinates."""
+    """Solves poses of one mechanism from readings of its encoders."""
 
     def __init__(self, mechanism: Mechanism) -> None:
         self._mechanism = mechanism
@@ -51,7 +51,7 @@ class ForwardKinematics:
         _check(tolerance)
         given = np.zeros(6) if start is None else START.array(start)
         arguments = (self._joint, START)
-        lead, (joints, first) = samples(arguments, (self._joint.array(joint), given))
+        lead, (joints, first) = samples(arguments, (self._read(joint), given))
         count = max(len(joints), len(first)) if 0 not in lead else 0
         joints = np.broadcast_to(joints, (count, joints.shape[1]))
         first = np.broadcast_to(first, (count, 6))
@@ -78,6 +78,10 @@ class ForwardKinematics:
             status=status,
         ).shaped(lead)
 
+    def _read(self, reading: Any) -> np.ndarray:
+        """Joint coordinates, zero at home, that encoders' readings stand for."""
+        return self._joint.array(reading) - self._mechanism.zeros
+
     def _bound(self, pose: np.ndarray, step: Step) -> np.ndarray:
         """Of the pose's error, (N,), in characteristic lengths and radians.
 
@@ -98,7 +102,7 @@ class ForwardKinematics:
     ) -> AssemblyModes:
         """Assembly modes of one sample, (n,), that a seeded search finds; it may miss some."""
         _check(tolerance)
-        return search(self._mechanism, self._steps, self._joint.array(joints), seed, tolerance)
+        return search(self._mechanism, self._steps, self._read(joints), seed, tolerance)
 
 
 def _check(tolerance: Any) -> None:
