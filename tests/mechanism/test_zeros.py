@@ -80,7 +80,7 @@ def simulated(machine: condyle.Mechanism, model: str | None = None) -> xr.Datase
     controller = {"kind": "joint_pd", "stiffness": 20.0, "damping": 0.2}
     if model is not None:
         controller["model"] = model
-    scenario = {"duration": 0.05, "controller": controller, "sensors": {}}
+    scenario = {"duration": 0.004, "rtol": 1e-6, "controller": controller, "sensors": {}}
     return condyle.simulate(
         condyle.derive(machine, backend="numpy"),
         scenario,
