@@ -244,7 +244,9 @@ DOORS: dict[str, Door] = {
         {"mechanism": lambda stage: stage.mechanism}, model="mechanism", words=("general",)
     ),
     "Model.variants": Door(
-        {"table": {"platform.mass": [0.2, 0.3]}}, words=("platform.mass", "mechanism"), calls=20
+        {"table": {"platform.mass": [0.2, 0.3]}, "keep": "home"},
+        words=("platform.mass", "mechanism"),
+        calls=20,
     ),
     "Model.kernel": Door({"question": "inverse"}),
     "Model.unchecked": Door(),

@@ -38,7 +38,7 @@ def alone(c: Case, changes: dict[str, Any], **how: Any) -> Model | str:
     model = Model(c.mechanism, **how)
     try:
         held = c.mechanism.set("dependent", model.dependent) if model.dependent else c.mechanism
-        return Model(held.set(changes), **how)
+        return Model(held.set(changes, keep="home"), **how)
     except CondyleError as error:
         return "; ".join(getattr(error, "problems", [str(error)]))
 

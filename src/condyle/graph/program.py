@@ -259,6 +259,11 @@ class ManyNumbers:
     def __len__(self) -> int:
         return len(self.parameters)
 
+    def some(self, rows: np.ndarray) -> ManyNumbers:
+        """Of some of the mechanisms."""
+        lanes, padding = (tuple(own[rows] for own in each) for each in (self.lanes, self.padding))
+        return ManyNumbers(self.parameters[rows], lanes, padding, self.order)
+
     def __getitem__(self, i: int) -> Numbers:
         lanes, padding = (tuple(own[i] for own in each) for each in (self.lanes, self.padding))
         return Numbers(self.parameters[i], lanes, padding, self.order)

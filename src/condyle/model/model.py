@@ -445,7 +445,7 @@ class Model:
         """
         return extend("model.solve", self, motion, load, load_point, flag, reactions, threads)
 
-    def variants(self, table: Mapping[str, ArrayLike]) -> Any:
+    def variants(self, table: Mapping[str, ArrayLike], *, keep: str = "home") -> Any:
         """Variants of the mechanism, by numbers of its file as columns: `condyle.model.variants`.
 
         The coordinates stay independent and dependent as they are here.
@@ -453,9 +453,10 @@ class Model:
         Args:   table: path of `mechanism.get` -> values, (V, ...) [SI]: a mapping, a Dataset or a
                 data frame. `chain.*.base` is (V, chains, 3); a table is its entries in the file's
                 order.
+                keep: as of `mechanism.set`: by default surfaces follow their contacts' home.
         Raises: InputError: for an unknown path, or values that do not fit.
         """
-        return extend("model.variants", self, table)
+        return extend("model.variants", self, table, keep)
 
     # -- in other frameworks -----------------------------------------------------------------
 

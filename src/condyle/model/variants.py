@@ -18,16 +18,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..accessors import extend
-from ..errors import CondyleError, InputError, MechanismError, shown
+from ..errors import CondyleError, InputError, shown
 from ..graph.program import ManyNumbers, Numbers
 from ..kinematics.singularities import Singularity
-from ..mechanism.home import holding_problems, off_surface
 from ..mechanism.mechanism import Mechanism
-from ..mechanism.paths import changed, parsed, written
+from ..mechanism.paths import parsed, written
 from ..mechanism.table import Table
 from ..motion import Load, Motion
 from ..questions.file_numbers import numbers_of
 from ..questions.structure import Structure, structure_of
+from ..questions.variant_numbers import VariantNumbers, variant_numbers
 from ..status import Status
 from .arguments import ORIGIN, POINT, WRENCH, Argument
 from .distributing import Distributor
@@ -36,6 +36,9 @@ from .model import Model
 from .model_result import ModelResult
 
 Array = np.ndarray
+MANY = 64  # variants whose numbers are worth a compiler
+FAR = 1e5  # of any number: beyond it files may be refused
+LOSSY = ("rotor_inertia", "viscous", "coulomb")
 KEPT = 64  # mechanisms and models at hand
 FILLS: dict[str, Any] = {"f": np.nan, "b": False}
 
@@ -81,8 +84,8 @@ class Variants:
     own status, where a variant is no mechanism.
     """
 
-    def __init__(self, model: Model, table: Mapping[str, ArrayLike]) -> None:
-        self.model = model
+    def __init__(self, model: Model, table: Mapping[str, ArrayLike], keep: str = "home") -> None:
+        self.model, self.keep = model, keep
         machine = model.mechanism
         if machine.contacts and machine.dependent is None:
             machine = machine.set("dependent", model.dependent)
@@ -111,9 +114,7 @@ class Variants:
 
     def changes(self, i: int) -> dict[str, Any]:
         """What `mechanism.set` is given for a variant."""
-        return {
-            path: self._entries(path, values[i].tolist()) for path, values in self.table.items()
-        }
+        return {path: self._entries(path, a[i].tolist()) for path, a in self.table.items()}
 
     def _entries(self, path: str, value: Any) -> Any:
         here = self.base.get(path)
@@ -150,14 +151,8 @@ class Variants:
         return self.model._with(system.one(int(np.searchsorted(group.rows, i))), self.model._asked)
 
     def _made(self, i: int) -> Mechanism | CondyleError:
-        name = self.base.name
         try:
-            made = super(Mechanism, type(self.base)).checked(
-                changed(self.base, self.changes(i)), name
-            )
-            problems = list(off_surface(made.contacts)) or list(holding_problems(made))
-            if problems:
-                raise MechanismError(name, problems)
+            made = self.base.set(self.changes(i), keep=self.keep)
             self.model._asked.checked(made)
         except CondyleError as error:
             return error
@@ -165,9 +160,21 @@ class Variants:
 
     def _grouped(self) -> Iterator[Group]:
         """Variants of one structure together, and what answers for them."""
-        own: dict[Structure, list[tuple[int, Numbers]]] = {}
         system = self.model.system
-        for i in range(self.count):
+        structure = self._structure(replace(system.structure, zeros=frozenset()))
+        found = self._judged(structure)
+        left, own = np.arange(self.count), dict[Structure, list[tuple[int, Numbers]]]()
+        if found is not None:
+            far = np.zeros(self.count, dtype=bool)
+            for values in self.table.values():
+                far |= ~(np.abs(values.reshape(self.count, -1)) < FAR).all(axis=1)
+            far[found.doubt] = True
+            left = np.flatnonzero(far)
+            self.status[~far] = found.status[~far]
+            if (rows := np.flatnonzero(~far & (found.status == Status.ok))).size:
+                many = found.numbers if len(rows) == self.count else found.numbers.some(rows)
+                yield Group(self, rows, self._together(structure, rows, many))
+        for i in left.tolist():
             made = self._mechanism(i)
             if isinstance(made, CondyleError):
                 problems = getattr(made, "problems", [""])
@@ -175,12 +182,29 @@ class Variants:
                 self.status[i] = Status.singular if held else Status.refused
                 continue
             structure = structure_of(made, system.formulation, system.route)
-            numbers = numbers_of(structure, made)
-            own.setdefault(structure, []).append((i, numbers))
+            own.setdefault(structure, []).append((i, numbers_of(structure, made)))
         for structure, members in own.items():
             rows = np.array([i for i, _ in members])
-            many = ManyNumbers.of([numbers for _, numbers in members])
-            yield Group(self, rows, self._together(structure, rows, many))
+            numbers = ManyNumbers.of([one for _, one in members])
+            yield Group(self, rows, self._together(structure, rows, numbers))
+
+    def _structure(self, structure: Structure) -> Structure:
+        """That of all variants, whatever of losses and slopes varies."""
+        keys = [parsed(path) for path in self.table]
+        if any(k[0] == "chain" and str(k[-1]) in LOSSY for k in keys):
+            structure = replace(structure, losses=True)
+        if any(k[0] == "contact" and "slope" in k for k in keys):
+            structure = replace(structure, parallel=False)
+        return structure
+
+    def _judged(self, structure: Structure) -> VariantNumbers | None:
+        """Numbers and statuses in one batch; None where a path has no number of the kernel."""
+        own = {p: a for p, a in self.table.items() if parsed(p)[:2] != ("platform", "points")}
+        backend = "numpy" if self.count < MANY else self.model.backend.asked
+        try:
+            return variant_numbers(self.base, structure, own, self.keep, backend) if own else None
+        except InputError:
+            return None
 
     def _together(self, structure: Structure, rows: np.ndarray, numbers: ManyNumbers) -> Model:
         system = self.model.system

@@ -17,6 +17,7 @@ from ...mechanism.mechanism import Mechanism
 from ...model.distributing import Distribution
 from ...model.inverse_dynamics import SOLVED
 from ...model.model import Model
+from ...model.variants import MANY
 from ...motion import (
     Load,
     Motion,
@@ -135,6 +136,8 @@ def prepared(
         few: Any = {k: getattr(path, k)[:2] for k in ("t", "value", "rate", "acceleration")}
         (q, q1, q2), _ = model.poses.of_motion(replace(path, **few))
         model.inverse_dynamics(q, q1, q2, outputs=SOLVED, threads=1)
+    if design.count >= MANY:
+        model.variants(job.columns(design.rows(0, MANY)))  # as are those of numbers
     needed = SOLVED if study.solutions else outputs_of(model, (one.values for one in found))
     return replace(job, outputs=needed)
 
