@@ -26,8 +26,8 @@ from ..mechanism.paths import parsed, written
 from ..mechanism.table import Table
 from ..motion import Load, Motion
 from ..questions.file_numbers import numbers_of
+from ..questions.many_numbers import VariantNumbers, variant_numbers
 from ..questions.structure import Structure, structure_of
-from ..questions.variant_numbers import VariantNumbers, variant_numbers
 from ..status import Status
 from .arguments import ORIGIN, POINT, WRENCH, Argument
 from .distributing import Distributor
