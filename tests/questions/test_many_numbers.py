@@ -83,6 +83,7 @@ def test_every_reason() -> None:
     jaw = machine_of("masticatory")
     left, right = (f"contact.{name}" for name in jaw.contact_names)
     first = f"chain.{jaw.chain_names[0]}"
+    jaw = jaw.set(f"{first}.crank.mass", 0.1)
     xx, yy, zz = (jaw.get(f"platform.inertia.{key}") for key in ("xx", "yy", "zz"))
     tip, base = (np.array(jaw.get(f"{first}.{key}")) for key in ("crank_tip", "base"))
     axis = np.array(jaw.get(f"{first}.axis"))
@@ -94,6 +95,8 @@ def test_every_reason() -> None:
         "gravity": ((0.0, np.nan, -9.81), Status.refused),
         f"{first}.crank.inertia": (0.0, Status.refused),
         f"{first}.coupler.com": (1.01, Status.refused),
+        "platform.com": ((0.0, np.nan, 0.0), Status.refused),
+        f"{first}.crank.com": (0.5, Status.refused),
         f"{first}.coupler.axial": (1.0, Status.refused),
         f"{first}.coupler.transverse": (1e-19, Status.refused),
         f"{first}.axis": (along, Status.refused),

@@ -41,7 +41,8 @@ def file_numbers(structure: Structure, walls: tuple[Wall, ...], judged: bool = F
 def _written(structure: Structure, walls: tuple[Wall, ...], judged: bool) -> Program:
     layout, b = Layout.of(structure), Builder(structure, Layout.of_file(structure, walls))
     groups = range(len(structure.chains))
-    values, placed = _shared(b, walls)
+    constants = [_constants(b, group) for group in groups]
+    values, placed = _shared(b, walls, constants)
     if judged:
         judge(b, walls, placed, values)
     for name, (_, count) in layout.parameters.items():
@@ -51,23 +52,24 @@ def _written(structure: Structure, walls: tuple[Wall, ...], judged: bool) -> Pro
         if all(name in lane for lane in layout.lanes):
             for group in groups:
                 alone: list[ca.SX | None] = [None] * len(groups)
-                alone[group] = _lane(b, group, name)
+                alone[group] = constants[group] if name == "constants" else _lane(b, group, name)
                 b.output(f"{name}_{group}", alone, "", layout.lanes[group][name][1])
     return b.finish()
 
 
+def _constants(b: Builder, group: int) -> ca.SX:
+    family = FAMILIES[b.structure.families[group]]
+    return family.derived_vector(ca.vertcat(*(b.lane(group, path) for path in family.numbers)))
+
+
 def _lane(b: Builder, group: int, name: str) -> ca.SX:
-    family, structure = FAMILIES[b.structure.families[group]], b.structure
     if name == "mask":
         return ca.SX(1)
     if name == "joint":
         return b.lane(group, "platform")
-    if name == "constants":
-        given = ca.vertcat(*(b.lane(group, path) for path in family.numbers))
-        return family.derived_vector(given)
     if name == "zero":
         return b.lane(group, ZERO)
-    assert structure.losses
+    assert b.structure.losses
     rotor, gear, viscous, coulomb, speed = (
         b.lane(group, f"actuator.{key}")
         for key in ("rotor_inertia", "gear", "viscous", "coulomb", "smoothing_speed")
@@ -75,14 +77,16 @@ def _lane(b: Builder, group: int, name: str) -> ca.SX:
     return ca.vertcat(rotor * gear**2, viscous, coulomb, speed**2)
 
 
-def _shared(b: Builder, walls: Sequence[Wall]) -> tuple[dict[str, ca.SX], list[Placed]]:
+def _shared(
+    b: Builder, walls: Sequence[Wall], constants: Sequence[ca.SX]
+) -> tuple[dict[str, ca.SX], list[Placed]]:
     """Shared numbers by name, and what the contacts lead to."""
     structure = b.structure
     k, groups = len(structure.contacts), range(len(structure.chains))
     own = {name: b.parameter(name) for name in b.layout.parameters}
     points = [own[f"contact_point_{i}"] for i in range(k)]
     joints = [b.lane(group, "platform") for group in groups]
-    masses = [_end_mass(b, group) for group in groups]
+    masses = [_end_mass(b, group, constants[group]) for group in groups]
     first = b.total([m * p for m, p in zip(masses, joints, strict=True)])
     second = b.total(
         [
@@ -140,9 +144,9 @@ def _about(second: ca.SX) -> ca.SX:
     return ca.vertcat(*(trace * (i == j) - second[n] for n, (i, j) in enumerate(INERTIA)))
 
 
-def _end_mass(b: Builder, group: int) -> ca.SX:
+def _end_mass(b: Builder, group: int, constants: ca.SX) -> ca.SX:
     family = FAMILIES[b.structure.families[group]]
-    own = family.end_masses(family.named(_lane(b, group, "constants")))
+    own = family.end_masses(family.named(constants))
     return sum(own.values(), ca.SX(0))
 
 

@@ -104,6 +104,7 @@ def _shared_ranges(b: Builder, walls: Sequence[Wall]) -> Iterator[ca.SX]:
     for i, (j, k) in enumerate(INERTIA):
         yield from within(own("inertia")[i], field_range(Inertia, "xyz"[j] + "xyz"[k]))
     yield from within(own("landmark"), field_range(Contact, "point"))
+    yield from within(own("com"), field_range(Platform, "com"))
     for i, wall in enumerate(walls):
         yield from within(own(f"contact_point_{i}"), field_range(Contact, "point"))
         if wall.push:
@@ -123,6 +124,8 @@ def _of_chain(b: Builder, group: int) -> Iterator[ca.SX]:
         if path.endswith(".axial"):
             transverse = own[path.replace("axial", "transverse")]
             yield x <= 2 * transverse * (1 + 1e-12)
+    if "crank.com" in own:
+        yield own["crank.mass"] * own["crank.com"] ** 2 <= own["crank.inertia"] * (1 + 1e-12)
     for start, end in table.links.values():
         line = own[end] - own[start]
         yield ca.dot(line, line) > 0
