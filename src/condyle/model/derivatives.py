@@ -221,6 +221,8 @@ class Derived:
 
     def linearised(self, q: Any, v: Any, effort: Any, wrench: Any, at: Any) -> ModelResult:
         """As `Model.linearise`."""
+        own = self._own
+        own.samples((own.q, own.v, own.effort), (q, v, effort), wrench, at)  # what is missing, too
         given = {"q": q, "v": v, "effort": effort, "wrench": wrench, "at": at}
         d = self.matrices("acceleration", ("q", "v", "effort"), given)
         by = {name: d["acceleration", name] for name in ("q", "v", "effort")}
