@@ -8,7 +8,7 @@ import pytest
 import condyle
 from condyle.errors import InputError, UnsupportedError
 
-from .conftest import ARGUMENTS, RESULTS, slopes, state
+from .conftest import ARGUMENTS, RESULTS, differences, slopes, state
 
 jax = pytest.importorskip("jax")
 pytestmark = pytest.mark.slow
@@ -81,6 +81,53 @@ def test_two_models_in_one_function(compiler_command):
     for value, model in zip(found, models, strict=True):
         right = model.inverse_dynamics(*(given[name] for name in "qva")).effort
         assert np.asarray(value) == pytest.approx(right, rel=1e-12)
+
+
+@pytest.mark.parametrize("door", ["kernel", "graph"])
+def test_numbers_of_the_file(model, door):
+    machine, given = model.mechanism, state(model)
+    names = ARGUMENTS["inverse_dynamics"][:3]
+    paths = ["platform.mass", f"chain.{machine.chain_names[1]}.base"]
+    paths += [f"contact.{machine.contact_names[0]}.point"] if machine.contacts else []
+    function = model.to_jax(door, numbers=[*paths, "chain.*.actuator.viscous"]).inverse_dynamics
+    state_ = [given[name] for name in names]
+
+    def right(changes):
+        other = condyle.derive(machine.set(changes, keep="home"), backend="numpy")
+        return other.inverse_dynamics(*state_).effort
+
+    changes = {paths[0]: 0.3, paths[1]: np.array(machine.get(paths[1])) + 1e-4}
+    for own in ({}, changes):
+        found = np.asarray(function(*state_, numbers=own)["effort"])
+        assert found == pytest.approx(right(own), rel=1e-9, abs=1e-12)
+    nominal = {path: np.array(machine.get(path), dtype=float) for path in paths}
+    nominal["chain.*.actuator.viscous"] = np.zeros(len(machine.chains))
+
+    def effort(numbers):
+        return function(*state_, numbers=numbers)["effort"]
+
+    by = {name: way(effort)(nominal) for name, way in (("f", jax.jacfwd), ("r", jax.jacrev))}
+    for path in paths:
+        base = np.atleast_1d(nominal[path])
+        h = 1e-4 * max(np.abs(base).max(), 0.01)
+
+        def moved(x, path=path):
+            return right({path: x.tolist() if x.size > 1 else float(x[0])})
+
+        expected = differences(moved, base, h).reshape(by["f"][path].shape)
+        for found in by.values():
+            error = np.abs(np.asarray(found[path]) - expected).max()
+            assert error <= 1e-8 * np.abs(expected).max(), path
+    if machine.name == "gough-stewart":  # not redundant: what rubs is its own actuator's
+        joint_rate = model.inverse_dynamics(*state_, outputs="joint_rate").joint_rate
+        viscous = np.asarray(by["r"]["chain.*.actuator.viscous"])
+        assert viscous == pytest.approx(np.diag(joint_rate), rel=1e-9, abs=1e-12)
+    with pytest.raises(InputError, match=r"to_jax was told of .*; got gravity"):
+        function(*state_, numbers={"gravity": np.zeros(3)})
+    with pytest.raises(InputError, match=r"expected an array of shape \(\.\.\., 3\)"):
+        function(*state_, numbers={paths[1]: 1.0})
+    with pytest.raises(InputError, match="was not told of platform"):
+        model.to_jax(door).inverse_dynamics(*state_, numbers={"platform.mass": 1.0})
 
 
 def test_refused(model):

@@ -12,6 +12,8 @@ import numpy as np
 from ..backends.kernel import Kernel, places_of, shapes_of
 from ..errors import UnsupportedError
 from ..model.model import Model
+from ..model.system import System
+from ..questions import Question
 from ..questions.friction import MOST
 
 Details = tuple[Any, ...]
@@ -21,19 +23,33 @@ Details = tuple[Any, ...]
 class Asked:
     """A question of a model.
 
+    system:    of the model; with all numbers, if some of them are arguments.
     arguments: names as functions have them, and the ports that each is, in turn.
     results:   of the question, in the order of rows.
     """
 
-    model: Model
+    system: System
     question: str
     details: Details
     arguments: tuple[tuple[str, tuple[str, ...]], ...]
     results: tuple[str, ...]
+    numbered: bool = False
+
+    def written(self, *question: Any) -> Question:
+        """A question, with the mechanism's numbers as ports if some are arguments."""
+        found = Question.about(self.system.structure, *question)
+        return found.with_ports() if self.numbered else found
+
+    def kernel(self, *question: Any) -> Kernel:
+        """The kernel of `written`."""
+        if not self.numbered:
+            return self.system.kernel(*question)
+        found = self.written(*question)
+        return self.system.backend.kernel(found.key, found.variants, self.system.numbers)
 
     @cached_property
     def values(self) -> Kernel:
-        return self.model.kernel(self.question, *self.details)
+        return self.kernel(self.question, *self.details)
 
     @cached_property
     def ports(self) -> tuple[str, ...]:
@@ -42,8 +58,11 @@ class Asked:
     @cache  # noqa: B019  (a model's own)
     def slopes(self, ports: tuple[str, ...]) -> Kernel:
         """Of the derivatives of all results by some ports, `<result>/<port>`."""
-        asked = "slopes", self.question, self.details, ports, self.results
-        return self.model.kernel("derivative", *asked)
+        return self.derivative("slopes", ports)
+
+    def derivative(self, how: str, by: tuple[str, ...]) -> Kernel:
+        """Derivatives of all results by some ports: see `questions.derivative`."""
+        return self.kernel("derivative", how, self.question, self.details, by, self.results)
 
     def matrix(self, result: str, port: str, slopes: Any) -> Any:
         """Derivatives as a kernel has them, (..., result, port)."""
@@ -59,9 +78,10 @@ class Asked:
         return {port: int(np.prod(shapes[port])) for port in self.ports}
 
 
-def dynamics(model: Model) -> dict[str, Asked]:
+def dynamics(model: Model, numbered: bool = False) -> dict[str, Asked]:
     """Inverse and forward dynamics.
 
+    Args:   numbered: whether numbers of the mechanism are arguments.
     Raises: UnsupportedError: for efforts within limits, or friction at many contacts.
     """
     if model.chooses_efforts:
@@ -71,22 +91,25 @@ def dynamics(model: Model) -> dict[str, Asked]:
         )
     if len(model.system.structure.friction) > MOST:
         raise UnsupportedError(f"friction at more than {MOST} contacts has no function here")
+    system = model.system.wide if numbered else model.system
     wrench = ("wrench", ("force", "moment")), ("at", ("point",))
     state = ("q", ("q",)), ("v", ("q1",))
     return {
         "inverse_dynamics": Asked(
-            model,
+            system,
             "inverse",
             (("contact",),),
             (*state, ("a", ("q2",)), *wrench),
             ("effort", "contact_force"),
+            numbered,
         ),
         "forward_dynamics": Asked(
-            model,
+            system,
             "forward",
             (("contact",),),
             (*state, ("effort", ("effort",)), *wrench),
             ("acceleration", "contact_force"),
+            numbered,
         ),
     }
 
@@ -105,10 +128,12 @@ def inputs_of(
         where |= {port: (i, sum(sizes[p] for p in own[:j])) for j, port in enumerate(own)}
     argument, entry = list[int](), list[int]()
     for port in kernel.interface.ports:
-        i, first = where[port.name]
-        lanes = kernel.order if port.lanes else range(port.size)
-        argument += [i] * len(lanes)
-        entry += [first + k for k in lanes]
+        at, first = where[port.name]
+        places = [*range(port.size)]
+        if port.lanes:
+            places = [i * len(kernel.order) + k for i in range(port.size) for k in kernel.order]
+        argument += [at] * len(places)
+        entry += [first + k for k in places]
     return argument, entry
 
 

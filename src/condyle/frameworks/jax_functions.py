@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -22,9 +22,9 @@ from ..backends.kernel import AGAIN, Kernel
 from ..errors import InputError, UnsupportedError, as_name, did_you_mean, shown
 from ..extras import require
 from ..model.model import Model
-from ..questions import Question
 from ..status import Status
 from .asked import Asked, Placed, dynamics, inputs_of
+from .file_values import DIRECTIONS, FILE, NUMBERS, FileValues
 from .traced import traced
 
 TARGET = "condyle_batch"
@@ -47,7 +47,7 @@ class JaxFunctions:
     inverse_dynamics: Function
     forward_dynamics: Function
 
-    def __init__(self, model: Model, door: str = "kernel") -> None:
+    def __init__(self, model: Model, door: str = "kernel", numbers: Sequence[str] = ()) -> None:
         """As of `Model.to_jax`."""
         as_name(door, "door")
         if door not in DOORS:
@@ -65,19 +65,22 @@ class JaxFunctions:
                 f"to_jax calls compiled kernels, and this model has {model.backend.name}; "
                 'door="graph" needs none'
             )
-        for name, asked in dynamics(model).items():
-            setattr(self, name, _function(asked, DOORS[door](asked)))
+        file = FileValues.of(model, numbers) if numbers else None
+        for name, asked in dynamics(model, file is not None).items():
+            setattr(self, name, _function(asked, DOORS[door](asked, file), file))
 
 
-def _traced(asked: Asked) -> Called:
+def _traced(asked: Asked, file: FileValues | None) -> Called:
     """The graph, operation by operation."""
     import jax.numpy as jnp
 
-    question = Question.about(asked.model.system.structure, asked.question, *asked.details)
-    run = traced(question.variants(), asked.model.system.numbers)
+    question = asked.written(asked.question, *asked.details)
+    run = traced(question.variants(), asked.system.numbers)
 
     def called(*given: Any) -> dict[str, Any]:
-        found = run(dict(zip(asked.ports, given, strict=True)))
+        if file is not None:
+            given = *given[:-1], *file.kernel_numbers(given[-1])
+        found = run(dict(zip((*asked.ports, *NUMBERS), given, strict=False)))
         status = jnp.where(found["status"] == AGAIN, jnp.uint8(UNSURE), found["status"])
         good = (status == 0)[..., None]
         found |= {name: jnp.where(good, found[name], jnp.nan) for name in asked.results}
@@ -86,33 +89,42 @@ def _traced(asked: Asked) -> Called:
     return called
 
 
-def _compiled(asked: Asked) -> Called:
-    """The kernel, with derivatives by another."""
+def _compiled(asked: Asked, file: FileValues | None) -> Called:
+    """The kernel, with derivatives by others."""
     import jax
     import jax.numpy as jnp
 
     _registered()
-    ports, values = asked.ports, _caller(asked.values, asked.ports)
+    ports = asked.ports + (NUMBERS if file is not None else ())
+    values = _caller(asked.values, ports)
+
+    def whole(given: Any) -> Any:
+        return given if file is None else (*given[:-1], *file.kernel_numbers(given[-1]))
 
     @jax.custom_jvp
     def called(*given: Any) -> dict[str, Any]:
-        return values(*given)
+        return values(*whole(given))
 
     def rule(primals: Any, tangents: Any) -> Any:
         moving = {
             port: t
-            for port, t in zip(ports, tangents, strict=True)
+            for port, t in zip(asked.ports, tangents, strict=False)
             if type(t) is not jax.custom_derivatives.SymbolicZero
         }
         found = called(*primals)
-        slopes = _caller(asked.slopes(tuple(moving)), ports)(*primals) if moving else {}
+        slopes: dict[str, Any] = {}
+        if moving:
+            slopes = _caller(asked.slopes(tuple(moving)), ports)(*whole(primals))
+        if file is not None and type(tangents[-1]) is not jax.custom_derivatives.SymbolicZero:
+            moving[FILE] = tangents[-1]
+            along = _caller(asked.derivative("directional", NUMBERS), ports + DIRECTIONS)
+            slopes |= file.slopes(along, whole(primals), primals[-1], asked.results)
         change: dict[str, Any] = {name: jnp.zeros_like(found[name]) for name in asked.results}
         for name in (own for own in asked.results if found[own].shape[-1]):
             for port, t in moving.items():
                 own = slopes[f"{name}/{port}"]
-                change[name] = change[name] + jnp.einsum(
-                    "...rp,...p->...r", asked.matrix(name, port, own), t
-                )
+                own = own if port == FILE else asked.matrix(name, port, own)
+                change[name] = change[name] + jnp.einsum("...rp,...p->...r", own, t)
         change["status"] = np.zeros(found["status"].shape, dtype=jax.dtypes.float0)
         return found, change
 
@@ -120,16 +132,25 @@ def _compiled(asked: Asked) -> Called:
     return called
 
 
-DOORS: dict[str, Callable[[Asked], Called]] = {"kernel": _compiled, "graph": _traced}
+DOORS: dict[str, Callable[[Asked, FileValues | None], Called]] = {
+    "kernel": _compiled,
+    "graph": _traced,
+}
 
 
-def _function(asked: Asked, called: Called) -> Function:
+def _function(asked: Asked, called: Called, file: FileValues | None) -> Function:
     import jax.numpy as jnp
 
     sizes = asked.sizes()
 
-    def function(*given: Any, **named: Any) -> dict[str, Any]:
+    def function(
+        *given: Any, numbers: Mapping[str, Any] | None = None, **named: Any
+    ) -> dict[str, Any]:
         flat = _ports(asked, sizes, given, named)
+        if file is not None:
+            flat.append(file.given(numbers or {}))
+        elif numbers:
+            raise InputError(f"numbers: to_jax was not told of {', '.join(map(str, numbers))}")
         lead = jnp.broadcast_shapes(*(a.shape[:-1] for a in flat))
         found: dict[str, Any] = called(*(jnp.broadcast_to(a, (*lead, a.shape[-1])) for a in flat))
         return found

@@ -12,7 +12,7 @@
 #include "xla/ffi/api/c_api.h"
 
 #define SAMPLES 256 /* of a piece, whose columns stay in a cache */
-#define COLUMNS 1024
+#define COLUMNS 8192
 
 typedef void Batch(const double *table, const double *const *in, const ptrdiff_t *stride,
                    size_t count, double *out, size_t columns, uint8_t *status);

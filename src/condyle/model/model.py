@@ -12,7 +12,7 @@ by a kernel of the backend; samples that it cannot vouch for are solved again by
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Self
 
@@ -460,16 +460,18 @@ class Model:
 
     # -- in other frameworks -----------------------------------------------------------------
 
-    def to_jax(self, door: str = "kernel") -> Any:
+    def to_jax(self, door: str = "kernel", numbers: Sequence[str] = ()) -> Any:
         """Dynamics as pure functions of JAX, which jit, vmap and differentiate: `JaxFunctions`.
 
         Args:   door: kernel: our own C, called by XLA on processors; graph: traced operation by
                 operation, slower there, but it runs wherever JAX does.
+                numbers: paths of the file's numbers that calls may give, and derivatives be taken
+                by: `numbers={"platform.mass": 0.2}`; home is kept.
         Raises: MissingExtraError: without JAX.
-                InputError:        where JAX is set to float32; for another door.
+                InputError:        where JAX is set to float32; for another door or path.
                 UnsupportedError:  for `kernel` without a compiler; for efforts within limits.
         """
-        return extend("model.to_jax", self, door)
+        return extend("model.to_jax", self, door, numbers)
 
     def to_torch(self) -> Any:
         """Dynamics as operators of PyTorch, with exact derivatives: `TorchFunctions`.
