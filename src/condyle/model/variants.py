@@ -86,10 +86,7 @@ class Variants:
 
     def __init__(self, model: Model, table: Mapping[str, ArrayLike], keep: str = "home") -> None:
         self.model, self.keep = model, keep
-        machine = model.mechanism
-        if machine.contacts and machine.dependent is None:
-            machine = machine.set("dependent", model.dependent)
-        self.base = machine
+        self.base = machine = _with_coordinates(model.mechanism, model.dependent)
         self.table = _columns(machine, table)
         self.count = len(next(iter(self.table.values())))
         self.status = np.zeros(self.count, dtype=np.uint8)
@@ -339,6 +336,14 @@ class Variants:
         bad = np.flatnonzero(self.status)
         found.status[bad] = self.status[bad].reshape(-1, *(1 for _ in lead))
         return found
+
+
+@lru_cache(8)
+def _with_coordinates(mechanism: Mechanism, dependent: tuple[str, ...]) -> Mechanism:
+    """The mechanism as if its dependent coordinates stood in its file."""
+    if not mechanism.contacts or mechanism.dependent is not None:
+        return mechanism
+    return mechanism.set("dependent", dependent)
 
 
 def _scattered(parts: list[tuple[np.ndarray, Any]], count: int) -> Any:
