@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from condyle.mechanism import Mechanism
 from condyle.questions.file_numbers import numbers_of
 from condyle.questions.number_paths import number_jacobian
 from condyle.questions.numbers import Layout
-from condyle.questions.structure import Structure, walls_of
+from condyle.questions.structure import Structure, smooth_forms, walls_of
 
 EXHAUSTIVE = (*SURFACES, *condyle.bundled_mechanisms())
 CARRIERS = ("surface.offset", "surface.centre", "surface.point", "surface.points")
@@ -111,6 +112,24 @@ def test_derivatives_of_the_kernels_numbers(name: str) -> None:
         off = np.abs(got - want) - noise
         worst, largest = float(off.max()), float(np.abs(want).max())
         assert worst <= 1e-9 * max(1.0, largest), path
+
+
+def test_a_round_paraboloid() -> None:
+    """A ball on one has no principal axes to differentiate: its general form has derivatives."""
+    machine = condyle.load_mechanism("masticatory-curved")
+    name = machine.contact_names[0]
+    at = f"contact.{name}"
+    round_one = {f"{at}.surface.xx": 3.0, f"{at}.surface.yy": 3.0, f"{at}.surface.xy": 0.0}
+    machine = machine.set(round_one, keep="home")
+    machine = machine.set({f"{at}.ball_radius": 0.004, f"{at}.side": "below"}, keep="home")
+    plain = wide(machine)
+    assert plain.contacts[0][0] == "parallel-quadric"
+    structure = replace(plain, contacts=smooth_forms(machine))
+    for key in ("xy", "xx"):
+        path = f"{at}.surface.{key}"
+        got = number_jacobian(machine, structure, [path])
+        want, noise = differences(machine, structure, path, "home")
+        assert (np.abs(got - want) - noise).max() <= 1e-9 * np.abs(want).max()
 
 
 def test_all_else_held() -> None:

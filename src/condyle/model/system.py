@@ -25,7 +25,7 @@ from ..questions.file_numbers import numbers_of
 from ..questions.friction import MOST
 from ..questions.number_paths import number_jacobian
 from ..questions.numbers import agree, characteristic, require_closed_form, specialised
-from ..questions.structure import structure_of
+from ..questions.structure import smooth_forms, structure_of
 from .closing import Closure
 from .distributing import LEAST, Distribution, Distributor
 from .robust_path import Robust
@@ -156,7 +156,8 @@ class System:
 
         Contacts on parallel planes stand alone, and every actuator has losses.
         """
-        return self._restructured(zeros=frozenset(), parallel=False, losses=True)
+        forms = smooth_forms(self.mechanism)
+        return self._restructured(zeros=frozenset(), parallel=False, losses=True, contacts=forms)
 
     @cached_property
     def rubbing(self) -> System:

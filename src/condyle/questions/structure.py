@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from ..mechanism.home import dependent_coordinates
 from ..mechanism.mechanism import Mechanism
+from ..mechanism.surface import ParallelQuadric, Quadratic
 from ..mechanism.surface.wall import Wall, wall_of
 
 
@@ -78,6 +79,23 @@ def structure_of(
         losses=any(not chain.actuator.ideal for chain in mechanism.chains),
         friction=friction,
     )
+
+
+def smooth_forms(mechanism: Mechanism) -> tuple[tuple[str, int], ...]:
+    """`Structure.contacts` of which the kernel's numbers have derivatives everywhere.
+
+    Principal axes of a paraboloid that is equally curved all round have none; its general form
+    does without.
+    """
+    found = []
+    for contact in mechanism.contacts:
+        locus, wall = contact.offset_surface, contact.surface
+        form, count = locus.form, len(locus.constants())
+        all_round = isinstance(wall, Quadratic) and wall.xx == wall.yy and wall.xy == 0
+        if all_round and isinstance(locus, ParallelQuadric):
+            form, count = f"parallel {wall.form}", 8 + len(wall.constants())
+        found.append((form, count))
+    return tuple(found)
 
 
 def walls_of(

@@ -56,6 +56,7 @@ __all__ = [
     "Ellipsoid",
     "Expression",
     "Parallel",
+    "ParallelQuadric",
     "Plane",
     "Profile",
     "Quadratic",
