@@ -141,7 +141,7 @@ def own_probes(mechanism: Mechanism, formulations: list[str]) -> Iterator[Probe]
             yield from _kernel_probes(label + what, kernel, case.columns, case.right, found, timer)
     yield from _forward_probes(f"{name} {FORWARD}", case, timer)
     numpy = Model(mechanism, backend="numpy")
-    yield _python_probe(
+    yield python_probe(
         f"{name} numpy: batch", lambda: numpy.inverse_dynamics(*case.arguments), SAMPLES
     )
     if all(c.offset_surface.form == "plane" for c in mechanism.contacts):
@@ -217,7 +217,7 @@ def thread_probes(mechanism: Mechanism) -> Iterator[Probe]:
         size = "" if count == 200_000 else f" of {count}"
         for threads, what in ((1, "one thread"), (2, "two threads")):
             call = partial(model.inverse_dynamics, *given, threads=threads)
-            yield _python_probe(f"{label}{size}, {what}", call, count)
+            yield python_probe(f"{label}{size}, {what}", call, count)
 
 
 def asked_probes(mechanism: Mechanism) -> Iterator[Probe]:
@@ -226,11 +226,11 @@ def asked_probes(mechanism: Mechanism) -> Iterator[Probe]:
     label, given = mechanism.name, case.many(MANY)
     for what, outputs in (("efforts", ()), ("all outputs", "all")):
         call = partial(model.inverse_dynamics, *given, outputs=outputs)
-        yield _python_probe(f"{label}: {what}", call, MANY)
+        yield python_probe(f"{label}: {what}", call, MANY)
     t = np.linspace(0, 5, MANY)
     chew, bite = reference_motion(), reference_load()
     path = Motion.from_arrays(chew.t, chew.value, chew.names, landmark="incisor", times=t)
-    yield _python_probe(f"{label}: {SOLVE}", lambda: model.solve(path, bite), MANY)
+    yield python_probe(f"{label}: {SOLVE}", lambda: model.solve(path, bite), MANY)
 
 
 def map_probes(mechanism: Mechanism) -> Iterator[Probe]:
@@ -238,7 +238,7 @@ def map_probes(mechanism: Mechanism) -> Iterator[Probe]:
     model = Model(mechanism, backend="compiled")
     over = {"X": (-5e-3, 5e-3, 400), "beta": (-0.1, 0.35, MAPPED // 400)}
     call = partial(workspace_map, model, over, "ratio", threads=1)
-    yield _python_probe(f"{mechanism.name}: {MAP}", call, MAPPED)
+    yield python_probe(f"{mechanism.name}: {MAP}", call, MAPPED)
 
 
 def policy_probes(mechanism: Mechanism) -> Iterator[Probe]:
@@ -258,7 +258,7 @@ def policy_probes(mechanism: Mechanism) -> Iterator[Probe]:
         model = Model(machine, backend="compiled", distribution=policy)
         outputs = ("pose",)  # with the motion, which `bounded` needs, so that all have the same
         call = partial(model.inverse_dynamics, *given, outputs=outputs, threads=1)
-        yield _python_probe(f"{label}: {name}", call, JAW_SAMPLES)
+        yield python_probe(f"{label}: {name}", call, JAW_SAMPLES)
 
 
 def limit_probes(
@@ -294,10 +294,10 @@ def jaw_probes(mechanism: Mechanism) -> Iterator[Probe]:
         bite[:, 2] = -100 * np.sin(turn / 2 * t[:, 0]) ** 2  # N
         call = partial(model.inverse_dynamics, q, q1, q2, bite, "right_molar", threads=1)
         assert (call().status == 0).all()
-        yield _python_probe(f"{mechanism.name}: {objective}", call, JAW_SAMPLES)
+        yield python_probe(f"{mechanism.name}: {objective}", call, JAW_SAMPLES)
 
 
-def _python_probe(name: str, call: Callable[[], object], count: int) -> Probe:
+def python_probe(name: str, call: Callable[[], object], count: int) -> Probe:
     """A call from Python that evaluates `count` samples, all of them right by definition."""
 
     def run() -> float:

@@ -48,6 +48,7 @@ from .peers import closed_loops
 from .programs import BINDING
 from .rows import Probe, Row, timed
 from .simulating import LOOP, simulation_probes
+from .slopes import slope_probes, slope_ratios
 from .sweeps import ALL, sweep_ratios, sweep_rows
 
 REFERENCE = "masticatory"
@@ -116,6 +117,7 @@ def run_benchmark(seconds: float = 1.0) -> Benchmark:
         with step("building other engines"):
             probes += _peer_probes(unavailable)
         probes += [*asked_probes(load_mechanism(REFERENCE)), *map_probes(load_mechanism(REFERENCE))]
+        probes += slope_probes(load_mechanism(REFERENCE))
         with step("building exported C"):
             probes += exported_probes(load_mechanism(REFERENCE))
         probes += [
@@ -281,6 +283,7 @@ def _ratios(rows: list[Row], lanes: int) -> dict[str, float]:
     threads = [by_name.get(f"{own}: batch, {what}") for what in ("one thread", "two threads")]
     if threads[0] and threads[1]:
         ratios["two threads, times faster than one"] = threads[0].over(threads[1])
+    ratios |= slope_ratios(REFERENCE, by_name)
     ratios |= sweep_ratios(by_name) if ALL in by_name else {}
     ready = f"{REFERENCE}: file to ready kernel"
     ratios["file to ready kernel, cold [s]"] = by_name[f"{ready}, cold"].seconds
