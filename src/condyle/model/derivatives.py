@@ -151,7 +151,7 @@ class Derived:
                     values[name, by][part.good] += block[:, :, at]
         units = {(n, by): f"({UNITS[n]}) / ({asked.unit(by)})" for n, by in values}
         shaped = {
-            (n, by): a.reshape(*lead, *self._shape(n), *asked.shapes[by])
+            (n, by): a.reshape((*lead, *self._shape(n), *asked.shapes[by]))
             for (n, by), a in values.items()
         }
         return Derivatives(shaped, status.reshape(lead), units)
@@ -182,7 +182,7 @@ class Derived:
             rows = self._along(part.held, directions)[..., None]
             for name in part.names:
                 values[name][part.good] = part.held.applied(name, rows)[..., 0]
-        shaped = {n: a.reshape(*lead, *self._shape(n)) for n, a in values.items()}
+        shaped = {n: a.reshape((*lead, *self._shape(n))) for n, a in values.items()}
         return Derivatives(shaped, status.reshape(lead), {n: UNITS[n] for n in shaped})
 
     def vjp(
@@ -216,7 +216,7 @@ class Derived:
                 values[b][part.good] += np.concatenate([found[p] for p in PORTS[state]], axis=1)
             for b, at in asked.columns.items():
                 values[b][part.good] += (found[NUMBERS] @ asked.J)[:, at]
-        shaped = {by: a.reshape(*lead, *asked.shapes[by]) for by, a in values.items()}
+        shaped = {by: a.reshape((*lead, *asked.shapes[by])) for by, a in values.items()}
         return Derivatives(shaped, status.reshape(lead), {by: asked.unit(by) for by in shaped})
 
     def linearised(self, q: Any, v: Any, effort: Any, wrench: Any, at: Any) -> ModelResult:

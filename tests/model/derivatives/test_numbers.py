@@ -139,6 +139,23 @@ def test_forward_and_reverse_are_the_matrix() -> None:
             same(back[by].reshape(2, -1), (weights[:, None] @ flat[by])[:, 0])
 
 
+def test_one_state_and_one_number() -> None:
+    """No leading shape, and none of the number: what is left is that of the result."""
+    m, one = Model("masticatory", backend="numpy"), np.full(4, 1e-3)
+    given = {"q": one, "v": one, "a": one, "at": "right_molar"}
+    by = "platform.mass"
+    d = m.derivatives(("effort", "contact_force"), by, **given)["effort", by]
+    assert d.shape == (6,)
+    same(m.jvp("effort", {by: 2.0}, **given)["effort"], 2 * d)
+    same(m.vjp("effort", np.ones(6), by, **given)[by], np.asarray(d.sum()))
+    point = "contact.left_condyle.point"
+    assert m.derivatives("singularity_ratio", point, q=one)["singularity_ratio", point].shape == (
+        3,
+    )
+    mass = m.derivatives("singularity_ratio", by, q=one, zeros=True)["singularity_ratio", by]
+    assert mass.shape == () and mass == 0
+
+
 @pytest.mark.parametrize(
     ("of", "by", "message"),
     [
