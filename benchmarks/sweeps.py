@@ -11,7 +11,7 @@ from condyle.analysis.sweep import Study, sweep
 
 from .rows import Row
 
-VARIANTS, FEW = 10_000, 2_000
+VARIANTS, FEW = 100_000, 2_000
 STUDY: dict[str, Any] = {
     "motion": {"file": "reference", "rate": 40.0},  # 201 samples
     "vary": [
