@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..backends.kernel import AGAIN, OK
-from ..errors import InputError, as_flag, did_you_mean, shown
+from ..errors import InputError, UnsupportedError, as_flag, did_you_mean, shown
 from ..graph.program import Interface
 from ..graph.transform import LANE_NUMBERS, NUMBERS
 from ..kinematics.constraints import indices
@@ -250,6 +250,8 @@ class Derived:
         """Good samples, kind by kind, and all statuses: of several kinds, what failed first."""
         parts, status = [], np.zeros(count, dtype=np.uint8)
         for kind, names in asked.kinds:
+            if kind is INVERSE:
+                self._require_known(asked)
             own, rows = np.zeros(count, dtype=np.uint8), np.arange(count)
             if kind is INVERSE and names == ("effort",) and self._plain(asked.system):
                 kernel = asked.system.kernel("inverse")
@@ -267,6 +269,21 @@ class Derived:
                     parts.append(_Part(names, kind, other, good))
             status = _worse(status, own)
         return [part for part in parts if part.good.size], status
+
+    def _require_known(self, asked: _Asked) -> None:
+        """Raises UnsupportedError for numbers that the objective itself is made of."""
+        chosen = self._inverse().distributor.distribution
+        limits = [by for by in asked.wrt if by.endswith(("torque_limit", "force_limit"))]
+        if chosen.objective.limits and limits:
+            raise UnsupportedError(
+                f"wrt: {limits[0]} is a limit that distribution {chosen.name} minimises within; "
+                "there are no derivatives by limits yet: take differences"
+            )
+        if chosen.contact_weight and asked.numbers:
+            raise UnsupportedError(
+                "wrt: with a contact weight the objective depends on numbers of the file, and has "
+                "no derivatives by them: take contact_weight 0"
+            )
 
     def _plain(self, system: System) -> bool:
         """Whether efforts can be differentiated as the kernel computes them."""

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from condyle.errors import UnsupportedError
+from condyle.model.distributing import Distribution
 from condyle.model.model import Model
 from condyle.status import Status
 
@@ -73,6 +75,17 @@ def test_forward_and_reverse_are_the_matrix() -> None:
     for by in ("q", "wrench"):
         total = sum((w[:, None] @ d[of, by])[:, 0] for of, w in weights.items())
         np.testing.assert_allclose(back[by], total, atol=1e-9 * np.abs(total).max())
+
+
+def test_numbers_of_the_objective_are_never_zeros() -> None:
+    state = {n: np.zeros(4) for n in "qva"}
+    limit = "chain.masseter_left.actuator.torque_limit"
+    model = Model("masticatory", backend="numpy", distribution="bounded")
+    with pytest.raises(UnsupportedError, match="no derivatives by limits yet"):
+        model.derivatives("effort", limit, **state, zeros=True)
+    weighted = Distribution("weighted", contact_weight=1.0)
+    with pytest.raises(UnsupportedError, match="take contact_weight 0"):
+        model.with_distribution(weighted).derivatives("effort", "platform.mass", **state)
 
 
 def test_an_effort_at_its_limit_is_a_kink() -> None:
