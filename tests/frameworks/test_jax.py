@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from oracles.random_mechanism import random_mechanism
 
 import condyle
 from condyle.errors import InputError, UnsupportedError
+from condyle.mechanism.files import from_data
 
 from .conftest import ARGUMENTS, RESULTS, differences, slopes, state
 
@@ -128,6 +130,22 @@ def test_numbers_of_the_file(model, door):
         function(*state_, numbers={paths[1]: 1.0})
     with pytest.raises(InputError, match="was not told of platform"):
         model.to_jax(door).inverse_dynamics(*state_, numbers={"platform.mass": 1.0})
+
+
+def test_numbers_of_chains_of_all_families_in_any_order(compiler_command):
+    rng = np.random.default_rng(3)
+    raw = random_mechanism(rng, families=("RSS", "PSS", "SPS"), chains=7, contacts=2)
+    machine = from_data(raw)
+    model = condyle.derive(machine, backend="compiled")
+    bases = np.array([chain.base for chain in machine.chains]) + rng.normal(0, 1e-4, (7, 3))
+    names = machine.chain_names
+    other = machine.set({f"chain.{n}.base": b.tolist() for n, b in zip(names, bases, strict=True)})
+    q, v, a = (rng.normal(0, size, 4) for size in (0.001, 0.1, 1.0))
+    right = condyle.derive(other, backend="numpy").inverse_dynamics(q, v, a).effort
+    for door in ("kernel", "graph"):
+        function = model.to_jax(door, numbers="chain.*.base").inverse_dynamics
+        found = np.asarray(function(q, v, a, numbers={"chain.*.base": bases})["effort"])
+        assert found == pytest.approx(right, rel=1e-9, abs=1e-12)
 
 
 def test_refused(model):

@@ -11,10 +11,13 @@ import numpy as np
 
 from ..backends.kernel import Kernel, places_of, shapes_of
 from ..errors import UnsupportedError
+from ..graph.program import Program, Variants
+from ..graph.transform import numbers_as_ports
 from ..model.model import Model
 from ..model.system import System
 from ..questions import Question
 from ..questions.friction import MOST
+from ..questions.numbers import Layout
 
 Details = tuple[Any, ...]
 
@@ -35,17 +38,20 @@ class Asked:
     results: tuple[str, ...]
     numbered: bool = False
 
-    def written(self, *question: Any) -> Question:
-        """A question, with the mechanism's numbers as ports if some are arguments."""
-        found = Question.about(self.system.structure, *question)
-        return found.with_ports() if self.numbered else found
+    def written(self, *question: Any) -> Program:
+        """A question's robust program, with the mechanism's numbers as ports if they are asked."""
+        found = Question.about(self.system.structure, *question).variants()
+        program = found.robust or found.main
+        sizes = Layout.of(self.system.structure).sizes
+        return numbers_as_ports(program, *sizes) if self.numbered else program
 
     def kernel(self, *question: Any) -> Kernel:
-        """The kernel of `written`."""
+        """The kernel of a question; of `written` if numbers are asked."""
         if not self.numbered:
             return self.system.kernel(*question)
-        found = self.written(*question)
-        return self.system.backend.kernel(found.key, found.variants, self.system.numbers)
+        key = Question.about(self.system.structure, *question).with_ports().key
+        build = lambda: Variants(self.written(*question))  # noqa: E731
+        return self.system.backend.kernel(f"{key} robust", build, self.system.numbers)
 
     @cached_property
     def values(self) -> Kernel:

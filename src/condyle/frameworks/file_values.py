@@ -51,7 +51,7 @@ class FileValues:
         found = tuple(FileNumbers(mechanism, structure, walls).at(paths))
         own = numbers_of_file(mechanism, structure, walls)
         question = Question("file_numbers", structure, (walls,)).with_ports()
-        return FileValues(found, structure, own, traced(question.variants(), own))
+        return FileValues(found, structure, own, traced(question.variants().main, own))
 
     @cached_property
     def _base(self) -> tuple[np.ndarray, np.ndarray]:

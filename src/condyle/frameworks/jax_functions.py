@@ -74,8 +74,7 @@ def _traced(asked: Asked, file: FileValues | None) -> Called:
     """The graph, operation by operation."""
     import jax.numpy as jnp
 
-    question = asked.written(asked.question, *asked.details)
-    run = traced(question.variants(), asked.system.numbers)
+    run = traced(asked.written(asked.question, *asked.details), asked.system.numbers)
 
     def called(*given: Any) -> dict[str, Any]:
         if file is not None:

@@ -10,15 +10,15 @@ import numpy as np
 
 from ..backends.kernel import AGAIN, OK
 from ..graph.operations import OPERATIONS, REDUCTIONS
-from ..graph.program import Numbers, Program, Variants
+from ..graph.program import Numbers, Program
 
 Arrays = Mapping[str, Any]
 
 
-def traced(variants: Variants, numbers: Numbers) -> Callable[[Arrays], dict[str, Any]]:
+def traced(program: Program, numbers: Numbers) -> Callable[[Arrays], dict[str, Any]]:
     """A function of arrays by port, (..., size) each with one leading shape, lanes in the callers'
     order; results are (..., *shape), lanes last, and `status` (...)."""
-    program, order = variants.robust or variants.main, np.array(numbers.order)
+    order = np.array(numbers.order)
     groups = np.split(order, np.cumsum(program.counts)[:-1])
 
     def run(ports: Arrays) -> dict[str, Any]:
