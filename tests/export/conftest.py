@@ -47,6 +47,13 @@ def limited() -> condyle.Mechanism:
     return machine.model_copy(update={"chains": chains, "contacts": (sided, right)})
 
 
+def weak() -> condyle.Mechanism:
+    """The reference mechanism with limits of effort that a chew reaches."""
+    machine = condyle.load_mechanism("masticatory")
+    actuators = {f"chain.{name}.actuator.torque_limit": 0.03 for name in machine.chain_names}
+    return machine.set(actuators)
+
+
 def rubbing() -> condyle.Mechanism:
     """The reference mechanism with friction at a contact."""
     return condyle.load_mechanism("masticatory").set(
@@ -54,7 +61,7 @@ def rubbing() -> condyle.Mechanism:
     )
 
 
-CHANGED = {"limited": limited, "rubbing": rubbing}
+CHANGED = {"limited": limited, "weak": weak, "rubbing": rubbing}
 FOLDERS: dict[str, tuple[str, dict[str, Any]]] = {
     "jaw": (
         "masticatory",
@@ -67,7 +74,10 @@ FOLDERS: dict[str, tuple[str, dict[str, Any]]] = {
             ),
         },
     ),
-    "single": ("gough-stewart", {"precision": "float", "questions": ("inverse", "pose")}),
+    "single": (
+        "gough-stewart",
+        {"precision": "float", "questions": ("inverse", "pose", "computed_torque")},
+    ),
     "curved": (
         "masticatory-curved",
         {"precision": "float", "questions": ("inverse", "motion", "pose", "joint_pd")},

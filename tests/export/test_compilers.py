@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import ctypes
 import re
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
-from export.conftest import Folder
+from export.conftest import Folder, written
 from support.speeds import few
 from support.tools import need, run
 
+import condyle
 from condyle.export.c_package import write_facts
+from condyle.simulation.reference_path import path_of
 
 Folders = Callable[[str], Folder]
 STRICT = "-Werror -Wshadow -Wstrict-prototypes -Wmissing-prototypes -Wdouble-promotion"
 SANITIZED = "-fsanitize=address,undefined -fno-sanitize-recover=all"
+LOOP = "observer", "computed_torque", "forward", "joints"
 CORTEX = "-mcpu=cortex-m7 -mfpu=fpv5-d16 -mfloat-abi=hard -isystem /usr/include/newlib"
 
 
@@ -145,11 +150,72 @@ def test_facts_are_measured_wherever_the_folder_is(
     assert rows["jaw_computed_torque"]["code"] > rows["jaw_inverse"]["code"]
 
 
-def test_the_tick_of_the_page(folder: Folders, tmp_path: Path) -> None:
-    """The controller that docs/how-to/controller.md shows, on the functions of the header."""
+def tick_of_the_page() -> str:
+    """The controller that docs/how-to/controller.md shows, on the functions of `jaw`."""
     page = Path(__file__).parents[2] / "docs" / "how-to" / "controller.md"
     shown = page.read_text(encoding="utf-8").split("```c\n")[1].split("```")[0]
-    text = shown.replace("masticatory", "jaw").replace("MASTICATORY", "JAW")
-    (tmp_path / "tick.c").write_text(text)
+    return shown.replace("masticatory", "jaw").replace("MASTICATORY", "JAW")
+
+
+def test_the_tick_of_the_page(folder: Folders, tmp_path: Path) -> None:
+    (tmp_path / "tick.c").write_text(tick_of_the_page())
     paths = f"-I{folder('jaw').path}"
     run("gcc", "-std=c99", "-Wall", "-Werror", paths, "-fsyntax-only", "tick.c", folder=tmp_path)
+
+
+@pytest.mark.slow
+def test_the_tick_of_the_page_closes_the_loop(folder: Folders, tmp_path: Path) -> None:
+    """With `forward` as the plant and `joints` as its encoders it is condyle's own simulation: the
+    same path, gains, low-pass and rate, through efforts that limits cut."""
+    need("gcc")
+    T, steps, ticks = 1e-3, 4, 150
+    of = written("weak", tmp_path / "jaw", prefix="jaw", questions=LOOP)
+    t = np.linspace(0, 0.1, 101)
+    s = t / 0.1
+    rise = s**4 * (35 - 84 * s + 70 * s**2 - 20 * s**3)
+    columns = {"X": 0.002 * rise, "Y": 0.001 * rise, "alpha": 0.01 * rise, "beta": 0.05 * rise}
+    motion = condyle.Motion.from_arrays(t, columns)
+    law = {"kind": "computed_torque", "stiffness": 900.0, "damping": 60.0, "rate": 1 / T}
+    scenario = {
+        "duration": ticks * T,
+        "rate": 1 / T,
+        "method": "rk4",
+        "step": T / steps,
+        "controller": law,
+        "sensors": {"velocity_cutoff": np.log(2) / (2 * np.pi * T)},  # smoothing of a half
+    }
+    model = condyle.derive(of.exported.mechanism)
+    own = condyle.simulate(model, scenario, motion=motion)
+    assert any(event["kind"] == "saturated" for event in own.condyle.events)
+    q, q1 = (
+        own[name].sel(coordinate=own["independent"].values).values for name in ("pose", "pose_rate")
+    )
+    path = path_of(model, motion, None, None).at(T * np.arange(ticks))
+    (tmp_path / "tick.c").write_text(tick_of_the_page())
+    flags = ("-std=c99", "-O1", "-shared", "-fPIC", f"-I{of.path}")
+    run("gcc", *flags, "tick.c", of.path / of.source, "-o", "loop.so", "-lm", folder=tmp_path)
+    library = ctypes.CDLL(str(tmp_path / "loop.so"))
+
+    def call(name: str, *arrays: np.ndarray) -> None:
+        pointers = [np.ascontiguousarray(a).ctypes.data_as(ctypes.c_void_p) for a in arrays]
+        assert getattr(library, name)(*pointers) == 0
+
+    def rate(y: np.ndarray) -> np.ndarray:
+        acceleration, contact = np.zeros(4), np.zeros(2)
+        call("jaw_forward", y[:4], y[4:], effort, *np.zeros((3, 3)), acceleration, contact)
+        return np.concatenate([y[4:], acceleration])
+
+    y, effort, h = np.zeros(8), np.zeros(6), T / steps
+    for k in range(ticks):
+        joint, rates, pose, pose_rate = (np.zeros(6) for _ in range(4))
+        call("jaw_joints", y[:4], y[4:], joint, rates, pose, pose_rate)
+        assert np.abs(q[k] - y[:4]).max() < 1e-9
+        assert np.abs(q1[k] - y[4:]).max() < 1e-9
+        call("tick", joint, *np.split(path[k, :12], 3), effort)
+        assert np.abs(own["effort"][k] - effort).max() < 1e-9
+        for _ in range(steps):
+            a = rate(y)
+            b = rate(y + h / 2 * a)
+            c = rate(y + h / 2 * b)
+            d = rate(y + h * c)
+            y = y + h / 6 * (a + 2 * b + 2 * c + d)

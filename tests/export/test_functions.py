@@ -56,6 +56,12 @@ def jaw(folder: Folders, tmp_path_factory: pytest.TempPathFactory) -> Library:
     return Library(folder("jaw").exported, tmp_path_factory.mktemp("library"))
 
 
+def test_operations_are_of_all_that_a_function_does(jaw: Library) -> None:
+    """A controller works no less than the inverse dynamics in it."""
+    inverse, controller = (jaw.exported[q].operations for q in ("inverse", "computed_torque"))
+    assert controller > inverse > 1000
+
+
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e60, -1e200, 1e308])
 @pytest.mark.parametrize("question", ["inverse", "forward", "motion", "pose", "closure"])
 def test_no_number_gets_in(jaw: Library, question: str, bad: float) -> None:

@@ -194,13 +194,14 @@ CATALOGUE: dict[str, Entry] = {
     ),
     "computed_torque": Entry(
         "Controller: efforts that follow a desired motion, by "
-        "q'' = q2_d + kd (q1_d - q1) + kp (q_d - q).",
+        "q'' = q2_d + kd (q1_d - q1) + kp (q_d - q). Of least norm, and clipped at the actuators' "
+        "limits.",
         f"q_d q1_d q2_d q q1 stiffness>kp damping>kd {BORNE}",
-        "asked>effort",
         question="tick",
         details=lambda wish: (ComputedTorque, (), None, False, True),
         rubbing="UNCERTIFIED",
         quick=True,
+        limited=True,
     ),
 }
 TANGENT = "_derivative"  # after the name of a question: how its results change
