@@ -1,4 +1,4 @@
-"""Bounds hold: against a text in 60 digits, as `benchmarks/accuracy.py` measures them."""
+"""Bounds hold at a few states of many machines, as `benchmarks/accuracy.py` measures them."""
 
 from __future__ import annotations
 
@@ -31,4 +31,5 @@ def test_bounds_hold_at_a_few_states() -> None:
     machines = dict(bundled())
     for name in ("gough-stewart", "masticatory"):
         rows = list(checked(rng, name, machines[name], 1, "numpy"))
-        assert len(rows) == 2 and all(0 < row.ratio < 1 for row in rows)
+        assert {"inverse", "forward"} < {row.question for row in rows}
+        assert all(row.ratio < 1 for row in rows)

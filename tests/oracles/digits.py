@@ -24,6 +24,7 @@ class Jet:
     """x, x', x''."""
 
     __slots__ = ("a", "v", "x")
+    __array_ufunc__ = None  # arithmetic with arrays of numbers is that of jets
 
     def __init__(self, x: Any, v: Any = 0, a: Any = 0) -> None:
         self.x, self.v, self.a = mpf(x), mpf(v), mpf(a)
@@ -134,6 +135,10 @@ def solved(A: list[Vector], b: Vector) -> Vector:
             left = left - rows[k][j] * x[j]
         x[k] = left / rows[k][k]
     return x
+
+
+def largest(values: Vector) -> Number:
+    return max(abs(x) for x in values)
 
 
 def rotation(axis: int, c: Any, s: Any) -> list[Vector]:
@@ -275,7 +280,7 @@ class Contact:
         ]
         right = [p[i] - w[i] - d * n[i] for i in range(3)] + [-g]
         step = solved(A, right)
-        return add(w, step[:3]), d + step[3], max(abs(x) for x in plain(step))
+        return add(w, step[:3]), d + step[3], largest(plain(step))
 
 
 # -- the mechanism ---------------------------------------------------------------------------
@@ -431,7 +436,7 @@ class Machine:
             for i, x in zip(self.held, step, strict=True):
                 pose[i] += x
             C = self._slopes(pose)
-            if max(abs(x) for x in step) < TINY:
+            if largest(step) < TINY:
                 break
         dep = [[row[i] for i in self.held] for row in C]
         M_J: list[Vector] = [[mpf(0)] * len(self.free) for _ in range(6)]
@@ -549,14 +554,19 @@ class Machine:
         """
         (Q,), J, N, T = self.forces(self.closed(near, q, q1, q2)[0], wrench, point)
         D, off = self._along(N, T, force)
-        # J^T tau + D^T lambda = Q with least |tau|: tau = J y, D y = 0.
-        k, JT = len(D), transposed(J)
+        # J^T tau + D^T lambda = Q with least |tau|: small tau = J y, D y = 0. Rows of J^T are
+        # pivots before small ones are: those would make J^T J, whose condition is squared.
+        k, n, JT = len(D), len(J), transposed(J)
+        zero, small = mpf(0), mpf(2) ** -40
         A = [
-            [dot(JT[i], JT[j]) for j in range(6)] + [D[c][i] for c in range(k)] for i in range(6)
-        ] + [[*row, *([mpf(0)] * k)] for row in D]
-        x = solved(A, [*Q, *([mpf(0)] * k)])
-        tau, kept = turned(J, x[:6]), iter(x[6:])
-        return tau, [mpf(0) if i in off else next(kept) for i in range(len(N))]
+            *([*(small if i == j else zero for j in range(n)), *times(-1, J[i]), *([zero] * k)]
+              for i in range(n)),
+            *([*JT[i], *([zero] * 6), *(d[i] for d in D)] for i in range(6)),
+            *([*([zero] * n), *d, *([zero] * k)] for d in D),
+        ]  # fmt: skip
+        x = solved(A, [*([zero] * n), *Q, *([zero] * k)])
+        kept = iter(x[n + 6 :])
+        return x[:n], [zero if i in off else next(kept) for i in range(len(N))]
 
     def forward(
         self,
@@ -585,7 +595,7 @@ class Machine:
     ) -> tuple[list[Vector], list[int]]:
         """Rows along which the contacts act, and those that friction holds at 0."""
         signs = [mp.sign(mpf(f)) for f in force] or [0] * len(N)
-        off = [i for i, c in enumerate(self.contacts) if c.friction and not signs[i]]
+        off = [i for i, c in enumerate(self.contacts) if c.friction and not largest([signs[i]])]
         rows = zip(N, T, signs, strict=True)
         D = [add(n, t, -sign) for i, (n, t, sign) in enumerate(rows) if i not in off]
         return D, off

@@ -210,7 +210,8 @@ def _forward_bound(s: Arrays, w: np.ndarray, force: np.ndarray) -> np.ndarray:
     sigma = _singular_values(np.moveaxis(A / rows[..., None], 0, -1))
     size = np.linalg.norm(columns * np.concatenate([w, force], axis=1), axis=1)
     lost = np.fmax(1.0, np.linalg.norm(s["F"] / rows, axis=1) / (size + TINY))
-    spread = np.abs(np.linalg.det(s["S"] / np.linalg.norm(s["S"], axis=2, keepdims=True)))
+    long = np.fmax(1.0, np.linalg.norm(s["S"], axis=2, keepdims=True))
+    spread = np.abs(np.linalg.det(s["S"] / long))
     return bound(s["data_error"], lost * sigma[0] / sigma[-1] / spread)
 
 

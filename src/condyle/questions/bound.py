@@ -66,10 +66,13 @@ def beyond(square: ca.SX, k: int) -> ca.SX:
 
 
 def square_spread(S: ca.SX) -> ca.SX:
-    """Square of the volume of the rows of S, (m, m), made of length one."""
+    """Square of the volume of the rows of S, (m, m), those longer than one made of length one.
+
+    A short row of angular rates is a gimbal lock, not a unit.
+    """
     sizes = ca.SX(1)
     for i in range(S.shape[0]):
-        sizes = sizes * ca.sumsqr(S[i, :])
+        sizes = sizes * ca.fmax(1, ca.sumsqr(S[i, :]))
     return determinant(S) ** 2 / sizes
 
 
