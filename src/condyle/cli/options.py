@@ -75,8 +75,8 @@ Preload = Annotated[
 Backend = Annotated[
     str,
     option(
-        "How kernels run: compiled, numpy (the same numbers, slower), or auto: compiled where "
-        "there is a C compiler.",
+        "How kernels run: compiled, numpy (the same numbers, slower), cuda (on NVIDIA's graphics "
+        "processors), or auto: compiled where there is a C compiler.",
         autocompletion=one_of(*completion.BACKENDS),
     ),
 ]
