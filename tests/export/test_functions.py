@@ -227,6 +227,29 @@ def test_derivatives_are_differences(jaw: Library, question: str) -> None:
         np.testing.assert_allclose(slope[f"d_{name}"], found, rtol=0, atol=1e-6 * scale)
 
 
+def test_slopes_of_efforts(jaw: Library) -> None:
+    """By q, q1 and q2: against differences of the exported inverse dynamics, of sixth order."""
+    rng, h = np.random.default_rng(3), 2e-4
+    sizes = {a.name: a.size for a in jaw.exported["inverse"].inputs}
+    at = {name: 0.002 * rng.normal(size=n) for name, n in sizes.items()}
+    status, found = jaw("derivatives", **at)
+    assert status == OK
+    (by_q,) = (a for a in jaw.exported["derivatives"].outputs if a.name == "effort_by_q")
+    assert by_q.labels[1] == "temporalis_right by X" and by_q.units[0] == "(N m)/(m)"
+    for name in ("q", "q1", "q2"):
+        columns = []
+        for unit in np.eye(4):
+            total = 0.0
+            for step, weight in ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60)):
+                for sign in (1, -1):
+                    moved = at | {name: at[name] + sign * step * h * unit}
+                    total = total + sign * weight / h * jaw("inverse", **moved)[1]["effort"]
+            columns.append(total)
+        right = np.concatenate(columns)
+        error = np.abs(found[f"effort_by_{name}"] - right).max()
+        assert error <= 1e-9 * np.abs(right).max(), name
+
+
 def test_turning_joints_may_count_whole_turns(jaw: Library) -> None:
     assert jaw("pose", joint=2 * np.pi * np.arange(-3, 3))[0] == OK
 

@@ -26,7 +26,7 @@ BACKENDS = ("auto", "compiled", "numpy", "cuda")
 FMUS = ("plant", "inverse", "controller", "bounded", "pose", "joints")
 STYLES = ("screen", "journal", "journal-wide")
 EXPORTS = (
-    *("inverse", "contact", "bounded", "forward"),
+    *("inverse", "contact", "bounded", "forward", "derivatives"),
     *("motion", "closure", "pose", "observer", "state", "joints"),
     *("computed_torque", "impedance", "joint_pd", "bite_force"),
 )

@@ -142,6 +142,14 @@ CATALOGUE: dict[str, Entry] = {
         quick=True,
         bounding=(("contact", "bound"),),
     ),
+    "derivatives": Entry(
+        "Derivatives of efforts of least norm by q, q1 and q2, one column after another.",
+        f"{STATE} {LOAD}",
+        " ".join(f"effort/{port}>effort_by_{port}" for port in ("q", "q1", "q2")),
+        question="derivative",
+        details=lambda wish: ("slopes", "inverse", (), ("q", "q1", "q2"), ("effort",)),
+        rubbing="UNCERTIFIED",
+    ),
     "motion": Entry(
         "Pose and its rates from the independent coordinates.", STATE, WHOLE, doubt="UNREACHABLE"
     ),

@@ -208,6 +208,8 @@ class Arguments:
 
         Args: name: in C;  described: description, and unit where that is not `KNOWN` either.
         """
+        if "_by_" in name:
+            return self._slopes(name, port.name)
         size = port.size if isinstance(port, Port) else math.prod(port.shape)
         known = name.removeprefix(PREFIX)
         text, of, per = KNOWN.get(known, (name.replace("_", " "), "", "=1"))
@@ -223,9 +225,22 @@ class Arguments:
             labels = [str(i + 1) for i in range(size)] if size > 1 else [name]
         if name == "s" and self._landmark is not None:
             text = f'displacement of "{self._landmark}" from home, in {{S}}'
-        if of in (AXES, CONTACT) or per.startswith("="):
-            units = [per.removeprefix("=")] * len(labels)
-        else:
-            own = self._units.get(of) or ["m" if n in "XYZxyz" else "rad" for n in labels]
-            units = [f"{unit}{per}" for unit in own]
+        units = self._units_of(of, per, labels)
         return Argument(name, text, tuple(labels), tuple(units), given, port.name)
+
+    def _units_of(self, of: str, per: str, labels: Sequence[str]) -> list[str]:
+        if of in (AXES, CONTACT) or per.startswith("="):
+            return [per.removeprefix("=")] * len(labels)
+        own = self._units.get(of) or ["m" if n in "XYZxyz" else "rad" for n in labels]
+        return [f"{unit}{per}" for unit in own]
+
+    def _slopes(self, name: str, port: str) -> Argument:
+        """Derivatives `<of>_by_<in>`, one column, of all entries of `of`, after another."""
+        ends = []
+        for part in name.split("_by_"):
+            text, of, per = KNOWN[part]
+            ends.append((text, self._labels[of], self._units_of(of, per, self._labels[of])))
+        (text, rows, units), (by, columns, per_units) = ends
+        labels = tuple(f"{row} by {column}" for column in columns for row in rows)
+        both = tuple(f"({unit})/({per})" for per in per_units for unit in units)
+        return Argument(name, f"derivatives of the {text} by the {by}", labels, both, False, port)
