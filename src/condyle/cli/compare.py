@@ -10,7 +10,7 @@ from ..errors import InputError
 from . import options
 from .answer import Answer, command_line, files_line
 from .command import COMPUTE, command
-from .inputs import can_draw, output_folder, require_drawing, warn
+from .inputs import can_be_folder, can_draw, output_folder, require_drawing, warn
 
 
 @command(COMPUTE, example="condyle compare jaw.toml --motion path.csv --load bite.csv")
@@ -44,6 +44,7 @@ def compare(
     machine = condyle.load_mechanism(mechanism)
     following = motion.arguments()
     load_point = following.pop("load_point")
+    can_be_folder(out)
     path, acting = motion_and_load(machine, **following)
     found: Any
     if tradeoff:

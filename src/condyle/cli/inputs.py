@@ -75,6 +75,12 @@ def output_folder(path: Path) -> Path:
         raise InputError(f"--out {error}") from None
 
 
+def can_be_folder(path: Path) -> None:
+    """Raises InputError before minutes pass, if a file stands where `output_folder` is to be."""
+    if not next((part for part in (path, *path.parents) if part.exists()), Path()).is_dir():
+        output_folder(path)
+
+
 def require_drawing(figures: bool, report: bool) -> None:
     """Raises MissingExtraError before minutes pass, if what draws them is not installed."""
     if figures:

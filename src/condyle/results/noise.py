@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from ..errors import InputError
@@ -22,7 +24,8 @@ def deviations_of(model: Model, noise: Values) -> dict[str, np.ndarray]:
     Raises: InputError: for unknown columns, and for anything but positive numbers.
     """
     names = [prefix + name for prefix in RATES for name in model.independent]
-    text = noise.split(",") if isinstance(noise, str) else list(noise)
+    text = noise.split(",") if isinstance(noise, str) else noise
+    text = text if isinstance(text, Iterable) else ()  # refused below
     paths = [one.split("=")[0].strip() for one in text if isinstance(one, str) and "." in one]
     numbers = [p for p in paths if p.partition(".")[0] in ("platform", "chain", "contact")]
     given = values_of(noise, [*names, "gravity", *numbers], "noise")
