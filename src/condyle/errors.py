@@ -119,6 +119,13 @@ class WarningError(CondyleError):
         super().__init__("; ".join(self.warnings) + ".", "Without --strict this is a warning")
 
 
+class CondyleWarning(UserWarning):
+    """Python's warning of what is valid and suggests a slip, such as a wrong unit.
+
+    `warnings.simplefilter("ignore", CondyleWarning)` silences it.
+    """
+
+
 class MissingExtraError(CondyleError):
     """A package that is not installed, because only part of condyle needs it.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import pickle
 import tomllib
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.errors import InputError, MechanismError
+from condyle.errors import CondyleWarning, InputError, MechanismError
 from condyle.mechanism import Mechanism, bundled_text, dumps, parse
 from condyle.mechanism.bodies import Platform
 from condyle.mechanism.files import from_data
@@ -263,3 +264,18 @@ def test_home_kept_by_a_centre() -> None:
         round_one.set(f"contact.{name}.surface.centre", off, keep="home")
     with pytest.raises(InputError, match='keep: expected "home" or "all", got'):
         round_one.set("platform.mass", 0.2, keep="some")
+
+
+def test_set_warns_of_new_slips_alone() -> None:
+    machine = condyle.load_mechanism("masticatory")
+    with pytest.warns(CondyleWarning, match="gravity") as told:
+        moon = machine.set("gravity", (0.0, 0.0, -1.62))
+    assert len(told) == 1
+    assert told[0].filename == __file__, "the line that calls set"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        machine.set("platform.mass", 0.25)
+        moon.set("gravity", (0.0, 0.0, -1.63))  # known already
+        moon.set("gravity", (0.0, 0.0, -9.81))
+        variants = condyle.derive(machine, backend="numpy").variants({"gravity[2]": [-1.6, -9.8]})
+        assert variants.mechanism(0).gravity[2] == -1.6

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from functools import cached_property
@@ -9,7 +10,7 @@ from typing import Any, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from ..errors import InputError, MechanismError, shortened, shown
+from ..errors import CondyleWarning, InputError, MechanismError, shortened, shown
 from .bodies import Inertia, Platform
 from .chain import Chain
 from .contact import Bounds, Contact
@@ -58,7 +59,9 @@ class Mechanism(Table):
 
         Chains and contacts are addressed by name, entries of lists by index from 0. Several
         changes are made together: what must agree, such as a contact point and its surface, is
-        checked at the end. None removes an optional entry.
+        checked at the end. None removes an optional entry. Numbers that are valid and suggest a
+        slip, such as a wrong unit, give a `CondyleWarning`, as `condyle check` does, where the
+        mechanism had none of that kind before.
 
         Args:   path: one path, or paths with their values;  value: the new one, SI;
                 keep: `home`: a surface that a change takes off its contact's home follows it with
@@ -74,10 +77,22 @@ class Mechanism(Table):
         else:
             parsed(path)
             path = {path: value}
-        kept = set(kept_contacts(self, path, keep))
+        made = self._set(path, keep)
+        from .mechanism_checks import mechanism_warnings  # which reads mechanisms
+
+        if found := mechanism_warnings(made):
+            known = {warning.kind for warning in mechanism_warnings(self)}
+            for warning in found:
+                if warning.kind not in known:
+                    warnings.warn(str(warning), CondyleWarning, stacklevel=2)
+        return made
+
+    def _set(self, changes: Mapping[str, Any], keep: str) -> Self:
+        """`set` without its warnings, for many."""
+        kept = set(kept_contacts(self, changes, keep))
         if not kept:
-            return self.checked(changed(self, path), self.name)
-        made = super().checked(changed(self, path), self.name)
+            return self.checked(changed(self, changes), self.name)
+        made = super().checked(changed(self, changes), self.name)
         if len(made.contacts) != len(self.contacts):
             raise InputError('set: keep="home" needs as many contacts as before')
         pairs = enumerate(zip(self.contacts, made.contacts, strict=True))

@@ -149,7 +149,7 @@ class Variants:
 
     def _made(self, i: int) -> Mechanism | CondyleError:
         try:
-            made = self.base.set(self.changes(i), keep=self.keep)
+            made = self.base._set(self.changes(i), self.keep)
             self.model._asked.checked(made)
         except CondyleError as error:
             return error
@@ -343,7 +343,7 @@ def _with_coordinates(mechanism: Mechanism, dependent: tuple[str, ...]) -> Mecha
     """The mechanism as if its dependent coordinates stood in its file."""
     if not mechanism.contacts or mechanism.dependent is not None:
         return mechanism
-    return mechanism.set("dependent", dependent)
+    return mechanism._set({"dependent": dependent}, "all")
 
 
 def _scattered(parts: list[tuple[np.ndarray, Any]], count: int) -> Any:
