@@ -9,10 +9,11 @@ matrix A of m such columns |A^-1| <= (m / (m - 1))^((m - 1) / 2) / |det A| < 1.7
     chains:    the least discriminant d, since joints follow from square roots of it and
                Jacobians and rates from powers of that root: u / d;
     contacts:  the volume c of the rows of C in the dependent coordinates: poses are
-               off by u / c, and the Jacobian M_J and its rates by u / c^2;
+               off by u / c, and the Jacobian M_J and its rates by u e / c^2, where
+               e = 1 + |X_EE|^2 in characteristic lengths and radians;
     equations: the volume V of the columns of A = J M_J, or of the inertia matrix.
 
-    bound = SAFETY u / (d c^2 V)
+    bound = SAFETY u e / (d c^2 V)
 
 Errors count relative to the largest entry of the answer, or to the largest of its terms where they
 cancel: gravity, load, accelerations, rates, each alone. Every factor is an upper bound of
@@ -94,17 +95,29 @@ def off_contacts(b: Builder, platform: Platform) -> ca.SX:
     return ca.sumsqr(unit * solve_small(C, phi)) if dep else ca.SX(0)
 
 
+def _extent(b: Builder, platform: Platform) -> ca.SX:
+    """e of a pose, at least 1: what closes contacts rounds by its size.
+
+    Not counted: rounding of a profile's heights, which knots close together magnify.
+    """
+    if not b.structure.contacts:
+        return ca.SX(1)
+    inverse = 1 / b.parameter("length")
+    pose = platform.pose
+    return 1 + inverse * inverse * ca.sumsqr(pose[:3]) + ca.sumsqr(pose[3:])
+
+
 def data_error(
     b: Builder, platform: Platform, discriminants: Lanes, left: ca.SX | None = None
 ) -> ca.SX:
-    """Of the data of the equations: (u / c^2 + r / c) / d.
+    """Of the data of the equations: (u e / c^2 + r / c) / d.
 
     Args: discriminants: of the chains;  left: r^2, if not that of the platform's placement.
     """
     motion = platform.motion
     rest = platform.placement.left if left is None else left
     square = square_volume(b, motion.frame.N.T @ motion.E, b.structure.dependent)
-    found = ROUNDING / beyond(square, len(b.structure.dependent))
+    found = ROUNDING * _extent(b, platform) / beyond(square, len(b.structure.dependent))
     if not isinstance(rest, float):
         found = found + ca.sqrt(rest / square)
     return found / ca.fmin(b.least(discriminants), 1)
