@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.children import PATIENCE, start
 
 from condyle.errors import InputError
 from condyle.motion.table_reader import iter_table, read_table
@@ -177,3 +178,25 @@ def test_reading_in_chunks_takes_flat_memory(csv_file):
 def test_an_empty_line_at_the_end_of_a_chunk_is_still_between_rows(csv_file, chunk_rows):
     with pytest.raises(InputError, match="line 4: is empty, but rows follow"):
         list(iter_table(csv_file("t,x\n0,1\n1,1\n\n\n2,1\n"), chunk_rows))
+
+
+@pytest.mark.slow
+def test_a_footer_of_ten_thousand_columns_is_refused_in_little_memory(tmp_path: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    path = tmp_path / "wide.parquet"
+    table = pa.table({f"c{i}": pa.array(np.zeros(8)) for i in range(10_000)})
+    pq.write_table(table, path, row_group_size=2)
+    code = (
+        "import resource, sys, pyarrow.parquet, condyle.motion.table_reader as reader\n"
+        "from condyle.errors import InputError\n"
+        "before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
+        "try:\n    list(reader.iter_table(sys.argv[1], 100, known={'t': ''}))\n"
+        "except InputError as error:\n    print(len(str(error)) < 1000)\n"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)\n"
+    )
+    child = start(code, path)
+    out, err = child.communicate(timeout=PATIENCE)
+    assert not err and out.split()[0] == "True"
+    assert int(out.split()[1]) < 400_000  # KiB
