@@ -239,7 +239,7 @@ DOORS: dict[str, Door] = {
         calls=20,
         words=("X", "Fx", "no such"),
     ),
-    "Model.to_jax": Door({"door": "graph", "numbers": ()}, words=("jax", "JAX", "door"), calls=60),
+    "Model.to_jax": Door({"method": "graph", "numbers": ()}, words=("jax", "JAX"), calls=60),
     "Model.to_torch": Door(words=("torch",)),
     "Model.to_casadi": Door(words=("kernels",)),
     "Model.with_distribution": Door({"distribution": "minimum_norm"}),

@@ -88,7 +88,8 @@ class FileValues:
         known = {path.path: path for path in self.paths}
         if unknown := [str(name) for name in numbers if name not in known]:
             raise InputError(
-                f"numbers: to_jax was told of {', '.join(known)}; got {', '.join(unknown)}"
+                f"numbers: expected some of {', '.join(known)}, which to_jax was given; got "
+                f"{', '.join(unknown)}"
             )
         parameters, lanes = self._base
         (f, at), (g, row, lane) = self._places

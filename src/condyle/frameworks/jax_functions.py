@@ -47,11 +47,11 @@ class JaxFunctions:
     inverse_dynamics: Function
     forward_dynamics: Function
 
-    def __init__(self, model: Model, door: str = "kernel", numbers: Sequence[str] = ()) -> None:
+    def __init__(self, model: Model, method: str = "kernel", numbers: Sequence[str] = ()) -> None:
         """As of `Model.to_jax`."""
-        as_name(door, "door")
-        if door not in DOORS:
-            raise InputError(f"door: there is no {shown(door)}.{did_you_mean(door, DOORS)}")
+        as_name(method, "method")
+        if method not in METHODS:
+            raise InputError(f"method: there is no {shown(method)}.{did_you_mean(method, METHODS)}")
         require("jax", "jax")
         import jax
 
@@ -60,14 +60,14 @@ class JaxFunctions:
                 "to_jax computes in doubles, and JAX is set to float32. First call "
                 'jax.config.update("jax_enable_x64", True)'
             )
-        if door == "kernel" and model.backend.name != "compiled":
+        if method == "kernel" and model.backend.name != "compiled":
             raise UnsupportedError(
                 f"to_jax calls compiled kernels, and this model has {model.backend.name}; "
-                'door="graph" needs none'
+                'method="graph" needs none'
             )
         file = FileValues.of(model, numbers) if numbers else None
         for name, asked in dynamics(model, file is not None).items():
-            setattr(self, name, _function(asked, DOORS[door](asked, file), file))
+            setattr(self, name, _function(asked, METHODS[method](asked, file), file))
 
 
 def _traced(asked: Asked, file: FileValues | None) -> Called:
@@ -131,7 +131,7 @@ def _compiled(asked: Asked, file: FileValues | None) -> Called:
     return called
 
 
-DOORS: dict[str, Callable[[Asked, FileValues | None], Called]] = {
+METHODS: dict[str, Callable[[Asked, FileValues | None], Called]] = {
     "kernel": _compiled,
     "graph": _traced,
 }
@@ -149,7 +149,8 @@ def _function(asked: Asked, called: Called, file: FileValues | None) -> Function
         if file is not None:
             flat.append(file.given(numbers or {}))
         elif numbers:
-            raise InputError(f"numbers: to_jax was not told of {', '.join(map(str, numbers))}")
+            names = ", ".join(map(str, numbers))
+            raise InputError(f"numbers: name them first: to_jax(numbers=[...]); got {names}")
         lead = jnp.broadcast_shapes(*(a.shape[:-1] for a in flat))
         found: dict[str, Any] = called(*(jnp.broadcast_to(a, (*lead, a.shape[-1])) for a in flat))
         return found

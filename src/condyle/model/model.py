@@ -460,18 +460,18 @@ class Model:
 
     # -- in other frameworks -----------------------------------------------------------------
 
-    def to_jax(self, door: str = "kernel", numbers: Sequence[str] = ()) -> Any:
+    def to_jax(self, method: str = "kernel", numbers: Sequence[str] = ()) -> Any:
         """Dynamics as pure functions of JAX, which jit, vmap and differentiate: `JaxFunctions`.
 
-        Args:   door: kernel: our own C, called by XLA on processors; graph: traced operation by
+        Args:   method: kernel: our own C, called by XLA on processors; graph: traced operation by
                 operation, slower there, but it runs wherever JAX does.
                 numbers: paths of the file's numbers that calls may give, and derivatives be taken
                 by: `numbers={"platform.mass": 0.2}`; home is kept.
         Raises: MissingExtraError: without JAX.
-                InputError:        where JAX is set to float32; for another door or path.
+                InputError:        where JAX is set to float32; for another method or path.
                 UnsupportedError:  for `kernel` without a compiler; for efforts within limits.
         """
-        return extend("model.to_jax", self, door, numbers)
+        return extend("model.to_jax", self, method, numbers)
 
     def to_torch(self) -> Any:
         """Dynamics as operators of PyTorch, with exact derivatives: `TorchFunctions`.
