@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from typing import Any
+from urllib.parse import urlsplit
 
+import msgspec
 import numpy as np
 import pytest
+import viser
 from support.browser import Tab
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
 
 import condyle
 from condyle.errors import InputError
@@ -20,6 +27,7 @@ from .test_view import HANDLE, fill, near, row
 
 pytestmark = pytest.mark.usefixtures("compiler_command")  # by numpy a second takes minutes
 
+PROTOCOL = f"viser-v{viser.__version__}"
 TORQUE = {"kind": "computed_torque", "stiffness": 2500.0}
 FOOD = {"kind": "food", "food": "bolus", "point": "right_molar"}
 CHEW = {"duration": 3.0, "controller": TORQUE, "load": [FOOD]}
@@ -165,3 +173,35 @@ def grip(tab: Tab) -> tuple[int, int]:
 
     found = blue(tab.picture_where("canvas", lambda p: len(blue(p)) > 20, "the grip"))
     return left + int(found[0][1]), top + int(found[0][0]) + 10
+
+
+VALUES = [None, "", "1", "x" * 2000, True, [], [1.0], {}, {"value": 1}, -1, 1e308, 10**18]
+VALUES += [float("nan"), float("inf"), -0.0, b"\xff", "__class__"]
+
+
+@pytest.mark.slow
+def test_hostile_values_from_the_wire(capfd: pytest.CaptureFixture[str]) -> None:
+    """To every control of a running simulation, past what the page's own sliders allow."""
+    running = open_view("masticatory", port=0, scenario={**CHEW, "duration": 1000.0})
+    place = urlsplit(running.url)
+    controls = list(running._server.gui._gui_input_handle_from_uuid)
+    assert len(controls) > 10
+    updates = [{"value": value} for value in VALUES] + [{"label": 3}, {"nonsense": 1}, {}]
+    for update in updates:
+        left = [*controls]
+        while left:  # what cannot be read ends a connection
+            with (
+                suppress(ConnectionClosed),
+                connect(f"ws://{place.netloc}{place.path}", subprotocols=[PROTOCOL]) as client,
+            ):
+                while left:
+                    message = {"type": "GuiUpdateMessage", "uuid": left.pop(), "updates": update}
+                    client.send(msgspec.msgpack.encode(message))
+    time.sleep(1.0)
+    assert running._worker.is_alive()
+    shown = running.session.snapshot()
+    assert np.isfinite(shown.pose).all()
+    assert running.live is None or np.isfinite(running.live.snapshot().pose).all()
+    running.close()
+    told = capfd.readouterr()
+    assert "Traceback" not in told.out + told.err
