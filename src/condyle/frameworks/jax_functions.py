@@ -41,7 +41,7 @@ class JaxFunctions:
 
     Arguments are as of `Model`, without names of points; results are `effort` (..., n) or
     `acceleration` (..., m), `contact_force` (..., k) and `status` (...), NaN where that is not 0.
-    Samples that no kernel can vouch for, and a model solves by robust methods, are `uncertified`.
+    Samples that no kernel can certify, which a model solves by robust methods, are `uncertified`.
     """
 
     inverse_dynamics: Function
