@@ -194,8 +194,9 @@ def operation_counts() -> str:
     """Operations a sample of Models 1 and 2: every subexpression once, and written out."""
     import condyle
     from condyle.dynamics import FORMULATIONS
+    from condyle.questions.file_numbers import numbers_of
     from condyle.questions.inverse import motion
-    from condyle.questions.numbers import Layout, specialised
+    from condyle.questions.numbers import specialised
     from condyle.questions.platform import closed, given
     from condyle.questions.structure import structure_of
 
@@ -209,7 +210,7 @@ def operation_counts() -> str:
         counts = []
         for route, platform in (("direct", closed), ("core", given)):
             structure = structure_of(mechanism, name, route)
-            structure = specialised(structure, Layout.of(structure).numbers(mechanism))
+            structure = specialised(structure, numbers_of(structure, mechanism))
             counts.append(count(_model(structure, platform)))
         closure = count(motion(structure))
         one, two = counts[0], [counts[1][i] + closure[i] for i in range(2)]

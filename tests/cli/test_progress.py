@@ -222,7 +222,7 @@ def test_steps_of_a_comparison(
     save_figures(comparison.solution, comparison, tmp_path)
     assert watcher.steps["drawing figures"] == [5, 5]
     save_solution_figures(comparison.solution, tmp_path)
-    assert watcher.steps["drawing figures"] == [12, 12]
+    assert watcher.steps["drawing figures"] == [13, 13]
 
 
 @pytest.mark.usefixtures("compiler_command")

@@ -353,6 +353,10 @@ JSON = {
     "condyle run": ("run", "--rate", "20", "--out", "results"),
     "condyle solve": ("solve", "my.toml", "--states", "states.csv", "--out", "t.csv"),
     "condyle forward": ("forward", "my.toml", "--states", "efforts.csv", "--out", "a.csv"),
+    "condyle derivatives": (
+        *("derivatives", "my.toml", "--states", "states.csv", "--out", "d.csv"),
+        *("--of", "effort", "--wrt", "q"),
+    ),
     "condyle compare --tradeoff": ("compare", "--tradeoff", "--rate", "20", "--out", "curve"),
     "condyle pose": ("pose", "my.toml", "--joints", "encoders.csv", "--out", "p.csv"),
     "condyle pose --all": (
