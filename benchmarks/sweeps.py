@@ -1,10 +1,9 @@
-"""What a variant of a study costs: by one worker, by two, and by Dask."""
+"""What a variant of a study costs, by one worker and by two."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from importlib.util import find_spec
 from typing import Any
 
 from condyle.analysis.sweep import Study, sweep
@@ -31,33 +30,27 @@ STUDY: dict[str, Any] = {
     },
 }
 ALL = f"sweep: {VARIANTS} variants of 201 samples, two workers"
-ONE, TWO, DASK = (f"sweep: a variant, {who}" for who in ("one worker", "two workers", "Dask, two"))
+ONE, TWO = (f"sweep: a variant, {who}" for who in ("one worker", "two workers"))
 
 
 def sweep_rows() -> Iterator[Row]:
     """Seconds of a whole study, and of a variant by who does it, start of the workers included."""
-    _seconds(8, 1, "processes")  # builds the kernels
-    yield Row(ALL, _seconds(VARIANTS, 2, "processes"), 0.0, 0.0, None)
-    yield Row(ONE, _seconds(FEW, 1, "processes") / FEW, 0.0, 0.0, None)
-    yield Row(TWO, _seconds(FEW, 2, "processes") / FEW, 0.0, 0.0, None)
-    if find_spec("distributed") is not None:
-        yield Row(DASK, _seconds(FEW, 2, "dask") / FEW, 0.0, 0.0, None)
+    _seconds(8, 1)  # builds the kernels
+    yield Row(ALL, _seconds(VARIANTS, 2), 0.0, 0.0, None)
+    yield Row(ONE, _seconds(FEW, 1) / FEW, 0.0, 0.0, None)
+    yield Row(TWO, _seconds(FEW, 2) / FEW, 0.0, 0.0, None)
 
 
 def sweep_ratios(rows: dict[str, Row]) -> dict[str, float]:
     """The bars of studies."""
-    found = {
+    return {
         f"{ALL} [s]": rows[ALL].seconds,
         "sweep: efficiency of two workers": rows[ONE].seconds / rows[TWO].seconds / 2,
     }
-    if DASK in rows:
-        overhead = (rows[DASK].seconds - rows[TWO].seconds) * 1e6
-        found["sweep: Dask's overhead, its start included [us a variant]"] = overhead
-    return found
 
 
-def _seconds(count: int, workers: int, scheduler: str) -> float:
+def _seconds(count: int, workers: int) -> float:
     study = Study.checked({**STUDY, "sampling": {"kind": "sobol", "count": count}}, "bench")
     start = time.perf_counter()
-    sweep(study, workers=workers, scheduler=scheduler)
+    sweep(study, workers=workers, scheduler="processes")
     return time.perf_counter() - start

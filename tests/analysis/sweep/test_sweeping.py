@@ -23,6 +23,7 @@ import pyarrow.parquet as pq
 import pytest
 import tomli_w
 import xarray as xr
+from support.children import PATIENCE, start
 
 import condyle
 from condyle.analysis import workers as pool
@@ -313,3 +314,29 @@ def test_a_folder_from_a_stranger(tables: dict[str, Any], tmp_path: Path) -> Non
         rows.write_bytes(bytes(data[: rng.choice((len(data), rng.randrange(len(data))))]))
         with suppress(condyle.CondyleError):
             open_sweep(tmp_path)
+
+
+@pytest.mark.ci
+@pytest.mark.usefixtures("compiler_command")
+def test_many_variants_take_the_memory_of_few(tmp_path: Path) -> None:
+    """Of the process that gathers and of those that work, the largest."""
+    code = (
+        "import os, resource, sys, condyle\n"
+        "os.environ.pop('CONDYLE_BACKEND', None)\n"  # by numpy it takes minutes
+        "vary = {'what': 'platform.mass', 'range': [0.2, 0.3]}\n"
+        "measure = {'peak': {'of': 'effort', 'take': 'max_abs'}}\n"
+        "def most():\n"
+        "    who = resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN\n"
+        "    return max(resource.getrusage(one).ru_maxrss for one in who)\n"
+        "for count in (2_000, 60_000):\n"
+        "    study = {'motion': {'file': 'reference', 'rate': 2.0}, 'vary': [vary],\n"
+        "             'measure': measure, 'sampling': {'kind': 'sobol', 'count': count}}\n"
+        "    found = condyle.sweep(study, out=f'{sys.argv[1]}/{count}', workers=2)\n"
+        "    assert found.sizes['row'] == count\n"
+        "    print(most())\n"
+    )
+    child = start(code, tmp_path)
+    out, err = child.communicate(timeout=PATIENCE)
+    assert not child.returncode, err
+    few, many = map(int, out.split())
+    assert many - few < 150_000  # KiB
