@@ -17,6 +17,7 @@ from .contact import Bounds, Contact
 from .coordinates import COORDINATES, Coordinate
 from .home import home_problems, usable_sets
 from .kept_home import followed, kept_contacts
+from .mechanism_checks import mechanism_warnings
 from .paths import changed, parsed, value_at
 from .portrait import in_html, in_words
 from .quantities import Gravity, Name
@@ -78,8 +79,6 @@ class Mechanism(Table):
             parsed(path)
             path = {path: value}
         made = self._set(path, keep)
-        from .mechanism_checks import mechanism_warnings  # which reads mechanisms
-
         if found := mechanism_warnings(made):
             known = {warning.kind for warning in mechanism_warnings(self)}
             for warning in found:

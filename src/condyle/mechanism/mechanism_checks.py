@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from ..errors import few
+from .bodies import Platform
 from .chain import limits
-from .home import characteristic_length
-from .mechanism import Mechanism
+from .home import Parts, characteristic_length
 
 LARGE, SMALL = 10.0, 1e-4  # metres
 EARTH, EARTH_SPREAD = 9.81, 0.06  # m/s^2: 9.76 at the equator's mountains, 9.83 at the poles
@@ -23,6 +23,15 @@ SOUND = 340.0  # m/s
 ROUGHEST = 2.0  # coefficient of friction: hardly any pair has more
 POINTLIKE = 3e-3  # radius of gyration over the platform's own size
 ROUNDING = 1e-12  # metres outside a bound
+
+
+class Whole(Parts, Protocol):
+    """A mechanism, as far as its checks read it."""
+
+    @property
+    def platform(self) -> Platform: ...
+    @property
+    def gravity(self) -> tuple[float, ...]: ...
 
 
 @dataclass(frozen=True)
@@ -40,7 +49,7 @@ class CheckWarning:
         return self.message
 
 
-def mechanism_warnings(mechanism: Mechanism) -> list[CheckWarning]:
+def mechanism_warnings(mechanism: Whole) -> list[CheckWarning]:
     """Sizes, masses, gravity, limits and bounds that look like a slip of units or of a sign."""
     return [
         *_sizes(mechanism),
@@ -54,14 +63,14 @@ def mechanism_warnings(mechanism: Mechanism) -> list[CheckWarning]:
     ]
 
 
-def extent(mechanism: Mechanism) -> np.ndarray:
+def extent(mechanism: Whole) -> np.ndarray:
     """Sides of the box around all points of the mechanism at home, (3,) [m]."""
     points = [*platform_points(mechanism)]
     points += [point for chain in mechanism.chains for point in chain.fixed_points]
     return np.ptp(np.array(points), axis=0)
 
 
-def platform_points(mechanism: Mechanism) -> list[tuple[float, ...]]:
+def platform_points(mechanism: Whole) -> list[tuple[float, ...]]:
     """Joints, contacts and landmarks of the platform, in {M} [m]."""
     points: list[tuple[float, ...]] = [chain.platform for chain in mechanism.chains]
     return [*points, *(c.point for c in mechanism.contacts), *mechanism.platform.points.values()]
@@ -85,7 +94,7 @@ def _beyond(
         yield CheckWarning(kind, text.format(listed), {key: found})
 
 
-def _sizes(mechanism: Mechanism) -> Iterator[CheckWarning]:
+def _sizes(mechanism: Whole) -> Iterator[CheckWarning]:
     whole = {"the characteristic length": characteristic_length(mechanism)}
     parts = {
         f'the {name} of chain "{chain.name}"': length
@@ -111,7 +120,7 @@ def _sizes(mechanism: Mechanism) -> Iterator[CheckWarning]:
             return
 
 
-def _platform(mechanism: Mechanism) -> Iterator[CheckWarning]:
+def _platform(mechanism: Whole) -> Iterator[CheckWarning]:
     mass = mechanism.platform.mass
     gyration = float(np.sqrt(mechanism.platform.inertia.principal()[-1] / mass))
     size = float(np.linalg.norm(platform_points(mechanism), axis=1).max())
@@ -142,7 +151,7 @@ def _platform(mechanism: Mechanism) -> Iterator[CheckWarning]:
         )
 
 
-def _rods(mechanism: Mechanism) -> Iterator[CheckWarning]:
+def _rods(mechanism: Whole) -> Iterator[CheckWarning]:
     beyond = {
         f'{name} of chain "{chain.name}"': (radius, chain.lengths[name])
         for chain in mechanism.chains
@@ -161,7 +170,7 @@ def _rods(mechanism: Mechanism) -> Iterator[CheckWarning]:
         )
 
 
-def _gravity(mechanism: Mechanism) -> Iterator[CheckWarning]:
+def _gravity(mechanism: Whole) -> Iterator[CheckWarning]:
     gravity = np.array(mechanism.gravity)
     size = float(np.linalg.norm(gravity))
     data = {"gravity": list(mechanism.gravity)}
@@ -175,7 +184,7 @@ def _gravity(mechanism: Mechanism) -> Iterator[CheckWarning]:
         )
 
 
-def _speeds(mechanism: Mechanism) -> Iterator[CheckWarning]:
+def _speeds(mechanism: Whole) -> Iterator[CheckWarning]:
     # rad/s of a crank, else m/s
     speeds = {c.name: limits(c).speed * c.lengths.get("crank", 1.0) for c in mechanism.chains}
     beyond = {name: v for name, v in speeds.items() if SOUND < v < np.inf}
@@ -183,7 +192,7 @@ def _speeds(mechanism: Mechanism) -> Iterator[CheckWarning]:
     yield from _beyond("speed_limit", text, beyond, "{name} {:.4g} m/s", "speeds")
 
 
-def _losses(mechanism: Mechanism) -> Iterator[CheckWarning]:
+def _losses(mechanism: Whole) -> Iterator[CheckWarning]:
     """Actuators that cannot overcome their own friction, or whose friction never acts in full."""
     stuck, fading = {}, {}
     for chain in mechanism.chains:
@@ -199,14 +208,14 @@ def _losses(mechanism: Mechanism) -> Iterator[CheckWarning]:
     yield from _beyond("smoothing_large", text, fading, show, "chains")
 
 
-def _friction(mechanism: Mechanism) -> Iterator[CheckWarning]:
+def _friction(mechanism: Whole) -> Iterator[CheckWarning]:
     found = {contact.name: contact.friction.coefficient for contact in mechanism.contacts}
     large = {name: mu for name, mu in found.items() if mu > ROUGHEST}
     text = f"friction: a coefficient above {ROUGHEST:g}: {{}}; is it a percentage?"
     yield from _beyond("friction_large", text, large, "{name} {:g}", "contacts", "contact")
 
 
-def _bounds(mechanism: Mechanism) -> Iterator[CheckWarning]:
+def _bounds(mechanism: Whole) -> Iterator[CheckWarning]:
     for contact in mechanism.contacts:
         bounds = contact.bounds.entries()
         if not contact.surface.known or not any(bounds.values()):
