@@ -270,7 +270,10 @@ LABELS = {name: name for name in (*DIMENSIONS, "marker", "quantile")} | {
     "effort_unit": "chain", "joint_unit": "chain", "marker_body": "marker"
 }  # fmt: skip
 # Those that every solution has.
-NEEDED = ("effort", "contact_force", "pose", "joint", "joint_rate", "bound_margin", "load")
+NEEDED = (
+    *("effort", "contact_force", "pose", "joint", "joint_rate", "bound_margin", "load"),
+    *("singularity_ratio", "condition", "singularity"),
+)
 SOLUTION = Kind(
     "solution",
     _dimensions,
