@@ -16,6 +16,7 @@ from ..mechanism.mechanism import Mechanism
 from ..model.distributing import Distribution
 from ..model.model import Model
 from ..motion import resolve_load_point
+from ..results.solving import given_along
 from .paper import Seconds
 
 if TYPE_CHECKING:
@@ -92,12 +93,14 @@ class Run:
 
 def run(model: TimedModel, solution: xr.Dataset) -> Run:
     """Compute a solution's samples by another model, and time its torques, without the shares."""
-    given = states_of(model, solution)
+    states, given = states_of(model, solution), given_along(solution)
+    if given:
+        model.inverse_dynamics(*states, **given)  # its kernel is not yet there
     with without_collection():
         start = process_time()
-        model.inverse_dynamics(*given)
+        model.inverse_dynamics(*states, **given)
         numeric = process_time() - start
-    found = model.inverse_dynamics(*given, outputs=("share",))
+    found = model.inverse_dynamics(*states, **given, outputs=("share",))
     return Run(
         model.formulation,
         model.route,

@@ -15,6 +15,7 @@ from typing import ClassVar
 import casadi as ca
 
 from ..kinematics.chain import ChainDynamics, Constants, Family
+from ..kinematics.moving_base import MovingBase
 from ..kinematics.state import PointMotion, State
 
 
@@ -44,6 +45,14 @@ class Body:
         """Mass times the place of the mass centre in {S}, (3,) [kg m]: m O_M + S."""
         return self.mass * position + R @ self.first_moment
 
+    def carried(self, state: State, base: MovingBase) -> ca.SX:
+        """Force and moment about O_M, (6,), that a moving base adds."""
+        V, omega, S = state.twist[:3], state.twist[3:], state.R @ self.first_moment
+        here = base.acceleration(state.pose[:3], V)
+        force = self.mass * here + base.turning(S, ca.cross(omega, S))
+        turned = base.moment(state.R @ self.inertia @ state.R.T, omega)
+        return ca.vertcat(force, ca.cross(S, here) + turned)
+
 
 class Formulation(ABC):
     """One way to write the equations of motion."""
@@ -62,3 +71,9 @@ class Formulation(ABC):
     @abstractmethod
     def chain(self, family: Family, c: Constants, M: PointMotion, g: ca.SX) -> ChainDynamics:
         """Forces of a chain's bodies on its platform joint, and the joint's motion."""
+
+    def carried_chain(
+        self, family: Family, c: Constants, M: PointMotion, base: MovingBase
+    ) -> ca.SX:
+        """What a moving base adds to these forces, (3,)."""
+        return family.carried(c, M.position, M.velocity, base)

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from ..kinematics.chain import Constants, Family, Joint
+from ..kinematics.moving_base import MovingBase
 from .joint_space import JointState
 
 
@@ -28,7 +29,8 @@ from .joint_space import JointState
 class Carried:
     """Forces of joints on their links, moments about their points, (3,) each, and guides' moments.
 
-    Expressions in F, mu and the `weight` of each link's inertia, which is 1 in the end.
+    Expressions in F, mu and the `weight` of each link's inertia, which is 1 in the end; the last
+    weight, if the base moves, is that of all that it adds.
     """
 
     forces: list[ca.SX]
@@ -41,7 +43,7 @@ class FreeBodies:
     """The balances of one chain, expressions in a joint state.
 
     end_point: M, (3,).
-    K: (3 + guides, 3 + guides)   E: (3 + guides,)   R: (3 + guides, links), one column a link.
+    K: (3 + guides, 3 + guides)   E: (3 + guides,)   R: (3 + guides, weights), one column a weight.
     """
 
     joints: list[Joint]
@@ -54,12 +56,17 @@ class FreeBodies:
     R: ca.SX
 
 
-def free_bodies(family: Family, c: Constants, s: JointState, g: ca.SX) -> FreeBodies:
+def free_bodies(
+    family: Family, c: Constants, s: JointState, g: ca.SX, base: MovingBase | None = None
+) -> FreeBodies:
     """Cut a chain free at the joint state `s`."""
     links, joints = family.links(c, s.q), family.joints(c, s.q)
     M = family.end_point(c, s.q)
     count = sum(joint.guide is not None for joint in joints)
-    unknown, weight = ca.SX.sym("unknown", 3 + count), ca.SX.sym("weight", len(links))
+    unknown, weight = (
+        ca.SX.sym("unknown", 3 + count),
+        ca.SX.sym("weight", len(links) + (base is not None)),
+    )
     F = unknown[:3]
 
     # From the platform inwards: force, and moment about the origin of {S}.
@@ -75,6 +82,9 @@ def free_bodies(family: Family, c: Constants, s: JointState, g: ca.SX) -> FreeBo
         h = weight[i] * (
             link.inertia @ s.time_derivative(omega) + ca.cross(omega, link.inertia @ omega)
         )
+        if base is not None:
+            f += weight[-1] * link.mass * base.acceleration(link.centre, velocity)
+            h += weight[-1] * base.moment(link.inertia, omega)
         force = force + f
         moment = moment + ca.cross(link.centre, f) + h
         guide = None

@@ -16,6 +16,7 @@ import casadi as ca
 
 from ..kinematics.chain import ChainDynamics, Constants, Family, Link, Loop
 from ..kinematics.constraints import solve_small
+from ..kinematics.moving_base import MovingBase
 from ..kinematics.state import PointMotion
 from .formulation import Formulation
 
@@ -106,6 +107,17 @@ class JointSpace(Formulation):
         motion = joint_motion(family, c, M, self.bias)
         forces = motion.insert(s, [self.link_force(link, s, g) for link in links])
         return motion.dynamics({link.name: f for link, f in zip(links, forces, strict=True)})
+
+    def carried_chain(
+        self, family: Family, c: Constants, M: PointMotion, base: MovingBase
+    ) -> ca.SX:
+        s, force = JointState.symbols(), ca.SX.zeros(3)
+        for link in family.links(c, s.q):
+            J_E, omega = ca.jacobian(link.centre, s.q), link.spin @ s.rate
+            force += J_E.T @ (link.mass * base.acceleration(link.centre, J_E @ s.rate))
+            force += link.spin.T @ base.moment(link.inertia, omega)
+        motion = joint_motion(family, c, M, self.bias)
+        return motion.inverse.T @ motion.insert(s, [force])[0]
 
 
 def weight(height: ca.SX, g: ca.SX, c: ca.SX) -> ca.SX:

@@ -18,6 +18,7 @@ import casadi as ca
 
 from ..kinematics.chain import ChainDynamics, Constants, Family
 from ..kinematics.constraints import solve_small
+from ..kinematics.moving_base import MovingBase
 from ..kinematics.state import PointMotion, State
 from .formulation import Body, Formulation
 from .free_body import free_bodies
@@ -50,3 +51,13 @@ class NewtonEuler(Formulation):
         forces = {name: solved[:, 1 + i] for i, name in enumerate(family.bodies)}
         J, loop = solved[:, 0], motion.loop
         return ChainDynamics(forces, J, loop.discriminant, motion.rate[0], motion.acceleration[0])
+
+    def carried_chain(
+        self, family: Family, c: Constants, M: PointMotion, base: MovingBase
+    ) -> ca.SX:
+        if not family.bodies:
+            return ca.SX.zeros(3)
+        s = JointState.symbols()
+        bodies = free_bodies(family, c, s, ca.SX.zeros(3), base)
+        K, R = joint_motion(family, c, M).insert(s, [bodies.K, bodies.R[:, -1]])
+        return solve_small(K, R)[:3]

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..motion.column_units import FORCE, MOMENT, POSE
+from ..motion.column_units import FORCE, MOMENT
 from ..motion.path import Motion
 from ..motion.platform_load import Load
 from ..motion.table_writer import TableWriter
@@ -154,7 +154,7 @@ def write_motion(
     Raises: InputError: if a file cannot be written, or two are one.
     """
     motion = found.motion
-    tables = {out: {"t": motion.t} | dict(zip(POSE, motion.value.T, strict=True))}
+    tables = {out: motion.columns()}
     if measured is not None:
         tables[measured] = found.channels.columns()
     if load is not None:

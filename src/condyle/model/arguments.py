@@ -56,6 +56,22 @@ class Argument(NamedTuple):
 WRENCH = Argument("wrench", 6, "Fx, Fy, Fz [N], Mx, My, Mz [N m] in {S}")
 POINT = Argument("at", 3, "x, y, z [m] in {M}, or the name of a platform point")
 POSE = Argument("pose", 6, f"{', '.join(COORDINATES)} [m, rad]")
+# Where a motion gives more than states: of `Structure.given`.
+GIVEN = {
+    "gravity": Argument("gravity", 3, "gx, gy, gz [m/s^2] in {S}"),
+    "base": Argument(
+        "base", 9, "the base's acceleration [m/s^2], angular velocity [rad/s] and angular "
+        "acceleration [rad/s^2], x, y, z of each in {S}"
+    ),
+}  # fmt: skip
+NOTHING: Mapping[str, Any] = {}
+
+
+def given_of(gravity: Any, base: Any) -> Mapping[str, Any]:
+    """Those of `GIVEN` that are given."""
+    return {n: a for n, a in (("gravity", gravity), ("base", base)) if a is not None}
+
+
 PORTS = {"v": "q1", "a": "q2"}  # names of questions, where they are others
 
 
@@ -106,10 +122,21 @@ class Arguments:
         return found
 
     def samples(
-        self, arguments: Sequence[Argument], given: Sequence[Any], wrench: Any, at: Any
+        self,
+        arguments: Sequence[Argument],
+        given: Sequence[Any],
+        wrench: Any,
+        at: Any,
+        more: Mapping[str, Any] = NOTHING,
     ) -> tuple[Lead, dict[str, Array]]:
-        """The leading shape, and what questions take: states and load by port, see `samples`."""
+        """The leading shape, and what questions take: states and load by port, see `samples`.
+
+        Args: more: of `GIVEN`.
+        """
         w = NO_WRENCH if wrench is None else WRENCH.array(wrench)
+        if more:
+            arguments = (*arguments, *(GIVEN[name] for name in more))
+            given = (*given, *more.values())
         arrays = [argument.array(a) for argument, a in zip(arguments, given, strict=True)]
         lead, flat = samples((*arguments, WRENCH, POINT), [*arrays, w, self.point(at)])
         ports = {PORTS.get(a.name, a.name): x for a, x in zip(arguments, flat, strict=False)}

@@ -17,7 +17,7 @@ from ..graph.transform import LANE_NUMBERS, NUMBERS
 from ..kinematics.constraints import indices
 from ..questions.derivative import GRADIENT, OF_NUMBERS, PREFIX, WEIGHT
 from ..status import Status
-from .arguments import Argument, Arguments, Lead
+from .arguments import GIVEN, Argument, Arguments, Lead
 from .forward_dynamics import ForwardDynamics
 from .forward_kinematics import ForwardKinematics
 from .implicit import Held, accelerated, balanced, placed, read_back, samples_first
@@ -38,10 +38,13 @@ PORTS = {
     "at": ("point",),
     "effort": ("effort",),
     "joint": ("reading",),
+    "gravity": ("gravity",),
+    "base": ("base",),
 }
 DYNAMIC = ("q", "q1", "q2", "force", "moment", "point")  # ports of inverse dynamics
 OF_LANES = ("along", "joint", "transmission", "J_W", "effort", "reading")  # rows and ports
 UNITS = {"q": "m, rad", "v": "m/s, rad/s", "a": "m/s^2, rad/s^2", "wrench": "N, N m", "at": "m"}
+UNITS |= {"gravity": "m/s^2", "base": "m/s^2, rad/s, rad/s^2"}
 UNITS |= {"effort": "N m or N", "joint": "rad or m", "acceleration": "m/s^2, rad/s^2"}
 UNITS |= {"contact_force": "N", "pose": "m, rad", "contact_point": "m", "singularity_ratio": "1"}
 
@@ -58,9 +61,10 @@ class Kind:
     needs: tuple[str, ...]
 
 
-INVERSE = Kind(("effort", "contact_force"), ("q", "v", "a", "wrench", "at"), ("q", "v", "a"))
+BESIDE = ("wrench", "at", *GIVEN)
+INVERSE = Kind(("effort", "contact_force"), ("q", "v", "a", *BESIDE), ("q", "v", "a"))
 FORWARD = Kind(
-    ("acceleration", "contact_force"), ("q", "v", "effort", "wrench", "at"), ("q", "v", "effort")
+    ("acceleration", "contact_force"), ("q", "v", "effort", *BESIDE), ("q", "v", "effort")
 )
 PLACES = Kind(("pose", "joint", "contact_point", "singularity_ratio"), ("q",), ("q",))
 READINGS = Kind(("q",), ("joint",), ("joint",))
@@ -130,7 +134,7 @@ class Derived:
         self, of: Any, wrt: Any, given: Mapping[str, Any], zeros: bool = False, keep: str = "home"
     ) -> Derivatives:
         """As `Model.derivatives`."""
-        asked = _Asked.of(self._system, of, wrt, given, zeros, keep)
+        asked = _Asked.of(self._system_of(given), of, wrt, given, zeros, keep)
         lead, count, ports = self._samples(given)
         parts, status = self._parts(asked, ports, count)
         values = {
@@ -162,7 +166,7 @@ class Derived:
         """As `Model.jvp`."""
         if not isinstance(tangents, Mapping):
             raise InputError(f"tangents: expected arrays by name, got {shown(tangents)}")
-        asked = _Asked.of(self._system, of, tuple(tangents), given, zeros, keep)
+        asked = _Asked.of(self._system_of(given), of, tuple(tangents), given, zeros, keep)
         lead, count, ports = self._samples(given)
         along = {name: asked.rows(name, a, lead, count) for name, a in tangents.items()}
         parts, status = self._parts(asked, ports, count)
@@ -191,7 +195,7 @@ class Derived:
         """As `Model.vjp`."""
         names = names_of(of, "of")
         weights = weights if isinstance(weights, Mapping) else dict.fromkeys(names, weights)
-        asked = _Asked.of(self._system, of, wrt, given, zeros, keep)
+        asked = _Asked.of(self._system_of(given), of, wrt, given, zeros, keep)
         lead, count, ports = self._samples(given)
         every = [name for _, some in asked.kinds for name in some]
         if missing := [name for name in every if name not in weights]:
@@ -219,11 +223,14 @@ class Derived:
         shaped = {by: a.reshape((*lead, *asked.shapes[by])) for by, a in values.items()}
         return Derivatives(shaped, status.reshape(lead), {by: asked.unit(by) for by in shaped})
 
-    def linearised(self, q: Any, v: Any, effort: Any, wrench: Any, at: Any) -> ModelResult:
-        """As `Model.linearise`."""
+    def linearised(
+        self, q: Any, v: Any, effort: Any, wrench: Any, at: Any, more: Mapping[str, Any]
+    ) -> ModelResult:
+        """As `Model.linearise`; more: of `GIVEN`."""
         own = self._own
-        own.samples((own.q, own.v, own.effort), (q, v, effort), wrench, at)  # what is missing, too
-        given = {"q": q, "v": v, "effort": effort, "wrench": wrench, "at": at}
+        # What is missing, too.
+        own.samples((own.q, own.v, own.effort), (q, v, effort), wrench, at, more)
+        given = {"q": q, "v": v, "effort": effort, "wrench": wrench, "at": at, **more}
         d = self.matrices("acceleration", ("q", "v", "effort"), given)
         by = {name: d["acceleration", name] for name in ("q", "v", "effort")}
         shape, known = by["q"].shape, np.isfinite(by["q"]).all(axis=(-1, -2))
@@ -235,11 +242,15 @@ class Derived:
 
     # -- the solutions -----------------------------------------------------------------------
 
+    def _system_of(self, given: Mapping[str, Any]) -> System:
+        return self._system.under([name for name in GIVEN if given.get(name) is not None])
+
     def _samples(self, given: Mapping[str, Any]) -> tuple[Lead, int, Arrays]:
         """The leading shape, the number of samples, and every port's array with all of them."""
         own = self._own
         known = {"q": own.q, "v": own.v, "a": own.a, "effort": own.effort}
         known["joint"] = Argument("joint", own.effort.size, "in the order of the file [rad or m]")
+        known |= GIVEN
         there = [known[name] for name in known if given.get(name) is not None]
         values = [given[a.name] for a in there]
         lead, ports = own.samples(there, values, given.get("wrench"), given.get("at"))
@@ -255,7 +266,7 @@ class Derived:
             own, rows = np.zeros(count, dtype=np.uint8), np.arange(count)
             if kind is INVERSE and names == ("effort",) and self._plain(asked.system):
                 kernel = asked.system.kernel("inverse")
-                state = {n: ports[n] for n in DYNAMIC}
+                state = {n: ports[n] for n in (*DYNAMIC, *asked.system.structure.given)}
                 own = kernel.run(state).status
                 good, rows = np.flatnonzero(own == OK), np.flatnonzero(own == AGAIN)
                 state, still = {n: a[good] for n, a in state.items()}, np.zeros(len(good), bool)
@@ -293,7 +304,8 @@ class Derived:
         self, system: System, kind: Kind, of: tuple[str, ...], ports: Arrays
     ) -> tuple[Held | None, Array]:
         """What is held at solutions that are good, and the statuses of all."""
-        own, load = self._system, ("force", "moment", "point")
+        own, more = self._system, {n: ports[n] for n in system.structure.given}
+        load = ("force", "moment", "point", *more)
         wrench, at = np.hstack([ports["force"], ports["moment"]]), ports["point"]
         if kind is READINGS:
             found = self._readings().solve(ports["joint"])
@@ -302,10 +314,10 @@ class Derived:
             found = self._poses.inverse_kinematics(ports["q"], None, None)
         elif kind is INVERSE:
             state = [ports[n] for n in ("q", "q1", "q2")]
-            found = self._inverse().many(state, wrench, at, ("pose",), None)
+            found = self._inverse().many(state, wrench, at, ("pose",), None, more)
         else:
             state = [ports[n] for n in ("q", "q1", "effort")]
-            found = self._forward().many(state, wrench, at, ("pose",), None)
+            found = self._forward().many(state, wrench, at, ("pose",), None, more)
         status = found.status.astype(np.uint8)
         good = np.flatnonzero(status == Status.ok)
         if not good.size:
@@ -454,6 +466,7 @@ class _Asked:
         sizes = {
             "q": (m := len(own.independent),), "v": (m,), "a": (m,), "wrench": (6,), "at": (3,),
             "effort": (n := len(own.mechanism.chains),), "joint": (n,),
+            **{name: (GIVEN[name].size,) for name in own.structure.given},
         }  # fmt: skip
         asked = names_of(wrt, "wrt")
         states = {by: by for by in asked if by in sizes}
@@ -468,6 +481,8 @@ class _Asked:
         shapes: dict[str, tuple[int, ...]] = {by: sizes[state] for by, state in states.items()}
         units = {by: UNITS[state] for by, state in states.items()}
         paths = [by for by in asked if by not in states]
+        if "base" in paths:
+            raise InputError("wrt: base: give the base's motion too: base=..., (..., 9)")
         for by in paths:
             if "." not in by and by != "gravity":
                 raise InputError(

@@ -11,7 +11,7 @@ import numpy as np
 from ..backends.kernel import sample_rows
 from ..questions.forward import OUTPUTS as ASKED
 from ..status import Status
-from .arguments import Arguments, requested
+from .arguments import Arguments, Lead, requested
 from .model_result import ModelResult
 from .poses import Poses
 from .system import System
@@ -49,11 +49,10 @@ class ForwardDynamics(Dynamics):
     def question(self, whole: bool) -> tuple[tuple[Any, ...], dict[str, Array]]:
         return ("forward", ("contact", "bound") if whole else ("contact",)), {}
 
-    def many(
-        self, state: Any, wrench: Any, at: Any, outputs: Any, threads: int | None
+    def _solved(
+        self, lead: Lead, inputs: dict[str, Array], outputs: Any, threads: int | None
     ) -> ModelResult:
-        names, own = requested(outputs, OUTPUTS), self._arguments
-        lead, inputs = own.samples((own.q, own.v, own.effort), state, wrench, at)
+        names = requested(outputs, OUTPUTS)
         inputs |= self._system.labels(math.prod(lead))
         asked = {"contact", "bound", *(OUTPUTS[name] for name in names)}
         kernel = self._system.kernel("forward", tuple(name for name in ASKED if name in asked))

@@ -12,7 +12,7 @@ from ..backends.kernel import Answer, sample_rows
 from ..questions.bound import CERTIFIED, bound
 from ..questions.inverse import OUTPUTS as ASKED
 from ..status import Status
-from .arguments import Arguments, requested
+from .arguments import Arguments, Lead, requested
 from .closing import MOTION
 from .distributing import Distributor
 from .model_result import ModelResult
@@ -51,11 +51,10 @@ class InverseDynamics(Dynamics):
     def question(self, whole: bool) -> tuple[tuple[Any, ...], dict[str, Array]]:
         return self.distributor.question(whole)
 
-    def many(
-        self, state: Any, wrench: Any, at: Any, outputs: Any, threads: int | None
+    def _solved(
+        self, lead: Lead, inputs: dict[str, Array], outputs: Any, threads: int | None
     ) -> ModelResult:
-        names, own = requested(outputs, OUTPUTS), self._arguments
-        lead, inputs = own.samples((own.q, own.v, own.a), state, wrench, at)
+        names = requested(outputs, OUTPUTS)
         inputs |= self._system.labels(math.prod(lead))
         answer = self._solve(inputs, {OUTPUTS[name] for name in names}, threads)
         values, status = answer.values, answer.status

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..questions.reactions import POINT, Place, reaction_places
 from ..status import Status
+from .arguments import given_of
 from .model import Model
 from .model_result import ModelResult
 
@@ -23,13 +24,18 @@ class Reaction(Place):
 
 
 def reactions(
-    model: Model, result: ModelResult, effort: np.ndarray | None = None
+    model: Model,
+    result: ModelResult,
+    effort: np.ndarray | None = None,
+    gravity: np.ndarray | None = None,
+    base: np.ndarray | None = None,
 ) -> dict[str, Reaction]:
     """Reactions at N states, (N, ...); NaN where a sample failed.
 
     Args:    result: of inverse dynamics, with pose and rates.
              effort: (N, n), the efforts to balance if not those of the result. The contact
              forces are the result's in any case.
+             gravity, base: (N, 3) and (N, 9), as the result was given them.
     Returns: by name: <joint>_<chain>, <joint>_force_<chain>, <joint>_moment_<chain>,
              guide_moment_<chain>, contact_<contact>.
     """
@@ -40,7 +46,8 @@ def reactions(
         "effort": result.effort if effort is None else effort,
         "contact_force": result.contact_force,
     }
-    values = model.kernel("reactions").run(inputs).values
+    given = given_of(gravity, base)
+    values = model.system.under(tuple(given)).kernel("reactions").run({**inputs, **given}).values
     failed = result.status != Status.ok
     found = {}
     seen: dict[str, int] = {}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from functools import cached_property, lru_cache, partial
 from typing import Any
@@ -51,6 +51,14 @@ class ManySystem(System):
         self._asked: dict[Any, Any] = {}
         place = Layout.of(self.structure).parameters["length"][0]
         self.length = numbers.parameters[:, place]
+
+    def under(self, given: Sequence[str]) -> ManySystem:
+        other = copy(self)
+        other.__dict__.pop("robust", None)
+        other._base = self._base.under(given)
+        other.structure, other._asked = other._base.structure, {}
+        other.one = lru_cache(KEPT)(other._lent)
+        return other
 
     def _lent(self, i: int) -> System:
         return self._base.lent(self._mechanism(i), self.many[i])

@@ -12,7 +12,7 @@ by a kernel of the backend; samples that it cannot vouch for are solved again by
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Self
 
@@ -25,7 +25,7 @@ from ..errors import as_flag, as_name
 from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
 from ..questions.equations import INTERNAL, part_names
-from .arguments import Arguments
+from .arguments import Arguments, given_of
 from .derivatives import Derivatives, Derived
 from .distributing import Distribution, Distributor, reference_force
 from .forward_dynamics import ForwardDynamics
@@ -60,6 +60,9 @@ class Model:
         wrench:  force [N] and moment [N m] on the platform in {S}, (..., 6); None is zero
         at:      point of action: a platform point by name, or (..., 3) [m] in {M}; None is O_M
         effort:  of the actuators, in the order of the file, (..., n) [N m or N]
+        gravity: in {S}, (..., 3) [m/s^2]; None is the file's
+        base:    acceleration of the origin of {S} [m/s^2], angular velocity [rad/s] and angular
+                 acceleration [rad/s^2] of the base, components in {S}, (..., 9); None: at rest
     Arrays, points or outputs that do not fit are an InputError.
     """
 
@@ -172,12 +175,14 @@ class Model:
         wrench: ArrayLike | None = None,
         at: Point = None,
         *,
+        gravity: ArrayLike | None = None,
+        base: ArrayLike | None = None,
         outputs: Outputs = (),
         threads: int | None = None,
     ) -> ModelResult:
         """Efforts for a motion under a wrench: J_A^T tau = F of [Cheng2023] eqs (57), (63).
 
-        Args:    q, v, a, wrench, at: as of `Model`.
+        Args:    q, v, a, wrench, at, gravity, base: as of `Model`.
                  outputs: names of further results, computed only if named; "all" is
                  all: share, gravity_share, pose, pose_rate, pose_acceleration, joint_rate,
                  joint_acceleration, configuration, condition, slip, friction_force, shortfall,
@@ -187,7 +192,7 @@ class Model:
         Returns: effort (..., n), contact_force (..., k) [N], status (...), of `Status`, and what
                  `outputs` names; see `ModelResult`. NaN where the status is not 0.
         """
-        return self._inverse(q, v, a, wrench, at, outputs, threads)
+        return self._inverse(q, v, a, wrench, at, outputs, threads, given_of(gravity, base))
 
     def forward_dynamics(
         self,
@@ -197,6 +202,8 @@ class Model:
         wrench: ArrayLike | None = None,
         at: Point = None,
         *,
+        gravity: ArrayLike | None = None,
+        base: ArrayLike | None = None,
         outputs: Outputs = (),
         threads: int | None = None,
     ) -> ModelResult:
@@ -204,7 +211,8 @@ class Model:
 
         Limits of efforts are not applied, and cables may have negative efforts.
 
-        Args:    q, v, effort, wrench, at: as of `Model`;  threads: as of `inverse_dynamics`.
+        Args:    q, v, effort, wrench, at, gravity, base: as of `Model`;  threads: as of
+                 `inverse_dynamics`.
                  outputs: of pose, pose_rate, pose_acceleration, twist_rate (6,): [V'; omega'] in
                  {S}, joint, joint_rate, joint_acceleration, configuration, condition, slip,
                  friction_force, all_accelerations, all_contact_forces; "all" is all. The last two
@@ -214,7 +222,7 @@ class Model:
                  and what `outputs` names; see `ModelResult`. NaN where the status is not 0; in a
                  gimbal lock of the angles accelerations of coordinates alone are.
         """
-        return self._forward(q, v, effort, wrench, at, outputs, threads)
+        return self._forward(q, v, effort, wrench, at, outputs, threads, given_of(gravity, base))
 
     def unchecked(self) -> Unchecked:
         """The same functions for one state, at least latency: for a control loop.
@@ -236,6 +244,9 @@ class Model:
         effort: ArrayLike,
         wrench: ArrayLike | None = None,
         at: Point = None,
+        *,
+        gravity: ArrayLike | None = None,
+        base: ArrayLike | None = None,
     ) -> ModelResult:
         """x' = A x + B effort about states x = (q, v), exact; the wrench is constant in {S}.
 
@@ -243,7 +254,7 @@ class Model:
         Returns: A (..., 2 m, 2 m), B (..., 2 m, n), status (...); NaN where there are no
                  accelerations.
         """
-        return self._derived.linearised(q, v, effort, wrench, at)
+        return self._derived.linearised(q, v, effort, wrench, at, given_of(gravity, base))
 
     def derivatives(
         self,
@@ -257,6 +268,8 @@ class Model:
         joint: ArrayLike | None = None,
         wrench: ArrayLike | None = None,
         at: Point = None,
+        gravity: ArrayLike | None = None,
+        base: ArrayLike | None = None,
         zeros: bool = False,
         keep: str = "home",
     ) -> Derivatives:
@@ -271,9 +284,10 @@ class Model:
         Args:    of: of effort, contact_force (inverse dynamics, by the model's distribution);
                  acceleration, contact_force (forward dynamics, with `effort`); pose, joint,
                  contact_point, singularity_ratio; q (forward kinematics, with `joint`).
-                 wrt: of q, v, a, wrench, at, effort, joint, as far as the result depends on them,
-                 and paths of numbers of the file.
-                 q, v, a, effort, wrench, at: as of `Model`;  joint: (..., n) [rad or m].
+                 wrt: of q, v, a, wrench, at, effort, joint, gravity, base, as far as they are
+                 given and the result depends on them, and paths of numbers of the file.
+                 q, v, a, effort, wrench, at, gravity, base: as of `Model`;  joint: (..., n)
+                 [rad or m].
                  zeros: whether what cannot matter gives zeros, not an error.
                  keep: home: a surface follows a change of other numbers, so that its contact stays
                  on it at home; all: all else is held.
@@ -282,7 +296,7 @@ class Model:
         Raises:  InputError: for unknown names, missing arguments, and what cannot matter.
         """
         given = {"q": q, "v": v, "a": a, "effort": effort, "joint": joint}
-        given |= {"wrench": wrench, "at": at}
+        given |= {"wrench": wrench, "at": at, "gravity": gravity, "base": base}
         return self._derived.matrices(of, wrt, given, zeros, keep)
 
     def jvp(
@@ -297,6 +311,8 @@ class Model:
         joint: ArrayLike | None = None,
         wrench: ArrayLike | None = None,
         at: Point = None,
+        gravity: ArrayLike | None = None,
+        base: ArrayLike | None = None,
         zeros: bool = False,
         keep: str = "home",
     ) -> Derivatives:
@@ -305,7 +321,7 @@ class Model:
         Args: tangents: what each of `wrt` changes by, of its shape;  others: as of `derivatives`.
         """
         given = {"q": q, "v": v, "a": a, "effort": effort, "joint": joint}
-        given |= {"wrench": wrench, "at": at}
+        given |= {"wrench": wrench, "at": at, "gravity": gravity, "base": base}
         return self._derived.jvp(of, tangents, given, zeros, keep)
 
     def vjp(
@@ -321,6 +337,8 @@ class Model:
         joint: ArrayLike | None = None,
         wrench: ArrayLike | None = None,
         at: Point = None,
+        gravity: ArrayLike | None = None,
+        base: ArrayLike | None = None,
         zeros: bool = False,
         keep: str = "home",
     ) -> Derivatives:
@@ -330,7 +348,7 @@ class Model:
               of `derivatives`.
         """
         given = {"q": q, "v": v, "a": a, "effort": effort, "joint": joint}
-        given |= {"wrench": wrench, "at": at}
+        given |= {"wrench": wrench, "at": at, "gravity": gravity, "base": base}
         return self._derived.vjp(of, cotangents, wrt, given, zeros, keep)
 
     def mass_matrix(self, q: ArrayLike, *, space: str = "q") -> Array:
@@ -506,7 +524,11 @@ class Model:
     @property
     def parts(self) -> tuple[str, ...]:
         """Names of the parts of the efforts."""
-        structure = self.system.structure
+        return self.parts_under(())
+
+    def parts_under(self, given: Iterable[str]) -> tuple[str, ...]:
+        """The same where samples give gravity or the base's motion, by name."""
+        structure = self.system.under(tuple(given)).structure
         internal = not self._inverse.distributor.least_norm and not structure.friction
         return part_names(structure) + (INTERNAL,) * internal
 

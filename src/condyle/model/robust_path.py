@@ -61,7 +61,7 @@ class Robust:
         """All results of inverse dynamics by name, samples last, and their statuses."""
         values, closed = self.motion({name: inputs[name] for name in ("q", "q1", "q2")})
         poses, reached = {name: a.T for name, a in values.items()}, closed == Status.ok
-        load = {name: inputs[name] for name in ("force", "moment", "point")}
+        load = {n: inputs[n] for n in ("force", "moment", "point", *self._structure.given)}
         with np.errstate(all="ignore"):
             values |= self.configuration(poses)
             system = self._kernel("system").run(poses | load).values
@@ -99,7 +99,8 @@ class Robust:
         q, q1 = inputs["q"], inputs["q1"]
         values, closed = self.motion({"q": q, "q1": q1, "q2": np.zeros_like(q)})
         poses, reached = {name: a.T for name, a in values.items()}, closed == Status.ok
-        others = {name: inputs[name] for name in ("effort", "force", "moment", "point")}
+        load = "effort", "force", "moment", "point"
+        others = {name: inputs[name] for name in (*load, *self._structure.given)}
         with np.errstate(all="ignore"):
             configuration = self.configuration(poses)
             system = self._kernel("forward_system").run(poses | others).values

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from ..questions.file_numbers import numbers_of
 from ..questions.friction import MOST
 from ..questions.number_paths import number_jacobian
 from ..questions.numbers import agree, characteristic, require_closed_form, specialised
-from ..questions.structure import smooth_forms, structure_of
+from ..questions.structure import GIVEN, smooth_forms, structure_of
 from .closing import Closure
 from .distributing import LEAST, Distribution, Distributor
 from .robust_path import Robust
@@ -59,6 +59,7 @@ class System:
         self._lender: System | None = None
         self._kernels: dict[Any, Kernel] = {}
         self._closures: dict[Any, Closure] = {}
+        self._under: dict[tuple[str, ...], System] = {}
         self.seconds = time.perf_counter() - start
 
     def renumbered(self, mechanism: Mechanism) -> System:
@@ -80,11 +81,29 @@ class System:
 
     def lent(self, mechanism: Mechanism, numbers: Numbers) -> System:
         """The same with these numbers, sharing kernels: they leave out what is zero here."""
+        other = self._copied()
+        other.mechanism, other.numbers, other._lender = mechanism, numbers, self._lender or self
+        return other
+
+    def under(self, given: Sequence[str]) -> System:
+        """The same where samples give gravity or the base's motion: see `Structure.given`."""
+        given = tuple(name for name in GIVEN if name in given)
+        if given == self.structure.given:
+            return self
+        if given not in self._under:
+            other = self._copied()
+            other.structure = replace(self.structure, given=given)
+            other.general = None if self.general is None else other
+            other._lender = None if self._lender is None else self._lender.under(given)
+            self._under[given] = other
+        return self._under[given]
+
+    def _copied(self) -> Self:
+        """The same with nothing made yet."""
         other = copy(self)
         for name in [n for n, of in vars(System).items() if isinstance(of, cached_property)]:
             other.__dict__.pop(name, None)
-        other.mechanism, other.numbers, other._lender = mechanism, numbers, self._lender or self
-        other._kernels, other._closures = {}, {}
+        other._kernels, other._closures, other._under = {}, {}, {}
         return other
 
     @property
@@ -107,7 +126,7 @@ class System:
         if self.general is not None:
             return self.general
         given = self.mechanism, self.formulation, self.route, self.backend.asked
-        return System(*given, general=True)
+        return System(*given, general=True).under(self.structure.given)
 
     def labels(self, count: int) -> Arrays:
         """What kernels take beside the inputs of samples."""
@@ -168,7 +187,7 @@ class System:
         other = copy(self)
         other.structure = replace(self.structure, **changes)
         other.numbers = numbers_of(other.structure, self.mechanism)
-        other.general, other._lender, other._kernels = None, None, {}
+        other.general, other._lender, other._kernels, other._under = None, None, {}, {}
         return other
 
     def number_jacobian(self, paths: Sequence[str], keep: str = "home") -> np.ndarray:

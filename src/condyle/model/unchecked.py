@@ -7,15 +7,16 @@ kernel is called, is prepared once a thread.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from copy import copy
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from ..backends.c.compiled_kernel import CompiledKernel
 from ..backends.kernel import OK
-from .arguments import NO_WRENCH, ORIGIN, Argument, Arguments
+from .arguments import NO_WRENCH, NOTHING, ORIGIN, Argument, Arguments, Lead
 from .model_result import ModelResult
 from .system import System
 
@@ -56,11 +57,22 @@ class Dynamics:
 
     def __init__(self, system: System, arguments: Arguments, third: Argument) -> None:
         self._system, self._arguments, self.third = system, arguments, third
+        self._under: dict[tuple[str, ...], Self] = {}
 
     def __call__(
-        self, q: Any, v: Any, x: Any, wrench: Any, at: Any, outputs: Any, threads: int | None
+        self,
+        q: Any,
+        v: Any,
+        x: Any,
+        wrench: Any,
+        at: Any,
+        outputs: Any,
+        threads: int | None,
+        given: Mapping[str, Any] = NOTHING,
     ) -> ModelResult:
-        """As `Model.inverse_dynamics` and `Model.forward_dynamics`."""
+        """As `Model.inverse_dynamics` and `Model.forward_dynamics`; given: of `GIVEN`."""
+        if given:
+            return self.many((q, v, x), wrench, at, outputs, threads, given)
         if type(q) is np.ndarray and q.ndim == 1 and not outputs and threads is None:
             row = self._one(q, v, x, wrench, self._arguments.point(at))
             if row is not None:
@@ -71,9 +83,35 @@ class Dynamics:
         return self.many((q, v, x), wrench, at, outputs, threads)
 
     def many(
-        self, state: Any, wrench: Any, at: Any, outputs: Any, threads: int | None
+        self,
+        state: Any,
+        wrench: Any,
+        at: Any,
+        outputs: Any,
+        threads: int | None,
+        given: Mapping[str, Any] = NOTHING,
     ) -> ModelResult:
         """The same of arrays of any leading shape; state: q, v and the third argument."""
+        arguments = self._arguments.q, self._arguments.v, self.third
+        lead, inputs = self._arguments.samples(arguments, state, wrench, at, given)
+        return self.under(given)._solved(lead, inputs, outputs, threads)
+
+    def under(self, given: Iterable[str]) -> Self:
+        """The same of samples that give these of `GIVEN` too."""
+        names = tuple(given)
+        if not names:
+            return self
+        if names not in self._under:
+            other = copy(self)
+            other.__dict__.pop("_one", None)
+            other._system, other._under = self._system.under(names), {}
+            self._under[names] = other
+        return self._under[names]
+
+    def _solved(
+        self, lead: Lead, inputs: dict[str, np.ndarray], outputs: Any, threads: int | None
+    ) -> ModelResult:
+        """Of samples by port."""
         raise NotImplementedError
 
     def question(self, whole: bool) -> tuple[tuple[Any, ...], Mapping[str, np.ndarray]]:

@@ -25,11 +25,12 @@ from ..mechanism.mechanism import Mechanism
 from ..mechanism.paths import parsed, written
 from ..mechanism.table import Table
 from ..motion import Load, Motion
+from ..motion.gravity_and_base import each
 from ..questions.file_numbers import numbers_of
 from ..questions.many_numbers import VariantNumbers, variant_numbers
 from ..questions.structure import Structure, structure_of
 from ..status import Status
-from .arguments import ORIGIN, POINT, WRENCH, Argument
+from .arguments import GIVEN, ORIGIN, POINT, WRENCH, Argument, given_of
 from .distributing import Distributor
 from .many_systems import ManyInverse, ManySystem
 from .model import Model
@@ -64,13 +65,15 @@ class Group:
         Args: wrench: (N, 6), at a point of the platform, by name.
         """
         V, N, model = len(self.rows), len(motion.t), self.model
-        states, _ = model.poses.of_motion(motion)
+        poses = self.variants.model.poses if motion.kind == "pose" else model.poses
+        states, _ = poses.of_motion(motion)
         if len(states[0]) == N:
             states = tuple(np.tile(a, (V, 1)) for a in states)  # type: ignore[assignment]
         point = ORIGIN
         if at is not None:
             point = np.repeat(self.variants.points(at)[self.rows], N, axis=0)
-        return model._inverse.many(states, np.tile(wrench, (V, 1)), point, outputs, threads)
+        given = each(motion.given, lambda a: np.tile(a, (V, 1)))
+        return model._inverse.many(states, np.tile(wrench, (V, 1)), point, outputs, threads, given)
 
 
 class Variants:
@@ -250,13 +253,15 @@ class Variants:
         wrench: ArrayLike | None = None,
         at: Any = None,
         *,
+        gravity: ArrayLike | None = None,
+        base: ArrayLike | None = None,
         outputs: Any = (),
         threads: int | None = None,
     ) -> ModelResult:
         """Efforts of every variant on every state; as of `Model.inverse_dynamics`."""
         own = self.model._arguments
         state = self._state((own.q, own.v, own.a), (q, v, a))
-        return self._asked("_inverse", state, wrench, at, outputs, threads)
+        return self._asked("_inverse", state, wrench, at, outputs, threads, given_of(gravity, base))
 
     def forward_dynamics(
         self,
@@ -266,13 +271,15 @@ class Variants:
         wrench: ArrayLike | None = None,
         at: Any = None,
         *,
+        gravity: ArrayLike | None = None,
+        base: ArrayLike | None = None,
         outputs: Any = (),
         threads: int | None = None,
     ) -> ModelResult:
         """Accelerations of every variant in every state; as of `Model.forward_dynamics`."""
         own = self.model._arguments
         state = self._state((own.q, own.v, own.effort), (q, v, effort))
-        return self._asked("_forward", state, wrench, at, outputs, threads)
+        return self._asked("_forward", state, wrench, at, outputs, threads, given_of(gravity, base))
 
     def solve(
         self,
@@ -299,10 +306,18 @@ class Variants:
         return [x.array(a) for x, a in zip(arguments, given, strict=True)]
 
     def _asked(
-        self, kind: str, state: Sequence[Array], wrench: Any, at: Any, outputs: Any, threads: Any
+        self,
+        kind: str,
+        state: Sequence[Array],
+        wrench: Any,
+        at: Any,
+        outputs: Any,
+        threads: Any,
+        given: Mapping[str, Any],
     ) -> ModelResult:
         w = None if wrench is None else WRENCH.array(wrench)
-        shapes = [a.shape[:-1] for a in (*state, *(() if w is None else (w,)))]
+        given = {name: GIVEN[name].array(a) for name, a in given.items()}
+        shapes = [a.shape[:-1] for a in (*state, *(() if w is None else (w,)), *given.values())]
         point = None if at is None or isinstance(at, str) else POINT.array(at)
         shapes += [] if point is None else [point.shape[:-1]]
         try:
@@ -320,7 +335,8 @@ class Variants:
                 own = self.points(at)[rows].reshape(count, *(1 for _ in lead), 3)
             else:
                 own = ORIGIN if point is None else point
-            parts.append((rows, getattr(model, kind).many(each, w, own, outputs, threads)))
+            found = getattr(model, kind).many(each, w, own, outputs, threads, given)
+            parts.append((rows, found))
         return self._whole(parts, lead)
 
     def _whole(self, parts: Sequence[tuple[np.ndarray, Any]], lead: tuple[int, ...]) -> Any:

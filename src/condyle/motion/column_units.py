@@ -11,6 +11,9 @@ from .file_words import short
 
 POSE = ("X", "Y", "Z", "alpha", "beta", "gamma")
 LANDMARK = ("x", "y", "z")
+GRAVITY = ("gx", "gy", "gz")
+# Acceleration, angular velocity and angular acceleration of the base.
+BASE = tuple(f"base_{kind}{axis}" for kind in ("a", "w", "dw") for axis in "xyz")
 FORCE = ("Fx", "Fy", "Fz")
 MOMENT = ("Mx", "My", "Mz")
 
@@ -66,6 +69,10 @@ def dimension(column: str) -> Dimension | None:
         return "force", 0
     if column in MOMENT:
         return "moment", 0
+    if column in (*GRAVITY, *BASE[:3]):
+        return "length", 2
+    if column in BASE:
+        return "angle", 1 if column in BASE[3:6] else 2
     for rates in range(3):
         name = column[rates:]
         if column.startswith("d" * rates) and name in (*POSE, *LANDMARK):

@@ -12,18 +12,20 @@ import numpy as np
 
 from ..errors import InputError, shown
 from .arrays import as_doubles, as_number, as_samples, as_text, check_rising
-from .column_units import LANDMARK, POSE, Units, parse_units
+from .column_units import BASE, GRAVITY, LANDMARK, POSE, Units, parse_units
 from .file_words import digest, listed
 from .frame import as_sampled, table_from_frame
+from .gravity_and_base import Given, columns_beside, given_beside
 from .memory import memory_at_hand
 from .number_table import Table
 from .smoothing import Smoothing, parse_cutoff, smoothing_spline
 from .spline import Spline
 from .table_reader import read_table
-from .unit_checks import motion_warnings
+from .unit_checks import gravity_warnings, motion_warnings
 
 Kind = Literal["coordinates", "pose", "landmark"]
 
+KNOWN = ("t", *POSE, *LANDMARK, *GRAVITY, *BASE)
 MIN_ROWS = 6
 _SAMPLE_BYTES = 3000  # that a sample takes until its results are written
 _SLACK = 1e-9  # [s], by which output times may miss the input's ends through rounding
@@ -59,6 +61,9 @@ class Motion:
         smoothing: what was smoothed away, or None.
         sha256: hash of the file that was read, or None.
         warnings: implausible values, for the results.
+        gravity: in {S}, (N, 3) [m/s^2]; None: the mechanism's.
+        base: acceleration of the origin of {S} [m/s^2], angular velocity [rad/s] and angular
+            acceleration [rad/s^2] of the base, components in {S}, (N, 9); None: it is at rest.
     """
 
     kind: Kind
@@ -72,6 +77,8 @@ class Motion:
     smoothing: Smoothing | None = None
     sha256: str | None = None
     warnings: tuple[str, ...] = ()
+    gravity: np.ndarray | None = None
+    base: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.t)
@@ -82,6 +89,24 @@ class Motion:
         of = f" of {self.landmark}" if self.landmark else ""
         return f"Motion({self.source}: {', '.join(self.names)}{of}, {span})"
 
+    @property
+    def given(self) -> Given:
+        """Gravity and the base's motion, where the motion has them, as models take them."""
+        found: Given = {}
+        if self.gravity is not None:
+            found["gravity"] = self.gravity
+        if self.base is not None:
+            found["base"] = self.base
+        return found
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """The columns of a motion file, in SI."""
+        found = {"t": self.t, **dict(zip(self.names, self.value.T, strict=True))}
+        for names, a in ((GRAVITY, self.gravity), (BASE, self.base)):
+            if a is not None:
+                found |= zip(names, a.T, strict=True)
+        return found
+
     @classmethod
     def from_csv(
         cls,
@@ -90,11 +115,12 @@ class Motion:
         units: str | Units | None = None,
         **options: Unpack[Options],
     ) -> Motion:
-        """Read a motion file: `t` and pose coordinates, or `t,x,y,z`; see `from_arrays`.
+        """Read a motion file: `t` and pose coordinates, or `t,x,y,z`, and optionally gx, gy, gz
+        and base_ax ... base_dwz; see `from_arrays`.
 
         CSV, or Parquet if the name ends in .parquet. Where the header names units, those hold.
         """
-        table = read_table(path, known=("t", *POSE, *LANDMARK))
+        table = read_table(path, known=KNOWN)
         return replace(cls._from_table(table, units, **options), sha256=digest(path))
 
     @classmethod
@@ -107,7 +133,7 @@ class Motion:
         **options: Unpack[Options],
     ) -> Motion:
         """The same from a pandas DataFrame; its index is the time if no column is."""
-        table = table_from_frame(frame, ("t", *POSE, *LANDMARK), source)
+        table = table_from_frame(frame, KNOWN, source)
         return cls._from_table(table, units, **options)
 
     @classmethod
@@ -140,7 +166,9 @@ class Motion:
 
         Args:
             t: (N,) [s].
-            values: name -> (N,); or (N, m) with `names`, (m,).
+            values: name -> (N,); or (N, m) with `names`, (m,). With gx, gy, gz gravity is given,
+                with any of base_ax, base_ay ... base_dwz the base moves: the others are zero, but
+                base_dwx ..., without any of which they are the rates of base_wx ...
             units: of times, lengths and angles where they are not SI, such as "ms,mm,deg".
             landmark: platform point whose displacement x, y, z are; by default the mechanism's
                 incisor, or its only point.
@@ -159,7 +187,8 @@ class Motion:
         as_text(landmark, "landmark", "the name of a platform point")
         t = as_samples(t, "t", source) * unit.time
         columns = {name: as_samples(v, name, source, len(t)) for name, v in values.items()}
-        kind, names = _kind(columns, source)
+        beside = columns_beside(columns, source)
+        kind, names = _kind({n: c for n, c in columns.items() if n not in beside}, source)
         if kind != "landmark" and landmark is not None:
             raise InputError(
                 f'{source}: landmark "{landmark}" was given, but the columns are '
@@ -168,7 +197,8 @@ class Motion:
         if len(t) < MIN_ROWS:
             raise InputError(f"{source}: {len(t)} rows, expected at least {MIN_ROWS}")
         check_rising(t, f"{source}, sample {{}}".format)
-        samples = np.column_stack([columns[name] * unit.scale(name) for name in names])
+        every = (*names, *beside)
+        samples = np.column_stack([columns[name] * unit.scale(name) for name in every])
 
         since_start = t - t[0]  # keeps large times, such as those of a clock, exact
         smoothing = None
@@ -177,16 +207,28 @@ class Motion:
         else:
             frequency = parse_cutoff(cutoff)
             spline = smoothing_spline(since_start, samples, frequency)
-            removed = samples - spline(since_start)
+            removed = (samples - spline(since_start))[:, : len(names)]
             rms, peak = np.sqrt((removed**2).mean(axis=0)), np.abs(removed).max(axis=0)
             smoothing = Smoothing(frequency, cutoff == "auto", names, rms, peak)
         out = _trimmed(_output_times(t, rate, times, source), t, trim, source)
         value, first, second = (spline(out - t[0], nu) for nu in range(3))
+        as_given = smoothing is None and out is t  # to the last digit
+        m = len(names)
+        others = dict(zip(beside, (samples if as_given else value)[:, m:].T, strict=True))
+        if not {*BASE[6:]} & {*beside}:  # then the rate of the angular velocity is its spline's
+            rates = dict(zip(beside, first[:, m:].T, strict=True))
+            others |= {d: rates[w] for w, d in zip(BASE[3:6], BASE[6:], strict=True) if w in rates}
+        given = given_beside(others)
+        value, first, second = (a[:, : len(names)] for a in (value, first, second))
         if not np.isfinite(second).all():
             raise InputError(f"{source}: times or values are too extreme to differentiate")
         warnings = motion_warnings(source, names, t, value, first)
         derivatives = value, first, second
-        return cls(kind, names, landmark, out, *derivatives, source, smoothing, warnings=warnings)
+        warnings += gravity_warnings(source, given.get("gravity"))
+        return cls(
+            kind, names, landmark, out, *derivatives, source, smoothing, None, warnings,
+            given.get("gravity"), given.get("base"),
+        )  # fmt: skip
 
 
 def as_motion(motion: Any) -> Motion:

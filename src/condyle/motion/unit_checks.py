@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..mechanism.mechanism_checks import EARTH, EARTH_SPREAD
 from .column_units import dimension
 
 SOUND = 343.0  # m/s
@@ -36,6 +37,19 @@ def motion_warnings(
             said = f"reaches {most:.4g} rad, more than a turn; if angles are in degrees, say"
             warnings.append(f"{source}: {name} {said} --units deg")
     return (*warnings, *(time_warnings(source, t) if slow else ()))
+
+
+def gravity_warnings(source: str, gravity: np.ndarray | None) -> tuple[str, ...]:
+    """A warning of gravity, (N, 3) [m/s^2], whose size is neither the Earth's nor none."""
+    if gravity is None:
+        return ()
+    size = np.linalg.norm(gravity, axis=1)
+    odd = (np.abs(size - EARTH) > EARTH_SPREAD) & (size > 0)
+    if not odd.any():
+        return ()
+    worst = size[odd][np.argmax(np.abs(size[odd] - EARTH))]
+    said = f"gx, gy, gz: gravity of {worst:.4g} m/s^2 is neither the Earth's 9.81 nor none"
+    return (f"{source}: {said} ({int(odd.sum())} of {len(size)} samples)",)
 
 
 def load_warnings(source: str, t: np.ndarray, wrench: np.ndarray) -> tuple[str, ...]:

@@ -65,6 +65,10 @@ GEOMETRY = (
     "instant", "energy", "jacobians", "coriolis", "reactions", "linear", "places", "forward_system",
     "system",
 )  # fmt: skip
+# Questions that have inertia or gravity in them, of motions.
+DYNAMIC = (
+    "inverse", "balance", "system", "forward", "forward_system", "linear", "reactions",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -86,6 +90,8 @@ class Question:
         asked = details[1] if name == "derivative" else name
         if asked in GEOMETRY:
             structure = replace(structure, formulation="virtual_power", route="core")
+        if asked not in DYNAMIC:
+            structure = replace(structure, given=())
         return Question(name, structure, details)
 
     def with_ports(self) -> Question:

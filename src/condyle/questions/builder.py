@@ -7,6 +7,7 @@ differs from chain to chain, a shared one does not, and `total` sums lanes.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 
 import casadi as ca
 
@@ -14,8 +15,9 @@ from ..graph.graph import Graph, Value
 from ..graph.program import Check, Output, Port, Program
 from ..graph.read import read
 from ..graph.transform import substituted, tangents
+from ..kinematics.moving_base import MovingBase
 from .numbers import Layout
-from .structure import Structure
+from .structure import GIVEN, Structure
 
 Lanes = list[ca.SX]  # one expression a group
 
@@ -63,6 +65,22 @@ class Builder:
         """A shared number of the mechanism, or several, by the names of the layout."""
         start, count = self.layout.parameters[name]
         return self.symbols(name, [self._number(-1, start + i) for i in range(count)])
+
+    @cached_property
+    def gravity(self) -> ca.SX:
+        """In {S}, (3,): of the sample where it is given, else the mechanism's."""
+        given = "gravity" in self.structure.given
+        return self._given("gravity") if given else self.parameter("gravity")
+
+    @cached_property
+    def base(self) -> MovingBase | None:
+        """How the base moves; None where it stands still."""
+        if "base" not in self.structure.given:
+            return None
+        return MovingBase(*ca.vertsplit(self._given("base"), 3))
+
+    def _given(self, name: str) -> ca.SX:
+        return self.sample(name, *GIVEN[name])
 
     def lane(self, group: int, name: str) -> ca.SX:
         """Constants of the chains of a group: `mask`, `joint` or `constants`."""

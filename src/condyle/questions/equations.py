@@ -21,6 +21,7 @@ from ..dynamics import FORMULATIONS
 from ..dynamics.formulation import Body, Formulation
 from ..kinematics.chain import FAMILIES, ChainDynamics, Constants, Family
 from ..kinematics.constraints import indices, solve_small
+from ..kinematics.moving_base import MovingBase
 from ..kinematics.state import PointMotion, State, pose_state, twist_state
 from .builder import Builder, Lanes
 from .platform import (
@@ -33,6 +34,7 @@ from .platform import (
 from .structure import Structure
 
 LOAD, ACTUATORS, FRICTION, INTERNAL = "load", "actuators", "friction", "internal"
+BASE = "base"
 
 
 @dataclass(frozen=True)
@@ -140,7 +142,7 @@ def equations(
         given = (platform.placement.pose(), motion.rate, motion.acceleration)
         state = pose_state(*(b.cut(v) for v in given))
         basis, G = rate_basis(motion, dependent), motion.E.T @ frame.N
-    g = b.parameter("gravity")
+    g = b.gravity
     chains = [
         _chain_terms(b, group, method, state, g, lump, low_latency)
         for group in range(len(s.chains))
@@ -150,19 +152,32 @@ def equations(
     if s.losses:
         # Efforts bear these too: J^T effort = J^T tau + J^T loss.
         parts[ACTUATORS] = b.total([c.row * c.loss for c in chains])
+    if b.base is not None:
+        parts[BASE] = carried(b, method, state, b.base)
     parts[LOAD] = -(state.B.T @ load.about_centre(state.R))
     return Equations(b, state, basis, parts, chains, G)
 
 
+def carried(b: Builder, method: Formulation, state: State, base: MovingBase) -> ca.SX:
+    """What a moving base adds to the inertia of all bodies, (s,)."""
+    found = []
+    for group, kind in enumerate(b.structure.families):
+        family, M = FAMILIES[kind], state.point(b.lane(group, "joint"))
+        on_M = method.carried_chain(family, family.named(b.lane(group, "constants")), M, base)
+        found.append(state.generalized_force(b.lane(group, "mask") * on_M, M.lever))
+    return state.B.T @ platform_body(b, lumped=False).carried(state, base) + b.total(found)
+
+
 def part_names(structure: Structure) -> tuple[str, ...]:
-    """Parts of the efforts: platform, links of the chains, actuators, load, friction.
+    """Parts of the efforts: platform, links of the chains, actuators, moving base, load, friction.
 
     Each is the minimum-norm effort of its generalized force. Where the efforts differ from their
     sum, because friction depends on them or limits bind, the rest is internal: it does no work.
     """
     actuators = (ACTUATORS,) if structure.losses else ()
+    base = (BASE,) if BASE in structure.given else ()
     friction = (FRICTION, INTERNAL) if structure.friction else ()
-    return ("platform", *_links(structure), *actuators, LOAD, *friction)
+    return ("platform", *_links(structure), *actuators, *base, LOAD, *friction)
 
 
 def _links(structure: Structure) -> tuple[str, ...]:

@@ -23,7 +23,7 @@ from ..dynamics.virtual_power import VirtualPower
 from ..kinematics.chain import FAMILIES, ChainDynamics
 from ..kinematics.state import State, twist_state
 from .builder import Builder, Lanes
-from .equations import Wrench, equations, loss, platform_body, symmetric, total
+from .equations import Wrench, carried, equations, loss, platform_body, symmetric, total
 from .platform import Basis, Platform, twist_basis
 
 UPPER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # as `symmetric` takes them
@@ -64,7 +64,7 @@ def affine(b: Builder, platform: Platform, load: Wrench, effort: Lanes) -> Affin
 def _by_chains(b: Builder, platform: Platform, load: Wrench, effort: Lanes) -> Affine:
     """In twists, from every chain's effective mass at its platform joint."""
     s, motion = b.structure, platform.motion
-    method, body, g = VirtualPower(), platform_body(b, lumped=True), b.parameter("gravity")
+    method, body, g = VirtualPower(), platform_body(b, lumped=True), b.gravity
     # Forces due to the rates alone: accelerations add H times them.
     state = twist_state(platform.placement.position, motion.R, motion.twist, ca.SX.zeros(6))
     chains = [_chain(b, group, state, g, effort[group]) for group in range(len(s.chains))]
@@ -73,6 +73,8 @@ def _by_chains(b: Builder, platform: Platform, load: Wrench, effort: Lanes) -> A
     mass, turned = (symmetric(ca.vertsplit(part)) for part in (found[6:12], found[21:27]))
     own = body.of_twist(state.R)
     parts = [found[:6], method.platform(state, body, g), -load.about_centre(motion.R)]
+    if b.base is not None:
+        parts.append(carried(b, method, state, b.base))
     basis = twist_basis(motion, s.dependent)
     return Affine(
         H=own + ca.vertcat(ca.horzcat(mass, coupled.T), ca.horzcat(coupled, turned)),

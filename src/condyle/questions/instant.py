@@ -40,7 +40,7 @@ def energy(structure: Structure) -> Program:
     """Kinetic and potential energy [J], from q and q'; the potential is 0 at the origin of {S}."""
     b = Builder(structure)
     platform = closed(b, rates=1)
-    motion, g = platform.motion, b.parameter("gravity")
+    motion, g = platform.motion, b.gravity
     body = platform_body(b, lumped=False)
     V, omega = motion.twist[:3], motion.twist[3:]
     kinetic = body.kinetic(platform.R, V, omega)

@@ -17,6 +17,7 @@ from ..dynamics.joint_space import JointState, joint_motion
 from ..graph.program import Program
 from ..kinematics.chain import FAMILIES, Constants, Family, Joint
 from ..kinematics.constraints import solve_small
+from ..kinematics.moving_base import MovingBase
 from ..kinematics.state import PointMotion, pose_state
 from ..mechanism.mechanism import Mechanism
 from .builder import Builder
@@ -62,7 +63,7 @@ def reactions(structure: Structure) -> Program:
     b = Builder(structure)
     platform = given(b)
     effort, force = b.lane_sample("effort"), b.sample("contact_force", len(structure.contacts), "N")
-    g = b.parameter("gravity")
+    g = b.gravity
     motion = platform.motion
     state = pose_state(platform.pose, motion.rate, motion.acceleration)
     found: dict[str, list[tuple[ca.SX, ca.SX] | None]] = {}
@@ -71,7 +72,7 @@ def reactions(structure: Structure) -> Program:
         family = FAMILIES[kind]
         M = state.point(b.lane(group, "joint"))
         constants = family.named(b.lane(group, "constants"))
-        pairs = chain_reactions(family, constants, M, effort[group], g)
+        pairs = chain_reactions(family, constants, M, effort[group], g, b.base)
         for place, pair in zip(chain_places(family, ""), pairs, strict=True):
             found.setdefault(place.quantity, [None] * len(structure.chains))[group] = pair
             units[place.quantity] = place.unit
@@ -96,16 +97,20 @@ def reaction_places(mechanism: Mechanism) -> list[Place]:
 
 
 def chain_reactions(
-    family: Family, c: Constants, M: PointMotion, tau: ca.SX, g: ca.SX
+    family: Family,
+    c: Constants,
+    M: PointMotion,
+    tau: ca.SX,
+    g: ca.SX,
+    base: MovingBase | None = None,
 ) -> list[tuple[ca.SX, ca.SX]]:
     """Reactions of one chain under the effort tau, and their points, (3,) each."""
     if not family.bodies:
         return [(family.loop(c, M.position).J * tau, M.position)]
     s = JointState.symbols()
-    bodies = free_bodies(family, c, s, g)
+    bodies = free_bodies(family, c, s, g, base)
     values, points = zip(*_quantities(bodies), strict=True)
-    links = bodies.weight.numel()
-    all_weights = ca.SX.ones(links)
+    all_weights = ca.SX.ones(bodies.weight.numel())
     motion = joint_motion(family, c, M)
     carried = ca.substitute(ca.horzcat(*values), bodies.weight, all_weights)
     K, R, carried, where = motion.insert(s, [bodies.K, bodies.R, carried, ca.horzcat(*points)])

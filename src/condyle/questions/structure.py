@@ -10,6 +10,10 @@ from ..mechanism.mechanism import Mechanism
 from ..mechanism.surface import ParallelQuadric, Quadratic
 from ..mechanism.surface.wall import Wall, wall_of
 
+# What samples may give instead of, or besides, the mechanism's numbers: gravity in {S}, and of the
+# base its acceleration, angular velocity and angular acceleration in {S}; with their units.
+GIVEN = {"gravity": (3, "m/s^2"), "base": (9, "m/s^2, rad/s, rad/s^2")}
+
 
 @dataclass(frozen=True)
 class Structure:
@@ -21,6 +25,7 @@ class Structure:
     parallel:  two contacts on planes of one slope, written as their mean and difference.
     losses:    whether an actuator has a rotor or friction of its own.
     friction:  contacts with friction, by number.
+    given:     of `GIVEN`, what every sample gives: then a port has it.
     zeros:     parameters that are zero, (-1, i), and constants that are zero in every chain of a
                group, (group, i): their products are omitted.
     """
@@ -33,6 +38,7 @@ class Structure:
     parallel: bool = False
     losses: bool = False
     friction: tuple[int, ...] = ()
+    given: tuple[str, ...] = ()
     zeros: frozenset[tuple[int, int]] = frozenset()
 
     @property

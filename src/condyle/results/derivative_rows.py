@@ -15,6 +15,7 @@ from ..model.derivatives import Derivatives, names_of
 from ..model.given import as_model
 from ..model.model import Model
 from ..motion import Table
+from ..motion.column_units import BASE
 from ..status import STATUS_NAMES, Status
 from .forward_rows import KINDS
 from .state_rows import Columns, StateColumns, StatesReport
@@ -73,7 +74,7 @@ def derivative_states(
             )
         q, v, a = given.states(table, names, None)
         wrench, at = given.loads(table, load_point)
-        state: dict[str, Any] = {"q": q, "v": v, "wrench": wrench, "at": at}
+        state: dict[str, Any] = {"q": q, "v": v, "wrench": wrench, "at": at, **given.given(table)}
         state |= {"effort": table.require(efforts)} if forward else {"a": a}
         d = model.derivatives(of, wrt, **state, zeros=zeros)
         bad = ~np.isin(d.status, (Status.ok, Status.kink))
@@ -139,6 +140,8 @@ def _arguments(model: Model, by: str, shape: tuple[int, ...], a: np.ndarray) -> 
         return [prefixes[by] + c for c in model.independent]
     if by == "wrench":
         return list(WRENCH)
+    if by == "base":
+        return list(BASE)
     if by == "effort":
         return [f"tau_{c}" for c in model.mechanism.chain_names]
     if a.shape[2] == 1:

@@ -12,6 +12,7 @@ import numpy as np
 from ..kinematics.causes import causes
 from ..mechanism.chain import limits
 from ..mechanism.mechanism import Mechanism
+from ..motion.gravity_and_base import Given
 from ..status import Status
 from .contacts import bound_margins, contact_loss
 
@@ -22,6 +23,7 @@ class Derived:
 
     wrench:  (N, 6), load on the platform [N, N m], where that is known.
     limited: whether efforts were chosen within limits.
+    given:   gravity, (N, 3), and the base's motion, (N, 9), where samples give them.
     simulated: what only a simulation has, by the names of its variables.
     """
 
@@ -30,6 +32,7 @@ class Derived:
     wrench: np.ndarray = field(default_factory=lambda: np.zeros((0, 6)))
     limited: bool = False
     simulated: Mapping[str, np.ndarray] = field(default_factory=dict)
+    given: Given = field(default_factory=Given)
 
     @cached_property
     def ok(self) -> np.ndarray:
@@ -68,6 +71,22 @@ class Derived:
     def share(self) -> np.ndarray:
         """Of the efforts, needed by each part, (parts, N, n)."""
         return np.moveaxis(self.evaluation.share, 1, 0)
+
+    @property
+    def gravity(self) -> np.ndarray:
+        return self.given["gravity"]
+
+    @property
+    def base_acceleration(self) -> np.ndarray:
+        return self.given["base"][:, :3]
+
+    @property
+    def base_angular_velocity(self) -> np.ndarray:
+        return self.given["base"][:, 3:6]
+
+    @property
+    def base_angular_acceleration(self) -> np.ndarray:
+        return self.given["base"][:, 6:]
 
     @cached_property
     def sliding_speed(self) -> np.ndarray:

@@ -50,7 +50,8 @@ def forward_states(
     Args:    model: one, or a mechanism, the path of a file, or the name of a bundled one.
              states: CSV, or Parquet if its name ends in .parquet, with 6 - k pose coordinates,
              their rates dX... (none: at rest), tau_<chain> of every chain, and optionally some of
-             Fx, Fy, Fz, Mx, My, Mz. Other columns are named in a warning.
+             Fx, Fy, Fz, Mx, My, Mz, gravity (gx, gy, gz) and the base's motion (base_ax ...
+             base_dwz), as of motions. Other columns are named in a warning.
              out: ddX... of the given coordinates, contact_<contact>, the pose, joint_<chain>, and
              contact_loss_<contact> of unilateral contacts; with `flag` also status and cause.
              flag: keep rows that have no accelerations, empty, with a status.
@@ -83,6 +84,7 @@ def forward_states(
             effort,
             wrench,
             at,
+            **given.given(table),
             outputs=("pose", "pose_acceleration", "joint"),
             threads=threads,
         )

@@ -16,6 +16,7 @@ from ..model.joint_reactions import reactions as joint_reactions
 from ..model.model import Model
 from ..model.model_result import require_ok
 from ..motion import Table
+from ..motion.column_units import BASE, GRAVITY
 from ..motion.written_values import Values
 from .accuracy import max_error_of, require_accuracy
 from .contacts import AXES, contact_loss_columns
@@ -55,7 +56,8 @@ def solve_states(
     Args:    model: one, or a mechanism, the path of a file, or the name of a bundled one.
              states: CSV, or Parquet if its name ends in .parquet, with 6 - k pose coordinates,
              their rates dX... and accelerations ddX... (without any of both the states are at
-             rest), and optionally some of Fx, Fy, Fz, Mx, My, Mz. Other columns are named in a
+             rest), and optionally some of Fx, Fy, Fz, Mx, My, Mz, gravity (gx, gy, gz) and the
+             base's motion (base_ax ... base_dwz), as of motions. Other columns are named in a
              warning, or refused if they look misspelt.
              out: likewise CSV or Parquet.
              reactions: columns reaction_<joint>_<chain>_x, _y, _z ... too.
@@ -142,7 +144,8 @@ def solve_table(
     """Output columns for the rows of one table, and what follows from its evaluation."""
     given, mechanism = state_columns(model), model.mechanism
     names = given.names(table)
-    used = {prefix + name for prefix in ("", *given.rates) for name in names} | {*WRENCH}
+    used = {prefix + name for prefix in ("", *given.rates) for name in names}
+    used |= {*WRENCH, *GRAVITY, *BASE}
     if idle := [name for name in table.columns if name not in used]:
         raise InputError(
             f"{table.source}: {', '.join(idle)} would not be used: the state is given by "
@@ -155,8 +158,9 @@ def solve_table(
         )
     states = given.states(table, names, threads)
     wrench, at = given.loads(table, load_point)
+    beside = given.given(table)
     evaluation = model.inverse_dynamics(
-        *states, wrench, at, outputs=(*SOLVED, "ambiguous"), threads=threads
+        *states, wrench, at, **beside, outputs=(*SOLVED, "ambiguous"), threads=threads
     )
     derived = Derived(mechanism, evaluation, wrench, model.limited)
     if not flag:
@@ -167,11 +171,11 @@ def solve_table(
         if variable.column is not None and variable.when(derived):
             columns |= variable_columns(variable, variable.filled(derived), labels_of(mechanism))
     if reactions:
-        for name, reaction in joint_reactions(model, evaluation).items():
+        for name, reaction in joint_reactions(model, evaluation, **beside).items():
             array = np.where(derived.ok[:, None], reaction.array, np.nan)
             columns |= {f"reaction_{name}_{axis}": array[:, i] for i, axis in enumerate(AXES)}
     if deviations is not None:
-        columns |= deviation_columns(model, derived, deviations, states, wrench, at)
+        columns |= deviation_columns(model, derived, deviations, states, wrench, at, beside)
     columns |= contact_loss_columns(mechanism, derived.contact_loss)
     if flag:
         shortfall = derived.shortfall if derived.limited else None

@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import InputError
 from ..model.model import Model
 from ..model.poses import States
+from ..motion.gravity_and_base import Given, each
 from ..motion.written_values import Values, values_of
 from ..status import Status
 from .derived import Derived
@@ -47,6 +48,7 @@ def deviation_columns(
     state: States,
     wrench: np.ndarray,
     at: str | None,
+    given: Given,
 ) -> Columns:
     """Columns sd_tau_<chain>: sqrt(sum (d tau / d x_i)^2 s_i^2).
 
@@ -57,7 +59,14 @@ def deviation_columns(
     if (good := np.flatnonzero(derived.ok)).size:
         q, v, a = (x[good] for x in state)
         d = model.derivatives(
-            "effort", tuple(deviations), q=q, v=v, a=a, wrench=wrench[good], at=at
+            "effort",
+            tuple(deviations),
+            q=q,
+            v=v,
+            a=a,
+            wrench=wrench[good],
+            at=at,
+            **each(given, lambda x: x[good]),
         )
         shape = len(good), len(chains), -1
         parts = [(d["effort", by].reshape(shape) * s) ** 2 for by, s in deviations.items()]

@@ -12,8 +12,10 @@ import xarray as xr
 from ..backends.interval import UndecidedError, enclosed
 from ..errors import InputError, UnsupportedError, shown
 from ..model.model import Model
+from ..motion.gravity_and_base import each
 from ..progress import step
 from ..questions import Question
+from .solving import given_along
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ def prove(model: Model, solution: xr.Dataset, count: int) -> list[Proof]:
             f"--prove (prove=...) proves efforts of least norm, not those of "
             f'"{model.distribution.name}": take --distribution minimum_norm'
         )
-    system = model.system
+    system = model.system.under(tuple(given_along(solution)))
     question = Question.about(system.structure, "inverse", ("contact",))
     program = question.variants().main
     found = []
@@ -82,10 +84,13 @@ def _proof(program: Any, numbers: Any, solution: xr.Dataset, model: Model, i: in
     names = list(model.independent)
     here = solution.isel(time=i)
     ports = {"q": "pose", "q1": "pose_rate", "q2": "pose_acceleration"}
-    inputs = {port: here[name].sel(coordinate=names).values[None] for port, name in ports.items()}
+    inputs: dict[str, Any] = {
+        port: here[name].sel(coordinate=names).values[None] for port, name in ports.items()
+    }
     load, where = here["load"].values, solution.condyle.options["load_point"]
     point = np.zeros(3) if where is None else np.array(model.mechanism.platform.points[where])
     inputs |= {"force": load[None, :3], "moment": load[None, 3:], "point": point[None]}
+    inputs |= {**each(given_along(solution), lambda a: a[i, None])}
     got = {name: here[name].values for name in ("effort", "contact_force")}
     try:
         intervals = enclosed(program, numbers, inputs)

@@ -19,13 +19,14 @@ from ..model.joint_reactions import reactions as joint_reactions
 from ..model.model import Model
 from ..model.model_result import ModelResult, require_ok
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
+from ..motion.gravity_and_base import Given
 from ..progress import step
 from ..questions.equations import LOAD as LOAD_PART
 from ..version import __version__
 from . import solution as _accessor  # noqa: F401  # registers `dataset.condyle`
 from .contacts import AXES
 from .derived import Derived
-from .variables import VARIABLES, WRENCH, chosen
+from .variables import BASE_PARTS, VARIABLES, WRENCH, chosen
 from .warnings import Notice, Watch
 
 
@@ -48,7 +49,12 @@ def solve(
     with step("solving"):
         states, residual = model.poses.of_motion(motion)
         evaluation = model.inverse_dynamics(
-            *states, wrench, name, outputs=(*SOLVED, "ambiguous"), threads=threads
+            *states,
+            wrench,
+            name,
+            **motion.given,
+            outputs=(*SOLVED, "ambiguous"),
+            threads=threads,
         )
     if not flag:
         require_ok(model.mechanism, evaluation, motion.t)
@@ -56,7 +62,7 @@ def solve(
     solution = assemble(model, motion, load, wrench, name, evaluation, residual, seconds)
     if not reactions:
         return solution
-    found = joint_reactions(model, evaluation)
+    found = joint_reactions(model, evaluation, **motion.given)
     variables, coordinates = reaction_variables(model.mechanism, found)
     return solution.assign(variables).assign_coords(coordinates)
 
@@ -76,7 +82,7 @@ def assemble(
     Arrays of the evaluation become those of the solution, without a copy where no sample failed.
     The share of the load is left out where there is no load.
     """
-    derived = Derived(model.mechanism, evaluation, wrench, model.limited)
+    derived = Derived(model.mechanism, evaluation, wrench, model.limited, given=motion.given)
     watch = Watch(model.mechanism, residual=residual)
     watch.see(derived, motion.t)
     options = {
@@ -91,10 +97,21 @@ def assemble(
         "smoothing": None if motion.smoothing is None else str(motion.smoothing),
         "solve_seconds": seconds,
     }
+    parts = model.parts_under(motion.given)
     title = f"Inverse dynamics of {model.mechanism.name}"
-    solution = labelled(model, derived, motion.t, model.parts, title, options, watch.notices())
+    solution = labelled(model, derived, motion.t, parts, title, options, watch.notices())
     solution["effort"].attrs["long_name"] = chosen(str(model.distribution.name))
     return solution
+
+
+def given_along(solution: xr.Dataset) -> Given:
+    """`gravity` and `base` of a solution, as models take them, where its motion gave them."""
+    found: Given = {}
+    if "gravity" in solution:
+        found["gravity"] = solution["gravity"].values
+    if BASE_PARTS[0] in solution:
+        found["base"] = np.hstack([solution[name].values for name in BASE_PARTS])
+    return found
 
 
 def labelled(

@@ -18,7 +18,8 @@ from ..mechanism.mechanism import COORDINATES
 from ..model.model import Model
 from ..model.poses import States
 from ..motion import Table, TableWriter, iter_table, resolve_load_point
-from ..motion.column_units import Dimension, dimension
+from ..motion.column_units import BASE, GRAVITY, Dimension, dimension
+from ..motion.gravity_and_base import Given, columns_beside, given_beside
 from .variables import WRENCH
 
 CHUNK_ROWS = 16384
@@ -60,7 +61,8 @@ class StateColumns:
     def known(self) -> dict[str, Dimension]:
         """The columns that are read."""
         names = [prefix + name for prefix in ("", *self.rates) for name in COORDINATES]
-        own = {name: kind for name in (*names, *WRENCH) if (kind := dimension(name)) is not None}
+        names += [*WRENCH, *GRAVITY, *BASE]
+        own = {name: kind for name in names if (kind := dimension(name)) is not None}
         return own | dict(self.others)
 
     def names(self, table: Table) -> list[str]:
@@ -98,6 +100,11 @@ class StateColumns:
         if load_point is not None or set(given) & set(WRENCH[:3]):
             point = resolve_load_point(load_point, self.model.mechanism.platform.points)
         return wrench, point
+
+    def given(self, table: Table) -> Given:
+        """Gravity and the base's motion, where a table has them, as models take them."""
+        columns_beside(table.columns, table.source)
+        return given_beside(table.columns)
 
     def stream(
         self,

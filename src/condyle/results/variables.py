@@ -34,11 +34,18 @@ ACCOUNTS = (
 )  # fmt: skip
 WRENCH = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 
+BASE_PARTS = ("base_acceleration", "base_angular_velocity", "base_angular_acceleration")
+
 Rule = Callable[[Mechanism], str]
 
 
 def with_friction(derived: Derived) -> bool:
     return any(contact.friction.coefficient for contact in derived.mechanism.contacts)
+
+
+def given(name: str) -> Callable[[Derived], bool]:
+    """Whether every sample gives that: gravity, or the base's motion."""
+    return lambda derived: name in derived.given
 
 
 def with_limits(derived: Derived) -> bool:
@@ -105,7 +112,7 @@ class Variable:
 def labels_of(mechanism: Mechanism) -> dict[str, Sequence[str]]:
     """Labels along the dimensions that columns have."""
     chains, contacts = mechanism.chain_names, mechanism.contact_names
-    return {"chain": chains, "contact": contacts, "coordinate": COORDINATES}
+    return {"chain": chains, "contact": contacts, "coordinate": COORDINATES, "axis": AXES}
 
 
 def variable_columns(
@@ -163,6 +170,7 @@ def _each(units: Iterable[str], form: str) -> str:
 
 
 _CHAIN, _POSE, _CONTACT = ("time", "chain"), ("time", "coordinate"), ("time", "contact")
+_VECTOR = ("time", "axis")
 _PLACE = (*_CONTACT, "axis")
 _FREE = ("time", "independent")
 
@@ -223,6 +231,23 @@ VARIABLES = (
     Variable(
         "load_mode", ("time", "source"), "1",
         "mode of each load: of food 0 apart, 1 between the teeth, 2 broken",
+    ),
+    Variable(
+        "gravity", _VECTOR, "m/s^2", "gravity in {S} that the motion gives", "gravity",
+        column="g", only=given("gravity"), failed=True,
+    ),
+    Variable(
+        "base_acceleration", _VECTOR, "m/s^2", "acceleration of the origin of {S}",
+        "base_acceleration", column="base_a", only=given("base"), failed=True,
+    ),
+    Variable(
+        "base_angular_velocity", _VECTOR, "rad/s", "angular velocity of the base in {S}",
+        "base_angular_velocity", column="base_w", only=given("base"), failed=True,
+    ),
+    Variable(
+        "base_angular_acceleration", _VECTOR, "rad/s^2",
+        "angular acceleration of the base in {S}", "base_angular_acceleration",
+        column="base_dw", only=given("base"), failed=True,
     ),
     Variable(
         "energy", ("time", "account"), "J",
@@ -322,8 +347,8 @@ DIMENSIONS = {
     "contact": "names of the mechanism file",
     "coordinate": ", ".join(COORDINATES),
     "independent": "the independent coordinates; `J_W_sigma` has as many values, falling",
-    "part": "platform, links of the chains and, where there is one, the load; shares add up to "
-    "the effort",
+    "part": "platform, links of the chains and, where there is one, the base's motion and the "
+    "load; shares add up to the effort",
     "axis": f"{', '.join(AXES)} in {{S}}",
     "component": ", ".join(WRENCH),
     "source": "loads of a scenario, by name",

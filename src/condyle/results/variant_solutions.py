@@ -65,7 +65,7 @@ def solve(
     reasons = [variants.reason(i) if variants.status[i] else "" for i in range(len(variants))]
     made["reason"] = "variant", np.array(reasons, dtype=object)
     used = {dim for dims, *_ in made.values() for dim in np.atleast_1d(dims)}
-    known = coordinates(model, motion.t, model.parts)
+    known = coordinates(model, motion.t, model.parts_under(motion.given))
     kept = {k: v for k, v in known.items() if k in used or (k.endswith("unit") and "chain" in used)}
     return xr.Dataset(made, {**kept, "variant": np.arange(len(variants))})
 

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, UnsupportedError
 from ..model.model import Model
 from ..motion import Motion, read_table, reference_motion, trial_motion
 from ..motion.reference_case import fits_reference
@@ -73,6 +73,11 @@ def path_of(model: Model, motion: Motion, force: float | None, file: str | None)
 
     Args: force: f_d [N] at all times;  file: CSV of t, force instead.
     """
+    if motion.given:
+        raise UnsupportedError(
+            f"{motion.source}: gives {' and '.join(motion.given)}; in a simulation gravity is the "
+            "mechanism's and the base is at rest: leave those columns out"
+        )
     q = model.poses.of_motion(motion)[0][0]
     if not np.isfinite(q).all():
         bad = int(np.argmin(np.isfinite(q).all(axis=1)))

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from oracles.bodies import Body, bodies
+from oracles.bodies import Body, bodies, cross_matrix
 from oracles.jets import Jet
 from oracles.random_mechanism import off_centre, random_mechanism
 from support.families import MECHANISMS, Case, case, of_raw
@@ -34,10 +36,13 @@ def build(name: str) -> Case:
     return of_raw(random_mechanism(np.random.default_rng(8), **SURFACES[name]))
 
 
-def found_reactions(c: Case, formulation: str = "virtual_power") -> dict[str, Reaction]:
+def found_reactions(
+    c: Case, formulation: str = "virtual_power", **given: np.ndarray
+) -> dict[str, Reaction]:
     model = Model(c.mechanism, formulation=formulation, backend="numpy")
     q, q1, q2 = (c.states[key] for key in ("q", "qd", "qdd"))
-    return reactions(model, model.inverse_dynamics(q, q1, q2, *parts(c.load), outputs="all"))
+    found = model.inverse_dynamics(q, q1, q2, *parts(c.load), **given, outputs="all")
+    return reactions(model, found, **given)
 
 
 class Ledger:
@@ -69,14 +74,33 @@ def body_of(reaction: Reaction, name: str) -> str:
 EVERY = [*MECHANISMS, *SURFACES, OFF_CENTRE]
 
 
-@pytest.mark.parametrize("name", few(EVERY, OFF_CENTRE, "rss", "pss_k0", "sps_k3", "mixed_k1_n7"))
-def test_every_body_balances(name: str) -> None:
-    c = build(name)
-    found = found_reactions(c)
+BALANCED = few(EVERY, OFF_CENTRE, "rss", "pss_k0", "sps_k3", "mixed_k1_n7")
+
+
+def carried(body: Body, base: np.ndarray) -> Body:
+    """A body of the moving base in a frame that stands still, which {S} is passing now."""
+    a, w, w_rate = base.reshape(3, 3)
+    turn = Jet(np.eye(3), cross_matrix(w), cross_matrix(w_rate) + cross_matrix(w) @ cross_matrix(w))
+    origin = Jet(np.zeros(3), np.array([1.0, -2.0, 3.0]), a)
+    return replace(body, centre=origin + turn @ body.centre, R=turn @ body.R)
+
+
+@pytest.mark.parametrize("moving", [False, True])
+@pytest.mark.parametrize("name", BALANCED)
+def test_every_body_balances(name: str, moving: bool) -> None:
+    c, given = build(name), dict[str, np.ndarray]()
+    if moving:
+        rng, count = np.random.default_rng(3), len(c.load)
+        given = {"gravity": rng.normal(0, 9, (count, 3)), "base": rng.normal(0, 6, (count, 9))}
+    found = found_reactions(c, **given)
     for i in range(len(c.load)):
         motion = Jet(*(c.states[key][i] for key in ("pose", "pose_rate", "pose_acceleration")))
         free = bodies(c.raw, motion)
-        ledger = Ledger(free, np.array(c.mechanism.gravity))
+        gravity = np.array(c.mechanism.gravity)
+        if given:
+            gravity = given["gravity"][i]
+            free = {key: carried(body, given["base"][i]) for key, body in free.items()}
+        ledger = Ledger(free, gravity)
         for r in found.values():
             vector, zero = r.array[i], np.zeros(3)
             force, moment = (vector, zero) if r.unit == "N" else (zero, vector)

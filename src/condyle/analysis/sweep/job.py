@@ -26,6 +26,7 @@ from ...motion import (
     resolve_load_point,
     trial_motion,
 )
+from ...motion.gravity_and_base import each
 from ...motion.reference_case import bundled_reference, fits_load, fits_reference
 from ...results.variant_solutions import outputs_of
 from .measure import Reading, reading
@@ -135,7 +136,8 @@ def prepared(
     for path in paths:  # what does not fit the mechanism shows here, and kernels are built
         few: Any = {k: getattr(path, k)[:2] for k in ("t", "value", "rate", "acceleration")}
         (q, q1, q2), _ = model.poses.of_motion(replace(path, **few))
-        model.inverse_dynamics(q, q1, q2, outputs=SOLVED, threads=1)
+        given = each(path.given, lambda a: a[:2])
+        model.inverse_dynamics(q, q1, q2, **given, outputs=SOLVED, threads=1)
     if design.count >= MANY:
         model.variants(job.columns(design.rows(0, MANY)))  # as are those of numbers
     needed = SOLVED if study.solutions else outputs_of(model, (one.values for one in found))

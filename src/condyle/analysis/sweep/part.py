@@ -121,7 +121,9 @@ def _alone(job: Job, batch: Variants, i: int, m: int) -> tuple[ModelResult, floa
     """All results of one variant along a motion, and the residual of its poses."""
     model = batch.alone(i)
     states, residual = model.poses.of_motion(job.motions[m])
-    found = model.inverse_dynamics(*states, job.wrenches[m], job.point, outputs=SOLVED, threads=1)
+    found = model.inverse_dynamics(
+        *states, job.wrenches[m], job.point, **job.motions[m].given, outputs=SOLVED, threads=1
+    )
     return found, residual
 
 

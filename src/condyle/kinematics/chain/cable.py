@@ -13,6 +13,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from ..moving_base import MovingBase
 from .family import ChainDynamics, Constants, Cut, Joint, Link
 from .rod import LineFamily
 
@@ -47,6 +48,9 @@ class CableFamily(LineFamily):
             rate=rate,
             acceleration=ca.dot(J, A) - swing,
         )
+
+    def carried(self, c: Constants, M: ca.SX, V: ca.SX, base: MovingBase) -> ca.SX:
+        return ca.SX.zeros(3)
 
     def explain(self, chain: Any, pose: np.ndarray) -> str:
         return f'chain "{chain.name}" has no direction: M is where the cable is held'

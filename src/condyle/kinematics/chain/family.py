@@ -25,6 +25,7 @@ import casadi as ca
 import numpy as np
 
 from ...mechanism.coordinates import rotations
+from ..moving_base import MovingBase
 from ..rotation import rotation_y, rotation_z
 
 Cut = Callable[[ca.SX], ca.SX]
@@ -233,6 +234,10 @@ class Family(ABC):
         """
 
     @abstractmethod
+    def carried(self, c: Constants, M: ca.SX, V: ca.SX, base: MovingBase) -> ca.SX:
+        """Virtual power: what a moving base adds to the forces on M, (3,)."""
+
+    @abstractmethod
     def explain(self, chain: Any, pose: np.ndarray) -> str:
         """Why the chain cannot reach its platform joint at a pose, with distances."""
 
@@ -337,6 +342,31 @@ def rod_guide(N: ca.SX, q_r: ca.SX) -> ca.SX:
 def rod_inertia(n: ca.SX, transverse: ca.SX, axial: ca.SX) -> ca.SX:
     """Inertia of a rod along the unit vector n, in {S}, (3, 3)."""
     return transverse * ca.SX.eye(3) + (axial - transverse) * (n @ n.T)
+
+
+def carried_moment(
+    e: ca.SX,
+    e_rate: ca.SX,
+    Y: ca.SX,
+    transverse: ca.SX,
+    axial: ca.SX,
+    base: MovingBase,
+    inverse: ca.SX,
+) -> ca.SX:
+    """Force dual to e' of what a moving base adds to the moment of a body along e, (3,) [N].
+
+    The body turns with N_i0 Ry(beta) Rz(gamma): omega = n x e' / |e| + beta' s n, as in
+    `axial_force`. Apart, since without axial inertia nothing depends on beta.
+
+    Args: inverse: 1 / |e|.
+    """
+    n = e * inverse
+    across = ca.skew(n) * inverse
+    s, turn = ca.dot(Y, n), ca.cross(Y, n) * inverse
+    spin = across + n @ (turn * (s / (1 - s * s))).T
+    outer = n @ n.T
+    swung = base.moment(transverse * (ca.SX.eye(3) - outer), across @ e_rate)
+    return across.T @ swung + spin.T @ base.moment(axial * outer, spin @ e_rate)
 
 
 def rod_masses(

@@ -11,6 +11,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from ..moving_base import MovingBase
 from .family import ChainDynamics, Constants, Cut, Joint, Link, Loop, joint_position, unit
 from .rod import ROD, ROD_NUMBERS, RodFamily
 
@@ -80,6 +81,14 @@ class PSSFamily(RodFamily):
             inertias={"sliders": c.slider, "rods": m_SS},
             end_masses=self.end_masses(c),
         )
+
+    def tangent(self, c: Constants, S: ca.SX) -> ca.SX:
+        return c.axis
+
+    def carried_effort(
+        self, c: Constants, S: ca.SX, S_rate: ca.SX, tangent: ca.SX, base: MovingBase
+    ) -> ca.SX:
+        return c.slider * ca.dot(tangent, base.acceleration(S, S_rate))
 
     def explain(self, chain: Any, pose: np.ndarray) -> str:
         across, length = self.span(chain, pose)

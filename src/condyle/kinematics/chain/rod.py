@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import casadi as ca
 
+from ..moving_base import MovingBase
 from .family import (
     Constants,
     Family,
@@ -14,6 +15,7 @@ from .family import (
     Link,
     Loop,
     axial_force,
+    carried_moment,
     rod_direction,
     rod_frame,
     rod_guide,
@@ -62,6 +64,29 @@ class RodFamily(Family):
 
     def end_masses(self, c: Constants) -> dict[str, ca.SX]:
         return {self.bodies[1]: rod_masses(c.mass, c.com, c.transverse, c.L)[0]}
+
+    @abstractmethod
+    def tangent(self, c: Constants, S: ca.SX) -> ca.SX:
+        """dS / d joint, (3,)."""
+
+    @abstractmethod
+    def carried_effort(
+        self, c: Constants, S: ca.SX, S_rate: ca.SX, tangent: ca.SX, base: MovingBase
+    ) -> ca.SX:
+        """What a moving base adds to the effort of the driven link."""
+
+    def carried(self, c: Constants, M: ca.SX, V: ca.SX, base: MovingBase) -> ca.SX:
+        chain = self.dynamics(c, M, V, ca.SX.zeros(3), ca.SX.zeros(3))
+        e = self.loop(c, M).rod
+        S = M - e
+        t = self.tangent(c, S)
+        S_rate = t * chain.rate
+        e_rate = V - S_rate
+        force = c.mass * base.acceleration(S + c.com * e, S_rate + c.com * e_rate)
+        swing = carried_moment(e, e_rate, c.Y, c.transverse, c.axial, base, 1 / c.L)
+        effort = ca.dot(t, (1 - c.com) * force - swing)
+        effort += self.carried_effort(c, S, S_rate, t, base)
+        return c.com * force + swing + chain.J * effort
 
     @staticmethod
     def rod_inertias(

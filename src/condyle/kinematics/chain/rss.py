@@ -12,6 +12,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from ..moving_base import MovingBase
 from ..rotation import rotation_z
 from .family import ChainDynamics, Constants, Cut, Joint, Link, Loop, joint_position, unit
 from .rod import ROD, ROD_NUMBERS, RodFamily
@@ -132,6 +133,17 @@ class RSSFamily(RodFamily):
             inertias={"cranks": c.crank, "couplers": m_SS * c.l**2},
             end_masses=self.end_masses(c),
         )
+
+    def tangent(self, c: Constants, S: ca.SX) -> ca.SX:
+        return ca.cross(c.C[:, 2], S - c.G)
+
+    def carried_effort(
+        self, c: Constants, S: ca.SX, S_rate: ca.SX, tangent: ca.SX, base: MovingBase
+    ) -> ca.SX:
+        part = c.crank_com / c.l
+        force = c.crank_mass * base.acceleration(c.G + part * (S - c.G), part * S_rate)
+        central = c.crank - c.crank_mass * c.crank_com**2
+        return part * ca.dot(tangent, force) + central * ca.dot(c.C[:, 2], base.w_rate)
 
     def explain(self, chain: Any, pose: np.ndarray) -> str:
         near, far, length = (f"{v * 1e3:.1f}" for v in self._distances(chain, pose))

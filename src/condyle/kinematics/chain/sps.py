@@ -12,12 +12,14 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from ..moving_base import MovingBase
 from .family import (
     ChainDynamics,
     Constants,
     Cut,
     Joint,
     Link,
+    carried_moment,
     rod_direction,
     rod_guide,
     rod_inertia,
@@ -118,6 +120,20 @@ class SPSFamily(LineFamily):
             },
             end_masses=self.end_masses(c),
         )
+
+    def carried(self, c: Constants, M: ca.SX, V: ca.SX, base: MovingBase) -> ca.SX:
+        e = M - c.B
+        inverse = c.present * (1 / ca.norm_2(e))
+        u = e * inverse
+        across = inverse * (ca.SX.eye(3) - u @ u.T)  # du / dM
+        u_rate = across @ V
+        at_cylinder = base.acceleration(c.B + c.cylinder_com * u, c.cylinder_com * u_rate)
+        at_piston = base.acceleration(M - c.piston_com * u, V - c.piston_com * u_rate)
+        pushed, pulled = c.cylinder_mass * at_cylinder, c.piston_mass * at_piston
+        turned = across.T @ (c.cylinder_com * pushed - c.piston_com * pulled)
+        transverse = c.cylinder_transverse + c.piston_transverse
+        axial = c.cylinder_axial + c.piston_axial
+        return pulled + turned + carried_moment(e, V, c.Y, transverse, axial, base, inverse)
 
     def explain(self, chain: Any, pose: np.ndarray) -> str:
         return f'chain "{chain.name}" has no direction: M is at its base joint'

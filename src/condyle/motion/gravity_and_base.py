@@ -1,0 +1,48 @@
+"""Gravity and the base's motion among the columns of a table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from typing import Any, TypedDict, cast
+
+import numpy as np
+
+from ..errors import InputError
+from .column_units import BASE, GRAVITY
+from .file_words import listed
+
+
+class Given(TypedDict, total=False):
+    """What models take beside states: gravity, (N, 3), and the base's motion, (N, 9)."""
+
+    gravity: np.ndarray
+    base: np.ndarray
+
+
+def columns_beside(names: Collection[str], source: str) -> tuple[str, ...]:
+    """Those of gravity and of the base's motion, in order.
+
+    Raises: InputError: for a part of gravity.
+    """
+    given = [name for name in GRAVITY if name in names]
+    if 0 < len(given) < len(GRAVITY):
+        missing = listed([name for name in GRAVITY if name not in given], "")
+        raise InputError(f"{source}: got {listed(given, '')}; gravity also needs {missing}")
+    return (*given, *(name for name in BASE if name in names))
+
+
+def given_beside(columns: Mapping[str, np.ndarray]) -> Given:
+    """What there are columns of; the base's columns that are not there are zero."""
+    found: Given = {}
+    if GRAVITY[0] in columns:
+        found["gravity"] = np.column_stack([columns[name] for name in GRAVITY])
+    if moving := [columns[name] for name in BASE if name in columns]:
+        still = np.zeros_like(moving[0])
+        found["base"] = np.column_stack([columns.get(name, still) for name in BASE])
+    return found
+
+
+def each(given: Given, take: Callable[[np.ndarray], np.ndarray]) -> Given:
+    """The same with what is taken of each array."""
+    found: Any = {name: take(np.asarray(a)) for name, a in given.items()}
+    return cast(Given, found)
