@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from .recording import Recording, find_label
 from .rigid import FEWEST, FLATTEST, Fit, breadth, common_shape, fit
 
 _STILL = 1e-3  # m, by which the platform may move while the mechanism is at home
+_CLOSED = 2e-3  # m, by which it may differ between the homes of two trials
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,43 +35,108 @@ class Body:
 
 @dataclass(frozen=True, eq=False)
 class Bodies:
-    """Both bodies, and what was found about them.
+    """Both bodies in a recording, and what was found about them.
 
-    Attributes: at_home: frames of the home stretch, (F,).
+    Attributes: recording: where they were seen.
+                at_home: frames of its home stretch, (F,); none where home is the static trial's.
+                static: both bodies in the static trial, whose home they are at.
     """
 
+    recording: Recording
     fixed: Body
     platform: Body
     at_home: np.ndarray
     warnings: tuple[str, ...]
+    static: Bodies | None = None
 
     @property
     def both(self) -> tuple[Body, Body]:
         return self.fixed, self.platform
+
+    def off_static(self) -> float:
+        """Distance of the platform's markers at this recording's home from the static's [m].
+
+        Root mean square over markers; NaN where they are not seen, or there is no such home.
+        """
+        moved = self.platform.fit
+        if not (moved.found & self.at_home).any():
+            return float("nan")
+        places = self.platform.shape @ moved.rotation[self.at_home].transpose(0, 2, 1)
+        places = np.nanmean(places + moved.position[self.at_home, None], axis=0)
+        return float(np.sqrt(((places - self.platform.shape) ** 2).sum(axis=1).mean()))
+
+    def head_moved(self) -> tuple[float, float]:
+        """Largest way of the fixed markers' middle from the static's [m], and turn [rad]."""
+        fixed = self.fixed.fit
+        middle = self.fixed.shape.mean(axis=0)
+        way = np.linalg.norm(fixed.rotation @ middle + fixed.position - middle, axis=1)
+        turn = np.arccos(np.clip((np.trace(fixed.rotation, axis1=1, axis2=2) - 1) / 2, -1, 1))
+        return float(np.nanmax(way)), float(np.nanmax(turn))
+
+    @property
+    def home(self) -> Bodies:
+        """The bodies in the recording that home and registered points belong to."""
+        return self.static or self
 
     def steadied(self, points: np.ndarray) -> np.ndarray:
         """Points of the laboratory, (F, n, 3), with the base's motion taken out."""
         return self.fixed.fit.back(points)
 
 
-def find_bodies(recording: Recording, file: MarkerFile) -> Bodies:
-    """Fit both bodies to their shapes at home.
+def find_bodies(recording: Recording, file: MarkerFile, static: Recording | None = None) -> Bodies:
+    """Fit both bodies to their shapes at home, in the recording itself or in a static trial.
 
     Raises: InputError: for markers that are not there, or do not hold a body.
     """
-    home = home_frames(recording, file.home)
+    if static is not None and file.static is not None:
+        return _carried(_at_home(static, file, file.static.home), recording, file)
+    if file.home is None:
+        raise InputError(f"{recording.source}: its static trial (static) was not given")
+    return _at_home(recording, file, file.home)
+
+
+def _at_home(recording: Recording, file: MarkerFile, stretch: tuple[float, float]) -> Bodies:
+    home = home_frames(recording, stretch)
     warnings: list[str] = []
     fixed = _body(recording, "fixed", file.fixed, home, lambda points: points, warnings)
     platform = _body(recording, "platform", file.platform, home, fixed.fit.back, warnings)
-    moved, shape = platform.fit, platform.shape
-    centre = moved.rotation[home] @ shape.mean(axis=0) + moved.position[home]
+    centre = _centre(platform)[home]
     apart = float(np.nanmax(np.linalg.norm(centre - np.nanmean(centre, axis=0), axis=1)))
     if apart > _STILL:
         warnings.append(
             f"{recording.source}: the platform moves by {apart * 1e3:.3g} mm while it is said to "
-            f"be at home ({file.home[0]:g} to {file.home[1]:g} s); their mean is taken for home"
+            f"be at home ({stretch[0]:g} to {stretch[1]:g} s); their mean is taken for home"
         )
-    return Bodies(fixed, platform, home, tuple(warnings))
+    return Bodies(recording, fixed, platform, home, tuple(warnings))
+
+
+def _carried(static: Bodies, recording: Recording, file: MarkerFile) -> Bodies:
+    """The bodies of a static trial in another recording."""
+    warnings = list(static.warnings)
+
+    def body(old: Body, steadied: Callable[[np.ndarray], np.ndarray]) -> Body:
+        places = [find_label(name, recording.labels, recording.source) for name in old.names]
+        points = recording.points[:, places]
+        return Body(old.what, old.names, points, old.shape, fit(old.shape, steadied(points)))
+
+    fixed = body(static.fixed, lambda points: points)
+    platform = body(static.platform, fixed.fit.back)
+    found = Bodies(recording, fixed, platform, np.zeros(len(recording.t), bool), (), static)
+    if file.home is not None:
+        found = replace(found, at_home=home_frames(recording, file.home))
+        off = found.off_static()
+        if off > _CLOSED:
+            warnings.append(
+                f"{recording.source}: at its home the platform is {off * 1e3:.3g} mm from where "
+                f"it is in the static trial {static.recording.source}; did markers move on their "
+                "body, or were the teeth not closed?"
+            )
+    return replace(found, warnings=tuple(warnings))
+
+
+def _centre(platform: Body) -> np.ndarray:
+    """Middle of the platform's markers with the base's motion taken out, (F, 3)."""
+    return platform.fit.rotation @ platform.shape.mean(axis=0) + platform.fit.position
 
 
 def home_frames(recording: Recording, home: tuple[float, float]) -> np.ndarray:

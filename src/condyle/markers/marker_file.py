@@ -1,6 +1,7 @@
 """The marker file: which markers move with which body, when the mechanism is at home, and where.
 
-It may name other channels too: [forces] for the load, [emg] for the muscles.
+It may name other channels too: [forces] for the load, [emg] for the muscles; a static trial
+([static]) where the mechanism is at home and its points are given; and the vertical ([vertical]).
 """
 
 from __future__ import annotations
@@ -10,7 +11,14 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 
 from ..errors import InputError, ProblemsError, few, shown
 from ..mechanism.messages import describe
@@ -33,6 +41,50 @@ _Hertz = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]
 _Above = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
 
 
+_Interval = tuple[_Time, _Time]
+
+
+def _one_time(value: Any) -> Any:
+    return (value, value) if _is_number(value) else value
+
+
+def _in_order(value: tuple[float, float] | None) -> tuple[float, float] | None:
+    if value is not None and value[1] < value[0]:
+        raise ValueError(f"expected [from, to] or one time, got [{value[0]:g}, {value[1]:g}] s")
+    return value
+
+
+_Home = Annotated[_Interval, BeforeValidator(_one_time), AfterValidator(_in_order)]
+
+
+class Static(Table):
+    """A static trial: another recording of the same markers, with the mechanism at home."""
+
+    file: Annotated[str, Field(min_length=1)] = Field(
+        description="the recording; relative paths start at the marker file"
+    )
+    home: _Home = Field(description="when the mechanism is at home in it [s]")
+
+
+class Vertical(Table):
+    """Gravity and the base's motion, from the recording."""
+
+    up: tuple[float, float, float] | None = Field(
+        None, description="the vertical in the laboratory; default: the recording's"
+    )
+    moving: Annotated[bool, Field(strict=True)] = Field(
+        True, description="the base's acceleration and rotation are in the motion too"
+    )
+
+    @field_validator("up", mode="before")
+    @classmethod
+    def _direction(cls, value: Any) -> Any:
+        three = isinstance(value, list | tuple) and len(value) == 3 and all(map(_is_number, value))
+        if value is not None and not (three and any(value)):
+            raise ValueError(f"expected three numbers, not all zero, got {shown(value)}")
+        return value
+
+
 class Forces(Table):
     """The load on the platform, from three channels or from a force plate."""
 
@@ -46,7 +98,9 @@ class Forces(Table):
     reverse: Annotated[bool, Field(strict=True)] = Field(
         False, description="the channels measure the force of the platform on the sensor"
     )
-    zero: tuple[_Time, _Time] | None = Field(None, description="when there is no load [s]")
+    zero: Annotated[_Interval, AfterValidator(_in_order)] | None = Field(
+        None, description="when there is no load [s]"
+    )
 
     @field_validator("channels", mode="before")
     @classmethod
@@ -70,13 +124,6 @@ class Forces(Table):
         if self.plate is not None and self.axes != "laboratory":
             raise ValueError('a plate stands in the laboratory; axes is for "channels"')
         return self
-
-    @field_validator("zero")
-    @classmethod
-    def _in_order(cls, value: tuple[float, float] | None) -> tuple[float, float] | None:
-        if value is not None and value[1] < value[0]:
-            raise ValueError(f"expected [from, to], got [{value[0]:g}, {value[1]:g}] s")
-        return value
 
 
 class Emg(Table):
@@ -106,10 +153,21 @@ class MarkerFile(Table):
 
     fixed: _Labels = Field(description="markers that move with the base")
     platform: _Labels = Field(description="markers that move with the platform")
-    home: tuple[_Time, _Time] = Field(description="when the mechanism is at home [s]")
+    home: _Home | None = Field(
+        None,
+        description="when the mechanism is at home [s]; with a static trial not needed",
+    )
     places: dict[str, Any] = Field(alias="register")
     forces: Forces | None = Field(None, description="channels of the load")
     emg: Emg | None = Field(None, description="channels of the muscles")
+    weights: dict[_Label, _Above] = Field(
+        default_factory=dict,
+        description="platform marker -> weight in the pose on the contacts; the others' is 1",
+    )
+    static: Static | None = Field(None, description="a static trial")
+    vertical: Vertical = Field(
+        default_factory=lambda: Vertical(), description="gravity and the base's motion"
+    )
 
     @property
     def directed(self) -> bool:
@@ -125,18 +183,6 @@ class MarkerFile(Table):
             return data
         kept = {key: value for key, value in data.items() if key not in names}
         return kept | {"register": {key: data[key] for key in data.keys() & names}}
-
-    @field_validator("home", mode="before")
-    @classmethod
-    def _one_time(cls, value: Any) -> Any:
-        return (value, value) if _is_number(value) else value
-
-    @field_validator("home")
-    @classmethod
-    def _in_order(cls, value: tuple[float, float]) -> tuple[float, float]:
-        if value[1] < value[0]:
-            raise ValueError(f"expected [from, to] or one time, got [{value[0]:g}, {value[1]:g}] s")
-        return value
 
     @field_validator("fixed", "platform", mode="before")
     @classmethod
@@ -169,6 +215,21 @@ class MarkerFile(Table):
             )
         return self
 
+    @model_validator(mode="after")
+    def _of_platform(self) -> Self:
+        if unknown := sorted(self.weights.keys() - {*self.platform}):
+            raise ValueError(f"weights: {few(unknown)} is not listed in platform")
+        return self
+
+    @model_validator(mode="after")
+    def _at_home(self) -> Self:
+        if self.home is None and self.static is None:
+            raise ValueError(
+                "home: is missing; name a stretch in which the mechanism is at home [s], or a "
+                "static trial (static)"
+            )
+        return self
+
 
 def read_markers(source: str | os.PathLike[str] | Mapping[str, Any] | MarkerFile) -> MarkerFile:
     """A marker file from a path, or from tables.
@@ -185,7 +246,11 @@ def read_markers(source: str | os.PathLike[str] | Mapping[str, Any] | MarkerFile
         text = content_of(source, LARGEST_FILE + 1).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(f"{source}: is no text (UTF-8 expected); a marker file is TOML") from None
-    return _checked(read_tables(text, os.fspath(source)), os.fspath(source))
+    file = _checked(read_tables(text, os.fspath(source)), os.fspath(source))
+    if file.static is None:
+        return file
+    there = os.path.join(os.path.dirname(os.fspath(source)), file.static.file)
+    return file.model_copy(update={"static": file.static.model_copy(update={"file": there})})
 
 
 def _checked(data: Mapping[str, Any], source: str) -> MarkerFile:

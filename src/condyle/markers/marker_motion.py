@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from ..errors import InputError, shown
 from ..mechanism import as_mechanism
+from ..mechanism.mechanism import Mechanism
 from ..motion.arrays import as_number
 from ..motion.column_units import POSE
 from ..motion.file_words import listed
@@ -64,11 +65,31 @@ def motion_from_c3d(
         as_number(value, name, f"a number of at least 0 [{unit_of}]", lambda x: x >= 0)
     machine = as_mechanism(model)
     file, recording = read_markers(markers), read_c3d(path, unit)
+    static = None if file.static is None else read_c3d(file.static.file, unit)
+    return motion_of(
+        recording, file, machine, static=static, max_residual=max_residual, max_gap=max_gap,
+        longest=longest, force=force, cutoff=cutoff,
+    )  # fmt: skip
+
+
+def motion_of(
+    recording: Recording,
+    file: MarkerFile,
+    machine: Mechanism,
+    *,
+    static: Recording | None = None,
+    max_residual: float = MAX_RESIDUAL,
+    max_gap: float = MAX_GAP,
+    longest: bool = False,
+    force: Sequence[str] | None = None,
+    cutoff: float | str | None = None,
+) -> MarkerMotion:
+    """The same of recordings that were read; static: the trial that `file.static` names."""
     forces = file.forces if force is None else _three(force)
     activity = {} if file.emg is None else envelopes(file.emg, recording, machine)
-    bodies = find_bodies(recording, file)
+    bodies = find_bodies(recording, file, static)
 
-    registration = register(file, machine, partial(_place, recording, bodies))
+    registration = register(file, machine, partial(_place, bodies.home))
     R, p = registration.pose(bodies.platform.fit.rotation, bodies.platform.fit.position)
     worst = np.maximum(*(body.fit.largest() for body in bodies.both))  # NaN where either is
     used = worst <= max_residual
@@ -138,8 +159,9 @@ def _three(channels: Sequence[str]) -> Forces:
         ) from None
 
 
-def _place(recording: Recording, bodies: Bodies, where: Place, key: str) -> np.ndarray:
+def _place(bodies: Bodies, where: Place, key: str) -> np.ndarray:
     """Where a marker is at home on the mean, or what numbers in the file's unit say, (3,) [m]."""
+    recording = bodies.recording
     if not isinstance(where, str):
         return np.array(where) * recording.metres
     label = find_label(where, recording.labels, f"register: {key}: {recording.source}")

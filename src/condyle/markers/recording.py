@@ -37,6 +37,7 @@ class Recording:
         samples: (F, n, C), n samples a frame, in the channel's unit.
         plates: force plates, in the file's order.
         warnings: what had to be assumed.
+        up: axis of the laboratory that points upwards, (3,): Z, or what the file says.
     """
 
     source: str
@@ -53,6 +54,7 @@ class Recording:
     samples: np.ndarray
     plates: tuple[Plate, ...] = ()
     warnings: tuple[str, ...] = ()
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
     @property
     def analog(self) -> np.ndarray:
@@ -134,6 +136,7 @@ def _read(content: bytes, path: str | os.PathLike[str], unit: str | None) -> Rec
         samples=np.array(analog),
         plates=read_plates(file, metres),
         warnings=assumed,
+        up=_up(file.get("POINT:Y_SCREEN")),
     )
 
 
@@ -191,6 +194,14 @@ def _unit(
             f"{', '.join(LENGTH_UNITS)}. If you know it, name it with --units (unit=...)"
         )
     return name, LENGTH_UNITS[name], ()
+
+
+def _up(screen: Any) -> tuple[float, float, float]:
+    """The axis that is drawn upwards (POINT:Y_SCREEN), such as +Z or -Y; Z where none is named."""
+    said = "" if screen is None else _plain(screen.bytes).upper()
+    axis = "XYZ".find(said[-1:] or "Z")
+    x, y, z = np.eye(3)[axis] * (-1 if said.startswith("-") else 1)
+    return float(x), float(y), float(z)
 
 
 def _labels(file: Any, key: str, count: int) -> tuple[str, ...]:

@@ -1,0 +1,95 @@
+"""A static trial: home and the points are its own, both bodies carry them into other trials."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tomli_w
+from scipy.spatial.transform import Rotation
+from support.recorded_jaw import Jaw, record
+
+from condyle.errors import InputError
+from condyle.markers import MarkerMotion, motion_from_c3d, read_markers
+from condyle.markers.rigid import common_shape, fit
+
+STATIC: dict[str, Any] = {"file": "static.c3d", "home": [0.0, 0.5]}
+ROUNDING = np.array([1e-6] * 3 + [2e-5] * 3)  # single precision, over the least breadth
+
+
+def trial(folder: Path, away: float = 0.03, **options: Any) -> Jaw:
+    """A static trial, written, and a jaw that opens with the head `away` [m] and turned."""
+    record(seconds=1.0, **options).write(folder / "static.c3d")
+    jaw = record(**options)
+    turn = Rotation.from_rotvec([0.3, -0.2, 0.1]).as_matrix()
+    jaw.points[:] = jaw.points @ turn.T + np.array([away, -away, 0.5 * away])
+    return jaw
+
+
+def measured(jaw: Jaw, folder: Path, **changes: Any) -> MarkerMotion:
+    tables = jaw.tables(**changes)
+    if "static" in changes and "home" not in changes:
+        del tables["home"]
+    path = folder / "m.toml"
+    path.write_text(tomli_w.dumps(tables))
+    return motion_from_c3d(jaw.write(folder / "a.c3d"), path, "masticatory")
+
+
+def error(got: MarkerMotion, jaw: Jaw) -> np.ndarray:
+    return np.abs(got.motion.value - jaw.pose).max(axis=0)
+
+
+def test_both_bodies_carry_the_static_trial(tmp_path: Path) -> None:
+    """The head stands elsewhere and turned; the teeth need not be closed in the trial."""
+    jaw = trial(tmp_path)
+    got = measured(jaw, tmp_path, static=STATIC)
+    assert (error(got, jaw) < ROUNDING).all() and got.warnings == ()
+    # The numbers of another trial, taken as if the head had stayed.
+    wrong = measured(jaw, tmp_path)
+    assert error(wrong, jaw)[:3].max() > 1e-3
+    # The trial's own home is held against the static's.
+    both = measured(jaw, tmp_path, static=STATIC, home=[0.0, 0.5])
+    assert (error(both, jaw) < ROUNDING).all() and both.warnings == ()
+
+
+def test_markers_that_moved_on_their_body_are_said(tmp_path: Path) -> None:
+    """A brace that slipped by 3 mm between the trials."""
+    jaw = trial(tmp_path)
+    for name in ("Lower_FL", "Lower_BL", "Lower_FR", "Lower_BR"):
+        jaw.at(name)[:] += [0.003, 0.0, 0.0]
+    got = measured(jaw, tmp_path, static=STATIC, home=[0.0, 0.5])
+    assert "at its home the platform is 3 mm from where it is in the static trial" in str(
+        got.warnings
+    )
+
+
+def test_points_named_by_markers_are_those_of_the_static_trial(tmp_path: Path) -> None:
+    """In the trial itself the pointed marker is gone."""
+    jaw = trial(tmp_path)
+    still = record(seconds=1.0)
+    place = np.array(jaw.register["left_condyle"]) / 1e3
+    upper = still.points[:, :4]  # the marker goes with the head
+    shape = common_shape(upper[:51])
+    head = fit(shape, upper)
+    still.at("TMJ_L")[:] = head.rotation @ place + head.position
+    still.write(tmp_path / "static.c3d")
+    register = jaw.register | {"left_condyle": "TMJ_L"}
+    jaw.at("TMJ_L")[:] = np.nan
+    got = measured(jaw, tmp_path, static=STATIC, register=register)
+    assert (error(got, jaw) < 2 * ROUNDING).all()
+
+
+def test_a_marker_file_needs_a_home_somewhere(tmp_path: Path) -> None:
+    jaw = record(seconds=1.0)
+    tables = jaw.tables()
+    del tables["home"]
+    with pytest.raises(InputError, match="home: is missing; name a stretch"):
+        read_markers(tables)
+    with pytest.raises(InputError, match="no such file"):
+        measured(jaw, tmp_path, static={"file": "none.c3d", "home": 0.2})
+    with pytest.raises(InputError, match=r"weights: Uper is not listed in platform"):
+        read_markers(jaw.tables(weights={"Uper": 2.0}))
+    with pytest.raises(InputError, match=r"vertical\.up: expected three numbers, not all zero"):
+        read_markers(jaw.tables(vertical={"up": [0, 0, 0]}))
