@@ -1,0 +1,129 @@
+"""A mechanism scaled to a subject: known affine maps, someone else's splines, a body of points."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.interpolate import RBFInterpolator
+
+import condyle
+from condyle.errors import InputError, UnsupportedError
+from condyle.mechanism.scaling import named_points, scaled_to
+
+FOUR = ["incisor", "left_condyle", "right_condyle", "chin"]
+MANY = [*FOUR, "left_molar", "right_molar", "left_canine", "right_canine"]
+A = np.array([[1.08, 0.01, 0.02], [-0.015, 0.94, 0.0], [0.03, -0.01, 1.05]])
+b = np.array([2e-3, -1e-3, 3e-3])
+
+
+@pytest.fixture(scope="module")
+def jaw() -> condyle.Mechanism:
+    return condyle.load_mechanism("human-jaw")
+
+
+def moved(jaw: condyle.Mechanism, names: list[str], d: Any = 0.0) -> dict[str, Any]:
+    x = named_points(jaw, names)
+    return dict(zip(names, x @ A.T + b + np.abs(x[:, 1:2]) * d, strict=True))
+
+
+def every_point(jaw: condyle.Mechanism) -> np.ndarray:
+    return np.array(
+        [end for chain in jaw.chains for end in (chain.base, chain.platform)]
+        + [contact.point for contact in jaw.contacts]
+        + list(jaw.platform.points.values())
+        + [jaw.platform.com]
+    )
+
+
+@pytest.mark.parametrize("kind", ["affine", "thin_plate"])
+@pytest.mark.parametrize("names", [FOUR, MANY])
+def test_an_affine_subject_is_found(jaw: condyle.Mechanism, kind: str, names: list[str]) -> None:
+    """Of whom four landmarks, or eight, are known: every point of the file follows."""
+    found = scaled_to(jaw, moved(jaw, names), kind)
+    np.testing.assert_allclose(every_point(found.mechanism), every_point(jaw) @ A.T + b, atol=1e-13)
+    assert found.volume == pytest.approx(np.linalg.det(A), rel=1e-11)
+    assert found.mechanism.platform.mass == pytest.approx(0.2 * np.linalg.det(A), rel=1e-11)
+    assert max(found.residual.values()) < 1e-13 and not found.warnings
+    assert found.stretch == pytest.approx(np.linalg.norm(A, axis=0), rel=1e-11)
+
+
+def test_sides_of_their_own(jaw: condyle.Mechanism) -> None:
+    """A left side that is wider than the right: one affine map a side, one at the middle."""
+    d = np.array([0.02, 0.05, -0.03])
+    found = scaled_to(jaw, moved(jaw, MANY, d))
+    x = every_point(jaw)
+    assert found.kind == "affine by side"
+    expected = x @ A.T + b + np.abs(x[:, 1:2]) * d
+    np.testing.assert_allclose(every_point(found.mechanism)[:-1], expected[:-1], atol=1e-13)
+
+
+def test_landmarks_off_an_affine_map(jaw: condyle.Mechanism) -> None:
+    """The spline goes through all of them, and elsewhere where SciPy's goes; the affine map does
+    not, and says by how much."""
+    rng = np.random.default_rng(3)
+    places = {n: p + rng.normal(0, 2e-3, 3) for n, p in moved(jaw, MANY).items()}
+    bent = scaled_to(jaw, places, "thin_plate")
+    assert max(bent.residual.values()) < 1e-12
+    given = named_points(jaw, MANY), np.array([*places.values()])
+    theirs = RBFInterpolator(*given, kernel="linear", degree=1)
+    np.testing.assert_allclose(every_point(bent.mechanism), theirs(every_point(jaw)), atol=1e-9)
+    straight = scaled_to(jaw, places)
+    off = named_points(straight.mechanism, MANY) - np.array([*places.values()])
+    assert straight.residual == pytest.approx(
+        dict(zip(MANY, np.linalg.norm(off, axis=1), strict=True))
+    )
+    assert max(straight.residual.values()) > 1e-4
+
+
+def test_inertia_is_that_of_the_moved_body(jaw: condyle.Mechanism) -> None:
+    """Six points of mass with the jaw's mass and inertia, each moved by the map."""
+    body = jaw.platform
+    I = body.inertia.tensor()
+    second = np.diag(np.trace(I) / 2 - np.diag(I))  # the jaw's products of inertia are zero
+    arms = np.vstack([side * np.sqrt(3 * second / body.mass) for side in (1, -1)])
+    mass = body.mass / 6
+    made = scaled_to(jaw, moved(jaw, FOUR)).mechanism.platform
+    there, per_mass = arms @ A.T, mass * np.linalg.det(A)
+    expected = per_mass * (np.sum(there**2) * np.eye(3) - there.T @ there)
+    np.testing.assert_allclose(made.inertia.tensor(), expected, rtol=1e-11, atol=1e-18)
+
+
+def test_contacts_stay_on_their_surfaces(jaw: condyle.Mechanism) -> None:
+    curved = condyle.load_mechanism("human-jaw-curved")
+    for machine in (jaw, curved):
+        made = scaled_to(machine, moved(machine, FOUR)).mechanism
+        for old, new in zip(machine.contacts, made.contacts, strict=True):
+            assert abs(new.gradient()[0] - old.gradient()[0]) < 1e-12
+            for axis, bound in old.bounds:
+                if bound is not None:
+                    shift = np.subtract(new.point, old.point)["xyz".index(axis)]
+                    assert getattr(new.bounds, axis) == pytest.approx(np.add(bound, shift))
+
+
+def test_what_was_scaled_is_said(jaw: condyle.Mechanism) -> None:
+    text = str(scaled_to(jaw, moved(jaw, FOUR)))
+    for words in ("4 landmarks (affine)", "24 chains", "2 contacts", "inertia", "greatest forces"):
+        assert words in text
+    large = {name: 2 * p for name, p in moved(jaw, FOUR).items()}
+    assert "check the landmarks' places" in scaled_to(jaw, large).warnings[0]
+
+
+def test_landmarks_that_determine_nothing(jaw: condyle.Mechanism) -> None:
+    right = moved(jaw, FOUR)
+    with pytest.raises(InputError, match="got 3, expected 4 or more"):
+        scaled_to(jaw, moved(jaw, FOUR[:3]))
+    with pytest.raises(InputError, match='has no point or contact "nose"'):
+        scaled_to(jaw, right | {"nose": np.zeros(3)})
+    flat = jaw.set({f"platform.points.{n}[0]": 0.03 for n in MANY if "condyle" not in n})
+    with pytest.raises(InputError, match="are in one plane"):
+        scaled_to(flat, moved(flat, ["incisor", "chin", "left_molar", "right_molar"]))
+    left, other = right["left_condyle"], right["right_condyle"]
+    swapped = right | {"left_condyle": other, "right_condyle": left}
+    with pytest.raises(InputError, match="inside out"):
+        scaled_to(jaw, swapped)
+    with pytest.raises(UnsupportedError, match="bodies of its own"):
+        scaled_to(condyle.load_mechanism("masticatory"), right)
+    with pytest.raises(InputError, match="thin_plate"):
+        scaled_to(jaw, right, "rubber")
