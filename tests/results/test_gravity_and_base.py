@@ -13,6 +13,7 @@ from condyle import InputError, Motion, UnsupportedError
 from condyle.motion import read_table, write_table
 from condyle.motion.column_units import BASE, GRAVITY
 from condyle.results.solving import given_along
+from condyle.results.summary import summarize
 
 T = np.linspace(0, 1, 41)
 HEXAGLIDE = ("X", "Y", "alpha", "beta", "gamma")
@@ -132,3 +133,32 @@ def test_states(tmp_path: Path, model: condyle.Model, name: str) -> None:
     condyle.forward_states(model, tmp_path / name, tmp_path / "out.csv")
     out = read_table(tmp_path / "out.csv").columns
     np.testing.assert_allclose(out["ddX"], motion.acceleration[:, 0], atol=1e-9)
+
+
+def test_the_summary_says_how_much(model: condyle.Model) -> None:
+    motion = Motion.from_arrays(T, {n: a for n, a in columns().items() if n != "t"})
+    solution = model.solve(motion)
+    summary = summarize(solution)
+    assert summary.data["gravity"]["tilt"] == pytest.approx(np.degrees(0.4))
+    largest = np.abs(solution["share"].sel(part="base")).max()
+    assert summary.data["moving_base"]["value"] == pytest.approx(float(largest))
+    assert "at most 22.9 degrees from" in str(summary)
+    assert "effort for the base's motion: at most" in str(summary)
+
+
+def test_a_sweep_over_motions_with_and_without(tmp_path: Path, model: condyle.Model) -> None:
+    moving = Motion.from_arrays(T, {n: a for n, a in columns().items() if n != "t"})
+    write_table(tmp_path / "moving.csv", columns())
+    write_table(tmp_path / "still.csv", {n: columns()[n] for n in ("t", *HEXAGLIDE)})
+    mass = model.mechanism.platform.mass
+    study = {
+        "motion": [{"file": str(tmp_path / f"{name}.csv")} for name in ("moving", "still")],
+        "vary": [{"what": "platform.mass", "values": [mass, 2 * mass]}],
+        "measure": {"need": {"of": "share", "take": "max_abs", "over": ["time", "chain"]}},
+        "backend": "numpy",
+    }
+    table = condyle.sweep(study, mechanism=model.mechanism, load=condyle.Load.zero(), workers=1)
+    wanted = np.abs(model.solve(moving)["share"]).max(("time", "chain"))
+    for part in ("platform", "base"):
+        np.testing.assert_allclose(table[f"need.{part}"][0], wanted.sel(part=part), rtol=1e-12)
+    assert float(table["need.base"][1]) == 0

@@ -40,6 +40,16 @@ class Summary:
                 f"greatest activation (effort over its limit): {most['value']:.4g}, "
                 f"{most['chain']} at t = {most['time']:g} s"
             )
+        if (own := d["gravity"]) is not None:
+            lines.append(
+                f"gravity of the motion: {own['least']:.4g} to {own['most']:.4g} m/s^2, at most "
+                f"{own['tilt']:.3g} degrees from the mechanism's"
+            )
+        if (most := d["moving_base"]) is not None:
+            lines.append(
+                f"effort for the base's motion: at most {most['value']:.4g} {most['unit']}, "
+                f"{most['chain']} at t = {most['time']:g} s"
+            )
         if d["peak_contact_force"]:
             lines.append("peak contact force (negative: the surface pushes along -n)")
             lines += [
@@ -107,6 +117,8 @@ def summarize(solution: xr.Dataset) -> Summary:
                 if some
             },
             "greatest_activation": _greatest_activation(solution),
+            "gravity": _gravity(solution),
+            "moving_base": _moving_base(solution),
             "distribution": options.get("distribution", "minimum_norm"),
             "power": _power(solution),
             "friction_work": _friction_work(solution),
@@ -144,6 +156,32 @@ def _greatest_activation(solution: xr.Dataset) -> dict[str, Any] | None:
     sample, chain, value = found
     return {
         "value": abs(value),
+        "chain": str(solution["chain"].values[chain]),
+        "time": float(solution["time"].values[sample]),
+    }
+
+
+def _gravity(solution: xr.Dataset) -> dict[str, float] | None:
+    """Size of gravity [m/s^2] and its angle with the mechanism's [deg], where the motion has it."""
+    if "gravity" not in solution:
+        return None
+    gravity, own = solution["gravity"].values, np.array(solution.condyle.mechanism.gravity)
+    size = np.linalg.norm(gravity, axis=1)
+    across = np.linalg.norm(np.cross(gravity, own), axis=1)
+    tilt = np.degrees(np.arctan2(across, gravity @ own))
+    return {"least": float(size.min()), "most": float(size.max()), "tilt": float(tilt.max())}
+
+
+def _moving_base(solution: xr.Dataset) -> dict[str, Any] | None:
+    """The largest effort that the base's motion asks for; None where the base is at rest."""
+    if "base" not in solution["part"].values:
+        return None
+    if (found := peak(solution["share"].sel(part="base").values)) is None:
+        return None
+    sample, chain, value = found
+    return {
+        "value": abs(value),
+        "unit": str(solution["effort_unit"].values[chain]),
         "chain": str(solution["chain"].values[chain]),
         "time": float(solution["time"].values[sample]),
     }

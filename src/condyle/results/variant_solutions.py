@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import partial
 from typing import Any
 
@@ -110,10 +110,16 @@ def measured(
     return np.concatenate(parts)
 
 
-def outputs_of(model: Model, reads: Iterable[Measure]) -> tuple[str, ...]:
-    """Outputs of inverse dynamics that something is read of."""
+def outputs_of(
+    model: Model, reads: Iterable[Measure], given: Collection[str] = ()
+) -> tuple[str, ...]:
+    """Outputs of inverse dynamics that something is read of.
+
+    Args: given: gravity or base, if motions give them.
+    """
     home = np.zeros((1, len(model.independent)))
-    seen = _Seen(model.inverse_dynamics(home, home, home, outputs=SOLVED))
+    base = np.zeros(9) if "base" in given else None
+    seen = _Seen(model.inverse_dynamics(home, home, home, base=base, outputs=SOLVED))
     for read in reads:
         read(Derived(model.mechanism, seen, np.zeros((1, 6)), model.limited), 1)
     return tuple(name for name in SOLVED if name in seen.names)

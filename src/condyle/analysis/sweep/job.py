@@ -120,7 +120,7 @@ def prepared(
     base = tuple(_numbers(study, machine))
     design = Design(study.vary, study.sampling, base)
     design.check()
-    paths = motions or tuple(_motion(one, machine) for one in study.motion)
+    paths = _alike(motions or tuple(_motion(one, machine) for one in study.motion))
     acting = load or _load(study.load, machine)
     name = study.load_point or acting.point
     if np.any(acting.wrench) or name is not None:
@@ -128,7 +128,8 @@ def prepared(
     wrenches = tuple(acting.at(path.t) for path in paths)
     job = Job(study, machine, paths, acting, wrenches, name, design)
     model = job.model
-    found = tuple(reading(name, measure, model) for name, measure in study.measure.items())
+    given = tuple(dict.fromkeys(name for path in paths for name in path.given))
+    found = tuple(reading(name, one, model, given) for name, one in study.measure.items())
     job = replace(job, readings=found)
     taken = [*OWN, *job.parameters, *job.measures]
     if twice := [n for n in dict.fromkeys(taken) if taken.count(n) > 1]:
@@ -136,12 +137,23 @@ def prepared(
     for path in paths:  # what does not fit the mechanism shows here, and kernels are built
         few: Any = {k: getattr(path, k)[:2] for k in ("t", "value", "rate", "acceleration")}
         (q, q1, q2), _ = model.poses.of_motion(replace(path, **few))
-        given = each(path.given, lambda a: a[:2])
-        model.inverse_dynamics(q, q1, q2, **given, outputs=SOLVED, threads=1)
+        around = each(path.given, lambda a: a[:2])
+        model.inverse_dynamics(q, q1, q2, **around, outputs=SOLVED, threads=1)
     if design.count >= MANY:
         model.variants(job.columns(design.rows(0, MANY)))  # as are those of numbers
-    needed = SOLVED if study.solutions else outputs_of(model, (one.values for one in found))
+    reads = (one.values for one in found)
+    needed = SOLVED if study.solutions else outputs_of(model, reads, given)
     return replace(job, outputs=needed)
+
+
+def _alike(paths: tuple[Motion, ...]) -> tuple[Motion, ...]:
+    """Motions whose efforts have the same parts: where one has a moving base, all have."""
+    if not any("base" in path.given for path in paths):
+        return paths
+    return tuple(
+        replace(path, base=np.zeros((len(path), 9))) if path.base is None else path
+        for path in paths
+    )
 
 
 def _numbers(study: Study, machine: Mechanism) -> Iterator[float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from itertools import product
 
@@ -54,8 +54,10 @@ class Reading:
         return np.reshape(found, (count, len(self.names)))
 
 
-def reading(name: str, measure: Measure, model: Model) -> Reading:
+def reading(name: str, measure: Measure, model: Model, given: Collection[str] = ()) -> Reading:
     """A measure, looked up in what a model's solutions have.
+
+    Args:   given: gravity or base, if the motions give them.
 
     Raises: InputError: for a variable, dimension or entry that there is not.
     """
@@ -68,7 +70,7 @@ def reading(name: str, measure: Measure, model: Model) -> Reading:
             f"measure {name}: solutions of this mechanism have no {variable.name} "
             f"({variable.meaning})"
         )
-    labels = labels_of(model)
+    labels = {**labels_of(model), "part": model.parts_under(given)}
     dims = variable.dims
     for dim, entry in measure.chosen.items():
         if dim not in dims:
