@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from oracles.random_mechanism import random_mechanism
 from support.families import MECHANISMS, MIXED, Case, case, close, of_raw
+from support.loads import parts
 from support.speeds import few
 
 pytestmark = pytest.mark.slow
@@ -110,3 +111,25 @@ def test_rod_angles(name: str) -> None:
         theirs = by_engine(*c.sample(i))
         close(ours.configuration.beta[i], theirs["beta_i"], TOLERANCE, floor=1e-3)
         close(ours.configuration.gamma[i], theirs["gamma_i"], TOLERANCE, floor=1e-3)
+
+
+@pytest.mark.parametrize(
+    "options", few([*CLASS, *SURFACES], CLASS[0], MECHANISMS["mixed_k0_n8"], SURFACES[3]), ids=str
+)
+def test_a_moving_base(options: dict[str, Any]) -> None:
+    """Pinocchio's recursion with a free base that is led."""
+    engine("pinocchio", random_mechanism(np.random.default_rng(0)))  # skips without it
+    from oracles.pinocchio_engine import OnMovingBase
+
+    rng = np.random.default_rng(200 + len(str(options)))
+    c = of_raw(random_mechanism(rng, **options))
+    gravity, base = rng.normal(0, 9, (len(c.load), 3)), rng.normal(0, 6, (len(c.load), 9))
+    q = (c.states[key] for key in ("q", "qd", "qdd"))
+    ours = c.model().inverse_dynamics(*q, *parts(c.load), gravity=gravity, base=base)
+    assert (ours.status == 0).all()
+    for i in range(len(c.load)):
+        by_engine = OnMovingBase(c.raw, base[i], gravity[i])
+        theirs = by_engine.inverse_dynamics(*c.sample(i))
+        close(ours.effort[i], theirs["tau"], TOLERANCE)
+        force = np.abs(c.load[i, :3]).max()
+        close(ours.contact_force[i], theirs["contact"], TOLERANCE, floor=force)

@@ -221,3 +221,35 @@ def test_friction_and_limits() -> None:
         close(back.acceleration, a, 1e-6)
         assert model.parts_under(given)[:4] == ("platform", "couplers", "cranks", "actuators")
         close(found.share[good].sum(axis=1), found.effort[good], 1e-9)
+
+
+def test_gravity_that_varies_and_is_given() -> None:
+    c = case("rss")
+    batch = c.model().variants({"gravity[2]": [-9.8, -9.7]})
+    with pytest.raises(InputError, match=r"gravity\[2\]: varies, and gravity is given"):
+        batch.inverse_dynamics(*states(c), **moved(c))
+
+
+@pytest.mark.parametrize("distribution", ["minimum_norm", "bounded"])
+def test_derivatives_with_friction_and_limits(distribution: str) -> None:
+    raw = random_mechanism(np.random.default_rng(2), chains=8)
+    for contact in raw["contact"]:
+        contact["friction"] = {"coefficient": 0.2}
+    for chain in raw["chain"]:
+        chain["actuator"] = {"torque_limit": 0.5, "viscous": 1e-3, "rotor_inertia": 1e-5}
+    c = of_raw(raw)
+    model = Model(c.mechanism, distribution=distribution, backend="numpy")
+    q, v, a, wrench, at = states(c)
+    state = {"q": q, "v": v, "a": a, "wrench": wrench, "at": at, **moved(c)}
+    d = model.derivatives("effort", ("gravity", "base"), **state)
+    good = d.status == 0
+    assert good.sum() > 1
+    for by, h in (("gravity", 1e-4), ("base", 1e-4)):
+        for i in range(d["effort", by].shape[-1]):
+            ends = []
+            for step in (h, -h):
+                x = np.array(state[by])
+                x[:, i] += step
+                ends.append(model.inverse_dynamics(**{**state, by: x}).effort)
+            slope = (ends[0] - ends[1]) / (2 * h)
+            close(d["effort", by][good, :, i], slope[good], 1e-6, floor=1e-2)

@@ -18,13 +18,17 @@ FIXED, ORIGIN = np.eye(3), np.zeros(3)
 
 
 class PinocchioEngine(CutTree):
-    def __init__(self, description: Raw | Description) -> None:
+    def __init__(self, description: Raw | Description, free: bool = False) -> None:
+        """Args: free: with a free base, whose velocities come first."""
         super().__init__(description)
         d = self.d
         self.model = pin.Model()
         self.model.gravity.linear = d.gravity
         self.closed: list[tuple[int, int]] = []  # pairs of frames that must coincide
-        at = self._joint(0, pin.JointModelTranslation())
+        self.root = 0
+        if free:
+            self.root = self._joint(0, pin.JointModelFreeFlyer())
+        at = self._joint(self.root, pin.JointModelTranslation())
         for kind in (pin.JointModelRX(), pin.JointModelRY(), pin.JointModelRZ()):
             at = self._joint(at, kind)
         self.platform = at
@@ -52,7 +56,7 @@ class PinocchioEngine(CutTree):
         end = np.array([chain.length, 0, 0])
         if chain.kind == "SPS":
             cylinder, piston = chain.rods
-            at = self._joint(0, pin.JointModelRY(), chain.N0, chain.S)
+            at = self._joint(self.root, pin.JointModelRY(), chain.N0, chain.S)
             at = self._joint(at, pin.JointModelRZ())
             self._body(at, cylinder.mass, cylinder.com, cylinder.inertia)
             drive = at = self._joint(at, pin.JointModelPX(), at=end)
@@ -60,17 +64,21 @@ class PinocchioEngine(CutTree):
             tip = self._frame(at, np.zeros(3))
         else:
             if chain.kind == "RSS":
-                drive = self._joint(0, pin.JointModelRevoluteUnaligned(chain.axis), at=chain.G)
+                drive = self._joint(
+                    self.root, pin.JointModelRevoluteUnaligned(chain.axis), at=chain.G
+                )
                 about = chain.drive * np.outer(chain.axis, chain.axis)
                 m, com = chain.drive_mass, chain.drive_com
                 about -= m * (com @ com) * np.outer(chain.axis, chain.axis)
                 self._body(drive, m, com, about)
                 S = self._frame(drive, chain.S - chain.G)
             else:
-                drive = self._joint(0, pin.JointModelPrismaticUnaligned(chain.axis), at=chain.S)
+                drive = self._joint(
+                    self.root, pin.JointModelPrismaticUnaligned(chain.axis), at=chain.S
+                )
                 self._body(drive, chain.drive, 0.0, np.zeros((3, 3)))
                 S = self._frame(drive, np.zeros(3))
-            at = self._joint(0, pin.JointModelTranslation(), at=chain.S)
+            at = self._joint(self.root, pin.JointModelTranslation(), at=chain.S)
             self.closed.append((S, self._frame(at, np.zeros(3))))
             at = self._joint(at, pin.JointModelRY(), chain.N0)
             at = self._joint(at, pin.JointModelRZ())
@@ -112,3 +120,26 @@ class PinocchioEngine(CutTree):
         M = np.triu(pin.crba(self.model, self.data, q))
         h = pin.nonLinearEffects(self.model, self.data, q, v).copy()
         return M + np.triu(M, 1).T, h
+
+
+class OnMovingBase(PinocchioEngine):
+    """On a base that passes the resting frame, with its acceleration, angular velocity and
+    acceleration, (9,)."""
+
+    def __init__(self, description: Raw | Description, base: Array, gravity: Array) -> None:
+        super().__init__(description)
+        self.base = base
+        self.whole = PinocchioEngine(description, free=True)
+        self.whole.model.gravity.linear = gravity
+
+    def inverse(self, q: Array, v: Array, a: Array) -> Array:
+        still, rest = np.array([0.0, 0, 0, 0, 0, 0, 1]), np.zeros(3)
+        acceleration, w, w_rate = self.base.reshape(3, 3)
+        model, data = self.whole.model, self.whole.data
+        return pin.rnea(
+            model,
+            data,
+            np.append(still, q),
+            np.concatenate([rest, w, v]),
+            np.concatenate([acceleration, w_rate, a]),
+        )[6:]

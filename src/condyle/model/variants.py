@@ -9,7 +9,7 @@ Variants keep the coordinates of the mechanism that they come from, and the kern
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from typing import Any
@@ -72,6 +72,7 @@ class Group:
         point = ORIGIN
         if at is not None:
             point = np.repeat(self.variants.points(at)[self.rows], N, axis=0)
+        self.variants.check_given(motion.given)
         given = each(motion.given, lambda a: np.tile(a, (V, 1)))
         return model._inverse.many(states, np.tile(wrench, (V, 1)), point, outputs, threads, given)
 
@@ -243,6 +244,14 @@ class Variants:
                 found[:, keys[3] if keys[3:] else slice(None)] = values  # type: ignore[index]
         return found
 
+    def check_given(self, given: Collection[str]) -> None:
+        """Raises InputError where gravity is given beside that of the variants."""
+        if "gravity" in given and (own := [p for p in self.table if parsed(p)[0] == "gravity"]):
+            raise InputError(
+                f"{own[0]}: varies, and gravity is given sample by sample (gx, gy, gz of a motion, "
+                "or gravity=...), so that it has no effect: leave out one of them"
+            )
+
     # -- all together ------------------------------------------------------------------------
 
     def inverse_dynamics(
@@ -317,6 +326,7 @@ class Variants:
     ) -> ModelResult:
         w = None if wrench is None else WRENCH.array(wrench)
         given = {name: GIVEN[name].array(a) for name, a in given.items()}
+        self.check_given(given)
         shapes = [a.shape[:-1] for a in (*state, *(() if w is None else (w,)), *given.values())]
         point = None if at is None or isinstance(at, str) else POINT.array(at)
         shapes += [] if point is None else [point.shape[:-1]]
