@@ -133,7 +133,8 @@ class MotionOptions(Group):
         Path | None,
         option(
             "Motion (CSV or Parquet): t (s) and pose coordinates such as X, Y (m), alpha, beta "
-            "(rad), or the path x, y, z (m) of a landmark. Default: the bundled chewing path where "
+            "(rad), or the path x, y, z (m) of a landmark; if any, gravity gx, gy, gz (m/s^2) and "
+            "the base's motion base_ax ... base_dwz. Default: the bundled chewing path where "
             "it fits the mechanism, else a trial motion about home (both synthetic)."
         ),
     ] = None

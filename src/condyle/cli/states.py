@@ -32,7 +32,8 @@ def solve(
     Options:
         states: States (CSV or Parquet), one per row: pose coordinates such as X, Y (m), alpha, beta
             (rad), their rates dX ... (per s) and accelerations ddX ... (per s^2; at rest without
-            both), and, if any, Fx, Fy, Fz (N), Mx, My, Mz (N m).
+            both), and, if any, Fx, Fy, Fz (N), Mx, My, Mz (N m), gravity gx, gy, gz (m/s^2) and the
+            base's motion base_ax ... base_dwz.
         out: File for the results (.csv or .parquet).
         noise: Standard deviations of columns of states, "X=0.01 mm,dX=1 mm/s", and of numbers of
             the mechanism file (SI), "platform.mass=0.01": those of the efforts are written too, as
@@ -75,7 +76,8 @@ def forward(
     Options:
         states: States and efforts (CSV or Parquet), one per row: pose coordinates such as X, Y (m),
             alpha, beta (rad), their rates dX ... (per s), tau_CHAIN of every chain (N m, or N where
-            it slides or pulls), and, if any, Fx, Fy, Fz (N), Mx, My, Mz (N m).
+            it slides or pulls), and, if any, Fx, Fy, Fz (N), Mx, My, Mz (N m), gravity gx, gy, gz
+            (m/s^2) and the base's motion base_ax ... base_dwz.
         out: File for the results (.csv or .parquet).
     """
     import condyle
@@ -120,7 +122,7 @@ def derivatives(
         out: File for the derivatives (.csv or .parquet).
         of: effort, contact_force, acceleration, pose, joint, contact_point or singularity_ratio;
             several times for several. Default: effort.
-        wrt: q, v, a, wrench, at, effort, or the path of a number of the mechanism file such as
+        wrt: q, v, a, wrench, at, effort, gravity, base, or the path of a number of the mechanism file such as
             platform.mass; several times for several. Default: q.
         zeros: Write zeros where a number cannot matter, instead of failing.
     """
