@@ -122,8 +122,8 @@ def derivatives(
         out: File for the derivatives (.csv or .parquet).
         of: effort, contact_force, acceleration, pose, joint, contact_point or singularity_ratio;
             several times for several. Default: effort.
-        wrt: q, v, a, wrench, at, effort, gravity, base, or the path of a number of the mechanism file such as
-            platform.mass; several times for several. Default: q.
+        wrt: q, v, a, wrench, at, effort, gravity, base, or the path of a number of the
+            mechanism file such as platform.mass; several times for several. Default: q.
         zeros: Write zeros where a number cannot matter, instead of failing.
     """
     import condyle
