@@ -39,7 +39,7 @@ def test_the_motion_is_written_and_its_quality_said(call: Callable[..., Any]) ->
         "a.c3d: 400 frames at 100 Hz from 0 to 3.99 s, lengths in mm",
         "Motion: 400 poses from 0 to 3.99 s, 5 of them filled in",
         "Registration, distance of each point from its place in the mechanism: incisor",
-        "Contacts will take away: left_condyle 0.0",
+        "Contacts, distance of the measured poses: left_condyle ",
         "Gaps: 1",
         "2 to 2.04 s (5 frames, filled): 2 of 4 fixed markers seen, not Upper_FL, Upper_BL",
         "Results: o.csv",

@@ -23,6 +23,7 @@ from condyle.kinematics.constraints import (
     parasitic_jacobian,
     residuals,
 )
+from condyle.kinematics.continuation import least_squares
 from condyle.kinematics.rotation import Bryant, rotation
 from condyle.mechanism import COORDINATES, Mechanism, parse
 from condyle.mechanism.home import (
@@ -33,7 +34,6 @@ from condyle.mechanism.home import (
     usable_sets,
 )
 from condyle.model.closing import Closure
-from condyle.model.continuation import least_squares
 
 pytestmark = pytest.mark.slow
 

@@ -1,7 +1,7 @@
 """Poses followed from home, with every condition written as CasADi's expression.
 
-Shares with the library how poses are followed (`model.continuation`), rates by the chain rule, and
-the contacts' equations; derivatives are CasADi's own, and run by its virtual machine.
+Shares with the library how poses are followed (`kinematics.continuation`), rates by the chain rule,
+and the contacts' equations; derivatives are CasADi's own, and run by its virtual machine.
 """
 
 from __future__ import annotations

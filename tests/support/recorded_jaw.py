@@ -2,13 +2,14 @@
 
 Four markers on a brace at the upper teeth, four at the lower, four on the face; a laboratory with
 axes of its own; a head that moves meanwhile. All in metres. Shared with the library: where a
-mechanism's file puts its named points.
+mechanism's file puts its named points, and the dependent coordinates of its contacts.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -96,6 +97,8 @@ def record(
     pose = np.column_stack(
         [0.003 * open_, 0.001 * side, -0.012 * open_, 0.01 * side, 0.12 * open_, 0.01 * side]
     )
+    machine = condyle.load_mechanism(mechanism)
+    pose = on_contacts(mechanism, pose)
     pose[:, 2] -= push * open_
     R = Rotation.from_euler("XYZ", pose[:, 3:]).as_matrix()
     # At home the head does not stand still either, once it moves.
@@ -111,7 +114,6 @@ def record(
     base = np.concatenate([base, np.broadcast_to(face, (len(t), 4, 3))], axis=1)
     lab = (base @ A.T + b) @ H.transpose(0, 2, 1) + h[:, None]
     lab += rng.normal(0, noise, lab.shape) if noise else 0.0
-    machine = condyle.load_mechanism(mechanism)
     there = {c.name: c.point for c in machine.contacts} | dict(machine.platform.points)
     # Numbers are where the point is on the mean of home, as the fixed markers are.
     home = t <= 0.5
@@ -120,6 +122,18 @@ def record(
     return Jaw(
         t, pose, [*FIXED, *PLATFORM, "Nasion", "Cheek_L", "Cheek_R", "TMJ_L"], lab, A, b, register
     )
+
+
+@cache
+def _model(mechanism: str) -> condyle.Model:
+    return condyle.Model(condyle.load_mechanism(mechanism), backend="numpy")
+
+
+def on_contacts(mechanism: str, pose: np.ndarray) -> np.ndarray:
+    """Poses (F, 6) with the dependent coordinates of the contacts."""
+    model = _model(mechanism)
+    q = pose[:, [condyle.mechanism.COORDINATES.index(name) for name in model.independent]]
+    return np.array(model.inverse_kinematics(q).pose)
 
 
 def mean_motion(H: np.ndarray, h: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

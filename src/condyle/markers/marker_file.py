@@ -166,7 +166,8 @@ class MarkerFile(Table):
     )
     static: Static | None = Field(None, description="a static trial")
     vertical: Vertical = Field(
-        default_factory=lambda: Vertical(), description="gravity and the base's motion"
+        default_factory=lambda: Vertical.model_validate({}),
+        description="gravity and the base's motion",
     )
 
     @property

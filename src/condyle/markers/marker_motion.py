@@ -1,4 +1,7 @@
-"""From markers to motion: two rigid bodies, the base taken out, the rest a pose in {S}."""
+"""From markers to motion: two rigid bodies, the base taken out, the rest a pose in {S}.
+
+Of the poses on the contacts it is the one nearest to the platform's markers.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +21,7 @@ from ..mechanism.mechanism import Mechanism
 from ..motion.arrays import as_number
 from ..motion.column_units import POSE
 from ..motion.file_words import listed
+from ..motion.nearest_pose import NearestPoses, nearest_poses
 from ..motion.path import Motion
 from .emg import envelopes
 from .forces import measured_load
@@ -28,7 +32,7 @@ from .marker_gaps import close_gaps
 from .marker_report import MarkerMotion, MarkerResidual
 from .measured_channels import MeasuredChannels
 from .recording import Recording, find_label, read_c3d
-from .registration import register
+from .registration import Registration, register
 from .rigid import continuous_angles
 
 MAX_RESIDUAL = 2e-3  # m
@@ -95,9 +99,17 @@ def motion_of(
     used = worst <= max_residual
     checks = exchanged_and_loose(recording, bodies, ~used & np.isfinite(worst))
 
-    pose = np.where(used[:, None], np.hstack([p, continuous_angles(R)]), np.nan)
+    free = np.where(used[:, None], np.hstack([p, continuous_angles(R)]), np.nan)
+    fitted = _on_contacts(machine, bodies, registration, file, free)
+    lost = used & ~fitted.found
+
+    def why(run: slice) -> str:
+        if lost[run].any():
+            return "no pose on the contacts is near the platform's markers"
+        return why_none(bodies, max_residual, run)
+
+    used, pose = used & fitted.found, fitted.pose
     try:
-        why = partial(why_none, bodies, max_residual)
         kept, whole, gaps = close_gaps(recording.source, recording.t, pose, max_gap, longest, why)
     except InputError as error:
         if not checks:
@@ -139,11 +151,31 @@ def motion_of(
         gaps=tuple(gaps),
         registration=registration,
         off_contacts={n: (_rms(d), float(np.abs(d).max())) for n, d in off.items()},
+        fitted=fitted,
+        markers_moved=fitted.summary(at),
         channels=channels,
         load=load,
         recording=recording,
         warnings=warnings,
     )
+
+
+def _on_contacts(
+    machine: Mechanism,
+    bodies: Bodies,
+    registration: Registration,
+    file: MarkerFile,
+    free: np.ndarray,
+) -> NearestPoses:
+    """The poses on the contacts that are nearest to the platform's markers.
+
+    Args: free: the poses that fit without contacts, (F, 6); NaN where there is none.
+    """
+    platform = bodies.platform
+    points = dict(zip(platform.names, registration.to_base(platform.shape), strict=True))
+    weights = np.array([file.weights.get(name, 1.0) for name in platform.names])
+    measured = registration.to_base(bodies.steadied(platform.points))
+    return nearest_poses(machine, points, measured, free, weights)
 
 
 def _three(channels: Sequence[str]) -> Forces:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..motion.column_units import FORCE, MOMENT
+from ..motion.nearest_pose import NearestPoses
 from ..motion.path import Motion
 from ..motion.platform_load import Load
 from ..motion.table_writer import TableWriter
@@ -44,12 +45,18 @@ class MarkerMotion:
     """A motion from markers, and their residuals.
 
     Attributes:
-        motion: X_EE in {S}, of kind "pose", without gaps.
+        motion: X_EE in {S}, of kind "pose", without gaps: on the contacts, the nearest to the
+            platform's markers.
         measured: (N,), where it was measured; elsewhere a gap was filled.
         residuals: of every marker, over the frames that were used.
         gaps: filled or cut off, in their order.
         registration: from the laboratory to {S}.
-        off_contacts: distance of each ball from its surface, root mean square and largest [m].
+        off_contacts: distance of each ball from its surface before that, root mean square and
+            largest [m].
+        fitted: the poses on the contacts, frame by frame of the recording, and the distances of the
+            markers;
+        markers_moved: their root mean squares and largest [m], by marker and of "all": `before` the
+            contacts and `after`, and how far these have `moved` them.
         channels: what was measured with it, at its times: markers in {S} with the base's motion
             taken out, their residuals, and EMG, where the marker file names channels.
         load: from force channels or a force plate, where some were named.
@@ -63,6 +70,8 @@ class MarkerMotion:
     gaps: tuple[Gap, ...]
     registration: Registration
     off_contacts: dict[str, tuple[float, float]]
+    fitted: NearestPoses
+    markers_moved: dict[str, dict[str, float]]
     channels: MeasuredChannels
     load: Load | None
     recording: Recording
@@ -94,9 +103,7 @@ class MarkerMotion:
             lines.append(
                 f"Registration, distance of each point from its place in the mechanism: {points}"
             )
-        if off := self.off_contacts.items():
-            balls = ", ".join(f"{n} {_mm(rms)} RMS, {_mm(m)} at most" for n, (rms, m) in off)
-            lines.append(f"Contacts will take away: {balls}")
+        lines += self._contacts()
         if (load := self.load) is not None:
             force, moment = (
                 np.linalg.norm(part, axis=1).max() for part in np.split(load.wrench, 2, 1)
@@ -113,6 +120,32 @@ class MarkerMotion:
             lines.append(f"  and {len(self.gaps) - _LISTED} more")
         return "\n".join(lines)
 
+    def _contacts(self) -> list[str]:
+        """How far the contacts are from the measured poses, and what they change of the markers."""
+        if not self.off_contacts:
+            return []
+        balls = ", ".join(
+            f"{n} {_mm(rms)} RMS, {_mm(m)} at most" for n, (rms, m) in self.off_contacts.items()
+        )
+        lines = [
+            f"Contacts, distance of the measured poses: {balls}",
+            "Distance of each marker on the platform from its place, before the contacts and on "
+            "them:",
+        ]
+        width = max(map(len, self.markers_moved))
+        lines += [
+            f"  {name:{width}}  {_mm(d['before_rms'])} RMS, {_mm(d['before_largest'])} at most; "
+            f"{_mm(d['after_rms'])} RMS, {_mm(d['after_largest'])} at most"
+            for name, d in self.markers_moved.items()
+            if d
+        ]
+        every = self.markers_moved["all"]
+        lines.append(
+            f"Contacts move the markers by {_mm(every['moved_rms'])} RMS, "
+            f"{_mm(every['moved_largest'])} at most"
+        )
+        return lines
+
 
 def as_data(found: MarkerMotion) -> dict[str, Any]:
     """The same in SI, as JSON has it."""
@@ -128,6 +161,7 @@ def as_data(found: MarkerMotion) -> dict[str, Any]:
         "off_contacts": {
             n: {"rms": rms, "largest": most} for n, (rms, most) in found.off_contacts.items()
         },
+        "markers_moved": found.markers_moved,
         "gaps": [vars(gap) for gap in found.gaps],
         "load": load and {"point": load.point, "largest": np.abs(load.wrench).max(axis=0).tolist()},
         "emg": {chain: float(values.max()) for chain, values in found.channels.emg.items()},

@@ -14,6 +14,7 @@ from ..backends.numpy_kernel import NumpyKernel
 from ..errors import InputError, did_you_mean
 from ..graph.program import Numbers
 from ..kinematics.constraints import closed_form_available
+from ..kinematics.continuation import Conditions, Steps, follow, least_squares, nearest
 from ..mechanism.home import (
     MAX_CONDITION,
     condition_of,
@@ -26,7 +27,6 @@ from ..questions.file_numbers import numbers_of
 from ..questions.numbers import characteristic, specialised
 from ..questions.structure import Structure, structure_of
 from ..status import Status
-from .continuation import Conditions, Steps, follow, least_squares, nearest
 
 Array = np.ndarray
 MOTION = ("pose", "pose_rate", "pose_acceleration")

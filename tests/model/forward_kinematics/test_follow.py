@@ -14,9 +14,9 @@ from oracles.rotations import platform_motion
 
 import condyle
 from condyle.errors import LostError
+from condyle.kinematics.continuation import Steps, follow
 from condyle.mechanism import bundled_text
 from condyle.mechanism.files import from_data
-from condyle.model.continuation import Steps, follow
 from condyle.model.forward_kinematics import ForwardKinematics
 from condyle.model.forward_kinematics.joint_steps import joint_steps
 from condyle.model.forward_kinematics.pose_status import PoseStatus

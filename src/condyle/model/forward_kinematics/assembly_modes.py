@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...kinematics.continuation import CONVERGED, Steps
 from ...mechanism.coordinates import bryant_angles, rotations
 from ...mechanism.mechanism import Mechanism
-from ..continuation import CONVERGED, Steps
 from .joint_steps import JointSteps
 from .orientation import principal
 from .pose_status import PoseStatus, judge

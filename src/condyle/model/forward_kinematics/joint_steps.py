@@ -13,6 +13,7 @@ import numpy as np
 from ...backends.numpy_kernel import NumpyKernel
 from ...kinematics.chain import FAMILIES
 from ...kinematics.constraints import indices
+from ...kinematics.continuation import Conditions, Steps
 from ...kinematics.singularities import admitted_twists
 from ...mechanism.home import characteristic_length, independent_coordinates
 from ...mechanism.mechanism import Mechanism
@@ -20,7 +21,6 @@ from ...questions import Question
 from ...questions.file_numbers import numbers_of
 from ...questions.numbers import specialised
 from ...questions.structure import structure_of
-from ..continuation import Conditions, Steps
 
 
 class JointSteps(Steps):

@@ -14,11 +14,11 @@ import numpy as np
 
 from ...errors import InputError, shown
 from ...kinematics.constraints import indices
+from ...kinematics.continuation import Step, follow
 from ...mechanism.home import independent_coordinates
 from ...mechanism.mechanism import Mechanism
 from ...questions.bound import ROUNDING, SAFETY
 from ..arguments import POSE, Argument, samples
-from ..continuation import Step, follow
 from ..model_result import ModelResult
 from .assembly_modes import AssemblyModes, search
 from .joint_steps import joint_steps

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..continuation import (
+from ...kinematics.continuation import (
     ALIKE,
     CONVERGED,
     LONGEST,

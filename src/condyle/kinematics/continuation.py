@@ -109,16 +109,16 @@ class Steps:
         self._turning = angles if turning else np.zeros(len(angles), dtype=bool)
         self._weight = np.where(angles, 1.0, 1 / length)
         self._unit = np.repeat([length, 1.0], 3)
-        self._free = self._unit[free]
+        self.free_unit = self._unit[free]
 
     @np.errstate(all="ignore")
     def step(self, pose: Array, prescribed: Array) -> Step:
         """Steps from poses (N, 6) towards values (N, r)."""
         at = self.conditions(pose)
         residual = self._without_turns(prescribed - at.value)
-        A = at.slope * self._weight[:, None] * self._free
+        A = at.slope * self._weight[:, None] * self.free_unit
         dq = least_squares(A, ((residual - at.carried) * self._weight)[..., None])
-        move = at.back + (at.basis @ (dq * self._free[:, None]))[..., 0]
+        move = at.back + (at.basis @ (dq * self.free_unit[:, None]))[..., 0]
         change = np.abs(A @ dq)[..., 0]
         settled = (change <= ROUNDING * (1 + np.abs(A).sum(axis=2))).all(axis=1)
         settled &= (np.abs(at.off) <= ROUNDING * self.length).all(axis=1)
@@ -128,7 +128,7 @@ class Steps:
 
     def scaled_basis(self, pose: Array) -> Array:
         """X' = basis f' at poses (N, 6), (N, 6, m), without dimension."""
-        return self.conditions(pose).basis * self._free / self._unit[:, None]
+        return self.conditions(pose).basis * self.free_unit / self._unit[:, None]
 
     def _without_turns(self, difference: Array) -> Array:
         turns = np.round(difference / (2 * np.pi)) * (2 * np.pi)

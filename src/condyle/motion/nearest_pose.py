@@ -1,0 +1,245 @@
+"""The pose on the contacts that is nearest to where points of the platform were measured.
+
+    min over q of  sum_i w_i |x_i(q) - measured_i|^2,    x_i = R s_i + O_M,
+
+all frames at once in arrays, by Gauss-Newton in the independent coordinates:
+
+    A dq ~ measured - x,    A = (dx / dX_EE) M_J,    X_EE' = M_J q',
+
+with M_J from the contacts' exact derivatives (the question `conditions`), and the dependent
+coordinates brought back onto the surfaces in the same steps. A frame starts at the pose that fits
+its points without contacts, which the contacts are not far from. Where the ends of the way do not
+tell that no singularity, where branches meet, is between them, it is followed in pieces
+(`kinematics.continuation`); a frame that does not get to its end so starts at the frame before it,
+or after it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..backends.numpy_kernel import NumpyKernel
+from ..errors import InputError
+from ..kinematics.constraints import indices
+from ..kinematics.continuation import (
+    ALIKE,
+    Conditions,
+    Steps,
+    follow,
+    least_squares,
+    nearest,
+    unlikeness,
+)
+from ..mechanism.coordinates import rotations
+from ..mechanism.home import characteristic_length, independent_coordinates
+from ..questions import Question
+from ..questions.file_numbers import numbers_of
+from ..questions.structure import structure_of
+
+if TYPE_CHECKING:
+    from ..mechanism.mechanism import Mechanism
+    from .path import Motion
+
+_FLATTEST = 0.03  # breadth over length of points that still tell a turn about their length
+
+
+@dataclass(frozen=True, eq=False)
+class NearestPoses:
+    """Poses on the contacts nearest to F frames of n measured points.
+
+    Attributes: names: of the points, (n,).
+                pose: X_EE, (F, 6) [m, rad]; NaN where there is none.
+                before, after: distance of each point from where it was measured, with the pose that
+                    fits without contacts, and with the one on them, (F, n) [m].
+                moved: distance between the two places, (F, n) [m].
+    """
+
+    names: tuple[str, ...]
+    pose: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    moved: np.ndarray
+
+    @property
+    def found(self) -> np.ndarray:
+        """Frames that have a pose, (F,)."""
+        return np.isfinite(self.pose[:, 0])
+
+    def summary(self, frames: np.ndarray | slice = slice(None)) -> dict[str, dict[str, float]]:
+        """Of each point, and of all together ("all"), root mean square and largest [m]."""
+        found: dict[str, dict[str, float]] = {}
+        columns = {name: [i] for i, name in enumerate(self.names)}
+        for name, i in (columns | {"all": list(range(len(self.names)))}).items():
+            found[name] = {}
+            for what in ("before", "after", "moved"):
+                values = getattr(self, what)[frames][:, i]
+                values = values[np.isfinite(values)]
+                if values.size:
+                    found[name][f"{what}_rms"] = float(np.sqrt(np.mean(values**2)))
+                    found[name][f"{what}_largest"] = float(values.max())
+        return found
+
+
+def nearest_poses(
+    mechanism: Mechanism,
+    points: dict[str, np.ndarray],
+    measured: np.ndarray,
+    start: np.ndarray,
+    weights: np.ndarray | None = None,
+) -> NearestPoses:
+    """Poses on the contacts for measured points.
+
+    Args:   points: name -> place in {M}, (3,) [m], of n points.
+            measured: in {S}, (F, n, 3) [m]; NaN where not seen.
+            start: poses that fit without contacts, (F, 6); NaN where there is none.
+            weights: of the points, (n,); default: 1.
+    Returns: NaN where no start, or no way without a singularity from it or a neighbour.
+    """
+    shape = np.array(list(points.values()), dtype=float).reshape(-1, 3)
+    root = np.sqrt(np.ones(len(shape)) if weights is None else np.asarray(weights, dtype=float))
+    pose = np.full(start.shape, np.nan)
+    seen = np.isfinite(measured).all(axis=-1)
+    usable = np.isfinite(start).all(axis=1) & (seen.sum(axis=1) >= 2)
+    patterns, which = np.unique(seen, axis=0, return_inverse=True)
+    which = which.ravel()
+    contacts = _contacts(mechanism)
+    fits = [_steps(mechanism, contacts, shape[p], root[p]) for p in patterns]
+    aims = [(measured[:, p] * root[p, None]).reshape(len(pose), 3 * p.sum()) for p in patterns]
+    for i, steps in enumerate(fits):
+        here = np.flatnonzero(usable & (which == i))
+        if not len(here):
+            continue
+        goal = aims[i][here]
+        there, reached = nearest(steps, start[here], goal)
+        reached[reached] = _alike(steps, start[here][reached], there[reached])
+        far = ~reached
+        there[far], reached[far] = follow(steps, start[here[far]], goal[far])
+        pose[here[reached]] = there[reached]
+
+    left = np.flatnonzero(usable & np.isnan(pose[:, 0]))
+    for forwards in (True, False):
+        for f in left if forwards else left[::-1]:
+            beside = f - 1 if forwards else f + 1
+            if not 0 <= beside < len(pose) or not np.isnan(pose[f, 0]):
+                continue
+            steps, goal = fits[which[f]], aims[which[f]][f : f + 1]
+            there, reached = follow(steps, pose[beside : beside + 1], goal)
+            if reached[0]:
+                pose[f] = there[0]
+
+    free, on = (placed(shape, p) for p in (start, pose))
+    before, after, moved = (
+        np.linalg.norm(a - b, axis=-1) for a, b in ((free, measured), (on, measured), (on, free))
+    )
+    moved[~seen] = np.nan
+    return NearestPoses(tuple(points), pose, before, after, moved)
+
+
+def placed(shape: np.ndarray, pose: np.ndarray) -> np.ndarray:
+    """Points of the platform, (n, 3) in {M}, at poses (F, 6): (F, n, 3) in {S}."""
+    return shape @ rotations(pose[:, 3:]).transpose(0, 2, 1) + pose[:, None, :3]
+
+
+def fit_motion(mechanism: Mechanism, motion: Motion) -> tuple[np.ndarray, NearestPoses]:
+    """The samples of a motion of whole poses on the contacts: X_EE, (N, 6), and how far they were.
+
+    Nearest are they at the points of the platform: contact points and landmarks, all with one
+    weight; where these are on a line, the chains' joints on the platform too.
+
+    Raises: InputError: for another motion, or a sample that has no pose on the contacts near it.
+    """
+    if motion.kind != "pose":
+        raise InputError(
+            f"{motion.source}: --fit (fit=True) is for whole poses (t, X, Y, Z, alpha, beta, "
+            f"gamma), got {', '.join(motion.names)}, which are on the contacts as they are"
+        )
+    points = {c.name: np.array(c.point) for c in mechanism.contacts}
+    points |= {name: np.array(p) for name, p in mechanism.platform.points.items()}
+    if _on_a_line(points):
+        points |= {chain.name: np.array(chain.platform) for chain in mechanism.chains}
+    shape = np.array(list(points.values()))
+    found = nearest_poses(mechanism, points, placed(shape, motion.value), motion.value)
+    if not found.found.all():
+        i = int(np.argmin(found.found))
+        raise InputError(
+            f"{motion.source}: no pose on the contacts is near that of t = {motion.t[i]:.6g} s "
+            f"(sample {i}): {', '.join(f'{v:.4g}' for v in motion.value[i])}. The motion is not "
+            "one of this mechanism, or in other units or another frame"
+        )
+    return found.pose, found
+
+
+def _on_a_line(points: dict[str, np.ndarray]) -> bool:
+    shape = np.array(list(points.values())).reshape(-1, 3)
+    if len(shape) < 3:
+        return True
+    sigma = np.linalg.svd(shape - shape.mean(axis=0), compute_uv=False)
+    return bool(sigma[1] <= _FLATTEST * sigma[0])
+
+
+@dataclass(frozen=True)
+class _Contacts:
+    """phi and C = d phi / dX_EE at poses, by numpy, and which coordinates depend."""
+
+    kernel: NumpyKernel
+    k: int
+    dependent: list[int]
+    free: list[int]
+
+    def at(self, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Distances (N, k), M_J (N, 6, 6 - k), and the way back onto the surfaces, (N, 6)."""
+        k, dep, free = self.k, self.dependent, self.free
+        found = self.kernel.run({"pose": pose, "pose_rate": np.zeros_like(pose)}).values
+        phi = np.ascontiguousarray(found["values"][:k].T)
+        C = np.ascontiguousarray(np.moveaxis(found["K"], -1, 0)[:, :k])
+        M_J = np.zeros((len(pose), 6, 6 - k))
+        M_J[:, free, range(6 - k)] = 1.0
+        back = np.zeros_like(pose)
+        if k:
+            solved = -least_squares(C[:, :, dep], np.dstack([C[:, :, free], phi]))
+            M_J[:, dep], back[:, dep] = solved[..., :-1], solved[..., -1]
+        return phi, M_J, back
+
+
+def _contacts(mechanism: Mechanism) -> _Contacts:
+    names = tuple(independent_coordinates(mechanism))
+    structure = structure_of(mechanism)
+    question = Question.about(structure, "conditions", names)
+    free = indices(names)
+    dependent = [i for i in range(6) if i not in free]
+    kernel = NumpyKernel(question.variants(), numbers_of(structure, mechanism))
+    return _Contacts(kernel, len(mechanism.contacts), dependent, free)
+
+
+def _steps(mechanism: Mechanism, contacts: _Contacts, shape: np.ndarray, root: np.ndarray) -> Steps:
+    """Steps towards measured points (n, 3) times the roots of their weights, (n,)."""
+
+    def at(pose: np.ndarray) -> Conditions:
+        phi, M_J, back = contacts.at(pose)
+        R = rotations(pose[:, 3:])
+        lever = shape @ R.transpose(0, 2, 1)
+        # Axes about which alpha, beta and gamma turn.
+        first = np.broadcast_to([1.0, 0.0, 0.0], (len(pose), 3))
+        cos, sin = np.cos(pose[:, 3]), np.sin(pose[:, 3])
+        axes = (first, np.column_stack([np.zeros(len(pose)), cos, sin]), R[:, :, 2])
+        slope = np.zeros((len(pose), len(shape), 3, 6))
+        slope[..., range(3), range(3)] = 1.0
+        for i, axis in enumerate(axes):
+            slope[..., 3 + i] = np.cross(axis[:, None], lever)
+        rows = len(pose), 3 * len(shape)
+        slope = (slope * root[:, None, None]).reshape(*rows, 6)
+        value = ((lever + pose[:, None, :3]) * root[:, None]).reshape(rows)
+        carried = (slope @ back[..., None])[..., 0]
+        return Conditions(value, slope @ M_J, M_J, back, carried, phi)
+
+    none = np.zeros(3 * len(shape), dtype=bool)
+    return Steps(at, characteristic_length(mechanism), none, np.array(contacts.free))
+
+
+def _alike(steps: Steps, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Whether no singularity is between the ends of ways, as far as these tell, (N,)."""
+    A, B = (steps.conditions(pose).slope * steps.free_unit for pose in (start, end))
+    return unlikeness(A, B) <= ALIKE

@@ -1,0 +1,106 @@
+"""The pose on the contacts nearest to measured points: against truth, and what noise permits.
+
+Truth comes from the tests' own closure of the contacts; bounds of Cramer and Rao by differences of
+it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from oracles.closure import complete_state
+from support.families import Case, case
+from support.speeds import few
+
+from condyle.motion.nearest_pose import NearestPoses, nearest_poses, placed
+
+Array = np.ndarray
+MARKERS = {
+    "FL": np.array([0.085, 0.025, -0.02]),
+    "BL": np.array([0.055, 0.042, -0.03]),
+    "FR": np.array([0.083, -0.027, -0.018]),
+    "BR": np.array([0.052, -0.043, -0.035]),
+}
+SHAPE = np.array(list(MARKERS.values()))
+# Planes and curved joints, no contact to three.
+CASES = few(("k2_n9", "k3_curved", "cable_k0", "pss_k1", "pss_k3_n8", "rss"), "k2_n9", "k3_curved")
+NOISE = 2e-4  # m
+
+
+def pose_of(of: Case, q: Array) -> Array:
+    still = np.zeros_like(q)
+    return np.asarray(complete_state(of.raw, of.states["names"], q, still, still, steps=8)[0])
+
+
+def nearest(of: Case, measured: Array, start: Array, weights: Array | None = None) -> NearestPoses:
+    return nearest_poses(of.mechanism, MARKERS, measured, start, weights)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_without_noise_the_pose_comes_back(name: str) -> None:
+    """From starts 3 mm and 2 degrees away; a marker that is not seen is left out."""
+    of, rng = case(name), np.random.default_rng(1)
+    true = of.states["pose"]
+    measured = placed(SHAPE, true)
+    measured[1, 2] = np.nan
+    off = rng.normal(0, 1, true.shape) * np.repeat([0.003, 0.035], 3)
+    found = nearest(of, measured, true + off)
+    assert found.found.all()
+    np.testing.assert_allclose(found.pose, true, rtol=0, atol=1e-9)
+    assert np.isnan(found.after[1, 2]) and np.nanmax(found.after) < 1e-9
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_noise_within_the_bound_of_cramer_and_rao(name: str) -> None:
+    of, rng, count = case(name), np.random.default_rng(2), 400
+    q = of.states["q"][1]
+    true = pose_of(of, q)
+    h = 1e-6
+    steps = h * np.eye(len(q))
+    slope = np.array([(pose_of(of, q + d) - pose_of(of, q - d)) / (2 * h) for d in steps]).T
+    away = [(placed(SHAPE, (true + h * c)[None]) - placed(SHAPE, (true - h * c)[None])) / (2 * h)
+            for c in slope.T]  # fmt: skip
+    J = np.array(away).reshape(len(q), -1).T
+    bound = np.sqrt(np.diag(slope @ np.linalg.inv(J.T @ J / NOISE**2) @ slope.T))
+    measured = placed(SHAPE, np.tile(true, (count, 1)))
+    found = nearest(of, measured + rng.normal(0, NOISE, measured.shape), np.tile(true, (count, 1)))
+    error = np.sqrt(((found.pose - true) ** 2).mean(axis=0))
+    # 400 frames tell a deviation to 3.5 %.
+    moves = bound > 1e-12
+    assert (error[moves] < 1.15 * bound[moves]).all() and (error[moves] > 0.85 * bound[moves]).all()
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_no_pose_on_the_contacts_is_nearer(name: str) -> None:
+    """By 1 mm of misfit and weights: neighbours on the contacts are all farther."""
+    of, rng = case(name), np.random.default_rng(3)
+    true, weights = of.states["pose"][[1]], np.array([1.0, 4.0, 0.5, 2.0])
+    measured = placed(SHAPE, true) + rng.normal(0, 0.001, (1, 4, 3))
+    found = nearest(of, measured, true, weights)
+    columns = [["X", "Y", "Z", "alpha", "beta", "gamma"].index(n) for n in of.states["names"]]
+    q = found.pose[0][columns]
+
+    def misfit(pose: Array) -> float:
+        return float((weights[:, None] * (placed(SHAPE, pose[None]) - measured)[0] ** 2).sum())
+
+    least = misfit(found.pose[0])
+    assert found.pose[0] == pytest.approx(pose_of(of, q), abs=1e-11)
+    for step in np.concatenate([np.eye(len(q)), -np.eye(len(q))]) * 1e-4:
+        assert misfit(pose_of(of, q + step)) > least
+    assert misfit(nearest(of, measured, true).pose[0]) > least  # the weights count
+
+
+def test_a_frame_that_cannot_be_followed_is_left_out() -> None:
+    of = case("k3_curved")
+    true = np.repeat(of.states["pose"][[1]], 3, axis=0)
+    measured, start = placed(SHAPE, true), true.copy()
+    start[1] = np.nan  # no pose without contacts
+    measured[2] += 5.0  # nothing of this mechanism gets there
+    found = nearest(of, measured, start)
+    assert found.found[0] and not found.found[1]
+    assert set(found.summary()) == {*MARKERS, "all"}
+    np.testing.assert_allclose(found.pose[0], true[0], atol=1e-9)
+    if found.found[2]:  # the nearest there is: on the contacts
+        names = ["X", "Y", "Z", "alpha", "beta", "gamma"]
+        q = found.pose[2][[names.index(n) for n in of.states["names"]]]
+        np.testing.assert_allclose(pose_of(of, q), found.pose[2], atol=1e-8)
