@@ -22,6 +22,7 @@ def c3d_bytes(
     channels: Sequence[tuple[str, str]] = (),
     analog: np.ndarray | None = None,
     plates: dict[str, Any] | None = None,
+    y_screen: str | None = None,
 ) -> bytes:
     """A recording of markers, in Intel's order of bytes.
 
@@ -29,6 +30,7 @@ def c3d_bytes(
               0 for 16-bit integers, each worth so much.
           missing: "residual" (-1), "nan" or "zero".
           channels: (label, unit);  analog: (F, samples a frame, C).
+          y_screen: the axis that is drawn upwards.
           plates: parameters of the group FORCE_PLATFORM; arrays by their dimensions in the file.
     """
     frames, count = points.shape[:2]
@@ -42,6 +44,7 @@ def c3d_bytes(
             "DATA_START": np.int16(0),
             "LABELS": list(labels),
             **({} if units is None else {"UNITS": [units]}),
+            **({} if y_screen is None else {"Y_SCREEN": [y_screen]}),
         },
         "ANALOG": {"USED": np.int16(len(channels)), "RATE": np.float32(rate * per_frame)},
     }

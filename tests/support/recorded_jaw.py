@@ -58,7 +58,8 @@ class Jaw:
     def tables(self, **changes: Any) -> dict[str, Any]:
         """The marker file."""
         tables = {"fixed": FIXED, "platform": PLATFORM, "home": [0.0, 0.5]}
-        return tables | {"register": self.register} | changes
+        vertical = {"up": self.A[:, 2].tolist()}
+        return tables | {"register": self.register, "vertical": vertical} | changes
 
     def write(self, path: Path, unit: float = 1e3, **options: Any) -> Path:
         path.write_bytes(c3d_bytes(self.labels, self.points * unit, **options))
@@ -101,10 +102,7 @@ def record(
     pose = on_contacts(mechanism, pose)
     pose[:, 2] -= push * open_
     R = Rotation.from_euler("XYZ", pose[:, 3:]).as_matrix()
-    # At home the head does not stand still either, once it moves.
-    turns = head * 0.2 * np.column_stack([np.sin(0.9 * t), np.sin(0.6 * t), np.sin(0.4 * t)])
-    H = Rotation.from_rotvec(turns).as_matrix()
-    h = head * 0.05 * np.column_stack([np.sin(0.5 * t), 1 - np.cos(0.8 * t), np.sin(0.7 * t)])
+    H, h = head_at(t, head)
     A = Rotation.from_rotvec(rng.normal(0, 1.5, 3)).as_matrix()
     b = np.array([-0.45, 0.2, 1.1])
     upper = np.array(list(UPPER.values()))[None]
@@ -122,6 +120,13 @@ def record(
     return Jaw(
         t, pose, [*FIXED, *PLATFORM, "Nasion", "Cheek_L", "Cheek_R", "TMJ_L"], lab, A, b, register
     )
+
+
+def head_at(t: np.ndarray, head: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+    """The head's turn and way in the laboratory, (F, 3, 3) and (F, 3) [m]: never at rest."""
+    turns = head * 0.2 * np.column_stack([np.sin(0.9 * t), np.sin(0.6 * t), np.sin(0.4 * t)])
+    way = head * 0.05 * np.column_stack([np.sin(0.5 * t), 1 - np.cos(0.8 * t), np.sin(0.7 * t)])
+    return Rotation.from_rotvec(turns).as_matrix(), way
 
 
 @cache

@@ -29,6 +29,7 @@ from .rigid import FEWEST
 
 DIRECTIONS = ("forward", "up")
 ORIGIN = "origin"
+CUTOFF = 5.0  # Hz: heads move slower than jaws
 HIGH_PASS, LOW_PASS = 20.0, 6.0  # Hz: below are movements of cables; above, single firings
 
 Place = str | tuple[float, float, float]
@@ -75,6 +76,7 @@ class Vertical(Table):
     moving: Annotated[bool, Field(strict=True)] = Field(
         True, description="the base's acceleration and rotation are in the motion too"
     )
+    cutoff: _Above = Field(CUTOFF, description="that the base's motion is smoothed at [Hz]")
 
     @field_validator("up", mode="before")
     @classmethod

@@ -80,7 +80,7 @@ def close_gaps(
         inside = kept.start <= r.start and r.stop <= kept.stop
         ends = float(t[r.start]), float(t[r.stop - 1])
         gaps.append(Gap(*ends, r.stop - r.start, why(r), "filled" if inside else "cut"))
-    return kept, _filled(t[kept], values[kept]), gaps
+    return kept, filled(t[kept], values[kept]), gaps
 
 
 def _longest_between(runs: list[slice], count: int) -> slice:
@@ -88,7 +88,7 @@ def _longest_between(runs: list[slice], count: int) -> slice:
     return max(map(slice, starts, stops), key=lambda s: s.stop - s.start)
 
 
-def _filled(t: np.ndarray, values: np.ndarray) -> np.ndarray:
+def filled(t: np.ndarray, values: np.ndarray) -> np.ndarray:
     """The values with a cubic spline through those there are where some are missing."""
     known = np.isfinite(values).all(axis=1)
     if known.all():

@@ -34,6 +34,7 @@ from .measured_channels import MeasuredChannels
 from .recording import Recording, find_label, read_c3d
 from .registration import Registration, register
 from .rigid import continuous_angles
+from .vertical import base_motion
 
 MAX_RESIDUAL = 2e-3  # m
 MAX_GAP = 0.1  # s
@@ -115,9 +116,9 @@ def motion_of(
         if not checks:
             raise
         raise InputError(f"{'. '.join(checks)}. {error.message}", error.hint) from None
-    motion = Motion.from_arrays(
-        recording.t[kept], whole, POSE, cutoff=cutoff, source=recording.source
-    )
+    vertical = base_motion(file.vertical, bodies, registration, machine, kept)
+    columns = dict(zip(POSE, whole.T, strict=True)) | vertical.columns()
+    motion = Motion.from_arrays(recording.t[kept], columns, cutoff=cutoff, source=recording.source)
     at = used.copy()
     at[: kept.start] = at[kept.stop :] = False
     off = off_contacts(machine, R[at], p[at])
@@ -131,6 +132,7 @@ def motion_of(
         *odd_sizes(recording, bodies),
         *registration.warnings,
         *checks,
+        *vertical.warnings,
         *motion.warnings,
         *(() if load is None else load.warnings),
     )
@@ -153,6 +155,7 @@ def motion_of(
         off_contacts={n: (_rms(d), float(np.abs(d).max())) for n, d in off.items()},
         fitted=fitted,
         markers_moved=fitted.summary(at),
+        vertical=vertical,
         channels=channels,
         load=load,
         recording=recording,

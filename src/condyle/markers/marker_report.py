@@ -20,6 +20,7 @@ from .marker_gaps import Gap
 from .measured_channels import MeasuredChannels
 from .recording import Recording
 from .registration import Registration
+from .vertical import BaseMotion
 
 _LISTED = 12  # gaps in the text; all are in the data
 
@@ -57,6 +58,7 @@ class MarkerMotion:
             markers;
         markers_moved: their root mean squares and largest [m], by marker and of "all": `before` the
             contacts and `after`, and how far these have `moved` them.
+        vertical: gravity and the base's motion, which `motion` has too.
         channels: what was measured with it, at its times: markers in {S} with the base's motion
             taken out, their residuals, and EMG, where the marker file names channels.
         load: from force channels or a force plate, where some were named.
@@ -72,6 +74,7 @@ class MarkerMotion:
     off_contacts: dict[str, tuple[float, float]]
     fitted: NearestPoses
     markers_moved: dict[str, dict[str, float]]
+    vertical: BaseMotion
     channels: MeasuredChannels
     load: Load | None
     recording: Recording
@@ -103,7 +106,7 @@ class MarkerMotion:
             lines.append(
                 f"Registration, distance of each point from its place in the mechanism: {points}"
             )
-        lines += self._contacts()
+        lines += [*self._contacts(), str(self.vertical)]
         if (load := self.load) is not None:
             force, moment = (
                 np.linalg.norm(part, axis=1).max() for part in np.split(load.wrench, 2, 1)
@@ -162,6 +165,7 @@ def as_data(found: MarkerMotion) -> dict[str, Any]:
             n: {"rms": rms, "largest": most} for n, (rms, most) in found.off_contacts.items()
         },
         "markers_moved": found.markers_moved,
+        "vertical": found.vertical.data(),
         "gaps": [vars(gap) for gap in found.gaps],
         "load": load and {"point": load.point, "largest": np.abs(load.wrench).max(axis=0).tolist()},
         "emg": {chain: float(values.max()) for chain, values in found.channels.emg.items()},
@@ -181,7 +185,7 @@ def write_motion(
 ) -> list[Path]:
     """Write all files or none; returns their names.
 
-    Args:   out: t, X ... gamma;
+    Args:   out: t, X ... gamma, gravity (gx, gy, gz) and the base's motion (base_ax ...);
             measured: the columns of `MeasuredChannels`, empty where nothing was seen;
             load: t, Fx, Fy, Fz [N] and, of a plate, Mx, My, Mz [N m] in {S}.
             A name that ends in .parquet makes a Parquet file, any other a CSV file.
