@@ -33,6 +33,7 @@ from .forward_kinematics import TOLERANCE, ForwardKinematics
 from .inverse_dynamics import InverseDynamics
 from .model_result import ModelResult
 from .poses import Poses
+from .regressor import Regression, Regressor
 from .system import System
 from .unchecked import Unchecked
 
@@ -350,6 +351,34 @@ class Model:
         given = {"q": q, "v": v, "a": a, "effort": effort, "joint": joint}
         given |= {"wrench": wrench, "at": at, "gravity": gravity, "base": base}
         return self._derived.vjp(of, cotangents, wrt, given, zeros, keep)
+
+    @cached_property
+    def regression(self) -> Regression:
+        """The regressor and the numbers it is taken by: for rooms that stand on models."""
+        return Regression(self.system, self._arguments, self.poses)
+
+    def regressor(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        wrench: ArrayLike | None = None,
+        at: Point = None,
+    ) -> Regressor:
+        """The equations of motion in the numbers of bodies and actuators, linear in them.
+
+            r = model.regressor(q, v, a)
+            r.Y @ r.numbers + r.load                            J^T effort, (..., m)
+
+        The numbers are the platform's mass, first moment and inertia about O_M; masses, first
+        moments and inertias of chains about their own joints; of actuators rotor (in a crank's
+        inertia), viscous and Coulomb friction. Friction at contacts is left out.
+
+        Args:    as of `inverse_dynamics`.
+        Returns: Y (..., m, P), load (..., m), J (..., n, m), numbers, names, units (P,), status
+                 (...), and the rows that give contact forces: see `Regressor`.
+        """
+        return self.regression(q, v, a, wrench, at)
 
     def mass_matrix(self, q: ArrayLike, *, space: str = "q") -> Array:
         """M_r of [Cheng2023] eqs (57), (63), (..., m, m) [kg, kg m, kg m^2].

@@ -35,6 +35,7 @@ _FILES = {
     "instant": "instant energy",
     "matrices": "matrices coriolis jacobians",
     "reactions": "reactions",
+    "regressor": "regressor",
     "rate": "rate",
     "observer": "observer",
     "tick": "tick",
@@ -63,7 +64,7 @@ SOURCES = ("mechanism", "kinematics", "dynamics", "graph", "questions")
 GEOMETRY = (
     "allocation", "motion", "closure", "conditions", "configuration", "survey", "encoders", "pose",
     "instant", "energy", "jacobians", "coriolis", "reactions", "linear", "places", "forward_system",
-    "system",
+    "system", "regressor",
 )  # fmt: skip
 # Questions that have inertia or gravity in them, of motions.
 DYNAMIC = (

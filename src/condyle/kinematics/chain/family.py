@@ -178,6 +178,8 @@ class Family(ABC):
     effort_unit: ClassVar[str]
     numbers: ClassVar[dict[str, int]]  # path in the chain's table -> number of entries
     shapes: ClassVar[dict[str, int]]  # constant -> number of entries (1, 2, 3 or 9)
+    # Numbers of the bodies in which forces are linear, with units: see `of_standard`.
+    standard: ClassVar[dict[str, str]] = {}
     # Constants that make J and forces of `dynamics` vanish at 0, for lanes without a chain. A
     # family without any is masked by a few multiplications.
     padding: ClassVar[tuple[str, ...]] = ()
@@ -188,6 +190,17 @@ class Family(ABC):
 
         Args: f: by the paths of `numbers`, with `_` for a dot.
         """
+
+    def of_standard(self, c: Constants, p: Constants) -> dict[str, Any]:
+        """Constants of the bodies from their standard numbers, by the names of `shapes`.
+
+        Args: p: by the names of `standard`, with `_` for a dot; masses are not 0.
+        """
+        return {}
+
+    def to_standard(self, f: Constants) -> dict[str, Any]:
+        """The numbers of `standard` from the file's. Args: f: as of `derived`."""
+        return {}
 
     def constants(self, chain: Any) -> dict[str, np.ndarray]:
         """Constants of one chain, by the names of `shapes`."""

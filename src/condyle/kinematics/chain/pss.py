@@ -40,6 +40,15 @@ class PSSFamily(RodFamily):
             **self.rod_constants(f, "rod", rod),
         }
 
+    standard = {"slider.mass": "kg", **RodFamily.rod_standard("rod")}
+
+    def of_standard(self, c: Constants, p: Constants) -> dict[str, Any]:
+        return {"slider": p.slider_mass, **self.rod_of_standard(c, p, "rod")}
+
+    def to_standard(self, f: Constants) -> dict[str, Any]:
+        rod = self.rod_to_standard(f, "rod", ca.norm_2(f.platform - f.base))
+        return {"slider.mass": f.slider_mass, **rod}
+
     def tip(self, c: Constants, q_r: ca.SX) -> ca.SX:
         return c.S + q_r[0] * c.axis
 

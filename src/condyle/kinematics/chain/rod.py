@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import casadi as ca
 
@@ -26,6 +26,7 @@ from .family import (
 
 # Constants of every rod: N is N_i0 and Y its second axis; `branch` is that of home.
 ROD_NUMBERS = ("mass", "com", "transverse", "axial")  # of the file
+STANDARD = ("mass", "moment", "inertia", "axial")  # about the joint S, along the rod
 ROD = {"L": 1, "branch": 1, "Y": 3, "mass": 1, "com": 1, "transverse": 1, "axial": 1}
 
 
@@ -33,6 +34,30 @@ class RodFamily(Family):
     """A driven link of the base, and a rod of constant length with ball joints S on it and M."""
 
     ball: ClassVar[tuple[str, str]]  # name and place of the joint S
+
+    @staticmethod
+    def rod_standard(rod: str) -> dict[str, str]:
+        """Numbers of `standard` of a rod: inertia is about S, and axial. Args: rod: its table."""
+        units = {"mass": "kg", "moment": "kg m", "inertia": "kg m^2", "axial": "kg m^2"}
+        return {f"{rod}.{name}": unit for name, unit in units.items()}
+
+    @staticmethod
+    def rod_of_standard(c: Constants, p: Constants, rod: str) -> dict[str, Any]:
+        mass, moment, inertia, axial = (getattr(p, f"{rod}_{name}") for name in STANDARD)
+        com = moment / (mass * c.L)
+        return {
+            "mass": mass,
+            "com": com,
+            "transverse": inertia - moment * (com * c.L),
+            "axial": axial,
+        }
+
+    @staticmethod
+    def rod_to_standard(f: Constants, rod: str, length: ca.SX) -> dict[str, Any]:
+        mass, com, transverse, axial = (getattr(f, f"{rod}_{name}") for name in ROD_NUMBERS)
+        arm = com * length
+        found = (mass, mass * arm, transverse + mass * arm**2, axial)
+        return {f"{rod}.{name}": value for name, value in zip(STANDARD, found, strict=True)}
 
     @abstractmethod
     def tip(self, c: Constants, q_r: ca.SX) -> ca.SX:

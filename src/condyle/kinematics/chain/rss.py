@@ -58,6 +58,16 @@ class RSSFamily(RodFamily):
             **self.rod_constants(f, "coupler", coupler),
         }
 
+    standard = RodFamily.rod_standard("coupler") | {"crank.moment": "kg m", "crank.inertia": "kg m^2"}
+
+    def of_standard(self, c: Constants, p: Constants) -> dict[str, Any]:
+        own = {"crank_mass": p.crank_moment, "crank_com": ca.SX(1), "crank": p.crank_inertia}
+        return own | self.rod_of_standard(c, p, "coupler")
+
+    def to_standard(self, f: Constants) -> dict[str, Any]:
+        own = self.rod_to_standard(f, "coupler", ca.norm_2(f.platform - f.crank_tip))
+        return own | {"crank.moment": f.crank_mass * f.crank_com, "crank.inertia": f.crank_inertia}
+
     def tip(self, c: Constants, q_r: ca.SX) -> ca.SX:
         return c.G + (c.C @ rotation_z(ca.cos(q_r[0]), ca.sin(q_r[0])))[:, 0] * c.l
 

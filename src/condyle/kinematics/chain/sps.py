@@ -25,7 +25,7 @@ from .family import (
     rod_inertia,
     rod_spin,
 )
-from .rod import LineFamily
+from .rod import LineFamily, RodFamily
 
 # Of both bodies; cylinder_com is the distance from B, piston_com that from M, along the leg.
 BODIES = [(b, n) for b in ("cylinder", "piston") for n in ("mass", "com", "transverse", "axial")]
@@ -42,6 +42,22 @@ class SPSFamily(LineFamily):
     def derived(self, f: Constants) -> dict[str, ca.SX]:
         own = {f"{body}_{name}": getattr(f, f"{body}_{name}") for body, name in BODIES}
         return super().derived(f) | own
+
+    # Each body's inertia is about its own joint: the cylinder's B, the piston's M.
+    standard = RodFamily.rod_standard("cylinder") | RodFamily.rod_standard("piston")
+
+    def of_standard(self, c: Constants, p: Constants) -> dict[str, Any]:
+        found = {}
+        for body in ("cylinder", "piston"):
+            one = RodFamily.rod_of_standard(Constants({"L": 1}), p, body)
+            found |= {f"{body}_{name}": value for name, value in one.items()}
+        return found
+
+    def to_standard(self, f: Constants) -> dict[str, Any]:
+        one = ca.SX(1)
+        return RodFamily.rod_to_standard(f, "cylinder", one) | RodFamily.rod_to_standard(
+            f, "piston", one
+        )
 
     def links(self, c: Constants, q_r: ca.SX) -> list[Link]:
         n, spin = rod_direction(c.N, q_r), rod_spin(c.N, q_r)

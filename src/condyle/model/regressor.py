@@ -1,0 +1,186 @@
+"""The equations in the numbers of bodies and actuators: `Model.regressor`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from ..kinematics.chain import FAMILIES
+from ..kinematics.chain.family import Constants
+from ..mechanism.mechanism import Mechanism
+from ..questions.file_numbers import numbers_of_file
+from ..questions.number_paths import FileNumbers, NumberPath
+from ..questions.numbers import Layout
+from ..questions.regressor import LOSSES, PLATFORM, chain_numbers
+from ..questions.structure import Structure, walls_of
+from ..status import Status
+from .arguments import POINT, WRENCH, Arguments, samples
+from .poses import Poses
+from .system import System
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Regressor:
+    """The equations of motion in the standard numbers pi, in which efforts are linear.
+
+        Y pi + load = J^T effort
+
+    Y: (..., m, P);  load: (..., m) [N, N m], of the wrench;  J: (..., n, m), joint' = J q_EE'.
+    numbers: pi of the mechanism, (P,) [SI];  names, units: of each, (P,).
+    status: (...), of `Status`; NaN where it is not 0.
+    contact_Y (..., k, P), contact_load (..., k), contact_J (..., k, n): the forces of the contacts,
+    contact_Y pi + contact_load - contact_J effort [N].
+    """
+
+    Y: Array
+    load: Array
+    J: Array
+    contact_Y: Array
+    contact_load: Array
+    contact_J: Array
+    numbers: Array
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    status: Array
+
+    def __repr__(self) -> str:
+        return f"Regressor Y {self.Y.shape} of {', '.join(self.names[:3])} .. {self.names[-1]}"
+
+
+class StandardNumbers:
+    """The numbers that efforts are linear in, from the file's: see `questions.regressor`.
+
+    names, units: (P,), of the platform and then chain by chain;  home: the file's numbers, (F,).
+    """
+
+    def __init__(self, mechanism: Mechanism, structure: Structure) -> None:
+        walls = walls_of(mechanism, structure)
+        layout, own = Layout.of_file(structure, walls), numbers_of_file(mechanism, structure, walls)
+        self._file = FileNumbers(mechanism, structure, walls)
+        self.home = np.concatenate([own.parameters, *(lane.T.ravel() for lane in own.lanes)])
+        self._starts = np.cumsum([own.parameters.size, *(lane.size for lane in own.lanes)])
+        self._sizes = layout.sizes[1]
+        z = ca.SX.sym("file", self.home.size)
+        named = {n: z[start : start + count] for n, (start, count) in layout.parameters.items()}
+        names, units = list(PLATFORM), list(PLATFORM.values())
+        values = [_platform(named["mass"], named["com"], named["inertia"])]
+        lanes = [(g, i) for g, count in enumerate(structure.counts) for i in range(count)]
+        for group, lane in (lanes[own.order.index(i)] for i in range(len(own.order))):
+            at, kind = self._starts[group] + lane * self._sizes[group], structure.families[group]
+            slots = layout.lanes[group].items()
+            file = {n.replace(".", "_"): z[at + s : at + s + count] for n, (s, count) in slots}
+            chain = mechanism.chains[own.order[lanes.index((group, lane))]].name
+            values.append(_chain(kind, Constants(file)))
+            names += [f"chain.{chain}.{name}" for name in chain_numbers(kind)]
+            units += [_unit(kind, name) for name in chain_numbers(kind)]
+        self.names, self.units = tuple(names), tuple(units)
+        pi = ca.vertcat(*values)
+        self._pi = ca.Function("standard", [z], [pi])
+        self._slope = ca.Function("slope", [z], [ca.densify(ca.jacobian(pi, z))])
+
+    def at(self, paths: list[str]) -> list[NumberPath]:
+        """As `FileNumbers.at`."""
+        return self._file.at(paths)
+
+    def places(self, path: NumberPath) -> list[int]:
+        """Where numbers stand among all of the file."""
+        return [
+            i if group < 0 else int(self._starts[group]) + lane * self._sizes[group] + i
+            for group, i, lane in path.slots
+        ]
+
+    def of(self, file: Array) -> Array:
+        """Standard numbers of the file's, (P,)."""
+        return np.asarray(self._pi(file)).ravel()
+
+    def slope(self, file: Array) -> Array:
+        """Their derivatives by the file's, (P, F)."""
+        return np.asarray(self._slope(file))
+
+
+def _platform(mass: ca.SX, com: ca.SX, inertia: ca.SX) -> ca.SX:
+    """Mass, first moment and inertia about O_M."""
+    square = ca.dot(com, com)
+    shift = [square - com[i] ** 2 for i in range(3)]
+    shift += [-com[0] * com[1], -com[0] * com[2], -com[1] * com[2]]
+    return ca.vertcat(mass, mass * com, inertia + mass * ca.vertcat(*shift))
+
+
+def _chain(kind: str, f: Constants) -> ca.SX:
+    own = FAMILIES[kind].to_standard(f)
+    own |= {"actuator.viscous": f.actuator_viscous, "actuator.coulomb": f.actuator_coulomb}
+    rotor = f.actuator_rotor_inertia * f.actuator_gear**2
+    turned = "crank.inertia" if "crank.inertia" in own else LOSSES[0]
+    own[turned] = own.get(turned, ca.SX(0)) + rotor
+    return ca.vertcat(*(own[name] for name in chain_numbers(kind)))
+
+
+def _unit(kind: str, name: str) -> str:
+    family = FAMILIES[kind]
+    slides = family.joint_unit == "m"
+    losses = {
+        "actuator.rotor": "kg" if slides else "kg m^2",
+        "actuator.viscous": "N s/m" if slides else "N m s/rad",
+        "actuator.coulomb": family.effort_unit,
+    }
+    return losses[name] if name in losses else family.standard[name]
+
+
+class Regression:
+    """The regressor of one model; see `Model.regressor`."""
+
+    def __init__(self, system: System, arguments: Arguments, poses: Poses) -> None:
+        self._system, self._arguments, self._poses = system, arguments, poses
+
+    @cached_property
+    def standard(self) -> StandardNumbers:
+        return StandardNumbers(self._system.mechanism, self._system.wide.structure)
+
+    def __call__(self, q: Any, v: Any, a: Any, wrench: Any, at: Any) -> Regressor:
+        """As `Model.regressor`."""
+        own, kernel = self._arguments, self._system.wide.kernel("regressor")
+        lead, inputs = own.samples((own.q, own.v, own.a), (q, v, a), wrench, at)
+        states = [inputs.pop(name) for name in ("q", "q1", "q2")]
+        count = max(map(len, (*states, *inputs.values()))) if 0 not in lead else 0
+        whole = [np.broadcast_to(x, (count, x.shape[1])) for x in states]
+        poses, closed = self._poses.whole(*whole)
+        answer = kernel.run(poses | inputs)
+        status = np.where(closed, answer.status, Status.unreachable).astype(np.uint8)
+        found = {}
+        for prefix in ("", "contact_"):
+            Y, load, row = self._rows(answer.values, prefix, count)
+            found |= {f"{prefix}Y": Y, f"{prefix}load": load, f"{prefix}J": row}
+        found["J"] = found["J"].swapaxes(1, 2)
+        for name, value in found.items():
+            value[status != Status.ok] = np.nan
+            found[name] = value.reshape((*lead, *value.shape[1:]))
+        standard = self.standard
+        return Regressor(
+            **found,
+            numbers=standard.of(standard.home),
+            names=standard.names,
+            units=standard.units,
+            status=status.reshape(lead),
+        )
+
+    def _rows(self, values: dict[str, Array], prefix: str, count: int) -> tuple[Array, ...]:
+        """Y (N, rows, P), the load (N, rows) and the actuators' rows (N, rows, n)."""
+        structure, order = self._system.wide.structure, self._system.numbers.order
+        if prefix and not structure.contacts:
+            empty = (count, 0, len(self.standard.names)), (count, 0), (count, 0, structure.n)
+            return tuple(map(np.zeros, empty))
+        columns: dict[int, Array] = {}
+        lanes = iter(order)
+        for group, size in enumerate(structure.counts):
+            own = values[f"{prefix}chain_{group}"]  # (rows, p, lanes, N)
+            columns |= {next(lanes): own[:, :, lane] for lane in range(size)}
+        parts = [values[f"{prefix}platform"], *(columns[i] for i in range(structure.n))]
+        Y = np.moveaxis(np.concatenate(parts, axis=1), -1, 0)
+        load, row = values[f"{prefix}load"], values[f"{prefix}row"]
+        return Y, load.T.copy(), np.moveaxis(row, -1, 0).copy()
