@@ -13,12 +13,12 @@ from ..kinematics.chain import FAMILIES
 from ..kinematics.chain.family import Constants
 from ..mechanism.mechanism import Mechanism
 from ..questions.file_numbers import numbers_of_file
-from ..questions.number_paths import FileNumbers, NumberPath
+from ..questions.number_paths import ENTRIES, FileNumbers, NumberPath
 from ..questions.numbers import Layout
 from ..questions.regressor import LOSSES, PLATFORM, chain_numbers
 from ..questions.structure import Structure, walls_of
 from ..status import Status
-from .arguments import POINT, WRENCH, Arguments, samples
+from .arguments import Arguments
 from .poses import Poses
 from .system import System
 
@@ -29,21 +29,25 @@ Array = np.ndarray
 class Regressor:
     """The equations of motion in the standard numbers pi, in which efforts are linear.
 
-        Y pi + load = J^T effort
+        Y pi + load + friction |contact_force| = J^T effort
 
-    Y: (..., m, P);  load: (..., m) [N, N m], of the wrench;  J: (..., n, m), joint' = J q_EE'.
+    Y: (..., m, P);  load: (..., m) [N, N m], of the wrench;  J: (..., n, m), joint' = J q_EE';
+    friction: (..., m, k).
     numbers: pi of the mechanism, (P,) [SI];  names, units: of each, (P,).
     status: (...), of `Status`; NaN where it is not 0.
-    contact_Y (..., k, P), contact_load (..., k), contact_J (..., k, n): the forces of the contacts,
-    contact_Y pi + contact_load - contact_J effort [N].
+    contact_Y (..., k, P), contact_load (..., k), contact_J (..., k, n), contact_friction
+    (..., k, k): contact_force = contact_Y pi + contact_load + contact_friction |contact_force| -
+    contact_J effort [N].
     """
 
     Y: Array
     load: Array
     J: Array
+    friction: Array
     contact_Y: Array
     contact_load: Array
     contact_J: Array
+    contact_friction: Array
     numbers: Array
     names: tuple[str, ...]
     units: tuple[str, ...]
@@ -56,7 +60,8 @@ class Regressor:
 class StandardNumbers:
     """The numbers that efforts are linear in, from the file's: see `questions.regressor`.
 
-    names, units: (P,), of the platform and then chain by chain;  home: the file's numbers, (F,).
+    names, units: (P,), of the platform and then chain by chain;  home: the file's numbers, (F,),
+    by `file_names`.
     """
 
     def __init__(self, mechanism: Mechanism, structure: Structure) -> None:
@@ -66,6 +71,7 @@ class StandardNumbers:
         self.home = np.concatenate([own.parameters, *(lane.T.ravel() for lane in own.lanes)])
         self._starts = np.cumsum([own.parameters.size, *(lane.size for lane in own.lanes)])
         self._sizes = layout.sizes[1]
+        self.file_names = _file_names(mechanism, structure, layout, own.order)
         z = ca.SX.sym("file", self.home.size)
         named = {n: z[start : start + count] for n, (start, count) in layout.parameters.items()}
         names, units = list(PLATFORM), list(PLATFORM.values())
@@ -102,6 +108,31 @@ class StandardNumbers:
     def slope(self, file: Array) -> Array:
         """Their derivatives by the file's, (P, F)."""
         return np.asarray(self._slope(file))
+
+
+def _file_names(
+    mechanism: Mechanism, structure: Structure, layout: Layout, order: tuple[int, ...]
+) -> list[str]:
+    """Paths of the file's numbers, entry by entry; other words where the file has no such path."""
+    own = {"mass": "platform.mass", "com": "platform.com", "inertia": "platform.inertia"}
+    names = []
+    for name, (_, count) in layout.parameters.items():
+        path = own.get(name, name)
+        if name == "inertia":
+            names += [f"{path}.{entry}" for entry in ENTRIES]
+        else:
+            names += _entries(path, count)
+    lanes = iter(order)
+    for group, count in enumerate(structure.counts):
+        for _ in range(count):
+            chain = mechanism.chains[next(lanes)].name
+            for path, (_, size) in layout.lanes[group].items():
+                names += _entries(f"chain.{chain}.{path}", size)
+    return names
+
+
+def _entries(path: str, count: int) -> list[str]:
+    return [path] if count == 1 else [f"{path}[{i}]" for i in range(count)]
 
 
 def _platform(mass: ca.SX, com: ca.SX, inertia: ca.SX) -> ca.SX:
@@ -154,8 +185,8 @@ class Regression:
         status = np.where(closed, answer.status, Status.unreachable).astype(np.uint8)
         found = {}
         for prefix in ("", "contact_"):
-            Y, load, row = self._rows(answer.values, prefix, count)
-            found |= {f"{prefix}Y": Y, f"{prefix}load": load, f"{prefix}J": row}
+            own_rows = self._rows(answer.values, prefix, count)
+            found |= {f"{prefix}{name}": value for name, value in own_rows.items()}
         found["J"] = found["J"].swapaxes(1, 2)
         for name, value in found.items():
             value[status != Status.ok] = np.nan
@@ -169,18 +200,24 @@ class Regression:
             status=status.reshape(lead),
         )
 
-    def _rows(self, values: dict[str, Array], prefix: str, count: int) -> tuple[Array, ...]:
-        """Y (N, rows, P), the load (N, rows) and the actuators' rows (N, rows, n)."""
-        structure, order = self._system.wide.structure, self._system.numbers.order
-        if prefix and not structure.contacts:
-            empty = (count, 0, len(self.standard.names)), (count, 0), (count, 0, structure.n)
-            return tuple(map(np.zeros, empty))
+    def _rows(self, values: dict[str, Array], prefix: str, count: int) -> dict[str, Array]:
+        """Y (N, rows, P), load (N, rows), J (N, rows, n) and friction (N, rows, k)."""
+        structure = self._system.wide.structure
+        n, k = structure.n, len(structure.contacts)
+        rows = k if prefix else structure.m
+        if not rows:
+            sizes = {"Y": (len(self.standard.names),), "load": (), "J": (n,), "friction": (k,)}
+            return {name: np.zeros((count, 0, *size)) for name, size in sizes.items()}
         columns: dict[int, Array] = {}
-        lanes = iter(order)
+        lanes = iter(self._system.numbers.order)
         for group, size in enumerate(structure.counts):
             own = values[f"{prefix}chain_{group}"]  # (rows, p, lanes, N)
             columns |= {next(lanes): own[:, :, lane] for lane in range(size)}
-        parts = [values[f"{prefix}platform"], *(columns[i] for i in range(structure.n))]
-        Y = np.moveaxis(np.concatenate(parts, axis=1), -1, 0)
-        load, row = values[f"{prefix}load"], values[f"{prefix}row"]
-        return Y, load.T.copy(), np.moveaxis(row, -1, 0).copy()
+        parts = [values[f"{prefix}platform"], *(columns[i] for i in range(n))]
+        found = {
+            "Y": np.concatenate(parts, axis=1),
+            "load": values[f"{prefix}load"],
+            "J": values[f"{prefix}row"],
+            "friction": values.get(f"{prefix}friction", np.zeros((rows, k, count))),
+        }
+        return {name: np.moveaxis(value, -1, 0).copy() for name, value in found.items()}

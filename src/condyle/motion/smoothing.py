@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from .. import progress
 from ..errors import InputError
 from .arrays import as_number
 from .column_units import ANGLE_UNITS, POSE
-from .spline import Spline
+from .spline import Spline, basis
 
 AUTO_CUTOFF = 10.0
 """Cut-off of "auto" [Hz]. Chewing repeats one to two times a second, so at least five harmonics
@@ -60,6 +61,17 @@ def parse_cutoff(cutoff: float | str) -> float:
 
 
 def smoothing_spline(t: np.ndarray, values: np.ndarray, cutoff: float) -> Spline:
+    """Values smoothed by `LowPass`.
+
+    Args:   t: (N,) [s], rising from 0. values: (N, m). cutoff: [Hz].
+    Returns: s, of N' knots that do not depend on N.
+    Raises:  InputError: if the samples are too sparse or too few for the cut-off.
+    """
+    with progress.step("smoothing"):
+        return LowPass(t, cutoff).spline(values)
+
+
+class LowPass:
     """Quintic smoothing spline: a low-pass filter with the cut-off frequency `cutoff`.
 
         min over c:  sum_i |y_i - s(t_i)|^2 + mu sum_j |D^4 c_j|^2,   s = sum_j c_j B_j
@@ -71,32 +83,52 @@ def smoothing_spline(t: np.ndarray, values: np.ndarray, cutoff: float) -> Spline
     where h is the knot step: that of a Butterworth filter of order 4 run forward and backward, with
     mu' such that it is 1/sqrt(2) at the cut-off. Unlike the filter it needs no made-up samples
     beyond the ends (a cubic passes unchanged, up to the ends) and takes uneven samples as they are.
-
-    Args:    t: (N,) [s], rising from 0. values: (N, m). cutoff: [Hz].
-    Returns: s, of N' knots that do not depend on N.
-    Raises:  InputError: if the samples are too sparse or too few for the cut-off.
     """
-    from scipy.interpolate import BSpline
-    from scipy.sparse import diags_array
-    from scipy.sparse.linalg import spsolve
 
-    _check_cutoff(t, cutoff)
-    intervals = math.ceil(_KNOTS_PER_PERIOD * cutoff * t[-1])
-    step = t[-1] / intervals
-    knots = step * np.arange(-_DEGREE, intervals + _DEGREE + 1)
-    B = BSpline.design_matrix(np.minimum(t, knots[-_DEGREE - 1]), knots, _DEGREE)
-    size = intervals + _DEGREE
-    binomials = [(-1.0) ** i * math.comb(_ORDER, i) for i in range(_ORDER + 1)]
-    D = diags_array(binomials, offsets=range(_ORDER + 1), shape=(size - _ORDER, size))
+    def __init__(self, t: np.ndarray, cutoff: float) -> None:
+        """As `smoothing_spline`."""
+        from scipy.interpolate import BSpline
+        from scipy.sparse import diags_array
+        from scipy.sparse.linalg import splu
 
-    half_turn = math.pi * cutoff * step
-    samples_per_knot = (len(t) - 1) / intervals
-    spline_gain = np.sinc(half_turn / math.pi) ** (2 * (_DEGREE + 1))
-    mu = (math.sqrt(2) - 1) * spline_gain / (2 * math.sin(half_turn)) ** (2 * _ORDER)
-    A = B.T @ B + mu * samples_per_knot * (D.T @ D)
-    with progress.step("smoothing"):
-        coefficients = spsolve(A.tocsc(), B.T @ values).reshape(size, -1)
-    return Spline(knots, coefficients, _DEGREE)
+        _check_cutoff(t, cutoff)
+        intervals = math.ceil(_KNOTS_PER_PERIOD * cutoff * t[-1])
+        step = t[-1] / intervals
+        self._knots = knots = step * np.arange(-_DEGREE, intervals + _DEGREE + 1)
+        B = BSpline.design_matrix(np.minimum(t, knots[-_DEGREE - 1]), knots, _DEGREE)
+        size = intervals + _DEGREE
+        binomials = [(-1.0) ** i * math.comb(_ORDER, i) for i in range(_ORDER + 1)]
+        D = diags_array(binomials, offsets=range(_ORDER + 1), shape=(size - _ORDER, size))
+
+        half_turn = math.pi * cutoff * step
+        samples_per_knot = (len(t) - 1) / intervals
+        spline_gain = np.sinc(half_turn / math.pi) ** (2 * (_DEGREE + 1))
+        mu = (math.sqrt(2) - 1) * spline_gain / (2 * math.sin(half_turn)) ** (2 * _ORDER)
+        self._B = B
+        self._factor = splu((B.T @ B + mu * samples_per_knot * (D.T @ D)).tocsc())
+
+    def spline(self, values: np.ndarray) -> Spline:
+        """The smoothed values. Args: values: (N, m)."""
+        found = self._factor.solve(self._B.T @ np.asarray(values, dtype=float))
+        return Spline(self._knots, found.reshape(len(found), -1), _DEGREE)
+
+    def back(self, weights: np.ndarray, times: np.ndarray, nu: int = 0) -> np.ndarray:
+        """Weights of the values, (N, m), in a sum of the spline's derivatives of order `nu`.
+
+        Args: weights: (K, m), of s^(nu) at times (K,).
+        """
+        return self._B @ self._factor.solve(design(self._knots, times, nu).T @ weights)
+
+
+def design(knots: np.ndarray, times: np.ndarray, nu: int) -> Any:
+    """Derivatives of order `nu` of all quintic B-splines at times, (K, M), sparse."""
+    from scipy.sparse import csr_array
+
+    first, rows = basis(knots, times, _DEGREE, nu)
+    columns = first[:, None] + np.arange(_DEGREE + 1)
+    starts = np.arange(0, rows.size + 1, _DEGREE + 1)
+    shape = (len(times), len(knots) - _DEGREE - 1)
+    return csr_array((rows.ravel(), columns.ravel(), starts), shape=shape)
 
 
 def _check_cutoff(t: np.ndarray, cutoff: float) -> None:

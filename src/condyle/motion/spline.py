@@ -31,14 +31,14 @@ class Spline:
         inner = t[(degree + 1) // 2 : len(t) - (degree + 1) // 2]
         knots = np.concatenate([t[0] * ends, inner, t[-1] * ends])
         with np.errstate(all="ignore"):
-            first, rows = _basis(knots, t, degree, 0)
+            first, rows = basis(knots, t, degree, 0)
             flat = _banded_solve(first, rows, values.reshape(len(t), -1))
         coefficients = flat.reshape(values.shape)
         return cls(knots, coefficients, degree)
 
     def __call__(self, t: np.ndarray, nu: int = 0) -> np.ndarray:
         """The derivative of order `nu` at times (K,); beyond the ends the last piece goes on."""
-        first, rows = _basis(self.knots, t, self.degree, nu)
+        first, rows = basis(self.knots, t, self.degree, nu)
         found: np.ndarray = np.zeros((len(t), *self.coefficients.shape[1:]))
         with np.errstate(all="ignore"):  # of times too close together
             for j in range(self.degree + 1):
@@ -46,7 +46,7 @@ class Spline:
         return found
 
 
-def _basis(knots: np.ndarray, t: np.ndarray, degree: int, nu: int) -> tuple[np.ndarray, np.ndarray]:
+def basis(knots: np.ndarray, t: np.ndarray, degree: int, nu: int) -> tuple[np.ndarray, np.ndarray]:
     """The B-splines that are not zero at times (K,), or their derivatives of order `nu`.
 
     By the recurrence of Cox and de Boor; its last `nu` steps are those of derivatives.

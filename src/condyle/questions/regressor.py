@@ -45,6 +45,8 @@ def regressor(structure: Structure) -> Program:
     to q_EE'; with contacts the same that gives their forces, `contact_platform` (k, 10) ..:
 
         contact_force = contact_Y pi + contact_load - contact_row effort.
+
+    `friction` (m, k) and `contact_friction` (k, k), times |contact_force|, add to the load.
     """
     b = Builder(structure)
     platform, load = given(b), Wrench.of(b)
@@ -54,9 +56,10 @@ def regressor(structure: Structure) -> Program:
     rows = {"": admissible.T}
     if dep := indices(structure.dependent):
         # Across the contacts: the equations dual to the dependent coordinates.
-        across = motion.E[:, dep].T
-        N = contacts(b, platform).N
-        rows["contact_"] = solve_small(across @ N, across)
+        across, touch = motion.E[:, dep].T, contacts(b, platform)
+        rows["contact_"] = solve_small(across @ touch.N, across)
+        for prefix, projection in rows.items():
+            b.output(f"{prefix}friction", projection @ touch.T, "", projection.shape[0], len(dep))
     own = _platform(b, state)
     for prefix, projection in rows.items():
         b.output(f"{prefix}platform", projection @ own, "", projection.shape[0], len(PLATFORM))

@@ -2,39 +2,21 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, StrictBool, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, StrictBool, model_validator
 
-from ...errors import InputError, ProblemsError, as_name, as_path, no_such_file, printable, shown
+from ...errors import printable
 from ...mechanism.library import bundled_mechanisms
-from ...mechanism.messages import describe
-from ...mechanism.quantities import listed
+from ...mechanism.study_file import Count, Finite, StudyFile, numbers
 from ...mechanism.table import FrozenTable, Table
 from ...mechanism.table_schema import schema_of
-from ...mechanism.toml import nests_too_deep, read_tables, read_text, too_deep
 
 REFERENCE, TRIAL, NONE = "reference", "trial", "none"  # instead of a file
-MOST_SHOWN = 3  # problems in one line
 
-Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Count = Annotated[int, Field(strict=True, ge=1)]
-
-
-def _numbers(value: Any) -> Any:
-    """Numbers are SI; text with a unit is refused."""
-    value = listed(value)
-    for one in value if isinstance(value, list | tuple) else (value,):
-        if isinstance(one, str):
-            raise ValueError(f'expected numbers in SI (m, kg, rad, N), got "{one[:40]}"')
-    return tuple(value) if isinstance(value, list) else value
-
-
-Pair = Annotated[tuple[Finite, Finite], BeforeValidator(_numbers)]
+Pair = Annotated[tuple[Finite, Finite], BeforeValidator(numbers)]
 
 
 class Follower(Table):
@@ -64,7 +46,7 @@ class Vary(Table):
         default=(), description='dependent paths; with "-" in front the negative value'
     )
     range: Pair | None = Field(default=None, description="[lower, upper], SI")
-    values: Annotated[tuple[Finite, ...], BeforeValidator(_numbers), Field(min_length=1)] | None = (
+    values: Annotated[tuple[Finite, ...], BeforeValidator(numbers), Field(min_length=1)] | None = (
         Field(default=None, description="list of values, SI")
     )
     normal: Pair | None = Field(default=None, description="[mean, standard deviation], SI")
@@ -156,10 +138,8 @@ DEFAULT_MEASURES = {
 }
 
 
-class Study(Table):
+class Study(StudyFile):
     """Variants of one mechanism, one or several motions, and the measures."""
-
-    refusal = ProblemsError
 
     mechanism: str | None = Field(
         default=None, description="a file, or a bundled mechanism; default: masticatory"
@@ -197,30 +177,6 @@ class Study(Table):
             )
         return self
 
-    @classmethod
-    def checked(cls, data: Mapping[str, Any], source: str) -> Self:
-        """A study of `data`; `source` names it in messages.
-
-        Raises: InputError: with the problem, in one line.
-        """
-        as_name(source, "source")
-        if not isinstance(data, Mapping):
-            raise InputError(f"data: expected the tables of a study, got {shown(data)}")
-        if nests_too_deep(data):
-            raise too_deep(source)
-        try:
-            return cls.model_validate(data)
-        except ValidationError as error:
-            problems = [" ".join(p.split()) for p in describe(error, data, cls)]
-        raise InputError(f"{source}: {some_of(problems, MOST_SHOWN)}")
-
-    def title(self) -> str:
-        return "study"
-
-    def data(self) -> dict[str, Any]:
-        """The study as JSON, without defaults."""
-        return json.loads(self.model_dump_json(exclude_defaults=True))
-
 
 def read_study(source: str | os.PathLike[str] | Mapping[str, Any] | Study) -> Study:
     """A study from a TOML file, or from its tables.
@@ -229,17 +185,12 @@ def read_study(source: str | os.PathLike[str] | Mapping[str, Any] | Study) -> St
 
     Raises: InputError: with the problem, in one line.
     """
-    if isinstance(source, Study):
-        return source
-    if isinstance(source, Mapping):
-        return Study.checked(source, "study")
-    path = Path(as_path(source, "study", "a study, a file or tables"))
-    if not os.path.isfile(path):
-        raise no_such_file(path)
-    study = Study.checked(read_tables(read_text(path), str(path)), str(path))
+    study, folder = Study.read(source)
+    if folder is None:
+        return study
 
     def beside(name: str, words: Iterable[str]) -> str:
-        return name if name in words else str(path.parent / name)
+        return name if name in words else str(folder / name)
 
     named: dict[str, Any] = {}
     if study.load is not None:
@@ -251,12 +202,6 @@ def read_study(source: str | os.PathLike[str] | Mapping[str, Any] | Study) -> St
         for one in study.motion
     ]
     return study.model_copy(update=named)
-
-
-def some_of(problems: list[str], most: int) -> str:
-    """The first problems, in one line, and how many more there are."""
-    more = len(problems) - most
-    return "; ".join(problems[:most]) + (f"; and {more} more" if more > 0 else "")
 
 
 def json_schema() -> dict[str, Any]:

@@ -20,13 +20,13 @@ from pydantic import BaseModel, Field, JsonValue
 
 from ...atomic import make_folder, replacing, write_text
 from ...errors import InputError, as_path, printable, shortened
+from ...mechanism.study_file import some_of
 from ...mechanism.toml import read_tables
 from ...mechanism.writing import record
 from ...motion.memory import at_most, memory_at_hand
 from ...version import __version__
 from .job import MOTION, REASON, SECONDS, STATUS, VARIANT, Job
 from .part import Rows
-from .study import some_of
 
 STUDY, ROWS, SOLUTIONS = "study.json", "rows", "solutions"
 PART, ALL = "part-{:06d}.parquet", "all.parquet"

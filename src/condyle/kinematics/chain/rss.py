@@ -58,7 +58,10 @@ class RSSFamily(RodFamily):
             **self.rod_constants(f, "coupler", coupler),
         }
 
-    standard = RodFamily.rod_standard("coupler") | {"crank.moment": "kg m", "crank.inertia": "kg m^2"}
+    standard = RodFamily.rod_standard("coupler") | {
+        "crank.moment": "kg m",
+        "crank.inertia": "kg m^2",
+    }
 
     def of_standard(self, c: Constants, p: Constants) -> dict[str, Any]:
         own = {"crank_mass": p.crank_moment, "crank_com": ca.SX(1), "crank": p.crank_inertia}

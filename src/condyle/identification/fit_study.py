@@ -1,0 +1,73 @@
+"""What `identify` is asked for: the numbers that are unknown, what is known of them, the noise."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Self
+
+from pydantic import BeforeValidator, Field, StrictBool, model_validator
+
+from ..mechanism.study_file import Finite, StudyFile, numbers
+from ..mechanism.table import FrozenTable, Table
+from ..mechanism.table_schema import schema_of
+
+Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
+Values = Annotated[tuple[Finite, ...] | Finite, BeforeValidator(numbers)]
+Prior = Annotated[tuple[Values, Values], BeforeValidator(numbers)]
+
+
+class Noise(Table):
+    """Standard deviations of what was measured; without: from what smoothing removes."""
+
+    effort: Positive | None = Field(default=None, description="of efforts [N m or N]")
+    encoder: Positive | None = Field(default=None, description="of joint readings [rad or m]")
+
+
+class FitOptions(Table):
+    """How the log is read and fitted."""
+
+    smooth: Positive = Field(default=10.0, description="cut-off of the low-pass filter [Hz]")
+    trim: Finite | None = Field(
+        default=None, ge=0, description="left out at both ends [s]; default: 1.5 periods of smooth"
+    )
+    delay: StrictBool = Field(
+        default=False, description="fit a common delay of the efforts behind the encoders [s]"
+    )
+    bias: StrictBool = Field(default=False, description="fit a constant error of each effort")
+    validate_: Annotated[float, Field(strict=True, ge=0, lt=0.9)] | str = Field(
+        default=0.25, alias="validate", description="share of the log's end, or the file of a log"
+    )
+    load_point: str | None = Field(default=None, description="where the load acts")
+    seed: Annotated[int, Field(strict=True, ge=0)] = 1
+
+
+class FitStudy(StudyFile):
+    """Unknown numbers of a mechanism's file, and how they are fitted."""
+
+    numbers: tuple[str, ...] = Field(
+        min_length=1, description='unknown numbers by path, such as "platform.mass"'
+    )
+    shared: tuple[str, ...] = Field(
+        default=(), description="of these a star stands for one number, not one a chain"
+    )
+    prior: dict[str, Prior] = Field(
+        default={}, description="path -> [mean, standard deviation], of a vector two lists"
+    )
+    noise: Noise = Noise()
+    options: FitOptions = FitOptions()
+
+    @model_validator(mode="after")
+    def _known(self) -> Self:
+        object.__setattr__(self, "prior", FrozenTable(self.prior))
+        for name, paths in (("shared", self.shared), ("prior", self.prior)):
+            for path in paths:
+                if path not in self.numbers:
+                    raise ValueError(f"{name}: {path} is not among numbers")
+        for path in self.shared:
+            if "*" not in path:
+                raise ValueError(f"shared: {path} has no star; leave it out")
+        return self
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON schema of fit studies, for editors."""
+    return {**schema_of(FitStudy), "title": "condyle fit"}

@@ -1,0 +1,297 @@
+"""The fit: weighted least squares over the numbers that data can tell, physically consistent."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import progress
+from ..errors import InputError, few
+from ..extras import require
+from .base_parameters import told_apart
+from .equations import LogEquations, Rows
+from .unknowns import Unknowns
+
+ITERATIONS = 30
+CONVERGED = 1e-6  # of a step, in standard deviations
+DOUBT = 2.0  # standard deviation over the size of a number, beyond which data do not tell it
+BORDER = 1e-9  # of a cone's size, nearer than which a number is held at the border
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Unknowns of the file, then the extras.
+
+    x: (U + E,);  covariance: (U + E, U + E), zero where held;  told: (U + E,), whether fitted;
+    why: number -> why it is not;  held: words of what the rules hold at a border;
+    rows: of each log, at x.
+    """
+
+    x: np.ndarray
+    covariance: np.ndarray
+    told: np.ndarray
+    why: dict[int, str]
+    held: tuple[str, ...]
+    rows: tuple[Rows, ...]
+
+
+@dataclass(frozen=True)
+class _Cones:
+    """Rules: C x + d in the nonnegative numbers, and one pseudo-inertia per (M, d): M x + d >= 0.
+
+    words: of the linear ones.
+    """
+
+    C: np.ndarray
+    d: np.ndarray
+    words: list[str]
+
+
+def fit(logs: Sequence[LogEquations], unknowns: Unknowns, names: Sequence[str]) -> Fit:
+    """The fit of several logs.
+
+    Args:   names: of the unknowns and the extras.
+    Raises: InputError: where it does not settle.
+    """
+    U, E = len(unknowns.all), len(names) - len(unknowns.all)
+    x = np.concatenate([unknowns.prior, np.zeros(E)])
+    told: np.ndarray | None = None
+    why: dict[int, str] = {}
+    held: tuple[str, ...] = ()
+    known = np.concatenate([unknowns.spread, np.full(E, np.inf)])
+    mean = x.copy()
+    with progress.step("fitting"):
+        for _ in range(ITERATIONS):
+            rows = [log.rows(x[:U], x[U:]) for log in logs]
+            white = [_whitened(one) for one in rows]
+            A, r = (np.concatenate([w[i] for w in white]) for i in range(2))
+            prior = np.flatnonzero(np.isfinite(known))
+            A = np.concatenate([A, np.eye(len(x))[prior] / known[prior, None]])
+            r = np.concatenate([r, (x - mean)[prior] / known[prior]])
+            if told is None:
+                told, why = _told(A, r, unknowns, x, names)
+            bent = sum(log.attenuation(x[:U], one.V) for log, one in zip(logs, rows, strict=True))
+            normal = A[:, told].T @ A[:, told]
+            step = np.zeros(len(x))
+            right = A[:, told].T @ r - np.asarray(bent)[told]
+            step[told] = -np.linalg.solve(normal, right)
+            if not _allowed(unknowns, x[:U] + step[:U]):
+                step[told] = _in_cones(unknowns, x, told, normal, right)
+            x = x + step
+            size = np.sqrt(max(0.0, float(step[told] @ normal @ step[told])))
+            if size < CONVERGED * max(1, told.sum()) ** 0.5:
+                break
+        else:
+            raise InputError(
+                "the fit does not settle: fewer numbers, priors, or a log of larger motions helps"
+            )
+    held = tuple(_held(unknowns, x[:U], np.linalg.inv(normal), told))
+    rows = [log.rows(x[:U], x[U:]) for log in logs]
+    covariance = np.zeros((len(x), len(x)))
+    covariance[np.ix_(told, told)] = _covariance(logs, rows, x[:U], told, known)
+    return Fit(x, covariance, told, why, held, tuple(rows))
+
+
+def _whitened(rows: Rows) -> tuple[np.ndarray, np.ndarray]:
+    """A (rows, U) and r (rows,), each of the residual's own size."""
+    root = np.linalg.cholesky(rows.V)
+    A = np.linalg.solve(root, rows.A)
+    r = np.linalg.solve(root, rows.r[..., None])
+    return A.reshape(-1, A.shape[2]), r.ravel()
+
+
+def _told(
+    A: np.ndarray, r: np.ndarray, unknowns: Unknowns, x: np.ndarray, names: Sequence[str]
+) -> tuple[np.ndarray, dict[int, str]]:
+    """Which numbers the data tell, each to within twice its size, and why the others are not."""
+    lengths = np.linalg.norm(A, axis=0)
+    size = _sizes(unknowns, x)
+    bare = size == 0
+    # Of a number that is 0 in the file: what would make up for all that is measured.
+    size[bare] = np.linalg.norm(A @ x - r) / np.where(lengths > 0, lengths, np.inf)[bare]
+    found = told_apart(A * size, 1 / DOUBT, relative=False)
+    told = np.zeros(len(x), dtype=bool)
+    told[found.known] = True
+    why = {}
+    for column, j in zip(found.follow.T, found.rest, strict=True):
+        if lengths[j] * size[j] <= 1 / DOUBT:
+            why[int(j)] = "the data say nothing of it"
+            continue
+        share = np.abs(column)
+        with_it = [
+            names[i] for i, f in zip(found.known, share, strict=True) if f > 0.1 * share.max()
+        ]
+        why[int(j)] = f"not told apart from {few(with_it)}"
+    return told, why
+
+
+def _sizes(unknowns: Unknowns, x: np.ndarray) -> np.ndarray:
+    """How large numbers are: those of a vector as its largest entry."""
+    size = np.abs(x)
+    paths = np.array([one.path for one in unknowns.all])
+    for path in set(paths):
+        own = np.flatnonzero(paths == path)
+        size[own] = size[own].max()
+    return size
+
+
+def _covariance(
+    logs: Sequence[LogEquations],
+    rows: Sequence[Rows],
+    x: np.ndarray,
+    told: np.ndarray,
+    known: np.ndarray,
+) -> np.ndarray:
+    """Of what is fitted: noise goes through smoothing into all times at once."""
+    weighted = [np.linalg.solve(one.V, one.A[:, :, told]) for one in rows]
+    F = sum(
+        np.einsum("tru,trw->uw", one.A[:, :, told], w)
+        for one, w in zip(rows, weighted, strict=True)
+    )
+    F = F + np.diag(1 / known[told] ** 2)
+    inverse = np.linalg.inv(F)
+    found = inverse @ np.diag(1 / known[told] ** 2) @ inverse
+    for log, w in zip(logs, weighted, strict=True):
+        gain = np.einsum("uw,trw->utr", inverse, w)
+        found = found + log.spread(gain, x)
+    return np.asarray(found)
+
+
+# -- physical consistency --------------------------------------------------------------------
+
+
+def pseudo_inertia(pi: np.ndarray) -> np.ndarray:
+    """Of a platform's ten numbers: positive definite for every body that can be, (4, 4).
+
+    [S h; h^T m] with S the second moments, tr(I) / 2 E - I (Wensing, Kim and Slotine 2018).
+    """
+    m, h, (xx, yy, zz, xy, xz, yz) = pi[0], pi[1:4], pi[4:10]
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    found = np.empty((4, 4))
+    found[:3, :3] = np.trace(inertia) / 2 * np.eye(3) - inertia
+    found[:3, 3] = found[3, :3] = h
+    found[3, 3] = m
+    return found
+
+
+def _allowed(unknowns: Unknowns, x: np.ndarray) -> bool:
+    cones = _linear(unknowns)
+    platform = pseudo_inertia(unknowns.pi(x))
+    return bool((cones.C @ x + cones.d >= 0).all() and np.linalg.eigvalsh(platform)[0] > 0)
+
+
+def _linear(unknowns: Unknowns) -> _Cones:
+    """The rules of the file that are linear."""
+    U = len(unknowns.all)
+    rows: list[np.ndarray] = []
+    ends: list[float] = []
+    words: list[str] = []
+
+    def add(entries: dict[int, float], constant: float, text: str) -> None:
+        row = np.zeros(U)
+        for i, factor in entries.items():
+            row[i] = factor
+        rows.append(row)
+        ends.append(constant)
+        words.append(text)
+
+    low, high = unknowns.bounds
+    for i, one in enumerate(unknowns.all):
+        if np.isfinite(low[i]):
+            add({i: 1.0}, -low[i], f"{one.name} at {low[i]:g}")
+        if np.isfinite(high[i]):
+            add({i: -1.0}, high[i], f"{one.name} at {high[i]:g}")
+    for axial, transverse, a, t in unknowns.axial_rules():
+        entries = ({axial: -1.0} if axial is not None else {}) | (
+            {transverse: 2.0} if transverse is not None else {}
+        )
+        constant = (0.0 if axial is not None else -a) + (0.0 if transverse is not None else 2 * t)
+        named = unknowns.all[axial if axial is not None else transverse].name  # type: ignore[index]
+        add(entries, constant, f"{named}: axial at twice transverse")
+    return _Cones(np.array(rows).reshape(-1, U), np.array(ends), words)
+
+
+def _in_cones(
+    unknowns: Unknowns, x: np.ndarray, told: np.ndarray, normal: np.ndarray, right: np.ndarray
+) -> np.ndarray:
+    """The best step within the rules, by a semidefinite program: (fitted,).
+
+    Of the platform's pseudo-inertia, linear about x, for whose numbers it is exact.
+    """
+    require("clarabel", "identify")
+    import clarabel
+    from scipy.sparse import csc_array
+
+    U = len(unknowns.all)
+    free = np.flatnonzero(told)
+    # Steps in units of the standard deviations that data give, so that all are of one size.
+    scale = 1 / np.sqrt(np.diag(normal))
+    own = free < U
+    cones = _linear(unknowns)
+    C = np.zeros((len(cones.d), len(free)))
+    C[:, own] = cones.C[:, free[own]]
+    slack = cones.C @ x[:U] + cones.d
+    size = np.linalg.norm(C * scale, axis=1)
+    used = size > 0
+    pi, slope = unknowns.pi(x[:U])[:10], unknowns.slope(x[:U])[:10]
+    P0 = pseudo_inertia(pi)
+    balance = 1 / np.sqrt(np.maximum(np.diag(P0), 1e-300))
+    each = np.zeros((len(free), 4, 4))
+    for k in np.flatnonzero(own):
+        column = slope[:, free[k]]
+        # Linear in pi, so that a pseudo-inertia of a direction is one too.
+        each[k] = pseudo_inertia(column)
+    triangle = [(i, j) for j in range(4) for i in range(j + 1)]
+
+    def flat(matrix: np.ndarray) -> np.ndarray:
+        scaled = matrix * np.outer(balance, balance)
+        return np.array([scaled[i, j] * (1 if i == j else np.sqrt(2)) for i, j in triangle])
+
+    margin = BORDER * np.eye(4) / np.outer(balance, balance)
+    blocks = [-(C * scale)[used] / size[used, None]]
+    ends = [slack[used] / size[used]]
+    kinds = [clarabel.NonnegativeConeT(int(used.sum()))]
+    if any(each[k].any() for k in range(len(free))):
+        blocks.append(-np.array([flat(e * s) for e, s in zip(each, scale, strict=True)]).T)
+        ends.append(flat(P0 - margin))
+        kinds.append(clarabel.PSDTriangleConeT(4))
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-10
+    H = normal * np.outer(scale, scale)
+    solver = clarabel.DefaultSolver(
+        csc_array(np.triu((H + H.T) / 2)),
+        right * scale,
+        csc_array(np.concatenate(blocks)),
+        np.concatenate(ends),
+        kinds,
+        settings,
+    )
+    found = solver.solve()
+    if str(found.status) not in ("Solved", "AlmostSolved"):
+        raise InputError(
+            "the fit within the rules of the file does not settle "
+            f"({found.status}): priors or a log of larger motions help"
+        )
+    return np.array(found.x) * scale
+
+
+def _held(unknowns: Unknowns, x: np.ndarray, covariance: np.ndarray, told: np.ndarray) -> list[str]:
+    """What stands at a border, in words."""
+    cones = _linear(unknowns)
+    spread = np.zeros(len(x))
+    own = np.flatnonzero(told)
+    inside = own < len(x)
+    spread[own[inside]] = np.sqrt(np.diag(covariance))[inside]
+    slack = cones.C @ x + cones.d
+    near = slack <= 1e-6 * (np.abs(cones.C) @ spread)
+    found = [word for word, at in zip(cones.words, near, strict=True) if at]
+    platform = pseudo_inertia(unknowns.pi(x))
+    size = np.diag(platform)
+    balanced = platform / np.sqrt(np.outer(size, size))
+    touches = any(one.path.startswith("platform") for one in unknowns.all)
+    if touches and np.linalg.eigvalsh(balanced)[0] < 1e-6:
+        found.append("platform: its mass lies in a plane or a line, as far as the rules allow")
+    return found

@@ -1,0 +1,215 @@
+"""`identify`: numbers of a mechanism's file from logs of the machine. Check, fit, judge."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import CondyleWarning, InputError, few
+from ..mechanism import as_mechanism
+from ..mechanism.mechanism import Mechanism
+from ..model.model import derive
+from .equations import Extras, LogEquations, Rows
+from .fit_study import FitStudy
+from .fitting import Fit, fit
+from .log import Log, read_log
+from .unknowns import Unknowns, changes
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number after the fit. SI; deviation is NaN where the data do not tell it."""
+
+    name: str
+    unit: str
+    value: float
+    deviation: float
+    before: float
+    told: bool
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """How well equations hold on some of the logs.
+
+    spread: mean square of the residual over what noise makes of it: 1 where nothing is missing.
+    effort: root of the mean square of the residual as efforts, (n,) [N m or N].
+    """
+
+    spread: float
+    effort: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """What `identify` found.
+
+    mechanism: with the numbers fitted;  numbers: one a number;  correlation: (U, U), of those
+    told;  fitted, validated: residuals;  held: what the rules of the file hold at a border;
+    logs, fit: what stands behind them.
+    """
+
+    mechanism: Mechanism
+    numbers: tuple[Number, ...]
+    correlation: np.ndarray
+    fitted: Judged
+    validated: Judged | None
+    held: tuple[str, ...]
+    chains: tuple[str, ...]
+    logs: tuple[LogEquations, ...]
+    fit: Fit
+
+    def __str__(self) -> str:
+        wide = max(len(one.name) for one in self.numbers)
+        lines = []
+        for one in self.numbers:
+            said = f"+- {one.deviation:.2g}" if one.told else f"not identified: {one.why}"
+            lines.append(f"{one.name:{wide}}  {one.value:12.6g} {said} {one.unit}".rstrip())
+        lines.append(f"residual over noise: fitted {np.sqrt(self.fitted.spread):.3g}")
+        if self.validated is not None:
+            lines[-1] += f", validated {np.sqrt(self.validated.spread):.3g}"
+        return "\n".join([*lines, *(f"held by the rules of the file: {one}" for one in self.held)])
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """The same for programs."""
+        numbers = {
+            one.name: {
+                "value": one.value,
+                "deviation": one.deviation if one.told else None,
+                "unit": one.unit,
+                "before": one.before,
+                "identified": one.told,
+                **({"why": one.why} if one.why else {}),
+            }
+            for one in self.numbers
+        }
+        judged = {"fitted": self.fitted, "validated": self.validated}
+        residuals = {
+            name: {
+                "over_noise": float(np.sqrt(one.spread)),
+                "effort_rms": dict(zip(self.chains, map(float, one.effort), strict=True)),
+            }
+            for name, one in judged.items()
+            if one is not None
+        }
+        return {"numbers": numbers, "residuals": residuals, "held": list(self.held)}
+
+
+def identify(
+    mechanism: Mechanism | str | os.PathLike[str],
+    logs: Any,
+    study: FitStudy | Mapping[str, Any] | str | os.PathLike[str],
+    *,
+    backend: str = "auto",
+) -> Identified:
+    """Numbers of a mechanism's file from logs of the machine.
+
+    Weighted least squares of the equations of motion, which are linear in masses, moments and
+    friction; every body is one that can be. Its covariance counts noise of efforts and of encoders,
+    as smoothing leaves it. Numbers that the logs cannot tell stay as they are, and are named.
+
+    Args:   mechanism: to start from;  logs: one file or several (CSV, Parquet): t, joint_<chain>
+            or q, tau_<chain>, if any Fx .. Mz and contact_<contact>.
+            study: what is unknown: see the guide on identification.
+    Raises: InputError: for files that do not fit, or a fit that does not settle.
+    """
+    machine = as_mechanism(mechanism)
+    asked, folder = FitStudy.read(study)
+    model = derive(machine, backend=backend, distribution="minimum_norm")
+    options = asked.options
+    files = [logs] if isinstance(logs, str | os.PathLike) else list(logs)
+    if not files:
+        raise InputError("logs: expected one file or several, got none")
+    read = [read_log(model, path, options.smooth, options.trim) for path in files]
+    unknowns = Unknowns(model.regression.standard, asked)
+    extras = Extras(options.bias, options.delay)
+    share = options.validate_
+    kept: list[Log] = []
+    apart: list[Log] = []
+    if isinstance(share, str):
+        path = share if folder is None else str(folder / share)
+        kept, apart = read, [read_log(model, path, options.smooth, options.trim)]
+    else:
+        kept = [log.part(0.0, 1.0 - share) for log in read]
+        apart = [log.part(1.0 - share, 1.0) for log in read] if share else []
+    noise = asked.noise.effort, asked.noise.encoder
+    point = _load_point(machine, options.load_point, read)
+
+    def equations(some: Sequence[Log]) -> list[LogEquations]:
+        return [LogEquations(model, log, unknowns, extras, noise, point) for log in some]
+
+    own = extras.names(machine.chain_names)
+    names = [one.name for one in unknowns.all] + [name for name, _ in own]
+    units = [one.unit for one in unknowns.all] + [unit for _, unit in own]
+    on = equations(kept)
+    found = fit(on, unknowns, names)
+    U = len(unknowns.all)
+    before = np.concatenate([unknowns.nominal, np.zeros(len(own))])
+    numbers = []
+    for i, name in enumerate(names):
+        told = bool(found.told[i])
+        deviation = float(np.sqrt(found.covariance[i, i])) if told else float("nan")
+        numbers.append(
+            Number(
+                name,
+                units[i],
+                float(found.x[i]),
+                deviation,
+                float(before[i]),
+                told,
+                found.why.get(i, ""),
+            )
+        )
+    if untold := [one.name for one in numbers if not one.told]:
+        warnings.warn(
+            f"the logs cannot tell {few(untold)}: they stay as they were",
+            CondyleWarning,
+            stacklevel=2,
+        )
+    validated = None
+    if apart:
+        rows = [one.rows(found.x[:U], found.x[U:]) for one in equations(apart)]
+        validated = _judged(rows)
+    deviations = np.sqrt(np.diag(found.covariance))
+    safe = np.where(deviations > 0, deviations, 1.0)
+    return Identified(
+        machine._set(changes(unknowns, found.x[:U]), "all"),
+        tuple(numbers),
+        found.covariance / np.outer(safe, safe),
+        _judged(found.rows),
+        validated,
+        found.held,
+        machine.chain_names,
+        tuple(on),
+        found,
+    )
+
+
+def _judged(rows: Sequence[Any]) -> Judged:
+    squares = [
+        np.einsum("tr,tr->t", one.r, np.linalg.solve(one.V, one.r[..., None])[..., 0])
+        for one in rows
+    ]
+    count = sum(one.r.size for one in rows)
+    effort = np.concatenate([one.effort for one in rows])
+    return Judged(float(sum(s.sum() for s in squares) / count), np.sqrt((effort**2).mean(axis=0)))
+
+
+def _load_point(machine: Mechanism, asked: str | None, logs: Sequence[Log]) -> str | None:
+    """Where the load acts, if there is one."""
+    if asked is None and not any(log.wrench.any() for log in logs):
+        return None
+    name = asked or "right_molar"
+    if name not in machine.platform.points:
+        raise InputError(
+            f'load_point: the logs have a load, and the mechanism no point "{name}"; give one of '
+            f"{few(machine.platform.points) or 'its platform.points'} in [options]"
+        )
+    return name

@@ -1,0 +1,198 @@
+"""What a machine recorded: encoders or poses, efforts, loads, forces of contacts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..mechanism.coordinates import COORDINATES
+from ..model.model import Model
+from ..motion.arrays import check_rising
+from ..motion.column_units import FORCE, MOMENT
+from ..motion.file_words import columns_are
+from ..motion.smoothing import LowPass
+from ..motion.table_reader import read_table
+
+DENSE = 20  # samples to a period of the cut-off; denser logs are averaged
+WANTED = 6  # rows of equations to a period of the cut-off
+APART = 1.0  # rad or m, that readings may contradict each other by
+END = 1.5  # periods of the cut-off that are left out at either end
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """A recording on a mechanism, smoothed.
+
+    t: (N,) [s], from 0;  q, v, a: (N, m);  effort: (N, n), averaged but not smoothed;
+    wrench: (N, 6);  contact: (N, k) or None;  encoders: whether q comes from the joints.
+    averaged: how many samples of the file make one;  kept: (K,) [s], times of the equations.
+    noise: standard deviations of a sample here, from what smoothing removes: effort (n,), encoder
+    (n,), contact (k,).
+    """
+
+    source: str
+    t: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    effort: np.ndarray
+    wrench: np.ndarray
+    contact: np.ndarray | None
+    encoders: bool
+    averaged: int
+    kept: np.ndarray
+    low_pass: LowPass
+    noise: tuple[np.ndarray, np.ndarray, np.ndarray]
+
+    @cached_property
+    def effort_spline(self) -> Any:
+        """The efforts, smoothed."""
+        return self.low_pass.spline(self.effort)
+
+    @cached_property
+    def impulses(self) -> np.ndarray:
+        """Weights of the samples, (4, N), in the middle's value smoothed once, and in its value,
+        rate and acceleration smoothed twice."""
+        middle = self.t[len(self.t) // 2 : len(self.t) // 2 + 1]
+        once = self.low_pass.back(np.ones((1, 1)), middle)
+        rows = [once, *(self.low_pass.back(once, self.t, nu) for nu in range(3))]
+        return np.concatenate(rows, axis=1).T
+
+    def smoothed(self, values: np.ndarray) -> np.ndarray:
+        """Values at the samples, (N, ...), smoothed, at the times kept, (K, ...)."""
+        flat = self.low_pass.spline(values.reshape(len(values), -1))(self.kept)
+        return flat.reshape(len(self.kept), *values.shape[1:])
+
+    def back(self, weights: np.ndarray) -> np.ndarray:
+        """Weights of what `smoothed` takes from those of what it gives, (N, ...)."""
+        flat = self.low_pass.back(weights.reshape(len(weights), -1), self.kept)
+        return flat.reshape(len(self.t), *weights.shape[1:])
+
+    def part(self, start: float, stop: float) -> Log:
+        """With the equations of a part of its time alone, shares of the whole in 0..1."""
+        span = self.kept[-1] - self.kept[0]
+        since = (self.kept - self.kept[0]) / (span or 1.0)
+        chosen = (since >= start) & (since < stop if stop < 1 else since <= 1)
+        return Log(**{**vars_of(self), "kept": self.kept[chosen]})
+
+
+def vars_of(log: Log) -> dict[str, Any]:
+    """The fields of a log."""
+    return {name: getattr(log, name) for name in Log.__dataclass_fields__}
+
+
+def read_log(model: Model, path: Any, cutoff: float, trim: float | None = None) -> Log:
+    """A log of a mechanism: CSV or Parquet.
+
+    Columns: t, and joint_<chain> of all actuators or coordinates as of a motion; tau_<chain>;
+    if any Fx .. Mz at the load point, contact_<contact>.
+    """
+    chains = model.mechanism.chain_names
+    contacts = model.mechanism.contact_names
+    joints, efforts = [f"joint_{c}" for c in chains], [f"tau_{c}" for c in chains]
+    forces = [f"contact_{c}" for c in contacts]
+    known = ("t", *COORDINATES, *joints, *efforts, *FORCE, *MOMENT, *forces)
+    table = read_table(path, known=known)
+    t = table.require(["t"])[:, 0]
+    check_rising(t, table.where)
+    effort = table.require(efforts)
+    encoders = any(name in table.columns for name in joints)
+    if encoders:
+        places = table.require(joints)
+    else:
+        places = table.require(_coordinates(model, set(table.columns), table.source))
+    zero = np.zeros(table.rows)
+    wrench = np.column_stack([table.columns.get(n, zero) for n in (*FORCE, *MOMENT)])
+    given = [name for name in forces if name in table.columns]
+    if given and len(given) != len(forces):
+        missing = [name for name in forces if name not in given]
+        raise InputError(
+            f"{table.source}: {columns_are(missing)} missing; give all contacts' or none"
+        )
+    contact = table.require(forces) if given else None
+    return make_log(
+        model, t, places, effort, wrench, contact, encoders, cutoff, trim, Path(path).name
+    )
+
+
+def _coordinates(model: Model, there: set[str], source: str) -> list[str]:
+    """Names of q, in order, if the log has them."""
+    names = list(model.independent)
+    if missing := [name for name in names if name not in there]:
+        raise InputError(
+            f"{source}: expected joint_<chain> of every chain, or {', '.join(names)}; "
+            f"{columns_are(missing)} missing"
+        )
+    return names
+
+
+def make_log(
+    model: Model,
+    t: np.ndarray,
+    places: np.ndarray,
+    effort: np.ndarray,
+    wrench: np.ndarray,
+    contact: np.ndarray | None,
+    encoders: bool,
+    cutoff: float,
+    trim: float | None = None,
+    source: str = "log",
+) -> Log:
+    """A log from arrays: joints (N, n) or coordinates q (N, m), and efforts (N, n).
+
+    Raises: InputError: where joints cannot be, or it is too short or sparse for the cut-off.
+    """
+    span = t[-1] - t[0]
+    many = max(1, int((len(t) - 1) / (span * cutoff * DENSE)))
+    rows = len(t) // many * many
+
+    def average(x: np.ndarray) -> np.ndarray:
+        return x[:rows].reshape(rows // many, many, *x.shape[1:]).mean(axis=1)
+
+    t, places, effort, wrench = map(average, (t, places, effort, wrench))
+    contact = None if contact is None else average(contact)
+    t = t - t[0]
+    low_pass = LowPass(t, cutoff)
+    encoder = np.zeros(effort.shape[1])
+    if encoders:
+        encoder = _removed(low_pass, t, places)
+        found = model.forward_kinematics(places, time=t, tolerance=APART)
+        if (bad := np.flatnonzero(found.status)).size:
+            raise InputError(
+                f"{source}: the joints at {t[bad[0]]:.6g} s lead to no pose; are these readings of "
+                "this mechanism, from home, in rad and m?"
+            )
+        q = found.q
+    else:
+        q = places
+    spline = low_pass.spline(q)
+    q, v, a = (spline(t, nu) for nu in range(3))
+    end = END / cutoff if trim is None else trim
+    count = int((t[-1] - 2 * end) * cutoff * WANTED) + 1
+    if t[-1] - 2 * end <= 0 or count < WANTED:
+        raise InputError(
+            f"{source}: {t[-1]:.3g} s are too short, with {end:.3g} s less at both ends"
+        )
+    kept = np.linspace(end, t[-1] - end, count)
+    noise = _removed(low_pass, t, effort), encoder, _removed(low_pass, t, contact)
+    return Log(
+        source, t, q, v, a, effort, wrench, contact, encoders, many, kept, low_pass, noise
+    )  # fmt: skip
+
+
+def _removed(low_pass: LowPass, t: np.ndarray, values: np.ndarray | None) -> np.ndarray:
+    """Standard deviations of white noise of a sample, (columns,), from what smoothing removes."""
+    if values is None:
+        return np.zeros(0)
+    rest = values - low_pass.spline(values)(t)
+    inner = slice(len(t) // 10, -(len(t) // 10) or None)
+    weight = low_pass.back(np.ones((1, 1)), t[len(t) // 2 : len(t) // 2 + 1])[:, 0]
+    share = 1 - 2 * weight[len(t) // 2] + weight @ weight  # of white noise that is removed
+    # The median is deaf to the jumps of dry friction.
+    spread = np.median(np.abs(rest[inner]), axis=0) / 0.6745
+    return np.asarray(spread / np.sqrt(share))

@@ -1,0 +1,144 @@
+"""The unknown numbers of a fit: where they stand in the file, and what they may be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..errors import InputError
+from ..model.regressor import StandardNumbers
+from ..questions.number_paths import ENTRIES, NumberPath
+from .fit_study import FitStudy
+
+# What identification knows; all else of a file is no number that efforts are linear in.
+FREE = ("mass", "com", "inertia", "transverse", "axial", "viscous", "coulomb", "rotor_inertia")
+POSITIVE = ("mass", "inertia", "transverse", "axial", "viscous", "coulomb", "rotor_inertia")
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One unknown: its name, unit, and the numbers of the file that it is, by their place."""
+
+    name: str
+    unit: str
+    path: str
+    places: tuple[int, ...]
+
+
+class Unknowns:
+    """Unknown numbers x, (U,), their prior, and what they make of the standard numbers."""
+
+    def __init__(self, standard: StandardNumbers, study: FitStudy) -> None:
+        """Raises: InputError: for unknown paths, and numbers that no log can tell."""
+        self.standard = standard
+        found: list[Unknown] = []
+        for path, one in zip(study.numbers, standard.at(list(study.numbers)), strict=True):
+            found += self._of(path, one, path in study.shared)
+        self.all = tuple(found)
+        self.nominal = np.array([standard.home[one.places[0]] for one in found])
+        self.prior, self.spread = self._priors(study)
+        self._spread_out = np.zeros((standard.home.size, len(found)))
+        for i, one in enumerate(found):
+            self._spread_out[list(one.places), i] = 1.0
+
+    def _of(self, path: str, one: NumberPath, shared: bool) -> list[Unknown]:
+        last = path.rpartition(".")[2].partition("[")[0]
+        known = last in FREE or path.startswith("platform.inertia")
+        if not known or path.startswith(("contact.", "gravity")):
+            raise InputError(
+                f"numbers: {path} is none that efforts are linear in; expected masses, mass "
+                "centres, inertias, viscous or Coulomb friction and rotors of chains. Lengths and "
+                "points are for condyle calibrate"
+            )
+        places = self.standard.places(one)
+        if shared:
+            rows = np.reshape(places, (one.shape[0], -1)).T
+            names = _entries(path, one.shape[1:])
+            return [
+                Unknown(name, one.unit, path, tuple(row))
+                for name, row in zip(names, rows, strict=True)
+            ]
+        names = [self.standard.file_names[place] for place in places]
+        return [Unknown(n, one.unit, path, (p,)) for n, p in zip(names, places, strict=True)]
+
+    def _priors(self, study: FitStudy) -> tuple[np.ndarray, np.ndarray]:
+        """Means and standard deviations, (U,) each; infinite where nothing is known."""
+        mean, spread = self.nominal.copy(), np.full(len(self.all), np.inf)
+        for path, (means, deviations) in study.prior.items():
+            own = [i for i, one in enumerate(self.all) if one.path == path]
+            for name, values, into in (("mean", means, mean), ("deviation", deviations, spread)):
+                row = np.ravel(values)
+                if row.size not in (1, len(own)):
+                    raise InputError(
+                        f"prior: {path} has {len(own)} numbers; expected as many, or one, for its "
+                        f"{name}, got {row.size}"
+                    )
+                into[own] = row
+        if (spread <= 0).any():
+            raise InputError("prior: a standard deviation is above 0; leave a known number out")
+        return mean, spread
+
+    def file(self, x: np.ndarray) -> np.ndarray:
+        """All numbers of the file, (F,), with these unknowns."""
+        found = self.standard.home.copy()
+        for value, one in zip(x, self.all, strict=True):
+            found[list(one.places)] = value
+        return found
+
+    def pi(self, x: np.ndarray) -> np.ndarray:
+        """Standard numbers, (P,)."""
+        return self.standard.of(self.file(x))
+
+    def slope(self, x: np.ndarray) -> np.ndarray:
+        """Their derivatives by the unknowns, (P, U)."""
+        return self.standard.slope(self.file(x)) @ self._spread_out
+
+    @cached_property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Least and largest values by the rules of the file, (U,) each."""
+        low, high = np.full(len(self.all), -np.inf), np.full(len(self.all), np.inf)
+        for i, one in enumerate(self.all):
+            last = one.name.rpartition(".")[2]
+            if last in POSITIVE:
+                low[i] = 0.0
+            rod = one.name.split(".")[-2] in ("coupler", "rod")
+            if last == "com" and one.name.startswith("chain."):
+                low[i], high[i] = 0.0, 1.0 if rod else np.inf
+        return low, high
+
+    def axial_rules(self) -> list[tuple[int | None, int | None, float, float]]:
+        """axial <= 2 transverse of every body: places among x or None, and the file's values."""
+        at = {name: i for i, one in enumerate(self.all) for name in one_names(one, self.standard)}
+        rules = []
+        for place, name in enumerate(self.standard.file_names):
+            if not name.endswith(".axial"):
+                continue
+            other = name.removesuffix("axial") + "transverse"
+            i, j = at.get(name), at.get(other)
+            if i is not None or j is not None:
+                values = self.standard.home
+                rules.append((i, j, values[place], values[self.standard.file_names.index(other)]))
+        return rules
+
+
+def one_names(one: Unknown, standard: StandardNumbers) -> list[str]:
+    """Names in the file of the numbers of an unknown."""
+    return [standard.file_names[place] for place in one.places]
+
+
+def _entries(path: str, shape: tuple[int, ...]) -> list[str]:
+    if not shape:
+        return [path]
+    if path.endswith(".inertia") and shape == (6,):
+        return [f"{path}.{entry}" for entry in ENTRIES]
+    return [f"{path}[{i}]" for i in range(shape[0])]
+
+
+def changes(unknowns: Unknowns, x: np.ndarray) -> dict[str, float]:
+    """What `Mechanism.set` takes: path -> value."""
+    found = {}
+    for value, one in zip(x, unknowns.all, strict=True):
+        found |= dict.fromkeys(one_names(one, unknowns.standard), float(value))
+    return found
