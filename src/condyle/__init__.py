@@ -54,6 +54,7 @@ _HOMES = {
     "workspace_map": "analysis.map",
     "workspace_size": "analysis.map",
     "open_map": "analysis.map",
+    "identify": "identification.identify",
     "run": "analysis.run_motion",
     "compare": "analysis.comparison",
     "tradeoff": "analysis.weight_curve",
@@ -97,6 +98,7 @@ if TYPE_CHECKING:
     from .export.matlab import export_matlab
     from .export.mjcf import export_mjcf
     from .export.new_mechanism import new_mechanism
+    from .identification.identify import identify
     from .markers import motion_from_c3d
     from .mechanism import Mechanism, bundled_mechanisms, dump, dumps, load_mechanism
     from .model.distributing import Distribution
@@ -124,6 +126,7 @@ register("model.solve", "condyle.results.solving:solve")
 register("model.variants", "condyle.model.variants:Variants")
 register("variants.solve", "condyle.results.variant_solutions:solve")
 register("variants.simulate", "condyle.simulation.simulating:of_variants")
+register("model.base_parameters", "condyle.identification.base_parameters:base_parameters")
 register("model.to_casadi", "condyle.frameworks.casadi_functions:CasadiFunctions")
 register("model.to_torch", "condyle.frameworks.torch_functions:TorchFunctions")
 register("model.to_jax", "condyle.frameworks.jax_functions:JaxFunctions")
@@ -134,6 +137,7 @@ register("map.table", "condyle.report.map_text:map_table")
 register("sweep.plot", "condyle.report.figures.sweep_figures:sweep_plots")
 register("sweep.table", "condyle.report.tables.sweep_tables:sweep_text")
 register("tables.text", "condyle.report.tables:tables_text")
+register("identified.report", "condyle.report.identification_page:write_page")
 register("mechanism.look", "condyle.report.scene.parts:Look")
 
 __all__ = [*_HOMES, "__version__"]

@@ -15,6 +15,7 @@ import numpy as np
 from ..errors import InputError
 from ..model.model import Model
 from ..model.regressor import Regressor
+from ..motion.gravity_and_base import each
 from .log import Log
 from .unknowns import Unknowns
 
@@ -64,7 +65,7 @@ class LogEquations:
     ) -> None:
         self.model, self.log, self.unknowns, self.extras = model, log, unknowns, extras
         self.point = point
-        self._at = model.regressor(log.q, log.v, log.a, log.wrench, point)
+        self._at = model.regressor(log.q, log.v, log.a, log.wrench, point, **log.given)
         if (bad := np.flatnonzero(self._at.status)).size:
             raise InputError(f"{log.source}: the pose at {log.t[bad[0]]:.6g} s cannot be reached")
         effort, encoder = noise
@@ -163,19 +164,21 @@ class LogEquations:
         states = [log.q[t], log.v[t], log.a[t]]
         sizes = [np.abs(s).max() + 1e-3 for s in states]
         effort = log.effort_spline(log.t[t])
+        given = each(log.given, lambda values: values[t])
         found = np.empty((3, len(t), m, m))
         regressors = []
         for order in range(3):
             h = STEP * sizes[order]
             for j in range(m):
-                values, Ys = [], []
+                values, Ys = list[np.ndarray](), list[np.ndarray]()
                 for sign in (1, -1):
                     moved = [s.copy() for s in states]
                     moved[order][:, j] += sign * h
-                    at = self.model.regressor(*moved, log.wrench[t], self.point)
+                    q, v, a = moved
+                    at = self.model.regressor(q, v, a, log.wrench[t], self.point, **given)
                     force = self._contact_forces(at, pi, effort)
                     values.append(self._residual(at, pi, effort, force))
-                    Ys.append(at.Y if keep else None)
+                    Ys.append(at.Y)
                 found[order, :, :, j] = (values[0] - values[1]) / (2 * h)
                 if keep:
                     regressors.append((Ys[0] - Ys[1]) / (2 * h))

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ..errors import CondyleWarning, InputError, few
+from ..accessors import extend
+from ..errors import InputError, few
 from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
 from ..model.model import derive
-from .equations import Extras, LogEquations, Rows
+from .equations import Extras, LogEquations
 from .fit_study import FitStudy
+from .fitted_file import write_fitted
 from .fitting import Fit, fit
 from .log import Log, read_log
 from .unknowns import Unknowns, changes
@@ -64,6 +65,36 @@ class Identified:
     chains: tuple[str, ...]
     logs: tuple[LogEquations, ...]
     fit: Fit
+    source: Mechanism | str | os.PathLike[str]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the reader should know."""
+        untold = [one.name for one in self.numbers if not one.told]
+        found = [f"the logs cannot tell {few(untold)}: they stay as they were"] if untold else []
+        return (*found, *(f"held by the rules of the file: {one}" for one in self.held))
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the mechanism's file with the fitted numbers, its comments kept.
+
+        Raises: InputError: if it cannot be written.  MissingExtraError: without tomlkit.
+        """
+        units = {one.name: one.unit for one in self.unknowns.of_file()}
+        read = ", ".join(dict.fromkeys(log.log.source for log in self.logs))
+        told = sum(one.told for one in self.numbers)
+        header = f"{told} of {len(self.numbers)} numbers identified from {read}"
+        write_fitted(self.source, self.mechanism, units, path, header)
+
+    def write_report(self, path: str | os.PathLike[str]) -> None:
+        """Write a page with residuals over time and frequency, numbers and correlations.
+
+        Raises: InputError: if it cannot be written.  MissingExtraError: without matplotlib.
+        """
+        extend("identified.report", self, path)
+
+    @property
+    def unknowns(self) -> Unknowns:
+        return self.logs[0].unknowns
 
     def __str__(self) -> str:
         wide = max(len(one.name) for one in self.numbers)
@@ -167,12 +198,6 @@ def identify(
                 found.why.get(i, ""),
             )
         )
-    if untold := [one.name for one in numbers if not one.told]:
-        warnings.warn(
-            f"the logs cannot tell {few(untold)}: they stay as they were",
-            CondyleWarning,
-            stacklevel=2,
-        )
     validated = None
     if apart:
         rows = [one.rows(found.x[:U], found.x[U:]) for one in equations(apart)]
@@ -189,6 +214,7 @@ def identify(
         machine.chain_names,
         tuple(on),
         found,
+        mechanism,
     )
 
 

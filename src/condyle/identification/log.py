@@ -13,8 +13,9 @@ from ..errors import InputError
 from ..mechanism.coordinates import COORDINATES
 from ..model.model import Model
 from ..motion.arrays import check_rising
-from ..motion.column_units import FORCE, MOMENT
+from ..motion.column_units import BASE, FORCE, GRAVITY, MOMENT
 from ..motion.file_words import columns_are
+from ..motion.gravity_and_base import Given, each
 from ..motion.smoothing import LowPass
 from ..motion.table_reader import read_table
 
@@ -29,7 +30,8 @@ class Log:
     """A recording on a mechanism, smoothed.
 
     t: (N,) [s], from 0;  q, v, a: (N, m);  effort: (N, n), averaged but not smoothed;
-    wrench: (N, 6);  contact: (N, k) or None;  encoders: whether q comes from the joints.
+    wrench: (N, 6);  contact: (N, k) or None;  given: gravity and the base's motion, if recorded;
+    encoders: whether q comes from the joints.
     averaged: how many samples of the file make one;  kept: (K,) [s], times of the equations.
     noise: standard deviations of a sample here, from what smoothing removes: effort (n,), encoder
     (n,), contact (k,).
@@ -43,6 +45,7 @@ class Log:
     effort: np.ndarray
     wrench: np.ndarray
     contact: np.ndarray | None
+    given: Given
     encoders: bool
     averaged: int
     kept: np.ndarray
@@ -96,7 +99,7 @@ def read_log(model: Model, path: Any, cutoff: float, trim: float | None = None) 
     contacts = model.mechanism.contact_names
     joints, efforts = [f"joint_{c}" for c in chains], [f"tau_{c}" for c in chains]
     forces = [f"contact_{c}" for c in contacts]
-    known = ("t", *COORDINATES, *joints, *efforts, *FORCE, *MOMENT, *forces)
+    known = ("t", *COORDINATES, *joints, *efforts, *FORCE, *MOMENT, *forces, *GRAVITY, *BASE)
     table = read_table(path, known=known)
     t = table.require(["t"])[:, 0]
     check_rising(t, table.where)
@@ -142,6 +145,7 @@ def make_log(
     cutoff: float,
     trim: float | None = None,
     source: str = "log",
+    given: Given | None = None,
 ) -> Log:
     """A log from arrays: joints (N, n) or coordinates q (N, m), and efforts (N, n).
 
@@ -156,6 +160,7 @@ def make_log(
 
     t, places, effort, wrench = map(average, (t, places, effort, wrench))
     contact = None if contact is None else average(contact)
+    beside = each(given or {}, average)
     t = t - t[0]
     low_pass = LowPass(t, cutoff)
     encoder = np.zeros(effort.shape[1])
@@ -180,9 +185,8 @@ def make_log(
         )
     kept = np.linspace(end, t[-1] - end, count)
     noise = _removed(low_pass, t, effort), encoder, _removed(low_pass, t, contact)
-    return Log(
-        source, t, q, v, a, effort, wrench, contact, encoders, many, kept, low_pass, noise
-    )  # fmt: skip
+    own = effort, wrench, contact, beside, encoders
+    return Log(source, t, q, v, a, *own, many, kept, low_pass, noise)
 
 
 def _removed(low_pass: LowPass, t: np.ndarray, values: np.ndarray | None) -> np.ndarray:

@@ -40,8 +40,8 @@ class Unknowns:
         self.nominal = np.array([standard.home[one.places[0]] for one in found])
         self.prior, self.spread = self._priors(study)
         self._spread_out = np.zeros((standard.home.size, len(found)))
-        for i, one in enumerate(found):
-            self._spread_out[list(one.places), i] = 1.0
+        for i, unknown in enumerate(found):
+            self._spread_out[list(unknown.places), i] = 1.0
 
     def _of(self, path: str, one: NumberPath, shared: bool) -> list[Unknown]:
         last = path.rpartition(".")[2].partition("[")[0]
@@ -79,6 +79,14 @@ class Unknowns:
         if (spread <= 0).any():
             raise InputError("prior: a standard deviation is above 0; leave a known number out")
         return mean, spread
+
+    def of_file(self) -> list[Unknown]:
+        """One of each number of the file."""
+        return [
+            Unknown(self.standard.file_names[place], one.unit, one.path, (place,))
+            for one in self.all
+            for place in one.places
+        ]
 
     def file(self, x: np.ndarray) -> np.ndarray:
         """All numbers of the file, (F,), with these unknowns."""
@@ -138,7 +146,7 @@ def _entries(path: str, shape: tuple[int, ...]) -> list[str]:
 
 def changes(unknowns: Unknowns, x: np.ndarray) -> dict[str, float]:
     """What `Mechanism.set` takes: path -> value."""
-    found = {}
+    found: dict[str, float] = {}
     for value, one in zip(x, unknowns.all, strict=True):
         found |= dict.fromkeys(one_names(one, unknowns.standard), float(value))
     return found

@@ -364,6 +364,9 @@ class Model:
         a: ArrayLike,
         wrench: ArrayLike | None = None,
         at: Point = None,
+        *,
+        gravity: ArrayLike | None = None,
+        base: ArrayLike | None = None,
     ) -> Regressor:
         """The equations of motion in the numbers of bodies and actuators, linear in them.
 
@@ -378,7 +381,14 @@ class Model:
         Returns: Y (..., m, P), load (..., m), J (..., n, m), numbers, names, units (P,), status
                  (...), and the rows that give contact forces: see `Regressor`.
         """
-        return self.regression(q, v, a, wrench, at)
+        return self.regression(q, v, a, wrench, at, given_of(gravity, base))
+
+    def base_parameters(self, motion: Motion) -> Any:
+        """Combinations of the regressor's numbers that a motion can tell: `BaseParameters`.
+
+        Args: motion: or the path of its file.
+        """
+        return extend("model.base_parameters", self, motion)
 
     def mass_matrix(self, q: ArrayLike, *, space: str = "q") -> Array:
         """M_r of [Cheng2023] eqs (57), (63), (..., m, m) [kg, kg m, kg m^2].

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -18,7 +19,7 @@ from ..questions.numbers import Layout
 from ..questions.regressor import LOSSES, PLATFORM, chain_numbers
 from ..questions.structure import Structure, walls_of
 from ..status import Status
-from .arguments import Arguments
+from .arguments import NOTHING, Arguments
 from .poses import Poses
 from .system import System
 
@@ -173,17 +174,19 @@ class Regression:
     def standard(self) -> StandardNumbers:
         return StandardNumbers(self._system.mechanism, self._system.wide.structure)
 
-    def __call__(self, q: Any, v: Any, a: Any, wrench: Any, at: Any) -> Regressor:
-        """As `Model.regressor`."""
-        own, kernel = self._arguments, self._system.wide.kernel("regressor")
-        lead, inputs = own.samples((own.q, own.v, own.a), (q, v, a), wrench, at)
+    def __call__(
+        self, q: Any, v: Any, a: Any, wrench: Any, at: Any, more: Mapping[str, Any] = NOTHING
+    ) -> Regressor:
+        """As `Model.regressor`. Args: more: gravity and base, if they are given."""
+        own, kernel = self._arguments, self._system.wide.under(tuple(more)).kernel("regressor")
+        lead, inputs = own.samples((own.q, own.v, own.a), (q, v, a), wrench, at, more)
         states = [inputs.pop(name) for name in ("q", "q1", "q2")]
         count = max(map(len, (*states, *inputs.values()))) if 0 not in lead else 0
         whole = [np.broadcast_to(x, (count, x.shape[1])) for x in states]
         poses, closed = self._poses.whole(*whole)
         answer = kernel.run(poses | inputs)
         status = np.where(closed, answer.status, Status.unreachable).astype(np.uint8)
-        found = {}
+        found: dict[str, Array] = {}
         for prefix in ("", "contact_"):
             own_rows = self._rows(answer.values, prefix, count)
             found |= {f"{prefix}{name}": value for name, value in own_rows.items()}

@@ -68,7 +68,7 @@ GEOMETRY = (
 )  # fmt: skip
 # Questions that have inertia or gravity in them, of motions.
 DYNAMIC = (
-    "inverse", "balance", "system", "forward", "forward_system", "linear", "reactions",
+    "inverse", "balance", "system", "forward", "forward_system", "linear", "reactions", "regressor",
 )  # fmt: skip
 
 

@@ -65,8 +65,7 @@ def regressor(structure: Structure) -> Program:
         b.output(f"{prefix}platform", projection @ own, "", projection.shape[0], len(PLATFORM))
         b.output(f"{prefix}load", -(projection @ load.about_centre(state.R)), "N, N m",
                  projection.shape[0])  # fmt: skip
-    g = b.parameter("gravity")
-    found = [_chain(b, group, state, g) for group in range(len(structure.chains))]
+    found = [_chain(b, group, state) for group in range(len(structure.chains))]
     least = b.least([discriminant for *_, discriminant in found])
     b.check(least, 0.0, Status.unreachable)
     for prefix, projection in rows.items():
@@ -83,10 +82,13 @@ def _platform(b: Builder, state: State) -> ca.SX:
     """Wrench of inertia less gravity of the platform by its ten numbers, (6, 10)."""
     own = ca.SX.sym("platform", len(PLATFORM))
     body = Body(own[0], own[1:4], symmetric(ca.vertsplit(own[4:])))
-    return ca.jacobian(VirtualPower().platform(state, body, b.parameter("gravity")), own)
+    force = VirtualPower().platform(state, body, b.gravity)
+    if b.base is not None:
+        force += body.carried(state, b.base)
+    return ca.jacobian(force, own)
 
 
-def _chain(b: Builder, group: int, state: State, g: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+def _chain(b: Builder, group: int, state: State) -> tuple[ca.SX, ca.SX, ca.SX]:
     """The actuator's row and the wrench by the chain's numbers, dual to the twist: (6,), (6, p).
 
     Also the chain's discriminant.
@@ -99,9 +101,12 @@ def _chain(b: Builder, group: int, state: State, g: ca.SX) -> tuple[ca.SX, ca.SX
     names = [name.replace(".", "_") for name in family.standard]
     numbers = Constants(dict(zip(names, ca.vertsplit(own), strict=True)))
     bodies = Constants({**vars(c), **family.of_standard(c, numbers)})
-    dynamics = VirtualPower().chain(family, bodies, M, g)
+    dynamics = VirtualPower().chain(family, bodies, M, b.gravity)
     mask = b.lane(group, "mask")
-    wrenches = [_moved(M, ca.jacobian(force, own)) for force in dynamics.forces.values()]
+    forces = list(dynamics.forces.values())
+    if b.base is not None:
+        forces.append(VirtualPower().carried_chain(family, bodies, M, b.base))
+    wrenches = [_moved(M, ca.jacobian(force, own)) for force in forces]
     # Linear, so that the slope is the same at all numbers: where each body has a mass.
     somewhere = ca.DM([float(name.endswith("mass")) for name in family.standard])
     Y = mask * sum((ca.substitute(w, own, somewhere) for w in wrenches), ca.SX(6, own.numel()))

@@ -47,7 +47,7 @@ class SPSFamily(LineFamily):
     standard = RodFamily.rod_standard("cylinder") | RodFamily.rod_standard("piston")
 
     def of_standard(self, c: Constants, p: Constants) -> dict[str, Any]:
-        found = {}
+        found: dict[str, Any] = {}
         for body in ("cylinder", "piston"):
             one = RodFamily.rod_of_standard(Constants({"L": 1}), p, body)
             found |= {f"{body}_{name}": value for name, value in one.items()}

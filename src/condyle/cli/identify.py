@@ -1,0 +1,51 @@
+"""condyle identify: numbers of a mechanism's file from logs of the machine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from ..errors import InputError
+from . import options
+from .answer import Answer, command_line, files_line
+from .command import COMPUTE, command
+from .inputs import require_drawing, warn
+
+
+@command(
+    COMPUTE,
+    example="condyle identify robot.toml --log run.csv --study fit.toml --out fitted.toml",
+)
+def identify(
+    mechanism: options.Mechanism,
+    study: Path,
+    out: Path,
+    log: Annotated[list[Path] | None, options.option()] = None,
+    report: Path | None = None,
+) -> Answer:
+    """Masses, mass centres, inertias and friction from logs of the machine.
+
+    Weighted least squares of the equations of motion; numbers that the logs cannot tell stay as
+    they are, and are named.
+
+    Options:
+        study: Fit study (TOML): the unknown numbers, what is known of them, the noise.
+        out: Mechanism file with the fitted numbers, its comments kept.
+        log: Log (CSV or Parquet), may be repeated: t, joint_CHAIN or coordinates such as X (m),
+            tau_CHAIN (N m or N), if any Fx .. Mz and contact_CONTACT (N).
+        report: Also write a page (.html) with residuals, numbers and correlations.
+    """
+    require_drawing(report is not None, False)
+    import condyle
+
+    if not log:
+        raise InputError("expected --log with a file, once or more")
+    found = condyle.identify(mechanism, log, study)
+    warn(found.warnings)
+    found.save(out)
+    files = [out]
+    if report is not None:
+        found.write_report(report)
+        files.append(report)
+    text = f"{found}\n{files_line(files)}"
+    return Answer(text, found.data, command_line("check", out))
