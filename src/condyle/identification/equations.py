@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
+from ..kinematics.chain import FAMILIES
+from ..mechanism.mechanism import Mechanism
 from ..model.model import Model
 from ..model.regressor import Regressor
 from ..motion.gravity_and_base import each
@@ -31,9 +33,10 @@ class Extras:
     bias: bool
     delay: bool
 
-    def names(self, chains: tuple[str, ...]) -> list[tuple[str, str]]:
+    def names(self, mechanism: Mechanism) -> list[tuple[str, str]]:
         """Names and units."""
-        found = [(f"bias.{chain}", "N m or N") for chain in chains] if self.bias else []
+        units = {chain.name: FAMILIES[chain.kind].effort_unit for chain in mechanism.chains}
+        found = [(f"bias.{name}", unit) for name, unit in units.items()] if self.bias else []
         return [*found, ("delay", "s")] if self.delay else found
 
 
@@ -241,12 +244,14 @@ class LogEquations:
             found += np.einsum("tnu,tnw->uw", H, H)
         return found
 
-    def attenuation(self, x: np.ndarray, V: np.ndarray) -> np.ndarray:
-        """What noise of the regressors adds to A^T V^-1 r in the mean, (U + extras,)."""
-        rows = len(self.extras.names(self.model.mechanism.chain_names))
-        found = np.zeros(len(x) + rows)
+    def attenuation(self, x: np.ndarray, V: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What noise of the regressors adds in the mean to A^T V^-1 r and to A^T V^-1 A, of the
+        unknowns and the extras: (U + E,) and (U + E, U + E)."""
+        U = len(x)
+        size = U + len(self.extras.names(self.model.mechanism))
+        found, square = np.zeros(size), np.zeros((size, size))
         if not self.encoder_noise.any():
-            return found
+            return found, square
         m, chosen = self.log.q.shape[1], np.arange(len(V))
         if len(chosen) > CORRECTED:
             chosen = chosen[:: -(-len(chosen) // CORRECTED)]
@@ -258,6 +263,9 @@ class LogEquations:
         G, inverse = impulses @ impulses.T, np.linalg.inv(V[chosen][:, :m, :m])
         for i in range(3):
             for j in range(3):
-                weighted = np.einsum("tab,tbj->taj", inverse, D[j])
-                found[: len(x)] += G[i, j] * np.einsum("itau,taj,tij->u", A[i], weighted, spread)
-        return found * len(V) / len(chosen)
+                moved = np.einsum("tij,jtau->itau", spread, A[j])
+                left = np.einsum("tab,itbu->itau", inverse, A[i])
+                found[:U] += G[i, j] * np.einsum("itau,taj,tij->u", left, D[j], spread)
+                square[:U, :U] += G[i, j] * np.einsum("itau,itaw->uw", left, moved)
+        share = len(V) / len(chosen)
+        return found * share, square * share

@@ -40,7 +40,7 @@ def write_fitted(
     for whole in dict.fromkeys(one.partition("[")[0] for one in paths):
         own = next(u for p, u in paths.items() if p.partition("[")[0] == whole)
         _put(document, parsed(whole), value_at(mechanism, whole), unit if own == "m" else 1.0)
-    for line in [f"condyle {__version__}", *reversed(header.splitlines())]:
+    for line in reversed([f"condyle {__version__}", *header.splitlines()]):
         document.body.insert(0, (None, tomlkit.comment(line)))
     written = tomlkit.dumps(document)
     write_text(Path(path), written)

@@ -15,8 +15,10 @@ from .equations import LogEquations, Rows
 from .unknowns import Unknowns
 
 ITERATIONS = 30
-CONVERGED = 1e-6  # of a step, in standard deviations
-DOUBT = 2.0  # standard deviation over the size of a number, beyond which data do not tell it
+CONVERGED = 1e-3  # of a step, in standard deviations
+DOUBT = 1.0  # standard deviation over the size of a number, beyond which data do not tell it
+HIDDEN = 0.5  # of what only this number explains, that may be noise
+CULPRITS = 4  # at most, that a number is said not to be told apart from
 BORDER = 1e-9  # of a cone's size, nearer than which a number is held at the border
 
 
@@ -70,12 +72,14 @@ def fit(logs: Sequence[LogEquations], unknowns: Unknowns, names: Sequence[str]) 
             prior = np.flatnonzero(np.isfinite(known))
             A = np.concatenate([A, np.eye(len(x))[prior] / known[prior, None]])
             r = np.concatenate([r, (x - mean)[prior] / known[prior]])
+            each = [log.attenuation(x[:U], one.V) for log, one in zip(logs, rows, strict=True)]
+            bent, noise = (np.sum([one[i] for one in each], axis=0) for i in range(2))
             if told is None:
                 told, why = _told(A, r, unknowns, x, names)
-            bent = sum(log.attenuation(x[:U], one.V) for log, one in zip(logs, rows, strict=True))
-            normal = A[:, told].T @ A[:, told]
+                _hidden(A, noise, told, why)
+            normal = A[:, told].T @ A[:, told] - noise[np.ix_(told, told)]
             step = np.zeros(len(x))
-            right = A[:, told].T @ r - np.asarray(bent)[told]
+            right = A[:, told].T @ r - bent[told]
             step[told] = -np.linalg.solve(normal, right)
             if not _allowed(unknowns, x[:U] + step[:U]):
                 step[told] = _in_cones(unknowns, x, told, normal, right)
@@ -105,7 +109,7 @@ def _whitened(rows: Rows) -> tuple[np.ndarray, np.ndarray]:
 def _told(
     A: np.ndarray, r: np.ndarray, unknowns: Unknowns, x: np.ndarray, names: Sequence[str]
 ) -> tuple[np.ndarray, dict[int, str]]:
-    """Which numbers the data tell, each to within twice its size, and why the others are not."""
+    """Which numbers the data tell, each to within its size, and why the others are not."""
     lengths = np.linalg.norm(A, axis=0)
     size = _sizes(unknowns, x)
     bare = size == 0
@@ -120,11 +124,23 @@ def _told(
             why[int(j)] = "the data say nothing of it"
             continue
         share = np.abs(column)
-        with_it = [
-            names[i] for i, f in zip(found.known, share, strict=True) if f > 0.1 * share.max()
-        ]
+        nearest = np.argsort(-share)[:CULPRITS]
+        with_it = [names[found.known[i]] for i in nearest if share[i] > 0.1 * share.max()]
         why[int(j)] = f"not told apart from {few(with_it)}"
     return told, why
+
+
+def _hidden(A: np.ndarray, noise: np.ndarray, told: np.ndarray, why: dict[int, str]) -> None:
+    """Leave out numbers whose columns, beyond what others explain, are noise; in place."""
+    while told.any():
+        own = np.flatnonzero(told)
+        beyond = 1 / np.diag(np.linalg.inv(A[:, own].T @ A[:, own]))
+        share = np.diag(noise)[own] / beyond
+        worst = int(np.argmax(share))
+        if share[worst] <= HIDDEN:
+            return
+        told[own[worst]] = False
+        why[int(own[worst])] = "the noise of the encoders hides what it does"
 
 
 def _sizes(unknowns: Unknowns, x: np.ndarray) -> np.ndarray:

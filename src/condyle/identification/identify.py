@@ -100,8 +100,9 @@ class Identified:
         wide = max(len(one.name) for one in self.numbers)
         lines = []
         for one in self.numbers:
-            said = f"+- {one.deviation:.2g}" if one.told else f"not identified: {one.why}"
-            lines.append(f"{one.name:{wide}}  {one.value:12.6g} {said} {one.unit}".rstrip())
+            said = f"+- {one.deviation:<8.2g} {one.unit}" if one.told else f"{one.unit} "
+            why = "" if one.told else f"(not identified: {one.why})"
+            lines.append(f"{one.name:{wide}}  {one.value:12.6g} {said}{why}".rstrip())
         lines.append(f"residual over noise: fitted {np.sqrt(self.fitted.spread):.3g}")
         if self.validated is not None:
             lines[-1] += f", validated {np.sqrt(self.validated.spread):.3g}"
@@ -176,7 +177,7 @@ def identify(
     def equations(some: Sequence[Log]) -> list[LogEquations]:
         return [LogEquations(model, log, unknowns, extras, noise, point) for log in some]
 
-    own = extras.names(machine.chain_names)
+    own = extras.names(machine)
     names = [one.name for one in unknowns.all] + [name for name, _ in own]
     units = [one.unit for one in unknowns.all] + [unit for _, unit in own]
     on = equations(kept)

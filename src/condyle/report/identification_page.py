@@ -68,13 +68,15 @@ def _summary(found: Identified) -> str:
 
 
 def _numbers(found: Identified) -> str:
-    rows = ["<tr><th>number</th><th>value</th><th>deviation</th><th>before</th><th></th></tr>"]
+    rows = [
+        "<tr><th>number</th><th>value</th><th>deviation</th><th>before</th><th>unit</th><th></th></tr>"
+    ]
     for one in found.numbers:
         deviation = f"{one.deviation:.2g}" if one.told else "&ndash;"
-        said = html.escape(one.unit if one.told else f"not identified: {one.why}")
+        said = "" if one.told else html.escape(f"not identified: {one.why}")
         rows.append(
             f"<tr><td>{html.escape(one.name)}</td><td>{one.value:.6g}</td><td>{deviation}</td>"
-            f"<td>{one.before:.6g}</td><td>{said}</td></tr>"
+            f"<td>{one.before:.6g}</td><td>{html.escape(one.unit)}</td><td>{said}</td></tr>"
         )
     return f"<table>{''.join(rows)}</table>"
 
