@@ -18,6 +18,7 @@ from typing import Any
 from unittest.mock import Mock, patch
 
 import numpy as np
+from support.machine_log import write_log
 from support.recorded_jaw import record
 
 import condyle
@@ -49,6 +50,10 @@ class Stage:
         """A C3D file and its marker file."""
         jaw = record(seconds=1.0)
         return jaw.write(Path("jaw.c3d").resolve()), jaw.write_tables(Path("jaw.toml").resolve())
+
+    @cached_property
+    def log(self) -> Path:
+        return write_log(Path("log.csv").resolve())
 
     @cached_property
     def motion(self) -> condyle.Motion:
@@ -204,6 +209,9 @@ DOORS: dict[str, Door] = {
     "Model.bias": Door({"q": Q, "v": Q}, states=("q", "v"), calls=60),
     "Model.coriolis": Door({"q": Q, "v": Q}, states=("q", "v"), calls=60),
     "Model.gravity": Door({"q": Q}, states=("q",), calls=60),
+    "Model.regressor": Door(STATE | {"wrench": WRENCH, "at": "incisor"}, calls=60),
+    "Model.base_parameters": Door({"motion": lambda stage: stage.motion}, calls=40),
+    "Model.parts_under": Door({"given": ("gravity",)}),
     "Model.jacobians": Door({"q": Q}, states=("q",), calls=60),
     "Model.linearise": Door(
         {"q": Q, "v": Q, "effort": EFFORT, "wrench": WRENCH, "at": "incisor"},
@@ -345,6 +353,16 @@ DOORS: dict[str, Door] = {
     ),
     "load_scenario": Door(
         {"source": lambda stage: stage.file("run.toml", "duration = 0.1")}, words=("path",)
+    ),
+    "identify": Door(
+        {
+            "mechanism": MACHINE,
+            "logs": lambda stage: stage.log,
+            "study": {"numbers": ["platform.mass"]},
+        },
+        words=("mechanism", "log"),
+        long=("study",),
+        calls=20,
     ),
     "check": Door({"mechanism": lambda stage: stage.mechanism}, calls=30),
     "schema": Door({"of": "mechanism"}),

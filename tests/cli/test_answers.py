@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from support.machine_log import STUDY as LOG_STUDY
+from support.machine_log import write_log
 from support.recorded_jaw import record
 from support.speeds import few, slow
 
@@ -50,6 +52,10 @@ CALLS: dict[str, tuple[str, ...]] = {
         *("--quantity", "joint", "--out", "my maps"),
     ),
     "compare": ("compare", *QUICK, "--motion", "my path.csv", "--no-figures", "--out", "x y"),
+    "identify": (
+        *("identify", "my jaw.toml", "--log", "a log.csv", "--study", "fit.toml"),
+        *("--out", "a fit.toml"),
+    ),
     "motion from-c3d": (
         *("motion", "from-c3d", "a trial.c3d", "--markers", "markers.toml"),
         *("--mechanism", "my jaw.toml", "--out", "a motion.csv"),
@@ -127,6 +133,8 @@ def command(
     jaw.write(Path("a trial.c3d"))
     jaw.write_tables(Path("markers.toml"))
     solution.condyle.save("a run.nc")
+    write_log(Path("a log.csv"))
+    Path("fit.toml").write_text(LOG_STUDY)
     return condyle_command
 
 

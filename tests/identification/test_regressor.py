@@ -88,6 +88,9 @@ def test_states_that_cannot_be_have_no_row() -> None:
     assert found.status.tolist()[0] == 0 and found.status.tolist()[1] != 0
     assert np.isfinite(found.Y[0]).all() and np.isnan(found.Y[1]).all()
     assert len(found.names) == len(found.units) == found.Y.shape[-1]
+    deep = model.regressor(np.zeros((2, 3, 4)), np.zeros(4), np.zeros(4))
+    assert deep.Y.shape == (2, 3, 4, len(found.names)) and deep.status.shape == (2, 3)
+    assert model.regressor(*np.zeros((3, 4))).J.shape == (6, 4)
 
 
 def test_what_a_motion_can_tell() -> None:

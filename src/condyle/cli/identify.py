@@ -48,4 +48,5 @@ def identify(
         found.write_report(report)
         files.append(report)
     text = f"{found}\n{files_line(files)}"
-    return Answer(text, found.data, command_line("check", out))
+    data = {**found.data, "files": list(map(str, files))}
+    return Answer(text, data, command_line("check", out))

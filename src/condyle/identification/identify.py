@@ -131,7 +131,13 @@ class Identified:
             for name, one in judged.items()
             if one is not None
         }
-        return {"numbers": numbers, "residuals": residuals, "held": list(self.held)}
+        return {
+            "mechanism": self.mechanism.name,
+            "numbers": numbers,
+            "residuals": residuals,
+            "held": list(self.held),
+            "warnings": list(self.warnings),
+        }
 
 
 def identify(
