@@ -23,6 +23,7 @@ from support.recorded_jaw import record
 
 import condyle
 from condyle.mechanism import bundled_text
+from condyle.mechanism.study_file import StudyFile
 from condyle.results.solution import Results
 
 MACHINE = "masticatory"
@@ -211,7 +212,6 @@ DOORS: dict[str, Door] = {
     "Model.gravity": Door({"q": Q}, states=("q",), calls=60),
     "Model.regressor": Door(STATE | {"wrench": WRENCH, "at": "incisor"}, calls=60),
     "Model.base_parameters": Door({"motion": lambda stage: stage.motion}, calls=40),
-    "Model.parts_under": Door({"given": ("gravity",)}),
     "Model.jacobians": Door({"q": Q}, states=("q",), calls=60),
     "Model.linearise": Door(
         {"q": Q, "v": Q, "effort": EFFORT, "wrench": WRENCH, "at": "incisor"},
@@ -386,6 +386,7 @@ DOORS: dict[str, Door] = {
     ),
     "Scenario": Door({"duration": 0.1, "rate": 1000.0, "method": "DOP853", "rtol": 1e-6}),
     "Study": Door(STUDY | {"formulation": "momentum", "preload": 0.0, "solutions": False}),
+    "Study.read": Door({"source": STUDY}, long=("source",), words=("study",)),
     "Study.checked": Door(
         {"data": STUDY, "source": "study.toml"}, words=("study.toml", "vary", "key")
     ),
@@ -475,7 +476,8 @@ def public_doors() -> set[str]:
     for name in {row.partition(".")[0] for row in DOORS if "." in row}:
         found |= {
             f"{name}.{method}"
-            for method, value in vars(page[name]).items()
+            for owner in (page[name], *(StudyFile,) * issubclass(page[name], StudyFile))
+            for method, value in vars(owner).items()
             if not method.startswith("_")
             and (inspect.isfunction(value) or isinstance(value, classmethod | staticmethod))
         }

@@ -58,7 +58,7 @@ def test_a_motion_file(tmp_path: Path, model: condyle.Model) -> None:
         table = read_table(tmp_path / name).columns
         for column in ("gx", "gz", "base_az", "base_wy", "base_dwy"):
             np.testing.assert_allclose(table[column], columns()[column], atol=1e-15)
-    assert list(motion.columns()) == ["t", *HEXAGLIDE, *GRAVITY, *BASE]
+    assert list(motion.columns) == ["t", *HEXAGLIDE, *GRAVITY, *BASE]
 
 
 def test_columns_between_the_samples_and_units() -> None:
@@ -116,7 +116,7 @@ def test_variants_and_sweeps(model: condyle.Model) -> None:
 @pytest.mark.parametrize("name", ["a.csv", "a.parquet"])
 def test_states(tmp_path: Path, model: condyle.Model, name: str) -> None:
     motion = Motion.from_arrays(T, {n: a for n, a in columns().items() if n != "t"})
-    states = {n: a for n, a in motion.columns().items() if n != "t"}
+    states = {n: a for n, a in motion.columns.items() if n != "t"}
     for prefix, rates in (("d", motion.rate), ("dd", motion.acceleration)):
         states |= {prefix + n: rates[:, i] for i, n in enumerate(motion.names)}
     write_table(tmp_path / name, states)

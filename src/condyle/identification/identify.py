@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..accessors import extend
-from ..errors import InputError, few
+from ..errors import InputError, as_path, few
 from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
 from ..model.model import derive
@@ -162,9 +162,10 @@ def identify(
     asked, folder = FitStudy.read(study)
     model = derive(machine, backend=backend, distribution="minimum_norm")
     options = asked.options
-    files = [logs] if isinstance(logs, str | os.PathLike) else list(logs)
+    files = [logs] if not isinstance(logs, list | tuple) else list(logs)
     if not files:
         raise InputError("logs: expected one file or several, got none")
+    files = [as_path(one, "logs", "the path of a log, or several") for one in files]
     read = [read_log(model, path, options.smooth, options.trim) for path in files]
     unknowns = Unknowns(model.regression.standard, asked)
     extras = Extras(options.bias, options.delay)

@@ -192,7 +192,7 @@ def write_motion(
     Raises: InputError: if a file cannot be written, or two are one.
     """
     motion = found.motion
-    tables = {out: motion.columns()}
+    tables = {out: motion.columns}
     if measured is not None:
         tables[measured] = found.channels.columns()
     if load is not None:

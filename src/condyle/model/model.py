@@ -563,11 +563,7 @@ class Model:
     @property
     def parts(self) -> tuple[str, ...]:
         """Names of the parts of the efforts."""
-        return self.parts_under(())
-
-    def parts_under(self, given: Iterable[str]) -> tuple[str, ...]:
-        """The same where samples give gravity or the base's motion, by name."""
-        structure = self.system.under(tuple(given)).structure
+        structure = self.system.structure
         internal = not self._inverse.distributor.least_norm and not structure.friction
         return part_names(structure) + (INTERNAL,) * internal
 
@@ -587,6 +583,13 @@ class Model:
         Raises: InputError: for an unknown question.
         """
         return self.system.kernel(as_name(question, "question"), *details)
+
+
+def parts_under(model: Model, given: Iterable[str]) -> tuple[str, ...]:
+    """`Model.parts` where samples give gravity or the base's motion, by name."""
+    system = model.system
+    chosen = model.parts[len(part_names(system.structure)) :]
+    return part_names(system.under(tuple(given)).structure) + chosen
 
 
 def derive(

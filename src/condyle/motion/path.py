@@ -99,6 +99,7 @@ class Motion:
             found["base"] = self.base
         return found
 
+    @property
     def columns(self) -> dict[str, np.ndarray]:
         """The columns of a motion file, in SI."""
         found = {"t": self.t, **dict(zip(self.names, self.value.T, strict=True))}

@@ -16,7 +16,7 @@ from ..mechanism.writing import record
 from ..model.inverse_dynamics import SOLVED
 from ..model.joint_reactions import Reaction
 from ..model.joint_reactions import reactions as joint_reactions
-from ..model.model import Model
+from ..model.model import Model, parts_under
 from ..model.model_result import ModelResult, require_ok
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
 from ..motion.gravity_and_base import Given
@@ -97,7 +97,7 @@ def assemble(
         "smoothing": None if motion.smoothing is None else str(motion.smoothing),
         "solve_seconds": seconds,
     }
-    parts = model.parts_under(motion.given)
+    parts = parts_under(model, motion.given)
     title = f"Inverse dynamics of {model.mechanism.name}"
     solution = labelled(model, derived, motion.t, parts, title, options, watch.notices())
     solution["effort"].attrs["long_name"] = chosen(str(model.distribution.name))

@@ -11,7 +11,7 @@ import xarray as xr
 
 from ..errors import InputError, did_you_mean
 from ..model.inverse_dynamics import SOLVED
-from ..model.model import Model
+from ..model.model import Model, parts_under
 from ..model.model_result import ModelResult
 from ..model.variants import Group, Variants
 from ..motion import Load, Motion, as_load, as_motion, resolve_load_point
@@ -65,7 +65,7 @@ def solve(
     reasons = [variants.reason(i) if variants.status[i] else "" for i in range(len(variants))]
     made["reason"] = "variant", np.array(reasons, dtype=object)
     used = {dim for dims, *_ in made.values() for dim in np.atleast_1d(dims)}
-    known = coordinates(model, motion.t, model.parts_under(motion.given))
+    known = coordinates(model, motion.t, parts_under(model, motion.given))
     kept = {k: v for k, v in known.items() if k in used or (k.endswith("unit") and "chain" in used)}
     return xr.Dataset(made, {**kept, "variant": np.arange(len(variants))})
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...errors import InputError, did_you_mean
 from ...mechanism.mechanism import COORDINATES
-from ...model.model import Model
+from ...model.model import Model, parts_under
 from ...results.contacts import AXES
 from ...results.derived import Derived
 from ...results.variables import BY_NAME, VARIABLES, WRENCH
@@ -70,7 +70,7 @@ def reading(name: str, measure: Measure, model: Model, given: Collection[str] = 
             f"measure {name}: solutions of this mechanism have no {variable.name} "
             f"({variable.meaning})"
         )
-    labels = {**labels_of(model), "part": model.parts_under(given)}
+    labels = {**labels_of(model), "part": parts_under(model, given)}
     dims = variable.dims
     for dim, entry in measure.chosen.items():
         if dim not in dims:
