@@ -10,9 +10,15 @@ import numpy as np
 import pytest
 from oracles.closure import complete_state
 from support.families import Case, case
+from support.recorded_jaw import on_contacts
 from support.speeds import few
 
-from condyle.motion.nearest_pose import NearestPoses, nearest_poses, placed
+import condyle
+from condyle.errors import InputError
+from condyle.motion import Motion
+from condyle.motion.column_units import POSE
+from condyle.motion.nearest_pose import NearestPoses, fit_motion, nearest_poses, placed
+from condyle.results.summary import summarize
 
 Array = np.ndarray
 MARKERS = {
@@ -104,3 +110,46 @@ def test_a_frame_that_cannot_be_followed_is_left_out() -> None:
         names = ["X", "Y", "Z", "alpha", "beta", "gamma"]
         q = found.pose[2][[names.index(n) for n in of.states["names"]]]
         np.testing.assert_allclose(pose_of(of, q), found.pose[2], atol=1e-8)
+
+
+def measured_poses() -> tuple[Motion, Array]:
+    """A jaw that opens, 2 mm too low and turned to a side; gravity is given with it."""
+    t = np.linspace(0.0, 1.0, 51)
+    open_, side = (1 - np.cos(2 * np.pi * t)) / 2, np.sin(2 * np.pi * t)
+    true = np.column_stack([0.003 * open_, 0.001 * side, 0 * t, 0.01 * side, 0.12 * open_, 0 * t])
+    true = on_contacts("masticatory", true)
+    given = true + open_[:, None] * [0, 0, -0.002, 0.0, 0.0, 0.02]
+    columns = dict(zip(POSE, given.T, strict=True)) | {"gx": 0 * t, "gy": 0 * t, "gz": 0 * t - 9.81}
+    return Motion.from_arrays(t, columns), given
+
+
+def test_a_motion_of_whole_poses_is_moved_onto_the_contacts() -> None:
+    motion, given = measured_poses()
+    machine = condyle.load_mechanism("masticatory")
+    got = fit_motion(machine, motion)
+    np.testing.assert_allclose(on_contacts("masticatory", got.value), got.value, atol=1e-12)
+    assert got.gravity is not None and got.kind == "pose" and got.contact_fit is not None
+    # Less than keeping X, Y, alpha and beta moves the same points.
+    points = {c.name: c.point for c in machine.contacts} | dict(machine.platform.points)
+    shape = np.array([*points.values()])
+    kept = on_contacts("masticatory", given)
+    by_kept, by_fit = (
+        np.linalg.norm(placed(shape, p) - placed(shape, given), axis=-1) for p in (kept, got.value)
+    )
+    assert np.sqrt((by_fit**2).mean()) < 0.6 * np.sqrt((by_kept**2).mean())
+    assert set(got.contact_fit) == {*points, "all"}
+    rms, most = got.contact_fit["all"]
+    assert [rms, most] == pytest.approx([np.sqrt((by_fit**2).mean()), by_fit.max()])
+    solution = condyle.run("masticatory", motion, fit=True, backend="numpy")
+    np.testing.assert_allclose(solution["pose"].values, got.value, atol=1e-9)
+    assert solution.condyle.options["contact_fit"] == got.contact_fit
+    assert "moved onto the contacts (RMS, at most)" in str(summarize(solution))
+
+
+def test_motions_that_cannot_be_fitted() -> None:
+    motion, _ = measured_poses()
+    few_columns = dict(zip(("X", "Y", "alpha", "beta"), motion.value.T[[0, 1, 3, 4]], strict=True))
+    with pytest.raises(InputError, match="on the contacts already"):
+        condyle.run("masticatory", Motion.from_arrays(motion.t, few_columns), fit=True)
+    with pytest.raises(InputError, match="requires --motion"):
+        condyle.run("masticatory", fit=True)

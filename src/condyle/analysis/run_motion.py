@@ -54,7 +54,8 @@ def run(
             prove: samples whose digits are to be proven, by intervals.
             measured: markers and EMG to keep with the results.
             vary: a study, or its file: quantiles of efforts and contact forces over its variants.
-            reading: units, landmark, smooth, rate, trim: how the file of a motion is read.
+            reading: units, landmark, smooth, rate, trim: how the file of a motion is read; fit:
+            whole poses are moved onto the contacts.
     Raises: CondyleError: for input that cannot be used, or samples that cannot be computed.
     """
     machine, max_error = as_mechanism(mechanism), max_error_of(max_error)

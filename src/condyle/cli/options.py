@@ -180,6 +180,14 @@ class MotionOptions(Group):
             min=0.0,
         ),
     ] = 0.0
+    fit: Annotated[
+        bool,
+        option(
+            "Move measured whole poses (t, X, Y, Z, alpha, beta, gamma) onto the contacts, each to "
+            "the pose nearest at the contact points and landmarks. Default: keep the independent "
+            "coordinates and recompute the others."
+        ),
+    ] = False
 
 
 @dataclass(frozen=True)

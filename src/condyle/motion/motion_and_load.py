@@ -25,6 +25,7 @@ def motion_and_load(
     smooth: float | str | None = None,
     rate: float | None = None,
     trim: float = 0.0,
+    fit: bool = False,
 ) -> tuple[Motion, Load]:
     """A motion and a load: those given, else the bundled ones, else a trial motion and no load.
 
@@ -33,10 +34,13 @@ def motion_and_load(
     Args:   motion: a file, or a `Motion`;  load: likewise.
             units, landmark, smooth, rate, trim: how the file of a motion is read, as of
             `Motion.from_csv`; of another motion none can be given.
+            fit: whole poses are moved onto the contacts, as of `fit_motion`.
     Raises: InputError: for options that do not fit the motion.
     """
     if motion is None and units is not None:
         raise InputError("--units (units=...) requires --motion: the bundled motion has its units")
+    if motion is None and fit:
+        raise InputError("--fit (fit=True) requires --motion: a motion of whole poses")
     bundled = motion is None and fits_reference(mechanism, landmark)
     if motion is None and landmark is not None and not bundled:
         raise InputError(
@@ -60,8 +64,18 @@ def motion_and_load(
                 "units, landmark, smooth, rate and trim are for the file of a motion; give them to "
                 "Motion.from_arrays"
             )
-        return as_motion(given), acting
+        found = as_motion(given)
+        return (_fitted(mechanism, found) if fit else found), acting
+    if fit:
+        measured = Motion.from_csv(given, units=units, landmark=landmark)
+        return _fitted(mechanism, measured, **how), acting
     found = Motion.from_csv(given, units=units, landmark=landmark, **how)
     if found.kind == "landmark":
         found = replace(found, landmark=resolve_landmark(landmark, mechanism.platform.points))
     return found, acting
+
+
+def _fitted(mechanism: Mechanism, motion: Motion, **how: Any) -> Motion:
+    from .nearest_pose import fit_motion  # kernels: most runs need none of it
+
+    return fit_motion(mechanism, motion, **how)

@@ -16,8 +16,8 @@ or after it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import Unpack
 
 import numpy as np
 
@@ -35,13 +35,12 @@ from ..kinematics.continuation import (
 )
 from ..mechanism.coordinates import rotations
 from ..mechanism.home import characteristic_length, independent_coordinates
+from ..mechanism.mechanism import Mechanism
 from ..questions import Question
 from ..questions.file_numbers import numbers_of
 from ..questions.structure import structure_of
-
-if TYPE_CHECKING:
-    from ..mechanism.mechanism import Mechanism
-    from .path import Motion
+from .column_units import POSE
+from .path import Motion, Options
 
 _FLATTEST = 0.03  # breadth over length of points that still tell a turn about their length
 
@@ -143,33 +142,39 @@ def placed(shape: np.ndarray, pose: np.ndarray) -> np.ndarray:
     return shape @ rotations(pose[:, 3:]).transpose(0, 2, 1) + pose[:, None, :3]
 
 
-def fit_motion(mechanism: Mechanism, motion: Motion) -> tuple[np.ndarray, NearestPoses]:
-    """The samples of a motion of whole poses on the contacts: X_EE, (N, 6), and how far they were.
+def fit_motion(mechanism: Mechanism, motion: Motion, **options: Unpack[Options]) -> Motion:
+    """A motion of whole poses, moved onto the contacts sample by sample.
 
-    Nearest are they at the points of the platform: contact points and landmarks, all with one
-    weight; where these are on a line, the chains' joints on the platform too.
+    Nearest at the points of the platform: contact points and landmarks, all of one weight; where
+    these are on a line, the chains' joints on the platform too.
 
+    Args:   options: as of `Motion.from_arrays`, for the motion on the contacts.
     Raises: InputError: for another motion, or a sample that has no pose on the contacts near it.
     """
     if motion.kind != "pose":
         raise InputError(
-            f"{motion.source}: --fit (fit=True) is for whole poses (t, X, Y, Z, alpha, beta, "
-            f"gamma), got {', '.join(motion.names)}, which are on the contacts as they are"
+            f"{motion.source}: --fit (fit=True) is for whole poses ({', '.join(POSE)}), got "
+            f"{', '.join(motion.names)}: those are on the contacts already. Leave it out"
         )
     points = {c.name: np.array(c.point) for c in mechanism.contacts}
     points |= {name: np.array(p) for name, p in mechanism.platform.points.items()}
     if _on_a_line(points):
         points |= {chain.name: np.array(chain.platform) for chain in mechanism.chains}
-    shape = np.array(list(points.values()))
-    found = nearest_poses(mechanism, points, placed(shape, motion.value), motion.value)
+    there = placed(np.array(list(points.values())), motion.value)
+    found = nearest_poses(mechanism, points, there, motion.value)
     if not found.found.all():
         i = int(np.argmin(found.found))
         raise InputError(
             f"{motion.source}: no pose on the contacts is near that of t = {motion.t[i]:.6g} s "
-            f"(sample {i}): {', '.join(f'{v:.4g}' for v in motion.value[i])}. The motion is not "
-            "one of this mechanism, or in other units or another frame"
+            f"(sample {i}): {', '.join(f'{v:.4g}' for v in motion.value[i])}. The motion is of "
+            "another mechanism, in other units, or in another frame"
         )
-    return found.pose, found
+    columns = motion.columns() | dict(zip(POSE, found.pose.T, strict=True))
+    del columns["t"]
+    fitted = Motion.from_arrays(motion.t, columns, source=motion.source, **options)
+    moved = {n: [d["moved_rms"], d["moved_largest"]] for n, d in found.summary().items()}
+    warnings = (*dict.fromkeys((*motion.warnings, *fitted.warnings)),)
+    return replace(fitted, sha256=motion.sha256, warnings=warnings, contact_fit=moved)
 
 
 def _on_a_line(points: dict[str, np.ndarray]) -> bool:

@@ -64,6 +64,8 @@ class Motion:
         gravity: in {S}, (N, 3) [m/s^2]; None: the mechanism's.
         base: acceleration of the origin of {S} [m/s^2], angular velocity [rad/s] and angular
             acceleration [rad/s^2] of the base, components in {S}, (N, 9); None: it is at rest.
+        contact_fit: how far each point was moved onto the contacts, and "all" of them: root mean
+            square and largest [m]; None: see `fit_motion`.
     """
 
     kind: Kind
@@ -79,6 +81,7 @@ class Motion:
     warnings: tuple[str, ...] = ()
     gravity: np.ndarray | None = None
     base: np.ndarray | None = None
+    contact_fit: dict[str, list[float]] | None = None
 
     def __len__(self) -> int:
         return len(self.t)

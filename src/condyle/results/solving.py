@@ -94,6 +94,7 @@ def assemble(
         "load_sha256": load.sha256,
         "load_point": load_point,
         "contact_residual_of_given_pose": residual,
+        "contact_fit": motion.contact_fit,
         "smoothing": None if motion.smoothing is None else str(motion.smoothing),
         "solve_seconds": seconds,
     }
@@ -185,6 +186,7 @@ def _options(model: Model, own: Mapping[str, Any]) -> dict[str, Any]:
         "derivation_seconds": model.derivation_seconds,
         **dict.fromkeys(("motion_sha256", "landmark", "load_sha256", "load_point", "smoothing")),
         "contact_residual_of_given_pose": None,
+        "contact_fit": None,
         **own,
     }
 

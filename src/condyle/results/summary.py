@@ -40,6 +40,12 @@ class Summary:
                 f"greatest activation (effort over its limit): {most['value']:.4g}, "
                 f"{most['chain']} at t = {most['time']:g} s"
             )
+        if fit := d["contact_fit"]:
+            lines.append("moved onto the contacts (RMS, at most)")
+            lines += [
+                f"  {name:<{width}}  {rms * 1e3:10.4g} {most * 1e3:10.4g} mm"
+                for name, (rms, most) in fit.items()
+            ]
         if (own := d["gravity"]) is not None:
             lines.append(
                 f"gravity of the motion: {own['least']:.4g} to {own['most']:.4g} m/s^2, at most "
@@ -117,6 +123,7 @@ def summarize(solution: xr.Dataset) -> Summary:
                 if some
             },
             "greatest_activation": _greatest_activation(solution),
+            "contact_fit": options.get("contact_fit"),
             "gravity": _gravity(solution),
             "moving_base": _moving_base(solution),
             "distribution": options.get("distribution", "minimum_norm"),

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 _WORDS = {
     "characteristic_length": "characteristic length [m]",
+    "contact_fit": "moved onto the contacts: RMS, at most [m]",
     "contact_residual_of_given_pose": "contact residual of the given pose [m]",
 }
 
@@ -225,7 +226,9 @@ def _words(key: str) -> str:
 
 def _said(value: Any) -> str:
     if isinstance(value, list):
-        return ", ".join(map(str, value)) or "none"
+        return ", ".join(map(_said, value)) or "none"
+    if isinstance(value, dict):
+        return "; ".join(f"{name}: {_said(one)}" for name, one in value.items())
     if isinstance(value, float):
         return f"{value:.6g}"
     return "none" if value is None else str(value)
