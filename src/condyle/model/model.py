@@ -106,6 +106,11 @@ class Model:
         _ = other.distribution  # has to fit, now
         return other
 
+    def under(self, given: Iterable[str]) -> Self:
+        """The same whose kernels always take gravity, or the base's motion: for simulations."""
+        names = tuple(given)
+        return self._with(self.system.under(names), self._asked) if names else self
+
     def __repr__(self) -> str:
         return (
             f'Model of "{self.mechanism.name}": {self.formulation}, route {self.route}, '

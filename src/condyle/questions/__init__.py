@@ -66,9 +66,10 @@ GEOMETRY = (
     "instant", "energy", "jacobians", "coriolis", "reactions", "linear", "places", "forward_system",
     "system", "regressor",
 )  # fmt: skip
-# Questions that have inertia or gravity in them, of motions.
+# Questions in which gravity and the base's motion may be given: `Structure.given`.
 DYNAMIC = (
     "inverse", "balance", "system", "forward", "forward_system", "linear", "reactions", "regressor",
+    "rate", "tick",
 )  # fmt: skip
 
 

@@ -40,7 +40,8 @@ def tick(
 
     Ports: q, q1, joint, joint_rate: as they are; where there are sensors only joint, which is then
     the encoders' reading, and joint_rate;
-    reference `REFERENCE`; force at the law's point, (3,); its gains; low, high: limits, a lane's.
+    reference `REFERENCE`, then those of `Structure.given`; force at the law's point, (3,); its
+    gains; low, high: limits, a lane's.
     Results: effort; asked, without limits; q, q1, joint, joint_rate, measured_force, as sampled;
     memory.
 
@@ -82,6 +83,9 @@ def _program(
     q, q1, q2 = (b.sample(name, m) for name in REFERENCE[:3])
     joint, rate = (b.lane_sample(name) for name in REFERENCE[3:5])
     reference = Reference(q, q1, q2, joint, rate, b.sample(REFERENCE[5], 1, "N"))
+
+    for name in structure.given:
+        getattr(b, name)  # their ports follow the reference's
 
     known = (
         Wrench(*(b.sample(f"borne_{x}", 3) for x in ("force", "moment", "point")))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..backends.kernel import AGAIN
-from ..errors import InputError, ScenarioError
+from ..errors import InputError, ScenarioError, UnsupportedError
 from ..kinematics.chain import FAMILIES
 from ..mechanism import load_mechanism
 from ..mechanism.chain import limits
@@ -175,6 +175,11 @@ def _drive(
         path = path_of(model, motion or default_motion(model), None, None)
         sensing = _sensing(model, scenario, PERIOD)
         return ClosedLoop(model, Law(None), path, PERIOD, 0, sensing, function)
+    if motion is not None and motion.given:
+        raise UnsupportedError(
+            f"{motion.source}: nothing follows its columns of {' and '.join(motion.given)} in open "
+            "loop; give a controller, or leave the motion out"
+        )
     n = len(model.mechanism.chains)
     if scenario.efforts is None:
         return OpenLoop(np.zeros(1), np.zeros((1, n)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -43,7 +44,8 @@ class Controller:
         plan, drive = plans[0], drive_of(plans[0])
         sensing = drive.sensing
         self._inverse = drive.model.unchecked()
-        self._model, velocity = drive.model, None if sensing is None else sensing.velocity
+        models = [drive_of(p).model.under(plan.given) for p in plans]
+        self._model, velocity = models[0], None if sensing is None else sensing.velocity
         # Ports of a tick -> results of the plant: encoders read joint + zero.
         joint = "joint" if sensing is None else "reading"
         self.measured = {"joint": joint, "joint_rate": "joint_rate"}
@@ -53,10 +55,11 @@ class Controller:
         self.outside = function or drive.model.chooses_efforts
         apart = self.outside and not function
         details = (*self.details, True) if apart else self.details
-        self.columns = Columns.of([drive_of(p).model for p in plans], "tick", *details)
+        self.columns = Columns.of(models, "tick", *details)
         self._apart = self.columns if self.outside else None
         self.ticks = plan.ticks()
-        self._rows = np.concatenate([self.columns.rows(name) for name in REFERENCE])
+        names = (*REFERENCE, *plan.given)
+        self._rows = np.concatenate([self.columns.rows(name) for name in names])
         self.first = int(self._rows.min())
         sizes = len(self._rows), self.columns.results, plan.size
         self.references, self.samples, self.states = (
@@ -220,10 +223,13 @@ class Controller:
                 return np.zeros(n)
             q, q1, q2, force, point = np.split(by[REQUEST], [m, 2 * m, 3 * m, 3 * m + 3])
             wrench = np.concatenate([force, np.zeros(3)])
+            if names := self.plan.given:
+                around: Any = {name: by.given[by.rows(name), 0] for name in names}
+                return self._model.inverse_dynamics(q, q1, q2, wrench, point, **around).effort
             found: np.ndarray = self._inverse.inverse_dynamics(q, q1, q2, wrench, point)
             return found
-        names = ("q", "q1", "joint", "joint_rate")
-        now = Measured(**{name: by[name] for name in names}, force=by["measured_force"], t=t)
+        measured = ("q", "q1", "joint", "joint_rate")
+        now = Measured(**{name: by[name] for name in measured}, force=by["measured_force"], t=t)
         *path, force = (by.given[by.rows(name), 0] for name in REFERENCE)
         reference = Reference(*path, force=float(force[0]))  # type: ignore[misc]
         found = self.drive.function(now, reference)  # type: ignore[misc]

@@ -146,7 +146,9 @@ def report(plan: Plan) -> GainReport:
     drive = plan.drive
     if not isinstance(drive, ClosedLoop):
         raise UnsupportedError("there is no loop to check: the scenario has no controller")
-    loop = Loop(plan, drive)
+    # Gravity as of the file, and the base at rest.
+    drive = replace(drive, path=replace(drive.path, around={}))
+    loop = Loop(replace(plan, drive=drive), drive)
     end = min(plan.duration, float(drive.path.times[-1]))
     times = np.linspace(0.0, end, POINTS)
     home = drive.path.at(np.zeros(1))

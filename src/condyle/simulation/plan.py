@@ -92,6 +92,16 @@ class Plan:
     functions: dict[int, Callable[..., Any]] = field(default_factory=dict)
 
     @property
+    def path(self) -> ReferencePath | None:
+        """What the controller follows, if there is one."""
+        return self.drive.path if isinstance(self.drive, ClosedLoop) else None
+
+    @property
+    def given(self) -> tuple[str, ...]:
+        """Whether gravity and the base's motion are given over time, by name."""
+        return () if self.path is None else tuple(self.path.around)
+
+    @property
     def size(self) -> int:
         """Of the state: q, q', and the works of `WORKS`."""
         return 2 * len(self.q) + len(WORKS)
@@ -104,6 +114,8 @@ class Plan:
         if isinstance(self.drive, OpenLoop):
             found.append(self.drive.times)
         found += [load.times for load in self.loads]
+        if self.path is not None and self.given:
+            found.append(self.path.times[[0, -1]])
         every = np.unique(np.concatenate(found))
         every = every[(every >= 0) & (every <= self.duration)]
         apart = np.concatenate([np.diff(every) > 1e-12, [True]])

@@ -65,7 +65,8 @@ class Plant:
 
     def __init__(self, plans: Sequence[Plan]) -> None:
         plan = plans[0]
-        self._model, machine = plan.model, plan.model.mechanism
+        models = [p.model.under(plan.given) for p in plans]
+        self._model, machine = models[0], plan.model.mechanism
         contacts = machine.contacts
         self._bounded = [i for i, c in enumerate(contacts) if any(c.bounds.entries().values())]
         self._sided = [i for i, c in enumerate(contacts) if c.one_sided]
@@ -75,7 +76,7 @@ class Plant:
             measured = [i for i, load in enumerate(plan.loads) if load.place == place]
         laws = tuple(load.law for load in plan.loads)
         self.details = (laws, tuple(measured), tuple(self._bounded), tuple(self._sided))
-        self.columns = Columns.of([p.model for p in plans], "rate", *self.details)
+        self.columns = Columns.of(models, "rate", *self.details)
         self.fill(plans)
 
     def fill(self, plans: Sequence[Plan]) -> None:
@@ -193,7 +194,8 @@ class Plant:
             raise NoRateError(Status.uncertified if closes else Status.unreachable)
         asked = columns.given[columns.rows("effort"), 0]
         effort = np.clip(asked, self.plan.low, self.plan.high)
-        found = self._model.forward_dynamics(y[:m], y[m : 2 * m], effort, self["wrench"])
+        around: Any = {n: columns.given[columns.rows(n), 0] for n in self.plan.given}
+        found = self._model.forward_dynamics(y[:m], y[m : 2 * m], effort, self["wrench"], **around)
         if found.status:
             raise NoRateError(int(found.status))
         force, rate = found.contact_force, columns.result("rate")
@@ -216,6 +218,10 @@ def fed(plans: Sequence[Plan]) -> list[Fed]:
         for i, load in enumerate(plans[0].loads)
         if len(load.times)
     ]
+    for name in plans[0].given:
+        paths = [p.path for p in plans if p.path is not None]
+        rows = stacked([np.asarray(path.around[name]) for path in paths])  # type: ignore[literal-required]
+        found.append(Fed(name, paths[0].times, rows, name == "base"))
     if isinstance(plans[0].drive, OpenLoop):
         efforts = stacked([p.drive.efforts for p in plans])  # type: ignore[union-attr]
         found.append(Fed("effort", plans[0].drive.times, efforts, False))

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, UnsupportedError
+from ..errors import InputError
 from ..model.model import Model
 from ..motion import Motion, read_table, reference_motion, trial_motion
+from ..motion.gravity_and_base import Given, each
 from ..motion.reference_case import fits_reference
 from ..motion.spline import Spline
 
@@ -20,6 +22,8 @@ class ReferencePath:
 
     times: (N,) [s];  q: (N, m).
     force: (F,) times [s] and (F,) newtons, linear between; one of each where it stays.
+    around: gravity and the base's motion at the times, linear between; before and after them
+            gravity stays as it is, and the base stands still.
     """
 
     model: Model
@@ -27,12 +31,14 @@ class ReferencePath:
     q: np.ndarray
     force_times: np.ndarray
     force: np.ndarray
+    around: Given = field(default_factory=Given)
 
     def same_as(self, other: ReferencePath) -> bool:
         """Whether it is the same at all times."""
         arrays = ("times", "q", "force_times", "force")
         return self is other or (
             self.model is other.model
+            and self.around is other.around
             and all(np.array_equal(getattr(self, n), getattr(other, n)) for n in arrays)
         )
 
@@ -49,7 +55,8 @@ class ReferencePath:
         return q, q1, q2
 
     def at(self, t: np.ndarray) -> np.ndarray:
-        """q, q', q'', joint, joint rate and force at times (K,) [s], (K, 3 m + 2 n + 1).
+        """q, q', q'', joint, joint rate and force at times (K,) [s], (K, 3 m + 2 n + 1); then
+        gravity and the base's motion, if they are given.
 
         Raises: InputError: where the mechanism cannot be there.
         """
@@ -61,7 +68,18 @@ class ReferencePath:
                 f"controller.motion: the pose at t = {t[bad]:g} s cannot be reached: q = {q[bad]}"
             )
         joint, rate = answer.values["joint"].T, answer.values["joint_rate"].T
-        return np.hstack([q, q1, q2, joint, rate, self.force_at(t)[:, None]])
+        around: Any = self.around_at(t).values()
+        return np.hstack([q, q1, q2, joint, rate, self.force_at(t)[:, None], *around])
+
+    def around_at(self, t: np.ndarray) -> Given:
+        """Gravity and the base's motion at times (K,) [s]."""
+        inside = ((t >= self.times[0]) & (t <= self.times[-1]))[:, None]
+        found = each(
+            self.around, lambda a: np.stack([np.interp(t, self.times, one) for one in a.T], axis=1)
+        )
+        if "base" in found:
+            found["base"] = found["base"] * inside
+        return found
 
     def force_at(self, t: np.ndarray) -> np.ndarray:
         """The force at times (K,) [s], (K,) [N]."""
@@ -73,11 +91,6 @@ def path_of(model: Model, motion: Motion, force: float | None, file: str | None)
 
     Args: force: f_d [N] at all times;  file: CSV of t, force instead.
     """
-    if motion.given:
-        raise UnsupportedError(
-            f"{motion.source}: gives {' and '.join(motion.given)}; in a simulation gravity is the "
-            "mechanism's and the base is at rest: leave those columns out"
-        )
     q = model.poses.of_motion(motion)[0][0]
     if not np.isfinite(q).all():
         bad = int(np.argmin(np.isfinite(q).all(axis=1)))
@@ -91,7 +104,7 @@ def path_of(model: Model, motion: Motion, force: float | None, file: str | None)
         times, newtons = table.require(["t", "force"]).T
         if (np.diff(times) <= 0).any():
             raise InputError(f"{file}: times must be strictly increasing")
-    return ReferencePath(model, motion.t - motion.t[0], q, times, newtons)
+    return ReferencePath(model, motion.t - motion.t[0], q, times, newtons, motion.given)
 
 
 def default_motion(model: Model) -> Motion:

@@ -13,6 +13,7 @@ from ..errors import InputError
 from ..model.distributing import shares
 from ..model.model import Model
 from ..model.model_result import ModelResult
+from ..motion.gravity_and_base import Given
 from ..questions.equations import INTERNAL
 from ..results.derived import Derived
 from ..results.solving import labelled
@@ -32,15 +33,17 @@ def solved(plan: Plan, trace: Trace, started: float) -> xr.Dataset:
     q, q1 = trace.state[:, :m], trace.state[:, m : 2 * m]
     acted = Plant([plan]).along(trace.t, trace.state, trace.modes)
     wrench = acted["wrench"]
-    evaluation = _evaluation(model, q, q1, trace.effort, wrench)
-    simulated = _energy(model, q, q1, trace, plan)
+    around: Given = {} if plan.path is None else plan.path.around_at(trace.t)
+    evaluation = _evaluation(model, q, q1, trace.effort, wrench, around)
+    # On a base that moves, or under gravity that turns, there is no potential.
+    simulated = {} if around else _energy(model, q, q1, trace, plan)
     if any(not chain.actuator.ideal for chain in model.mechanism.chains):
         simulated["actuator_loss"] = acted["loss"]
     if plan.loads:
         simulated |= {"load_force": acted["load_force"], "load_mode": trace.modes}
     if isinstance(plan.drive, ClosedLoop):
         simulated |= _controlled(plan, plan.drive, trace)
-    derived = Derived(model.mechanism, evaluation, wrench, simulated=simulated)
+    derived = Derived(model.mechanism, evaluation, wrench, simulated=simulated, given=around)
     watch = Watch(model.mechanism)
     watch.see(derived, trace.t)
     notices = [*(Notice("implausible", text) for text in odd_things(plan)), *watch.notices()]
@@ -48,7 +51,8 @@ def solved(plan: Plan, trace: Trace, started: float) -> xr.Dataset:
         text = f"the run ended at t = {end.time:.6g} s of {plan.duration:g} s: {end.text}"
         whose = f' ("{end.owner}")' if end.owner else ""
         notices.append(Notice("ended", text + whose, end.owner or None, time=end.time))
-    parts = model.parts if INTERNAL in model.parts else (*model.parts, INTERNAL)
+    parts = model.parts_under(around)
+    parts = parts if INTERNAL in parts else (*parts, INTERNAL)
     seconds = time.perf_counter() - started
     solution = labelled(
         model,
@@ -68,13 +72,19 @@ def solved(plan: Plan, trace: Trace, started: float) -> xr.Dataset:
 
 
 def _evaluation(
-    model: Model, q: np.ndarray, q1: np.ndarray, effort: np.ndarray, wrench: np.ndarray
+    model: Model,
+    q: np.ndarray,
+    q1: np.ndarray,
+    effort: np.ndarray,
+    wrench: np.ndarray,
+    around: Given,
 ) -> ModelResult:
     """Everything about the states of a trace, from forward dynamics."""
-    found = model.forward_dynamics(q, q1, effort, wrench, outputs="all")
+    found = model.forward_dynamics(q, q1, effort, wrench, **around, outputs="all")
     ports = {name: getattr(found, name) for name in ("pose", "pose_rate", "pose_acceleration")}
     ports |= {"force": wrench[:, :3], "moment": wrench[:, 3:], "point": np.zeros((1, 3))}
-    values = model.kernel("system").run(ports).values
+    system = model.system.under(tuple(around)).kernel("system")
+    values = system.run(ports | dict[str, Any](around)).values
     s = {name: np.moveaxis(a, -1, 0) for name, a in values.items()}
     rubbed = any(c.friction.coefficient for c in model.mechanism.contacts)
     share = shares(s, effort, found.contact_force if rubbed else None)
