@@ -169,7 +169,7 @@ def fit_motion(mechanism: Mechanism, motion: Motion, **options: Unpack[Options])
             f"(sample {i}): {', '.join(f'{v:.4g}' for v in motion.value[i])}. The motion is of "
             "another mechanism, in other units, or in another frame"
         )
-    columns = motion.columns() | dict(zip(POSE, found.pose.T, strict=True))
+    columns = motion.columns | dict(zip(POSE, found.pose.T, strict=True))
     del columns["t"]
     fitted = Motion.from_arrays(motion.t, columns, source=motion.source, **options)
     moved = {n: [d["moved_rms"], d["moved_largest"]] for n, d in found.summary().items()}
