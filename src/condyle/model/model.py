@@ -106,11 +106,6 @@ class Model:
         _ = other.distribution  # has to fit, now
         return other
 
-    def under(self, given: Iterable[str]) -> Self:
-        """The same whose kernels always take gravity, or the base's motion: for simulations."""
-        names = tuple(given)
-        return self._with(self.system.under(names), self._asked) if names else self
-
     def __repr__(self) -> str:
         return (
             f'Model of "{self.mechanism.name}": {self.formulation}, route {self.route}, '
@@ -588,6 +583,12 @@ class Model:
         Raises: InputError: for an unknown question.
         """
         return self.system.kernel(as_name(question, "question"), *details)
+
+
+def model_under(model: Model, given: Iterable[str]) -> Model:
+    """The same model whose kernels always take gravity, or the base's motion: for simulations."""
+    names = tuple(given)
+    return model._with(model.system.under(names), model._asked) if names else model
 
 
 def parts_under(model: Model, given: Iterable[str]) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InputError
 from ..graph.program import ManyNumbers
 from ..graph.transform import number_ports
-from ..model.model import Model
+from ..model.model import Model, model_under
 from ..questions.law.controller import Reference
 from ..questions.observer import Measured
 from ..questions.tick import REFERENCE, REQUEST, carried
@@ -44,7 +44,7 @@ class Controller:
         plan, drive = plans[0], drive_of(plans[0])
         sensing = drive.sensing
         self._inverse = drive.model.unchecked()
-        models = [drive_of(p).model.under(plan.given) for p in plans]
+        models = [model_under(drive_of(p).model, plan.given) for p in plans]
         self._model, velocity = models[0], None if sensing is None else sensing.velocity
         # Ports of a tick -> results of the plant: encoders read joint + zero.
         joint = "joint" if sensing is None else "reading"

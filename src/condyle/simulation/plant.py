@@ -11,6 +11,7 @@ import numpy as np
 from ..backends.kernel import AGAIN
 from ..errors import InputError
 from ..kinematics.chain import FAMILIES
+from ..model.model import model_under
 from ..questions.load.acting import WRENCH
 from ..status import Status
 from .columns import Columns
@@ -65,7 +66,7 @@ class Plant:
 
     def __init__(self, plans: Sequence[Plan]) -> None:
         plan = plans[0]
-        models = [p.model.under(plan.given) for p in plans]
+        models = [model_under(p.model, plan.given) for p in plans]
         self._model, machine = models[0], plan.model.mechanism
         contacts = machine.contacts
         self._bounded = [i for i, c in enumerate(contacts) if any(c.bounds.entries().values())]

@@ -11,7 +11,7 @@ import xarray as xr
 
 from ..errors import InputError
 from ..model.distributing import shares
-from ..model.model import Model
+from ..model.model import Model, parts_under
 from ..model.model_result import ModelResult
 from ..motion.gravity_and_base import Given
 from ..questions.equations import INTERNAL
@@ -51,7 +51,7 @@ def solved(plan: Plan, trace: Trace, started: float) -> xr.Dataset:
         text = f"the run ended at t = {end.time:.6g} s of {plan.duration:g} s: {end.text}"
         whose = f' ("{end.owner}")' if end.owner else ""
         notices.append(Notice("ended", text + whose, end.owner or None, time=end.time))
-    parts = model.parts_under(around)
+    parts = parts_under(model, around)
     parts = parts if INTERNAL in parts else (*parts, INTERNAL)
     seconds = time.perf_counter() - started
     solution = labelled(
