@@ -60,9 +60,11 @@ _HOMES = {
     "tradeoff": "analysis.weight_curve",
     "schema": "analysis.schema",
     "check": "report.mechanism_summary",
+    "measure_session": "report.measured_session",
     "write_report": "report.page",
     "serve_view": "view",
     "new_mechanism": "export.new_mechanism",
+    "new_study": "export.new_study",
     "Study": "analysis.sweep",
     "sweep": "analysis.sweep",
     "open_sweep": "analysis.sweep",
@@ -98,6 +100,7 @@ if TYPE_CHECKING:
     from .export.matlab import export_matlab
     from .export.mjcf import export_mjcf
     from .export.new_mechanism import new_mechanism
+    from .export.new_study import new_study
     from .identification.identify import identify
     from .markers import motion_from_c3d
     from .mechanism import Mechanism, bundled_mechanisms, dump, dumps, load_mechanism
@@ -111,6 +114,7 @@ if TYPE_CHECKING:
         trial_motion,
         write_reference,
     )
+    from .report.measured_session import measure_session
     from .report.mechanism_summary import check
     from .report.page import write_report
     from .results.derivative_rows import derivative_states

@@ -20,6 +20,7 @@ from unittest.mock import Mock, patch
 import numpy as np
 from support.machine_log import write_log
 from support.recorded_jaw import record
+from support.recorded_session import write_session
 
 import condyle
 from condyle.mechanism import bundled_text
@@ -55,6 +56,10 @@ class Stage:
     @cached_property
     def log(self) -> Path:
         return write_log(Path("log.csv").resolve())
+
+    @cached_property
+    def session(self) -> Path:
+        return write_session(Path.cwd(), 1, 1.0)[0]
 
     @cached_property
     def motion(self) -> condyle.Motion:
@@ -184,6 +189,11 @@ DOORS: dict[str, Door] = {
         },
         calls=100,
         words=("mechanism", "jaw.c3d", "jaw.toml", "cut-off", *FILES),
+    ),
+    "measure_session": Door(
+        {"session": lambda stage: stage.session, "out": None, "strict": False},
+        calls=40,
+        words=("mechanism", "session.toml", "key", "trial", *FILES),
     ),
     "derive": Door(
         {
@@ -331,6 +341,7 @@ DOORS: dict[str, Door] = {
     "new_mechanism": Door(
         {"name": "mine", "from_mjcf": None, "force": True, "strict": False}, words=FILES, calls=60
     ),
+    "new_study": Door({"name": "mine", "kind": "session", "force": True}, words=FILES, calls=60),
     "Results.save": Door({"path": "out.nc"}, calls=60),
     "Results.columns": Door(),
     "Results.with_measured": Door({"measured": "measured.csv"}, words=FILES),

@@ -15,6 +15,7 @@ import xarray as xr
 from support.machine_log import STUDY as LOG_STUDY
 from support.machine_log import write_log
 from support.recorded_jaw import record
+from support.recorded_session import write_session
 from support.speeds import few, slow
 
 import condyle
@@ -60,6 +61,7 @@ CALLS: dict[str, tuple[str, ...]] = {
         *("motion", "from-c3d", "a trial.c3d", "--markers", "markers.toml"),
         *("--mechanism", "my jaw.toml", "--out", "a motion.csv"),
     ),
+    "session": ("session", "session.toml", "--out", "a session"),
     "export c": ("export", "c", "my jaw.toml", "--question", "motion", "--out", "for c"),
     "export fmu": ("export", "fmu", "my jaw.toml", "--out", "units", "--kind", "inverse"),
     "export matlab": ("export", "matlab", "my jaw.toml", "--out", "for matlab"),
@@ -132,6 +134,7 @@ def command(
     jaw = record(noise=5e-5)
     jaw.write(Path("a trial.c3d"))
     jaw.write_tables(Path("markers.toml"))
+    write_session(Path.cwd(), 1, 2.5)
     solution.condyle.save("a run.nc")
     write_log(Path("a log.csv"))
     Path("fit.toml").write_text(LOG_STUDY)

@@ -17,6 +17,7 @@ from condyle.cli import completion
 from condyle.distribution import OBJECTIVES
 from condyle.dynamics import FORMULATIONS, ROUTES
 from condyle.export.fmu_model import KINDS
+from condyle.export.new_study import study_kinds
 from condyle.mechanism import bundled_text
 from condyle.motion import parse_units
 from condyle.report.figures import PLOTS
@@ -33,6 +34,7 @@ def test_the_names_are_those_of_the_registries() -> None:
     assert tuple(PLOTS) == completion.FIGURES
     assert tuple(STYLES) == completion.STYLES
     assert tuple(KINDS) == completion.FMUS
+    assert study_kinds() == completion.STUDIES
     assert tuple(completion.bundled()) == condyle.bundled_mechanisms()
     for units in completion.UNITS:
         parse_units(units)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import pytest
 
 import condyle
+from condyle.markers import read_session
 from condyle.mechanism import bundled_text, json_schema
 from condyle.motion import bundled_reference
 
@@ -111,3 +113,26 @@ def test_help_and_version(condyle_command: Callable[..., Any]) -> None:
 def test_misspelt_commands(condyle_command: Callable[..., Any], arguments: tuple[str, ...]) -> None:
     outcome = condyle_command(*arguments)
     assert outcome.status == 2 and "Traceback" not in outcome.err and outcome.out == ""
+
+
+def test_a_session_file_to_start_from(condyle_command: Callable[..., Any]) -> None:
+    outcome = condyle_command("new", "my session", "--study", "session")
+    assert outcome.status == 0 and "Wrote my session.toml" in outcome.out
+    session = read_session("my session.toml")
+    assert session.mechanism == "human-jaw" and len(session.trials) == 2
+    every = re.sub(r"(?m)^# (?=\[|\w+ = )", "", Path("my session.toml").read_text())
+    Path("all.toml").write_text(every.replace("[register]", '[register]\nchin = "Chin"\n#'))
+    whole = read_session("all.toml")
+    assert (
+        whole.scale is not None
+        and whole.static is not None
+        and whole.forces is not None
+        and whole.emg is not None
+    )
+    assert condyle_command("new", "my session", "--study", "session").status == 2
+    for words, text in (
+        (("--study", "sessoin"), 'Did you mean "session"'),
+        (("--study", "session", "--from-mjcf", "x"), "take one"),
+    ):
+        refused = condyle_command("new", "other", *words)
+        assert refused.status == 2 and text in refused.err

@@ -20,6 +20,7 @@ from typing import Any
 import pytest
 import yaml
 from support.recorded_jaw import record
+from support.recorded_session import write_session
 
 import condyle
 from condyle.mechanism import bundled_text
@@ -114,6 +115,7 @@ def put_files_of_a_reader(folder: Path) -> None:
     jaw = record(noise=5e-5)
     jaw.write(folder / "trial.c3d")
     jaw.write_tables(folder / "markers.toml")
+    write_session(folder, 2, 2.5)
     q = ("X", "Y", "alpha", "beta")
     names = [prefix + name for prefix in ("", "d", "dd") for name in q]
     (folder / "bite.csv").write_text("X,Y,alpha,beta,Fz\n0,0,0,0,-100\n")

@@ -6,11 +6,11 @@ from typing import Any
 
 from ..errors import InputError, did_you_mean, shown
 
-KINDS = ("mechanism", "scenario", "study")
+KINDS = ("mechanism", "scenario", "session", "study")
 
 
 def schema(of: str = "mechanism") -> dict[str, Any]:
-    """The JSON schema of mechanism, scenario or study files, for editors.
+    """The JSON schema of mechanism, scenario, session or study files, for editors.
 
     Raises: InputError: for another kind of file.
     """
@@ -20,6 +20,8 @@ def schema(of: str = "mechanism") -> dict[str, Any]:
         from ..mechanism import json_schema as made
     elif of == "scenario":
         from ..simulation import scenario_schema as made
+    elif of == "session":
+        from ..markers.session_file import json_schema as made
     else:
         from .sweep import json_schema as made
     return made()

@@ -1,7 +1,7 @@
 """Every command, in the order of the help page."""
 
 # isort: off
-from . import new, check, reference, motion  # noqa: F401
+from . import new, check, reference, motion, session  # noqa: F401
 from . import run, states, map, simulate, compare, sweep, identify, export  # noqa: F401
 from . import plot, report, view  # noqa: F401
 from . import upkeep  # noqa: F401

@@ -24,6 +24,7 @@ DISTRIBUTIONS = {  # name -> objective, and constraints
 }
 BACKENDS = ("auto", "compiled", "numpy", "cuda")
 FMUS = ("plant", "inverse", "controller", "bounded", "pose", "joints")
+STUDIES = ("session",)
 STYLES = ("screen", "journal", "journal-wide")
 EXPORTS = (
     *("inverse", "contact", "bounded", "forward", "derivatives"),

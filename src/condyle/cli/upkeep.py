@@ -103,12 +103,12 @@ def schema(
     of: Annotated[
         str,
         typer.Argument(
-            help="Kind of file: mechanism, scenario or study.",
-            autocompletion=one_of("mechanism", "scenario", "study"),
+            help="Kind of file: mechanism, scenario, session or study.",
+            autocompletion=one_of("mechanism", "scenario", "session", "study"),
         ),
     ] = "mechanism",
 ) -> Answer:
-    """JSON schema of mechanism, scenario or study files, for editors.
+    """JSON schema of mechanism, scenario, session or study files, for editors.
 
     An editor that has it completes keys and marks mistakes while you type.
     """

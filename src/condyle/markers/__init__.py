@@ -8,11 +8,14 @@ from .marker_motion import (
     MarkerMotion,
     MarkerResidual,
     motion_from_c3d,
+    motion_of,
+    registered_places,
 )
 from .marker_report import as_data, write_motion
 from .measured_channels import MeasuredChannels, read_channels
 from .recording import Recording, read_c3d
 from .registration import Registration
+from .session_file import SessionFile, read_session
 
 __all__ = [
     "MAX_GAP",
@@ -24,10 +27,14 @@ __all__ = [
     "MeasuredChannels",
     "Recording",
     "Registration",
+    "SessionFile",
     "as_data",
     "motion_from_c3d",
+    "motion_of",
     "read_c3d",
     "read_channels",
     "read_markers",
+    "read_session",
+    "registered_places",
     "write_motion",
 ]

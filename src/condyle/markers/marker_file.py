@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -107,6 +107,8 @@ class Forces(Table):
     @field_validator("channels", mode="before")
     @classmethod
     def _three_labels(cls, value: Any) -> Any:
+        if value is None:
+            return value
         labels = value if isinstance(value, list | tuple) else ()
         if len({*map(str, labels)}) != 3 or len(labels) != 3:
             raise ValueError(f"expected the labels of three channels, got {shown(value)}")
@@ -115,7 +117,8 @@ class Forces(Table):
     @field_validator("plate", mode="before")
     @classmethod
     def _number(cls, value: Any) -> Any:
-        if not isinstance(value, int) or isinstance(value, bool) or value < 1:
+        number = isinstance(value, int) and not isinstance(value, bool) and value >= 1
+        if value is not None and not number:
             raise ValueError(f"expected the number of a force plate, from 1, got {shown(value)}")
         return value
 
@@ -234,6 +237,9 @@ class MarkerFile(Table):
         return self
 
 
+File = TypeVar("File", bound=MarkerFile)
+
+
 def read_markers(source: str | os.PathLike[str] | Mapping[str, Any] | MarkerFile) -> MarkerFile:
     """A marker file from a path, or from tables.
 
@@ -241,26 +247,38 @@ def read_markers(source: str | os.PathLike[str] | Mapping[str, Any] | MarkerFile
     """
     if isinstance(source, MarkerFile):
         return source
+    return checked_file(MarkerFile, *tables_of(source, "markers", "marker file"))
+
+
+def tables_of(source: Any, argument: str, what: str) -> tuple[Mapping[str, Any], str]:
+    """The tables of a file, and what messages call it: its path, or the argument's name.
+
+    Raises: InputError: for anything but tables or the path of a TOML file.
+    """
     if isinstance(source, Mapping):
-        return _checked(source, "markers")
+        return source, argument
     if not isinstance(source, str | os.PathLike):
-        raise InputError(f"markers: expected the path of a marker file (TOML), got {shown(source)}")
+        raise InputError(f"{argument}: expected the path of a {what} (TOML), got {shown(source)}")
     try:
         text = content_of(source, LARGEST_FILE + 1).decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise InputError(f"{source}: is no text (UTF-8 expected); a marker file is TOML") from None
-    file = _checked(read_tables(text, os.fspath(source)), os.fspath(source))
+        raise InputError(f"{source}: is no text (UTF-8 expected); a {what} is TOML") from None
+    return read_tables(text, os.fspath(source)), os.fspath(source)
+
+
+def checked_file(kind: type[File], data: Mapping[str, Any], source: str) -> File:
+    """A file of its tables; relative paths start at its folder.
+
+    Raises: InputError: with every problem found, one line each.
+    """
+    try:
+        file = kind.model_validate(dict(data))
+    except ValidationError as error:
+        raise ProblemsError(source, describe(error, data, kind)) from None
     if file.static is None:
         return file
-    there = os.path.join(os.path.dirname(os.fspath(source)), file.static.file)
+    there = os.path.join(os.path.dirname(source), file.static.file)
     return file.model_copy(update={"static": file.static.model_copy(update={"file": there})})
-
-
-def _checked(data: Mapping[str, Any], source: str) -> MarkerFile:
-    try:
-        return MarkerFile.model_validate(dict(data))
-    except ValidationError as error:
-        raise ProblemsError(source, describe(error, data, MarkerFile)) from None
 
 
 def _problems(places: Mapping[str, Any]) -> Iterator[str]:

@@ -181,6 +181,24 @@ def _on_contacts(
     return nearest_poses(machine, points, measured, free, weights)
 
 
+def registered_places(
+    recording: Recording, file: MarkerFile, machine: Mechanism, static: Recording | None = None
+) -> dict[str, np.ndarray]:
+    """Points that the file registers, where they are in {S} at home, (3,) [m] each.
+
+    {S} is where all of them are nearest to their places in the mechanism.
+
+    Raises: InputError: where directions stand in the place of points; as of `motion_of`.
+    """
+    if file.directed:
+        raise InputError(
+            "scale: [register] gives directions; a mechanism is scaled to places of its points"
+        )
+    place = partial(_place, find_bodies(recording, file, static).home)
+    registration = register(file, machine, place)
+    return {n: registration.to_base(place(where, n)) for n, where in file.places.items()}
+
+
 def _three(channels: Sequence[str]) -> Forces:
     if not isinstance(channels, list | tuple):
         raise InputError(f"force: expected the labels of three channels, got {shown(channels)}")

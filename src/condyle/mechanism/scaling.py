@@ -63,7 +63,7 @@ class ScaledMechanism:
 
 
 def scaled_to(
-    mechanism: Mechanism, landmarks: Mapping[str, Sequence[float]], kind: str = "affine"
+    mechanism: Mechanism, landmarks: Mapping[str, Any], kind: str = "affine"
 ) -> ScaledMechanism:
     """A mechanism whose points are where a subject's are.
 
@@ -204,11 +204,12 @@ def _changes(m: Mechanism, warp: _Warp, J: np.ndarray, volume: float) -> dict[st
     second = 0.5 * np.trace(I := m.platform.inertia.tensor()) * np.eye(3) - I
     second = volume * J @ second @ J.T
     tensor = np.trace(second) * np.eye(3) - second
-    entries = {f"{a}{b}": tensor["xyz".index(a), "xyz".index(b)] for a, b in _ENTRIES}
     changes: dict[str, Any] = {
         "platform.mass": m.platform.mass * volume,
         "platform.com": warp(m.platform.com).tolist(),
-        "platform.inertia": {name: float(value) for name, value in entries.items()},
+        "platform.inertia": {
+            name: float(tensor["xyz".index(name[0]), "xyz".index(name[1])]) for name in _ENTRIES
+        },
         "platform.points": {name: warp(p).tolist() for name, p in m.platform.points.items()},
     }
     for i, contact in enumerate(m.contacts):

@@ -1,0 +1,83 @@
+"""What a cycle came to, as a row; and cycles over normalised time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .cycle_finding import Found, at_times
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+PHASES = 101  # samples of normalised time, 0 to 1
+
+
+def phase() -> np.ndarray:
+    """Normalised time, (PHASES,): 0 where a cycle begins, 1 where it ends."""
+    return np.linspace(0.0, 1.0, PHASES)
+
+
+def measured_columns(solution: xr.Dataset) -> dict[str, np.ndarray]:
+    """Magnitudes that cycles are measured by, (N,) each: joint loads, the load, efforts [SI]."""
+    found = {
+        f"contact_{name}": np.abs(solution["contact_force"].values[:, i])
+        for i, name in enumerate(solution["contact"].values)
+    }
+    found["load"] = np.linalg.norm(solution["load"].values[:, :3], axis=1)
+    effort = np.abs(solution["effort"].values)
+    return found | {f"tau_{name}": effort[:, i] for i, name in enumerate(solution["chain"].values)}
+
+
+def cycle_rows(solution: xr.Dataset, found: Found, by: str | None) -> list[dict[str, Any]]:
+    """A row for each cycle of a trial.
+
+    `start`, `duration` [s], `samples_without_result`, the range of the signal that cycles are
+    found by, and of each magnitude the peak, and the integral over time (`impulse`). Where a sample
+    has no result, peaks and impulses are None.
+    """
+    t, status = solution["time"].values, solution["status"].values
+    columns = measured_columns(solution)
+    values = np.column_stack([*columns.values()])
+    rows, pairs = [], zip(found.spans, _samples(t, found.spans), strict=True)
+    for k, ((start, end), samples) in enumerate(pairs, 1):
+        inside = (t > start) & (t < end)
+        failed = int((status[samples] != 0).sum())
+        ends = at_times(t, values, np.array([start, end]))
+        cut = np.vstack([ends[:1], values[inside], ends[1:]])
+        times = np.concatenate([[start], t[inside], [end]])
+        peaks, impulses = cut.max(axis=0), np.trapezoid(cut, times, axis=0)
+        row: dict[str, Any] = {
+            "cycle": k, "start": float(start), "duration": float(end - start),
+            "samples_without_result": failed,
+        }  # fmt: skip
+        if by is not None:
+            row[f"range_{by}"] = float(np.ptp(found.signal[inside])) if inside.any() else 0.0
+        for name, peak, impulse in zip(columns, peaks, impulses, strict=True):
+            row[f"peak_{name}"] = float(peak) if np.isfinite(peak) else None
+            row[f"impulse_{name}"] = float(impulse) if np.isfinite(impulse) else None
+        rows.append(row)
+    return rows
+
+
+def whole_spans(solution: xr.Dataset, spans: np.ndarray) -> np.ndarray:
+    """Cycles all of whose samples have a result."""
+    status = solution["status"].values
+    samples = _samples(solution["time"].values, spans)
+    return spans[np.array([not status[of].any() for of in samples], dtype=bool)]
+
+
+def _samples(t: np.ndarray, spans: np.ndarray) -> list[slice]:
+    """The samples of each cycle; its ends lie between two of them, and both count."""
+    first = np.clip(np.searchsorted(t, spans[:, 0], side="right") - 1, 0, None)
+    last = np.clip(np.searchsorted(t, spans[:, 1]), None, len(t) - 1)
+    return [slice(a, b + 1) for a, b in zip(first, last, strict=True)]
+
+
+def normalised(solution: xr.Dataset, spans: np.ndarray, variable: str) -> np.ndarray:
+    """A variable over the normalised time of cycles, (C, PHASES, ...)."""
+    times = spans[:, :1] + phase() * np.diff(spans, axis=1)
+    array = solution[variable]
+    values = np.moveaxis(array.values, array.dims.index("time"), 0)
+    return at_times(solution["time"].values, values, times)

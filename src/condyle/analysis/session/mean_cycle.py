@@ -1,0 +1,147 @@
+"""Means of cycles: over normalised time by trial and subject, and the mean cycle as a solution."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..sweep.bands import QUANTILES
+from .cycle_measures import normalised, phase
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from .solved_session import SolvedTrial
+
+KEPT = ("pose", "effort", "activation", "contact_force", "load", "emg")
+BANDS = ("effort", "contact_force")
+ALL = "all"  # the subject where none is named
+
+
+def mean_dataset(trials: Sequence[SolvedTrial]) -> xr.Dataset:
+    """Mean and standard deviation over normalised time, by trial and by subject.
+
+    Of each variable of `KEPT` that all trials have `<variable>_mean` and `_sd` over (trial, phase,
+    ...), and `<variable>_subject_mean` and `_sd` over (subject, phase, ...): over all cycles of the
+    trial or subject, n - 1 in the standard deviation. Cycles with a sample without a result do not
+    count; where no cycle counts, NaN.
+    """
+    import xarray as xr
+
+    first = trials[0].solution
+    subjects = list(dict.fromkeys(one.trial.subject or ALL for one in trials))
+    groups = {
+        "": ("trial", [[one] for one in trials]),
+        "_subject": (
+            "subject",
+            [[t for t in trials if (t.trial.subject or ALL) == name] for name in subjects],
+        ),
+    }
+    variables: dict[str, Any] = {}
+    for name in [n for n in KEPT if all(n in one.solution for one in trials)]:
+        array = first[name]
+        cycles = {id(one): normalised(one.solution, one.whole, name) for one in trials}
+        dims = [d for d in array.dims if d != "time"]
+        for ending, (along, members) in groups.items():
+            both = [_statistics(np.concatenate([cycles[id(t)] for t in of])) for of in members]
+            for k, (word, meaning) in enumerate((("mean", "mean"), ("sd", "standard deviation"))):
+                about = {"units": array.attrs["units"]}
+                about["long_name"] = f"{meaning} over cycles of: {array.attrs['long_name']}"
+                values = np.array([statistics[k] for statistics in both])
+                variables[f"{name}{ending}_{word}"] = (along, "phase", *dims), values, about
+    for along, members in groups.values():
+        count = [sum(len(t.whole) for t in of) for of in members]
+        about = {"units": "1", "long_name": "cycles that count"}
+        variables["cycles" if along == "trial" else "cycles_subject"] = along, count, about
+    coordinates: dict[str, Any] = {
+        "trial": [one.trial.name for one in trials],
+        "subject": subjects,
+        "phase": ("phase", phase(), {"units": "1", "long_name": "normalised time"}),
+    }
+    used = {
+        d for dims, *_ in variables.values() for d in ([dims] if isinstance(dims, str) else dims)
+    }
+    coordinates |= {
+        d: first[d] for d in ("chain", "contact", "coordinate", "component") if d in used
+    }
+    made = xr.Dataset(variables, coordinates)
+    made.attrs = {
+        "title": f"Mean cycles of {first.attrs['mechanism_name']}",
+        **{name: first.attrs[name] for name in ("source", "condyle_version", "mechanism_name")},
+    }
+    return made
+
+
+def mean_solution(
+    trials: Sequence[SolvedTrial], source: str, warnings: Sequence[str]
+) -> xr.Dataset | None:
+    """The mean of all whole cycles as a solution, with quantiles over cycles as its bands.
+
+    Its time is normalised time times the mean duration. None if no cycle is whole.
+    """
+    spans = [one.whole for one in trials]
+    count = sum(map(len, spans))
+    if not count:
+        return None
+    used = [one.solution for one in trials if len(one.whole)]
+    spans = [one.whole for one in trials if len(one.whole)]
+    first = used[0]
+    parts = list(dict.fromkeys(str(p) for s in used for p in s["part"].values))
+    used = [s.reindex(part=parts, fill_value=0.0) for s in used]  # without a load it has no share
+    shared = [
+        str(name)
+        for name, array in first.data_vars.items()
+        if "time" in array.dims and "quantile" not in array.dims and "marker" not in array.dims
+        and all(name in s for s in used)
+    ]  # fmt: skip
+    made = used[0][shared].isel(time=[0] * len(phase()))
+    for name in shared:
+        array = used[0][name]
+        cycles = np.concatenate(
+            [normalised(s, of, name) for s, of in zip(used, spans, strict=True)]
+        )
+        along = _merged(name, cycles, array.dtype)
+        values = np.moveaxis(along, 0, array.dims.index("time"))
+        made[name] = array.dims, values, array.attrs
+        if name in BANDS:
+            about = {"units": array.attrs["units"], "long_name": f"quantiles of {name} over cycles"}
+            quantiles = np.quantile(cycles, QUANTILES, axis=0)
+            made[f"{name}_quantile"] = ("quantile", *array.dims), quantiles, about
+    duration = float(np.mean(np.concatenate([np.diff(of, axis=1)[:, 0] for of in spans])))
+    made = made.assign_coords(
+        time=("time", duration * phase(), first["time"].attrs),
+        quantile=(
+            "quantile",
+            list(QUANTILES),
+            {"units": "1", "long_name": "share of cycles below"},
+        ),
+    )
+    options = json.loads(first.attrs["options"])
+    told = dict.fromkeys(("motion_sha256", "load_sha256", "contact_residual_of_given_pose"))
+    options |= told | {"motion": f"{source}: mean of {count} cycles", "load": "recorded"}
+    options["solve_seconds"] = sum(s.condyle.options["solve_seconds"] for s in used)
+    made.attrs = first.attrs | {
+        "title": f"Mean of {count} cycles of {first.attrs['mechanism_name']}",
+        "options": json.dumps(options),
+        "warnings": json.dumps(list(warnings)),
+        "notices": "[]",
+    }
+    return made
+
+
+def _merged(name: str, cycles: np.ndarray, kind: Any) -> np.ndarray:
+    """One value for all cycles, (C, PHASES, ...): of flags the worst, of numbers the mean."""
+    if kind.kind == "f":
+        return cycles.mean(axis=0)
+    return (cycles.min(axis=0) if name == "rank" else np.ceil(cycles.max(axis=0))).astype(kind)
+
+
+def _statistics(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and standard deviation of cycles (C, ...), NaN of too few."""
+    count = len(cycles)
+    nothing = np.full(cycles.shape[1:], np.nan)
+    mean = cycles.mean(axis=0) if count else nothing
+    return mean, cycles.std(axis=0, ddof=1) if count > 1 else nothing

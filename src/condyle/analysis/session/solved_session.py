@@ -1,0 +1,151 @@
+"""Every trial of a session: its motion, its solution, its cycles."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...errors import InputError, ProblemsError
+from ...markers import MarkerMotion, SessionFile, motion_of, read_c3d, registered_places
+from ...markers.recording import Recording
+from ...markers.session_file import Trial
+from ...mechanism import load_mechanism
+from ...mechanism.mechanism import Mechanism
+from ...mechanism.scaling import ScaledMechanism, scaled_to
+from ...model.distributing import Distribution
+from ...model.model import Model, derive
+from ...progress import stepping
+from ...results.solving import solve
+from ..run_motion import study_for
+from ..sweep import Study, with_bands
+from .cycle_finding import Found, find_cycles
+from .cycle_measures import cycle_rows, whole_spans
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+_SMOOTHED = 5e-5  # m, by which smoothed poses may miss the contacts without a word
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedTrial:
+    """A trial: what was recorded, the solution with markers and EMG, and its cycles.
+
+    rows: one a cycle, with the trial's name and words.
+    """
+
+    trial: Trial
+    motion: MarkerMotion
+    solution: xr.Dataset
+    found: Found
+    rows: list[dict[str, Any]]
+
+    @cached_property
+    def whole(self) -> np.ndarray:
+        """Start and end of the cycles that count for means: all their samples have a result."""
+        return whole_spans(self.solution, self.found.spans)
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedSession:
+    """All trials of a session.
+
+    mechanism: scaled to the subject, where `scaled` says so.   warnings: each once.
+    """
+
+    file: SessionFile
+    mechanism: Mechanism
+    scaled: ScaledMechanism | None
+    trials: tuple[SolvedTrial, ...]
+    warnings: tuple[str, ...] = field(default=())
+
+
+def solve_session(file: SessionFile) -> SolvedSession:
+    """Motions, solutions and cycles of all trials.
+
+    Raises: InputError: for recordings that cannot be used, named by the trial.
+    """
+    machine = load_mechanism(file.mechanism)
+    named = [trial.file for trial in file.trials]
+    named += [] if file.static is None else [file.static.file]
+    if missing := [path for path in named if not os.path.isfile(path)]:
+        raise ProblemsError("session", [f"{path}: no such file" for path in missing])
+    static = None if file.static is None else read_c3d(file.static.file)
+    scaled, warnings = None, list[str]()
+    if file.scale is not None:
+        scaled = _scaled(file, machine, static)
+        machine = scaled.mechanism
+        warnings += scaled.warnings
+    how = file.solve
+    study = None if how.vary is None else study_for(how.vary, machine)
+    model = derive(
+        machine, distribution=Distribution(how.distribution, how.preload, how.contact_weight)
+    )
+    trials = []
+    for trial in stepping("solving trials", file.trials):
+        try:
+            solved = _solved(trial, file, model, static, study)
+        except ProblemsError:
+            raise
+        except InputError as error:
+            raise InputError(f'trial "{trial.name}": {error.message}', error.hint) from error
+        trials.append(solved)
+        said = [*solved.motion.warnings, *notable(solved.solution)]
+        warnings += [w if trial.name in w else f"{trial.name}: {w}" for w in said]
+        if file.cycles is not None and not len(solved.found.spans):
+            warnings.append(f"{trial.name}: no cycles by {file.cycles.by} were found in it")
+    return SolvedSession(file, machine, scaled, tuple(trials), tuple(dict.fromkeys(warnings)))
+
+
+def notable(solution: xr.Dataset) -> list[str]:
+    """Warnings of a solution but for poses that smoothing alone took off the contacts."""
+    return [
+        notice.text
+        for notice in solution.condyle.notices
+        if notice.kind != "given_pose_residual" or (notice.value or 0.0) > _SMOOTHED
+    ]
+
+
+def _scaled(file: SessionFile, machine: Mechanism, static: Recording | None) -> ScaledMechanism:
+    """The mechanism scaled to the places that the static trial, or else the first, gives."""
+    assert file.scale is not None
+    there = static or read_c3d(file.trials[0].file)
+    places = registered_places(there, file, machine, static)
+    wanted = {name: places[name] for name in file.scale.landmarks}
+    return scaled_to(machine, wanted, file.scale.kind)
+
+
+def _solved(
+    trial: Trial, file: SessionFile, model: Model, static: Recording | None, study: Study | None
+) -> SolvedTrial:
+    found = motion_of(
+        read_c3d(trial.file),
+        file,
+        model.mechanism,
+        static=static,
+        max_residual=file.filter.max_residual,
+        max_gap=file.filter.max_gap,
+        longest=file.filter.longest,
+        cutoff=file.filter.cutoff,
+    )
+    load, point = found.load, file.solve.load_point
+    solution = solve(model, found.motion, load, load_point=point, flag=True)
+    said = [*found.warnings, *solution.condyle.warnings]
+    solution = solution.condyle.with_measured(found.channels)
+    if study is not None:
+        from ...motion import as_load
+
+        acting = as_load(load)
+        solution = with_bands(solution, study, found.motion, acting, mechanism=model.mechanism)
+    solution.attrs["warnings"] = json.dumps(list(dict.fromkeys(said)))
+    cycles = find_cycles(file.cycles, solution, found)
+    words = {"trial": trial.name, **{w: trial.words.get(w) for w in file.words}}
+    by = None if file.cycles is None else file.cycles.by
+    rows = [words | row for row in cycle_rows(solution, cycles, by)]
+    return SolvedTrial(trial, found, solution, cycles, rows)

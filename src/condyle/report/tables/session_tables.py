@@ -1,0 +1,163 @@
+"""What a session tells, as tables for a paper: recordings, trials, muscles or actuators."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...motion import write_table
+from .report_table import NOTHING, Cell, Table
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from ...analysis.session import SolvedSession, SolvedTrial
+
+MOST = 12  # chains that people are shown; the CSV has all
+MEANS = "± is the standard deviation over the cycles of the trial; joint loads and efforts by size."
+
+
+def session_tables(session: SolvedSession) -> list[Table]:
+    """All of them."""
+    return [recording_table(session), trial_table(session), effort_table(session)]
+
+
+def recording_table(session: SolvedSession) -> Table:
+    """How well each recording fits: markers in their bodies, registration, gaps, contacts."""
+    records = [_recording(one) for one in session.trials]
+    cells: dict[str, Cell] = {
+        "Trial": "trial",
+        "Frames": "frames",
+        "Time [s]": "seconds:.4g",
+        "Markers RMS [mm]": _mm("marker_rms"),
+        "largest [mm]": _mm("marker_largest"),
+        "Registration [mm]": _mm("registration_largest"),
+        "Off contacts RMS [mm]": _mm("off_contacts_rms"),
+        "Gaps": "gaps",
+        "Without a result": "samples_without_result",
+    }
+    notes = ["Markers: distance from their place in their body; registration: largest of a point."]
+    notes += [] if session.scaled is None else str(session.scaled).splitlines()
+    return Table.of("recordings", "Recordings", records, cells, [n.strip() for n in notes])
+
+
+def trial_table(session: SolvedSession) -> Table:
+    """Duration, joint loads and the load of each trial's cycles."""
+    contacts, words = session.mechanism.contact_names, session.file.words
+    wanted = ["duration"]
+    if session.file.cycles is not None:
+        wanted.append(f"range_{session.file.cycles.by}")
+    for name in (*(f"contact_{c}" for c in contacts), "load"):
+        wanted += [f"peak_{name}", f"impulse_{name}"]
+    records = []
+    for one in session.trials:
+        known = {word: one.trial.words.get(word, "") for word in words}
+        records.append(
+            {"trial": one.trial.name, **known, "cycles": len(one.whole)} | _means(one, wanted)
+        )
+    cells: dict[str, Cell] = {"Trial": "trial", **{w.capitalize(): _word(w) for w in words}}
+    cells |= {"Cycles": "cycles", "Duration [s]": _pair("duration")}
+    for contact in contacts:
+        cells[f"{contact}: peak [N]"] = _pair(f"peak_contact_{contact}")
+        cells[f"{contact}: impulse [N s]"] = _pair(f"impulse_contact_{contact}")
+    if any(record["peak_load_mean"] for record in records):
+        cells |= {
+            "Load: peak [N]": _pair("peak_load"),
+            "Load: impulse [N s]": _pair("impulse_load"),
+        }
+    return Table.of("trials", "Cycles of each trial: mean ± SD", records, cells, [MEANS])
+
+
+def effort_table(session: SolvedSession) -> Table:
+    """Peaks of each chain's effort in each trial's cycles; people see the largest."""
+    trials, chains = session.trials, session.mechanism.chain_names
+    found = [_means(one, [f"peak_tau_{c}" for c in chains]) for one in trials]
+    records: list[dict[str, Any]] = []
+    for chain in chains:
+        record: dict[str, Any] = {"chain": chain}
+        for one, means in zip(trials, found, strict=True):
+            for word in ("mean", "sd"):
+                record[f"{one.trial.name}_{word}"] = means[f"peak_tau_{chain}_{word}"]
+        records.append(record)
+    units = {str(unit) for unit in trials[0].solution["effort_unit"].values}
+    unit = units.pop() if len(units) == 1 else "N or N m"
+    cells: dict[str, Cell] = {"Chain": "chain"}
+    cells |= {f"{one.trial.name} [{unit}]": _pair(one.trial.name) for one in trials}
+    size = [max((r[f"{t.trial.name}_mean"] or 0.0 for t in trials), default=0.0) for r in records]
+    shown = sorted(np.argsort(-np.array(size), kind="stable")[:MOST].tolist())
+    notes = [MEANS]
+    if len(records) > MOST:
+        notes.append(f"The {MOST} largest of {len(records)}; the CSV file has all.")
+    return Table.of("efforts", "Peak efforts: mean ± SD", records, cells, notes, shown)
+
+
+def write_cycles(trials: Sequence[SolvedTrial], path: Path, parquet: bool) -> None:
+    """A row for each cycle of all trials."""
+    rows = [row for one in trials for row in one.rows]
+    columns: dict[str, list[Any]] = {}
+    for name in rows[0] if rows else ():
+        values = [row[name] for row in rows]
+        columns[name] = _column(values)
+    write_table(path, columns, parquet=parquet)
+
+
+def _column(values: list[Any]) -> list[Any]:
+    """Words that are numbers throughout stay numbers; else all are text, and missing ones empty."""
+    if all(v is None or (isinstance(v, int | float) and not isinstance(v, bool)) for v in values):
+        return [float("nan") if v is None else v for v in values]
+    return ["" if v is None else str(v).lower() if isinstance(v, bool) else str(v) for v in values]
+
+
+def _recording(one: SolvedTrial) -> dict[str, Any]:
+    motion = one.motion
+    rms = np.array([r.rms for r in motion.residuals])
+    largest = [r.largest for r in motion.residuals]
+    return {
+        "trial": one.trial.name,
+        "frames": len(motion.recording.t),
+        "seconds": float(motion.motion.t[-1] - motion.motion.t[0]),
+        "marker_rms": float(np.sqrt(np.nanmean(rms**2))),
+        "marker_largest": float(np.nanmax(largest)),
+        "registration_largest": max(motion.registration.residual.values(), default=None),
+        "off_contacts_rms": _rms(r for r, _ in motion.off_contacts.values()),
+        "gaps": len(motion.gaps),
+        "samples_without_result": int((one.solution["status"].values != 0).sum()),
+    }
+
+
+def _means(one: SolvedTrial, names: Iterable[str]) -> dict[str, Any]:
+    """Mean and standard deviation of measures over the whole cycles of a trial."""
+    rows = [row for row in one.rows if not row["samples_without_result"]]
+    found: dict[str, Any] = {}
+    for name in names:
+        values = [row[name] for row in rows if row[name] is not None]
+        found[f"{name}_mean"] = float(np.mean(values)) if values else None
+        found[f"{name}_sd"] = float(np.std(values, ddof=1)) if len(values) > 1 else None
+    return found
+
+
+def _rms(values: Iterable[float]) -> float | None:
+    squares = [value**2 for value in values]
+    return float(np.sqrt(np.mean(squares))) if squares else None
+
+
+def _pair(name: str) -> Cell:
+    """'12.3 ± 0.4'."""
+
+    def cell(record: dict[str, Any]) -> str:
+        mean, sd = record[f"{name}_mean"], record[f"{name}_sd"]
+        if mean is None:
+            return NOTHING
+        return f"{mean:.3g}" if sd is None else f"{mean:.3g} ± {sd:.2g}"
+
+    return cell
+
+
+def _mm(name: str) -> Cell:
+    return lambda record: NOTHING if record[name] is None else f"{record[name] * 1e3:.3g}"
+
+
+def _word(name: str) -> Cell:
+    return lambda record: str(record[name]) or NOTHING
