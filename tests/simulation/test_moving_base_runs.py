@@ -106,7 +106,7 @@ def test_compiled_steps_and_variants_in_lockstep(tmp_path: Path) -> None:
     for name in ("effort", "pose"):
         np.testing.assert_allclose(compiled[name], python[name], atol=1e-9)
     assert float(np.abs(compiled["tracking_error"]).max()) < 1e-3
-    write_table(tmp_path / "nod.csv", motion.columns())
+    write_table(tmp_path / "nod.csv", motion.columns)
     scenario["controller"]["motion"] = str(tmp_path / "nod.csv")
     mass = model.mechanism.platform.mass
     both = model.variants({"platform.mass": [mass, 1.2 * mass]}).simulate(scenario)
