@@ -12,20 +12,28 @@ from scipy.spatial.transform import Rotation
 from support.recorded_jaw import Jaw, record
 
 from condyle.errors import InputError
-from condyle.markers import MarkerMotion, motion_from_c3d, read_markers
+from condyle.markers import MarkerMotion, between_trials, motion_from_c3d, read_markers
 from condyle.markers.rigid import common_shape, fit
 
 STATIC: dict[str, Any] = {"file": "static.c3d", "home": [0.0, 0.5]}
 ROUNDING = np.array([1e-6] * 3 + [2e-5] * 3)  # single precision, over the least breadth
 
 
-def trial(folder: Path, away: float = 0.03, **options: Any) -> Jaw:
-    """A static trial, written, and a jaw that opens with the head `away` [m] and turned."""
-    record(seconds=1.0, **options).write(folder / "static.c3d")
-    jaw = record(**options)
-    turn = Rotation.from_rotvec([0.3, -0.2, 0.1]).as_matrix()
-    jaw.points[:] = jaw.points @ turn.T + np.array([away, -away, 0.5 * away])
+def trial(folder: Path) -> Jaw:
+    """A static trial, written, and a jaw that opens with the head 45 mm away and turned."""
+    record(seconds=1.0).write(folder / "static.c3d")
+    jaw = record()
+    jaw.points[:] = jaw.points @ TURN.T + 0.03 * AWAY
     return jaw
+
+
+TURN = Rotation.from_rotvec([0.3, -0.2, 0.1]).as_matrix()
+AWAY = np.array([1.0, -1.0, 0.5])
+
+
+def carried(jaw: Jaw) -> dict[str, Any]:
+    """The points where the head of the trial has them [mm]."""
+    return {n: (TURN @ p + 30 * AWAY).tolist() for n, p in jaw.register.items()}
 
 
 def measured(jaw: Jaw, folder: Path, **changes: Any) -> MarkerMotion:
@@ -46,12 +54,23 @@ def test_both_bodies_carry_the_static_trial(tmp_path: Path) -> None:
     jaw = trial(tmp_path)
     got = measured(jaw, tmp_path, static=STATIC)
     assert (error(got, jaw) < ROUNDING).all() and got.warnings == ()
+    assert got.static is not None and got.static["source"] == "static.c3d"
+    assert 0.03 < got.static["head_moved"] < 1.0 and "platform_moved" not in got.static
+    assert "From the static trial static.c3d the head is at most" in str(got)
     # The numbers of another trial, taken as if the head had stayed.
     wrong = measured(jaw, tmp_path)
     assert error(wrong, jaw)[:3].max() > 1e-3
+    still = motion_from_c3d(tmp_path / "static.c3d", jaw.tables(), "masticatory")
+    assert between_trials([still, got]) == (
+        {"a.c3d": pytest.approx({"fixed": 0, "platform": 0}, abs=2e-6)},
+        (),
+    )
+    apart, (said,) = between_trials([still, wrong])
+    assert apart["a.c3d"]["fixed"] > 0.02 and "points and markers disagree with static.c3d" in said
     # The trial's own home is held against the static's.
     both = measured(jaw, tmp_path, static=STATIC, home=[0.0, 0.5])
     assert (error(both, jaw) < ROUNDING).all() and both.warnings == ()
+    assert both.static is not None and both.static["platform_moved"] < 2e-6
 
 
 def test_markers_that_moved_on_their_body_are_said(tmp_path: Path) -> None:
@@ -63,6 +82,9 @@ def test_markers_that_moved_on_their_body_are_said(tmp_path: Path) -> None:
     assert "at its home the platform is 3 mm from where it is in the static trial" in str(
         got.warnings
     )
+    still = motion_from_c3d(tmp_path / "static.c3d", jaw.tables(), "masticatory")
+    slipped = motion_from_c3d(tmp_path / "a.c3d", jaw.tables(register=carried(jaw)), "masticatory")
+    assert "at home the platform is 3 mm" in str(between_trials([still, slipped])[1])
 
 
 def test_points_named_by_markers_are_those_of_the_static_trial(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from .measured_channels import MeasuredChannels, read_channels
 from .recording import Recording, read_c3d
 from .registration import Registration
 from .session_file import SessionFile, read_session
+from .trial_checks import between_trials
 
 __all__ = [
     "MAX_GAP",
@@ -29,6 +30,7 @@ __all__ = [
     "Registration",
     "SessionFile",
     "as_data",
+    "between_trials",
     "motion_from_c3d",
     "motion_of",
     "read_c3d",

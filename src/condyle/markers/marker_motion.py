@@ -155,12 +155,28 @@ def motion_of(
         off_contacts={n: (_rms(d), float(np.abs(d).max())) for n, d in off.items()},
         fitted=fitted,
         markers_moved=fitted.summary(at),
+        home_places={
+            body.what: dict(zip(body.names, registration.to_base(body.shape), strict=True))
+            for body in bodies.both
+        },
+        static=_held(bodies),
         vertical=vertical,
         channels=channels,
         load=load,
         recording=recording,
         warnings=warnings,
     )
+
+
+def _held(bodies: Bodies) -> dict[str, Any] | None:
+    """The static trial, and how far the head, and the platform at home, are from it."""
+    if bodies.static is None:
+        return None
+    way, turn = bodies.head_moved()
+    found: dict[str, Any] = {
+        "source": bodies.static.recording.source, "head_moved": way, "head_turned": turn,
+    }  # fmt: skip
+    return found | ({"platform_moved": bodies.off_static()} if bodies.at_home.any() else {})
 
 
 def _on_contacts(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -58,6 +59,10 @@ class MarkerMotion:
             markers;
         markers_moved: their root mean squares and largest [m], by marker and of "all": `before` the
             contacts and `after`, and how far these have `moved` them.
+        home_places: body -> marker -> its place at home in {S}, (3,) [m].
+        static: the static trial, where there is one: its `source`, how far the head is from where
+            it stood there at most (`head_moved` [m], `head_turned` [rad]), and, if the recording
+            has a home too, how far the platform is there (`platform_moved` [m]).
         vertical: gravity and the base's motion, which `motion` has too.
         channels: what was measured with it, at its times: markers in {S} with the base's motion
             taken out, their residuals, and EMG, where the marker file names channels.
@@ -74,6 +79,8 @@ class MarkerMotion:
     off_contacts: dict[str, tuple[float, float]]
     fitted: NearestPoses
     markers_moved: dict[str, dict[str, float]]
+    home_places: dict[str, dict[str, np.ndarray]]
+    static: dict[str, Any] | None
     vertical: BaseMotion
     channels: MeasuredChannels
     load: Load | None
@@ -105,6 +112,14 @@ class MarkerMotion:
             points = ", ".join(f"{name} {_mm(value)}" for name, value in given.items())
             lines.append(
                 f"Registration, distance of each point from its place in the mechanism: {points}"
+            )
+        if (held := self.static) is not None:
+            closed = held.get("platform_moved", math.nan)
+            home = "" if math.isnan(closed) else f"; the platform at home {_mm(closed)}"
+            lines.append(
+                f"From the static trial {held['source']} the head is at most "
+                f"{_mm(held['head_moved'])} and {np.degrees(held['head_turned']):.3g} "
+                f"degrees{home}"
             )
         lines += [*self._contacts(), str(self.vertical)]
         if (load := self.load) is not None:
@@ -164,6 +179,7 @@ def as_data(found: MarkerMotion) -> dict[str, Any]:
         "off_contacts": {
             n: {"rms": rms, "largest": most} for n, (rms, most) in found.off_contacts.items()
         },
+        "static": found.static,
         "markers_moved": found.markers_moved,
         "vertical": found.vertical.data(),
         "gaps": [vars(gap) for gap in found.gaps],

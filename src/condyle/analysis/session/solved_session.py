@@ -11,7 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import InputError, ProblemsError
-from ...markers import MarkerMotion, SessionFile, motion_of, read_c3d, registered_places
+from ...markers import (
+    MarkerMotion,
+    SessionFile,
+    between_trials,
+    motion_of,
+    read_c3d,
+    registered_places,
+)
 from ...markers.recording import Recording
 from ...markers.session_file import Trial
 from ...mechanism import load_mechanism
@@ -100,6 +107,7 @@ def solve_session(file: SessionFile) -> SolvedSession:
         warnings += [w if trial.name in w else f"{trial.name}: {w}" for w in said]
         if file.cycles is not None and not len(solved.found.spans):
             warnings.append(f"{trial.name}: no cycles by {file.cycles.by} were found in it")
+    warnings += between_trials([solved.motion for solved in trials])[1]
     return SolvedSession(file, machine, scaled, tuple(trials), tuple(dict.fromkeys(warnings)))
 
 
