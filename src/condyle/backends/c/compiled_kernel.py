@@ -68,7 +68,8 @@ class CompiledKernel:
     def run(self, inputs: Mapping[str, np.ndarray], threads: int | None = None) -> Answer:
         """Evaluate samples; columns that are contiguous or constant are fastest."""
         count, given = arrays_of(self._shapes, inputs)
-        rows = -(-count // UNIT) * UNIT
+        # An odd number of lines: columns a power of two apart would have to share places in caches.
+        rows = -(-count // UNIT) * UNIT + LINE
         status, raw = np.empty(count, dtype=np.uint8), np.empty(self.columns * rows + LINE)
         start = _address(raw)
         skipped = -start // 8 % LINE  # to a cache line, as vector loads like it
