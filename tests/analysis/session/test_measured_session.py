@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 import xarray as xr
 from scipy.spatial.distance import pdist
-from support.recorded_session import write_session
+from support.recorded_session import CYCLES, write_session
 
 import condyle
 from condyle.analysis.session import solve_session
@@ -97,11 +97,11 @@ def test_tables_for_a_paper(found: MeasuredSession) -> None:
     text = str(found)
     for words in ("Recordings", "Cycles of each trial", "left_condyle: peak [N]", "right", "±"):
         assert words in text
-    trial = found.tables[1].records[0]
+    trial = found.tables[2].records[0]
     peaks = [r["peak_contact_left_condyle"] for r in found.cycles if r["trial"] == "chewing1"]
     assert trial["peak_contact_left_condyle_mean"] == pytest.approx(np.mean(peaks))
     assert trial["peak_contact_left_condyle_sd"] == pytest.approx(np.std(peaks, ddof=1))
-    assert found.tables[1].markdown().startswith("**Cycles of each trial")
+    assert found.tables[2].markdown().startswith("**Cycles of each trial")
 
 
 def test_samples_without_a_result_do_not_count(tmp_path: Path) -> None:
@@ -160,7 +160,9 @@ def test_results_are_written_whole_or_not_at_all(
     path, _ = write_session(tmp_path, 1, 2.5)
     found = condyle.measure_session(path, tmp_path / "out")
     names = {"chewing1.nc", "cycles.csv", "cycles.parquet", "mean.nc", "report.html"}
-    names |= {f"{t}.{e}" for t in ("recordings", "trials", "efforts") for e in ("md", "csv")}
+    names |= {
+        f"{t}.{e}" for t in ("recordings", "markers", "trials", "efforts") for e in ("md", "csv")
+    }
     assert {p.name for p in (tmp_path / "out").iterdir()} == names == {p.name for p in found.files}
     opened = condyle.open_solution(tmp_path / "out" / "chewing1.nc")
     assert opened["marker_place"].shape[1] == 8
@@ -187,6 +189,32 @@ def test_without_cycles_a_trial_is_one(tmp_path: Path) -> None:
     (row,) = found.cycles
     assert row["start"] == 0 and row["duration"] == pytest.approx(1.99)
     assert not [name for name in row if name.startswith("range_")]
+
+
+def test_points_against_markers_between_trials(tmp_path: Path) -> None:
+    """Numbers that were typed from the first trial are applied where the head stood elsewhere."""
+    path, (_, second) = write_session(tmp_path, 2, 1.5, cycles={"by": "beta"})
+    assert [one["fixed_markers_moved"] for one in condyle.measure_session(path).tables[0].records][
+        1
+    ] == pytest.approx(0.0, abs=1e-7)
+    second.points += [0.02, 0.0, 0.01]
+    second.write(tmp_path / "chewing2.c3d")
+    found = condyle.measure_session(path)
+    off = found.tables[0].records[1]["fixed_markers_moved"]
+    assert off == pytest.approx(np.hypot(0.02, 0.01), rel=1e-3)
+    assert any("[register] cannot be right in both" in said for said in found.warnings)
+    markers = {(r["trial"], r["marker"]): r for r in found.tables[1].records}
+    assert len(markers) == 16 and markers["chewing1", "Upper_FL"]["after_rms"] is None
+    assert markers["chewing2", "Lower_FL"]["after_rms"] > 1e-5
+
+
+def test_bands_of_a_study(tmp_path: Path) -> None:
+    (tmp_path / "bands.toml").write_text(
+        '[[vary]]\nwhat = "platform.mass"\nvalues = [0.1, 0.2, 0.3]\n'
+    )
+    path, _ = write_session(tmp_path, 1, 1.5, solve={"vary": "bands.toml"}, cycles=CYCLES)
+    solution = condyle.measure_session(path).solutions["chewing1"]
+    assert solution["effort_quantile"].sizes["quantile"] == 5
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+_MOVED = 3e-3  # m, by which fixed markers may differ between trials without a word
 _SMOOTHED = 5e-5  # m, by which smoothed poses may miss the contacts without a word
 
 
@@ -45,6 +46,8 @@ class SolvedTrial:
     """A trial: what was recorded, the solution with markers and EMG, and its cycles.
 
     rows: one a cycle, with the trial's name and words.
+    moved: distance of the fixed markers in {S} from where the subject's first trial has them, root
+    mean square [m]: points that were registered elsewhere than the markers were; None of the first.
     """
 
     trial: Trial
@@ -52,6 +55,7 @@ class SolvedTrial:
     solution: xr.Dataset
     found: Found
     rows: list[dict[str, Any]]
+    moved: float | None = None
 
     @cached_property
     def whole(self) -> np.ndarray:
@@ -102,6 +106,15 @@ def solve_session(file: SessionFile) -> SolvedSession:
             raise
         except InputError as error:
             raise InputError(f'trial "{trial.name}": {error.message}', error.hint) from error
+        mates = [one for one in trials if one.trial.subject == trial.subject]
+        if mates and (moved := _moved(solved.motion, mates[0].motion)) is not None:
+            solved = replace(solved, moved=moved)
+            if moved > _MOVED:
+                warnings.append(
+                    f"{trial.name}: in {{S}} the fixed markers are {moved * 1e3:.3g} mm from where "
+                    f"{mates[0].trial.name} has them: [register] cannot be right in both. Points in "
+                    "numbers hold for one recording; name it in [static]"
+                )
         trials.append(solved)
         said = [*solved.motion.warnings, *notable(solved.solution)]
         warnings += [w if trial.name in w else f"{trial.name}: {w}" for w in said]
@@ -118,6 +131,24 @@ def notable(solution: xr.Dataset) -> list[str]:
         for notice in solution.condyle.notices
         if notice.kind != "given_pose_residual" or (notice.value or 0.0) > _SMOOTHED
     ]
+
+
+def _moved(motion: MarkerMotion, first: MarkerMotion) -> float | None:
+    """Distance of the fixed markers in {S} between two trials, root mean square [m]."""
+    here, there = _fixed(motion), _fixed(first)
+    apart = [np.sum((here[name] - there[name]) ** 2) for name in here.keys() & there.keys()]
+    return float(np.sqrt(np.mean(apart))) if apart else None
+
+
+def _fixed(motion: MarkerMotion) -> dict[str, np.ndarray]:
+    """Mean places of the fixed markers in {S}, the base's motion taken out, (3,) [m]."""
+    bodies = zip(motion.markers.items(), motion.channels.bodies, strict=True)
+    seen = {
+        name: points[np.isfinite(points).all(axis=1)]
+        for (name, points), body in bodies
+        if body == "fixed"
+    }
+    return {name: points.mean(axis=0) for name, points in seen.items() if len(points)}
 
 
 def _scaled(file: SessionFile, machine: Mechanism, static: Recording | None) -> ScaledMechanism:

@@ -21,7 +21,12 @@ MEANS = "± is the standard deviation over the cycles of the trial; joint loads 
 
 def session_tables(session: SolvedSession) -> list[Table]:
     """All of them."""
-    return [recording_table(session), trial_table(session), effort_table(session)]
+    return [
+        recording_table(session),
+        marker_table(session),
+        trial_table(session),
+        effort_table(session),
+    ]
 
 
 def recording_table(session: SolvedSession) -> Table:
@@ -31,16 +36,45 @@ def recording_table(session: SolvedSession) -> Table:
         "Trial": "trial",
         "Frames": "frames",
         "Time [s]": "seconds:.4g",
-        "Markers RMS [mm]": _mm("marker_rms"),
-        "largest [mm]": _mm("marker_largest"),
+        "In bodies [mm]": _mm("marker_rms"),
         "Registration [mm]": _mm("registration_largest"),
-        "Off contacts RMS [mm]": _mm("off_contacts_rms"),
+        "Between trials [mm]": _mm("fixed_markers_moved"),
+        "Before contacts [mm]": _mm("before_contacts_rms"),
+        "On contacts [mm]": _mm("on_contacts_rms"),
+        "Tilt [°]": lambda record: f"{np.degrees(record['tilt']):.3g}",
+        "Head [N]": "inertia_force_largest:.2g",
         "Gaps": "gaps",
         "Without a result": "samples_without_result",
     }
-    notes = ["Markers: distance from their place in their body; registration: largest of a point."]
+    notes = [
+        "Markers, root mean squares: distance from their place in their body; between trials, of "
+        "the fixed ones from where the first trial has them in {S}; of the platform's from the "
+        "pose before the contacts, and from the nearest on them. Registration: largest of a point.",
+        "Tilt: largest angle between the recording's vertical and the mechanism's; head: largest "
+        "inertia force of the platform from the head's motion.",
+    ]
     notes += [] if session.scaled is None else str(session.scaled).splitlines()
     return Table.of("recordings", "Recordings", records, cells, [n.strip() for n in notes])
+
+
+def marker_table(session: SolvedSession) -> Table:
+    """Every marker in every trial; people see the worst."""
+    records = [record for one in session.trials for record in _markers(one)]
+    cells: dict[str, Cell] = {
+        "Trial": "trial",
+        "Marker": "marker",
+        "Body": "body",
+        "Seen": "seen:.0%",
+        "In body RMS [mm]": _mm("rms"),
+        "largest [mm]": _mm("largest"),
+        "Before contacts RMS [mm]": _mm("before_rms"),
+        "largest [mm] ": _mm("before_largest"),
+        "On contacts RMS [mm]": _mm("after_rms"),
+        "largest [mm]  ": _mm("after_largest"),
+    }
+    worst = np.argsort([-(record["rms"] or 0.0) for record in records], kind="stable")[:MOST]
+    notes = [f"The {MOST} worst of {len(records)}; the CSV file has all."] * (len(records) > MOST)
+    return Table.of("markers", "Markers", records, cells, notes, sorted(worst.tolist()))
 
 
 def trial_table(session: SolvedSession) -> Table:
@@ -111,20 +145,39 @@ def _column(values: list[Any]) -> list[Any]:
 
 
 def _recording(one: SolvedTrial) -> dict[str, Any]:
-    motion = one.motion
+    motion, vertical = one.motion, one.motion.vertical.data()
     rms = np.array([r.rms for r in motion.residuals])
-    largest = [r.largest for r in motion.residuals]
+    every = motion.markers_moved.get("all", {})
     return {
         "trial": one.trial.name,
         "frames": len(motion.recording.t),
         "seconds": float(motion.motion.t[-1] - motion.motion.t[0]),
         "marker_rms": float(np.sqrt(np.nanmean(rms**2))),
-        "marker_largest": float(np.nanmax(largest)),
         "registration_largest": max(motion.registration.residual.values(), default=None),
-        "off_contacts_rms": _rms(r for r, _ in motion.off_contacts.values()),
+        "fixed_markers_moved": one.moved,
+        "before_contacts_rms": every.get("before_rms"),
+        "on_contacts_rms": every.get("after_rms"),
+        "on_contacts_largest": every.get("after_largest"),
+        "tilt": vertical["tilt"]["largest"],
+        "inertia_force_largest": vertical["inertia_force"]["largest"],
         "gaps": len(motion.gaps),
         "samples_without_result": int((one.solution["status"].values != 0).sum()),
     }
+
+
+def _markers(one: SolvedTrial) -> list[dict[str, Any]]:
+    """Distances [m] of every marker of a trial from its place."""
+    keys = ("before_rms", "before_largest", "after_rms", "after_largest")
+    return [
+        {"trial": one.trial.name, "marker": r.name, "body": r.body, "seen": r.seen}
+        | {"rms": _known(r.rms), "largest": _known(r.largest)}
+        | {key: one.motion.markers_moved.get(r.name, {}).get(key) for key in keys}
+        for r in one.motion.residuals
+    ]
+
+
+def _known(value: float) -> float | None:
+    return value if np.isfinite(value) else None
 
 
 def _means(one: SolvedTrial, names: Iterable[str]) -> dict[str, Any]:
@@ -136,11 +189,6 @@ def _means(one: SolvedTrial, names: Iterable[str]) -> dict[str, Any]:
         found[f"{name}_mean"] = float(np.mean(values)) if values else None
         found[f"{name}_sd"] = float(np.std(values, ddof=1)) if len(values) > 1 else None
     return found
-
-
-def _rms(values: Iterable[float]) -> float | None:
-    squares = [value**2 for value in values]
-    return float(np.sqrt(np.mean(squares))) if squares else None
 
 
 def _pair(name: str) -> Cell:
