@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-_MOVED = 3e-3  # m, by which fixed markers may differ between trials without a word
 _SMOOTHED = 5e-5  # m, by which smoothed poses may miss the contacts without a word
 
 
@@ -98,7 +97,7 @@ def solve_session(file: SessionFile) -> SolvedSession:
     model = derive(
         machine, distribution=Distribution(how.distribution, how.preload, how.contact_weight)
     )
-    trials = []
+    trials: list[SolvedTrial] = []
     for trial in stepping("solving trials", file.trials):
         try:
             solved = _solved(trial, file, model, static, study)
@@ -107,20 +106,15 @@ def solve_session(file: SessionFile) -> SolvedSession:
         except InputError as error:
             raise InputError(f'trial "{trial.name}": {error.message}', error.hint) from error
         mates = [one for one in trials if one.trial.subject == trial.subject]
-        if mates and (moved := _moved(solved.motion, mates[0].motion)) is not None:
-            solved = replace(solved, moved=moved)
-            if moved > _MOVED:
-                warnings.append(
-                    f"{trial.name}: in {{S}} the fixed markers are {moved * 1e3:.3g} mm from where "
-                    f"{mates[0].trial.name} has them: [register] cannot be right in both. Points in "
-                    "numbers hold for one recording; name it in [static]"
-                )
+        if mates:
+            apart, odd = between_trials([mates[0].motion, solved.motion])
+            solved = replace(solved, moved=next(iter(apart.values())).get("fixed"))
+            warnings += odd
         trials.append(solved)
         said = [*solved.motion.warnings, *notable(solved.solution)]
         warnings += [w if trial.name in w else f"{trial.name}: {w}" for w in said]
         if file.cycles is not None and not len(solved.found.spans):
             warnings.append(f"{trial.name}: no cycles by {file.cycles.by} were found in it")
-    warnings += between_trials([solved.motion for solved in trials])[1]
     return SolvedSession(file, machine, scaled, tuple(trials), tuple(dict.fromkeys(warnings)))
 
 
@@ -131,24 +125,6 @@ def notable(solution: xr.Dataset) -> list[str]:
         for notice in solution.condyle.notices
         if notice.kind != "given_pose_residual" or (notice.value or 0.0) > _SMOOTHED
     ]
-
-
-def _moved(motion: MarkerMotion, first: MarkerMotion) -> float | None:
-    """Distance of the fixed markers in {S} between two trials, root mean square [m]."""
-    here, there = _fixed(motion), _fixed(first)
-    apart = [np.sum((here[name] - there[name]) ** 2) for name in here.keys() & there.keys()]
-    return float(np.sqrt(np.mean(apart))) if apart else None
-
-
-def _fixed(motion: MarkerMotion) -> dict[str, np.ndarray]:
-    """Mean places of the fixed markers in {S}, the base's motion taken out, (3,) [m]."""
-    bodies = zip(motion.markers.items(), motion.channels.bodies, strict=True)
-    seen = {
-        name: points[np.isfinite(points).all(axis=1)]
-        for (name, points), body in bodies
-        if body == "fixed"
-    }
-    return {name: points.mean(axis=0) for name, points in seen.items() if len(points)}
 
 
 def _scaled(file: SessionFile, machine: Mechanism, static: Recording | None) -> ScaledMechanism:
