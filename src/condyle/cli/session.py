@@ -10,7 +10,7 @@ import typer
 from ..extras import require
 from .answer import Answer, command_line, files_line
 from .command import START, command
-from .inputs import STRICT, can_be_folder, warn
+from .inputs import STRICT, can_be_folder, require_drawing, warn
 
 
 @command(START, example="condyle session session.toml --out results")
@@ -27,7 +27,7 @@ def session(
         out: Folder for the results. Default: the name of the session file.
     """
     require("c3d", "c3d")
-    require("plotly", "report")
+    require_drawing(True, True)
     import condyle
 
     folder = out or Path(session.stem)

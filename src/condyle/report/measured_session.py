@@ -79,6 +79,7 @@ def measure_session(
     require("c3d", "c3d")
     if out is not None:
         require("plotly", "report")
+        require("matplotlib", "figures")
     file, strict = read_session(session), as_flag(strict, "strict")
     solved = solve_session(file)
     if strict and solved.warnings:

@@ -172,7 +172,7 @@ def test_results_are_written_whole_or_not_at_all(
     assert [r["start"] for r in table] == [r["start"] for r in found.cycles]
     assert table[0]["trial"] == "chewing1" and table[0]["side"] == "right"
     page = (tmp_path / "out" / "report.html").read_text()
-    assert "Cycles of each trial" in page and "mean of" in page
+    assert "Cycles of each trial" in page and "mean of" in page and "Bands over cycles" in page
     monkeypatch.setattr(
         "condyle.report.tables.report_table.Table.write_csv",
         lambda *_: (_ for _ in ()).throw(OSError),

@@ -274,8 +274,9 @@ def caption(solution: xr.Dataset) -> str:
         if what not in invented
     ]
     if "bands" in solution.attrs:
-        count = json.loads(solution.attrs["bands"])["variants"]
-        parts.append(f"bands: 5 to 95 and 25 to 75 % of {count} variants")
+        bands = json.loads(solution.attrs["bands"])
+        of = f"{bands['variants']} {bands.get('of', 'variants')}"
+        parts.append(f"bands: 5 to 95 and 25 to 75 % of {of}")
     reasons = dict.fromkeys(one.text for one in solution.condyle.failures)
     grey = [f" Grey: no result ({', '.join(list(reasons)[:MOST_REASONS])})."] if reasons else []
     return "; ".join(parts) + "." + "".join(grey)

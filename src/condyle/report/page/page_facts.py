@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import json
 import re
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -296,7 +297,8 @@ def bands_section(solution: xr.Dataset) -> Markup:
 
     names = ["effort"] + ["contact_force"] * bool(solution.sizes["contact"])
     pictures = [tag("p", _image(PLOTS[n](solution), f"Bands of {n}")) for n in names]
-    return tag("section", tag("h2", "Bands over variants"), *pictures, id="bands")
+    of = json.loads(solution.attrs["bands"]).get("of", "variants")
+    return tag("section", tag("h2", f"Bands over {of}"), *pictures, id="bands")
 
 
 def _image(figure: Figure, meaning: str) -> Markup:
