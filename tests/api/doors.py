@@ -44,10 +44,6 @@ class Stage:
         return condyle.derive(self.mechanism, backend="numpy")
 
     @cached_property
-    def general(self) -> condyle.Model:
-        return condyle.Model(self.mechanism, backend="numpy", general=True)
-
-    @cached_property
     def recording(self) -> tuple[Path, Path]:
         """A C3D file and its marker file."""
         jaw = record(seconds=1.0)
@@ -205,9 +201,7 @@ DOORS: dict[str, Door] = {
         },
         words=("masticatory",),
     ),
-    "Model": Door(
-        {"mechanism": MACHINE, "backend": "numpy", "general": False}, words=("masticatory",)
-    ),
+    "Model": Door({"mechanism": MACHINE, "backend": "numpy"}, words=("masticatory",)),
     "Distribution": Door(
         {"name": "bounded", "preload": 1.0, "contact_weight": 0.0}, words=("distribution",)
     ),
@@ -261,9 +255,6 @@ DOORS: dict[str, Door] = {
     "Model.to_torch": Door(words=("torch",)),
     "Model.to_casadi": Door(words=("kernels",)),
     "Model.with_distribution": Door({"distribution": "minimum_norm"}),
-    "Model.with_mechanism": Door(
-        {"mechanism": lambda stage: stage.mechanism}, model="mechanism", words=("general",)
-    ),
     "Model.variants": Door(
         {"table": {"platform.mass": [0.2, 0.3]}, "keep": "home"},
         words=("platform.mass", "mechanism"),
@@ -454,8 +445,6 @@ def target(name: str, stage: Stage) -> Callable[..., Any]:
         return unserved
     if name in ("Study.data", "Study.title"):
         return getattr(condyle.Study.checked(STUDY, "study"), method)
-    if name == "Model.with_mechanism":
-        return stage.general.with_mechanism
     if owner == "Study":
         return getattr(condyle.Study, method)
     return getattr(getattr(stage, owner.lower()) if owner else condyle, method)

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from support.cases import case, error
 
-import condyle
 from condyle.backends.c.compiled_kernel import CompiledKernel, Single
 from condyle.backends.kernel import AGAIN, Answer
 from condyle.errors import InputError
@@ -237,23 +236,3 @@ def test_another_choice_of_efforts_is_another_answer() -> None:
     np.testing.assert_array_equal(
         other.with_distribution().unchecked().inverse_dynamics(*sample), least
     )
-
-
-@pytest.mark.parametrize("question", QUESTIONS)
-def test_another_mechanism_of_the_structure(question: str) -> None:
-    base = condyle.load_mechanism("masticatory")
-    other = base.set({"platform.mass": 0.31})
-    general = Model(base, backend="compiled", general=True)
-    c = case("masticatory")
-    given = [a[-1] for a in c.arguments]
-    if question == "forward":
-        given[2] = general.unchecked().inverse_dynamics(*given)
-
-    def ask(model: Model) -> np.ndarray:
-        return getattr(model.unchecked(), f"{question}_dynamics")(*given)
-
-    own = ask(general)
-    found, wanted = ask(general.with_mechanism(other)), ask(Model(other, backend="numpy"))
-    assert error(found, wanted) < 1e-9
-    assert error(own, wanted) > 1e-3
-    np.testing.assert_array_equal(ask(general), own)

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from ..accessors import extend
 from ..backends.kernel import Kernel
-from ..errors import as_flag, as_name
+from ..errors import as_name
 from ..mechanism import as_mechanism
 from ..mechanism.mechanism import Mechanism
 from ..questions.equations import INTERNAL, part_names
@@ -75,17 +75,11 @@ class Model:
         route: str = ROUTE,
         distribution: str | Distribution | None = None,
         backend: str = "auto",
-        general: bool = False,
     ) -> None:
-        """As `derive`.
-
-        Args: general: for `with_mechanism`: kernels that serve every mechanism of the structure, by
-              leaving out nothing that happens to be zero in this one.
-        """
+        """As `derive`."""
         for name, given in (("formulation", formulation), ("route", route), ("backend", backend)):
             as_name(given, name)
-        general = as_flag(general, "general")
-        system = System(as_mechanism(mechanism), formulation, route, backend, general)
+        system = System(as_mechanism(mechanism), formulation, route, backend)
         self._assemble(system, Distribution.of(distribution))
 
     def _assemble(self, system: System, asked: Distribution) -> None:
@@ -123,24 +117,12 @@ class Model:
             "route": self.route,
             "distribution": self._asked,
             "backend": self.backend.asked,
-            "general": self.system.general is not None,
         }
         return partial(type(self), self.mechanism, **how), ()
 
     def with_distribution(self, distribution: str | Distribution | None = None) -> Self:
         """The same model with its kernels and another distribution; see `derive`."""
         return self._with(self.system, Distribution.of(distribution))
-
-    def with_mechanism(self, mechanism: Mechanism | str | os.PathLike[str]) -> Self:
-        """The same model, if it is general, of another mechanism of the same structure.
-
-        It shares the kernels, so that it costs a thousandth of a new one. The mechanism must have
-        been checked, as one from a file or from `Mechanism.set` is.
-
-        Raises: InputError: if the distribution does not fit the mechanism, it has other chains,
-                contacts or surfaces, or the model is not general.
-        """
-        return self._with(self.system.renumbered(as_mechanism(mechanism)), self._asked)
 
     # -- dynamics ----------------------------------------------------------------------------
 

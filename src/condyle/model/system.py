@@ -39,9 +39,14 @@ class System:
     """
 
     def __init__(
-        self, mechanism: Mechanism, formulation: str, route: str, backend: str, general: bool
+        self,
+        mechanism: Mechanism,
+        formulation: str,
+        route: str,
+        backend: str,
+        general: bool = False,
     ) -> None:
-        """As of `Model`."""
+        """As of `Model`; general: leaving out nothing that happens to be zero in the mechanism."""
         check_home(mechanism)
         if route not in ROUTES:
             raise InputError(f'no route "{route}".{did_you_mean(route, ROUTES)}')
@@ -55,29 +60,12 @@ class System:
             structure = structure_of(mechanism, self.formulation, route)
             self.numbers = numbers_of(structure, mechanism)
             self.structure = structure if general else specialised(structure, self.numbers)
-        self.general: System | None = self if general else None  # who lends kernels
+        self._general = general
         self._lender: System | None = None
         self._kernels: dict[Any, Kernel] = {}
         self._closures: dict[Any, Closure] = {}
         self._under: dict[tuple[str, ...], System] = {}
         self.seconds = time.perf_counter() - start
-
-    def renumbered(self, mechanism: Mechanism) -> System:
-        """The same, if it is general, of another mechanism of its structure, sharing kernels.
-
-        Raises: InputError: if it is not general, or for another structure.
-        """
-        if self.general is None:
-            raise InputError(
-                "with_mechanism: this model serves one mechanism; take a general one: "
-                "condyle.Model(mechanism, general=True)"
-            )
-        if structure_of(mechanism, self.formulation, self.route) != self.structure:
-            raise InputError(
-                f'mechanism: "{mechanism.name}" has other chains, contacts or surfaces than '
-                f'"{self.mechanism.name}"; derive a model of its own'
-            )
-        return self.general.lent(mechanism, numbers_of(self.structure, mechanism))
 
     def lent(self, mechanism: Mechanism, numbers: Numbers) -> System:
         """The same with these numbers, sharing kernels: they leave out what is zero here."""
@@ -93,7 +81,6 @@ class System:
         if given not in self._under:
             other = self._copied()
             other.structure = replace(self.structure, given=given)
-            other.general = None if self.general is None else other
             other._lender = None if self._lender is None else self._lender.under(given)
             self._under[given] = other
         return self._under[given]
@@ -123,8 +110,8 @@ class System:
     @cached_property
     def serving_all(self) -> System:
         """One whose kernels serve every mechanism of the structure, whatever is zero in this."""
-        if self.general is not None:
-            return self.general
+        if self._general:
+            return self.family
         given = self.mechanism, self.formulation, self.route, self.backend.asked
         return System(*given, general=True).under(self.structure.given)
 
@@ -187,7 +174,7 @@ class System:
         other = copy(self)
         other.structure = replace(self.structure, **changes)
         other.numbers = numbers_of(other.structure, self.mechanism)
-        other.general, other._lender, other._kernels, other._under = None, None, {}, {}
+        other._general, other._lender, other._kernels, other._under = False, None, {}, {}
         return other
 
     def number_jacobian(self, paths: Sequence[str], keep: str = "home") -> np.ndarray:
@@ -201,9 +188,8 @@ class System:
             lender = None if self._lender is None else self._lender.closure(names, landmark)
             if lender and not agree(lender.structure, lender.numbers_for(self.mechanism)):
                 lender = self.family.serving_all.closure(names, landmark)
-            general = self.general is not None
             self._closures[key] = Closure(
-                self.mechanism, names, landmark, self.backend, general, lender
+                self.mechanism, names, landmark, self.backend, self._general, lender
             )
         return self._closures[key]
 
