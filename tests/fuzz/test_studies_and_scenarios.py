@@ -12,6 +12,7 @@ import pytest
 import condyle
 from condyle.analysis.sweep.job import prepared
 from condyle.analysis.sweep.study import read_study
+from condyle.markers import read_session
 from condyle.mechanism import Mechanism
 from condyle.simulation.scenario import scenario_from
 from fuzz.mutations import STRANGE, _places, hostile, said_in_words
@@ -47,6 +48,23 @@ SCENARIO: dict[str, Any] = {
 }
 
 
+SESSION: dict[str, Any] = {
+    "mechanism": "masticatory",
+    "markers": {"fixed": ["a", "b", "c"], "platform": ["d", "e", "f"]},
+    "home": [0.0, 0.5],
+    "static": {"file": "s.c3d", "home": 0.1},
+    "register": {"incisor": "I", "left_condyle": [1.0, 2.0, 3.0], "right_condyle": "R"},
+    "scale": {"landmarks": ["incisor", "left_condyle"], "kind": "thin_plate"},
+    "vertical": {"up": [0, 0, 1], "moving": False},
+    "filter": {"markers": 10.0, "max_gap": 0.1},
+    "emg": {"channels": {"masseter_left": "E1"}, "greatest": {"masseter_left": 1.0}},
+    "forces": {"channels": ["Fx", "Fy", "Fz"], "zero": [0.0, 0.1]},
+    "cycles": {"by": "beta", "from": "minimum", "shortest": 0.4},
+    "trial": [{"file": "a.c3d", "side": "left"}, {"file": "b.c3d", "subject": "B", "n": 2}],
+    "solve": {"distribution": "bounded", "preload": 1.0},
+}
+
+
 def altered(tables: dict[str, Any], rng: random.Random) -> dict[str, Any]:
     """A few entries replaced, renamed, removed and doubled."""
     found = copy.deepcopy(tables)
@@ -78,12 +96,17 @@ def attempt_study(tables: dict[str, Any], machine: Mechanism) -> None:
     prepared(read_study(tables), None, None, None)
 
 
+def attempt_session(tables: dict[str, Any], machine: Mechanism) -> None:
+    read_session(tables)
+
+
 def attempt_scenario(tables: dict[str, Any], machine: Mechanism) -> None:
     scenario_from(tables)
 
 
 @pytest.mark.parametrize(
-    ("original", "attempt"), [(STUDY, attempt_study), (SCENARIO, attempt_scenario)]
+    ("original", "attempt"),
+    [(STUDY, attempt_study), (SCENARIO, attempt_scenario), (SESSION, attempt_session)],
 )
 def test_altered_tables(
     original: dict[str, Any],

@@ -89,6 +89,7 @@ def test_everything_wrong_is_said_at_once() -> None:
             {"trial": [{"file": "a.c3d", "words": [1]}]},
             r"words: expected text or a number, got \[1",
         ),
+        ({"trial": [{"file": "a.c3d", "a,b": 1}]}, "'a,b' cannot be the name of a column"),
         ({"trial": [{"file": "a.c3d", "trial": "b"}]}, "trial is a column of the tables"),
         ({"markers": {"fixd": []}}, "fixd is not a key of it; it has fixed, platform, weights"),
         ({"markers": 3}, "expected a table of fixed, platform, weights, got 3"),

@@ -13,7 +13,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import ConfigDict, Field, field_validator, model_validator
+from pydantic import (
+    ConfigDict,
+    Field,
+    TypeAdapter,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 
 from ..atomic import file_stem
 from ..errors import ProblemsError, few, shown
@@ -29,6 +36,7 @@ MEASURES = ("peak_", "impulse_", "range_")  # beginnings of the tables' other co
 FILES = ("mean", "cycles", "report")  # of results, beside those of the trials
 PROMINENCE = 0.25
 
+_NAME: TypeAdapter[str] = TypeAdapter(Name)
 _Text = Annotated[str, Field(min_length=1, max_length=1000)]
 _NotBelow = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]
 _Above = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
@@ -122,6 +130,10 @@ class Trial(Table):
         for word, value in data.items() if isinstance(data, Mapping) else ():
             if word in own:
                 continue
+            try:
+                _NAME.validate_python(word)
+            except ValidationError:
+                raise ValueError(f"{shown(word)} cannot be the name of a column") from None
             if word in TAKEN or word.startswith(MEASURES):
                 raise ValueError(f"{word} is a column of the tables; choose another word")
             if not isinstance(value, str | int | float):
