@@ -160,6 +160,35 @@ def test_the_bound_of_the_library(tmp_path: Path, precision: str) -> None:
             assert found["bound"][0] == pytest.approx(float(own.bound) * 2.0**29, rel=0.5)
 
 
+@pytest.mark.slow
+def test_gravity_and_a_moving_base_at_every_call(tmp_path: Path) -> None:
+    mechanism = condyle.load_mechanism("masticatory")
+    questions = ("contact", "forward", "motion")
+    jaw = Library(export(mechanism, questions, inputs=("base", "gravity"), lanes=0), tmp_path)
+    assert [a.name for a in jaw.exported["contact"].inputs][-2:] == ["gravity", "base"]
+    assert jaw.exported["contact"].inputs[-1].units[2:4] == ("m/s^2", "rad/s")
+    assert "base" not in [a.name for a in jaw.exported["motion"].inputs]
+    model, rng = condyle.derive(mechanism, backend="numpy"), np.random.default_rng(3)
+    q, q1, q2 = rng.uniform(-0.05, 0.05, (3, 4)) * [0.02, 0.02, 1, 1]
+    around = {"gravity": rng.normal(0, 9, 3), "base": rng.normal(0, 6, 9)}
+    right = model.inverse_dynamics(q, q1, q2, **around)
+    status, found = jaw("contact", q=q, q1=q1, q2=q2, **around)
+    assert status == OK
+    np.testing.assert_allclose(found["effort"], right.effort, rtol=1e-11)
+    np.testing.assert_allclose(found["contact_force"], right.contact_force, rtol=1e-11)
+    status, found = jaw("forward", q=q, q1=q1, effort=right.effort, **around)
+    assert status == OK
+    np.testing.assert_allclose(found["acceleration"], q2, atol=1e-9)
+
+
+def test_inputs_that_there_are_not() -> None:
+    mechanism = condyle.load_mechanism("masticatory")
+    with pytest.raises(InputError, match="expected gravity or base"):
+        export(mechanism, ("inverse",), inputs=("wind",))
+    with pytest.raises(InputError, match="none of motion, pose has gravity or inertia"):
+        export(mechanism, ("motion", "pose"), inputs=("base",))
+
+
 def test_outputs_that_there_are_not() -> None:
     mechanism = condyle.load_mechanism("masticatory")
     with pytest.raises(InputError, match="expected bound"):

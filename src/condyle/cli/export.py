@@ -31,6 +31,7 @@ def c(
     coordinates: Annotated[str | None, options.option("", "--from")] = None,
     landmark: options.Landmark = None,
     outputs: str | None = None,
+    inputs: str | None = None,
     precision: str = "double",
     constants: str = "inside",
     prefix: str | None = None,
@@ -54,6 +55,8 @@ def c(
         landmark: Platform point whose path is given to closure.
         outputs: bound: inverse, contact, bounded and forward also return the bound of their
             relative error.
+        inputs: gravity, base or gravity,base: dynamics take gravity, and the base's acceleration,
+            angular velocity and angular acceleration, at every call.
         precision: double, or float for single-precision processors.
         constants: inside: compiled in; struct: in a structure that the program fills at run time.
         prefix: Prefix of all names in C. Default: the mechanism's name.
@@ -68,6 +71,7 @@ def c(
         coordinates=coordinates or (),
         landmark=landmark,
         outputs=outputs or (),
+        inputs=inputs or (),
         precision=precision,
         constants=constants,
         prefix=prefix,

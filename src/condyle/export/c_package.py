@@ -47,6 +47,7 @@ def export_c(
     coordinates: str | Sequence[str] = (),
     landmark: str | None = None,
     outputs: str | Sequence[str] = (),
+    inputs: str | Sequence[str] = (),
     precision: str = "double",
     constants: str = "inside",
     prefix: str | None = None,
@@ -65,6 +66,8 @@ def export_c(
             coordinates, landmark: the coordinates that `closure` starts from, or the platform point
                       whose path it starts from.
             outputs: bound, for dynamics to return the bound of their relative error too.
+            inputs: gravity and base, for dynamics to take gravity in {S}, and the base's
+                    acceleration, angular velocity and angular acceleration, at every call.
             precision: double or float.
             constants: inside, or struct: in a structure that a program fills at run time.
             prefix: of all names in C; default: the mechanism's name.
@@ -93,6 +96,7 @@ def export_c(
         coordinates=names,
         landmark=landmark,
         outputs=texts_of("outputs", outputs),
+        inputs=texts_of("inputs", inputs),
     )
     folder = make_folder(path)
     files = write_package(exported, folder)

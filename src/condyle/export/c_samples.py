@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from ..backends.kernel import AGAIN, Kernel
 from ..backends.numpy_kernel import NumpyKernel
 from ..graph.program import Variants
 from ..model.closing import Closure
-from ..model.model import Model
+from ..model.model import Model, model_under
 from ..progress import stepping
 from ..questions import Question
 from ..questions.derivative import PREFIX, directional
@@ -28,7 +29,8 @@ Given = Mapping[str, np.ndarray]  # argument -> (N, size)
 COUNT = 40
 SIZES = {"force": 20.0, "moment": 0.5, "point": 0.05, "kp": 400.0, "kd": 40.0, "period": 1e-3}
 SIZES |= {"resolution": 1e-5, "smoothing": 0.9, "stiffness": 100.0, "damping": 10.0}
-SIGNED = ("force", "moment", "point", "direction")
+SIZES |= {"gravity": 10.0, "base": 3.0}
+SIGNED = ("gravity", "base", "force", "moment", "point", "direction")
 WIDTH = 0.1  # of states about home, in characteristic lengths and radians, halved until most reach
 
 
@@ -38,6 +40,10 @@ class Reference:
 
     model: Model
     wish: Wish
+
+    def around(self, given: Given) -> dict[str, Any]:
+        """Gravity and the base's motion, as models take them."""
+        return {name: given[name] for name in self.wish.given}
 
     def __call__(self, question: str, given: Given) -> tuple[Arrays, np.ndarray]:
         """Results by argument, (N, size) each, and statuses, (N,): out of bounds is `overflow`.
@@ -58,7 +64,7 @@ class Reference:
 
 def _graph(r: Reference, question: str, given: Given) -> tuple[Arrays, np.ndarray]:
     """By numpy's kernel of the same question."""
-    entry = require_question(question).asking(r.wish)
+    entry = require_question(question).asking(question, r.wish)
     kernel, names = _kernel(r, question, entry)
     ports, known = {}, own_numbers(r.model.mechanism)
     for port in kernel.interface.ports:
@@ -85,6 +91,7 @@ def _kernel(r: Reference, question: str, entry: Entry) -> tuple[Kernel, dict[str
     if not entry.tangent:
         return r.model.kernel(entry.question or question, *entry.details(r.wish)), names
     structure = structure_of(r.model.mechanism, r.model.formulation, r.model.route)
+    structure = replace(structure, given=r.wish.given)
     numbers = numbers_of(structure, r.model.mechanism)
     found = Question.about(structure, entry.question, *entry.details(r.wish)).variants()
     program = directional(found.robust or found.main, set(names), set(renamed(entry.results)))
@@ -101,13 +108,15 @@ def _load(given: Given) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _inverse(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
-    found = r.model.inverse_dynamics(given["q"], given["q1"], given["q2"], *_load(given))
+    q, v, a = (given[name] for name in ("q", "q1", "q2"))
+    found = r.model.inverse_dynamics(q, v, a, *_load(given), **r.around(given))
     results = {"effort": found.effort, "contact_force": found.contact_force}
     return results | {"bound": found.bound[:, None]}, found.status
 
 
 def _forward(r: Reference, given: Given) -> tuple[Arrays, np.ndarray]:
-    found = r.model.forward_dynamics(given["q"], given["q1"], given["effort"], *_load(given))
+    q, v, effort = (given[name] for name in ("q", "q1", "effort"))
+    found = r.model.forward_dynamics(q, v, effort, *_load(given), **r.around(given))
     results = {"acceleration": found.acceleration, "contact_force": found.contact_force}
     return results | {"bound": found.bound[:, None]}, found.status
 
@@ -156,7 +165,7 @@ def vectors(exported: Exported) -> list[Vectors]:
     # By numpy: no code is shared with what prints C.
     mechanism = exported.mechanism
     model = Model(mechanism, **exported.recipe, backend="numpy", distribution=least_norm(mechanism))
-    reference = Reference(model, exported.wish)
+    reference = Reference(model_under(model, exported.wish.given), exported.wish)
     draw = Samples(model)
     found = []
     for f in stepping("recording samples", exported.functions):

@@ -19,7 +19,7 @@ from ..model.model import Model
 from ..progress import stepping
 from ..questions.file_numbers import numbers_of
 from ..questions.numbers import specialised
-from ..questions.structure import structure_of
+from ..questions.structure import GIVEN, structure_of
 from ..version import __version__
 from . import c_struct
 from .c_context import CODES, WHY, Body, Context, require_precision
@@ -58,6 +58,7 @@ def export(
     coordinates: Sequence[str] = (),
     landmark: str | None = None,
     outputs: Sequence[str] = (),
+    inputs: Sequence[str] = (),
 ) -> Exported:
     """A mechanism in C: source, header and interface.
 
@@ -69,6 +70,8 @@ def export(
                        constants in a structure, there are none.
             coordinates, landmark: what `closure` starts from.
             outputs:   results besides the usual ones: bound, of the relative error.
+            inputs:    arguments of dynamics besides the usual ones: gravity, in place of the
+                       mechanism's, and base, the motion of the base.
     Raises: InputError, UnsupportedError: for options or mechanisms that C export has not.
             MechanismError: if the contacts do not hold the platform at home.
     """
@@ -87,9 +90,10 @@ def export(
     how: dict[str, Any] = {"formulation": formulation, "route": route, "backend": "numpy"}
     model = Model(mechanism, **how, distribution=least_norm(mechanism))
     asked = usual(mechanism) if questions is None else questions
-    wish = Wish(in_order(coordinates), landmark, _bounded(outputs))
+    wish = Wish(in_order(coordinates), landmark, _bounded(outputs), _given(inputs))
     entries = _entries(mechanism, asked, wish)
     structure = structure_of(mechanism, formulation_named(formulation).name, route)
+    structure = replace(structure, given=wish.given)
     numbers = numbers_of(structure, mechanism, landmark)
     if constants not in ("inside", "struct"):
         raise InputError(f'constants: expected inside or struct, got "{constants}"')
@@ -141,7 +145,7 @@ def export(
 
 def _entries(mechanism: Mechanism, questions: Sequence[str], wish: Wish) -> dict[str, Entry]:
     """The questions, each once."""
-    found = {question: require_question(question).asking(wish) for question in questions}
+    found = {name: require_question(name).asking(name, wish) for name in questions}
     if not found:
         raise InputError("no question to export")
     if wish.landmark is not None:
@@ -154,7 +158,23 @@ def _entries(mechanism: Mechanism, questions: Sequence[str], wish: Wish) -> dict
             f"outputs: none of {', '.join(found)} has a bound of its error; add one of {able}, or "
             "leave bound out"
         )
+    if wish.given and not any(entry.dynamic(name) for name, entry in found.items()):
+        raise InputError(
+            f"inputs: none of {', '.join(found)} has gravity or inertia in it; leave "
+            f"{' and '.join(wish.given)} out"
+        )
     return found
+
+
+def _given(inputs: Sequence[str]) -> tuple[str, ...]:
+    """Of gravity and base, in order.
+
+    Raises: InputError: for any other input.
+    """
+    for name in inputs:
+        if name not in GIVEN:
+            raise InputError(f"inputs: expected {' or '.join(GIVEN)}, got {shown(name)}")
+    return tuple(name for name in GIVEN if name in inputs)
 
 
 def _bounded(outputs: Sequence[str]) -> bool:

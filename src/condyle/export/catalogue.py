@@ -12,6 +12,7 @@ from typing import Any
 from ..errors import InputError, did_you_mean
 from ..mechanism.mechanism import COORDINATES, Mechanism
 from ..model.distributing import LEAST
+from ..questions import DYNAMIC
 from ..questions.allocation import TERMS
 from ..questions.law import CONTROLLERS, ControllerTable
 from ..questions.law.computed_torque import ComputedTorque
@@ -31,11 +32,13 @@ class Wish:
                  or
     landmark:    the platform's point whose path it starts from.
     bound:       whether dynamics return the bound of their relative error too.
+    given:       of gravity and base, what dynamics take besides: see `Structure.given`.
     """
 
     coordinates: tuple[str, ...] = ()
     landmark: str | None = None
     bound: bool = False
+    given: tuple[str, ...] = ()
 
 
 def in_order(coordinates: Sequence[str]) -> tuple[str, ...]:
@@ -83,12 +86,23 @@ class Entry:
     tangent: bool = False
     bounding: tuple[Any, ...] | None = None
 
-    def asking(self, wish: Wish) -> Entry:
-        """With the bound of its relative error among its results, if that is wished."""
+    def asking(self, name: str, wish: Wish) -> Entry:
+        """With the bound of its relative error among its results, and with gravity and the base's
+        motion among its arguments, as far as that is wished.
+
+        Args: name: of the entry.
+        """
+        found = self
+        if self.given and self.dynamic(name):
+            found = replace(found, given=" ".join((self.given, *wish.given)))
         if not wish.bound or self.bounding is None or self.tangent:
-            return self
+            return found
         bounding = self.bounding
-        return replace(self, results=f"{self.results} bound", details=lambda wish: bounding)
+        return replace(found, results=f"{self.results} bound", details=lambda wish: bounding)
+
+    def dynamic(self, name: str) -> bool:
+        """Whether it has gravity in it. Args: name: of the entry."""
+        return (self.question or name) in (*DYNAMIC, "derivative")
 
     def unsure(self, structure: Structure) -> str:
         """The status of samples that cannot be certified."""

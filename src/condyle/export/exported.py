@@ -15,6 +15,7 @@ from ..graph.program import Port, Result
 from ..kinematics.chain import FAMILIES
 from ..mechanism.home import independent_coordinates
 from ..mechanism.mechanism import COORDINATES, Mechanism
+from ..motion.column_units import BASE
 from ..questions.derivative import PREFIX
 from .catalogue import Wish
 
@@ -130,6 +131,7 @@ class Exported:
 # actuators, contacts, axes; the sample.
 FREE, WHOLE, GIVEN = "free", "whole", "given"
 JOINT, EFFORT, CONTACT, AXES, ONE = "joint", "effort", "contact", "axes", "one"
+MOVING = "moving"  # the base's motion
 # Name -> what it is, what its entries are of, and their unit: what follows that of a coordinate or
 # joint, or all of it.
 KNOWN = {
@@ -148,6 +150,11 @@ KNOWN = {
     "force": ("force on the platform, axes of {S}", AXES, "N"),
     "moment": ("moment on the platform, axes of {S}", AXES, "N m"),
     "point": ("point of action of the force, in the platform's frame {M}", AXES, "m"),
+    "gravity": ("gravity, axes of {S}", AXES, "m/s^2"),
+    "base": (
+        "acceleration, angular velocity and angular acceleration of the base, axes of {S}",
+        MOVING, "",
+    ),
     "direction": ("unit vector, in {S}", AXES, "1"),
     "pose": ("the platform's pose X_EE", WHOLE, ""),
     "pose_rate": ("its rates", WHOLE, "/s"),
@@ -195,10 +202,12 @@ class Arguments:
             EFFORT: chains,
             CONTACT: mechanism.contact_names,
             ONE: ("relative",),
+            MOVING: [name.removeprefix("base_") for name in BASE],
         }
         self._units: dict[str, Sequence[str]] = {
             JOINT: [family.joint_unit for family in families],
             EFFORT: [family.effort_unit for family in families],
+            MOVING: [unit for unit in ("m/s^2", "rad/s", "rad/s^2") for _ in "xyz"],
         }
 
     def argument(

@@ -69,7 +69,7 @@ GEOMETRY = (
 # Questions in which gravity and the base's motion may be given: `Structure.given`.
 DYNAMIC = (
     "inverse", "balance", "system", "forward", "forward_system", "linear", "reactions", "regressor",
-    "rate", "tick",
+    "limited", "rate", "tick",
 )  # fmt: skip
 
 
@@ -144,4 +144,4 @@ def _sources() -> str:
     return h.hexdigest()
 
 
-__all__ = ["QUESTIONS", "Question"]
+__all__ = ["DYNAMIC", "QUESTIONS", "Question"]
