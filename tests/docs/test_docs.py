@@ -197,6 +197,7 @@ EXAMPLES = {
     "forward_kinematics": (2.979e-05, 1e-7),
     "own_mechanism": (0.244891, 2e-6),
     "reference": (0.925334, 2e-6),
+    "session": (1.644, 0.03),
     "states_batch": (0.055845, 2e-6),
 }
 
@@ -218,6 +219,8 @@ def test_examples(
         monkeypatch.delenv("CONDYLE_BACKEND")
         monkeypatch.chdir(tmp_path)
         text = text.replace("SECONDS = 5.0", "SECONDS = 1.9")
+    if name == "session":
+        monkeypatch.chdir(tmp_path)
     exec(compile(text, str(path), "exec"), {"__name__": "__main__", "__file__": str(path)})
     last = capsys.readouterr().out.splitlines()[-1]
     number = float(re.findall(r"[-+]?\d[\d.]*(?:e[-+]?\d+)?", last)[-1])
