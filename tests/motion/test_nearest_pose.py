@@ -153,3 +153,16 @@ def test_motions_that_cannot_be_fitted() -> None:
         condyle.run("masticatory", Motion.from_arrays(motion.t, few_columns), fit=True)
     with pytest.raises(InputError, match="requires --motion"):
         condyle.run("masticatory", fit=True)
+
+
+def test_no_pose_is_on_another_branch() -> None:
+    """A curved jaw wide open and turned far to a side: its coordinates mean the other side."""
+    yaw = np.linspace(-0.5, -0.3, 5)
+    start = np.column_stack(
+        [np.full(5, v) for v in (0.0053, -0.0019, -0.0127, 0.0016, 0.2491)] + [yaw]
+    )
+    machine = condyle.load_mechanism("human-jaw-curved")
+    found = nearest_poses(machine, MARKERS, placed(SHAPE, start), start)
+    again = on_contacts("human-jaw-curved", found.pose[found.found])
+    np.testing.assert_allclose(again, found.pose[found.found], atol=1e-9)
+    assert not found.found.all()

@@ -10,13 +10,14 @@ with M_J from the contacts' exact derivatives (the question `conditions`), and t
 coordinates brought back onto the surfaces in the same steps. A frame starts at the pose that fits
 its points without contacts, which the contacts are not far from. Where the ends of the way do not
 tell that no singularity, where branches meet, is between them, it is followed in pieces
-(`kinematics.continuation`); a frame that does not get to its end so starts at the frame before it,
-or after it.
+(`kinematics.continuation`); a frame that does not get to its end so, or ends on another branch than
+home's, starts at the frame before it, or after it.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Unpack
 
 import numpy as np
@@ -39,9 +40,11 @@ from ..mechanism.mechanism import Mechanism
 from ..questions import Question
 from ..questions.file_numbers import numbers_of
 from ..questions.structure import structure_of
+from ..status import Status
 from .column_units import POSE
 from .path import Motion, Options
 
+_SAME = 1e-6  # m and rad
 _FLATTEST = 0.03  # breadth over length of points that still tell a turn about their length
 
 
@@ -95,7 +98,8 @@ def nearest_poses(
             measured: in {S}, (F, n, 3) [m]; NaN where not seen.
             start: poses that fit without contacts, (F, 6); NaN where there is none.
             weights: of the points, (n,); default: 1.
-    Returns: NaN where no start, or no way without a singularity from it or a neighbour.
+    Returns: NaN where there is no start, or no way from it or a neighbour without a singularity, on
+        the branch of home: the independent coordinates give every pose again.
     """
     shape = np.array(list(points.values()), dtype=float).reshape(-1, 3)
     root = np.sqrt(np.ones(len(shape)) if weights is None else np.asarray(weights, dtype=float))
@@ -105,7 +109,7 @@ def nearest_poses(
     patterns, which = np.unique(seen, axis=0, return_inverse=True)
     which = which.ravel()
     contacts = _contacts(mechanism)
-    fits = [_steps(mechanism, contacts, shape[p], root[p]) for p in patterns]
+    fits = [_steps(contacts, shape[p], root[p]) for p in patterns]
     aims = [(measured[:, p] * root[p, None]).reshape(len(pose), 3 * p.sum()) for p in patterns]
     for i, steps in enumerate(fits):
         here = np.flatnonzero(usable & (which == i))
@@ -116,6 +120,7 @@ def nearest_poses(
         reached[reached] = _alike(steps, start[here][reached], there[reached])
         far = ~reached
         there[far], reached[far] = follow(steps, start[here[far]], goal[far])
+        reached &= contacts.again(there)
         pose[here[reached]] = there[reached]
 
     left = np.flatnonzero(usable & np.isnan(pose[:, 0]))
@@ -126,7 +131,7 @@ def nearest_poses(
                 continue
             steps, goal = fits[which[f]], aims[which[f]][f : f + 1]
             there, reached = follow(steps, pose[beside : beside + 1], goal)
-            if reached[0]:
+            if reached[0] and contacts.again(there)[0]:
                 pose[f] = there[0]
 
     free, on = (placed(shape, p) for p in (start, pose))
@@ -190,16 +195,55 @@ class _Contacts:
     """phi and C = d phi / dX_EE at poses, by numpy, and which coordinates depend."""
 
     kernel: NumpyKernel
+    closure: NumpyKernel | None
     k: int
     dependent: list[int]
     free: list[int]
+    length: float
+
+    def again(self, pose: np.ndarray) -> np.ndarray:
+        """Whether poses are those that their independent coordinates give, closed from home, (N,).
+
+        Others are on another branch.
+        """
+        if self.closure is None:  # without contacts
+            return np.ones(len(pose), dtype=bool)
+        s = pose[:, self.free]
+        still = np.zeros_like(s)
+        answer = self.closure.run({"s": s, "s1": still, "s2": still})
+        closed = answer.values["pose"].T
+        if (left := np.flatnonzero(answer.status != Status.ok)).size:
+            home = np.zeros((len(left), 6))
+            goal = np.hstack([np.zeros((len(left), self.k)), s[left]])
+            there, reached = follow(self.from_home, home, goal)
+            closed[left] = np.where(reached[:, None], there, np.nan)
+        with np.errstate(invalid="ignore"):
+            return np.abs(closed - pose).max(axis=1) <= _SAME
+
+    @cached_property
+    def from_home(self) -> Steps:
+        """Towards contacts that hold and independent coordinates, in all six coordinates."""
+
+        def at(pose: np.ndarray) -> Conditions:
+            value, K = self.conditions(pose)
+            none = np.zeros_like(pose)
+            whole = np.broadcast_to(np.eye(6), K.shape)
+            return Conditions(value, K, whole, none, none, none[:, :0])
+
+        angles = np.array([False] * self.k + [i >= 3 for i in self.free])
+        return Steps(at, self.length, angles, np.arange(6))
+
+    def conditions(self, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """phi and the independent coordinates, (N, 6), and their derivatives, (N, 6, 6)."""
+        found = self.kernel.run({"pose": pose, "pose_rate": np.zeros_like(pose)}).values
+        K = np.ascontiguousarray(np.moveaxis(found["K"], -1, 0))
+        return np.ascontiguousarray(found["values"].T), K
 
     def at(self, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Distances (N, k), M_J (N, 6, 6 - k), and the way back onto the surfaces, (N, 6)."""
         k, dep, free = self.k, self.dependent, self.free
-        found = self.kernel.run({"pose": pose, "pose_rate": np.zeros_like(pose)}).values
-        phi = np.ascontiguousarray(found["values"][:k].T)
-        C = np.ascontiguousarray(np.moveaxis(found["K"], -1, 0)[:, :k])
+        value, K = self.conditions(pose)
+        phi, C = value[:, :k], K[:, :k]
         M_J = np.zeros((len(pose), 6, 6 - k))
         M_J[:, free, range(6 - k)] = 1.0
         back = np.zeros_like(pose)
@@ -212,14 +256,21 @@ class _Contacts:
 def _contacts(mechanism: Mechanism) -> _Contacts:
     names = tuple(independent_coordinates(mechanism))
     structure = structure_of(mechanism)
-    question = Question.about(structure, "conditions", names)
+    numbers = numbers_of(structure, mechanism)
+
+    def kernel(name: str) -> NumpyKernel:
+        return NumpyKernel(Question.about(structure, name, names).variants(), numbers)
+
+    closure = kernel("closure") if mechanism.contacts else None
     free = indices(names)
     dependent = [i for i in range(6) if i not in free]
-    kernel = NumpyKernel(question.variants(), numbers_of(structure, mechanism))
-    return _Contacts(kernel, len(mechanism.contacts), dependent, free)
+    length = characteristic_length(mechanism)
+    return _Contacts(
+        kernel("conditions"), closure, len(mechanism.contacts), dependent, free, length
+    )
 
 
-def _steps(mechanism: Mechanism, contacts: _Contacts, shape: np.ndarray, root: np.ndarray) -> Steps:
+def _steps(contacts: _Contacts, shape: np.ndarray, root: np.ndarray) -> Steps:
     """Steps towards measured points (n, 3) times the roots of their weights, (n,)."""
 
     def at(pose: np.ndarray) -> Conditions:
@@ -241,7 +292,7 @@ def _steps(mechanism: Mechanism, contacts: _Contacts, shape: np.ndarray, root: n
         return Conditions(value, slope @ M_J, M_J, back, carried, phi)
 
     none = np.zeros(3 * len(shape), dtype=bool)
-    return Steps(at, characteristic_length(mechanism), none, np.array(contacts.free))
+    return Steps(at, contacts.length, none, np.array(contacts.free))
 
 
 def _alike(steps: Steps, start: np.ndarray, end: np.ndarray) -> np.ndarray:
