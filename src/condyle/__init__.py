@@ -55,6 +55,7 @@ _HOMES = {
     "workspace_size": "analysis.map",
     "open_map": "analysis.map",
     "identify": "identification.identify",
+    "calibrate": "identification.calibrate",
     "run": "analysis.run_motion",
     "compare": "analysis.comparison",
     "tradeoff": "analysis.weight_curve",
@@ -101,6 +102,7 @@ if TYPE_CHECKING:
     from .export.mjcf import export_mjcf
     from .export.new_mechanism import new_mechanism
     from .export.new_study import new_study
+    from .identification.calibrate import calibrate
     from .identification.identify import identify
     from .markers import motion_from_c3d
     from .mechanism import Mechanism, bundled_mechanisms, dump, dumps, load_mechanism

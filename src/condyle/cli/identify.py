@@ -50,3 +50,33 @@ def identify(
     text = f"{found}\n{files_line(files)}"
     data = {**found.data, "files": list(map(str, files))}
     return Answer(text, data, command_line("check", out))
+
+
+@command(
+    COMPUTE,
+    example="condyle calibrate robot.toml --poses poses.csv --study calib.toml --out fitted.toml",
+)
+def calibrate(
+    mechanism: options.Mechanism,
+    poses: Path,
+    study: Path,
+    out: Path,
+) -> Answer:
+    """Points, axes and zeros of encoders from joints and measured poses.
+
+    All rows are fitted at once, with the measuring frame and the target's; numbers that the rows
+    cannot tell stay as they are, and are named.
+
+    Options:
+        poses: Table (CSV or Parquet), one pose per row: joint_CHAIN, and X, Y, Z (m), alpha, beta,
+            gamma (rad) of a target, or NAME_x, NAME_y, NAME_z (m) of points on the platform.
+        study: Calibration study (TOML): the unknown numbers, their tolerances, the noise.
+        out: Mechanism file with the fitted numbers, its comments kept.
+    """
+    import condyle
+
+    found = condyle.calibrate(mechanism, poses, study)
+    warn(found.warnings)
+    found.save(out)
+    data = {**found.data, "files": [str(out)]}
+    return Answer(f"{found}\n{files_line([out])}", data, command_line("check", out))

@@ -34,6 +34,24 @@ class Number:
     told: bool
     why: str = ""
 
+    def line(self, wide: int) -> str:
+        """In words. Args: wide: of the name."""
+        said = f"+- {self.deviation:<8.2g} {self.unit}" if self.told else f"{self.unit} "
+        why = "" if self.told else f"(not identified: {self.why})"
+        return f"{self.name:{wide}}  {self.value:12.6g} {said}{why}".rstrip()
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """For programs."""
+        return {
+            "value": self.value,
+            "deviation": self.deviation if self.told else None,
+            "unit": self.unit,
+            "before": self.before,
+            "identified": self.told,
+            **({"why": self.why} if self.why else {}),
+        }
+
 
 @dataclass(frozen=True)
 class Judged:
@@ -98,11 +116,7 @@ class Identified:
 
     def __str__(self) -> str:
         wide = max(len(one.name) for one in self.numbers)
-        lines = []
-        for one in self.numbers:
-            said = f"+- {one.deviation:<8.2g} {one.unit}" if one.told else f"{one.unit} "
-            why = "" if one.told else f"(not identified: {one.why})"
-            lines.append(f"{one.name:{wide}}  {one.value:12.6g} {said}{why}".rstrip())
+        lines = [one.line(wide) for one in self.numbers]
         lines.append(f"residual over noise: fitted {np.sqrt(self.fitted.spread):.3g}")
         if self.validated is not None:
             lines[-1] += f", validated {np.sqrt(self.validated.spread):.3g}"
@@ -111,17 +125,7 @@ class Identified:
     @property
     def data(self) -> dict[str, Any]:
         """The same for programs."""
-        numbers = {
-            one.name: {
-                "value": one.value,
-                "deviation": one.deviation if one.told else None,
-                "unit": one.unit,
-                "before": one.before,
-                "identified": one.told,
-                **({"why": one.why} if one.why else {}),
-            }
-            for one in self.numbers
-        }
+        numbers = {one.name: one.data for one in self.numbers}
         judged = {"fitted": self.fitted, "validated": self.validated}
         residuals = {
             name: {

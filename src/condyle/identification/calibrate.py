@@ -1,0 +1,282 @@
+"""`calibrate`: geometric numbers of a mechanism's file from encoders and measured poses.
+
+All rows are fitted at once; the coordinates of each row are eliminated from the normal equations.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .. import progress
+from ..errors import CondyleError, InputError, as_path, few
+from ..mechanism import as_mechanism
+from ..mechanism.mechanism import Mechanism
+from .base_parameters import told_apart
+from .calibration_problem import Placed, Problem, read_poses
+from .calibration_study import CalibrationStudy
+from .fitted_file import write_fitted
+from .identify import Number
+
+STEPS, SETTLED = 30, 1e-4  # steps at most; the last one's size in standard deviations
+LARGEST = 0.02  # of the characteristic length or of a radian: a standard deviation of no use
+CULPRITS = 4  # at most, that a number is said not to be told apart from
+APART = 1.0  # rad or m, that readings may contradict the file by
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """Distances of measured places from the machine's, and angles, over some rows.
+
+    place: root of the mean square, and largest [m];  angle: likewise [rad], None of points alone.
+    """
+
+    place: tuple[float, float]
+    angle: tuple[float, float] | None
+
+    def __str__(self) -> str:
+        rms, most = (1e3 * x for x in self.place)
+        said = f"{rms:.3g} mm rms, {most:.3g} mm at most"
+        if self.angle is not None:
+            rms, most = np.degrees(self.angle)
+            said += f"; {rms:.3g} degrees rms, {most:.3g} at most"
+        return said
+
+
+@dataclass(frozen=True, eq=False)
+class Calibrated:
+    """What `calibrate` found.
+
+    mechanism: with the numbers fitted;  numbers: one a number;  frames: the measuring frame's and
+    the target's six numbers, and points on the platform, by name;
+    before, after: by the file's numbers and by the fitted ones, on rows held back where there are
+    any; the readings alone say where the machine is;
+    spread: mean square of the residual over its noise, on fitted rows: 1 where nothing is missing.
+    """
+
+    mechanism: Mechanism
+    numbers: tuple[Number, ...]
+    frames: dict[str, tuple[float, ...]]
+    before: Misfit
+    after: Misfit
+    spread: float
+    rows: tuple[int, int]
+    source: Mechanism | str | os.PathLike[str]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the reader should know."""
+        untold = [one.name for one in self.numbers if not one.told]
+        return (f"the rows cannot tell {few(untold)}: they stay as they were",) if untold else ()
+
+    def __str__(self) -> str:
+        wide = max(len(one.name) for one in self.numbers)
+        lines = [one.line(wide) for one in self.numbers]
+        fitted, held = self.rows
+        lines.append(f"residual over noise: {np.sqrt(self.spread):.3g} ({fitted} rows)")
+        on = f"{held} rows held back" if held else "the rows themselves"
+        return "\n".join([*lines, f"on {on}: before {self.before}", f"  after {self.after}"])
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """The same for programs."""
+        misfits = {"before": self.before, "after": self.after}
+        return {
+            "mechanism": self.mechanism.name,
+            "numbers": {one.name: one.data for one in self.numbers},
+            "frames": {name: list(values) for name, values in self.frames.items()},
+            "residual_over_noise": float(np.sqrt(self.spread)),
+            **{
+                name: {
+                    "place_rms": one.place[0],
+                    "place_max": one.place[1],
+                    "angle_rms": None if one.angle is None else one.angle[0],
+                    "angle_max": None if one.angle is None else one.angle[1],
+                }
+                for name, one in misfits.items()
+            },
+            "warnings": list(self.warnings),
+        }
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the mechanism's file with the fitted numbers, its comments kept.
+
+        Raises: InputError: if it cannot be written.  MissingExtraError: without tomlkit.
+        """
+        units = {one.name: one.unit for one in self.numbers}
+        for chain in self.mechanism.chains:
+            path = f"chain.{chain.name}"
+            if chain.kind == "RSS" and {f"{path}.base[0]", f"{path}.crank_tip[0]"} & {*units}:
+                units.setdefault(f"{path}.axis", "")
+        for contact in self.mechanism.contacts:  # what keeps home may have moved
+            units |= _followed(contact.name, self.source, self.mechanism)
+        header = f"calibrated from {self.rows[0]} rows; {self.after}"
+        write_fitted(self.source, self.mechanism, units, path, header)
+
+
+def _followed(contact: str, source: Any, fitted: Mechanism) -> dict[str, str]:
+    """Numbers of a contact's surface that differ from the file's."""
+    before, found = as_mechanism(source), {}
+    for key, value in fitted.get(f"contact.{contact}.surface").entries().items():
+        path = f"contact.{contact}.surface.{key}"
+        if isinstance(value, float | tuple) and value != before.get(path):
+            found[path] = "m"
+    return found
+
+
+def calibrate(
+    mechanism: Mechanism | str | os.PathLike[str],
+    poses: str | os.PathLike[str],
+    study: CalibrationStudy | Mapping[str, Any] | str | os.PathLike[str],
+) -> Calibrated:
+    """Geometric numbers of a mechanism's file from encoders and measured poses.
+
+    Weighted least squares over numbers, the measuring frame, the target's and the coordinates of
+    every row. Numbers that the rows cannot tell, such as a common motion of all base points where
+    the measuring frame is unknown, stay as they are, and are named.
+
+    Args:   poses: table (CSV, Parquet): joint_<chain>, and X .. gamma of a target (m, rad), or
+            NAME_x, NAME_y, NAME_z of points on the platform (m), in the measuring frame.
+            study: what is unknown: see the guide on calibration.
+    Raises: InputError: for files that do not fit, or a fit that does not settle.
+    """
+    machine = as_mechanism(mechanism)
+    asked, _ = CalibrationStudy.read(study)
+    placed = read_poses(machine, as_path(poses, "poses"))
+    count = len(placed.joint)
+    held = np.zeros(count, dtype=bool)
+    order = np.random.default_rng(asked.options.seed).permutation(count)
+    held[order[: int(asked.options.validate_ * count)]] = True
+    problem = Problem(machine, asked, placed.rows(~held))
+    with progress.step("fitting"):
+        bare, _, _, _ = _solve(problem, frames_alone=True)
+        x, covariance, why, spread = _solve(problem)
+    numbers = []
+    U = len(problem.names)
+    for i, (name, unit) in enumerate(zip(problem.names, problem.units, strict=True)):
+        told = i not in why
+        deviation = float(np.sqrt(covariance[i, i])) if told else float("nan")
+        before = float(problem.nominal[i])
+        numbers.append(Number(name, unit, float(x[i]), deviation, before, told, why.get(i, "")))
+    rest = placed.rows(held if held.any() else ~held)
+    return Calibrated(
+        problem.machine(x),
+        tuple(numbers),
+        {
+            name: tuple(map(float, x[own]))
+            for name, own in problem.columns.items()
+            if own.start >= U
+        },
+        _misfit(problem, rest, bare),
+        _misfit(problem, rest, x),
+        spread,
+        (int((~held).sum()), int(held.sum())),
+        mechanism,
+    )
+
+
+def _solve(
+    problem: Problem, frames_alone: bool = False
+) -> tuple[np.ndarray, np.ndarray, dict[int, str], float]:
+    """Unknowns, their covariance, numbers that stay and why, and the residual over its noise.
+
+    Args: frames_alone: all numbers of the file stay.
+    """
+    U = len(problem.names)
+    mean, known = problem.prior
+    model = problem.model(mean)
+    found = model.forward_kinematics(problem.placed.joint, tolerance=APART)
+    if found.status.any():
+        row = int(np.argmax(found.status != 0))
+        raise InputError(
+            f"{problem.placed.source}: the joints of row {row + 1} lead to no pose; are they "
+            "readings of this mechanism, from home, in rad and m?"
+        )
+    q, x = found.q, problem.first_guess(found.pose)
+    why: dict[int, str] = {}
+    told: np.ndarray | None = None
+    for _ in range(STEPS):
+        linear = problem.linear(model, x, q)
+        J, r = linear.reduced()
+        prior = np.flatnonzero(np.isfinite(known))
+        J = np.concatenate([J, np.eye(problem.size)[prior] / known[prior, None]])
+        r = np.concatenate([r, (x[:U] - mean)[prior] / known[prior]])
+        if told is None:
+            told, why = _told(J, problem, frames_alone)
+        step = np.zeros(problem.size)
+        step[told] = -np.linalg.lstsq(J[:, told], r)[0]
+        each = linear.r + linear.J @ step
+        move = np.stack([np.linalg.lstsq(L, -e)[0] for L, e in zip(linear.L, each, strict=True)])
+        x, q = x + step, q + move
+        try:
+            model = problem.model(x)
+        except CondyleError as error:
+            raise InputError(
+                f"the fit left what can be built ({error}): give a tolerance"
+            ) from None
+        if np.linalg.norm(J @ step) < SETTLED * max(1, told.sum()) ** 0.5:
+            break
+    else:
+        raise InputError("the fit does not settle: tolerances, or rows of larger motions, help")
+    covariance = np.zeros((problem.size, problem.size))
+    covariance[np.ix_(told, told)] = np.linalg.inv(J[:, told].T @ J[:, told])
+    linear = problem.linear(model, x, q)
+    rest = linear.reduced()[1]
+    freedom = max(1, rest.size - int(told.sum()))
+    return x, covariance, why, float(rest @ rest) / freedom
+
+
+def _told(J: np.ndarray, problem: Problem, frames_alone: bool) -> tuple[np.ndarray, dict[int, str]]:
+    """Unknowns to fit: frames, then zeros of encoders, then all else that stands apart."""
+    U = len(problem.names)
+    told = np.zeros(problem.size, dtype=bool)
+    told[U:] = True
+    if frames_alone:
+        return told, dict.fromkeys(range(U), "held")
+    length = problem.model(problem.nominal).characteristic_length
+    size = np.array([LARGEST * (length if unit == "m" else 1.0) for unit in problem.units])
+    why: dict[int, str] = {}
+    zeros = [i for i, name in enumerate(problem.names) if name.endswith(".zero")]
+    rest = [i for i in range(U) if i not in zeros]
+    for group in (zeros, rest):
+        if not group:
+            continue
+        basis = J[:, told]
+        own = J[:, group]
+        if basis.shape[1]:
+            Q = np.linalg.qr(basis)[0]
+            own = own - Q @ (Q.T @ own)
+        found = told_apart(own * size[group], 1.0, relative=False)
+        told[[group[i] for i in found.known]] = True
+        for column, k in zip(found.follow.T, found.rest, strict=True):
+            share = np.abs(column)
+            nearest = np.argsort(-share)[:CULPRITS]
+            names = [
+                problem.names[group[found.known[i]]]
+                for i in nearest
+                if share[i] > 0.1 * share.max()
+            ]
+            lost = np.linalg.norm(own[:, k]) * size[group[k]] <= 1.0
+            why[group[k]] = (
+                "the rows say nothing of it beyond the frames and zeros"
+                if lost
+                else f"not told apart from {few(names)}"
+            )
+    return told, why
+
+
+def _misfit(problem: Problem, placed: Placed, x: np.ndarray) -> Misfit:
+    """Of rows, by what their readings say where the machine is."""
+    model = problem.model(x)
+    found = model.forward_kinematics(placed.joint, tolerance=APART)
+    place, angle = problem.off(placed, found.pose, x)
+    place, angle = place[np.isfinite(place)], angle[np.isfinite(angle)]
+
+    def two(values: np.ndarray) -> tuple[float, float]:
+        return float(np.sqrt((values**2).mean())), float(values.max())
+
+    return Misfit(two(place), two(angle) if angle.size else None)

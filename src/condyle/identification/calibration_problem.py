@@ -1,0 +1,414 @@
+"""What measured poses say of a machine: residuals, and their slopes by all that is unknown.
+
+Of every row the machine's own coordinates q are unknown too: readings and the measured target are
+both functions of them,
+
+    reading = joint(q; numbers) + zero,     measured = B P(q; numbers) G,
+
+with P the platform's pose, B the place of {S} in the measuring frame and G the target's in {M}.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, few
+from ..mechanism.coordinates import COORDINATES, bryant_angles, rotations
+from ..mechanism.mechanism import Mechanism
+from ..model.model import Model, derive
+from ..motion.table_reader import read_table
+from ..questions.number_paths import FileNumbers
+from ..questions.structure import walls_of
+from .calibration_study import CalibrationStudy
+
+LEAST_ROWS = 4
+PLACE = ("x", "y", "z")
+# Residual, slopes by numbers and by q, noise, and slopes by frames and points.
+Block = tuple[np.ndarray, np.ndarray, np.ndarray, float, dict[str, np.ndarray]]
+
+
+@dataclass(frozen=True)
+class Placed:
+    """Poses measured on a machine.
+
+    joint: (N, n);  pose: X .. gamma of the target (N, 6), or None;
+    points: name or number of a point on the platform -> its places, (N, 3).
+    """
+
+    source: str
+    joint: np.ndarray
+    pose: np.ndarray | None
+    points: dict[str, np.ndarray]
+
+    def rows(self, chosen: np.ndarray) -> Placed:
+        pose = None if self.pose is None else self.pose[chosen]
+        points = {name: places[chosen] for name, places in self.points.items()}
+        return Placed(self.source, self.joint[chosen], pose, points)
+
+
+def read_poses(mechanism: Mechanism, path: Any) -> Placed:
+    """A table (CSV, Parquet): joint_<chain>, and X .. gamma of a target, or NAME_x, NAME_y, NAME_z
+    of points on the platform.
+
+    A point of the file's is where the file says; any other is found with the rest.
+    """
+    table = read_table(path)
+    joints = table.require(f"joint_{name}" for name in mechanism.chain_names)
+    pose = None
+    if any(name in table.columns for name in COORDINATES):
+        pose = table.require(COORDINATES)
+    names = [n.removesuffix("_x") for n in table.columns if n.endswith("_x")]
+    points = {name: table.require(f"{name}_{axis}" for axis in PLACE) for name in names}
+    if pose is None and not points:
+        raise InputError(
+            f"{table.source}: expected X .. gamma of a target, or NAME_x, NAME_y, NAME_z of points "
+            f"on the platform, beside the joints; got {few(table.columns)}"
+        )
+    if table.rows < LEAST_ROWS:
+        raise InputError(f"{table.source}: {table.rows} rows, expected at least {LEAST_ROWS}")
+    return Placed(table.source, joints, pose, points)
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Residuals of all rows about a state, whitened: r + J dx + L dq.
+
+    r: (N, R);  J: (N, R, X), by unknowns, frames and points;  L: (N, R, m).
+    """
+
+    r: np.ndarray
+    J: np.ndarray
+    L: np.ndarray
+
+    def reduced(self) -> tuple[np.ndarray, np.ndarray]:
+        """The part of J and r, rows of all samples, that q does not explain."""
+        Q, _ = np.linalg.qr(self.L, mode="complete")
+        rest = Q[:, :, self.L.shape[2] :].swapaxes(1, 2)
+        J, r = rest @ self.J, rest @ self.r[..., None]
+        return J.reshape(-1, J.shape[2]), r.ravel()
+
+
+class Problem:
+    """Unknowns x: numbers of the file, then the frames' six each, then points of the platform."""
+
+    def __init__(self, mechanism: Mechanism, study: CalibrationStudy, placed: Placed) -> None:
+        self.start, self.study, self.placed = mechanism, study, placed
+        structure = derive(mechanism, backend="numpy").system.wide.structure
+        known = FileNumbers(mechanism, structure, walls_of(mechanism, structure))
+        self.paths, self.names, self.units = [], list[str](), list[str]()
+        for path, one in zip(study.numbers, known.at(list(study.numbers)), strict=True):
+            own = entries(mechanism, path)
+            self.paths.append(path)
+            self.names += own
+            self.units += [one.unit] * len(own)
+        frames = study.frames
+        self.free = {
+            "measuring": frames.measuring == "estimate",
+            "target": frames.target == "estimate" and placed.pose is not None,
+        }
+        self.lost = [n for n in placed.points if n not in mechanism.platform.points]
+        self.columns: dict[str, slice] = {"numbers": slice(0, len(self.names))}
+        at = len(self.names)
+        for name in (n for n, free in self.free.items() if free):
+            self.columns[name] = slice(at, at + 6)
+            at += 6
+        for name in self.lost:
+            self.columns[f"point {name}"] = slice(at, at + 3)
+            at += 3
+        self.size = at
+
+    @cached_property
+    def nominal(self) -> np.ndarray:
+        """Numbers of the file, (U,)."""
+        return np.array([value_of(self.start, name) for name in self.names])
+
+    @cached_property
+    def prior(self) -> tuple[np.ndarray, np.ndarray]:
+        """Means and standard deviations of the numbers; infinite where nothing is known."""
+        mean, spread = self.nominal.copy(), np.full(len(self.names), np.inf)
+        at = 0
+        for path in self.paths:
+            own = slice(at, at + len(entries(self.start, path)))
+            at = own.stop
+            if path in self.study.tolerance:
+                spread[own] = self.study.tolerance[path]
+            if path in self.study.prior:
+                try:
+                    mean[own], spread[own] = self.study.prior[path]
+                except ValueError:
+                    count = own.stop - own.start
+                    raise InputError(f"prior: {path} has {count} numbers; give as many") from None
+        if (spread <= 0).any():
+            raise InputError("prior: a standard deviation is above 0; leave a known number out")
+        return mean, spread
+
+    def machine(self, x: np.ndarray) -> Mechanism:
+        """The mechanism with these numbers; axes of cranks stay perpendicular to them."""
+        changes: dict[str, Any] = dict(zip(self.names, map(float, x), strict=False))
+        for chain in self.start.chains:
+            if chain.kind != "RSS":
+                continue
+            path = f"chain.{chain.name}"
+            base, tip, axis = (
+                np.array([changes.get(f"{path}.{key}[{i}]", x) for i, x in enumerate(own)])
+                for key, own in (
+                    ("base", chain.base),
+                    ("crank_tip", chain.crank_tip),
+                    ("axis", chain.axis),
+                )
+            )
+            if any(name.startswith((f"{path}.base", f"{path}.crank_tip")) for name in changes):
+                crank = (tip - base) / np.linalg.norm(tip - base)
+                axis = axis - (axis @ crank) * crank
+                for i in range(3):
+                    changes.pop(f"{path}.axis[{i}]", None)
+                changes[f"{path}.axis"] = tuple(map(float, axis / np.linalg.norm(axis)))
+        return self.start._set(changes, "home")
+
+    def model(self, x: np.ndarray) -> Model:
+        return derive(self.machine(x[: len(self.names)]), backend="numpy")
+
+    # -- frames ------------------------------------------------------------------------------
+
+    def frame(self, name: str, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Place and rotation of the frame."""
+        if self.free.get(name):
+            six = x[self.columns[name]]
+        else:
+            given = getattr(self.study.frames, name)
+            six = np.zeros(6) if given == "estimate" else np.array(given)
+        return six[:3], rotations(six[3:])
+
+    def first_guess(self, pose: np.ndarray) -> np.ndarray:
+        """Unknowns with frames from the poses, (N, 6), of the file's machine."""
+        x = np.zeros(self.size)
+        x[: len(self.names)] = self.prior[0]
+        place, R = pose[:, :3], rotations(pose[:, 3:])
+        measured = self.placed.pose
+        if measured is not None:
+            seen = rotations(measured[:, 3:])
+            B, G = self.frame("measuring", x)[1], self.frame("target", x)[1]
+            for _ in range(50):
+                if self.free["measuring"]:
+                    B = _mean_rotation(seen @ (R @ G).swapaxes(1, 2))
+                if self.free["target"]:
+                    G = _mean_rotation((B @ R).swapaxes(1, 2) @ seen)
+            # Linear in the two places: measured = b + B (place + R g).
+            rows = np.concatenate([np.broadcast_to(np.eye(3), (len(R), 3, 3)), B @ R], axis=2)
+            free = [self.free["measuring"]] * 3 + [self.free["target"]] * 3
+            offsets = np.concatenate([self.frame(n, x)[0] for n in ("measuring", "target")])
+            right = measured[:, :3] - place @ B.T - rows @ offsets
+            if any(free):
+                found = np.linalg.lstsq(rows[:, :, free].reshape(-1, sum(free)), right.ravel())[0]
+                offsets[free] += found
+            for name, turn, own in (("measuring", B, offsets[:3]), ("target", G, offsets[3:])):
+                if self.free[name]:
+                    x[self.columns[name]] = [*own, *bryant_angles(turn)]
+            return x
+        return self._guess_by_points(x, place, R)
+
+    def _guess_by_points(self, x: np.ndarray, place: np.ndarray, R: np.ndarray) -> np.ndarray:
+        """Frames and unknown points, in turns."""
+        spots = {name: np.zeros(3) for name in self.lost}
+        spots |= {
+            name: np.array(self.start.platform.points[name])
+            for name in self.placed.points
+            if name not in spots
+        }
+        b, B = self.frame("measuring", x)
+        for _ in range(200):
+            own = {name: place + R @ g for name, g in spots.items()}
+            if self.free["measuring"]:
+                here = np.concatenate([own[name] for name in spots])
+                seen = np.concatenate([self.placed.points[name] for name in spots])
+                B = _nearest_rotation((seen - seen.mean(axis=0)).T @ (here - here.mean(axis=0)))
+                b = seen.mean(axis=0) - B @ here.mean(axis=0)
+            for name in self.lost:
+                back = (self.placed.points[name] - b) @ B - place
+                spots[name] = np.einsum("tji,tj->ti", R, back).mean(axis=0)
+            if not self.lost:
+                break
+        if self.free["measuring"]:
+            x[self.columns["measuring"]] = [*b, *bryant_angles(B)]
+        for name in self.lost:
+            x[self.columns[f"point {name}"]] = spots[name]
+        return x
+
+    # -- residuals ---------------------------------------------------------------------------
+
+    def linear(self, model: Model, x: np.ndarray, q: np.ndarray) -> Linear:
+        """Residuals about x and q, whitened."""
+        noise, U = self.study.noise, len(self.names)
+        zeros = [p for p in self.paths if p.endswith("actuator.zero")]
+        others = [p for p in self.paths if p not in zeros]
+        at = model.inverse_kinematics(q)
+        slopes = model.derivatives(("pose", "joint"), ("q", *others), q=q, zeros=True)
+        N, n = at.joint.shape
+        by_numbers = {"pose": np.zeros((N, 6, U)), "joint": np.zeros((N, n, U))}
+        column = 0
+        for path in self.paths:
+            count = len(entries(self.start, path))
+            own = slice(column, column + count)
+            column += count
+            if path in zeros:
+                for k, name in enumerate(self.names[own]):
+                    chain = self.start.chain_names.index(name.split(".")[1])
+                    by_numbers["joint"][:, chain, own.start + k] = 1.0
+                continue
+            for of, into in by_numbers.items():
+                into[:, :, own] = slopes[of, path].reshape(N, into.shape[1], count)
+        read = at.joint + model.mechanism.zeros - self.placed.joint
+        blocks: list[Block] = [(read, by_numbers["joint"], slopes["joint", "q"], noise.encoder, {})]
+        blocks += self._targets(x, at.pose, by_numbers["pose"], slopes["pose", "q"])
+        r, J, L = [], [], []
+        for value, numbers, by_q, size, more in blocks:
+            slope = np.zeros((*value.shape, self.size))
+            slope[..., :U] = numbers
+            for name, by_frame in more.items():
+                if name in self.columns:
+                    slope[..., self.columns[name]] = by_frame
+            r.append(value / size)
+            J.append(slope / size)
+            L.append(by_q / size)
+        return Linear(np.concatenate(r, 1), np.concatenate(J, 1), np.concatenate(L, 1))
+
+    def off(self, placed: Placed, pose: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Distances [m] and angles [rad] of what was measured from poses of the platform, flat."""
+        b, B = self.frame("measuring", x)
+        R, places, angles = rotations(pose[:, 3:]), [], [np.zeros(0)]
+        for name, seen in placed.points.items():
+            spot = self._spot(name, x)
+            places.append(np.linalg.norm(b + (pose[:, :3] + R @ spot) @ B.T - seen, axis=1))
+        if placed.pose is not None:
+            g, G = self.frame("target", x)
+            here = b + (pose[:, :3] + R @ g) @ B.T
+            places.append(np.linalg.norm(here - placed.pose[:, :3], axis=1))
+            off = B @ R @ G @ rotations(placed.pose[:, 3:]).swapaxes(1, 2)
+            cosine = (np.trace(off, axis1=1, axis2=2) - 1) / 2
+            sine = np.linalg.norm(off - off.swapaxes(1, 2), axis=(1, 2)) / np.sqrt(8)
+            angles.append(np.arctan2(sine, cosine))
+        return np.concatenate(places), np.concatenate(angles)
+
+    def _spot(self, name: str, x: np.ndarray) -> np.ndarray:
+        """A point on the platform in {M}, (3,)."""
+        if name in self.lost:
+            return x[self.columns[f"point {name}"]]
+        return np.array(self.start.platform.points[name])
+
+    def _targets(
+        self, x: np.ndarray, pose: np.ndarray, by_numbers: np.ndarray, by_q: np.ndarray
+    ) -> list[Block]:
+        """Of poses and points: residual, slopes by numbers and q, noise, slopes by the rest."""
+        noise = self.study.noise
+        b, B = self.frame("measuring", x)
+        R = rotations(pose[:, 3:])
+        turns = _turns(pose[:, 3:])
+        found: list[Block] = []
+
+        def place(spot: np.ndarray, seen: np.ndarray, name: str, of_spot: np.ndarray) -> None:
+            arm = R @ spot
+            here = pose[:, :3] + arm
+            # Place of the spot by the pose, (N, 3, 6).
+            slope = np.concatenate(
+                [np.broadcast_to(np.eye(3), R.shape), -_cross(arm) @ turns], axis=2
+            )
+            more = {
+                "measuring": np.concatenate(
+                    [
+                        np.broadcast_to(np.eye(3), R.shape),
+                        -_cross(here @ B.T) @ _turns(_angles(self, "measuring", x)),
+                    ],
+                    axis=2,
+                ),
+                name: B @ R @ of_spot,
+            }
+            found.append(
+                (
+                    b + here @ B.T - seen,
+                    B @ slope @ by_numbers,
+                    B @ slope @ by_q,
+                    noise.position,
+                    more,
+                )
+            )
+
+        for name, seen in self.placed.points.items():
+            place(self._spot(name, x), seen, f"point {name}", np.eye(3))
+        if self.placed.pose is not None:
+            g, G = self.frame("target", x)
+            own = np.concatenate([np.eye(3), np.zeros((3, 3))], axis=1)
+            place(g, self.placed.pose[:, :3], "target", own)
+            seen = rotations(self.placed.pose[:, 3:])
+            off = B @ R @ G @ seen.swapaxes(1, 2)
+            value = _rotation_vector(off)
+            more = {
+                "measuring": _beside_zeros(_turns(_angles(self, "measuring", x)), R),
+                "target": _beside_zeros(B @ R @ _turns(_angles(self, "target", x)), R),
+            }
+            turned = np.concatenate([np.zeros(R.shape), B @ turns], axis=2)
+            found.append((value, turned @ by_numbers, turned @ by_q, noise.angle, more))
+        return found
+
+
+def _beside_zeros(slope: np.ndarray, like: np.ndarray) -> np.ndarray:
+    """Slopes by a frame's place, which are zero, and by its angles: (N, 3, 6)."""
+    return np.concatenate([np.zeros(like.shape), np.broadcast_to(slope, like.shape)], axis=2)
+
+
+def _angles(problem: Problem, name: str, x: np.ndarray) -> np.ndarray:
+    if problem.free.get(name):
+        return x[problem.columns[name]][3:]
+    given = getattr(problem.study.frames, name)
+    return np.zeros(3) if given == "estimate" else np.array(given)[3:]
+
+
+def _turns(angles: np.ndarray) -> np.ndarray:
+    """Angular velocity by rates of the angles, (..., 3, 3), in the frame's parent."""
+    (ca, cb, _), (sa, sb, _) = (np.moveaxis(f(angles), -1, 0) for f in (np.cos, np.sin))
+    one, zero = np.ones_like(ca), np.zeros_like(ca)
+    rows = [[one, zero, sb], [zero, ca, -sa * cb], [zero, sa, ca * cb]]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+def _cross(v: np.ndarray) -> np.ndarray:
+    """[v], (..., 3, 3): [v] w = v x w."""
+    x, y, z = np.moveaxis(v, -1, 0)
+    o = np.zeros_like(x)
+    return np.moveaxis(np.array([[o, -z, y], [z, o, -x], [-y, x, o]]), (0, 1), (-2, -1))
+
+
+def _rotation_vector(R: np.ndarray) -> np.ndarray:
+    """(N, 3), of rotations that are small or large."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_matrix(R).as_rotvec()
+
+
+def _nearest_rotation(M: np.ndarray) -> np.ndarray:
+    U, _, V = np.linalg.svd(M)
+    return U @ np.diag([1, 1, np.sign(np.linalg.det(U @ V))]) @ V
+
+
+def _mean_rotation(R: np.ndarray) -> np.ndarray:
+    return _nearest_rotation(R.sum(axis=0))
+
+
+def entries(mechanism: Mechanism, path: str) -> list[str]:
+    """Paths of single numbers, in the order of `NumberPath`."""
+    if "*" in path:
+        names = mechanism.chain_names if path.startswith("chain") else mechanism.contact_names
+        return [p for name in names for p in entries(mechanism, path.replace("*", name, 1))]
+    value = mechanism.get(path)
+    if isinstance(value, tuple):
+        return [f"{path}[{i}]" for i in range(len(value))]
+    if not isinstance(value, float | int):
+        raise InputError(f"numbers: {path} is no number or vector; give its entries, one a path")
+    return [path]
+
+
+def value_of(mechanism: Mechanism, path: str) -> float:
+    return float(mechanism.get(path))
