@@ -56,6 +56,7 @@ _HOMES = {
     "open_map": "analysis.map",
     "identify": "identification.identify",
     "calibrate": "identification.calibrate",
+    "excite": "identification.excite",
     "run": "analysis.run_motion",
     "compare": "analysis.comparison",
     "tradeoff": "analysis.weight_curve",
@@ -103,6 +104,7 @@ if TYPE_CHECKING:
     from .export.new_mechanism import new_mechanism
     from .export.new_study import new_study
     from .identification.calibrate import calibrate
+    from .identification.excite import excite
     from .identification.identify import identify
     from .markers import motion_from_c3d
     from .mechanism import Mechanism, bundled_mechanisms, dump, dumps, load_mechanism

@@ -1,4 +1,4 @@
-"""condyle identify: numbers of a mechanism's file from logs of the machine."""
+"""condyle identify, excite, calibrate: numbers of a mechanism's file from the machine itself."""
 
 from __future__ import annotations
 
@@ -80,3 +80,28 @@ def calibrate(
     found.save(out)
     data = {**found.data, "files": [str(out)]}
     return Answer(f"{found}\n{files_line([out])}", data, command_line("check", out))
+
+
+@command(COMPUTE, example="condyle excite robot.toml --study excite.toml --out path.csv")
+def excite(
+    mechanism: options.Mechanism,
+    out: Path,
+    study: Path | None = None,
+) -> Answer:
+    """The periodic path that tells most about masses, inertias and friction.
+
+    Within reach, bounds of contacts, limits of speed and effort, and away from singularities. Says
+    how well one period tells each number, and how many reach what is wanted.
+
+    Options:
+        out: Motion file for one period (.csv or .parquet).
+        study: Excitation study (TOML): numbers, noise, period, limits. Default: the platform's
+            numbers, and friction of the actuators.
+    """
+    import condyle
+
+    found = condyle.excite(mechanism, study)
+    found.save(out)
+    data = {**found.data, "files": [str(out)]}
+    then = command_line("run", mechanism, motion=out, load="none")
+    return Answer(f"{found}\n{files_line([out])}", data, then)

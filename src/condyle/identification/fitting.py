@@ -93,9 +93,9 @@ def fit(logs: Sequence[LogEquations], unknowns: Unknowns, names: Sequence[str]) 
             )
     held = tuple(_held(unknowns, x[:U], np.linalg.inv(normal), told))
     rows = [log.rows(x[:U], x[U:]) for log in logs]
-    covariance = np.zeros((len(x), len(x)))
-    covariance[np.ix_(told, told)] = _covariance(logs, rows, x[:U], told, known)
-    return Fit(x, covariance, told, why, held, tuple(rows))
+    spread = np.zeros((len(x), len(x)))
+    spread[np.ix_(told, told)] = covariance(logs, rows, x[:U], told, known)
+    return Fit(x, spread, told, why, held, tuple(rows))
 
 
 def _whitened(rows: Rows) -> tuple[np.ndarray, np.ndarray]:
@@ -153,7 +153,7 @@ def _sizes(unknowns: Unknowns, x: np.ndarray) -> np.ndarray:
     return size
 
 
-def _covariance(
+def covariance(
     logs: Sequence[LogEquations],
     rows: Sequence[Rows],
     x: np.ndarray,

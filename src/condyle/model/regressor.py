@@ -203,6 +203,26 @@ class Regression:
             status=status.reshape(lead),
         )
 
+    def split(self, by_Y: Array, by_J: Array) -> dict[str, Array]:
+        """Weights of Y, (N, m, P), and of J, (N, n, m), as those of the question's results."""
+        structure, at = self._system.wide.structure, len(PLATFORM)
+        N, m = by_Y.shape[:2]
+        found = {"platform": by_Y[:, :, :at].reshape(N, -1), "row": by_J.swapaxes(1, 2)}
+        places = {}
+        for chain, lane in enumerate(np.argsort(self._system.numbers.order)):
+            group = int(np.searchsorted(np.cumsum(structure.counts), lane, side="right"))
+            size = len(chain_numbers(structure.families[group]))
+            places[chain] = group, slice(at, at + size)
+            at += size
+        for group, kind in enumerate(structure.families):
+            size = len(chain_numbers(kind))
+            own = np.zeros((N, m * size, structure.n))
+            for chain, (of, part) in places.items():
+                if of == group:
+                    own[:, :, chain] = by_Y[:, :, part].reshape(N, -1)
+            found[f"chain_{group}"] = own
+        return found
+
     def _rows(self, values: dict[str, Array], prefix: str, count: int) -> dict[str, Array]:
         """Y (N, rows, P), load (N, rows), J (N, rows, n) and friction (N, rows, k)."""
         structure = self._system.wide.structure
