@@ -18,7 +18,7 @@ from typing import Any
 from unittest.mock import Mock, patch
 
 import numpy as np
-from support.machine_log import write_log
+from support.machine_log import write_log, write_poses
 from support.recorded_jaw import record
 from support.recorded_session import write_session
 
@@ -56,6 +56,10 @@ class Stage:
     @cached_property
     def session(self) -> Path:
         return write_session(Path.cwd(), 1, 1.0)[0]
+
+    @cached_property
+    def poses(self) -> Path:
+        return write_poses(Path("poses.csv").resolve())
 
     @cached_property
     def motion(self) -> condyle.Motion:
@@ -365,6 +369,26 @@ DOORS: dict[str, Door] = {
         words=("mechanism", "log"),
         long=("study",),
         calls=20,
+    ),
+    "calibrate": Door(
+        {
+            "mechanism": MACHINE,
+            "poses": lambda stage: stage.poses,
+            "study": {"numbers": ["chain.*.actuator.zero"]},
+        },
+        words=("mechanism",),
+        long=("study",),
+        calls=20,
+    ),
+    "excite": Door(
+        {
+            "mechanism": MACHINE,
+            "study": {"numbers": ["platform.mass"], "harmonics": 1, "starts": 1, "steps": 1},
+            "backend": "numpy",
+        },
+        words=("mechanism",),
+        long=("study",),
+        calls=10,
     ),
     "check": Door({"mechanism": lambda stage: stage.mechanism}, calls=30),
     "schema": Door({"of": "mechanism"}),

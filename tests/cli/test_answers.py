@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from support.machine_log import SHORT_PATH, write_log, write_poses
 from support.machine_log import STUDY as LOG_STUDY
-from support.machine_log import write_log
 from support.recorded_jaw import record
 from support.recorded_session import write_session
 from support.speeds import few, slow
@@ -57,6 +57,11 @@ CALLS: dict[str, tuple[str, ...]] = {
         *("identify", "my jaw.toml", "--log", "a log.csv", "--study", "fit.toml"),
         *("--out", "a fit.toml"),
     ),
+    "calibrate": (
+        *("calibrate", "my jaw.toml", "--poses", "poses.csv", "--study", "calib.toml"),
+        *("--out", "my geometry.toml"),
+    ),
+    "excite": ("excite", "my jaw.toml", "--study", "excite.toml", "--out", "my path.csv"),
     "motion from-c3d": (
         *("motion", "from-c3d", "a trial.c3d", "--markers", "markers.toml"),
         *("--mechanism", "my jaw.toml", "--out", "a motion.csv"),
@@ -138,6 +143,9 @@ def command(
     solution.condyle.save("a run.nc")
     write_log(Path("a log.csv"))
     Path("fit.toml").write_text(LOG_STUDY)
+    write_poses(Path("poses.csv"))
+    Path("calib.toml").write_text('numbers = ["chain.*.actuator.zero"]')
+    Path("excite.toml").write_text(SHORT_PATH)
     return condyle_command
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 import condyle
+from condyle.analysis.schema import KINDS as SCHEMAS
 from condyle.backends.choose import BACKENDS
 from condyle.cli import completion
 from condyle.distribution import OBJECTIVES
@@ -35,6 +36,7 @@ def test_the_names_are_those_of_the_registries() -> None:
     assert tuple(STYLES) == completion.STYLES
     assert tuple(KINDS) == completion.FMUS
     assert study_kinds() == completion.STUDIES
+    assert tuple(SCHEMAS) == completion.SCHEMAS
     assert tuple(completion.bundled()) == condyle.bundled_mechanisms()
     for units in completion.UNITS:
         parse_units(units)

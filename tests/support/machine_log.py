@@ -9,6 +9,7 @@ import numpy as np
 import condyle
 
 STUDY = 'numbers = ["platform.mass", "platform.com[0]"]\n[noise]\neffort = 1e-3\nencoder = 1e-5\n'
+SHORT_PATH = 'numbers = ["platform.mass"]\nharmonics = 1\nstarts = 1\nsteps = 1\nrate = 100.0\n'
 
 
 def write_log(path: Path) -> Path:
@@ -24,5 +25,17 @@ def write_log(path: Path) -> Path:
     chains = model.mechanism.chain_names
     names = ["t", *(f"joint_{c}" for c in chains), *(f"tau_{c}" for c in chains)]
     rows = np.column_stack([t, joint, effort])
+    np.savetxt(path, rows, delimiter=",", header=",".join(names), comments="", fmt="%.12g")
+    return path
+
+
+def write_poses(path: Path) -> Path:
+    """Readings at eight poses, and the poses."""
+    model = condyle.derive("masticatory", backend="numpy")
+    q = np.random.default_rng(1).normal(size=(8, 4)) * [1e-3, 1e-3, 0.02, 0.02]
+    found = model.inverse_kinematics(q)
+    names = [f"joint_{c}" for c in model.mechanism.chain_names]
+    names += ["X", "Y", "Z", "alpha", "beta", "gamma"]
+    rows = np.column_stack([found.joint, found.pose])
     np.savetxt(path, rows, delimiter=",", header=",".join(names), comments="", fmt="%.12g")
     return path

@@ -103,5 +103,5 @@ def excite(
     found = condyle.excite(mechanism, study)
     found.save(out)
     data = {**found.data, "files": [str(out)]}
-    then = command_line("run", mechanism, motion=out, load="none")
+    then = command_line("run", mechanism, motion=out)
     return Answer(f"{found}\n{files_line([out])}", data, then)

@@ -16,7 +16,7 @@ from ..atomic import replacing
 from ..errors import UnsupportedError
 from .answer import Answer, files_line
 from .command import MAINTENANCE, command
-from .completion import one_of
+from .completion import SCHEMAS, one_of
 from .inputs import output_folder
 from .options import option
 
@@ -103,12 +103,13 @@ def schema(
     of: Annotated[
         str,
         typer.Argument(
-            help="Kind of file: mechanism, scenario, session or study.",
-            autocompletion=one_of("mechanism", "scenario", "session", "study"),
+            help="Kind of file: mechanism, scenario, session, study (of a sweep), fit, "
+            "excitation or calibration.",
+            autocompletion=one_of(*SCHEMAS),
         ),
     ] = "mechanism",
 ) -> Answer:
-    """JSON schema of mechanism, scenario, session or study files, for editors.
+    """JSON schema of a kind of file, for editors.
 
     An editor that has it completes keys and marks mistakes while you type.
     """

@@ -109,9 +109,9 @@ class Calibrated:
         """
         units = {one.name: one.unit for one in self.numbers}
         for chain in self.mechanism.chains:
-            path = f"chain.{chain.name}"
-            if chain.kind == "RSS" and {f"{path}.base[0]", f"{path}.crank_tip[0]"} & {*units}:
-                units.setdefault(f"{path}.axis", "")
+            own = f"chain.{chain.name}"
+            if chain.kind == "RSS" and {f"{own}.base[0]", f"{own}.crank_tip[0]"} & {*units}:
+                units.setdefault(f"{own}.axis", "")
         for contact in self.mechanism.contacts:  # what keeps home may have moved
             units |= _followed(contact.name, self.source, self.mechanism)
         header = f"calibrated from {self.rows[0]} rows; {self.after}"

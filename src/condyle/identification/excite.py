@@ -41,7 +41,6 @@ STATES = ("q", "q1", "q2")
 SAMPLES = 16  # of the period, to a harmonic
 FIRST = 0.02  # amplitude of a start, in characteristic lengths or radians
 PENALTIES = (1e2, 1e3, 1e4)
-STEPS = 120  # of each
 OUTSIDE = 1e6  # the cost where the machine cannot be
 DRAWN_IN = 0.98  # amplitudes at a time
 PERIODS = 3  # on which the deviations are judged
@@ -71,6 +70,7 @@ class ExcitationStudy(StudyFile):
         default=None, description="largest force of a contact [N]; default: none"
     )
     starts: Count = Field(default=2, description="random starts")
+    steps: Count = Field(default=120, description="of the search, for each of three penalties")
     seed: Annotated[int, Field(strict=True, ge=0)] = 1
 
 
@@ -204,7 +204,7 @@ class _Path:
             def cost(flat: np.ndarray, penalty: float = penalty) -> tuple[float, np.ndarray]:
                 return self._cost(flat.reshape(shape), penalty)
 
-            options = {"maxiter": STEPS}
+            options = {"maxiter": self.asked.steps}
             found = minimize(  # type: ignore[call-overload]  # arrays are what it takes
                 cost, c.ravel(), jac=True, method="L-BFGS-B", options=options
             )

@@ -1,0 +1,165 @@
+"""`calibrate` finds planted geometry, says how well, and names what poses cannot tell."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import condyle
+from condyle.errors import InputError
+from condyle.mechanism import Mechanism
+
+pytestmark = pytest.mark.slow
+
+SPREAD, TURN = 5e-4, np.radians(0.5)
+POSITION, ANGLE, ENCODER = 5e-5, 1e-3, 1e-4
+ZEROS, POINTS = "chain.*.actuator.zero", "chain.*.platform"
+FRAME = np.array([0.3, -0.2, 0.5]), Rotation.from_rotvec([0.4, -0.3, 0.8])
+TARGET = np.array([0.01, 0.02, -0.03]), Rotation.from_rotvec([0.1, -0.5, 0.2])
+SPOTS = {"left": (0.02, 0.03, 0.01), "right": (0.03, -0.03, 0.02)}
+
+
+def built(rng: np.random.Generator) -> Mechanism:
+    """The bundled robot as a workshop would have built it."""
+    machine = condyle.load_mechanism("masticatory")
+    changes: dict[str, Any] = {}
+    for chain in machine.chains:
+        moved = np.array(chain.platform) + SPREAD * rng.normal(size=3)
+        changes[f"chain.{chain.name}.platform"] = tuple(map(float, moved))
+        changes[f"chain.{chain.name}.actuator.zero"] = TURN * rng.normal()
+    return machine.set(changes)
+
+
+def poses(of: Mechanism, rng: np.random.Generator, path: Path, count: int, spots: bool) -> Path:
+    """Readings and measured poses of a target, or places of points; rotations are SciPy's."""
+    model = condyle.derive(of, backend="numpy")
+    middle = np.array([-1e-3, 0.0, 0.0, 0.04])
+    q = middle + np.array([1.5e-3, 1.5e-3, 0.05, 0.06]) * rng.uniform(-1, 1, (count, 4))
+    found = model.inverse_kinematics(q)
+    assert not found.status.any()
+    readings = found.joint + of.zeros + ENCODER * rng.normal(size=found.joint.shape)
+    columns = {f"joint_{n}": r for n, r in zip(of.chain_names, readings.T, strict=True)}
+    place, R = found.pose[:, :3], Rotation.from_euler("XYZ", found.pose[:, 3:])
+    if spots:
+        own = SPOTS | {"incisor": of.platform.points["incisor"]}
+        for name, spot in own.items():
+            seen = FRAME[0] + FRAME[1].apply(place + R.apply(spot))
+            seen = seen + POSITION * rng.normal(size=seen.shape)
+            columns |= {f"{name}_{axis}": seen[:, i] for i, axis in enumerate("xyz")}
+    else:
+        seen = FRAME[0] + FRAME[1].apply(place + R.apply(TARGET[0]))
+        seen = seen + POSITION * rng.normal(size=seen.shape)
+        off = Rotation.from_rotvec(ANGLE * rng.normal(size=seen.shape))
+        angles = (off * FRAME[1] * R * TARGET[1]).as_euler("XYZ")
+        columns |= dict(zip("XYZ", seen.T, strict=True))
+        columns |= dict(zip(("alpha", "beta", "gamma"), angles.T, strict=True))
+    rows = np.column_stack(list(columns.values()))
+    np.savetxt(path, rows, delimiter=",", header=",".join(columns), comments="", fmt="%.12g")
+    return path
+
+
+def study(**more: Any) -> dict[str, Any]:
+    return {"numbers": [ZEROS, POINTS], "tolerance": {ZEROS: TURN, POINTS: SPREAD}, **more}
+
+
+@pytest.mark.parametrize("spots", [False, True])
+def test_planted_geometry(tmp_path: Path, spots: bool) -> None:
+    rng = np.random.default_rng(3 + spots)
+    truth = built(rng)
+    file = poses(truth, rng, tmp_path / "poses.csv", 60, spots)
+    found = condyle.calibrate("masticatory", file, study())
+    assert found.spread == pytest.approx(1.0, abs=0.3)
+    off = np.array([(one.value - truth.get(one.name)) / one.deviation for one in found.numbers])
+    assert len(off) == 24 and np.abs(off).max() < 4 and (np.abs(off) < 3).mean() > 0.9
+    assert found.after.place[0] < found.before.place[0]
+    np.testing.assert_allclose(found.frames["measuring"][:3], FRAME[0], atol=2e-3)
+    if spots:
+        for name, spot in SPOTS.items():
+            np.testing.assert_allclose(found.frames[f"point {name}"], spot, atol=1e-3)
+    else:
+        np.testing.assert_allclose(found.frames["target"][:3], TARGET[0], atol=2e-3)
+    out = tmp_path / "fitted.toml"
+    found.save(out)
+    again = condyle.load_mechanism(out)
+    for one in found.numbers:
+        assert again.get(one.name) == pytest.approx(one.value, rel=1e-12)
+    assert out.read_text().startswith("# condyle")
+
+
+def test_what_poses_cannot_tell(tmp_path: Path) -> None:
+    """Base points and the measuring frame move together: some are held, and named."""
+    rng = np.random.default_rng(8)
+    file = poses(built(rng), rng, tmp_path / "poses.csv", 40, False)
+    asked = {"numbers": [ZEROS, "chain.masseter_left.base", "chain.masseter_left.crank_tip"]}
+    found = condyle.calibrate("masticatory", file, asked)
+    held = [one for one in found.numbers if not one.told]
+    assert held and found.warnings
+    before = condyle.load_mechanism("masticatory")
+    for one in held:
+        assert one.value == before.get(one.name) and one.why
+        assert found.mechanism.get(one.name) == one.value
+
+
+def test_given_frames(tmp_path: Path) -> None:
+    rng = np.random.default_rng(9)
+    truth = built(rng)
+    file = poses(truth, rng, tmp_path / "poses.csv", 30, False)
+    frames = {
+        "measuring": [*FRAME[0], *FRAME[1].as_euler("XYZ")],
+        "target": [*TARGET[0], *TARGET[1].as_euler("XYZ")],
+    }
+    found = condyle.calibrate("masticatory", file, study(frames=frames))
+    assert not found.frames
+    assert found.spread == pytest.approx(1.0, abs=0.4)
+
+
+@pytest.mark.ci
+def test_deviations_are_true(tmp_path: Path) -> None:
+    errors = []
+    for seed in range(12):
+        rng = np.random.default_rng(100 + seed)
+        truth = built(rng)
+        file = poses(truth, rng, tmp_path / "poses.csv", 30, False)
+        found = condyle.calibrate("masticatory", file, study())
+        errors += [(one.value - truth.get(one.name)) / one.deviation for one in found.numbers]
+    assert (np.abs(errors) < 3).mean() > 0.98
+    assert 0.85 < np.sqrt(np.mean(np.square(errors))) < 1.15
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"numbers": ["chain.*.bse"]}, "bse"),
+        ({"numbers": ["name"]}, "number"),
+        ({"numbers": [ZEROS], "tolerance": {POINTS: 1e-3}}, "not among"),
+        ({"numbers": [ZEROS], "tolerance": {ZEROS: 0}}, "tolerance"),
+        ({"numbers": [POINTS], "prior": {POINTS: [[0, 0], [1, 1]]}}, "18 numbers"),
+        ({"numbers": [ZEROS], "frames": {"measuring": [0, 0, 0]}}, "measuring"),
+    ],
+)
+def test_what_it_refuses(tmp_path: Path, change: dict[str, Any], said: str) -> None:
+    rng = np.random.default_rng(1)
+    file = poses(built(rng), rng, tmp_path / "poses.csv", 8, False)
+    with pytest.raises(InputError, match=said):
+        condyle.calibrate("masticatory", file, change)
+
+
+def test_tables_it_refuses(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    file = poses(built(rng), rng, tmp_path / "poses.csv", 8, False)
+    text = file.read_text()
+    for old, new, said in (
+        ("joint_masseter_left", "joint_maseter_left", "joint_masseter_left"),
+        (",X,Y,Z,alpha,beta,gamma", ",a,b,c,d,e,f", "X .. gamma"),
+        (",gamma", ",gama", '"gamma"'),
+    ):
+        file.write_text(text.replace(old, new))
+        with pytest.raises(InputError, match=said):
+            condyle.calibrate("masticatory", file, {"numbers": [ZEROS]})
+    file.write_text("\n".join(text.split("\n")[:3]))
+    with pytest.raises(InputError, match="at least 4"):
+        condyle.calibrate("masticatory", file, {"numbers": [ZEROS]})
