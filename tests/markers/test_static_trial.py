@@ -60,6 +60,8 @@ def test_both_bodies_carry_the_static_trial(tmp_path: Path) -> None:
     # The numbers of another trial, taken as if the head had stayed.
     wrong = measured(jaw, tmp_path)
     assert error(wrong, jaw)[:3].max() > 1e-3
+    assert "given as numbers: they hold where the head is" in str(wrong)
+    assert "given as numbers" not in str(got)
     still = motion_from_c3d(tmp_path / "static.c3d", jaw.tables(), "masticatory")
     assert between_trials([still, got]) == (
         {"a.c3d": pytest.approx({"fixed": 0, "platform": 0}, abs=2e-6)},

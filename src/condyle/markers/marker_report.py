@@ -113,6 +113,11 @@ class MarkerMotion:
             lines.append(
                 f"Registration, distance of each point from its place in the mechanism: {points}"
             )
+        if self.static is None and (typed := self.registration.typed):
+            lines.append(
+                f"  {', '.join(typed)} given as numbers: they hold where the head is at home in "
+                "this recording. If they are from another one, name it as the static trial (static)"
+            )
         if (held := self.static) is not None:
             closed = held.get("platform_moved", math.nan)
             home = "" if math.isnan(closed) else f"; the platform at home {_mm(closed)}"

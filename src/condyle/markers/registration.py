@@ -26,12 +26,14 @@ class Registration:
                 residual: distance of each point given from its place in the mechanism [m]; empty
                     where directions were given.
                 warnings: implausible values.
+                typed: points that were given as numbers.
     """
 
     rotation: np.ndarray
     position: np.ndarray
     residual: dict[str, float]
     warnings: tuple[str, ...] = ()
+    typed: tuple[str, ...] = ()
 
     def to_base(self, points: np.ndarray) -> np.ndarray:
         """Points of the laboratory at home, (..., 3), in {S}."""
@@ -69,9 +71,9 @@ def register(
             )
     found = fit(there, here[None])
     residual = dict(zip(file.places, found.residual[0].tolist(), strict=True))
-    return Registration(
-        found.rotation[0], found.position[0], residual, _exchanged(there, here, [*file.places])
-    )
+    typed = tuple(name for name, value in file.places.items() if not isinstance(value, str))
+    said = _exchanged(there, here, [*file.places])
+    return Registration(found.rotation[0], found.position[0], residual, said, typed)
 
 
 def _exchanged(there: np.ndarray, here: np.ndarray, names: list[str]) -> tuple[str, ...]:
