@@ -11,7 +11,7 @@ import numpy as np
 from ..backends.kernel import sample_rows
 from ..questions.forward import OUTPUTS as ASKED
 from ..status import Status
-from .arguments import Arguments, Lead, requested
+from .arguments import Arguments, Lead
 from .model_result import ModelResult
 from .poses import Poses
 from .system import System
@@ -41,6 +41,7 @@ class ForwardDynamics(Dynamics):
     """What efforts and wrenches do to one mechanism; see `Model`."""
 
     results = ("acceleration", "contact_force", "bound")
+    outputs = OUTPUTS
 
     def __init__(self, system: System, arguments: Arguments, poses: Poses) -> None:
         super().__init__(system, arguments, arguments.effort)
@@ -50,9 +51,8 @@ class ForwardDynamics(Dynamics):
         return ("forward", ("contact", "bound") if whole else ("contact",)), {}
 
     def _solved(
-        self, lead: Lead, inputs: dict[str, Array], outputs: Any, threads: int | None
+        self, lead: Lead, inputs: dict[str, Array], names: tuple[str, ...], threads: int | None
     ) -> ModelResult:
-        names = requested(outputs, OUTPUTS)
         inputs |= self._system.labels(math.prod(lead))
         asked = {"contact", "bound", *(OUTPUTS[name] for name in names)}
         kernel = self._system.kernel("forward", tuple(name for name in ASKED if name in asked))

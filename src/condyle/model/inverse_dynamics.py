@@ -12,7 +12,7 @@ from ..backends.kernel import Answer, sample_rows
 from ..questions.bound import CERTIFIED, bound
 from ..questions.inverse import OUTPUTS as ASKED
 from ..status import Status
-from .arguments import Arguments, Lead, requested
+from .arguments import Arguments, Lead
 from .closing import MOTION
 from .distributing import Distributor
 from .model_result import ModelResult
@@ -43,6 +43,7 @@ class InverseDynamics(Dynamics):
     """What efforts a motion takes; see `Model`."""
 
     results = ("effort", "contact_force", "bound")
+    outputs = OUTPUTS
 
     def __init__(self, system: System, arguments: Arguments, distributor: Distributor) -> None:
         super().__init__(system, arguments, arguments.a)
@@ -52,9 +53,8 @@ class InverseDynamics(Dynamics):
         return self.distributor.question(whole)
 
     def _solved(
-        self, lead: Lead, inputs: dict[str, Array], outputs: Any, threads: int | None
+        self, lead: Lead, inputs: dict[str, Array], names: tuple[str, ...], threads: int | None
     ) -> ModelResult:
-        names = requested(outputs, OUTPUTS)
         inputs |= self._system.labels(math.prod(lead))
         answer = self._solve(inputs, {OUTPUTS[name] for name in names}, threads)
         values, status = answer.values, answer.status

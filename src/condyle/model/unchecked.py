@@ -16,7 +16,7 @@ import numpy as np
 
 from ..backends.c.compiled_kernel import CompiledKernel
 from ..backends.kernel import OK
-from .arguments import NO_WRENCH, NOTHING, ORIGIN, Argument, Arguments, Lead
+from .arguments import NO_WRENCH, NOTHING, ORIGIN, Argument, Arguments, Lead, requested
 from .model_result import ModelResult
 from .system import System
 
@@ -50,10 +50,12 @@ class Dynamics:
     """Inverse or forward dynamics of one mechanism: of one state here, of many where it is called.
 
     results: the first result, the contact forces and the bound.
+    outputs: what may be asked for besides, and what the question is asked for each.
     third:   the argument behind q and v.
     """
 
     results: tuple[str, str, str]
+    outputs: Mapping[str, str]
 
     def __init__(self, system: System, arguments: Arguments, third: Argument) -> None:
         self._system, self._arguments, self.third = system, arguments, third
@@ -92,9 +94,10 @@ class Dynamics:
         given: Mapping[str, Any] = NOTHING,
     ) -> ModelResult:
         """The same of arrays of any leading shape; state: q, v and the third argument."""
+        names = requested(outputs, self.outputs)
         arguments = self._arguments.q, self._arguments.v, self.third
         lead, inputs = self._arguments.samples(arguments, state, wrench, at, given)
-        return self.under(given)._solved(lead, inputs, outputs, threads)
+        return self.under(given)._solved(lead, inputs, names, threads)
 
     def under(self, given: Iterable[str]) -> Self:
         """The same of samples that give these of `GIVEN` too."""
@@ -109,9 +112,9 @@ class Dynamics:
         return self._under[names]
 
     def _solved(
-        self, lead: Lead, inputs: dict[str, np.ndarray], outputs: Any, threads: int | None
+        self, lead: Lead, inputs: dict[str, np.ndarray], names: tuple[str, ...], threads: int | None
     ) -> ModelResult:
-        """Of samples by port."""
+        """Of samples by port; names: of outputs."""
         raise NotImplementedError
 
     def question(self, whole: bool) -> tuple[tuple[Any, ...], Mapping[str, np.ndarray]]:
