@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from support.recorded_jaw import FIXED, LOWER, PLATFORM, UPPER, Jaw, on_contacts
 
 import condyle
 from condyle.errors import InputError
-from condyle.markers import MarkerMotion, motion_from_c3d, read_markers
+from condyle.markers import MarkerMotion, motion_from_c3d, motion_of, read_c3d, read_markers
 from condyle.markers.marker_bodies import home_frames
 
 # Single precision of some 1.5 m, over the least breadth of a brace, 15 mm.
@@ -55,6 +56,16 @@ def test_the_motion_comes_back(tmp_path: Path, seed: int) -> None:
     for name, place in UPPER.items():
         np.testing.assert_allclose(got.markers[name], np.tile(place, (len(jaw.t), 1)), atol=2e-6)
     np.testing.assert_allclose(got.markers["Lower_FL"][0], LOWER["Lower_FL"], atol=2e-6)
+
+
+@pytest.mark.parametrize("mechanism", ["masticatory", "masticatory-curved", "human-jaw"])
+def test_without_noise_to_the_last_digits(tmp_path: Path, mechanism: str) -> None:
+    """A recording in double precision, on planes and curved surfaces."""
+    jaw = record(mechanism=mechanism, seconds=2.0)
+    recording = replace(read_c3d(jaw.write(tmp_path / "a.c3d")), points=jaw.points)
+    got = motion_of(recording, read_markers(jaw.tables()), condyle.load_mechanism(mechanism))
+    np.testing.assert_allclose(got.motion.value, jaw.pose, rtol=0, atol=1e-9)
+    assert got.markers_moved["all"]["after_largest"] < 1e-9
 
 
 @pytest.mark.parametrize(("unit", "units"), [(1.0, "m"), (100.0, "cm"), (1e3, "mm"), (1e3, None)])
