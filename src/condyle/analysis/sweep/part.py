@@ -22,7 +22,7 @@ from .job import Job
 
 OK, REFUSED, FAILED = "ok", "refused", "failed"
 LONGEST_REASON = 300
-TOGETHER = 2**16  # samples of a batch: what they take stays small
+TOGETHER = 2**15  # samples of a batch: what they take stays small
 
 
 @dataclass
