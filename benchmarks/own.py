@@ -42,6 +42,7 @@ FORWARD = "forward dynamics"
 MANY = 100_000  # samples of what people call
 MAPPED = 200_000
 MAP = "map of reach and ratio, a pose"
+EVERYTHING, WRITTEN = "all outputs", "as many numbers written to memory"
 SOLVE = "solve along a landmark's path"
 
 
@@ -224,9 +225,11 @@ def asked_probes(mechanism: Mechanism) -> Iterator[Probe]:
     """What people call, from Python, on as many samples: efforts, everything, and `solve`."""
     model, case = Model(mechanism, backend="compiled"), Case.of(mechanism)
     label, given = mechanism.name, case.many(MANY)
-    for what, outputs in (("efforts", ()), ("all outputs", "all")):
+    for what, outputs in (("efforts", ()), (EVERYTHING, "all")):
         call = partial(model.inverse_dynamics, *given, outputs=outputs)
         yield python_probe(f"{label}: {what}", call, MANY)
+    size = sum(a.nbytes for a in vars(call()).values() if isinstance(a, np.ndarray)) // 8
+    yield python_probe(f"{label}: {WRITTEN}", partial(np.full, size, 1.0), MANY)
     t = np.linspace(0, 5, MANY)
     chew, bite = reference_motion(), reference_load()
     path = Motion.from_arrays(chew.t, chew.value, chew.names, landmark="incisor", times=t)
@@ -311,33 +314,40 @@ def python_probe(name: str, call: Callable[[], object], count: int) -> Probe:
 
 
 def _straight_probes(label: str, timer: Timer, case: Case) -> Iterator[Probe]:
+    function, order = straight_line(case)
+    run = straight_run(function, case.samples, timer)
+    got = np.asarray(function(case.samples[:256].T).full()).T[:, np.argsort(order)]
+    for dependent, what in ((0, "one"), (1, "one, dependent")):
+        yield Probe(f"{label}: {what}", partial(run, dependent), _error(got, case.right[:256]))
+
+
+def straight_line(case: Case) -> tuple[ca.Function, tuple[int, ...]]:
+    """Efforts as CasADi computes them, of `Case.samples`, and their order."""
     structure = structure_of(case.mechanism)
     numbers = numbers_of(structure, case.mechanism)
     program = inverse(specialised(structure, numbers)).main
-    function = torque_function(program, numbers, case.point)
+    return torque_function(program, numbers, case.point), numbers.order
+
+
+def straight_run(
+    function: ca.Function, samples: np.ndarray, timer: Timer
+) -> Callable[[int], float]:
+    """Builds CasADi's C of a function; what it gives runs all samples: seconds of one."""
     folder = Path(tempfile.mkdtemp(prefix="condyle-bench-"))
     (folder / "straight.c").write_text(_generated(function), encoding="utf-8")
     library = folder / "straight.so"
     find_compiler().build(library, folder / "straight.c")
-    call = ctypes.CDLL(str(library)).straight_line
+    call = getattr(ctypes.CDLL(str(library)), function.name())
     w, iw = np.empty(function.sz_w() + 1), np.empty(function.sz_iw() + 1, dtype=np.int64)
-    packed, out = np.ascontiguousarray(case.samples), np.empty(16)
-    got = np.asarray(function(packed[:256].T).full()).T[:, np.argsort(numbers.order)]
-    for dependent, what in ((0, "one"), (1, "one, dependent")):
+    packed, out = np.ascontiguousarray(samples), np.empty(function.numel_out())
+    shape = packed.shape
 
-        def run(dependent: int = dependent) -> float:
-            return timer.library.time_casadi(
-                call,
-                _at(packed),
-                len(packed),
-                packed.shape[1],
-                _at(out),
-                _at(iw),
-                _at(w),
-                dependent,
-            )
+    def run(dependent: int = 0) -> float:
+        return timer.library.time_casadi(
+            call, _at(packed), *shape, _at(out), _at(iw), _at(w), dependent
+        )
 
-        yield Probe(f"{label}: {what}", run, _error(got, case.right[:256]))
+    return run
 
 
 def _generated(function: ca.Function) -> str:

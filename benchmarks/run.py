@@ -28,11 +28,13 @@ from .exported import PORTABLE, WIDE, exported_probes
 from .motion import SECOND, motion_rows
 from .own import (
     BOUNDED,
+    EVERYTHING,
     FORWARD,
     FRICTION,
     LEAST_NORM,
     MAP,
     SOLVE,
+    WRITTEN,
     Timer,
     asked_probes,
     jaw_probes,
@@ -117,7 +119,7 @@ def run_benchmark(seconds: float = 1.0) -> Benchmark:
         with step("building other engines"):
             probes += _peer_probes(unavailable)
         probes += [*asked_probes(load_mechanism(REFERENCE)), *map_probes(load_mechanism(REFERENCE))]
-        probes += slope_probes(load_mechanism(REFERENCE))
+        probes += slope_probes(load_mechanism(REFERENCE), timer, unavailable)
         with step("building exported C"):
             probes += exported_probes(load_mechanism(REFERENCE))
         probes += [
@@ -269,9 +271,10 @@ def _ratios(rows: list[Row], lanes: int) -> dict[str, float]:
         for solver in ("DAQP", "quadprog", "HiGHS", "OSQP"):
             if other := by_name.get(f"{limited.name}, {solver}"):
                 ratios[f"{label}, bounded, times faster than {solver}"] = other.over(limited)
-    asked = by_name[f"{REFERENCE}: torques"]
-    for what in ("evaluate", SOLVE):
-        ratios[f"{what} over efforts alone"] = by_name[f"{REFERENCE}: {what}"].over(asked)
+    asked, everything = by_name[f"{REFERENCE}: efforts"], by_name[f"{REFERENCE}: {EVERYTHING}"]
+    ratios[f"{EVERYTHING} over efforts alone"] = everything.over(asked)
+    ratios[f"{EVERYTHING} over {WRITTEN}"] = everything.over(by_name[f"{REFERENCE}: {WRITTEN}"])
+    ratios[f"{SOLVE} over efforts alone"] = by_name[f"{REFERENCE}: {SOLVE}"].over(asked)
     loop = by_name[f"{REFERENCE}: {LOOP}"]
     ratios["control at 1 kHz, plant at 10 kHz, times real time"] = 1 / loop.seconds
     for size in ("100", "5000"):

@@ -13,7 +13,7 @@ from . import compilers
 from .base import Peer, PeerError
 from .mujoco_c import MujocoFree, MujocoTree
 from .mujoco_python import MujocoPython
-from .pinocchio_cpp import PinocchioFree, PinocchioTree
+from .pinocchio_cpp import PinocchioDerivatives, PinocchioFree, PinocchioTree
 from .pinocchio_python import PinocchioPython
 from .sympy_paper import SympyPaper
 
@@ -30,6 +30,7 @@ PEERS: dict[str, Callable[[], Peer]] = {
     "pinocchio-tree-gcc": lambda: PinocchioTree("gcc"),
     "pinocchio-free-clang": lambda: PinocchioFree("clang"),
     "pinocchio-free-gcc": lambda: PinocchioFree("gcc"),
+    "pinocchio-derivatives": lambda: PinocchioDerivatives(_best()),
     "mujoco-tree": lambda: MujocoTree(_best()),
     "mujoco-free": lambda: MujocoFree(_best()),
     "pinocchio-python": PinocchioPython,

@@ -36,3 +36,12 @@ class PinocchioFree(_PinocchioCpp):
 
     title = "Pinocchio C++, free couplers"
     source = "pinocchio_free.cpp"
+
+
+class PinocchioDerivatives(PinocchioFree):
+    """With the couplers' own derivatives too, which is not yet those of torques by q, q', q''."""
+
+    title = "Pinocchio C++, computeRNEADerivatives of free couplers"
+
+    def _options(self) -> list[str]:
+        return [*super()._options(), "-DDERIVATIVES"]

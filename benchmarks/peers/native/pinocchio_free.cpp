@@ -1,5 +1,6 @@
 // Pinocchio's RNEA where it pays most: on six free couplers, one joint each. The platform and the
 // cranks are products of a line; the couplers' attitude comes as quaternions without arc functions.
+#include <pinocchio/algorithm/rnea-derivatives.hpp>
 #include <pinocchio/algorithm/rnea.hpp>
 
 #include "entry.hpp"
@@ -15,7 +16,11 @@ class PinocchioFree {
     const Chains c = move(m_, b);
     const FreeCouplers f = release(c);
     fill(c, f);
+#ifdef DERIVATIVES  // of the couplers' forces by their own coordinates: a part of the whole
+    pinocchio::computeRNEADerivatives(model_, data_, q_, v_, a_);
+#else
     pinocchio::rnea(model_, data_, q_, v_, a_);
+#endif
     project(m_, b, c, forces(b, c, f), s, tau);
   }
 
