@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from ..extras import require
 from .answer import Answer, command_line, files_line
 from .command import START, command
 from .inputs import STRICT, can_be_folder, require_drawing, warn
@@ -26,7 +25,6 @@ def session(
     Options:
         out: Folder for the results. Default: the name of the session file.
     """
-    require("c3d", "c3d")
     require_drawing(True, True)
     import condyle
 

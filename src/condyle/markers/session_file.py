@@ -121,6 +121,10 @@ class Trial(Table):
 
     file: _Text = Field(description="the recording; relative paths start at the session file")
     name: Name = Field(default="", description="of its results; default: the name of the file")
+    channels: _Text | None = Field(
+        default=None,
+        description="file of force and EMG channels (.mot, .sto, .csv) on the recording's clock",
+    )
     subject: str = Field(default="", description="who it is of; means are by subject too")
 
     @model_validator(mode="before")
@@ -178,6 +182,9 @@ class SessionFile(MarkerFile):
     refusal: ClassVar[type[ProblemsError]] = ProblemsError
 
     mechanism: _Text = Field(description="a file, or the name of a bundled mechanism")
+    unit: Literal["m", "cm", "mm", "um"] | None = Field(
+        default=None, description="of lengths in recordings, in place of what they say"
+    )
     scale: Scale | None = Field(default=None, description="to this subject; default: as it is")
     filter: Filter = Field(default_factory=lambda: Filter(), description="of the markers")
     cycles: Cycles | None = Field(default=None, description="default: each trial is one cycle")
@@ -248,9 +255,11 @@ def read_session(source: str | os.PathLike[str] | Mapping[str, Any] | SessionFil
     def beside(path: str) -> str:
         return os.path.join(folder, path)
 
-    named: dict[str, Any] = {
-        "trials": tuple(t.model_copy(update={"file": beside(t.file)}) for t in file.trials)
-    }
+    def placed(trial: Trial) -> Trial:
+        files = {"file": trial.file, "channels": trial.channels}
+        return trial.model_copy(update={k: p and beside(p) for k, p in files.items()})
+
+    named: dict[str, Any] = {"trials": tuple(map(placed, file.trials))}
     if file.mechanism not in bundled_mechanisms():
         named["mechanism"] = beside(file.mechanism)
     if file.solve.vary is not None:

@@ -76,7 +76,6 @@ def measure_session(
     from ..results.solution import write_netcdf
     from .tables.session_tables import session_tables, write_cycles
 
-    require("c3d", "c3d")
     if out is not None:
         require("plotly", "report")
         require("matplotlib", "figures")

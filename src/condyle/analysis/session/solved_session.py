@@ -16,9 +16,9 @@ from ...markers import (
     SessionFile,
     between_trials,
     motion_of,
-    read_c3d,
     registered_places,
 )
+from ...markers.recorded_tables import read_recording
 from ...markers.recording import Recording
 from ...markers.session_file import Trial
 from ...mechanism import load_mechanism
@@ -82,11 +82,11 @@ def solve_session(file: SessionFile) -> SolvedSession:
     Raises: InputError: for recordings that cannot be used, named by the trial.
     """
     machine = load_mechanism(file.mechanism)
-    named = [trial.file for trial in file.trials]
+    named = [path for trial in file.trials for path in (trial.file, trial.channels) if path]
     named += [] if file.static is None else [file.static.file]
     if missing := [path for path in named if not os.path.isfile(path)]:
         raise ProblemsError("session", [f"{path}: no such file" for path in missing])
-    static = None if file.static is None else read_c3d(file.static.file)
+    static = None if file.static is None else read_recording(file.static.file, file.unit)
     scaled, warnings = None, list[str]()
     if file.scale is not None:
         scaled = _scaled(file, machine, static)
@@ -130,7 +130,7 @@ def notable(solution: xr.Dataset) -> list[str]:
 def _scaled(file: SessionFile, machine: Mechanism, static: Recording | None) -> ScaledMechanism:
     """The mechanism scaled to the places that the static trial, or else the first, gives."""
     assert file.scale is not None
-    there = static or read_c3d(file.trials[0].file)
+    there = static or read_recording(file.trials[0].file, file.unit)
     places = registered_places(there, file, machine, static)
     wanted = {name: places[name] for name in file.scale.landmarks}
     return scaled_to(machine, wanted, file.scale.kind)
@@ -140,7 +140,7 @@ def _solved(
     trial: Trial, file: SessionFile, model: Model, static: Recording | None, study: Study | None
 ) -> SolvedTrial:
     found = motion_of(
-        read_c3d(trial.file),
+        read_recording(trial.file, file.unit, trial.channels),
         file,
         model.mechanism,
         static=static,

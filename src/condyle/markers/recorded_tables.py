@@ -1,0 +1,218 @@
+"""Recordings as tables of text: markers of .trc and .csv, channels of .mot, .sto and .csv."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError, few
+from ..motion.arrays import check_rising
+from ..motion.column_units import LENGTH_UNITS
+from ..motion.file_words import content_of, digest, short
+from ..motion.table_reader import read_table
+from .recording import Recording, read_c3d
+
+_LARGEST = 1_000_000_000  # bytes
+_UNEVEN = 0.02  # of a frame, by which times may miss an even grid
+_COMPONENT = re.compile(r"(.+)_([xyz])\s*(?:[\[(]\s*(\w+)\s*[\])])?")
+_Y_UP, _Z_UP = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+def read_recording(
+    path: str | os.PathLike[str],
+    unit: str | None = None,
+    channels: str | os.PathLike[str] | None = None,
+) -> Recording:
+    """Read a recording of markers: C3D, TRC, or a table (CSV, Parquet).
+
+    TRC has the unit and rate of its header, and Y up as OpenSim has it. A table has `t` [s] and
+    `<marker>_x`, `_y`, `_z` [m, or as `_x [mm]` says]; its other columns are channels. An empty
+    cell is a marker that was not seen.
+
+    Args:   unit: of lengths, in place of what the file says;
+            channels: another file (.mot, .sto, a table) with force or EMG channels on the same
+            clock, in place of the recording's own.
+    Raises: InputError: for other files, and times that are not even.
+    """
+    kind = Path(path).suffix.lower()
+    if kind == ".c3d":
+        found = read_c3d(path, unit)
+    elif kind in _READERS:
+        found = _READERS[kind](path, unit)
+    else:
+        known = few(sorted([".c3d", *_READERS]))
+        raise InputError(f'{path}: expected a recording that ends in {known}, got "{short(kind)}"')
+    return found if channels is None else _with_channels(found, channels)
+
+
+def _read_trc(path: str | os.PathLike[str], unit: str | None) -> Recording:
+    lines = _lines(path)
+    if len(lines) < 6 or not lines[0].startswith("PathFileType"):
+        raise InputError(f"{path}: is no TRC file: its first line does not begin PathFileType")
+    keys, values = (line.split("\t") for line in lines[1:3])
+    head = dict(zip(map(str.strip, keys), map(str.strip, values), strict=False))
+    names = lines[3].rstrip("\t\r ").split("\t")
+    labels = [name.strip() for name in names[2::3]]
+    if not labels or not all(labels) or any(name.strip() for name in (*names[3::3], *names[4::3])):
+        raise InputError(
+            f"{path}, line 4: expected Frame#, Time, and the name of each marker above its X"
+        )
+    rows = [(n, line) for n, line in enumerate(lines[5:], 6) if line.strip()]
+    width = 2 + 3 * len(labels)
+    table = np.array([_numbers(path, n, line.split("\t"), width) for n, line in rows])
+    said = head.get("Units", "")
+    return _recording(
+        path,
+        table[:, 1] if len(rows) else np.empty(0),
+        labels,
+        table[:, 2:].reshape(len(rows), len(labels), 3),
+        unit or said or "mm",
+        up=_Y_UP,
+        warnings=() if unit or said else (f"{path}: names no unit of length; mm was assumed",),
+    )
+
+
+def _read_table(path: str | os.PathLike[str], unit: str | None) -> Recording:
+    table = read_table(path, gaps=True)
+    columns = dict(table.columns)
+    t = columns.pop("t", columns.pop("time", None))
+    if t is None:
+        raise InputError(f'{path}: column "t" is missing; expected t, and <marker>_x, _y, _z')
+    parts: dict[str, dict[str, str]] = {}
+    units = set()
+    for name in columns:
+        if match := _COMPONENT.fullmatch(name):
+            parts.setdefault(match[1], {})[match[2]] = name
+            units.add(unit or match[3] or "m")
+    whole = {label: axes for label, axes in parts.items() if len(axes) == 3}
+    if not whole:
+        raise InputError(f"{path}: has no marker: expected columns <marker>_x, _y and _z")
+    if len(units) > 1:
+        raise InputError(f"{path}: lengths in {few(sorted(units))}; expected one unit")
+    points = np.array([[columns.pop(axes[a]) for a in "xyz"] for axes in whole.values()])
+    found = _recording(path, t, list(whole), points.transpose(2, 0, 1), units.pop())
+    samples = np.array([*columns.values()]).reshape(len(columns), len(t)).T[:, None]
+    return replace(
+        found, channels=tuple(columns), channel_units=("",) * len(columns), samples=samples
+    )
+
+
+_READERS: dict[str, Callable[[str | os.PathLike[str], str | None], Recording]] = {
+    ".trc": _read_trc,
+    ".csv": _read_table,
+    ".parquet": _read_table,
+}
+
+
+def _with_channels(recording: Recording, path: str | os.PathLike[str]) -> Recording:
+    """The recording with the channels of another file, as many samples a frame as that has."""
+    if Path(path).suffix.lower() in (".mot", ".sto"):
+        names, values = _read_storage(path)
+    else:
+        table = read_table(path)
+        names, values = list(table.columns), np.column_stack([*table.columns.values()])
+    time = next((i for i, name in enumerate(names) if name.lower() in ("t", "time")), None)
+    if time is None:
+        raise InputError(f"{path}: expected a column of times, t or time, got {few(names)}")
+    t, values = values[:, time], np.delete(values, time, axis=1)
+    check_rising(t, f"{path}, row {{}}".format)
+    each = max(round((len(t) - 1) / max(t[-1] - t[0], 1e-9) / recording.rate), 1)
+    at = recording.t[:, None] + np.arange(each) / (each * recording.rate)
+    if (
+        t[0] > recording.t[0] + 0.5 / recording.rate
+        or t[-1] < recording.t[-1] - 0.5 / recording.rate
+    ):
+        raise InputError(
+            f"{path}: runs from {t[0]:.6g} to {t[-1]:.6g} s, and {recording.source} from "
+            f"{recording.t[0]:.6g} to {recording.t[-1]:.6g} s; expected channels for all of it"
+        )
+    samples = np.stack([np.interp(at, t, column) for column in values.T], axis=-1)
+    labels = tuple(name for i, name in enumerate(names) if i != time)
+    return replace(
+        recording, channels=labels, channel_units=("",) * len(labels), samples=samples, plates=()
+    )
+
+
+def _read_storage(path: str | os.PathLike[str]) -> tuple[list[str], np.ndarray]:
+    """Names and numbers of a .mot or .sto file of OpenSim."""
+    lines = _lines(path)
+    ends = [n for n, line in enumerate(lines[:200]) if line.strip().lower() == "endheader"]
+    if not ends or len(lines) < ends[0] + 3:
+        raise InputError(f"{path}: is no .mot or .sto file: it has no line endheader, or no rows")
+    names = lines[ends[0] + 1].split()
+    rows = [(n, line) for n, line in enumerate(lines[ends[0] + 2 :], ends[0] + 3) if line.strip()]
+    values = np.array([_numbers(path, n, line.split(), len(names)) for n, line in rows])
+    if not np.isfinite(values).all():
+        raise InputError(f"{path}: has cells that are empty or no finite numbers")
+    return names, values
+
+
+def _recording(
+    path: str | os.PathLike[str],
+    t: np.ndarray,
+    labels: Sequence[str],
+    points: np.ndarray,
+    unit: str,
+    up: tuple[float, float, float] = _Z_UP,
+    warnings: tuple[str, ...] = (),
+) -> Recording:
+    if len(t) < 2:
+        raise InputError(f"{path}: holds {len(t)} frames, expected more")
+    if not np.isfinite(t).all():
+        raise InputError(f"{path}: a frame has no time; every frame needs one")
+    check_rising(t, f"{path}, frame {{}}".format)
+    step = float(t[-1] - t[0]) / (len(t) - 1)
+    if np.abs(t - t[0] - step * np.arange(len(t))).max() > _UNEVEN * step:
+        raise InputError(f"{path}: its times are not even; expected frames at one rate")
+    metres = _metres(path, unit)
+    return Recording(
+        source=os.path.basename(os.fspath(path)),
+        sha256=digest(path),
+        rate=float(f"{1 / step:.7g}"),
+        first_frame=1,
+        t=t,
+        unit=unit,
+        metres=metres,
+        labels=tuple(labels),
+        points=np.where(np.isfinite(points), points, np.nan) * metres,
+        channels=(),
+        channel_units=(),
+        samples=np.empty((len(t), 1, 0)),
+        warnings=warnings,
+        up=up,
+    )
+
+
+def _metres(path: str | os.PathLike[str], unit: str) -> float:
+    if unit not in LENGTH_UNITS:
+        known = ", ".join(LENGTH_UNITS)
+        raise InputError(f'{path}: its unit of length is "{short(unit)}", expected {known}')
+    return LENGTH_UNITS[unit]
+
+
+def _lines(path: str | os.PathLike[str]) -> list[str]:
+    try:
+        return content_of(path, _LARGEST).decode("utf-8-sig").splitlines()
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: is no text (UTF-8 expected)") from None
+
+
+def _numbers(
+    path: str | os.PathLike[str], line: int, cells: Sequence[str], width: int
+) -> list[float]:
+    """Numbers of a row; an empty cell is NaN."""
+    cells = [cell.strip() for cell in cells]
+    while len(cells) > width and not cells[-1]:
+        cells.pop()
+    cells += [""] * (width - len(cells))
+    if len(cells) > width:
+        raise InputError(f"{path}, line {line}: {len(cells)} cells, expected {width}")
+    try:
+        return [float(cell) if cell else np.nan for cell in cells]
+    except ValueError as error:
+        raise InputError(f"{path}, line {line}: {short(str(error))}") from None

@@ -1,0 +1,123 @@
+"""Recordings in other files than C3D say what the C3D file says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.recorded_jaw import Jaw, record
+from support.recorded_session import write_session
+
+import condyle
+from condyle.errors import InputError
+from condyle.markers.recorded_tables import read_recording
+
+
+def write_trc(jaw: Jaw, path: Path) -> Path:
+    """As OpenSim's files are; a marker that was not seen is three empty cells."""
+    head = ["PathFileType\t4\t(X/Y/Z)\tjaw.trc", "DataRate\tCameraRate\tNumFrames\tUnits"]
+    head += [f"100.00\t100.00\t{len(jaw.t)}\tmm"]
+    head += ["Frame#\tTime\t" + "\t\t\t".join(jaw.labels) + "\t\t", "\t\tX1\tY1\tZ1", ""]
+    rows = [
+        "\t".join(
+            [str(k), f"{t:.5f}", *("" if np.isnan(x) else f"{1e3 * x:.9f}" for x in row.ravel())]
+        )
+        for k, (t, row) in enumerate(zip(jaw.t, jaw.points, strict=True), 1)
+    ]
+    path.write_text("\n".join([*head, *rows]) + "\n")
+    return path
+
+
+def write_csv(jaw: Jaw, path: Path, unit: str = "", scale: float = 1.0) -> Path:
+    names = [f"{label}_{axis}{unit}" for label in jaw.labels for axis in "xyz"]
+    rows = [
+        ",".join([f"{t}", *("" if np.isnan(x) else repr(float(x * scale)) for x in row.ravel())])
+        for t, row in zip(jaw.t, jaw.points, strict=True)
+    ]
+    path.write_text("\n".join([",".join(["t", *names]), *rows]))
+    return path
+
+
+def write_mot(path: Path, rate: float = 500.0, end: float = 4.0) -> Path:
+    t = np.arange(0, end, 1 / rate)
+    rows = [f"{a:.6f}\t{3 * a:.9f}\t0\t{-50 * a:.9f}" for a in t]
+    head = ["bite", "nRows=1", "inDegrees=no", "endheader", "time\tFx\tFy\tFz"]
+    path.write_text("\n".join([*head, *rows]))
+    return path
+
+
+def test_the_same_markers(tmp_path: Path) -> None:
+    jaw = record(noise=1e-4)
+    jaw.at("Lower_FL")[30:40] = np.nan
+    theirs = read_recording(jaw.write(tmp_path / "a.c3d"))
+    for path in (
+        write_trc(jaw, tmp_path / "a.trc"),
+        write_csv(jaw, tmp_path / "a.csv"),
+        write_csv(jaw, tmp_path / "b.csv", " [mm]", 1e3),
+    ):
+        mine = read_recording(path)
+        assert mine.labels == theirs.labels and mine.rate == theirs.rate
+        np.testing.assert_allclose(mine.t, theirs.t, atol=1e-9)
+        np.testing.assert_allclose(mine.points, jaw.points, atol=1e-12)
+        np.testing.assert_allclose(mine.points, theirs.points, atol=1e-7)
+    assert read_recording(tmp_path / "a.trc").up == (0, 1, 0)
+    assert read_recording(tmp_path / "b.csv").unit == "mm"
+
+
+def test_channels_of_another_file(tmp_path: Path) -> None:
+    jaw = record(seconds=2.0)
+    path = write_csv(jaw, tmp_path / "a.csv")
+    found = read_recording(path, channels=write_mot(tmp_path / "a.mot"))
+    assert found.channels == ("Fx", "Fy", "Fz") and found.channel_rate == 500
+    t = found.t[:, None] + np.arange(5) / 500
+    np.testing.assert_allclose(found.samples[..., 2], -50 * t, atol=1e-6)
+    with pytest.raises(InputError, match=r"runs from 0 to 0.998 s, and a.csv from 0 to 1.99"):
+        read_recording(path, channels=write_mot(tmp_path / "b.mot", end=1.0))
+
+
+def test_a_session_of_them(tmp_path: Path) -> None:
+    """Markers in a table, the bite in a file of OpenSim: the load is that one, turned into {S}."""
+    path, (jaw,) = write_session(
+        tmp_path, 1, 2.0, {"head": 0.0, "unit": 1.0},
+        trial=[{"file": "jaw.csv", "channels": "bite.sto"}],
+        forces={"channels": ["Fx", "Fy", "Fz"], "point": "incisor"},
+    )  # fmt: skip
+    write_csv(jaw, tmp_path / "jaw.csv")
+    write_mot(tmp_path / "bite.sto")
+    solution = condyle.measure_session(path).solutions["jaw"]
+    t = solution["time"].values + 2 / 500  # the mean of the five samples of a frame
+    force = np.column_stack([3 * t, 0 * t, -50 * t]) @ jaw.A
+    np.testing.assert_allclose(solution["load"].values[:, :3], force, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("a.txt", "t", 'ends in .c3d, .csv, .parquet, .trc, got ".txt"'),
+        ("a.trc", "Path", "is no TRC file"),
+        ("a.trc", "PathFileType\na\nb\nFrame#\tTime\tA\tB\n\n\n1\t2\t3", "line 4: expected Frame#"),
+        ("a.trc", "PathFileType\na\nb\nFrame#\tTime\tA\t\t\nX\n1\t0\tx\t2\t3", "line 6: could not"),
+        ("a.trc", "PathFileType\na\nb\nFrame#\tTime\tA\t\t\nX\n1\t0\t1\t2\t3", "holds 1 frames"),
+        ("a.csv", "x\n1\n2\n", 'column "t" is missing'),
+        ("a.csv", "t,A_x,A_y\n0,1,2\n1,1,2\n", "has no marker"),
+        ("a.csv", "t,A_x,A_y,A_z\n0,1,2,3\n1,1,2,3\n5,1,2,3\n", "times are not even"),
+        ("a.csv", "t,A_x [ft],A_y [ft],A_z [ft]\n0,1,2,3\n1,1,2,3\n", 'unit of length is "ft"'),
+        ("a.csv", "t,A_x,A_y [mm],A_z\n0,1,2,3\n1,1,2,3\n", "lengths in m, mm; expected one"),
+        ("a.csv", "t,A_x,A_y,A_z\n0,1,2,3\n,1,2,3\n2,1,2,3\n", "a frame has no time"),
+    ],
+)
+def test_files_that_are_none(tmp_path: Path, name: str, text: str, said: str) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(InputError, match=said.replace("[", r"\[")):
+        read_recording(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    "text", ["time Fx\n0 1", "endheader\nFx Fy\n1 2\n3 4", "endheader\nt F\n1 x"]
+)
+def test_storage_files_that_are_none(tmp_path: Path, text: str) -> None:
+    jaw = record(seconds=1.0)
+    (tmp_path / "a.sto").write_text(text)
+    with pytest.raises(InputError, match=r"a\.sto"):
+        read_recording(write_csv(jaw, tmp_path / "a.csv"), channels=tmp_path / "a.sto")
