@@ -121,7 +121,9 @@ def mean_solution(
     )
     options = json.loads(first.attrs["options"])
     told = dict.fromkeys(("motion_sha256", "load_sha256", "contact_residual_of_given_pose"))
-    options |= told | {"motion": f"{source}: mean of {count} cycles", "load": "recorded"}
+    options |= told | {"motion": f"{source}: mean of {count} cycles"}
+    if any(s["load"].values.any() for s in used):
+        options["load"] = "recorded"
     options["solve_seconds"] = sum(s.condyle.options["solve_seconds"] for s in used)
     made.attrs = first.attrs | {
         "title": f"Mean of {count} cycles of {first.attrs['mechanism_name']}",
